@@ -1,0 +1,1 @@
+//! Ratings to an analysis: numbers and warnings. Pure.

@@ -1,0 +1,105 @@
+//! Standard output and standard error, and what they can show.
+
+use super::failure::Failure;
+use crate::text::Untrusted;
+use std::io::{self, IsTerminal as _, Write};
+
+/// Where a command prints. Output goes through [`Console::out`], everything for
+/// the person at the terminal through [`Console::say`].
+pub struct Console {
+    out: Box<dyn Write>,
+    err: Box<dyn Write>,
+    /// Whether standard output shows colours.
+    pub colour: bool,
+    /// Whether standard error shows colours.
+    pub err_colour: bool,
+    /// Whether standard output is a terminal.
+    pub terminal: bool,
+    /// Columns of the terminal; 100 where there is none.
+    pub width: usize,
+}
+
+impl std::fmt::Debug for Console {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Console")
+            .field("colour", &self.colour)
+            .field("terminal", &self.terminal)
+            .field("width", &self.width)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Console {
+    /// The process's own.
+    pub fn of_process() -> Self {
+        let plain = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty())
+            || std::env::var_os("TERM").is_some_and(|t| t == "dumb");
+        let terminal = io::stdout().is_terminal();
+        let width = match crossterm::terminal::size() {
+            Ok((columns, _)) if terminal && columns > 0 => usize::from(columns),
+            _ => 100,
+        };
+        Self {
+            out: Box::new(io::BufWriter::new(io::stdout())),
+            err: Box::new(io::stderr()),
+            colour: terminal && !plain,
+            err_colour: io::stderr().is_terminal() && !plain,
+            terminal,
+            width,
+        }
+    }
+
+    /// One that writes to `out` and `err`, without colour, 100 columns wide.
+    pub fn to(out: impl Write + 'static, err: impl Write + 'static) -> Self {
+        Self {
+            out: Box::new(out),
+            err: Box::new(err),
+            colour: false,
+            err_colour: false,
+            terminal: false,
+            width: 100,
+        }
+    }
+
+    /// Prints a document to standard output. A closed pipe is a success: the
+    /// reader has what it wanted.
+    ///
+    /// # Errors
+    /// [`Failure`] if it cannot be written for another reason.
+    pub fn out(&mut self, text: impl AsRef<str>) -> Result<(), Failure> {
+        let written = self
+            .out
+            .write_all(text.as_ref().as_bytes())
+            .and_then(|()| self.out.flush());
+        match written {
+            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+                Err(Failure::input(format!("standard output: {e}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Tells the person something, on standard error, one line.
+    pub fn say(&mut self, text: impl AsRef<str>) {
+        // Nobody is left to tell if this fails.
+        let _ = writeln!(self.err, "{}", Untrusted(text.as_ref()));
+    }
+
+    /// Prints findings to standard error.
+    pub fn findings(&mut self, findings: &[crate::diagnostic::Findings]) {
+        for f in findings {
+            let _ = write!(self.err, "{}", f.render(self.err_colour));
+        }
+    }
+
+    /// Prints why a command failed.
+    pub fn failure(&mut self, failure: &Failure) {
+        self.findings(&failure.findings);
+        if !failure.message.is_empty() {
+            self.say(format!("error: {}", failure.message));
+        }
+        if let Some(hint) = &failure.hint {
+            self.say(format!("  hint: {hint}"));
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Opens a protocol and everything it names, and joins them.

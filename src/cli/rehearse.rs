@@ -1,0 +1,12 @@
+//! `study rehearse`
+
+use super::{Console, Failure};
+
+/// Arguments of `study rehearse`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {}
+
+/// Does it.
+pub(super) fn run(_args: &Args, _console: &mut Console) -> Result<(), Failure> {
+    Err(Failure::input("not built yet"))
+}

@@ -1,0 +1,111 @@
+//! What plays a realization.
+//!
+//! [`Device`] never blocks: a command is asked for, and what came of it is
+//! reported by a later [`Device::poll`]. Time is an argument, so the same device
+//! runs on a virtual clock. The host never closes the force loop.
+//!
+//! `virtual_device` is the simulated one, in this process.
+
+pub mod virtual_device;
+
+use crate::limits::Limits;
+use crate::model::Realization;
+use crate::outcome::{Playback, Sample};
+use std::time::Duration;
+
+/// Who a device is and what it can do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// Names it in every file, such as `simulated-1`.
+    pub id: String,
+    /// Whether no motor and no hand is behind it.
+    pub simulated: bool,
+    /// Whether it reports samples while it plays.
+    pub telemetry: bool,
+    /// What it never exceeds, whatever is asked.
+    pub limits: Limits,
+}
+
+/// Why a command was refused on the spot.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DeviceError {
+    /// The table cannot be played.
+    #[error("the device refuses the table: {0}")]
+    Refused(String),
+    /// The command does not fit the device's state.
+    #[error("the device cannot {command} while {state}")]
+    WrongState {
+        /// What was asked.
+        command: &'static str,
+        /// What it is doing.
+        state: &'static str,
+    },
+    /// It does not answer.
+    #[error("the device does not answer: {0}")]
+    Lost(String),
+}
+
+/// What a device says between two polls, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Report {
+    /// The table is there and valid.
+    Loaded,
+    /// It plays.
+    Started,
+    /// What it measured since the last report.
+    Telemetry(Vec<Sample>),
+    /// Full strokes and clamps so far.
+    Progress {
+        /// Full strokes.
+        strokes: u32,
+        /// Clamps.
+        clamps: u64,
+    },
+    /// It has stopped and is limp.
+    Stopped(Playback),
+    /// It has tripped and is limp, latched.
+    Fault(String),
+    /// It does not answer any more.
+    Lost(String),
+    /// It is back, limp and ready for a table.
+    Ready,
+}
+
+/// A playback device, real or simulated.
+///
+/// `at` is monotonic time since an origin of the caller's and never goes back.
+pub trait Device: Send {
+    /// Who it is.
+    fn identity(&self) -> Identity;
+
+    /// Sends a table; [`Report::Loaded`] follows. The device plays it under
+    /// `limits`, or its own where they are lower.
+    ///
+    /// # Errors
+    /// [`DeviceError`] if it cannot even be asked.
+    fn load(
+        &mut self,
+        realization: &Realization,
+        limits: Limits,
+        at: Duration,
+    ) -> Result<(), DeviceError>;
+
+    /// Starts playing what is loaded; [`Report::Started`] follows.
+    ///
+    /// # Errors
+    /// [`DeviceError`] if nothing is loaded.
+    fn start(&mut self, at: Duration) -> Result<(), DeviceError>;
+
+    /// Stops playing; [`Report::Stopped`] follows.
+    ///
+    /// # Errors
+    /// [`DeviceError`] if it does not answer.
+    fn stop(&mut self, at: Duration) -> Result<(), DeviceError>;
+
+    /// Zero force at once. Cannot fail: a device that does not hear it goes limp
+    /// by its own watchdog. Whatever was playing is lost without a report.
+    fn limp(&mut self, at: Duration);
+
+    /// What happened up to `at`.
+    fn poll(&mut self, at: Duration) -> Vec<Report>;
+}

@@ -1,0 +1,487 @@
+//! A strict reader of TOML that reports every fault, not the first.
+//!
+//! ```text
+//! let document = Document::parse(text);            // syntax faults collected
+//! let mut root = document.root();
+//! let mut design = root.table("design");           // Option<Table>
+//! design.u32("repetitions")                        // type faults collected
+//! design.finish();                                 // unknown keys collected
+//! let faults = document.into_faults();
+//! ```
+//!
+//! Every value that is looked at leaves its place in [`Document::span_of`] under
+//! its path (`models[2].vaf`), for checks that come later and know only the path.
+
+use super::{Fault, did_you_mean};
+use crate::text::Untrusted;
+use std::borrow::Cow;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A parsed TOML document and the faults found in it so far.
+#[derive(Debug)]
+pub struct Document<'t> {
+    root: Spanned<DeTable<'t>>,
+    notes: RefCell<Notes>,
+}
+
+#[derive(Debug, Default)]
+struct Notes {
+    faults: Vec<Fault>,
+    spans: BTreeMap<String, Range<usize>>,
+}
+
+/// What reading leaves behind: the faults, and where each value stood.
+#[derive(Debug, Default, Clone)]
+pub struct Read {
+    /// In the order they were found.
+    pub faults: Vec<Fault>,
+    /// Path of a value (`models[2].vaf`, `design`) → its bytes.
+    pub spans: BTreeMap<String, Range<usize>>,
+}
+
+impl<'t> Document<'t> {
+    /// Parses TOML; syntax errors become faults and whatever could be read stays.
+    pub fn parse(text: &'t str) -> Self {
+        let (root, errors) = DeTable::parse_recoverable(text);
+        let faults = errors
+            .iter()
+            .map(|e| Fault::error(e.message().trim().to_owned()).at(e.span()))
+            .collect();
+        Self {
+            root,
+            notes: RefCell::new(Notes {
+                faults,
+                spans: BTreeMap::new(),
+            }),
+        }
+    }
+
+    /// The document's top level.
+    pub fn root(&self) -> Table<'_, 't> {
+        Table {
+            document: self,
+            table: self.root.get_ref(),
+            span: 0..0,
+            path: String::new(),
+            known: Vec::new(),
+        }
+    }
+
+    /// Adds a fault.
+    pub fn fault(&self, fault: Fault) {
+        self.notes.borrow_mut().faults.push(fault);
+    }
+
+    /// Where the value at a path stands, if it was read.
+    pub fn span_of(&self, path: &str) -> Option<Range<usize>> {
+        self.notes.borrow().spans.get(path).cloned()
+    }
+
+    /// All faults and places.
+    pub fn finish(self) -> Read {
+        let notes = self.notes.into_inner();
+        Read {
+            faults: notes.faults,
+            spans: notes.spans,
+        }
+    }
+}
+
+/// A table that is being read: ask for keys, then [`Table::finish`].
+#[derive(Debug)]
+pub struct Table<'d, 't> {
+    document: &'d Document<'t>,
+    table: &'d DeTable<'t>,
+    span: Range<usize>,
+    path: String,
+    known: Vec<Cow<'static, str>>,
+}
+
+/// A value with its place.
+#[derive(Debug, Clone)]
+pub struct Value<'d, 't> {
+    document: &'d Document<'t>,
+    value: &'d DeValue<'t>,
+    span: Range<usize>,
+    path: String,
+}
+
+impl<'d, 't> Table<'d, 't> {
+    /// Where the table stands.
+    pub fn span(&self) -> Range<usize> {
+        self.span.clone()
+    }
+
+    /// The table's path, as in `[design]`; empty at the top level.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// The keys of the table, as written, with their places.
+    pub fn keys(&self) -> Vec<(String, Range<usize>)> {
+        let mut keys: Vec<_> = self
+            .table
+            .iter()
+            .map(|(key, _)| (key.get_ref().to_string(), key.span()))
+            .collect();
+        keys.sort_by_key(|(_, span)| span.start);
+        keys
+    }
+
+    /// The value of a key, if it is there. Marks the key as known.
+    pub fn value(&mut self, key: &str) -> Option<Value<'d, 't>> {
+        self.known.push(Cow::Owned(key.to_owned()));
+        let value = self.table.get(key)?;
+        let path = if self.path.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.path)
+        };
+        Some(Value::new(self.document, value, path))
+    }
+
+    /// The value of a key that has to be there; its absence is a fault.
+    pub fn required(&mut self, key: &str) -> Option<Value<'d, 't>> {
+        let value = self.value(key);
+        if value.is_none() {
+            self.missing(key);
+        }
+        value
+    }
+
+    /// Reports that a key is missing.
+    pub fn missing(&self, key: &str) {
+        let place = if self.path.is_empty() {
+            "the file".to_owned()
+        } else {
+            format!("[{}]", self.path)
+        };
+        let fault = Fault::error(format!("{place} has no `{key}`"));
+        self.document.fault(if self.path.is_empty() {
+            fault
+        } else {
+            fault.at(self.span.clone())
+        });
+    }
+
+    /// A table inside this one.
+    pub fn table(&mut self, key: &str) -> Option<Table<'d, 't>> {
+        self.value(key)?.table()
+    }
+
+    /// Text; a value of another type is a fault and `None`.
+    pub fn text(&mut self, key: &str) -> Option<String> {
+        self.value(key)?.text()
+    }
+
+    /// A number, whole or not.
+    pub fn f64(&mut self, key: &str) -> Option<f64> {
+        self.value(key)?.f64()
+    }
+
+    /// A whole number from 0 to 2³² − 1.
+    pub fn u32(&mut self, key: &str) -> Option<u32> {
+        self.value(key)?.u32()
+    }
+
+    /// A whole number.
+    pub fn i64(&mut self, key: &str) -> Option<i64> {
+        self.value(key)?.i64()
+    }
+
+    /// `true` or `false`.
+    pub fn bool(&mut self, key: &str) -> Option<bool> {
+        self.value(key)?.bool()
+    }
+
+    /// An array of text.
+    pub fn texts(&mut self, key: &str) -> Option<Vec<String>> {
+        Some(
+            self.value(key)?
+                .array()?
+                .into_iter()
+                .filter_map(|v| v.text())
+                .collect(),
+        )
+    }
+
+    /// An array of numbers.
+    pub fn f64s(&mut self, key: &str) -> Option<Vec<f64>> {
+        Some(
+            self.value(key)?
+                .array()?
+                .into_iter()
+                .filter_map(|v| v.f64())
+                .collect(),
+        )
+    }
+
+    /// An array of tables, `[[key]]`; empty if it is absent.
+    pub fn tables(&mut self, key: &str) -> Vec<Table<'d, 't>> {
+        self.value(key)
+            .and_then(|v| v.array())
+            .unwrap_or_default()
+            .into_iter()
+            .filter_map(|v| v.table())
+            .collect()
+    }
+
+    /// One of a fixed set of words; anything else is a fault that lists them.
+    pub fn word<T: Copy>(&mut self, key: &str, words: &[(&'static str, T)]) -> Option<T> {
+        let value = self.value(key)?;
+        value.word(words)
+    }
+
+    /// Adds a fault about the value of a key (or about the table without it).
+    pub fn fault_at(&self, key: &str, fault: Fault) {
+        let span = self
+            .table
+            .get(key)
+            .map_or_else(|| self.span.clone(), Spanned::span);
+        self.document.fault(fault.at(span));
+    }
+
+    /// Reports every key that nobody asked for.
+    pub fn finish(self) {
+        let place = if self.path.is_empty() {
+            "at the top level".to_owned()
+        } else {
+            format!("in [{}]", self.path)
+        };
+        for (key, span) in self.keys() {
+            if self.known.iter().any(|k| *k == key) {
+                continue;
+            }
+            let mut fault =
+                Fault::error(format!("unknown key `{}` {place}", Untrusted(&key))).at(span);
+            fault = match did_you_mean(&key, self.known.iter().map(AsRef::as_ref)) {
+                Some(near) => fault.label(format!("did you mean `{near}`?")),
+                None => {
+                    let mut known: Vec<&str> = self.known.iter().map(AsRef::as_ref).collect();
+                    known.sort_unstable();
+                    known.dedup();
+                    fault.hint(format!("known keys are {}", known.join(", ")))
+                }
+            };
+            self.document.fault(fault);
+        }
+    }
+}
+
+impl<'d, 't> Value<'d, 't> {
+    fn new(document: &'d Document<'t>, value: &'d Spanned<DeValue<'t>>, path: String) -> Self {
+        document
+            .notes
+            .borrow_mut()
+            .spans
+            .insert(path.clone(), value.span());
+        Self {
+            document,
+            value: value.get_ref(),
+            span: value.span(),
+            path,
+        }
+    }
+
+    /// Where the value stands.
+    pub fn span(&self) -> Range<usize> {
+        self.span.clone()
+    }
+
+    /// Its path, such as `models[2].vaf`.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Adds a fault about this value.
+    pub fn fault(&self, fault: Fault) {
+        self.document.fault(fault.at(self.span.clone()));
+    }
+
+    fn mismatch(&self, wanted: &str) {
+        let found = match self.value {
+            DeValue::String(_) => "text",
+            DeValue::Integer(_) => "a whole number",
+            DeValue::Float(_) => "a number",
+            DeValue::Boolean(_) => "true or false",
+            DeValue::Datetime(_) => "a date",
+            DeValue::Array(_) => "a list",
+            DeValue::Table(_) => "a table",
+        };
+        self.fault(Fault::error(format!(
+            "`{}` has to be {wanted}, not {found}",
+            self.path
+        )));
+    }
+
+    /// Whether the value is text.
+    pub fn is_text(&self) -> bool {
+        self.value.is_str()
+    }
+
+    /// Whether the value is a table.
+    pub fn is_table(&self) -> bool {
+        self.value.is_table()
+    }
+
+    /// The value as text.
+    pub fn text(&self) -> Option<String> {
+        let text = self.value.as_str().map(str::to_owned);
+        if text.is_none() {
+            self.mismatch("text in quotes");
+        }
+        text
+    }
+
+    /// The value as a number. NaN and infinities are legal TOML and come through:
+    /// whoever asks has to check them.
+    pub fn f64(&self) -> Option<f64> {
+        let number = match self.value {
+            DeValue::Float(float) => float.as_str().parse().ok(),
+            DeValue::Integer(_) => self.whole().map(|n| n as f64),
+            _ => None,
+        };
+        if number.is_none() {
+            self.mismatch("a number");
+        }
+        number
+    }
+
+    fn whole(&self) -> Option<i64> {
+        match self.value {
+            DeValue::Integer(n) => i64::from_str_radix(n.as_str(), n.radix()).ok(),
+            _ => None,
+        }
+    }
+
+    /// The value as a whole number.
+    pub fn i64(&self) -> Option<i64> {
+        let number = self.whole();
+        if number.is_none() {
+            self.mismatch("a whole number");
+        }
+        number
+    }
+
+    /// The value as a whole number from 0 to 2³² − 1.
+    pub fn u32(&self) -> Option<u32> {
+        let number = self.i64()?;
+        let small = u32::try_from(number).ok();
+        if small.is_none() {
+            self.fault(Fault::error(format!(
+                "`{}` has to be from 0 to {}, not {number}",
+                self.path,
+                u32::MAX
+            )));
+        }
+        small
+    }
+
+    /// The value as `true` or `false`.
+    pub fn bool(&self) -> Option<bool> {
+        let flag = self.value.as_bool();
+        if flag.is_none() {
+            self.mismatch("true or false");
+        }
+        flag
+    }
+
+    /// The value as a table.
+    pub fn table(self) -> Option<Table<'d, 't>> {
+        let Some(table) = self.value.as_table() else {
+            self.mismatch("a table");
+            return None;
+        };
+        Some(Table {
+            document: self.document,
+            table,
+            span: self.span,
+            path: self.path,
+            known: Vec::new(),
+        })
+    }
+
+    /// The value as a list.
+    pub fn array(&self) -> Option<Vec<Value<'d, 't>>> {
+        let Some(array) = self.value.as_array() else {
+            self.mismatch("a list");
+            return None;
+        };
+        Some(
+            array
+                .iter()
+                .enumerate()
+                .map(|(i, v)| Value::new(self.document, v, format!("{}[{i}]", self.path)))
+                .collect(),
+        )
+    }
+
+    /// The value as one of a fixed set of words.
+    pub fn word<T: Copy>(&self, words: &[(&'static str, T)]) -> Option<T> {
+        let given = self.text()?;
+        if let Some((_, value)) = words.iter().find(|(word, _)| *word == given) {
+            return Some(*value);
+        }
+        let list: Vec<String> = words.iter().map(|(word, _)| format!("`{word}`")).collect();
+        let mut fault = Fault::error(format!("`{}` cannot be `{}`", self.path, Untrusted(&given)));
+        fault = match did_you_mean(&given, words.iter().map(|(word, _)| *word)) {
+            Some(near) => fault.label(format!("did you mean `{near}`?")),
+            None => fault.hint(format!("it is one of {}", list.join(", "))),
+        };
+        self.fault(fault);
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_is_found_not_only_the_first() {
+        let text = "a = 1\nb = \"x\"\n[design]\nrepetition = 3\norder = \"blokked\"\nn = -1\n";
+        let document = Document::parse(text);
+        let mut root = document.root();
+        assert_eq!(root.text("a"), None);
+        assert_eq!(root.f64("c"), None);
+        let mut design = root.table("design").unwrap();
+        assert_eq!(design.u32("repetitions"), None);
+        assert_eq!(
+            design.word("order", &[("blocked", 1), ("shuffled", 2)]),
+            None
+        );
+        assert_eq!(design.u32("n"), None);
+        design.finish();
+        root.finish();
+        let read = document.finish();
+        let messages: Vec<_> = read.faults.iter().map(|f| f.message.as_str()).collect();
+        assert_eq!(
+            messages,
+            [
+                "`a` has to be text in quotes, not a whole number",
+                "`design.order` cannot be `blokked`",
+                "`design.n` has to be from 0 to 4294967295, not -1",
+                "unknown key `repetition` in [design]",
+                "unknown key `b` at the top level",
+            ]
+        );
+        assert_eq!(
+            read.faults[3].label.as_deref(),
+            Some("did you mean `repetitions`?")
+        );
+        assert_eq!(&text[read.spans["design.order"].clone()], "\"blokked\"");
+    }
+
+    #[test]
+    fn broken_syntax_is_a_fault_with_a_place() {
+        let document = Document::parse("a = \nb = 2\n");
+        assert_eq!(document.root().f64("b"), Some(2.0));
+        let read = document.finish();
+        assert!(!read.faults.is_empty());
+        assert!(read.faults[0].span.is_some());
+    }
+}

@@ -1,0 +1,20 @@
+//! The command line of `study`.
+
+use clap::Parser as _;
+use std::process::ExitCode;
+use study::cli::{Cli, Console, Failure, guard};
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(said) => return study::cli::usage(&said),
+    };
+    let mut console = Console::of_process();
+    match guard(|| study::cli::run(cli, &mut console)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            console.failure(&failure);
+            ExitCode::from(Failure::exit_code(&failure))
+        }
+    }
+}

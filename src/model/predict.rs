@@ -1,0 +1,251 @@
+//! The force of a realization: equation 1 with interpolated parameters.
+//!
+//! Only `core` and slices, so that the same source runs on a device. Nothing here
+//! allocates, panics on a valid table, or fails: a table is valid when its slices
+//! are equally long, have at least two nodes, and `x_mm` ascends strictly.
+//!
+//! The two branches are joined by a direction z in [−1, 1]:
+//! F = (1+z)/2 · F⁺ + (1−z)/2 · F⁻. With [`Direction::Sign`] z is the sign of v,
+//! which is the paper's model.
+
+/// A table as borrowed slices.
+#[derive(Debug, Clone, Copy)]
+pub struct TableView<'a> {
+    /// Positions of the nodes, mm, strictly ascending.
+    pub x_mm: &'a [f64],
+    /// For v > 0.
+    pub positive: BranchView<'a>,
+    /// For v < 0.
+    pub negative: BranchView<'a>,
+    /// How parameters between nodes are found.
+    pub lookup: Lookup,
+}
+
+/// The parameters of one direction as borrowed slices.
+#[derive(Debug, Clone, Copy)]
+pub struct BranchView<'a> {
+    /// Mass, kg.
+    pub m_kg: &'a [f64],
+    /// Damping, N·s/mm.
+    pub b_n_s_per_mm: &'a [f64],
+    /// Stiffness, N/mm.
+    pub k_n_per_mm: &'a [f64],
+    /// Offset force, N.
+    pub f0_n: &'a [f64],
+}
+
+/// How parameters between nodes are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lookup {
+    /// Interpolated.
+    Linear,
+    /// The node to the left.
+    Floor,
+    /// The nearest node, the left one at the middle.
+    Nearest,
+}
+
+/// How the branch follows from the motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Direction {
+    /// The sign of v; at v = 0 the sign before.
+    Sign,
+    /// z ← clip(z + 2Δx/δ, −1, 1).
+    Play {
+        /// δ, mm.
+        delta_mm: f64,
+    },
+    /// z ← s + (z − s)·e^(−|Δx|/δ), s = sign(Δx).
+    Dahl {
+        /// δ, mm.
+        delta_mm: f64,
+    },
+}
+
+/// Position, velocity and acceleration at an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// mm.
+    pub x_mm: f64,
+    /// mm/s.
+    pub v_mm_s: f64,
+    /// m/s².
+    pub a_m_s2: f64,
+}
+
+/// The direction state z, carried from sample to sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DirectionState {
+    z: f64,
+    last_x_mm: Option<f64>,
+}
+
+impl Default for DirectionState {
+    /// Moving in +: what the paper's model does before anything has moved.
+    fn default() -> Self {
+        Self {
+            z: 1.0,
+            last_x_mm: None,
+        }
+    }
+}
+
+impl DirectionState {
+    /// Takes in a motion and gives the direction z, in [−1, 1].
+    pub fn step(&mut self, rule: Direction, motion: Motion) -> f64 {
+        let dx = self.last_x_mm.map_or(0.0, |last| motion.x_mm - last);
+        self.last_x_mm = Some(motion.x_mm);
+        match rule {
+            Direction::Sign => {
+                if motion.v_mm_s > 0.0 {
+                    self.z = 1.0;
+                } else if motion.v_mm_s < 0.0 {
+                    self.z = -1.0;
+                }
+            }
+            Direction::Play { delta_mm } => {
+                self.z = (self.z + 2.0 * dx / delta_mm).clamp(-1.0, 1.0);
+            }
+            Direction::Dahl { delta_mm } => {
+                let s = if dx > 0.0 {
+                    1.0
+                } else if dx < 0.0 {
+                    -1.0
+                } else {
+                    return self.z;
+                };
+                self.z = s + (self.z - s) * libm::exp(-libm::fabs(dx) / delta_mm);
+            }
+        }
+        self.z
+    }
+}
+
+/// The force of the table, N. Outside the nodes the edge parameters apply to the
+/// actual position; a device adds its wall there.
+pub fn force_n(table: &TableView<'_>, z: f64, motion: Motion) -> f64 {
+    let (left, weight) = locate(table.x_mm, table.lookup, motion.x_mm);
+    let plus = 0.5 * (1.0 + z);
+    let minus = 0.5 * (1.0 - z);
+    let mut force = 0.0;
+    if plus > 0.0 {
+        force += plus * branch_force_n(&table.positive, left, weight, motion);
+    }
+    if minus > 0.0 {
+        force += minus * branch_force_n(&table.negative, left, weight, motion);
+    }
+    force
+}
+
+/// m a + b v + k x + F0 with each parameter interpolated by itself.
+fn branch_force_n(branch: &BranchView<'_>, left: usize, weight: f64, motion: Motion) -> f64 {
+    let at = |p: &[f64]| {
+        if weight == 0.0 {
+            p[left]
+        } else {
+            p[left] + weight * (p[left + 1] - p[left])
+        }
+    };
+    at(branch.m_kg) * motion.a_m_s2
+        + at(branch.b_n_s_per_mm) * motion.v_mm_s
+        + at(branch.k_n_per_mm) * motion.x_mm
+        + at(branch.f0_n)
+}
+
+/// The node to the left of x and how far x lies towards the next, in [0, 1).
+fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
+    let last = nodes.len() - 1;
+    // not(x > first) also holds for a NaN, which then reads the first node
+    if !(x_mm > nodes[0]) {
+        return (0, 0.0);
+    }
+    if x_mm >= nodes[last] {
+        return (last, 0.0);
+    }
+    let left = nodes.partition_point(|node| *node <= x_mm) - 1;
+    let weight = (x_mm - nodes[left]) / (nodes[left + 1] - nodes[left]);
+    match lookup {
+        Lookup::Linear => (left, weight),
+        Lookup::Floor => (left, 0.0),
+        Lookup::Nearest => (left + usize::from(weight > 0.5), 0.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(lookup: Lookup) -> ([f64; 3], [f64; 3], [f64; 3], Lookup) {
+        ([0.0, 1.0, 2.0], [0.0, 2.0, 0.0], [0.0; 3], lookup)
+    }
+
+    fn force(lookup: Lookup, z: f64, x_mm: f64) -> f64 {
+        let (x, f0, zero, lookup) = table(lookup);
+        let negative = [10.0; 3];
+        let branch = |f0_n| BranchView {
+            m_kg: &zero,
+            b_n_s_per_mm: &zero,
+            k_n_per_mm: &zero,
+            f0_n,
+        };
+        let view = TableView {
+            x_mm: &x,
+            positive: branch(&f0),
+            negative: branch(&negative),
+            lookup,
+        };
+        force_n(
+            &view,
+            z,
+            Motion {
+                x_mm,
+                v_mm_s: 0.0,
+                a_m_s2: 0.0,
+            },
+        )
+    }
+
+    #[test]
+    fn look_ups_differ_only_between_nodes() {
+        for lookup in [Lookup::Linear, Lookup::Floor, Lookup::Nearest] {
+            assert_eq!(force(lookup, 1.0, 1.0), 2.0);
+            assert_eq!(force(lookup, 1.0, -5.0), 0.0);
+            assert_eq!(force(lookup, 1.0, 9.0), 0.0);
+        }
+        assert_eq!(force(Lookup::Linear, 1.0, 0.75), 1.5);
+        assert_eq!(force(Lookup::Floor, 1.0, 0.75), 0.0);
+        assert_eq!(force(Lookup::Nearest, 1.0, 0.75), 2.0);
+    }
+
+    #[test]
+    fn the_direction_blends_the_branches() {
+        assert_eq!(force(Lookup::Linear, 0.0, 1.0), 6.0);
+        assert_eq!(force(Lookup::Linear, -1.0, 1.0), 10.0);
+    }
+
+    #[test]
+    fn at_rest_the_sign_stays_and_play_follows_the_distance() {
+        let motion = |x_mm, v_mm_s| Motion {
+            x_mm,
+            v_mm_s,
+            a_m_s2: 0.0,
+        };
+        let mut state = DirectionState::default();
+        assert_eq!(state.step(Direction::Sign, motion(0.0, 0.0)), 1.0);
+        assert_eq!(state.step(Direction::Sign, motion(0.0, -1.0)), -1.0);
+        assert_eq!(state.step(Direction::Sign, motion(0.0, 0.0)), -1.0);
+
+        let play = Direction::Play { delta_mm: 0.5 };
+        let mut state = DirectionState::default();
+        state.step(play, motion(1.0, 0.0));
+        assert!((state.step(play, motion(0.75, 0.0)) - 0.0).abs() < 1e-12);
+        assert_eq!(state.step(play, motion(0.0, 0.0)), -1.0);
+    }
+
+    #[test]
+    fn a_position_that_is_no_number_reads_the_edge() {
+        assert!(force(Lookup::Linear, 1.0, f64::INFINITY).is_finite());
+        let (x, ..) = table(Lookup::Linear);
+        assert_eq!(locate(&x, Lookup::Linear, f64::NAN), (0, 0.0));
+    }
+}

@@ -1,0 +1,1 @@
+//! What can be doubted about a readable protocol.

@@ -1,0 +1,1 @@
+//! Effects of a session to device, store and operator.

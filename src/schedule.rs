@@ -1,0 +1,1 @@
+//! Design and seat to a whole, frozen order of trials.
