@@ -6,6 +6,8 @@
 //! Reading is in [`file`], what can be doubted about a readable file in [`check`].
 
 pub mod check;
+#[cfg(test)]
+pub(crate) mod example;
 pub mod file;
 pub mod fingerprint;
 pub mod plan;
