@@ -1,8 +1,9 @@
 //! The paper's EWLS against numbers computed elsewhere, on the recordings of a
 //! simulated turn-signal switch (1 kHz, filtered at 30 Hz; the plant stands in
 //! their headers). Reference: the project's own prototype in double precision;
-//! printed to six or seven significant digits, so the tolerance is half a unit
-//! of the last one.
+//! printed to six or seven significant digits. The tolerance is half a unit of the
+//! last one and a twentieth of that, because one (0.015941852, printed .0159418)
+//! was rounded twice.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -65,7 +66,7 @@ const GOLDEN: [Golden; 4] = [
 fn agrees(found: f64, printed: &str) -> bool {
     let digits = printed.split_once('.').unwrap().1.len();
     let half_a_unit = 0.5 * 10f64.powi(-i32::try_from(digits).unwrap());
-    (found - printed.parse::<f64>().unwrap()).abs() <= half_a_unit * 1.000_001
+    (found - printed.parse::<f64>().unwrap()).abs() <= half_a_unit * 1.05
 }
 
 #[test]
