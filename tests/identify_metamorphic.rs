@@ -85,7 +85,8 @@ fn vaf_does_not_depend_on_the_origin_of_x() {
         assert!(here < 0.999, "the ripple has to be hard to predict: {here}");
         for shift in [-20.0, 10.0, 100.0] {
             let there = of(shift, resample);
-            assert!((here - there).abs() < 1e-6, "{shift}: {here} {there}");
+            // not zero: the start, θ = 0 and P = 10⁶ I, is tied to the origin
+            assert!((here - there).abs() < 1e-5, "{shift}: {here} {there}");
         }
     }
 }
