@@ -10,8 +10,10 @@ use study::protocol::Order::{Blocked, Fixed, LatinSquare, Shuffled, Williams};
 use study::protocol::{Order, Seat};
 use study::schedule::Planner;
 
-/// models, repetitions, order, max_run, min_distance, numbers up to
-const DESIGNS: [(usize, u32, Order, Option<u32>, Option<u32>, u32); 19] = [
+/// Models, repetitions, order, `max_run`, `min_distance`, numbers up to.
+type Case = (usize, u32, Order, Option<u32>, Option<u32>, u32);
+
+const DESIGNS: [Case; 19] = [
     (5, 3, Blocked, None, None, 5),
     (5, 3, Blocked, Some(1), None, 5),
     (5, 3, Blocked, Some(2), None, 5),
