@@ -143,7 +143,11 @@ fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
             critical_r(n)
         ),
     };
-    let word = if n == 1 { "realization" } else { "realizations" };
+    let word = if n == 1 {
+        "realization"
+    } else {
+        "realizations"
+    };
     faults.push(
         Fault::warning(format!("{n} test {word}: {so}"))
             .at(spans.get("models").cloned().or(spans.get("models[0]").cloned()).map(first_line))
@@ -270,12 +274,29 @@ fn roles(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
             );
         }
     }
-    let needs = |rule: &str| protocol.analysis.exclude.iter().position(|e| e.rule == rule);
-    let has_reference = protocol.models.iter().any(|m| m.role == Role::HiddenReference);
+    let needs = |rule: &str| {
+        protocol
+            .analysis
+            .exclude
+            .iter()
+            .position(|e| e.rule == rule)
+    };
+    let has_reference = protocol
+        .models
+        .iter()
+        .any(|m| m.role == Role::HiddenReference);
     let has_duplicate = protocol.models.iter().any(|m| m.duplicate_of.is_some());
     for (rule, met, what) in [
-        ("hidden-reference-below", has_reference, "no realization has the role \"hidden-reference\""),
-        ("inconsistent", has_duplicate, "no realization has a `duplicate_of`"),
+        (
+            "hidden-reference-below",
+            has_reference,
+            "no realization has the role \"hidden-reference\"",
+        ),
+        (
+            "inconsistent",
+            has_duplicate,
+            "no realization has a `duplicate_of`",
+        ),
     ] {
         if let Some(i) = needs(rule)
             && !met

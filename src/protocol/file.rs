@@ -19,8 +19,8 @@ pub use analysis::EXCLUSIONS;
 pub use orders::parse_orders;
 
 use super::{
-    Consent, DeviceKind, DeviceRules, Entry, FORMAT, Protocol, Question, SessionRules, Study, Text,
-    TrialRules, Uncertified,
+    Consent, DeviceKind, DeviceRules, Entry, FORMAT, Order, Protocol, Question, SessionRules,
+    Study, Text, TrialRules, Uncertified,
 };
 use crate::diagnostic::table::{Document, Table};
 use crate::diagnostic::{Fault, Findings};
@@ -42,6 +42,19 @@ pub struct Parsed {
     pub findings: Findings,
     /// Path of a value (`models[2].vaf`, `design.order`) → its bytes in the file.
     pub spans: BTreeMap<String, Range<usize>>,
+    /// The other files that it names, also where the protocol has errors.
+    pub named: Vec<Named>,
+}
+
+/// A file that a protocol names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Named {
+    /// Path of the value, such as `models[2].file`.
+    pub place: String,
+    /// Relative to the protocol, with `/`.
+    pub file: String,
+    /// Whether it holds orders, not a model.
+    pub orders: bool,
 }
 
 /// Reads a protocol file; `path` is only for messages.
@@ -57,6 +70,7 @@ pub fn parse(path: &str, text: &str) -> Parsed {
             protocol: None,
             findings,
             spans: BTreeMap::new(),
+            named: Vec::new(),
         };
     }
     let document = Document::parse(text);
@@ -65,8 +79,9 @@ pub fn parse(path: &str, text: &str) -> Parsed {
         document: &document,
         broken,
     };
+    let mut named = Vec::new();
     let protocol = if format_is_ours(&reader) {
-        read(&reader)
+        read(&reader, &mut named)
     } else {
         None
     };
@@ -77,6 +92,7 @@ pub fn parse(path: &str, text: &str) -> Parsed {
         protocol: protocol.filter(|_| !findings.has_errors()),
         findings,
         spans: read.spans,
+        named,
     }
 }
 
@@ -98,9 +114,8 @@ fn format_is_ours(reader: &Reader<'_, '_>) -> bool {
     if format == FORMAT {
         return true;
     }
-    let version = |format: &str| -> Option<u32> {
-        format.strip_prefix("study-protocol/")?.parse().ok()
-    };
+    let version =
+        |format: &str| -> Option<u32> { format.strip_prefix("study-protocol/")?.parse().ok() };
     let fault = match (version(&format), version(FORMAT)) {
         (Some(theirs), Some(ours)) if theirs > ours => Fault::error(format!(
             "the format `{}` is newer than this program, which reads `{FORMAT}`",
@@ -118,7 +133,7 @@ fn format_is_ours(reader: &Reader<'_, '_>) -> bool {
 }
 
 /// Reads all sections; `None` if a part is faulty, which has been reported.
-fn read<'d, 't>(reader: &Reader<'d, 't>) -> Option<Protocol> {
+fn read<'d, 't>(reader: &Reader<'d, 't>, named: &mut Vec<Named>) -> Option<Protocol> {
     let mut root = reader.document.root();
     root.value("format");
     let study = study(reader, &mut root);
@@ -136,6 +151,20 @@ fn read<'d, 't>(reader: &Reader<'d, 't>) -> Option<Protocol> {
     let analysis = analysis::read(reader, &mut root);
     root.finish();
 
+    named.extend(models.iter().filter_map(|model| {
+        Some(Named {
+            place: format!("{}.file", model.path),
+            file: model.file.clone()?,
+            orders: false,
+        })
+    }));
+    if let Some(Order::File(file)) = design.as_ref().map(|d| &d.order) {
+        named.push(Named {
+            place: "design.order.file".to_owned(),
+            file: file.clone(),
+            orders: true,
+        });
+    }
     let mut draft = agree::Draft {
         design: design.as_ref(),
         device: device.as_ref(),

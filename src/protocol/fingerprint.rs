@@ -329,10 +329,7 @@ mod tests {
             parts(&|p| p.models[0].vaf = Some(0.5)),
             [false, false, true]
         );
-        assert_eq!(
-            parts(&|p| p.design.participants = 12),
-            [false, false, true]
-        );
+        assert_eq!(parts(&|p| p.design.participants = 12), [false, false, true]);
         assert_eq!(
             parts(&|p| p.models[0].file = Some("elsewhere.toml".to_owned())),
             [false, false, false]
@@ -345,7 +342,10 @@ mod tests {
         let mut files = bytes(&protocol);
         let first = of(&protocol, &files, None);
         let orders = FileOrders::from([(1, vec![protocol.models[0].id.clone()])]);
-        assert_ne!(of(&protocol, &files, Some(&orders)).stimulus, first.stimulus);
+        assert_ne!(
+            of(&protocol, &files, Some(&orders)).stimulus,
+            first.stimulus
+        );
         files.insert(protocol.models[0].id.clone(), b"other".to_vec());
         assert_ne!(of(&protocol, &files, None).stimulus, first.stimulus);
         assert_eq!(of(&protocol, &files, None).wording, first.wording);

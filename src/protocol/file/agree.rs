@@ -62,8 +62,10 @@ impl Draft<'_> {
     fn something_to_feel_and_ask(&self, document: &Document<'_>) {
         if self.models.iter().all(|m| m.role == Role::Practice) {
             document.fault(
-                Fault::error("nothing is to be felt: no [[models]] with another role than practice")
-                    .hint("add [[models]] with an id and a file"),
+                Fault::error(
+                    "nothing is to be felt: no [[models]] with another role than practice",
+                )
+                .hint("add [[models]] with an id and a file"),
             );
         }
         if self.questions.is_empty() {
@@ -82,7 +84,11 @@ impl Draft<'_> {
                 .filter_map(|m| m.id.as_ref())
                 .find(|other| other.collides_with(id));
             if let Some(other) = earlier {
-                document.fault(collision(id.as_str(), other.as_str()).at(at(document, &model.path, "id")));
+                document.fault(collision(id.as_str(), other.as_str()).at(at(
+                    document,
+                    &model.path,
+                    "id",
+                )));
             }
         }
     }
@@ -160,7 +166,10 @@ impl Draft<'_> {
                     }
                 }
             }
-            if model.device.is_some_and(|own| own != device.kind && own != DeviceKind::Manual) {
+            if model
+                .device
+                .is_some_and(|own| own != device.kind && own != DeviceKind::Manual)
+            {
                 document.fault(
                     Fault::error(format!(
                         "model `{name}` cannot have a {} device of its own",
@@ -198,11 +207,23 @@ impl Draft<'_> {
     fn columns(&self, document: &Document<'_>) {
         let mut taken: Vec<String> = Vec::new();
         for question in &self.questions {
-            column(document, question, &mut taken, is_ratings_column, "ratings.csv");
+            column(
+                document,
+                question,
+                &mut taken,
+                is_ratings_column,
+                "ratings.csv",
+            );
         }
         let mut once: Vec<String> = Vec::new();
         for question in self.setup.iter().chain(&self.intake).chain(&self.outro) {
-            column(document, question, &mut once, is_participants_column, "participants.csv");
+            column(
+                document,
+                question,
+                &mut once,
+                is_participants_column,
+                "participants.csv",
+            );
         }
         let mut reported: Vec<&str> = Vec::new();
         for model in &self.models {
@@ -211,7 +232,10 @@ impl Draft<'_> {
                 let fault = if is_ratings_column(name) {
                     fixed(name, "ratings.csv")
                 } else if taken.iter().any(|t| t.eq_ignore_ascii_case(name)) {
-                    Fault::error(format!("`{}` is a question and a covariate", Untrusted(name)))
+                    Fault::error(format!(
+                        "`{}` is a question and a covariate",
+                        Untrusted(name)
+                    ))
                 } else {
                     continue;
                 };
@@ -236,8 +260,12 @@ impl Draft<'_> {
         let Some(question) = asked else {
             let ids = self.questions.iter().filter_map(|q| q.id.as_ref());
             document.fault(
-                unknown("question", analysis.primary.as_str(), ids.map(QuestionId::as_str))
-                    .at(place),
+                unknown(
+                    "question",
+                    analysis.primary.as_str(),
+                    ids.map(QuestionId::as_str),
+                )
+                .at(place),
             );
             return;
         };

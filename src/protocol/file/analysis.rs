@@ -1,8 +1,8 @@
 //! `[analysis]`: what was decided before the data.
 
 use super::reader::{Reader, finite, question_id};
-use crate::diagnostic::{Fault, did_you_mean};
 use crate::diagnostic::table::Table;
+use crate::diagnostic::{Fault, did_you_mean};
 use crate::protocol::{AnalysisRules, ExclusionRule, Unfinished};
 use crate::text::Untrusted;
 use std::collections::BTreeMap;
@@ -61,10 +61,7 @@ pub(super) fn read<'d, 't>(
     })
 }
 
-fn exclusion<'d, 't>(
-    reader: &Reader<'d, 't>,
-    mut table: Table<'d, 't>,
-) -> Option<ExclusionRule> {
+fn exclusion<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> Option<ExclusionRule> {
     let names = EXCLUSIONS.map(|(name, _)| name);
     let value = reader.need(
         &mut table,

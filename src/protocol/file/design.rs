@@ -101,9 +101,7 @@ fn order(value: Value<'_, '_>) -> Option<Order> {
     Some(Order::File(file?))
 }
 
-fn breaks_of<'d, 't>(
-    reader: &Reader<'d, 't>,
-) -> impl FnOnce(Value<'d, 't>) -> Option<Breaks> {
+fn breaks_of<'d, 't>(reader: &Reader<'d, 't>) -> impl FnOnce(Value<'d, 't>) -> Option<Breaks> {
     let reader = *reader;
     move |value| {
         let mut table = value.table()?;

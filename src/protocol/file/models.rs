@@ -74,8 +74,11 @@ fn model<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> Draft {
         let vaf = v.f64()?;
         if vaf.is_nan() || vaf > 1.0 || vaf == f64::NEG_INFINITY {
             v.fault(
-                Fault::error(format!("`{}` has to be a number up to 1, not {vaf}", v.path()))
-                    .hint("VAF = 1 − var(F − F̂) / var(F)"),
+                Fault::error(format!(
+                    "`{}` has to be a number up to 1, not {vaf}",
+                    v.path()
+                ))
+                .hint("VAF = 1 − var(F − F̂) / var(F)"),
             );
             return None;
         }
@@ -109,10 +112,9 @@ fn covariates(table: &mut Table<'_, '_>) -> BTreeMap<String, f64> {
             continue;
         };
         if QuestionId::new(key.as_str()).is_err() {
-            value.fault(
-                Fault::error("a covariate names a column: use 1 to 32 of A-Z a-z 0-9 _ -")
-
-            );
+            value.fault(Fault::error(
+                "a covariate names a column: use 1 to 32 of A-Z a-z 0-9 _ -",
+            ));
         }
         if let Some(number) = finite(&value) {
             covariates.insert(key, number);

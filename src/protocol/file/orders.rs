@@ -123,9 +123,7 @@ impl Lines {
         };
         let positions = self.rows.entry(row).or_default();
         if positions.insert(position, model).is_some() {
-            self.fault(
-                Fault::error(format!("row {row} has position {position} twice")).at(span),
-            );
+            self.fault(Fault::error(format!("row {row} has position {position} twice")).at(span));
         }
     }
 
@@ -152,7 +150,9 @@ impl Lines {
     fn finish(mut self) -> (FileOrders, Findings) {
         let mut orders = FileOrders::new();
         for (row, positions) in std::mem::take(&mut self.rows) {
-            let gap = (1..).zip(positions.keys()).find(|(want, have)| want != *have);
+            let gap = (1..)
+                .zip(positions.keys())
+                .find(|(want, have)| want != *have);
             if let Some((want, _)) = gap
                 && !self.findings.has_errors()
             {
@@ -226,7 +226,10 @@ mod tests {
             ["the first line has to be `row,position,model`"]
         );
         assert_eq!(
-            parse_orders("o", &b"row,position,model\n1,1,\xff\n"[..]).1.faults[0].message,
+            parse_orders("o", &b"row,position,model\n1,1,\xff\n"[..])
+                .1
+                .faults[0]
+                .message,
             "line 2 is not UTF-8"
         );
     }

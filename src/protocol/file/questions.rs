@@ -25,9 +25,7 @@ impl Draft {
     /// The question, if every part could be read.
     pub(super) fn finish(self) -> Option<Question> {
         let kind = self.kind?;
-        let required = self
-            .required
-            .unwrap_or(!matches!(kind, QuestionKind::Text));
+        let required = self.required.unwrap_or(!matches!(kind, QuestionKind::Text));
         Some(Question {
             id: self.id?,
             prompt: self.prompt?,
@@ -133,8 +131,11 @@ fn rating<'d, 't>(reader: &Reader<'d, 't>, table: &mut Table<'d, 't>) -> Option<
                 "the label at {at} is outside the scale {from} to {to}"
             ))),
             Err(_) => label.fault(
-                Fault::error(format!("a label stands at a whole number, not at `{}`", Untrusted(&key)))
-                    .hint("such as labels = { 1 = \"not at all\", 7 = \"very\" }"),
+                Fault::error(format!(
+                    "a label stands at a whole number, not at `{}`",
+                    Untrusted(&key)
+                ))
+                .hint("such as labels = { 1 = \"not at all\", 7 = \"very\" }"),
             ),
         }
     }

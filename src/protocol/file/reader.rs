@@ -120,7 +120,8 @@ pub(super) fn prose(value: &Value<'_, '_>) -> Option<String> {
     }
     if text.trim().is_empty() {
         value.fault(
-            Fault::error(format!("`{}` is empty", value.path())).hint("say something or leave the key out"),
+            Fault::error(format!("`{}` is empty", value.path()))
+                .hint("say something or leave the key out"),
         );
         return None;
     }
