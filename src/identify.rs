@@ -346,6 +346,8 @@ impl<'r> Training<'r> {
         Provenance {
             filter: Some("as recorded".into()),
             recordings: [(self.recording.name.clone(), self.recording.sha256.clone())].into(),
+            // a probe's program writes there what was recorded, and whether it is real
+            note: self.recording.header.first().cloned(),
             ..Provenance::default()
         }
     }

@@ -368,10 +368,7 @@ mod tests {
         let r = read_text(&text).unwrap();
         let said: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
         assert_eq!(said[0], "1 gaps in time, the longest 0.0080 s at 0.1990 s");
-        assert!(
-            said[1].contains("as fast as v_mm_s says"),
-            "{said:?}"
-        );
+        assert!(said[1].contains("as fast as v_mm_s says"), "{said:?}");
         assert_eq!(said.len(), 2, "{said:?}");
     }
 }

@@ -8,6 +8,7 @@
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
+use study::identify::grid::{self, Plan};
 use study::identify::resample::Resample;
 use study::identify::{Training, vaf};
 use study::model::predict::Lookup;
@@ -115,4 +116,29 @@ fn vaf_agrees_with_the_reference_to_the_printed_digits() {
             );
         }
     }
+}
+
+#[test]
+fn the_paper_grid_falls_with_lambda_at_1_khz_and_does_not_peak() {
+    // At 10 kHz it peaks at 0.9995, as the paper's Fig. 11; L is ten times longer here.
+    let recording_a = recording("training_a.csv");
+    let validation = recording("validation_a.csv");
+    let training = Training::new(&recording_a).unwrap();
+    let plan = Plan::Ewls {
+        lambdas: vec![0.9991, 0.9993, 0.9995, 0.9997, 0.9999],
+        dx_mm: vec![1.0],
+        resample: Resample::Point,
+    };
+    let cells = grid::run(&training, &plan, Lookup::Linear, &[&validation], || ()).unwrap();
+    assert!(
+        cells
+            .windows(2)
+            .all(|pair| pair[1].scores[0].vaf < pair[0].scores[0].vaf)
+    );
+    assert_eq!(grid::best(&cells, 1), Some(0));
+    // 1 / ((1 − λ) ρ) with ρ samples over 31.93 mm
+    let memory = cells[2].realization.provenance.memory_mm.unwrap();
+    let [positive, negative] = training.directions();
+    let dense = positive.len().max(negative.len()) as f64;
+    assert!((memory - 2000.0 * 31.93 / dense).abs() < 0.01, "{memory}");
 }

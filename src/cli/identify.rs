@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 pub(super) struct Args {
     /// The recording to identify from: a CSV with t_s, x_mm, f_n (and v_mm_s, a_m_s2)
     #[arg(value_name = "TRAINING")]
-    training: PathBuf,
+    training: Named,
 
     /// Recordings that lambda and dx are chosen on; NAME=PATH names one in model files
     #[arg(long, value_name = "REC", num_args = 1.., required = true)]
@@ -34,7 +34,7 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = MethodWord::Ewls)]
     method: MethodWord,
 
-    /// Forgetting factors, above 0 and at most 1, separated by commas [default: the paper's nine]
+    /// Forgetting factors, above 0 and at most 1, separated by commas [default: 0.999 to 0.9999 in steps of 0.0001]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = lambda)]
     lambda: Vec<f64>,
 
@@ -178,10 +178,12 @@ fn increment(given: &str) -> Result<f64, String> {
     }
 }
 
-/// The forgetting factors of the paper's grid.
-const PAPER_LAMBDAS: [f64; 9] = [
-    0.999, 0.9991, 0.9992, 0.9993, 0.9994, 0.9995, 0.9996, 0.9997, 0.9999,
+/// Over the range of the paper's grid.
+const DEFAULT_LAMBDAS: [f64; 10] = [
+    0.999, 0.9991, 0.9992, 0.9993, 0.9994, 0.9995, 0.9996, 0.9997, 0.9998, 0.9999,
 ];
+/// The paper's best and the one of its study, mm.
+const DEFAULT_DX_MM: [f64; 2] = [0.5, 1.0];
 
 /// What was identified, for [`output`].
 struct Found<'a> {
@@ -198,18 +200,16 @@ struct Found<'a> {
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let plan = plan(args)?;
-    let training_name = Named::unnamed(&args.training);
-    let training = read(&training_name, console)?;
+    let training = read(&args.training, console)?;
     let mut recordings = Vec::new();
     for named in args.validate.iter().chain(&args.test) {
         recordings.push((named, read(named, console)?));
     }
-    refuse_reuse(&training_name, &training, &recordings)?;
+    refuse_reuse(&args.training, &training, &recordings)?;
     let recordings: Vec<(&Named, &Recording)> = recordings.iter().map(|(n, r)| (*n, r)).collect();
 
-    let cells = identify(args, &plan, &training, &recordings).map_err(|e| {
-        Failure::input(format!("{}: {e}", args.training.display()))
-    })?;
+    let cells = identify(args, &plan, &training, &recordings)
+        .map_err(|e| Failure::input(format!("{}: {e}", args.training.path.display())))?;
     let best = grid::best(&cells, args.validate.len());
     let mut found = Found {
         args,
@@ -242,14 +242,14 @@ fn plan(args: &Args) -> Result<Plan, Failure> {
         )
     };
     let dx_mm = if args.dx.is_empty() {
-        vec![0.5, 1.0]
+        DEFAULT_DX_MM.to_vec()
     } else {
         args.dx.clone()
     };
     Ok(match args.method {
         MethodWord::Ewls => Plan::Ewls {
             lambdas: if args.lambda.is_empty() {
-                PAPER_LAMBDAS.to_vec()
+                DEFAULT_LAMBDAS.to_vec()
             } else {
                 args.lambda.clone()
             },
@@ -272,9 +272,7 @@ fn read(named: &Named, console: &mut Console) -> Result<Recording, Failure> {
     let path = &named.path;
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
     let recording = recording::read(&named.name, BufReader::with_capacity(1 << 16, file))
-        .map_err(|e| {
-            Failure::input(format!("{}: line {}: {}", path.display(), e.line, e.fault))
-        })?;
+        .map_err(|e| Failure::input(format!("{}: line {}: {}", path.display(), e.line, e.fault)))?;
     for warning in &recording.warnings {
         console.say(format!("warning: {}: {warning}", path.display()));
     }

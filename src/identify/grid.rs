@@ -115,7 +115,10 @@ fn cell(method: Method, identified: Identified, recordings: &[&Recording]) -> Ce
         .map(|recording| vaf::score(&realization, recording))
         .collect();
     for (recording, score) in recordings.iter().zip(&scores) {
-        realization.vaf.insert(recording.name.clone(), score.vaf);
+        let name = recording.name.clone();
+        let hash = recording.sha256.clone();
+        realization.provenance.recordings.insert(name.clone(), hash);
+        realization.vaf.insert(name, score.vaf);
     }
     Cell {
         method,

@@ -49,9 +49,7 @@ pub(super) fn complete(name: String, rows: Rows) -> Result<Recording, RecordingE
     } else if is_constant(&a_m_s2) {
         warnings.push(Warning::Constant { column: COLUMNS[3] });
     } else {
-        warnings.extend(scale(COLUMNS[3], &a_m_s2, |i| {
-            acceleration(&t_s, &x_mm, i)
-        }));
+        warnings.extend(scale(COLUMNS[3], &a_m_s2, |i| acceleration(&t_s, &x_mm, i)));
     }
     if !(v_mm_s.iter().any(|v| *v > 0.0) && v_mm_s.iter().any(|v| *v < 0.0)) {
         warnings.push(Warning::OneDirection);

@@ -33,10 +33,8 @@ pub(super) fn files(
             .replace("{dx}", &number(provenance.dx_mm));
         let id = ModelId::new(id).map_err(Failure::input)?;
         if ids.iter().any(|other| other.collides_with(&id)) {
-            return Err(
-                Failure::input(format!("two cells would be called {id}"))
-                    .hint("the template needs {lambda} or {dx}, or the list is too long"),
-            );
+            return Err(Failure::input(format!("two cells would be called {id}"))
+                .hint("the template needs {lambda} or {dx}, or the list is too long"));
         }
         cell.realization.id = id.to_string();
         files.push((
@@ -52,8 +50,10 @@ pub(super) fn files(
 pub(super) fn write(dir: &Path, files: &[(PathBuf, String)], force: bool) -> Result<(), Failure> {
     fs::create_dir_all(dir).map_err(|e| Failure::file(dir, &e))?;
     if !force && let Some((path, _)) = files.iter().find(|(path, _)| path.exists()) {
-        return Err(Failure::input(format!("{} is there already", path.display()))
-            .hint("--force overwrites it; nothing was written"));
+        return Err(
+            Failure::input(format!("{} is there already", path.display()))
+                .hint("--force overwrites it; nothing was written"),
+        );
     }
     for (path, text) in files {
         // A reader never sees half a file: the whole one takes the name at once.
@@ -63,7 +63,10 @@ pub(super) fn write(dir: &Path, files: &[(PathBuf, String)], force: bool) -> Res
             .create(true)
             .truncate(true)
             .open(&part)
-            .and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()))
+            .and_then(|mut file| {
+                file.write_all(text.as_bytes())
+                    .and_then(|()| file.sync_all())
+            })
             .and_then(|()| fs::rename(&part, path));
         if let Err(e) = written {
             // what is left of it is of no use
@@ -123,14 +126,17 @@ pub(super) fn json(found: &Found<'_>) -> String {
         .enumerate()
         .map(|(i, (named, r))| {
             let validates = i < found.args.validate.len();
-            recording(named, &r.sha256, if validates { "validate" } else { "test" })
+            recording(
+                named,
+                &r.sha256,
+                if validates { "validate" } else { "test" },
+            )
         })
         .collect();
-    let training = super::Named::unnamed(&found.args.training);
     let document = json!({
         "format": "study-identify/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
-        "training": recording(&training, &found.training.sha256, "training"),
+        "training": recording(&found.args.training, &found.training.sha256, "training"),
         "recordings": recordings,
         "best": found.best,
         "cells": cells,
@@ -182,6 +188,9 @@ pub(super) fn table(found: &Found<'_>) -> String {
         found.training.range_mm()[1],
         found.training.top_speed_mm_s(),
     );
+    if let Some(cell) = found.cells.first() {
+        let _ = writeln!(out, "{}", how(cell));
+    }
     out.push('\n');
     out.push_str(&align(&rows));
     out.push('\n');
@@ -192,10 +201,24 @@ pub(super) fn table(found: &Found<'_>) -> String {
     out
 }
 
+/// What all cells have in common.
+fn how(cell: &Cell) -> String {
+    let mut words = vec![cell.method.word().to_owned()];
+    if let Some(start) = start(cell.method) {
+        words.push(format!("{start} start"));
+    }
+    if let Some(sort) = sort(cell.method) {
+        words.push(format!("{sort} in x"));
+    }
+    if let Some(resample) = &cell.realization.provenance.resample {
+        words.push(format!("{resample} resampling"));
+    }
+    words.push(format!("{} look-up", lookup_word(cell.realization.lookup)));
+    words.join(", ")
+}
+
 fn heads(found: &Found<'_>) -> Vec<String> {
-    let mut heads: Vec<String> = ["", "method", "lambda", "L mm", "dx mm", "resample", "lookup"]
-        .map(String::from)
-        .to_vec();
+    let mut heads: Vec<String> = ["", "lambda", "L mm", "dx mm"].map(String::from).to_vec();
     for (named, _) in &found.recordings {
         // A name as long as a path would push the numbers off the screen.
         let name: String = named.name.chars().take(24).collect();
@@ -218,12 +241,9 @@ fn row(cell: &Cell, best: bool) -> Vec<String> {
     };
     let mut row = vec![
         if best { "*" } else { "" }.to_owned(),
-        cell.method.word().to_owned(),
         number(provenance.lambda),
         memory,
         number(provenance.dx_mm),
-        provenance.resample.clone().unwrap_or("-".into()),
-        lookup_word(cell.realization.lookup).to_owned(),
     ];
     for score in &cell.scores {
         row.push(format!("{:.6}", score.vaf));
@@ -250,14 +270,18 @@ fn verdict(found: &Found<'_>) -> String {
             .collect::<Vec<_>>()
             .join(", ")
     };
-    let mut out = format!("* highest VAF: {}", list(0, validations));
-    if found.cells.len() > 1 {
-        out += if validations == 1 {
+    if found.cells.len() == 1 {
+        return format!("VAF {}\n", list(0, found.recordings.len()));
+    }
+    let mut out = format!(
+        "* highest VAF: {}{}",
+        list(0, validations),
+        if validations == 1 {
             ", chosen on this recording"
         } else {
             " (highest mean), chosen on these recordings"
-        };
-    }
+        }
+    );
     out.push('\n');
     if validations < found.recordings.len() {
         let _ = writeln!(
@@ -265,7 +289,7 @@ fn verdict(found: &Found<'_>) -> String {
             "  to report: {}",
             list(validations, found.recordings.len())
         );
-    } else if found.cells.len() > 1 {
+    } else {
         out += "  a VAF that chose its own cell is optimistic: report one on a --test recording\n";
     }
     out
@@ -286,8 +310,7 @@ fn warnings(found: &Found<'_>) -> Vec<(String, String)> {
         .collect()
 }
 
-/// Columns as wide as their widest entry, two blanks apart; words to the left,
-/// numbers to the right.
+/// Columns as wide as their widest entry, flush right.
 fn align(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let widths: Vec<usize> = (0..columns)
@@ -298,9 +321,8 @@ fn align(rows: &[Vec<String>]) -> String {
         let mut line = String::new();
         for (i, (cell, width)) in row.iter().zip(&widths).enumerate() {
             let blanks = " ".repeat(width - cell.width());
-            let words = matches!(i, 0 | 1 | 5 | 6);
-            let (before, after) = if words { ("", &*blanks) } else { (&*blanks, "") };
-            let _ = write!(line, "{before}{cell}{after}  ");
+            let gap = if i == 0 { " " } else { "  " };
+            let _ = write!(line, "{blanks}{cell}{gap}");
         }
         out.push_str(line.trim_end());
         out.push('\n');

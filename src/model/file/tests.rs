@@ -59,25 +59,97 @@ fn a_model_file_is_read_as_it_says() {
 #[test]
 fn every_fault_has_its_line() {
     for (from, to, said) in [
-        ("[0, 0.1, 0]", "[0, nan, 0]", "12: `positive.m_kg[1]` has to be a finite number, not NaN"),
-        ("[0, 0.1, 0]", "[0,\n-inf, 0]", "13: `positive.m_kg[1]` has to be a finite number, not -inf"),
-        ("[0, 1, 2]", "[0, 2, 2]", "6: `x_mm[2]` is 2 after 2: positions have to ascend"),
-        ("[0, 1, 2]", "[0]", "6: `x_mm` has 1 nodes: a table has 2 to 20000"),
-        ("[1, -1, 1]", "[1, -1]", "14: `positive.k_n_per_mm` has 2 numbers where `x_mm` has 3"),
-        ("delta_mm = 0.5", "delta_mm = 0", "4: `direction.delta_mm` has to be a finite number above zero, not 0"),
-        ("delta_mm = 0.5", "delta = 0.5", "4: [direction] has no `delta_mm`"),
-        ("\"play\", delta_mm = 0.5", "\"sign\", delta_mm = 0.5", "4: unknown key `delta_mm` in [direction]"),
-        ("val = 0.5", "val = 79", "10: the VAF on `val` is 79: it is at most 1"),
-        ("val = 0.5", "val = nan", "10: `vaf.val` has to be a finite number, not NaN"),
-        ("[0, 2], v", "[2, 0], v", "5: `trained.x_mm` has to ascend: lowest, then highest position"),
-        ("[0, 2], v", "[0, 1, 2], v", "5: `trained.x_mm` has to be two numbers, not 3"),
-        ("v_mm_s = 100", "v_mm_s = inf", "5: `trained.v_mm_s` has to be a finite number above zero, not inf"),
-        ("id = \"a\"", "id = \"../a\"", "2: `../a` is no model id: use 1 to 32 of A-Z a-z 0-9 . _ -"),
+        (
+            "[0, 0.1, 0]",
+            "[0, nan, 0]",
+            "12: `positive.m_kg[1]` has to be a finite number, not NaN",
+        ),
+        (
+            "[0, 0.1, 0]",
+            "[0,\n-inf, 0]",
+            "13: `positive.m_kg[1]` has to be a finite number, not -inf",
+        ),
+        (
+            "[0, 1, 2]",
+            "[0, 2, 2]",
+            "6: `x_mm[2]` is 2 after 2: positions have to ascend",
+        ),
+        (
+            "[0, 1, 2]",
+            "[0]",
+            "6: `x_mm` has 1 nodes: a table has 2 to 20000",
+        ),
+        (
+            "[1, -1, 1]",
+            "[1, -1]",
+            "14: `positive.k_n_per_mm` has 2 numbers where `x_mm` has 3",
+        ),
+        (
+            "delta_mm = 0.5",
+            "delta_mm = 0",
+            "4: `direction.delta_mm` has to be a finite number above zero, not 0",
+        ),
+        (
+            "delta_mm = 0.5",
+            "delta = 0.5",
+            "4: [direction] has no `delta_mm`",
+        ),
+        (
+            "\"play\", delta_mm = 0.5",
+            "\"sign\", delta_mm = 0.5",
+            "4: unknown key `delta_mm` in [direction]",
+        ),
+        (
+            "val = 0.5",
+            "val = 79",
+            "10: the VAF on `val` is 79: it is at most 1",
+        ),
+        (
+            "val = 0.5",
+            "val = nan",
+            "10: `vaf.val` has to be a finite number, not NaN",
+        ),
+        (
+            "[0, 2], v",
+            "[2, 0], v",
+            "5: `trained.x_mm` has to ascend: lowest, then highest position",
+        ),
+        (
+            "[0, 2], v",
+            "[0, 1, 2], v",
+            "5: `trained.x_mm` has to be two numbers, not 3",
+        ),
+        (
+            "v_mm_s = 100",
+            "v_mm_s = inf",
+            "5: `trained.v_mm_s` has to be a finite number above zero, not inf",
+        ),
+        (
+            "id = \"a\"",
+            "id = \"../a\"",
+            "2: `../a` is no model id: use 1 to 32 of A-Z a-z 0-9 . _ -",
+        ),
         ("\"floor\"", "\"flor\"", "3: `lookup` cannot be `flor`"),
-        ("method = \"by hand\"", "lambda = 2", "8: `provenance.lambda` has to be above 0 and at most 1, not 2"),
-        ("[negative]", "[negatve]", "16: unknown key `negatve` at the top level"),
-        ("[0, 2], v", "[0, 1.5], v", "6: there are nodes outside `trained.x_mm`"),
-        ("\"a\"", "7", "2: `id` has to be text in quotes, not a whole number"),
+        (
+            "method = \"by hand\"",
+            "lambda = 2",
+            "8: `provenance.lambda` has to be above 0 and at most 1, not 2",
+        ),
+        (
+            "[negative]",
+            "[negatve]",
+            "16: unknown key `negatve` at the top level",
+        ),
+        (
+            "[0, 2], v",
+            "[0, 1.5], v",
+            "6: there are nodes outside `trained.x_mm`",
+        ),
+        (
+            "\"a\"",
+            "7",
+            "2: `id` has to be text in quotes, not a whole number",
+        ),
     ] {
         let found = faults(from, to);
         assert!(found.iter().any(|f| f == said), "{said}\n{found:#?}");
