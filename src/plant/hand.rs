@@ -1,0 +1,5 @@
+//! The hand.
+/// Hand.
+pub struct Hand; 
+/// HP.
+pub struct HandParameters;
