@@ -6,6 +6,7 @@
 //!
 //! `virtual_device` is the simulated one, in this process.
 
+pub mod core;
 pub mod virtual_device;
 
 use crate::limits::Limits;

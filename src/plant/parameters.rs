@@ -102,7 +102,8 @@ impl Parameters {
         }
     }
 
-    /// Switch B: a sharp cam with a rippled surface. Largest static force 9.08 N.
+    /// Switch B: a sharp cam with a rippled surface. Largest static force 9.08 N,
+    /// which takes a ripple of 0.8 N rms, not of that amplitude (then 8.69 N).
     pub fn b() -> Self {
         let mut b = Self::a();
         for well in b.valleys.iter_mut().chain(&mut b.crests) {
@@ -110,7 +111,7 @@ impl Parameters {
         }
         Self {
             slope: 0.40,
-            ripple_n: 0.8,
+            ripple_n: 0.8 * std::f64::consts::SQRT_2,
             ..b
         }
     }
