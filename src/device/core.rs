@@ -166,6 +166,9 @@ enum End {
 /// Share of the range at either side that counts as its end.
 const END_SHARE: f64 = 0.2;
 
+/// Share of the limit below which a clamp is over: noise about the limit is one.
+const CLAMP_OVER: f64 = 0.9;
+
 impl Core {
     /// A limp servo.
     pub fn new(settings: Settings) -> Self {
@@ -356,11 +359,15 @@ impl Core {
         if !(limit.is_finite() && limit > 0.0) {
             return 0.0;
         }
-        let over = libm::fabs(force_n) > limit;
-        if over && !self.clamping {
-            self.tally.clamps += 1;
+        let size = libm::fabs(force_n);
+        if size > limit {
+            if !self.clamping {
+                self.tally.clamps += 1;
+            }
+            self.clamping = true;
+        } else if size < CLAMP_OVER * limit {
+            self.clamping = false;
         }
-        self.clamping = over;
         force_n.clamp(-limit, limit)
     }
 }
