@@ -332,8 +332,7 @@ impl Core {
         let mut force_n = without_n + mass_kg * a_m_s2;
         let beyond = motion.x_mm - x_mm;
         if beyond != 0.0 {
-            let wall_n =
-                settings.wall_n_per_mm * beyond + settings.wall_n_s_per_mm * motion.v_mm_s;
+            let wall_n = settings.wall_n_per_mm * beyond + settings.wall_n_s_per_mm * motion.v_mm_s;
             // a wall pushes back and never holds on
             force_n += if beyond > 0.0 {
                 wall_n.max(0.0)
@@ -401,5 +400,222 @@ impl LowPass {
         self.memory[0] = 2.0 * fed - self.back[0] * output + self.memory[1];
         self.memory[1] = fed - self.back[1] * output;
         output
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::predict::{BranchView, Lookup};
+
+    const NODES: [f64; 2] = [0.0, 30.0];
+    const NONE: [f64; 2] = [0.0; 2];
+
+    /// A table of constant damping in both directions.
+    fn damper(b_n_s_per_mm: &[f64; 2]) -> Rendering<'_> {
+        let branch = BranchView {
+            m_kg: &NONE,
+            b_n_s_per_mm,
+            k_n_per_mm: &NONE,
+            f0_n: &NONE,
+        };
+        Rendering {
+            table: TableView {
+                x_mm: &NODES,
+                positive: branch,
+                negative: branch,
+                lookup: Lookup::Linear,
+            },
+            rule: Direction::Sign,
+            range_mm: NODES,
+            trained_mm_s: 500.0,
+        }
+    }
+
+    fn bare() -> Settings {
+        Settings {
+            damping_n_s_per_mm: 0.0,
+            ..Settings::default()
+        }
+    }
+
+    fn motion(x_mm: f64, v_mm_s: f64) -> Motion {
+        Motion {
+            x_mm,
+            v_mm_s,
+            a_m_s2: 0.0,
+        }
+    }
+
+    /// Four seconds of 15 ± 14 mm at 1 Hz.
+    fn swing(core: &mut Core, what: &Rendering<'_>) {
+        core.start();
+        for i in 0..16_000 {
+            let phase = core::f64::consts::TAU * f64::from(i) / 4000.0;
+            let v = 14.0 * core::f64::consts::TAU * libm::cos(phase);
+            core.step(what, motion(15.0 + 14.0 * libm::sin(phase), v));
+        }
+    }
+
+    #[test]
+    fn a_damper_takes_energy_and_a_negative_one_gives_it() {
+        let mut core = Core::new(bare());
+        swing(&mut core, &damper(&[0.02; 2]));
+        let tally = core.tally();
+        assert!(tally.energy_j > 0.1, "{tally:?}");
+        assert!(tally.least_energy_j > -1e-3, "{tally:?}");
+
+        swing(&mut core, &damper(&[-0.02; 2]));
+        let tally = core.tally();
+        assert!(tally.energy_j < -0.1, "{tally:?}");
+        assert_eq!(
+            tally.least_energy_j,
+            tally.energy_j.min(tally.least_energy_j)
+        );
+        assert!(tally.least_energy_j < -0.1, "{tally:?}");
+    }
+
+    /// Starts in the middle, then four turns of two crossings each: high, low, …
+    #[test]
+    fn full_strokes_are_counted_and_half_ones_are_not() {
+        let mut core = Core::new(bare());
+        swing(&mut core, &damper(&NONE));
+        assert_eq!(core.tally().strokes, 7);
+        assert_eq!(core.tally().switches, 8);
+
+        core.start();
+        for i in 0..16_000 {
+            let phase = core::f64::consts::TAU * f64::from(i) / 4000.0;
+            core.step(&damper(&NONE), motion(8.0 + 8.0 * libm::sin(phase), 0.0));
+        }
+        assert_eq!(core.tally().strokes, 0);
+    }
+
+    #[test]
+    fn a_trip_is_latched_until_a_new_start() {
+        let what = damper(&[0.02; 2]);
+        for (bad, why) in [
+            (motion(15.0, 1000.5), Trip::Velocity),
+            (motion(33.0, 0.0), Trip::Stroke),
+            (motion(-3.0, 0.0), Trip::Stroke),
+            (motion(f64::NAN, 0.0), Trip::NotANumber),
+            (motion(15.0, f64::INFINITY), Trip::NotANumber),
+        ] {
+            let mut core = Core::new(bare());
+            swing(&mut core, &what);
+            assert_eq!(core.step(&what, bad), 0.0);
+            assert_eq!(core.state(), State::Tripped(why));
+            assert_eq!(core.step(&what, motion(15.0, 100.0)), 0.0);
+            core.limp();
+            assert_eq!(core.state(), State::Tripped(why));
+            core.start();
+            assert_eq!(core.state(), State::Playing);
+        }
+    }
+
+    #[test]
+    fn a_table_of_no_numbers_trips_and_never_reaches_the_motor() {
+        let mut core = Core::new(bare());
+        core.start();
+        assert_eq!(core.step(&damper(&[f64::NAN; 2]), motion(15.0, 10.0)), 0.0);
+        assert_eq!(core.state(), State::Tripped(Trip::NotANumber));
+    }
+
+    #[test]
+    fn a_limit_that_is_none_is_limp() {
+        for force_n in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
+            let mut core = Core::new(Settings { force_n, ..bare() });
+            swing(&mut core, &damper(&[0.05; 2]));
+            assert_eq!(core.held_n(), 0.0, "{force_n}");
+        }
+        let mut core = Core::new(Settings {
+            velocity_mm_s: f64::NAN,
+            ..bare()
+        });
+        core.start();
+        core.step(&damper(&[0.05; 2]), motion(15.0, 1.0));
+        assert_eq!(core.state(), State::Tripped(Trip::Velocity));
+    }
+
+    #[test]
+    fn the_force_comes_up_over_the_ramp_and_never_faster_than_the_slew_limit() {
+        let what = damper(&[0.05; 2]);
+        let mut core = Core::new(bare());
+        core.start();
+        let moving = motion(15.0, 200.0);
+        let force: Vec<f64> = (0..2000).map(|_| core.step(&what, moving)).collect();
+        assert_eq!(force[0], 0.0);
+        assert!((force[800] - 5.0).abs() < 0.02, "{}", force[800]);
+        assert!((force[1999] - 10.0).abs() < 1e-9);
+        let back = motion(15.0, -200.0);
+        let mut last = force[1999];
+        for _ in 0..80 {
+            let now = core.step(&what, back);
+            assert!((now - last).abs() <= 0.5 + 1e-9);
+            last = now;
+        }
+        assert!((last + 10.0).abs() < 1e-9, "{last}");
+        assert!(core.tally().slewed > 30);
+    }
+
+    #[test]
+    fn beyond_the_range_a_wall_pushes_back() {
+        let what = damper(&NONE);
+        let mut core = Core::new(bare());
+        core.start();
+        let mut force = 0.0;
+        for _ in 0..4000 {
+            force = core.step(&what, motion(30.5, 0.0));
+        }
+        assert!((force - 5.0).abs() < 1e-9, "{force}");
+        for _ in 0..4000 {
+            force = core.step(&what, motion(-0.5, 0.0));
+        }
+        assert!((force + 5.0).abs() < 1e-9, "{force}");
+    }
+
+    #[test]
+    fn one_run_into_the_limit_is_one_clamp() {
+        let what = damper(&[0.05; 2]);
+        let mut core = Core::new(bare());
+        core.start();
+        for i in 0..4000 {
+            // about the limit of 12 N at 240 mm/s
+            let v = 240.0 + 5.0 * libm::sin(f64::from(i));
+            assert!(core.step(&what, motion(15.0, v)) <= 12.0);
+        }
+        assert_eq!(core.tally().clamps, 1);
+    }
+
+    #[test]
+    fn a_mass_below_the_least_is_held_to_it_and_counted() {
+        let heavy = [-2.0; 2];
+        let branch = BranchView {
+            m_kg: &heavy,
+            b_n_s_per_mm: &NONE,
+            k_n_per_mm: &NONE,
+            f0_n: &NONE,
+        };
+        let mut what = damper(&NONE);
+        what.table.positive = branch;
+        let pushed = Motion {
+            a_m_s2: 5.0,
+            ..motion(15.0, 1.0)
+        };
+        let settle = |least_mass_kg| {
+            let mut core = Core::new(Settings {
+                least_mass_kg,
+                ..bare()
+            });
+            core.start();
+            let force = (0..4000).fold(0.0, |_, _| core.step(&what, pushed));
+            (force, core.tally().mass_held)
+        };
+        let (force, held) = settle(-0.6);
+        assert!((force + 3.0).abs() < 1e-6, "{force}");
+        assert_eq!(held, 4000);
+        let (force, held) = settle(f64::NEG_INFINITY);
+        assert!((force + 10.0).abs() < 1e-6, "{force}");
+        assert_eq!(held, 0);
     }
 }

@@ -150,6 +150,14 @@ impl VirtualDevice {
         }
     }
 
+    /// The force that it holds at this moment, N; zero unless it plays.
+    pub fn held_n(&self) -> f64 {
+        match &self.phase {
+            Phase::Playing(run) => run.core.held_n(),
+            _ => 0.0,
+        }
+    }
+
     /// Lets time pass up to `at`.
     fn advance(&mut self, at: Duration) {
         loop {

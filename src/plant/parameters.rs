@@ -71,7 +71,7 @@ pub struct BadPlant {
 }
 
 impl Parameters {
-    /// Switch A: a smooth cam. Largest static force 8.86 N.
+    /// Switch A: a smooth cam. Largest static force over the stroke 8.86 N.
     pub fn a() -> Self {
         let well = |at_mm, width_mm| Well { at_mm, width_mm };
         Self {
@@ -102,8 +102,8 @@ impl Parameters {
         }
     }
 
-    /// Switch B: a sharp cam with a rippled surface. Largest static force 9.08 N,
-    /// which takes a ripple of 0.8 N rms, not of that amplitude (then 8.69 N).
+    /// Switch B: a sharp cam with a rippled surface. Largest static force 8.69 N;
+    /// `docs/simulation.md` says where that differs from its description.
     pub fn b() -> Self {
         let mut b = Self::a();
         for well in b.valleys.iter_mut().chain(&mut b.crests) {
@@ -111,7 +111,7 @@ impl Parameters {
         }
         Self {
             slope: 0.40,
-            ripple_n: 0.8 * std::f64::consts::SQRT_2,
+            ripple_n: 0.8,
             ..b
         }
     }
