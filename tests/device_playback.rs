@@ -166,6 +166,41 @@ fn an_active_table_shows_in_the_energy_and_the_switches() {
     );
 }
 
+/// The paper's realizations have m down to −1.9 kg; the device holds it to the
+/// slider's mass, so that a session is not one fault after the other.
+#[test]
+fn a_table_of_negative_mass_can_be_played_without_a_fault() {
+    for seed in 0..5 {
+        let mut device = playing(
+            Options {
+                seed,
+                ..Options::default()
+            },
+            &detents(-1.2, 0.015, Direction::Sign),
+        );
+        let reports = device.poll(ms(12_022));
+        let faults = reports.iter().filter(|r| matches!(r, Report::Fault(_)));
+        assert_eq!(faults.count(), 0, "seed {seed}");
+    }
+}
+
+#[test]
+fn a_hand_faster_than_the_limit_trips_the_device_which_stays_limp() {
+    let mut slow = limits(12.0);
+    slow.velocity_mm_s = Limit::new(20.0).unwrap();
+    let mut device = VirtualDevice::new(Options::default());
+    device.load(&ordinary(), slow, ms(0)).unwrap();
+    device.poll(ms(20));
+    device.start(ms(20)).unwrap();
+    let reports = device.poll(ms(12_000));
+    assert_eq!(
+        reports.last(),
+        Some(&Report::Fault("velocity limit exceeded".to_owned()))
+    );
+    assert_eq!(device.held_n(), 0.0);
+    assert_eq!(device.poll(ms(20_000)), [], "latched");
+}
+
 #[test]
 fn limp_is_no_force_and_no_report_in_every_state() {
     let states: [(&str, &dyn Fn(&mut VirtualDevice)); 5] = [
