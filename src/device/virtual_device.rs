@@ -48,12 +48,17 @@ pub struct Options {
     pub faults: FaultPlan,
     /// Hand and slider.
     pub hand: HandParameters,
+    /// Smallest mass that is rendered, kg: minus infinity plays every table as it
+    /// is, which no hand may be able to hold.
+    pub least_mass_kg: f64,
 }
 
 impl Default for Options {
-    /// 4 kHz servo, 1 kHz telemetry, 15 N, 1 m/s, no faults, seed 0.
+    /// 4 kHz servo, 1 kHz telemetry, 15 N, 1 m/s, no faults, seed 0; no less mass
+    /// than the slider's own can be taken away.
     fn default() -> Self {
         let limit = |value| Limit::new(value).expect("a positive constant");
+        let hand = HandParameters::default();
         Self {
             seed: 0,
             servo_hz: 4000.0,
@@ -63,7 +68,8 @@ impl Default for Options {
                 velocity_mm_s: limit(1000.0),
             },
             faults: FaultPlan::none(),
-            hand: HandParameters::default(),
+            hand,
+            least_mass_kg: -hand.slider_kg,
         }
     }
 }
@@ -218,7 +224,7 @@ impl VirtualDevice {
             servo_hz: options.servo_hz,
             force_n: loaded.limits.force_n.get(),
             velocity_mm_s: loaded.limits.velocity_mm_s.get(),
-            least_mass_kg: -options.hand.slider_kg,
+            least_mass_kg: options.least_mass_kg,
             ..Settings::default()
         });
         core.start();
