@@ -4,8 +4,13 @@
 //! reported by a later [`Device::poll`]. Time is an argument, so the same device
 //! runs on a virtual clock. The host never closes the force loop.
 //!
-//! `virtual_device` is the simulated one, in this process.
+//! [`virtual_device`] is the simulated one, in this process; [`core`] the servo
+//! step that it shares with a firmware, [`table`] what it demands of a table,
+//! [`faults`] what it can be told to do wrong.
 
+pub mod core;
+pub mod faults;
+pub mod table;
 pub mod virtual_device;
 
 use crate::limits::Limits;
