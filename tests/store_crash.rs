@@ -41,8 +41,14 @@ fn run(disk: &MemoryDisk, told: &mut Told) -> Result<(), StoreError> {
     let all = session("P01", 1, claimed.seat);
     let had: Vec<Event> = claimed.entries.iter().map(|e| e.event.clone()).collect();
     assert_eq!(had, all[..had.len()], "what was read is what was written");
-    assert!(had.len() >= told.events.len(), "an acknowledged event is lost");
-    assert!(had.len() <= told.events.len() + 1, "only one can be in doubt");
+    assert!(
+        had.len() >= told.events.len(),
+        "an acknowledged event is lost"
+    );
+    assert!(
+        had.len() <= told.events.len() + 1,
+        "only one can be in doubt"
+    );
     told.events = had;
     let mut journal = claimed.folder.journal()?;
     for (n, event) in all.iter().enumerate().skip(told.events.len()) {
@@ -79,7 +85,11 @@ fn comes_back(disk: &MemoryDisk, told: &mut Told, why: &str) {
             let study = open(disk).unwrap();
             study.refresh(&protocol()).unwrap();
             let sessions = study.sessions().unwrap();
-            let events: Vec<Event> = sessions[0].entries.iter().map(|e| e.event.clone()).collect();
+            let events: Vec<Event> = sessions[0]
+                .entries
+                .iter()
+                .map(|e| e.event.clone())
+                .collect();
             assert_eq!(events, session("P01", 1, Seat::Row(1)), "{why}");
         }
         Err(e) => panic!("{why}: over {over}: {e}"),
@@ -119,7 +129,11 @@ fn nothing_acknowledged_is_lost_by_a_kill_or_loss_of_power_at_any_call() {
                     claimed: told.claimed,
                     events: told.events.clone(),
                 };
-                comes_back(&found, &mut told, &format!("{fault:?} at {call}, {crash:?}"));
+                comes_back(
+                    &found,
+                    &mut told,
+                    &format!("{fault:?} at {call}, {crash:?}"),
+                );
                 states += 1;
             }
         }
@@ -137,7 +151,13 @@ fn recovery_can_be_killed_at_each_step_and_run_again() {
         assert!(told.claimed && !told.events.is_empty());
         let torn = disk.after(first);
         let whole = torn.after(Crash::Process);
-        let _ = run(&whole, &mut Told { claimed: true, events: told.events.clone() });
+        let _ = run(
+            &whole,
+            &mut Told {
+                claimed: true,
+                events: told.events.clone(),
+            },
+        );
         for fault in [Fault::Kill, Fault::KillInWrite] {
             for call in 0..whole.calls() {
                 let second = torn.after(Crash::Process);
@@ -199,7 +219,11 @@ fn lost_with(plant: impl Fn(&MemoryDisk)) -> bool {
     let Ok(study) = StudyFolder::open_on(Arc::new(found), Path::new("results/small")) else {
         return true;
     };
-    study.sessions().unwrap().iter().all(|s| s.entries.len() < told.events.len())
+    study
+        .sessions()
+        .unwrap()
+        .iter()
+        .all(|s| s.entries.len() < told.events.len())
 }
 
 #[test]

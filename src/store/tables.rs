@@ -6,53 +6,10 @@
 
 use super::derive::Columns;
 use crate::outcome::{AttemptRow, Author, Failure, ParticipantRow, RatingRow};
-use crate::protocol::Answer;
+use crate::protocol::{Answer, columns};
 use crate::text::QuestionId;
 use chrono::{DateTime, FixedOffset};
 use std::io;
-
-/// Columns of `ratings.csv` before the questions.
-const BEFORE: [&str; 20] = [
-    "study",
-    "participant",
-    "session",
-    "row",
-    "trial",
-    "block",
-    "position",
-    "planned_position",
-    "model",
-    "role",
-    "repetition",
-    "previous_model",
-    "practice",
-    "pilot",
-    "simulated",
-    "device_kind",
-    "device_id",
-    "operator",
-    "tool_version",
-    "protocol_version",
-];
-
-/// Columns of `ratings.csv` after the questions; covariates follow.
-const AFTER: [&str; 15] = [
-    "corrected",
-    "declined",
-    "remarks",
-    "reference_s",
-    "exploration_s",
-    "response_s",
-    "strokes",
-    "least_energy_j",
-    "switches_per_s",
-    "clamp_count",
-    "started_at",
-    "rated_at",
-    "attempt",
-    "status",
-    "vaf",
-];
 
 const ATTEMPT_COLUMNS: [&str; 15] = [
     "participant",
@@ -70,23 +27,6 @@ const ATTEMPT_COLUMNS: [&str; 15] = [
     "by",
     "text",
     "at",
-];
-
-/// Columns of `participants.csv` before the answers of setup, intake and outro.
-const PARTICIPANT_COLUMNS: [&str; 13] = [
-    "participant",
-    "session",
-    "state",
-    "reason",
-    "row",
-    "pilot",
-    "simulated",
-    "erased",
-    "consent_version",
-    "protocol_version",
-    "trials_done",
-    "trials_planned",
-    "started_at",
 ];
 
 type Writer = csv::Writer<Vec<u8>>;
@@ -120,13 +60,13 @@ fn answer(answer: Option<&Answer>) -> String {
 }
 
 /// `ratings.csv`.
-pub(super) fn ratings(rows: &[RatingRow], columns: &Columns) -> io::Result<Vec<u8>> {
+pub(super) fn ratings(rows: &[RatingRow], own: &Columns) -> io::Result<Vec<u8>> {
     let mut out = writer();
-    let header = BEFORE
+    let header = columns::RATINGS_BEFORE
         .into_iter()
-        .chain(columns.questions.iter().map(QuestionId::as_str))
-        .chain(AFTER)
-        .chain(columns.covariates.iter().map(String::as_str));
+        .chain(own.questions.iter().map(QuestionId::as_str))
+        .chain(columns::RATINGS_AFTER)
+        .chain(own.covariates.iter().map(String::as_str));
     out.write_record(header)?;
     for row in rows {
         let mut cells = vec![
@@ -151,7 +91,7 @@ pub(super) fn ratings(rows: &[RatingRow], columns: &Columns) -> io::Result<Vec<u
             row.tool_version.clone(),
             row.protocol_version.to_string(),
         ];
-        cells.extend(columns.questions.iter().map(|q| answer(row.answers.get(q))));
+        cells.extend(own.questions.iter().map(|q| answer(row.answers.get(q))));
         cells.extend([
             row.corrected.to_string(),
             row.declined.to_string(),
@@ -170,7 +110,7 @@ pub(super) fn ratings(rows: &[RatingRow], columns: &Columns) -> io::Result<Vec<u
             number(row.vaf),
         ]);
         let covariate = |name: &String| number(row.covariates.get(name).copied());
-        cells.extend(columns.covariates.iter().map(covariate));
+        cells.extend(own.covariates.iter().map(covariate));
         out.write_record(&cells)?;
     }
     bytes(out)
@@ -203,11 +143,11 @@ pub(super) fn attempts(rows: &[AttemptRow]) -> io::Result<Vec<u8>> {
 }
 
 /// `participants.csv`.
-pub(super) fn participants(rows: &[ParticipantRow], columns: &Columns) -> io::Result<Vec<u8>> {
+pub(super) fn participants(rows: &[ParticipantRow], own: &Columns) -> io::Result<Vec<u8>> {
     let mut out = writer();
-    let header = PARTICIPANT_COLUMNS
+    let header = columns::PARTICIPANTS
         .into_iter()
-        .chain(columns.forms.iter().map(QuestionId::as_str));
+        .chain(own.forms.iter().map(QuestionId::as_str));
     out.write_record(header)?;
     for row in rows {
         let mut cells = vec![
@@ -226,7 +166,7 @@ pub(super) fn participants(rows: &[ParticipantRow], columns: &Columns) -> io::Re
             row.trials_planned.to_string(),
             time(row.started_at),
         ];
-        cells.extend(columns.forms.iter().map(|q| answer(row.answers.get(q))));
+        cells.extend(own.forms.iter().map(|q| answer(row.answers.get(q))));
         out.write_record(&cells)?;
     }
     bytes(out)

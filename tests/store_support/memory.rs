@@ -4,7 +4,7 @@
 //! The rules are the strict ones that POSIX allows: the bytes of a file are on the
 //! medium after a sync of the file, its name after a sync of the folder, and after
 //! a failed sync the bytes in doubt are lost although a later sync says "ok".
-#![allow(dead_code, missing_docs)]
+#![allow(dead_code, missing_docs, unreachable_pub)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -261,7 +261,11 @@ impl Appender for File {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let fault = self.disk.call(true)?;
         let mut state = self.disk.state.lock().unwrap();
-        let taken = if fault.is_some() { bytes.len() / 2 } else { bytes.len() };
+        let taken = if fault.is_some() {
+            bytes.len() / 2
+        } else {
+            bytes.len()
+        };
         if let Node::File { bytes: all, .. } = &mut state.nodes[self.node] {
             all.extend_from_slice(&bytes[..taken]);
         }

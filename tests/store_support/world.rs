@@ -1,5 +1,5 @@
 //! A small study, for tests of the store.
-#![allow(dead_code, missing_docs)]
+#![allow(dead_code, missing_docs, unreachable_pub)]
 
 use std::collections::BTreeMap;
 use study::limits::{Limit, Limits};
@@ -120,7 +120,10 @@ pub fn fingerprints() -> Fingerprints {
 
 pub fn files() -> Vec<(String, Vec<u8>)> {
     vec![
-        ("protocol.toml".to_owned(), b"format = \"study-protocol/1\"\n".to_vec()),
+        (
+            "protocol.toml".to_owned(),
+            b"format = \"study-protocol/1\"\n".to_vec(),
+        ),
         ("models/A.toml".to_owned(), b"id = \"A\"\n".to_vec()),
     ]
 }
