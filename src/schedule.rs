@@ -78,9 +78,17 @@ pub fn requeue(felt: &[&Trial], rest: &[Trial], failed: &Trial, design: &Design)
     let mut queue = rest.to_vec();
     queue.insert(place, failed.clone());
     let run = design.max_run.is_some_and(|max| {
-        let all: Vec<_> = felt.iter().copied().chain(&queue).map(|t| &t.model).collect();
+        let all: Vec<_> = felt
+            .iter()
+            .copied()
+            .chain(&queue)
+            .map(|t| &t.model)
+            .collect();
         let index = felt.len() + place;
-        let before = all[..index].iter().rev().take_while(|m| **m == &failed.model);
+        let before = all[..index]
+            .iter()
+            .rev()
+            .take_while(|m| **m == &failed.model);
         let after = all[index + 1..].iter().take_while(|m| **m == &failed.model);
         before.count() + after.count() + 1 > max as usize
     });
