@@ -17,8 +17,8 @@ use crate::device::{Device, Report};
 use crate::limits::Limits;
 use crate::model::Realization;
 use crate::outcome::{Event, Moment};
-use crate::protocol::{DeviceKind, FileOrders, Protocol};
 use crate::protocol::fingerprint::Fingerprints;
+use crate::protocol::{DeviceKind, FileOrders, Protocol};
 use crate::session::{Effect, Ending, Input, Session, View, input::Claim};
 use crate::store::{ClaimRequest, SeatKind, StudyFolder};
 use crate::text::{ModelId, ParticipantId};
@@ -259,7 +259,7 @@ impl Runner {
             kind: self.setup.kind,
             rows: self.setup.rows.clone(),
         };
-        let claimed = self.setup.study.claim(&request, self.setup.clock.now());
+        let claimed = self.setup.study.claim(&request);
         let opened = claimed.and_then(|mut claimed| {
             let journal = claimed.folder.journal()?;
             Ok((claimed, journal))

@@ -33,17 +33,34 @@ fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
         ("identify", &["model", "recording", "stats"]),
         ("session", &["protocol", "schedule", "outcome"]),
         ("store", &["protocol", "schedule", "outcome", "model"]),
-        ("device", &["outcome", "model", "plant", "trajectory", "recording"]),
+        (
+            "device",
+            &["outcome", "model", "plant", "trajectory", "recording"],
+        ),
         ("rater", &["protocol", "outcome", "model", "plant"]),
         ("analyze", &["protocol", "outcome", "stats", "model"]),
         (
             "runner",
-            &["session", "device", "store", "schedule", "outcome", "protocol", "model", "rater"],
+            &[
+                "session", "device", "store", "schedule", "outcome", "protocol", "model", "rater",
+            ],
         ),
-        ("report", &["analyze", "stats", "identify", "model", "outcome", "recording"]),
+        (
+            "report",
+            &[
+                "analyze",
+                "stats",
+                "identify",
+                "model",
+                "outcome",
+                "recording",
+            ],
+        ),
         (
             "power",
-            &["protocol", "schedule", "outcome", "analyze", "stats", "rater", "model"],
+            &[
+                "protocol", "schedule", "outcome", "analyze", "stats", "rater", "model",
+            ],
         ),
         ("tui", &["runner", "session", "outcome", "protocol"]),
         ("cli", all),
@@ -52,10 +69,24 @@ fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
 }
 
 /// Modules that may touch files, clocks, terminals, processes or the network.
-const WITH_IO: [&str; 7] = ["store", "tui", "runner", "cli", "main", "device/link", "device/serial"];
+const WITH_IO: [&str; 7] = [
+    "store",
+    "tui",
+    "runner",
+    "cli",
+    "main",
+    "device/link",
+    "device/serial",
+];
 const IO: [&str; 8] = [
-    "std::fs", "std::process", "std::net", "std::env", "Instant::now", "SystemTime::now",
-    "Local::now", "Utc::now",
+    "std::fs",
+    "std::process",
+    "std::net",
+    "std::env",
+    "Instant::now",
+    "SystemTime::now",
+    "Local::now",
+    "Utc::now",
 ];
 
 /// Files that use nothing but `core`, `libm` and slices.
@@ -133,7 +164,11 @@ fn violations(files: &[(String, String)]) -> Vec<String> {
     for (file, text) in files {
         let module = module_of(file);
         let lines = text.lines().count();
-        let most = if file == "main.rs" { MAX_MAIN_LINES } else { MAX_LINES };
+        let most = if file == "main.rs" {
+            MAX_MAIN_LINES
+        } else {
+            MAX_LINES
+        };
         if lines > most {
             wrong.push(format!("{file} has {lines} lines, more than {most}"));
         }
@@ -144,7 +179,9 @@ fn violations(files: &[(String, String)]) -> Vec<String> {
             continue;
         }
         let Some(may) = allowed.get(module) else {
-            wrong.push(format!("{file}: module {module} is not in the import table"));
+            wrong.push(format!(
+                "{file}: module {module} is not in the import table"
+            ));
             continue;
         };
         for import in imports(text) {
@@ -158,9 +195,9 @@ fn violations(files: &[(String, String)]) -> Vec<String> {
                 wrong.push(format!("{file} imports {import}"));
             }
         }
-        let with_io = WITH_IO
-            .iter()
-            .any(|m| module == *m || file.starts_with(&format!("{m}.")) || file.starts_with(&format!("{m}/")));
+        let with_io = WITH_IO.iter().any(|m| {
+            module == *m || file.starts_with(&format!("{m}.")) || file.starts_with(&format!("{m}/"))
+        });
         if !with_io {
             for word in IO {
                 if code(text).contains(word) {
@@ -169,7 +206,9 @@ fn violations(files: &[(String, String)]) -> Vec<String> {
             }
         }
         if CORE_ONLY.contains(&file.as_str()) {
-            for word in ["std::", "alloc::", "Vec<", "String", "Box<", "format!", "vec!"] {
+            for word in [
+                "std::", "alloc::", "Vec<", "String", "Box<", "format!", "vec!",
+            ] {
                 if code(text).contains(word) {
                     wrong.push(format!("{file} uses {word}"));
                 }
@@ -193,7 +232,10 @@ fn a_planted_violation_is_found() {
         ["session.rs imports device"]
     );
     assert_eq!(
-        planted("tui/views/x.rs", "use crate::{outcome::Place, store::{Journal, x}};\n"),
+        planted(
+            "tui/views/x.rs",
+            "use crate::{outcome::Place, store::{Journal, x}};\n"
+        ),
         ["tui/views/x.rs imports store"]
     );
     assert_eq!(

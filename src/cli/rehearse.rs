@@ -1,9 +1,10 @@
 //! `study rehearse`: a whole study with simulated participants.
 
 use super::{Console, Failure, Kind, load};
-use crate::device::virtual_device::{FaultPlan, Options, VirtualDevice};
-use crate::outcome::State;
-use crate::protocol::DeviceKind;
+use crate::device::faults::FaultPlan;
+use crate::device::virtual_device::{Options, VirtualDevice};
+use crate::outcome::{State, Status};
+use crate::protocol::{DeviceKind, Seat};
 use crate::rater::{Effect, Impression, Rater};
 use crate::runner::Setup;
 use crate::runner::clock::{Clock as _, VirtualClock};
@@ -78,13 +79,19 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut study = Some(study);
     let progress = super::console::progress(u64::from(args.participants), "participants");
     for number in 1..=args.participants {
-        let clock = VirtualClock::starting_at(first_day() + chrono::Days::new(u64::from(number - 1)));
+        let clock =
+            VirtualClock::starting_at(first_day() + chrono::Days::new(u64::from(number - 1)));
         let device_seed = seed.wrapping_add(u64::from(number) << 32);
-        let mut options = Options::real_time(device_seed);
-        options.telemetry_hz = f64::from(args.telemetry);
-        if args.faults {
-            options.faults = FaultPlan::random(device_seed, FAULT_PROBABILITY);
-        }
+        let options = Options {
+            seed: device_seed,
+            telemetry_hz: f64::from(args.telemetry),
+            faults: if args.faults {
+                FaultPlan::random(device_seed, FAULT_PROBABILITY)
+            } else {
+                FaultPlan::none()
+            },
+            ..Options::default()
+        };
         let here = match study.take() {
             Some(first) => first,
             None => StudyFolder::open(&folder)?,
@@ -111,17 +118,20 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     progress.finish_and_clear();
     let study = StudyFolder::open(&folder)?;
-    let derived = study.derive(&protocol)?;
-    study.write_derived(&derived)?;
+    let derived = study.refresh(&protocol)?;
     let done = derived
         .participants
         .iter()
         .filter(|p| p.state == State::Done)
         .count();
+    let rated = derived
+        .rows
+        .iter()
+        .filter(|row| !row.practice && row.status == Status::Ok)
+        .count();
     let shown = folder.display();
     console.out(format!(
-        "{done} simulated participants, {} rated trials in {shown}.\nSimulated: their liking is built in (docs/simulation.md) and is no evidence of anything.\nNext: study analyze {shown}\n",
-        derived.rated()
+        "{done} simulated participants, {rated} rated trials in {shown}.\nSimulated: their liking is built in (docs/simulation.md) and is no evidence of anything.\nNext: study analyze {shown}\n"
     ))
 }
 
@@ -131,14 +141,15 @@ fn refuse_occupied(study: &StudyFolder, folder: &Path) -> Result<(), Failure> {
     if sessions.is_empty() {
         return Ok(());
     }
-    let simulated = sessions.iter().filter(|s| s.is_simulated()).count();
+    let simulated = sessions
+        .iter()
+        .filter(|s| s.seat.is_some_and(Seat::is_simulated))
+        .count();
     let what = if simulated == sessions.len() {
         format!("already holds {simulated} rehearsed sessions")
     } else {
         "holds sessions with people".to_owned()
     };
-    Err(
-        Failure::results(format!("{} {what}", folder.display()))
-            .hint("name another folder with --out"),
-    )
+    Err(Failure::results(format!("{} {what}", folder.display()))
+        .hint("name another folder with --out"))
 }

@@ -33,7 +33,7 @@ pub(super) struct Args {
     #[arg(long)]
     pilot: bool,
     /// Rows that may be handed out, such as 1-40: give each of two rigs its own
-    #[arg(long, value_name = "A-B", value_parser = super::rows::parse)]
+    #[arg(long, value_name = "A-B", value_parser = super::schedule::parse_rows)]
     rows: Option<std::ops::RangeInclusive<u32>>,
     /// Folder that holds the results of all studies
     #[arg(long, value_name = "DIR", default_value = "results")]
@@ -92,14 +92,15 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut tui = Tui::open(tui::Options {
         mouse: !args.no_mouse,
         live: args.live,
-        colour: tui::Colour::of_environment(),
+        colour: tui::Colour::detect(|name| std::env::var(name).ok()),
     })
-    .map_err(|e| Failure::new(Kind::Usage, e))?;
+    .map_err(|e| Failure::new(Kind::Usage, &e).hint(e.hint()))?;
     let study = StudyFolder::open_or_create(&args.results, &frozen, at)?;
     let folder = study.path().to_owned();
-    let device: Box<dyn Device> = Box::new(VirtualDevice::new(Options::real_time(
-        loaded.protocol.study.seed,
-    )));
+    let device: Box<dyn Device> = Box::new(VirtualDevice::new(Options {
+        seed: loaded.protocol.study.seed,
+        ..Options::default()
+    }));
     let protocol = Arc::new(loaded.protocol);
     let setup = Setup {
         protocol: protocol.clone(),
@@ -137,8 +138,7 @@ fn finish(
 ) -> Result<(), Failure> {
     if *ending != Ending::Nothing {
         let study = StudyFolder::open(folder)?;
-        let derived = study.derive(protocol)?;
-        study.write_derived(&derived)?;
+        study.refresh(protocol)?;
     }
     let shown = folder.display();
     match ending {

@@ -140,7 +140,7 @@ fn csv(header: bool, plans: &[(u32, Vec<Trial>)]) -> Result<String, Failure> {
 }
 
 /// Reads `7` or `1-40`.
-fn parse_rows(given: &str) -> Result<RangeInclusive<u32>, String> {
+pub(super) fn parse_rows(given: &str) -> Result<RangeInclusive<u32>, String> {
     let number = |text: &str| {
         let text = text.trim();
         match text.parse::<u32>() {

@@ -76,7 +76,9 @@ pub fn run_one(
     for _ in 0..MAX_TURNS {
         let view = runner.view();
         match &view.screen {
-            Screen::Who { claiming: false, .. } => {
+            Screen::Who {
+                claiming: false, ..
+            } => {
                 if let Some(why) = view.notice.clone() {
                     return Err(RehearsalError::Refused {
                         participant: participant.to_owned(),

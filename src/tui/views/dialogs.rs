@@ -42,9 +42,7 @@ pub const KEYS: [(&str, &str, &str); 13] = [
 /// An answer in a few words, safe to show.
 pub fn answer_words(answer: &Answer, columns: usize) -> String {
     match answer {
-        Answer::Declined { reason } => {
-            wrap::one_line(&format!("declined: {reason}"), columns)
-        }
+        Answer::Declined { reason } => wrap::one_line(&format!("declined: {reason}"), columns),
         Answer::Text(text) if text.trim().is_empty() => "–".to_owned(),
         other => wrap::one_line(&other.cell(), columns),
     }
@@ -149,7 +147,8 @@ impl DialogView<'_> {
                 self.theme.text()
             }
         };
-        let one = |author, name: &str| Span::styled(format!("{} {name}   ", mark(author)), style(author));
+        let one =
+            |author, name: &str| Span::styled(format!("{} {name}   ", mark(author)), style(author));
         Line::from(vec![
             Span::styled("Says  ", self.theme.quiet()),
             one(Author::Experimenter, "experimenter"),
@@ -181,8 +180,13 @@ impl DialogView<'_> {
             let items = correct.items.iter().enumerate().skip(first);
             for (y, (i, item)) in (1..=height).zip(items) {
                 let here = i == correct.cursor;
-                let style = if here { self.theme.chosen() } else { self.theme.text() };
-                let answer = answer_words(&item.answer, usize::from(inside.width).saturating_sub(34));
+                let style = if here {
+                    self.theme.chosen()
+                } else {
+                    self.theme.text()
+                };
+                let answer =
+                    answer_words(&item.answer, usize::from(inside.width).saturating_sub(34));
                 let words = format!(
                     "{} {:<11} {:<18} {answer}",
                     if here { "›" } else { " " },
@@ -200,7 +204,11 @@ impl DialogView<'_> {
         };
         let columns = usize::from(inside.width);
         let prompt = wrap::one_line(&item.question.prompt, columns);
-        left(buf, row(inside, 1), &Line::from(Span::styled(prompt, self.theme.strong())));
+        left(
+            buf,
+            row(inside, 1),
+            &Line::from(Span::styled(prompt, self.theme.strong())),
+        );
         let now = answer_words(&item.answer, columns.saturating_sub(20));
         let title = wrap::one_line(&item.title, 12);
         let arrow = match &correct.step {
@@ -254,11 +262,21 @@ impl Widget for &DialogView<'_> {
             Dialog::MarkBad { trial, .. } => {
                 let trial = wrap::one_line(trial, 20);
                 let words = format!("Why is {trial} bad? It does not count and comes back later.");
-                self.ask(buf, inside, &words, &[("Enter", "marks it"), ("Esc", "closes")]);
+                self.ask(
+                    buf,
+                    inside,
+                    &words,
+                    &[("Enter", "marks it"), ("Esc", "closes")],
+                );
             }
             Dialog::Decline { .. } => {
                 let words = "Why is there no answer? The reason is kept.";
-                self.ask(buf, inside, words, &[("Enter", "declines"), ("Esc", "closes")]);
+                self.ask(
+                    buf,
+                    inside,
+                    words,
+                    &[("Enter", "declines"), ("Esc", "closes")],
+                );
             }
             Dialog::Confirm(confirm) => {
                 let (words, yes) = match confirm {

@@ -185,8 +185,16 @@ impl FormView<'_> {
         }
         if self.questions.len() > 1 {
             let other = if at == 0 { "comment" } else { "back" };
-            let is_comment = self.questions.iter().skip(1).any(|q| q.id.as_str() == "comment");
-            let other = if at == 0 && !is_comment { "next" } else { other };
+            let is_comment = self
+                .questions
+                .iter()
+                .skip(1)
+                .any(|q| q.id.as_str() == "comment");
+            let other = if at == 0 && !is_comment {
+                "next"
+            } else {
+                other
+            };
             keys.push(("Tab".to_owned(), other));
         }
         keys.push(("Enter".to_owned(), "save"));
@@ -203,7 +211,10 @@ impl FormView<'_> {
             let columns = usize::from(area.width).saturating_sub(30);
             let answer = super::dialogs::answer_words(&earlier.answer, columns);
             let line = Line::from(vec![
-                Span::styled(format!("{:<10} ", wrap::one_line(&earlier.title, 10)), self.theme.quiet()),
+                Span::styled(
+                    format!("{:<10} ", wrap::one_line(&earlier.title, 10)),
+                    self.theme.quiet(),
+                ),
                 Span::styled(
                     format!("{:<16} ", wrap::one_line(earlier.question.id.as_str(), 16)),
                     self.theme.quiet(),
@@ -220,7 +231,11 @@ impl Widget for &FormView<'_> {
         let tall = self.tall(self.column(body));
         let placed = self.place(body);
         if self.compact() {
-            let ask = if self.to_experimenter { "Set up" } else { "Ask" };
+            let ask = if self.to_experimenter {
+                "Set up"
+            } else {
+                "Ask"
+            };
             let label = Line::from(Span::styled(ask, self.theme.quiet()));
             left(buf, row(placed.prompt, 0), &label);
             let indented = Rect {
@@ -238,12 +253,19 @@ impl Widget for &FormView<'_> {
             };
             if let Some(title) = title {
                 let question = answer.question;
-                let words = wrap::one_line(&question.prompt, usize::from(title.width).saturating_sub(11));
+                let words = wrap::one_line(
+                    &question.prompt,
+                    usize::from(title.width).saturating_sub(11),
+                );
                 let mut spans = vec![Span::styled(words, self.theme.text())];
                 if !question.required {
                     spans.push(Span::styled(" (optional)", self.theme.quiet()));
                 }
-                let title = if self.compact() { *title } else { middle(*title, 72, 1) };
+                let title = if self.compact() {
+                    *title
+                } else {
+                    middle(*title, 72, 1)
+                };
                 left(buf, title, &Line::from(spans));
             }
             answer.render(*area, buf);

@@ -179,14 +179,16 @@ impl<'a> Page<'a> {
             return form.hints();
         }
         match &self.view.screen {
-            Screen::Who { claiming: false, .. } => own(&[("Tab", "other field"), ("Enter", "begin")]),
+            Screen::Who {
+                claiming: false, ..
+            } => own(&[("Tab", "other field"), ("Enter", "begin")]),
             Screen::Playing { .. } if self.view.can_advance => {
                 own(&[("Enter", "to rate"), ("Esc", "stops")])
             }
             Screen::Playing { .. } | Screen::Loading => own(&[("Esc", "stops")]),
-            Screen::DeviceTrouble { can_go_on: true, .. } => {
-                own(&[("Enter", "goes on"), ("F10", "leaves")])
-            }
+            Screen::DeviceTrouble {
+                can_go_on: true, ..
+            } => own(&[("Enter", "goes on"), ("F10", "leaves")]),
             Screen::DeviceTrouble { .. } => own(&[("F10", "leaves")]),
             Screen::SaveTrouble { .. } => own(&[("Enter", "tries again")]),
             _ => {
@@ -210,7 +212,10 @@ impl<'a> Page<'a> {
         };
         let (w, h) = MINIMUM;
         let lines = [
-            format!("{w} × {h} is needed, this is {} × {}.", area.width, area.height),
+            format!(
+                "{w} × {h} is needed, this is {} × {}.",
+                area.width, area.height
+            ),
             "Make the window larger.".to_owned(),
             stop.to_owned(),
         ];

@@ -56,13 +56,20 @@ impl Widget for &Status<'_> {
         let bad = matches!(line.device, DeviceState::Fault | DeviceState::Lost);
         let mut spans = vec![Span::styled(
             device(line.device),
-            if bad { self.theme.trouble_frame() } else { quiet },
+            if bad {
+                self.theme.trouble_frame()
+            } else {
+                quiet
+            },
         )];
         if line.device != DeviceState::Unknown {
             spans.push(Span::styled(format!(" · {}", clock(line.elapsed_s)), quiet));
             let (saved, answered) = (line.trials_saved, line.trials_answered);
             if !line.all_saved {
-                spans.push(Span::styled(format!(" · saving … {saved} of {answered}"), quiet));
+                spans.push(Span::styled(
+                    format!(" · saving … {saved} of {answered}"),
+                    quiet,
+                ));
             } else if answered > 0 {
                 spans.push(Span::styled(" · saved ", quiet));
                 spans.push(Span::styled("✓", self.theme.saved()));
@@ -100,10 +107,18 @@ impl Widget for &Top<'_> {
                 width: area.width.saturating_sub(2),
                 ..area
             };
-            left(buf, at, &Line::from(Span::styled(words, self.theme.banner())));
+            left(
+                buf,
+                at,
+                &Line::from(Span::styled(words, self.theme.banner())),
+            );
         }
         if let Some(progress) = self.view.progress {
-            let what = if progress.practice { "practice" } else { "trial" };
+            let what = if progress.practice {
+                "practice"
+            } else {
+                "trial"
+            };
             let (k, n) = (progress.current, progress.total);
             let words = Span::styled(format!("{what} {k} of {n}"), self.theme.quiet());
             let at = Rect {
