@@ -74,10 +74,10 @@ pub fn parse(path: &str, text: &str) -> Parsed {
         };
     }
     let document = Document::parse(text);
-    let broken = document.has_faults();
+    let broken = document.fault_count();
     let reader = Reader {
         document: &document,
-        broken,
+        broken: broken > 0,
     };
     let mut named = Vec::new();
     let protocol = if format_is_ours(&reader) {
@@ -87,6 +87,7 @@ pub fn parse(path: &str, text: &str) -> Parsed {
     };
     let read = document.finish();
     findings.faults = read.faults;
+    drop_echoes(&mut findings.faults, broken);
     findings.sort();
     Parsed {
         protocol: protocol.filter(|_| !findings.has_errors()),
@@ -94,6 +95,25 @@ pub fn parse(path: &str, text: &str) -> Parsed {
         spans: read.spans,
         named,
     }
+}
+
+/// Where the syntax is broken (the first `broken` faults), the reader stumbles a
+/// second time over what was put there instead: that is not a fault of its own.
+fn drop_echoes(faults: &mut Vec<Fault>, broken: usize) {
+    let holes: Vec<Range<usize>> = faults[..broken]
+        .iter()
+        .filter_map(|f| f.span.clone())
+        .collect();
+    let mut at = 0;
+    faults.retain(|fault| {
+        at += 1;
+        at <= broken
+            || !fault.span.as_ref().is_some_and(|span| {
+                holes
+                    .iter()
+                    .any(|hole| span.start <= hole.end && hole.start <= span.end)
+            })
+    });
 }
 
 /// A file of another format is not read any further: every key would be a fault.
