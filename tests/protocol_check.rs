@@ -1,5 +1,7 @@
 //! `study check`, `new` and `schema` as a user meets them.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use assert_cmd::Command;
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,8 @@
 //! The JSON Schema and the reader know the same keys, and the shipped protocols
 //! are valid by both.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::Path;

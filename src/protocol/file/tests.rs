@@ -1,5 +1,5 @@
 use super::*;
-use crate::protocol::{Answer, Order, QuestionKind, Role};
+use crate::protocol::{Answer, DeviceKind, Order, QuestionKind, Role};
 
 const LEAST: &str = r#"
 format = "study-protocol/1"
