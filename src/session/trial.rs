@@ -37,9 +37,9 @@ impl Session {
         }
     }
 
-    /// A device that starts unasked is made limp.
+    /// A device that starts unasked is made limp, and with it what was on its way.
     pub(super) fn device_started(&mut self, at: Moment) {
-        match (&self.phase, &self.history.open) {
+        match (&mut self.phase, &self.history.open) {
             (Phase::Ready { .. }, Some(open)) => {
                 let started = Event::PlaybackStarted {
                     trial: open.trial.trial,
@@ -53,6 +53,14 @@ impl Session {
                 };
             }
             (Phase::Playing { .. }, _) => {}
+            (Phase::Loading { .. }, _) => {
+                self.out.push(Effect::Limp);
+                self.lose_attempt(Failure::DeviceFault, "the device started unasked", at);
+            }
+            (Phase::Stopping { limped, .. }, _) => {
+                *limped = true;
+                self.out.push(Effect::Limp);
+            }
             _ => self.out.push(Effect::Limp),
         }
     }

