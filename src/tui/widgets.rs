@@ -33,12 +33,7 @@ pub fn row(area: Rect, y: u16) -> Rect {
 /// `area` without its first `y` rows, at most `height` tall.
 pub fn rows(area: Rect, y: u16, height: u16) -> Rect {
     let y = y.min(area.height);
-    Rect::new(
-        area.x,
-        area.y + y,
-        area.width,
-        height.min(area.height - y),
-    )
+    Rect::new(area.x, area.y + y, area.width, height.min(area.height - y))
 }
 
 /// Draws a line at the left of a row. The text has to be safe already.
@@ -57,7 +52,9 @@ pub fn centre(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
 
 /// Draws a line at the right of a row.
 pub fn right(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
-    let width = u16::try_from(line.width()).unwrap_or(u16::MAX).min(area.width);
+    let width = u16::try_from(line.width())
+        .unwrap_or(u16::MAX)
+        .min(area.width);
     let x = area.right() - width;
     left(buf, Rect { x, width, ..area }, line);
 }

@@ -13,7 +13,7 @@ use study::session::view::{
 use study::text::QuestionId;
 use study::tui::{Colour, Surface};
 
-pub fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
+pub(crate) fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
     let required = kind != QuestionKind::Text;
     Question {
         id: QuestionId::new(id).unwrap(),
@@ -23,7 +23,7 @@ pub fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
     }
 }
 
-pub fn rating(from: i64, to: i64, labels: &[(i64, &str)]) -> QuestionKind {
+pub(crate) fn rating(from: i64, to: i64, labels: &[(i64, &str)]) -> QuestionKind {
     QuestionKind::Rating {
         from,
         to,
@@ -31,16 +31,20 @@ pub fn rating(from: i64, to: i64, labels: &[(i64, &str)]) -> QuestionKind {
     }
 }
 
-pub fn realism() -> Question {
+pub(crate) fn realism() -> Question {
     let labels = [(1, "not at all realistic"), (7, "very realistic")];
-    question("realism", "How realistic did it feel?", rating(1, 7, &labels))
+    question(
+        "realism",
+        "How realistic did it feel?",
+        rating(1, 7, &labels),
+    )
 }
 
-pub fn comment() -> Question {
+pub(crate) fn comment() -> Question {
     question("comment", "Comment", QuestionKind::Text)
 }
 
-pub fn slider() -> Question {
+pub(crate) fn slider() -> Question {
     let ends = [("0", "no effort"), ("100", "the most I can imagine")];
     question(
         "effort",
@@ -54,8 +58,13 @@ pub fn slider() -> Question {
     )
 }
 
-pub fn choice(multiple: bool) -> Question {
-    let options = ["right-handed", "left-handed", "both", "I would rather not say"];
+pub(crate) fn choice(multiple: bool) -> Question {
+    let options = [
+        "right-handed",
+        "left-handed",
+        "both",
+        "I would rather not say",
+    ];
     question(
         "handedness",
         "Which hand do you write with?",
@@ -66,7 +75,7 @@ pub fn choice(multiple: bool) -> Question {
     )
 }
 
-pub fn number() -> Question {
+pub(crate) fn number() -> Question {
     question(
         "age",
         "How old are you?",
@@ -78,12 +87,12 @@ pub fn number() -> Question {
     )
 }
 
-pub const TRIAL: Place = Place::Trial {
+pub(crate) const TRIAL: Place = Place::Trial {
     trial: 7,
     attempt: 1,
 };
 
-pub fn form(questions: Vec<Question>) -> Screen {
+pub(crate) fn form(questions: Vec<Question>) -> Screen {
     Screen::Form {
         place: TRIAL,
         questions,
@@ -93,7 +102,7 @@ pub fn form(questions: Vec<Question>) -> Screen {
     }
 }
 
-pub fn view(screen: Screen) -> View {
+pub(crate) fn view(screen: Screen) -> View {
     let armed = matches!(screen, Screen::Playing { .. } | Screen::Loading);
     let device = match screen {
         Screen::Playing { .. } => DeviceState::Running {
@@ -109,7 +118,9 @@ pub fn view(screen: Screen) -> View {
     let before = !matches!(screen, Screen::Who { .. } | Screen::Consent { .. });
     let can_advance = match &screen {
         Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => *wait_s <= 0.0,
-        Screen::Playing { strokes_missing, .. } => *strokes_missing == 0,
+        Screen::Playing {
+            strokes_missing, ..
+        } => *strokes_missing == 0,
         Screen::Message { .. } | Screen::Paused { .. } | Screen::End { .. } => true,
         Screen::DeviceTrouble { can_go_on, .. } => *can_go_on,
         _ => false,
@@ -121,8 +132,18 @@ pub fn view(screen: Screen) -> View {
             total: 15,
         }),
         line: StatusLine {
-            participant: if device == DeviceState::Unknown { "" } else { "S03" }.to_owned(),
-            operator: if device == DeviceState::Unknown { "" } else { "lw" }.to_owned(),
+            participant: if device == DeviceState::Unknown {
+                ""
+            } else {
+                "S03"
+            }
+            .to_owned(),
+            operator: if device == DeviceState::Unknown {
+                ""
+            } else {
+                "lw"
+            }
+            .to_owned(),
             device,
             elapsed_s: 761.0,
             trials_saved: 6,
@@ -165,21 +186,21 @@ pub fn view(screen: Screen) -> View {
     }
 }
 
-pub fn pilot(screen: Screen) -> View {
+pub(crate) fn pilot(screen: Screen) -> View {
     View {
         banner: Some(Banner::Pilot),
         ..view(screen)
     }
 }
 
-pub fn asked(screen: Screen) -> View {
+pub(crate) fn asked(screen: Screen) -> View {
     View {
         entry: Entry::Experimenter,
         ..view(screen)
     }
 }
 
-pub fn strip() -> Strip {
+pub(crate) fn strip() -> Strip {
     Strip {
         samples: (0..300)
             .map(|i| {
@@ -193,138 +214,218 @@ pub fn strip() -> Strip {
 }
 
 /// Every screen once, by name.
-pub fn screens() -> Vec<(&'static str, View)> {
+pub(crate) fn screens() -> Vec<(&'static str, View)> {
     let text = |s: &str| s.to_owned();
     vec![
-        ("who", view(Screen::Who {
-            participant: text("S03"),
-            operator: String::new(),
-            claiming: false,
-        })),
-        ("resume", view(Screen::ResumeChoice {
-            gap_h: 19.25,
-            done: 6,
-            total: 15,
-        })),
-        ("consent", view(Screen::Consent {
-            document: text("Information and consent, turn-signal study"),
-            version: text("2"),
-        })),
-        ("instructions", view(Screen::Message {
-            kind: MessageKind::Instructions,
-            text: text(
-                "You will feel several versions of a turn-signal switch, one after the other.\n\n\
+        (
+            "who",
+            view(Screen::Who {
+                participant: text("S03"),
+                operator: String::new(),
+                claiming: false,
+            }),
+        ),
+        (
+            "resume",
+            view(Screen::ResumeChoice {
+                gap_h: 19.25,
+                done: 6,
+                total: 15,
+            }),
+        ),
+        (
+            "consent",
+            view(Screen::Consent {
+                document: text("Information and consent, turn-signal study"),
+                version: text("2"),
+            }),
+        ),
+        (
+            "instructions",
+            view(Screen::Message {
+                kind: MessageKind::Instructions,
+                text: text(
+                    "You will feel several versions of a turn-signal switch, one after the other.\n\n\
                  Before each one, operate the real switch. Then feel the device for as long as \
                  you like, and say how realistic it felt, from 1 (not at all) to 7 (very).\n\n\
                  There is no right or wrong answer. You may stop at any time with Esc.",
-            ),
-        })),
-        ("practice_over", view(Screen::Message {
-            kind: MessageKind::PracticeOver,
-            text: text("That was the practice. From now on it counts."),
-        })),
-        ("reference", view(Screen::Reference {
-            prompt: text("Operate the real switch."),
-            wait_s: 0.0,
-        })),
-        ("reference_wait", view(Screen::Reference {
-            prompt: text("Operate the real switch, then press Enter."),
-            wait_s: 4.2,
-        })),
+                ),
+            }),
+        ),
+        (
+            "practice_over",
+            view(Screen::Message {
+                kind: MessageKind::PracticeOver,
+                text: text("That was the practice. From now on it counts."),
+            }),
+        ),
+        (
+            "reference",
+            view(Screen::Reference {
+                prompt: text("Operate the real switch."),
+                wait_s: 0.0,
+            }),
+        ),
+        (
+            "reference_wait",
+            view(Screen::Reference {
+                prompt: text("Operate the real switch, then press Enter."),
+                wait_s: 4.2,
+            }),
+        ),
         ("loading", view(Screen::Loading)),
-        ("playing", view(Screen::Playing {
-            since_s: 14.3,
-            strokes_missing: 0,
-        })),
-        ("playing_strokes", pilot(Screen::Playing {
-            since_s: 3.0,
-            strokes_missing: 2,
-        })),
+        (
+            "playing",
+            view(Screen::Playing {
+                since_s: 14.3,
+                strokes_missing: 0,
+            }),
+        ),
+        (
+            "playing_strokes",
+            pilot(Screen::Playing {
+                since_s: 3.0,
+                strokes_missing: 2,
+            }),
+        ),
         ("stopping", view(Screen::Stopping)),
         ("stopped", view(Screen::Stopped { can_rate: true })),
-        ("device_trouble", view(Screen::DeviceTrouble {
-            what: text("overspeed: 1240 mm/s at 3.2 mm"),
-            can_go_on: true,
-        })),
-        ("device_lost", view(Screen::DeviceTrouble {
-            what: text("no answer for 200 ms"),
-            can_go_on: false,
-        })),
+        (
+            "device_trouble",
+            view(Screen::DeviceTrouble {
+                what: text("overspeed: 1240 mm/s at 3.2 mm"),
+                can_go_on: true,
+            }),
+        ),
+        (
+            "device_lost",
+            view(Screen::DeviceTrouble {
+                what: text("no answer for 200 ms"),
+                can_go_on: false,
+            }),
+        ),
         ("saving", view(Screen::Saving)),
-        ("save_trouble", view(Screen::SaveTrouble {
-            what: text("results/turn-signal/sessions/S03/1/journal.jsonl: no space left on device"),
-        })),
-        ("break", view(Screen::Break {
-            text: text("Take a rest."),
-            wait_s: 42.0,
-        })),
+        (
+            "save_trouble",
+            view(Screen::SaveTrouble {
+                what: text(
+                    "results/turn-signal/sessions/S03/1/journal.jsonl: no space left on device",
+                ),
+            }),
+        ),
+        (
+            "break",
+            view(Screen::Break {
+                text: text("Take a rest."),
+                wait_s: 42.0,
+            }),
+        ),
         ("paused", view(Screen::Paused { since_s: 65.0 })),
-        ("end", view(Screen::End { text: text("Thank you for taking part!") })),
+        (
+            "end",
+            view(Screen::End {
+                text: text("Thank you for taking part!"),
+            }),
+        ),
         ("rating", view(form(vec![realism(), comment()]))),
         ("rating_pilot", pilot(form(vec![realism(), comment()]))),
         ("rating_asked", asked(form(vec![realism(), comment()]))),
-        ("reference_asked", asked(Screen::Reference {
-            prompt: text("Operate the real switch."),
-            wait_s: 0.0,
-        })),
-        ("rating_eleven", view(form(vec![question(
-            "liking",
-            "Wie sehr gefällt dir der Schalter, verglichen mit dem echten?",
-            rating(0, 10, &[(0, "gar nicht"), (5, "mittel"), (10, "sehr")]),
-        ), comment()]))),
-        ("rating_signed", view(form(vec![question(
-            "force",
-            "力は本物と比べてどうでしたか。",
-            rating(-3, 3, &[(-3, "ずっと弱い"), (0, "同じ"), (3, "ずっと強い")]),
-        )]))),
-        ("rating_long", view(form(vec![question(
-            "percent",
-            "How sure are you?",
-            rating(0, 100, &[(0, "not at all"), (100, "completely")]),
-        )]))),
-        ("rating_all_labels", view(form(vec![question(
-            "agree",
-            "The detents were crisp.",
-            rating(1, 5, &[
-                (1, "strongly disagree"),
-                (2, "disagree"),
-                (3, "neither agree nor disagree"),
-                (4, "agree"),
-                (5, "strongly agree"),
-            ]),
-        )]))),
+        (
+            "reference_asked",
+            asked(Screen::Reference {
+                prompt: text("Operate the real switch."),
+                wait_s: 0.0,
+            }),
+        ),
+        (
+            "rating_eleven",
+            view(form(vec![
+                question(
+                    "liking",
+                    "Wie sehr gefällt dir der Schalter, verglichen mit dem echten?",
+                    rating(0, 10, &[(0, "gar nicht"), (5, "mittel"), (10, "sehr")]),
+                ),
+                comment(),
+            ])),
+        ),
+        (
+            "rating_signed",
+            view(form(vec![question(
+                "force",
+                "力は本物と比べてどうでしたか。",
+                rating(-3, 3, &[(-3, "ずっと弱い"), (0, "同じ"), (3, "ずっと強い")]),
+            )])),
+        ),
+        (
+            "rating_long",
+            view(form(vec![question(
+                "percent",
+                "How sure are you?",
+                rating(0, 100, &[(0, "not at all"), (100, "completely")]),
+            )])),
+        ),
+        (
+            "rating_all_labels",
+            view(form(vec![question(
+                "agree",
+                "The detents were crisp.",
+                rating(
+                    1,
+                    5,
+                    &[
+                        (1, "strongly disagree"),
+                        (2, "disagree"),
+                        (3, "neither agree nor disagree"),
+                        (4, "agree"),
+                        (5, "strongly agree"),
+                    ],
+                ),
+            )])),
+        ),
         ("slider", view(form(vec![slider(), comment()]))),
         ("choice", view(form(vec![choice(false)]))),
         ("choice_several", view(form(vec![choice(true)]))),
         ("number", view(form(vec![number()]))),
-        ("text", view(form(vec![question(
-            "strategy",
-            "How did you decide?",
-            QuestionKind::Text,
-        )]))),
-        ("setup", View {
-            progress: None,
-            ..view(Screen::Form {
-                place: Place::Setup,
-                questions: vec![question(
-                    "room",
-                    "Temperature of the room",
-                    QuestionKind::Number {
-                        unit: Some("°C".to_owned()),
-                        min: None,
-                        max: None,
-                    },
-                )],
-                page: 1,
-                pages: 2,
-                to_experimenter: true,
-            })
-        }),
+        (
+            "text",
+            view(form(vec![question(
+                "strategy",
+                "How did you decide?",
+                QuestionKind::Text,
+            )])),
+        ),
+        (
+            "setup",
+            View {
+                progress: None,
+                ..view(Screen::Form {
+                    place: Place::Setup,
+                    questions: vec![question(
+                        "room",
+                        "Temperature of the room",
+                        QuestionKind::Number {
+                            unit: Some("°C".to_owned()),
+                            min: None,
+                            max: None,
+                        },
+                    )],
+                    page: 1,
+                    pages: 2,
+                    to_experimenter: true,
+                })
+            },
+        ),
     ]
 }
 
 /// What is drawn, as a buffer.
-pub fn drawn(surface: &mut Surface, view: &View, strip: Option<&Strip>, w: u16, h: u16) -> Buffer {
+pub(crate) fn drawn(
+    surface: &mut Surface,
+    view: &View,
+    strip: Option<&Strip>,
+    w: u16,
+    h: u16,
+) -> Buffer {
     let area = Rect::new(0, 0, w, h);
     let mut buf = Buffer::empty(area);
     surface.follow(view, area);
@@ -333,7 +434,7 @@ pub fn drawn(surface: &mut Surface, view: &View, strip: Option<&Strip>, w: u16, 
 }
 
 /// The characters of a buffer.
-pub fn picture(buf: &Buffer) -> String {
+pub(crate) fn picture(buf: &Buffer) -> String {
     let area = buf.area;
     let mut out = String::new();
     for y in area.top()..area.bottom() {
@@ -352,6 +453,6 @@ pub fn picture(buf: &Buffer) -> String {
 }
 
 /// The picture of a view that nobody has typed into.
-pub fn fresh(view: &View, w: u16, h: u16) -> String {
+pub(crate) fn fresh(view: &View, w: u16, h: u16) -> String {
     picture(&drawn(&mut Surface::new(Colour::None), view, None, w, h))
 }

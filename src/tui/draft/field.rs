@@ -416,7 +416,10 @@ mod tests {
     fn extreme_scales_do_not_overflow() {
         let scale = scale(i64::MIN, i64::MAX);
         assert!(after(&scale, &digits("-9")).is_some());
-        assert_eq!(after(&scale, &[Key::End, Key::Right]), Some(i64::MAX as f64));
+        assert_eq!(
+            after(&scale, &[Key::End, Key::Right]),
+            Some(i64::MAX as f64)
+        );
     }
 
     #[test]
@@ -429,7 +432,10 @@ mod tests {
         });
         assert_eq!(after(&slider, &[]), None);
         assert_eq!(after(&slider, &[Key::Right]), Some(0.5));
-        assert_eq!(after(&slider, &[Key::Home, Key::Right, Key::Right, Key::Right]), Some(0.3));
+        assert_eq!(
+            after(&slider, &[Key::Home, Key::Right, Key::Right, Key::Right]),
+            Some(0.3)
+        );
         assert_eq!(after(&slider, &digits("0.75")), Some(0.75));
         assert_eq!(after(&slider, &digits("2")), None);
     }
@@ -440,7 +446,11 @@ mod tests {
         for (multiple, keys, want) in [
             (false, vec![Key::Down, Key::Down], vec!["b"]),
             (false, digits("31"), vec!["a"]),
-            (true, vec![Key::Down, Key::Char(' '), Key::End, Key::Char('x')], vec!["a", "c"]),
+            (
+                true,
+                vec![Key::Down, Key::Char(' '), Key::End, Key::Char('x')],
+                vec!["a", "c"],
+            ),
             (true, digits("323"), vec!["b"]),
         ] {
             let question = question(QuestionKind::Choice {

@@ -45,7 +45,10 @@ impl List<'_> {
 
     /// Columns that the widest option takes.
     pub fn columns(&self) -> u16 {
-        let widest = self.options.iter().map(|o| wrap::width(&wrap::one_line(o, 400)));
+        let widest = self
+            .options
+            .iter()
+            .map(|o| wrap::width(&wrap::one_line(o, 400)));
         u16::try_from(widest.max().unwrap_or(0)).unwrap_or(400) + MARGIN
     }
 
@@ -106,7 +109,11 @@ impl Widget for &List<'_> {
                     self.theme.text()
                 };
                 let mut spans = if j == 0 {
-                    let digit = if i < 9 { (i + 1).to_string() } else { " ".to_owned() };
+                    let digit = if i < 9 {
+                        (i + 1).to_string()
+                    } else {
+                        " ".to_owned()
+                    };
                     let pointer = if here { "›" } else { " " };
                     vec![
                         Span::styled(digit, self.theme.quiet()),

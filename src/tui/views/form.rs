@@ -122,7 +122,11 @@ impl FormView<'_> {
         let prompt = rows(area, y, prompt_rows);
         y += prompt_rows + gap;
         let mut answers = Vec::new();
+        // What comes after a scale of boxes keeps to their edges.
+        let boxes = self.answer(0, tall).and_then(|a| a.edges(area));
+        let below = boxes.filter(|edges| edges.width >= 48).unwrap_or(area);
         for (at, height) in heights.iter().enumerate() {
+            let area = if at > 0 { below } else { area };
             let title = (at > 0).then(|| {
                 let title = row(area, y);
                 y += 1;
@@ -185,8 +189,16 @@ impl FormView<'_> {
         }
         if self.questions.len() > 1 {
             let other = if at == 0 { "comment" } else { "back" };
-            let is_comment = self.questions.iter().skip(1).any(|q| q.id.as_str() == "comment");
-            let other = if at == 0 && !is_comment { "next" } else { other };
+            let is_comment = self
+                .questions
+                .iter()
+                .skip(1)
+                .any(|q| q.id.as_str() == "comment");
+            let other = if at == 0 && !is_comment {
+                "next"
+            } else {
+                other
+            };
             keys.push(("Tab".to_owned(), other));
         }
         keys.push(("Enter".to_owned(), "save"));
@@ -203,7 +215,10 @@ impl FormView<'_> {
             let columns = usize::from(area.width).saturating_sub(30);
             let answer = super::dialogs::answer_words(&earlier.answer, columns);
             let line = Line::from(vec![
-                Span::styled(format!("{:<10} ", wrap::one_line(&earlier.title, 10)), self.theme.quiet()),
+                Span::styled(
+                    format!("{:<10} ", wrap::one_line(&earlier.title, 10)),
+                    self.theme.quiet(),
+                ),
                 Span::styled(
                     format!("{:<16} ", wrap::one_line(earlier.question.id.as_str(), 16)),
                     self.theme.quiet(),
@@ -220,7 +235,11 @@ impl Widget for &FormView<'_> {
         let tall = self.tall(self.column(body));
         let placed = self.place(body);
         if self.compact() {
-            let ask = if self.to_experimenter { "Set up" } else { "Ask" };
+            let ask = if self.to_experimenter {
+                "Set up"
+            } else {
+                "Ask"
+            };
             let label = Line::from(Span::styled(ask, self.theme.quiet()));
             left(buf, row(placed.prompt, 0), &label);
             let indented = Rect {
@@ -238,12 +257,19 @@ impl Widget for &FormView<'_> {
             };
             if let Some(title) = title {
                 let question = answer.question;
-                let words = wrap::one_line(&question.prompt, usize::from(title.width).saturating_sub(11));
+                let words = wrap::one_line(
+                    &question.prompt,
+                    usize::from(title.width).saturating_sub(11),
+                );
                 let mut spans = vec![Span::styled(words, self.theme.text())];
                 if !question.required {
                     spans.push(Span::styled(" (optional)", self.theme.quiet()));
                 }
-                let title = if self.compact() { *title } else { middle(*title, 72, 1) };
+                let title = if self.compact() {
+                    *title
+                } else {
+                    middle(*title, 72, 1)
+                };
                 left(buf, title, &Line::from(spans));
             }
             answer.render(*area, buf);

@@ -46,7 +46,10 @@ impl Widget for &Playing<'_> {
             let strokes = if self.strokes_missing == 1 {
                 "1 full stroke more, from end to end".to_owned()
             } else {
-                format!("{} full strokes more, from end to end", self.strokes_missing)
+                format!(
+                    "{} full strokes more, from end to end",
+                    self.strokes_missing
+                )
             };
             let line = Line::from(Span::styled(strokes, self.theme.text()));
             centre(buf, row(words, y + 4), &line);
@@ -122,7 +125,11 @@ impl Widget for &Trace<'_> {
                 width: AXIS - 1,
                 ..row(area, y)
             };
-            right(buf, at, &Line::from(Span::styled(label, self.theme.quiet())));
+            right(
+                buf,
+                at,
+                &Line::from(Span::styled(label, self.theme.quiet())),
+            );
         }
         let foot = Rect {
             x: plot.x,

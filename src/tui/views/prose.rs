@@ -36,7 +36,13 @@ pub struct Prose {
 /// The words of a screen; `None` for the screens that are more than words.
 pub fn prose(view: &View) -> Option<Prose> {
     let aloud = view.entry == Entry::Experimenter;
-    let read_out = |text: &str| if aloud { text.to_owned() } else { String::new() };
+    let read_out = |text: &str| {
+        if aloud {
+            text.to_owned()
+        } else {
+            String::new()
+        }
+    };
     let ready: &[_] = if view.can_advance {
         &[("Enter", "when ready")]
     } else {
@@ -44,7 +50,11 @@ pub fn prose(view: &View) -> Option<Prose> {
     };
     let wait = |seconds: f64| {
         if seconds > 0.0 && seconds.is_finite() {
-            format!("in {}", clock(seconds.ceil()))
+            match seconds.ceil() {
+                1.0 => "in 1 second".to_owned(),
+                whole if whole < 100.0 => format!("in {whole} seconds"),
+                whole => format!("in {}", clock(whole)),
+            }
         } else {
             String::new()
         }
@@ -57,7 +67,11 @@ pub fn prose(view: &View) -> Option<Prose> {
                 hours(*gap_h)
             ),
             choices: vec![
-                ("b", "restart the block", "what was felt in it is felt again"),
+                (
+                    "b",
+                    "restart the block",
+                    "what was felt in it is felt again",
+                ),
                 ("c", "continue where it stopped", "what follows is marked"),
                 ("d", "drop out", "the participant does not come back"),
             ],
@@ -215,18 +229,30 @@ impl ProseView<'_> {
         let from = self.reading.scrolled.min(lines.len().saturating_sub(page));
         let style = self.theme.text();
         if place.y >= area.y + 2 && !self.prose.above.is_empty() {
-            let above = Rect { y: place.y - 2, height: 1, ..area };
+            let above = Rect {
+                y: place.y - 2,
+                height: 1,
+                ..area
+            };
             let line = Line::from(Span::styled(self.prose.above.as_str(), self.theme.quiet()));
             centre(buf, above, &line);
         }
         if lines.len() <= 2 {
-            let wide = Rect { x: area.x, width: area.width, ..place };
+            let wide = Rect {
+                x: area.x,
+                width: area.width,
+                ..place
+            };
             centre_all(buf, wide, &lines, self.theme.strong());
         } else {
             left_all(buf, place, &lines[from..], style);
         }
         let more = lines.len() > from + page;
-        let foot = Rect { y: place.bottom() + 1, height: 1, ..area };
+        let foot = Rect {
+            y: place.bottom() + 1,
+            height: 1,
+            ..area
+        };
         if foot.bottom() <= area.bottom() && !self.prose.title.is_empty() {
             let line = Line::from(Span::styled(self.prose.title.as_str(), self.theme.quiet()));
             centre(buf, foot, &line);
@@ -236,7 +262,11 @@ impl ProseView<'_> {
             right(buf, row(area, 0), &arrow("↑ more  "));
         }
         if more {
-            right(buf, row(area, area.height.saturating_sub(1)), &arrow("↓ more  "));
+            right(
+                buf,
+                row(area, area.height.saturating_sub(1)),
+                &arrow("↓ more  "),
+            );
         }
     }
 }
@@ -271,7 +301,11 @@ impl Widget for &ProseView<'_> {
         centre_all(buf, rows(area, y, len(&body)), &body, self.theme.text());
         y += len(&body) + 2;
         let widest = |(key, what, more): &(&str, &str, &str)| {
-            let more = if more.is_empty() { 0 } else { wrap::width(more) + 3 };
+            let more = if more.is_empty() {
+                0
+            } else {
+                wrap::width(more) + 3
+            };
             wrap::width(key).max(5) + 2 + wrap::width(what) + more
         };
         let wide = prose.choices.iter().map(widest).max().unwrap_or(0);

@@ -58,9 +58,17 @@ impl Boxes<'_> {
         }
         let count = u16::try_from(self.to - self.from + 1).unwrap_or(1);
         let wide = ((area.width + 1) / count - 1).clamp(NARROW, WIDE);
-        let wide = if wide.is_multiple_of(2) { wide - 1 } else { wide };
+        let wide = if wide.is_multiple_of(2) {
+            wide - 1
+        } else {
+            wide
+        };
         let gap = if wide >= 11 { 2 } else { 1 };
-        let gap = if count * wide + (count - 1) * gap > area.width { 1 } else { gap };
+        let gap = if count * wide + (count - 1) * gap > area.width {
+            1
+        } else {
+            gap
+        };
         let all = count * wide + (count - 1) * gap;
         let start = area.x + (area.width - all) / 2;
         let height = self.tall.min(area.height);
@@ -117,7 +125,11 @@ impl Boxes<'_> {
     /// Rows that the labels take in so many columns.
     pub fn caption_rows(&self, columns: u16) -> u16 {
         let area = Rect::new(0, 0, columns, 3);
-        let most = self.captions(area).into_iter().map(|(_, _, l)| l.len()).max();
+        let most = self
+            .captions(area)
+            .into_iter()
+            .map(|(_, _, l)| l.len())
+            .max();
         u16::try_from(most.unwrap_or(0)).unwrap_or(4)
     }
 }
@@ -259,7 +271,15 @@ impl Widget for &Track<'_> {
             let column = (part * f64::from(line.width.saturating_sub(1))).round() as u16;
             let x = line.x + column;
             let mark = Line::from(Span::styled("●", self.theme.chosen()));
-            left(buf, Rect { x, width: 1, ..line }, &mark);
+            left(
+                buf,
+                Rect {
+                    x,
+                    width: 1,
+                    ..line
+                },
+                &mark,
+            );
             let text = Line::from(Span::styled(
                 value.to_string().replace('-', "−"),
                 self.theme.chosen(),
@@ -290,7 +310,11 @@ impl Widget for &Track<'_> {
         for (side, lines) in [(false, low), (true, high)] {
             for (i, text) in (0u16..).zip(&lines) {
                 let at = row(area, TRACK_ROWS + i);
-                let at = Rect { x: line.x, width: line.width.min(at.width), ..at };
+                let at = Rect {
+                    x: line.x,
+                    width: line.width.min(at.width),
+                    ..at
+                };
                 let text = Line::from(Span::styled(text.as_str(), self.theme.text()));
                 if side {
                     right(buf, at, &text);

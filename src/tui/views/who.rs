@@ -45,15 +45,27 @@ impl WhoView<'_> {
         };
         let (participant, operator) = (&self.who.participant, &self.who.operator);
         [
-            ("Participant", "a pseudonym, such as P01", field(participant, false), at(3)),
-            ("Operator", "your initials or a code", field(operator, true), at(6)),
+            (
+                "Participant",
+                "a pseudonym, such as P01",
+                field(participant, false),
+                at(3),
+            ),
+            (
+                "Operator",
+                "your initials or a code",
+                field(operator, true),
+                at(6),
+            ),
         ]
     }
 
     /// Where the terminal's cursor belongs.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
         let fields = self.fields(area);
-        fields.iter().find_map(|(_, _, field, at)| field.cursor(*at))
+        fields
+            .iter()
+            .find_map(|(_, _, field, at)| field.cursor(*at))
     }
 }
 
@@ -68,7 +80,11 @@ impl Widget for &WhoView<'_> {
         let title = Line::from(Span::styled(title, self.theme.strong()));
         centre(buf, row(place, 0), &title);
         for (label, hint, field, at) in self.fields(area) {
-            let start = Rect { x: place.x, width: LABEL.min(place.width), ..at };
+            let start = Rect {
+                x: place.x,
+                width: LABEL.min(place.width),
+                ..at
+            };
             let label = Line::from(Span::styled(label, self.theme.text()));
             left(buf, start, &label);
             field.render(at, buf);
