@@ -13,7 +13,7 @@ use study::session::view::{
 use study::text::QuestionId;
 use study::tui::{Colour, Surface};
 
-pub fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
+pub(crate) fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
     let required = kind != QuestionKind::Text;
     Question {
         id: QuestionId::new(id).unwrap(),
@@ -23,7 +23,7 @@ pub fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
     }
 }
 
-pub fn rating(from: i64, to: i64, labels: &[(i64, &str)]) -> QuestionKind {
+pub(crate) fn rating(from: i64, to: i64, labels: &[(i64, &str)]) -> QuestionKind {
     QuestionKind::Rating {
         from,
         to,
@@ -31,7 +31,7 @@ pub fn rating(from: i64, to: i64, labels: &[(i64, &str)]) -> QuestionKind {
     }
 }
 
-pub fn realism() -> Question {
+pub(crate) fn realism() -> Question {
     let labels = [(1, "not at all realistic"), (7, "very realistic")];
     question(
         "realism",
@@ -40,11 +40,11 @@ pub fn realism() -> Question {
     )
 }
 
-pub fn comment() -> Question {
+pub(crate) fn comment() -> Question {
     question("comment", "Comment", QuestionKind::Text)
 }
 
-pub fn slider() -> Question {
+pub(crate) fn slider() -> Question {
     let ends = [("0", "no effort"), ("100", "the most I can imagine")];
     question(
         "effort",
@@ -58,7 +58,7 @@ pub fn slider() -> Question {
     )
 }
 
-pub fn choice(multiple: bool) -> Question {
+pub(crate) fn choice(multiple: bool) -> Question {
     let options = [
         "right-handed",
         "left-handed",
@@ -75,7 +75,7 @@ pub fn choice(multiple: bool) -> Question {
     )
 }
 
-pub fn number() -> Question {
+pub(crate) fn number() -> Question {
     question(
         "age",
         "How old are you?",
@@ -87,12 +87,12 @@ pub fn number() -> Question {
     )
 }
 
-pub const TRIAL: Place = Place::Trial {
+pub(crate) const TRIAL: Place = Place::Trial {
     trial: 7,
     attempt: 1,
 };
 
-pub fn form(questions: Vec<Question>) -> Screen {
+pub(crate) fn form(questions: Vec<Question>) -> Screen {
     Screen::Form {
         place: TRIAL,
         questions,
@@ -102,7 +102,7 @@ pub fn form(questions: Vec<Question>) -> Screen {
     }
 }
 
-pub fn view(screen: Screen) -> View {
+pub(crate) fn view(screen: Screen) -> View {
     let armed = matches!(screen, Screen::Playing { .. } | Screen::Loading);
     let device = match screen {
         Screen::Playing { .. } => DeviceState::Running {
@@ -186,21 +186,21 @@ pub fn view(screen: Screen) -> View {
     }
 }
 
-pub fn pilot(screen: Screen) -> View {
+pub(crate) fn pilot(screen: Screen) -> View {
     View {
         banner: Some(Banner::Pilot),
         ..view(screen)
     }
 }
 
-pub fn asked(screen: Screen) -> View {
+pub(crate) fn asked(screen: Screen) -> View {
     View {
         entry: Entry::Experimenter,
         ..view(screen)
     }
 }
 
-pub fn strip() -> Strip {
+pub(crate) fn strip() -> Strip {
     Strip {
         samples: (0..300)
             .map(|i| {
@@ -214,7 +214,7 @@ pub fn strip() -> Strip {
 }
 
 /// Every screen once, by name.
-pub fn screens() -> Vec<(&'static str, View)> {
+pub(crate) fn screens() -> Vec<(&'static str, View)> {
     let text = |s: &str| s.to_owned();
     vec![
         (
@@ -419,7 +419,13 @@ pub fn screens() -> Vec<(&'static str, View)> {
 }
 
 /// What is drawn, as a buffer.
-pub fn drawn(surface: &mut Surface, view: &View, strip: Option<&Strip>, w: u16, h: u16) -> Buffer {
+pub(crate) fn drawn(
+    surface: &mut Surface,
+    view: &View,
+    strip: Option<&Strip>,
+    w: u16,
+    h: u16,
+) -> Buffer {
     let area = Rect::new(0, 0, w, h);
     let mut buf = Buffer::empty(area);
     surface.follow(view, area);
@@ -428,7 +434,7 @@ pub fn drawn(surface: &mut Surface, view: &View, strip: Option<&Strip>, w: u16, 
 }
 
 /// The characters of a buffer.
-pub fn picture(buf: &Buffer) -> String {
+pub(crate) fn picture(buf: &Buffer) -> String {
     let area = buf.area;
     let mut out = String::new();
     for y in area.top()..area.bottom() {
@@ -447,6 +453,6 @@ pub fn picture(buf: &Buffer) -> String {
 }
 
 /// The picture of a view that nobody has typed into.
-pub fn fresh(view: &View, w: u16, h: u16) -> String {
+pub(crate) fn fresh(view: &View, w: u16, h: u16) -> String {
     picture(&drawn(&mut Surface::new(Colour::None), view, None, w, h))
 }

@@ -137,11 +137,32 @@ impl Dialog {
         }
     }
 
+    /// The key that opened it. It closes it too, without stopping a device that
+    /// plays, unless something is typed.
+    fn own_key(&self) -> Option<Key> {
+        Some(match self {
+            Self::Help => Key::Help,
+            Self::Remark { .. } => Key::Remark,
+            Self::Correct(_) => Key::Correct,
+            Self::MarkBad { .. } => Key::MarkBad,
+            Self::Decline { .. } => Key::Decline,
+            Self::Confirm(_) => return None,
+        })
+    }
+
     /// Works on the dialog. Esc is the caller's.
     pub fn key(&mut self, key: Key, screen: &Screen) -> Outcome {
+        if self.own_key() == Some(key) {
+            return match self.editor() {
+                Some(editor) if !editor.is_blank() => {
+                    missing("Something is typed: Enter keeps it, Ctrl-U removes it.")
+                }
+                _ => Outcome::Closed,
+            };
+        }
         match self {
             Self::Help => match key {
-                Key::Enter | Key::Help | Key::Char('?' | 'q') => Outcome::Closed,
+                Key::Enter | Key::Char('?' | 'q') => Outcome::Closed,
                 _ => Outcome::Open(Taken::No),
             },
             Self::Remark { by, text } => match key {

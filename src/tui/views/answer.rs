@@ -106,6 +106,18 @@ impl<'a> AnswerField<'a> {
         }
     }
 
+    /// From the first box to the last, if it is a scale of boxes.
+    pub fn edges(&self, area: Rect) -> Option<Rect> {
+        let at = Rect { height: 3, ..area };
+        let places = self.boxes(area.width)?.places(at);
+        let (first, last) = (places.first()?.1, places.last()?.1);
+        Some(Rect {
+            x: first.x,
+            width: last.right() - first.x,
+            ..area
+        })
+    }
+
     /// Rows that it takes in so many columns; at most `most`.
     pub fn rows(&self, columns: u16, most: u16) -> u16 {
         let rows = if let Some(boxes) = self.boxes(columns) {

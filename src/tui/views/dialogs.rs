@@ -18,6 +18,8 @@ use ratatui::widgets::Widget;
 pub struct DialogView<'a> {
     /// What is open.
     pub dialog: &'a Dialog,
+    /// Whether Esc also stops a device that is loaded or plays.
+    pub armed: bool,
     /// Its look.
     pub theme: Theme,
 }
@@ -135,7 +137,18 @@ impl DialogView<'_> {
 
     fn keys(&self, buf: &mut Buffer, inside: Rect, keys: &[(&str, &str)]) {
         let last = row(inside, inside.height.saturating_sub(1));
-        left(buf, last, &hints(self.theme, keys));
+        let esc = if self.armed {
+            ("Esc", "closes and STOPS")
+        } else {
+            ("Esc", "closes")
+        };
+        let mut keys = keys.to_vec();
+        match self.dialog {
+            Dialog::Confirm(_) => {}
+            Dialog::Help if !self.armed => {}
+            _ => keys.push(esc),
+        }
+        left(buf, last, &hints(self.theme, &keys));
     }
 
     fn by(&self, by: Author) -> Line<'static> {
@@ -164,7 +177,7 @@ impl DialogView<'_> {
                 format!("{key}  {other}")
             };
             let line = Line::from(vec![
-                Span::styled(format!("{both:<17}"), self.theme.key()),
+                Span::styled(format!("{both:<20}"), self.theme.key()),
                 Span::styled(what, self.theme.text()),
             ]);
             left(buf, row(inside, y), &line);
@@ -195,7 +208,7 @@ impl DialogView<'_> {
                 );
                 left(buf, row(inside, y), &Line::from(Span::styled(words, style)));
             }
-            let keys = [("↑ ↓", "which"), ("Enter", "correct it"), ("Esc", "closes")];
+            let keys = [("↑ ↓", "which"), ("Enter", "correct it")];
             self.keys(buf, inside, &keys);
             return;
         }
@@ -228,13 +241,13 @@ impl DialogView<'_> {
                 left(buf, row(inside, 3), &self.by(*by));
                 let why = Line::from(Span::styled("Why? Both answers are kept.", quiet));
                 left(buf, row(inside, 4), &why);
-                let keys = [("Enter", "corrects"), ("Tab", "who"), ("Esc", "closes")];
+                let keys = [("Enter", "corrects"), ("Tab", "who")];
                 self.keys(buf, inside, &keys);
             }
             _ => {
                 let new = Line::from(Span::styled("The new answer:", quiet));
                 left(buf, row(inside, 4), &new);
-                let keys = [("Enter", "goes on"), ("F6", "declined"), ("Esc", "closes")];
+                let keys = [("Enter", "goes on"), ("F6", "declined")];
                 self.keys(buf, inside, &keys);
             }
         }
@@ -255,28 +268,18 @@ impl Widget for &DialogView<'_> {
             Dialog::Help => self.help(buf, inside),
             Dialog::Remark { by, .. } => {
                 left(buf, row(inside, 1), &self.by(*by));
-                let keys = [("Enter", "saves"), ("Tab", "who"), ("Esc", "closes")];
+                let keys = [("Enter", "saves"), ("Tab", "who")];
                 self.keys(buf, inside, &keys);
             }
             Dialog::Correct(correct) => self.correct(buf, inside, correct),
             Dialog::MarkBad { trial, .. } => {
                 let trial = wrap::one_line(trial, 20);
                 let words = format!("Why is {trial} bad? It does not count and comes back later.");
-                self.ask(
-                    buf,
-                    inside,
-                    &words,
-                    &[("Enter", "marks it"), ("Esc", "closes")],
-                );
+                self.ask(buf, inside, &words, &[("Enter", "marks it")]);
             }
             Dialog::Decline { .. } => {
                 let words = "Why is there no answer? The reason is kept.";
-                self.ask(
-                    buf,
-                    inside,
-                    words,
-                    &[("Enter", "declines"), ("Esc", "closes")],
-                );
+                self.ask(buf, inside, words, &[("Enter", "declines")]);
             }
             Dialog::Confirm(confirm) => {
                 let (words, yes) = match confirm {

@@ -122,7 +122,11 @@ impl FormView<'_> {
         let prompt = rows(area, y, prompt_rows);
         y += prompt_rows + gap;
         let mut answers = Vec::new();
+        // What comes after a scale of boxes keeps to their edges.
+        let boxes = self.answer(0, tall).and_then(|a| a.edges(area));
+        let below = boxes.filter(|edges| edges.width >= 48).unwrap_or(area);
         for (at, height) in heights.iter().enumerate() {
+            let area = if at > 0 { below } else { area };
             let title = (at > 0).then(|| {
                 let title = row(area, y);
                 y += 1;

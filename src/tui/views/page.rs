@@ -9,7 +9,9 @@ use super::prose::{ProseView, prose};
 use super::status::{Status, Top};
 use super::trouble::Trouble;
 use super::who::WhoView;
+use crate::protocol::Entry;
 use crate::runner::Strip;
+use crate::session::view::DeviceState;
 use crate::session::{Screen, View};
 use crate::tui::draft::{Draft, Target};
 use crate::tui::theme::Theme;
@@ -19,6 +21,9 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+
+/// Where the experimenter types, these keys are in sight always.
+const COMMANDS: &str = "F2 remark  ·  F3 correct  ·  F4 bad trial  ·  F5 pause  ·  F6 declined";
 
 /// Everything that is on the terminal.
 #[derive(Debug)]
@@ -87,6 +92,7 @@ impl<'a> Page<'a> {
     fn dialog(&self) -> Option<DialogView<'a>> {
         Some(DialogView {
             dialog: self.draft.dialog()?,
+            armed: self.view.armed,
             theme: self.theme,
         })
     }
@@ -252,6 +258,12 @@ impl Widget for &Page<'_> {
         if self.draft.dialog().is_none() {
             let line = hints(self.theme, &keys);
             centre(buf, row(area, area.height - 3), &line);
+            if self.view.entry == Entry::Experimenter
+                && self.view.line.device != DeviceState::Unknown
+            {
+                let line = Line::from(Span::styled(COMMANDS, self.theme.quiet()));
+                centre(buf, row(area, area.height - 2), &line);
+            }
         }
         if let Some(dialog) = self.dialog() {
             dialog.render(body, buf);
@@ -264,6 +276,7 @@ impl Widget for &Page<'_> {
         }
         let status = Status {
             line: &self.view.line,
+            unsaved: matches!(self.view.screen, Screen::SaveTrouble { .. }),
             theme: self.theme,
         };
         status.render(row(area, area.height - 1), buf);

@@ -50,7 +50,11 @@ pub fn prose(view: &View) -> Option<Prose> {
     };
     let wait = |seconds: f64| {
         if seconds > 0.0 && seconds.is_finite() {
-            format!("in {}", clock(seconds.ceil()))
+            match seconds.ceil() {
+                1.0 => "in 1 second".to_owned(),
+                whole if whole < 100.0 => format!("in {whole} seconds"),
+                whole => format!("in {}", clock(whole)),
+            }
         } else {
             String::new()
         }

@@ -1,7 +1,7 @@
 //! The experimenter's line, the banner and the progress.
 
-use crate::session::View;
 use crate::session::view::{Banner, DeviceState, StatusLine};
+use crate::session::{Screen, View};
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, clock, left, right};
 use crate::tui::wrap;
@@ -15,6 +15,8 @@ use ratatui::widgets::Widget;
 pub struct Status<'a> {
     /// What it says.
     pub line: &'a StatusLine,
+    /// Whether saving has failed.
+    pub unsaved: bool,
     /// Its look.
     pub theme: Theme,
 }
@@ -65,7 +67,10 @@ impl Widget for &Status<'_> {
         if line.device != DeviceState::Unknown {
             spans.push(Span::styled(format!(" · {}", clock(line.elapsed_s)), quiet));
             let (saved, answered) = (line.trials_saved, line.trials_answered);
-            if !line.all_saved {
+            if self.unsaved {
+                let words = format!(" · NOT SAVED {saved} of {answered}");
+                spans.push(Span::styled(words, self.theme.trouble_frame()));
+            } else if !line.all_saved {
                 spans.push(Span::styled(
                     format!(" · saving … {saved} of {answered}"),
                     quiet,
@@ -113,14 +118,22 @@ impl Widget for &Top<'_> {
                 &Line::from(Span::styled(words, self.theme.banner())),
             );
         }
+        let mut words = Vec::new();
+        if let Screen::Form { page, pages, .. } = &self.view.screen
+            && *pages > 1
+        {
+            words.push(format!("page {page} of {pages}"));
+        }
         if let Some(progress) = self.view.progress {
             let what = if progress.practice {
                 "practice"
             } else {
                 "trial"
             };
-            let (k, n) = (progress.current, progress.total);
-            let words = Span::styled(format!("{what} {k} of {n}"), self.theme.quiet());
+            words.push(format!("{what} {} of {}", progress.current, progress.total));
+        }
+        if !words.is_empty() {
+            let words = Span::styled(words.join(" · "), self.theme.quiet());
             let at = Rect {
                 width: area.width.saturating_sub(1),
                 ..area
