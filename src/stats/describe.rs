@@ -143,11 +143,12 @@ pub fn tidy(x: f64) -> f64 {
     }
 }
 
-/// Whether all numbers are the same, but for the rounding of thirds.
+/// Whether all numbers are the same, but for the rounding of thirds: within
+/// 10⁻¹² of the largest, or of 1.
 pub fn constant(x: &[f64]) -> bool {
     let low = x.iter().copied().fold(f64::INFINITY, f64::min);
     let high = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    x.is_empty() || high - low <= 1e-12 * low.abs().max(high.abs())
+    x.is_empty() || high - low <= 1e-12 * low.abs().max(high.abs()).max(1.0)
 }
 
 #[cfg(test)]

@@ -14,7 +14,11 @@ use crate::rng::Stream;
 pub const MAX_EXACT: usize = 9;
 
 /// Pairings drawn above [`MAX_EXACT`].
-pub const DRAWS: u64 = 99_999;
+pub const DRAWS: u64 = 9_999;
+
+/// Most pairs for Monte Carlo; of Kendall's tau, whose work goes with the
+/// square, a tenth.
+const MAX_DRAWN: usize = 1000;
 
 const TIE: f64 = 1e-9;
 
@@ -43,10 +47,14 @@ pub struct Permuted {
     pub exact: bool,
 }
 
-/// The test. `None` where the statistic is not defined or there are fewer than
-/// three pairs. `seed` serves only above [`MAX_EXACT`].
+/// The test. `None` where the statistic is not defined, there are fewer than
+/// three pairs, or more than 1000 (Kendall: 100). `seed` serves only above [`MAX_EXACT`].
 pub fn test(statistic: Statistic, x: &[f64], y: &[f64], seed: u64) -> Option<Permuted> {
-    if x.len() < 3 {
+    let most = match statistic {
+        Statistic::Pearson | Statistic::Spearman => MAX_DRAWN,
+        Statistic::Kendall => MAX_DRAWN / 10,
+    };
+    if !(3..=most).contains(&x.len()) {
         return None;
     }
     let observed = match statistic {
