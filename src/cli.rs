@@ -12,6 +12,7 @@ mod identify;
 mod new;
 mod participant;
 mod rehearse;
+mod results;
 mod run;
 mod schedule;
 mod schema;

@@ -6,6 +6,7 @@
 //! Reading is in [`file`], what can be doubted about a readable file in [`check`].
 
 pub mod check;
+pub mod columns;
 #[cfg(test)]
 pub(crate) mod example;
 pub mod file;

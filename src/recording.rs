@@ -1,1 +1,374 @@
-//! What a probe measured.
+//! What a probe measured: time, position, velocity, acceleration, force.
+//!
+//! A recording is a CSV: `#` lines in words, one line of column names, then
+//! numbers. `t_s`, `x_mm` and `f_n` have to be there; `v_mm_s` and `a_m_s2` are
+//! used as they are where they are given and are differences of x where they are
+//! not, with a warning. Other columns are passed over. Nothing is filtered or
+//! thinned. F is the force that the probe applies to the target, positive with +x.
+//!
+//! Invariant of a [`Recording`]: all columns are equally long, at least three
+//! rows, finite; time ascends strictly; x and F vary.
+
+mod motion;
+mod rows;
+
+use std::fmt;
+use std::io::BufRead;
+
+/// A recording as columns, with the SHA-256 of the bytes it was read from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Names it in model files and messages.
+    pub name: String,
+    /// Time, s, strictly ascending.
+    pub t_s: Vec<f64>,
+    /// Position, mm.
+    pub x_mm: Vec<f64>,
+    /// Velocity, mm/s.
+    pub v_mm_s: Vec<f64>,
+    /// Acceleration, m/s².
+    pub a_m_s2: Vec<f64>,
+    /// Force that the probe applies to the target, N.
+    pub f_n: Vec<f64>,
+    /// The `#` lines above the column names, without `#` and the blank after it.
+    pub header: Vec<String>,
+    /// SHA-256 of all bytes of the file, 64 lower-case hexadecimal digits.
+    pub sha256: String,
+    /// What is doubtful about it.
+    pub warnings: Vec<Warning>,
+}
+
+impl Recording {
+    /// How many samples it has.
+    pub fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Never: a recording has at least three rows.
+    pub fn is_empty(&self) -> bool {
+        self.t_s.is_empty()
+    }
+
+    /// Time from the first sample to the last, s.
+    pub fn duration_s(&self) -> f64 {
+        self.t_s.last().unwrap_or(&0.0) - self.t_s.first().unwrap_or(&0.0)
+    }
+
+    /// Lowest and highest position, mm.
+    pub fn range_mm(&self) -> [f64; 2] {
+        motion::range(&self.x_mm)
+    }
+
+    /// Largest speed, mm/s.
+    pub fn top_speed_mm_s(&self) -> f64 {
+        self.v_mm_s.iter().fold(0.0, |top, v| v.abs().max(top))
+    }
+}
+
+/// What is doubtful about a recording that can be used.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Warning {
+    /// A column was absent and is a difference of x.
+    Derived {
+        /// The column.
+        column: &'static str,
+        /// How it was computed.
+        how: &'static str,
+    },
+    /// Samples are missing in time.
+    Gaps {
+        /// How many steps are longer than one and a half usual ones.
+        count: usize,
+        /// The longest, s.
+        longest_s: f64,
+        /// Where the longest begins, s.
+        at_s: f64,
+    },
+    /// The target was moved in one direction only.
+    OneDirection,
+    /// A column that should move with x does not have its scale.
+    Scale {
+        /// The column.
+        column: &'static str,
+        /// What x says, over what the column says.
+        ratio: f64,
+    },
+    /// A column has one value from beginning to end.
+    Constant {
+        /// The column.
+        column: &'static str,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Derived { column, how } => write!(f, "no column {column}: it is {how}"),
+            Self::Gaps {
+                count,
+                longest_s,
+                at_s,
+            } => write!(
+                f,
+                "{count} gaps in time, the longest {longest_s:.4} s at {at_s:.4} s"
+            ),
+            Self::OneDirection => f.write_str("the target moves in one direction only"),
+            Self::Scale { column, ratio } => write!(
+                f,
+                "x_mm changes {ratio:.3e} times as fast as {column} says: look at the units and the sign"
+            ),
+            Self::Constant { column } => write!(f, "{column} is the same in every row"),
+        }
+    }
+}
+
+/// Why a file is no recording, and at which line.
+#[derive(Debug, thiserror::Error)]
+#[error("{name}: line {line}: {fault}")]
+pub struct RecordingError {
+    /// The name that the caller gave.
+    pub name: String,
+    /// From 1. What is about a whole column points to the line of column names.
+    pub line: u64,
+    /// What is wrong.
+    pub fault: RecordingFault,
+}
+
+/// What is wrong with a file that should be a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingFault {
+    /// It could not be read.
+    #[error("cannot be read: {0}")]
+    Io(#[source] std::io::Error),
+    /// There is no line of column names.
+    #[error("the file ends before a line of column names such as t_s,x_mm,f_n")]
+    NoColumns,
+    /// A column is not there.
+    #[error("no column {missing}; the columns are {found}")]
+    MissingColumn {
+        /// Its name.
+        missing: &'static str,
+        /// Those that are there.
+        found: String,
+    },
+    /// A column is there twice.
+    #[error("two columns are called {0}")]
+    DoubleColumn(&'static str),
+    /// A row is longer or shorter than the line of column names.
+    #[error("{found} fields where the columns are {expected}")]
+    Ragged {
+        /// Fields of this row.
+        found: usize,
+        /// Columns.
+        expected: usize,
+    },
+    /// A field is no number.
+    #[error("{column} is `{text}`, which is no number")]
+    NotANumber {
+        /// The column.
+        column: &'static str,
+        /// The field, cut and escaped.
+        text: String,
+    },
+    /// A number is NaN or infinite.
+    #[error("{column} is {value}, which cannot be a measurement")]
+    NotFinite {
+        /// The column.
+        column: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// Time stands still or goes back.
+    #[error("t_s goes from {before} to {now}: time has to increase")]
+    Time {
+        /// The row before.
+        before: f64,
+        /// This row.
+        now: f64,
+    },
+    /// There are too few rows.
+    #[error("{0} rows: a recording has at least {least}", least = rows::LEAST_ROWS)]
+    TooShort(usize),
+    /// There are too many rows.
+    #[error("more than {most} rows: thin the recording or cut it", most = rows::MOST_ROWS)]
+    TooLong,
+    /// A line is too long to be a row of numbers.
+    #[error("the line is longer than {most} bytes", most = rows::MOST_LINE_BYTES)]
+    LongLine,
+    /// A column that has to vary does not.
+    #[error("{0} is the same in every row: nothing was measured")]
+    Constant(&'static str),
+    /// The stroke is too small to be millimetres.
+    #[error("the stroke is {stroke_mm} mm: x_mm looks like metres, multiply it by 1000")]
+    Metres {
+        /// Highest less lowest x.
+        stroke_mm: f64,
+    },
+}
+
+/// Reads a recording.
+///
+/// # Errors
+/// [`RecordingError`] with the line of the first thing that is wrong.
+pub fn read(name: impl Into<String>, input: impl BufRead) -> Result<Recording, RecordingError> {
+    let name = name.into();
+    match rows::read(input) {
+        Ok(rows) => motion::complete(name, rows),
+        Err((line, fault)) => Err(RecordingError { name, line, fault }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str) -> Result<Recording, RecordingError> {
+        read("r.csv", text.as_bytes())
+    }
+
+    fn message(text: &str) -> String {
+        read_text(text).unwrap_err().to_string()
+    }
+
+    const GOOD: &str = "# a probe\n# of ours\nt_s,x_mm,v_mm_s,a_m_s2,f_n\n\
+        0,1,5,0,2\n0.5,4,1,-0.01,3\n1,2,-4,0,1\n";
+
+    #[test]
+    fn columns_are_found_by_name_and_used_as_they_are() {
+        let r = read_text(GOOD).unwrap();
+        assert_eq!(r.header, ["a probe", "of ours"]);
+        assert_eq!(r.x_mm, [1.0, 4.0, 2.0]);
+        assert_eq!(r.v_mm_s, [5.0, 1.0, -4.0]);
+        assert_eq!(r.a_m_s2, [0.0, -0.01, 0.0]);
+        assert_eq!(r.range_mm(), [1.0, 4.0]);
+        assert_eq!(r.top_speed_mm_s(), 5.0);
+        let swapped = "f_n,note,x_mm,t_s\n2,9,1,0\n3,9,4,0.5\n1,9,2,1\n";
+        let r = read_text(swapped).unwrap();
+        assert_eq!(r.f_n, [2.0, 3.0, 1.0]);
+        assert_eq!(r.t_s, [0.0, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn the_hash_is_that_of_the_file() {
+        // printf 't_s,x_mm,f_n\n0,1,1\n1,2,2\n2,1,1\n' | sha256sum
+        let r = read_text("t_s,x_mm,f_n\n0,1,1\n1,2,2\n2,1,1\n").unwrap();
+        assert_eq!(
+            r.sha256,
+            "051a84a58e1b3ce81a4fa4bb35ac342cd6a2a3d792b52c4a5d55161529b8311d"
+        );
+    }
+
+    #[test]
+    fn absent_velocity_and_acceleration_are_differences_and_say_so() {
+        // x = t³ mm at 0, 1, 2, 3 s: central v at 1 is (8 − 0)/2, a is 6 mm/s²
+        let r = read_text("t_s,x_mm,f_n\n0,0,1\n1,1,2\n2,8,3\n3,27,4\n").unwrap();
+        assert_eq!(r.v_mm_s, [1.0, 4.0, 13.0, 19.0]);
+        assert_eq!(r.a_m_s2, [0.006, 0.006, 0.012, 0.012]);
+        let said: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            said,
+            [
+                "no column v_mm_s: it is the central difference of x_mm",
+                "no column a_m_s2: it is the second central difference of x_mm",
+                "the target moves in one direction only",
+            ]
+        );
+    }
+
+    #[test]
+    fn byte_order_mark_carriage_returns_blank_lines_and_quoted_names_are_no_obstacle() {
+        let text = "\u{feff}# made elsewhere\r\n\"t_s\",\"x_mm\",\"f_n\"\r\n0, 1 ,2\r\n\r\n1,3,1\r\n# pause\r\n2,1,2";
+        let r = read_text(text).unwrap();
+        assert_eq!(r.header, ["made elsewhere"]);
+        assert_eq!(r.x_mm, [1.0, 3.0, 1.0]);
+    }
+
+    #[test]
+    fn every_bad_row_is_named_with_its_line() {
+        let at = |row: &str| format!("# h\nt_s,x_mm,f_n\n0,1,1\n\n1,2,2\n{row}\n3,1,1\n");
+        for (row, said) in [
+            ("2,1", "r.csv: line 6: 2 fields where the columns are 3"),
+            ("2,1,1,1", "r.csv: line 6: 4 fields where the columns are 3"),
+            (
+                "2,NaN,1",
+                "r.csv: line 6: x_mm is NaN, which cannot be a measurement",
+            ),
+            (
+                "2,1,1e999",
+                "r.csv: line 6: f_n is inf, which cannot be a measurement",
+            ),
+            ("2,,1", "r.csv: line 6: x_mm is ``, which is no number"),
+            (
+                "2,\u{1b}[2J,1",
+                "r.csv: line 6: x_mm is `\\u{1b}[2J`, which is no number",
+            ),
+            (
+                "1,1,1",
+                "r.csv: line 6: t_s goes from 1 to 1: time has to increase",
+            ),
+            (
+                "0.5,1,1",
+                "r.csv: line 6: t_s goes from 1 to 0.5: time has to increase",
+            ),
+        ] {
+            assert_eq!(message(&at(row)), said);
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_no_recording_says_what_is_missing() {
+        assert_eq!(
+            message(""),
+            "r.csv: line 1: the file ends before a line of column names such as t_s,x_mm,f_n"
+        );
+        assert_eq!(
+            message("# h\nt_s,x,f_n\n"),
+            "r.csv: line 2: no column x_mm; the columns are t_s, x, f_n"
+        );
+        assert_eq!(
+            message("t_s,x_mm,f_n,x_mm\n"),
+            "r.csv: line 1: two columns are called x_mm"
+        );
+        assert_eq!(
+            message("t_s,x_mm,f_n\n0,1,1\n"),
+            "r.csv: line 2: 1 rows: a recording has at least 3"
+        );
+        assert_eq!(
+            message(&format!("t_s,x_mm,f_n\n0,{},1\n", "1".repeat(70_000))),
+            "r.csv: line 2: the line is longer than 65536 bytes"
+        );
+    }
+
+    #[test]
+    fn nothing_measured_and_metres_are_refused() {
+        assert_eq!(
+            message("# h\nt_s,x_mm,f_n\n0,1,1\n1,1,2\n2,1,3\n"),
+            "r.csv: line 2: x_mm is the same in every row: nothing was measured"
+        );
+        assert_eq!(
+            message("t_s,x_mm,f_n\n0,1,1\n1,2,1\n2,1,1\n"),
+            "r.csv: line 1: f_n is the same in every row: nothing was measured"
+        );
+        assert_eq!(
+            message("t_s,x_mm,f_n\n0,0.001,1\n1,0.035,2\n2,0.001,3\n"),
+            "r.csv: line 1: the stroke is 0.034 mm: x_mm looks like metres, multiply it by 1000"
+        );
+    }
+
+    #[test]
+    fn gaps_and_wrong_units_are_warnings() {
+        let mut text = String::from("t_s,x_mm,v_mm_s,a_m_s2,f_n\n");
+        for i in 0..400 {
+            let t = f64::from(if i < 200 { i } else { i + 7 }) * 0.001;
+            let (w, x) = (60.0, (60.0 * t).sin());
+            // v in m/s instead of mm/s
+            let v = w * (w * t).cos() / 1000.0;
+            text += &format!("{t},{},{v},{},{}\n", 10.0 * x, -w * w * x / 100.0, t.sin());
+        }
+        let r = read_text(&text).unwrap();
+        let said: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
+        assert_eq!(said[0], "1 gaps in time, the longest 0.0080 s at 0.1990 s");
+        assert!(said[1].contains("as fast as v_mm_s says"), "{said:?}");
+        assert_eq!(said.len(), 2, "{said:?}");
+    }
+}

@@ -1,12 +1,41 @@
 //! `study amend`
 
-use super::{Console, Failure};
+use super::{Console, Failure, load, results};
+use crate::store::Frozen;
+use std::path::PathBuf;
 
 /// Arguments of `study amend`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+pub(super) struct Args {
+    /// Results folder, or the folder of one study in it
+    results: PathBuf,
+    /// The amended protocol.toml, or the folder that holds it
+    protocol: PathBuf,
+    /// Why; it is kept
+    #[arg(long, value_name = "TEXT")]
+    reason: String,
+}
 
-/// Does it.
-pub(super) fn run(_args: &Args, _console: &mut Console) -> Result<(), Failure> {
-    Err(Failure::input("not built yet"))
+/// Freezes a new version of wording or analysis.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let reason = results::reason(&args.reason)?;
+    let loaded = load::load(&args.protocol)?;
+    console.findings(&loaded.findings);
+    let id = &loaded.protocol.study.id;
+    let mut studies = results::studies(&args.results)?;
+    studies.retain(|s| s.manifest().study == *id);
+    let Some(mut study) = studies.pop() else {
+        let none = format!("{}: no study `{id}` there", args.results.display());
+        return Err(Failure::input(none).hint("a protocol with another id is another study"));
+    };
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let version = study.amend(&frozen, reason, results::now())?;
+    console.out(format!(
+        "{id}: version {version} of the protocol is frozen. Sessions that start from now on record it.\n"
+    ))?;
+    results::refresh(&study, console)
 }

@@ -1,12 +1,234 @@
-//! `study new`
+//! `study new`: a protocol to start from, or a replication of a study.
 
-use super::{Console, Failure};
+use super::{Console, Failure, load};
+use crate::protocol::file;
+use crate::text::Untrusted;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// What a new study starts from: three realizations of the paper's.
+const PROTOCOL: &str = include_str!("new/protocol.toml");
+const MODELS: [(&str, &str); 3] = [
+    (
+        "models/lambda-0.9991.toml",
+        include_str!("../../protocols/turn-signal/models/lambda-0.9991.toml"),
+    ),
+    (
+        "models/lambda-0.9995.toml",
+        include_str!("../../protocols/turn-signal/models/lambda-0.9995.toml"),
+    ),
+    (
+        "models/lambda-0.9999.toml",
+        include_str!("../../protocols/turn-signal/models/lambda-0.9999.toml"),
+    ),
+];
 
 /// Arguments of `study new`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+pub(super) struct Args {
+    /// A folder that is not there yet, or empty
+    dir: PathBuf,
+    /// Replicate the study of a results folder
+    #[arg(long, value_name = "RESULTS")]
+    from: Option<PathBuf>,
+}
 
 /// Does it.
-pub(super) fn run(_args: &Args, _console: &mut Console) -> Result<(), Failure> {
-    Err(Failure::input("not built yet"))
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let dir = &args.dir;
+    refuse_unless_empty(dir)?;
+    let today = chrono::Local::now().date_naive();
+    let seed = today.format("%Y%m%d").to_string().parse().unwrap_or(1);
+    let files = match &args.from {
+        Some(results) => replication(results, &today.to_string(), seed)?,
+        None => starter(dir, seed)?,
+    };
+    write(dir, &files)?;
+    let shown = dir.display().to_string();
+    let shown = Untrusted(&shown);
+    console.out(format!(
+        "wrote {shown}: {} and {} files beside it\nnext: study check {shown}; study run {shown} --pilot\n",
+        load::FILE_NAME,
+        files.len() - 1
+    ))
+}
+
+/// Relative path, with `/`, and bytes.
+type Files = Vec<(String, Vec<u8>)>;
+
+fn starter(dir: &Path, seed: u64) -> Result<Files, Failure> {
+    let name = std::path::absolute(dir).map_err(|e| Failure::file(dir, &e))?;
+    let name = name.file_name().unwrap_or_default().to_string_lossy();
+    let text = with_values(PROTOCOL, &study_id(&name), seed)?;
+    let mut files = vec![(load::FILE_NAME.to_owned(), text.into_bytes())];
+    for (path, text) in MODELS {
+        files.push((path.to_owned(), text.as_bytes().to_vec()));
+    }
+    Ok(files)
+}
+
+/// The newest frozen protocol of a study, with an id and a seed of its own: under
+/// the old ones it would be the same study.
+fn replication(results: &Path, today: &str, seed: u64) -> Result<Files, Failure> {
+    let (folder, version) = frozen(results)?;
+    let loaded = load::load(&folder)?;
+    let study = &loaded.protocol.study;
+    let mut id = format!("{}-replication", study.id);
+    id.truncate(64);
+    let seed = if seed == study.seed { seed + 1 } else { seed };
+    let mut files = loaded.files;
+    let Some((_, bytes)) = files.first_mut() else {
+        return Err(Failure::input("the frozen protocol is empty"));
+    };
+    let text = String::from_utf8_lossy(bytes);
+    let text = with_values(&text, &id, seed)?;
+    let origin = format!(
+        "# A replication of the study `{}`, version {version} of its protocol, made on {today}.\n\
+         # Stimulus fingerprint of the original: {}\n\
+         # Its seed was {}; a replication has orders of its own.\n\n",
+        study.id, loaded.fingerprints.stimulus, study.seed
+    );
+    *bytes = (origin + &text).into_bytes();
+    Ok(files)
+}
+
+/// The folder of a study's newest protocol version, and its number.
+fn frozen(results: &Path) -> Result<(PathBuf, u32), Failure> {
+    let studies: Vec<PathBuf> = if results.join("protocol").is_dir() {
+        vec![results.to_owned()]
+    } else {
+        subfolders(results)?
+            .into_iter()
+            .filter(|folder| folder.join("protocol").is_dir())
+            .collect()
+    };
+    let [study] = studies.as_slice() else {
+        let shown = results.display();
+        return Err(match studies.len() {
+            0 => Failure::results(format!("{shown}: there is no study in this folder"))
+                .hint("--from takes a results folder, such as results/turn-signal"),
+            n => Failure::results(format!("{shown}: there are {n} studies in this folder"))
+                .hint("name the folder of one of them"),
+        });
+    };
+    let versions = subfolders(&study.join("protocol"))?;
+    versions
+        .into_iter()
+        .filter_map(|folder| {
+            let version = folder.file_name()?.to_str()?.parse::<u32>().ok()?;
+            Some((folder, version))
+        })
+        .max_by_key(|(_, version)| *version)
+        .ok_or_else(|| {
+            Failure::results(format!(
+                "{}: there is no protocol in it",
+                study.join("protocol").display()
+            ))
+        })
+}
+
+fn subfolders(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let mut folders = Vec::new();
+    for entry in fs::read_dir(folder).map_err(|e| Failure::file(folder, &e))? {
+        let path = entry.map_err(|e| Failure::file(folder, &e))?.path();
+        if path.is_dir() {
+            folders.push(path);
+        }
+    }
+    folders.sort();
+    Ok(folders)
+}
+
+/// The text of a protocol with another id and seed; comments and layout stay.
+fn with_values(text: &str, id: &str, seed: u64) -> Result<String, Failure> {
+    let spans = file::parse(load::FILE_NAME, text).spans;
+    let mut edits = Vec::new();
+    for (key, value) in [
+        ("study.id", format!("\"{id}\"")),
+        ("study.seed", seed.to_string()),
+    ] {
+        let span = spans
+            .get(key)
+            .ok_or_else(|| Failure::input(format!("the protocol has no `{key}`")))?;
+        edits.push((span.clone(), value));
+    }
+    // from the end, so that the earlier span stays where it is
+    edits.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
+    let mut text = text.to_owned();
+    for (span, value) in edits {
+        text.replace_range(span, &value);
+    }
+    Ok(text)
+}
+
+/// A study id from the name of a folder.
+fn study_id(name: &str) -> String {
+    let mut id = String::new();
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() {
+            id.push(c.to_ascii_lowercase());
+        } else if !id.ends_with('-') && !id.is_empty() {
+            id.push('-');
+        }
+    }
+    id.truncate(64);
+    let id = id.trim_end_matches('-');
+    if id.is_empty() {
+        "my-study".to_owned()
+    } else {
+        id.to_owned()
+    }
+}
+
+fn refuse_unless_empty(dir: &Path) -> Result<(), Failure> {
+    let full = match fs::read_dir(dir) {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => false,
+        Err(e) => return Err(Failure::file(dir, &e)),
+    };
+    if full {
+        return Err(
+            Failure::input(format!("{}: the folder is not empty", dir.display()))
+                .hint("nothing is ever overwritten; name a new folder"),
+        );
+    }
+    Ok(())
+}
+
+fn write(dir: &Path, files: &Files) -> Result<(), Failure> {
+    for (file, bytes) in files {
+        let path = dir.join(file);
+        let parent = path.parent().unwrap_or(dir);
+        fs::create_dir_all(parent).map_err(|e| Failure::file(parent, &e))?;
+        fs::File::create_new(&path)
+            .and_then(|mut out| out.write_all(bytes))
+            .map_err(|e| Failure::file(&path, &e))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_name_becomes_a_study_id() {
+        assert_eq!(study_id("Turn signal (v2)"), "turn-signal-v2");
+        assert_eq!(study_id("…"), "my-study");
+        assert!(study_id(&"x".repeat(100)).len() == 64);
+    }
+
+    #[test]
+    fn id_and_seed_change_and_nothing_else() {
+        let text = with_values(PROTOCOL, "other", 42).unwrap();
+        let changed: Vec<(&str, &str)> = PROTOCOL
+            .lines()
+            .zip(text.lines())
+            .filter(|(before, after)| before != after)
+            .collect();
+        assert_eq!(changed.len(), 2, "{changed:?}");
+        assert!(changed[0].1.starts_with("id = \"other\""));
+        assert!(changed[1].1.starts_with("seed = 42"));
+    }
 }

@@ -1,12 +1,146 @@
 //! `study status`
 
-use super::{Console, Failure};
+use super::{Console, Failure, results};
+use crate::outcome::{ParticipantRow, State};
+use crate::store::StudyFolder;
+use crate::text::Untrusted;
+use std::fmt::Write as _;
+use std::path::PathBuf;
 
 /// Arguments of `study status`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+pub(super) struct Args {
+    /// Results folder, or the folder of one study in it
+    results: PathBuf,
+}
 
-/// Does it.
-pub(super) fn run(_args: &Args, _console: &mut Console) -> Result<(), Failure> {
-    Err(Failure::input("not built yet"))
+/// Prints who has taken part, and never an order.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    for (n, study) in results::studies(&args.results)?.iter().enumerate() {
+        if n > 0 {
+            console.out("\n")?;
+        }
+        console.out(of_study(study)?)?;
+    }
+    Ok(())
+}
+
+fn of_study(study: &StudyFolder) -> Result<String, Failure> {
+    let manifest = study.manifest();
+    let mut out = format!(
+        "{} · {} · protocol version {}\n",
+        Untrusted(&manifest.study),
+        Untrusted(&study.path().display().to_string()),
+        study.version()
+    );
+    let all = study.participants()?;
+    let real: Vec<_> = all.iter().filter(|p| !p.pilot && !p.simulated).collect();
+    let pilots: Vec<_> = all.iter().filter(|p| p.pilot).collect();
+    let simulated: Vec<_> = all.iter().filter(|p| p.simulated).collect();
+    for (title, rows) in [
+        ("", &real),
+        ("Pilots", &pilots),
+        ("Simulated participants", &simulated),
+    ] {
+        if rows.is_empty() {
+            continue;
+        }
+        if !title.is_empty() {
+            let _ = writeln!(out, "\n{title}");
+        }
+        out.push_str(&table(rows));
+    }
+    let _ = writeln!(out, "\n{}", summary(study, &real));
+    let _ = writeln!(out, "Next free row: {}", study.next_row()?);
+    let damaged: Vec<String> = study
+        .sessions()?
+        .iter()
+        .filter(|s| !s.damage.is_empty())
+        .map(|s| s.participant.to_string())
+        .collect();
+    if !damaged.is_empty() {
+        let _ = writeln!(
+            out,
+            "Something is wrong with the journal of {}: see `study verify`",
+            damaged.join(", ")
+        );
+    }
+    Ok(out)
+}
+
+fn table(rows: &[&ParticipantRow]) -> String {
+    let mut lines = vec![
+        [
+            "participant",
+            "row",
+            "session",
+            "state",
+            "trials",
+            "started",
+            "reason",
+        ]
+        .map(str::to_owned),
+    ];
+    for row in rows {
+        let state = if row.erased {
+            format!("{}, erased", row.state.as_str())
+        } else {
+            row.state.as_str().to_owned()
+        };
+        lines.push([
+            row.participant.to_string(),
+            row.row.map_or_else(String::new, |r| r.to_string()),
+            row.session.to_string(),
+            state,
+            format!("{}/{}", row.trials_done, row.trials_planned),
+            row.started_at.map_or_else(String::new, |at| {
+                at.format("%Y-%m-%d %H:%M %:z").to_string()
+            }),
+            Untrusted(&row.reason).to_string(),
+        ]);
+    }
+    let mut widths = [0; 7];
+    for line in &lines {
+        for (width, cell) in widths.iter_mut().zip(line) {
+            *width = (*width).max(cell.chars().count());
+        }
+    }
+    let mut out = String::new();
+    for line in &lines {
+        let mut text = String::new();
+        for (width, cell) in widths.iter().zip(line) {
+            let _ = write!(text, "{cell:width$}  ");
+        }
+        let _ = writeln!(out, "{}", text.trim_end());
+    }
+    out
+}
+
+/// "3 participants: 2 done, 1 unfinished; 10 planned".
+fn summary(study: &StudyFolder, real: &[&ParticipantRow]) -> String {
+    let states = [
+        State::Done,
+        State::Unfinished,
+        State::DroppedOut,
+        State::NoShow,
+        State::Excluded,
+        State::Withdrawn,
+        State::Void,
+    ];
+    let counts: Vec<String> = states
+        .into_iter()
+        .map(|state| (state, real.iter().filter(|p| p.state == state).count()))
+        .filter(|(_, n)| *n > 0)
+        .map(|(state, n)| format!("{n} {}", state.as_str()))
+        .collect();
+    let people = match real.len() {
+        0 => "No participants yet".to_owned(),
+        1 => format!("1 participant: {}", counts.join(", ")),
+        n => format!("{n} participants: {}", counts.join(", ")),
+    };
+    // A damaged frozen protocol is for `study verify` to tell.
+    match results::frozen(study) {
+        Ok(loaded) => format!("{people}; {} planned", loaded.protocol.design.participants),
+        Err(_) => people,
+    }
 }

@@ -1,12 +1,86 @@
 //! `study verify`
 
-use super::{Console, Failure};
+use super::{Console, Failure, results};
+use crate::cli::load;
+use crate::store::{Finding, StudyFolder, layout};
+use crate::text::Untrusted;
+use std::path::PathBuf;
 
 /// Arguments of `study verify`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+pub(super) struct Args {
+    /// Results folder, or the folder of one study in it
+    results: PathBuf,
+    /// First write the derived tables again from the journals
+    #[arg(long)]
+    rebuild: bool,
+}
 
-/// Does it.
-pub(super) fn run(_args: &Args, _console: &mut Console) -> Result<(), Failure> {
-    Err(Failure::input("not built yet"))
+/// Prints what was found and fails if anything of it is wrong.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let mut wrong = 0;
+    for study in results::studies(&args.results)? {
+        let protocol = results::frozen(&study);
+        if let (true, Ok(loaded)) = (args.rebuild, &protocol) {
+            study.refresh(&loaded.protocol)?;
+        }
+        let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
+        found.extend(frozen_versions(&study));
+        console.out(of_study(&study, &found)?)?;
+        wrong += found.iter().filter(|f| f.wrong).count();
+    }
+    match wrong {
+        0 => Ok(()),
+        1 => Err(Failure::results("one thing is wrong")),
+        n => Err(Failure::results(format!("{n} things are wrong"))),
+    }
+}
+
+fn of_study(study: &StudyFolder, found: &[Finding]) -> Result<String, Failure> {
+    let path = study.path().display().to_string();
+    let mut out = String::new();
+    for finding in found {
+        let word = if finding.wrong { "wrong" } else { "note" };
+        out.push_str(&format!(
+            "{word}: {}/{}: {}\n",
+            Untrusted(&path),
+            Untrusted(&finding.place),
+            Untrusted(&finding.what)
+        ));
+    }
+    let sessions = study.sessions()?;
+    let events: usize = sessions.iter().map(|s| s.entries.len()).sum();
+    let verdict = match found.iter().filter(|f| f.wrong).count() {
+        0 => "all is as it was written",
+        _ => "not all is as it was written",
+    };
+    out.push_str(&format!(
+        "{}: {} sessions, {events} events: {verdict}\n",
+        Untrusted(&path),
+        sessions.len()
+    ));
+    if found.iter().any(|f| f.wrong && f.place.ends_with(".csv")) {
+        out.push_str("the tables are made again with --rebuild\n");
+    }
+    Ok(out)
+}
+
+/// Reads each frozen protocol and compares its fingerprints with study.json.
+fn frozen_versions(study: &StudyFolder) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for version in &study.manifest().versions {
+        let number = version.version;
+        let path = layout::protocol(study.path(), number).join(layout::PROTOCOL);
+        let what = match load::load(&path) {
+            Ok(loaded) if loaded.fingerprints == version.fingerprints => continue,
+            Ok(_) => "its fingerprints are not those in study.json".to_owned(),
+            Err(_) => format!("it cannot be read; see `study check {}`", path.display()),
+        };
+        found.push(Finding {
+            wrong: true,
+            place: format!("{}/{number}/{}", layout::PROTOCOLS, layout::PROTOCOL),
+            what,
+        });
+    }
+    found
 }

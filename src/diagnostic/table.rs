@@ -71,6 +71,12 @@ impl<'t> Document<'t> {
         }
     }
 
+    /// Whether anything was wrong so far; right after [`Document::parse`], whether
+    /// the syntax is broken.
+    pub fn has_faults(&self) -> bool {
+        !self.notes.borrow().faults.is_empty()
+    }
+
     /// Adds a fault.
     pub fn fault(&self, fault: Fault) {
         self.notes.borrow_mut().faults.push(fault);
@@ -305,6 +311,7 @@ impl<'d, 't> Value<'d, 't> {
     fn mismatch(&self, wanted: &str) {
         let found = match self.value {
             DeValue::String(_) => "text",
+            DeValue::Integer(_) if self.whole().is_none() => "one beyond 64 bits",
             DeValue::Integer(_) => "a whole number",
             DeValue::Float(_) => "a number",
             DeValue::Boolean(_) => "true or false",

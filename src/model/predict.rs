@@ -244,8 +244,13 @@ mod tests {
 
     #[test]
     fn a_position_that_is_no_number_reads_the_edge() {
-        assert!(force(Lookup::Linear, 1.0, f64::INFINITY).is_finite());
         let (x, ..) = table(Lookup::Linear);
-        assert_eq!(locate(&x, Lookup::Linear, f64::NAN), (0, 0.0));
+        for lookup in [Lookup::Linear, Lookup::Floor, Lookup::Nearest] {
+            assert_eq!(locate(&x, lookup, f64::NAN), (0, 0.0));
+            assert_eq!(locate(&x, lookup, f64::NEG_INFINITY), (0, 0.0));
+            assert_eq!(locate(&x, lookup, f64::INFINITY), (2, 0.0));
+        }
+        // the force is then no number either, which a limit's clamp makes 0
+        assert!(force(Lookup::Linear, 1.0, f64::NAN).is_nan());
     }
 }

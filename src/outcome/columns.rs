@@ -6,7 +6,7 @@ use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-use super::event::{Failure, State};
+use super::event::{Author, Failure, State};
 
 /// What became of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -130,7 +130,8 @@ pub struct AttemptRow {
     pub attempt: Option<u32>,
     /// Realization.
     pub model: Option<ModelId>,
-    /// `attempt`, `answer`, `correction`, `failure`, `remark`.
+    /// `attempt`, `answer`, `correction`, `failure`, `closed`, `remark`, `resume`,
+    /// `state`, `reveal`.
     pub what: &'static str,
     /// Question that was answered or corrected.
     pub question: Option<QuestionId>,
@@ -140,6 +141,8 @@ pub struct AttemptRow {
     pub to: Option<Answer>,
     /// Why an attempt failed.
     pub failure: Option<Failure>,
+    /// Who corrected or remarked.
+    pub by: Option<Author>,
     /// Reason, detail or remark.
     pub text: String,
     /// When.

@@ -30,7 +30,7 @@ impl Moment {
 /// An event with its place in the journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// From 0, without gaps.
+    /// From 1, without gaps; line 0 of a journal is the claim of its folder.
     pub seq: u64,
     /// When.
     pub at: Moment,
@@ -140,12 +140,15 @@ impl State {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Playback {
     /// From confirmed start to confirmed stop, s.
+    #[serde(deserialize_with = "null_as_nan")]
     pub exploration_s: f64,
     /// Full strokes, each from one end of the range to the other.
     pub strokes: u32,
     /// Least value of the energy that the hand had put in, J; negative: active.
+    #[serde(deserialize_with = "null_as_nan")]
     pub least_energy_j: f64,
     /// Changes of the direction state per second.
+    #[serde(deserialize_with = "null_as_nan")]
     pub switches_per_s: f64,
     /// How often the force was clamped.
     pub clamp_count: u64,
@@ -153,6 +156,12 @@ pub struct Playback {
     pub samples: u64,
     /// Telemetry samples known to be lost.
     pub samples_lost: u64,
+}
+
+/// JSON has no NaN: the writer puts null, and a device's nonsense must not make a
+/// line unreadable.
+fn null_as_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
 /// The first event of every session.

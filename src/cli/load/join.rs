@@ -1,0 +1,193 @@
+//! What only shows once the protocol, the model files and the orders stand
+//! together.
+
+use super::Others;
+use crate::diagnostic::{Fault, Findings, did_you_mean};
+use crate::protocol::check::Spans;
+use crate::protocol::{FileOrders, Order, Protocol, Role, Seat};
+use crate::schedule::balance::balances;
+use crate::schedule::{Planner, ScheduleError};
+use crate::text::Untrusted;
+
+/// Rows whose order is tried, however many participants are planned.
+const MAX_ROWS: u32 = 200;
+
+/// Fills in the VAFs that the protocol leaves to the model files, and compares
+/// those that it states.
+pub(super) fn vaf(
+    protocol: &mut Protocol,
+    others: &Others<'_>,
+    spans: &Spans,
+    findings: &mut Findings,
+) {
+    let wanted = protocol.analysis.vaf.clone();
+    let mut names_used: Vec<String> = Vec::new();
+    let mut names_seen: Vec<String> = Vec::new();
+    let mut misses = Vec::new();
+    for (i, entry) in protocol.models.iter_mut().enumerate() {
+        let Some(realization) = others.realization(&entry.id) else {
+            continue;
+        };
+        let known = &realization.vaf;
+        names_seen.extend(known.keys().cloned());
+        let name = match &wanted {
+            Some(name) => name.clone(),
+            None if known.len() == 1 => known.keys().next().cloned().unwrap_or_default(),
+            None if known.is_empty() => continue,
+            None => {
+                if entry.role == Role::Test && entry.vaf.is_none() {
+                    let names: Vec<&str> = known.keys().map(String::as_str).collect();
+                    misses.push(
+                        Fault::warning(format!(
+                            "`{}` has several VAFs and `analysis.vaf` does not say which counts",
+                            entry.id
+                        ))
+                        .at(spans.get(&format!("models[{i}].id")).cloned())
+                        .hint(format!("its file has {}", names.join(", "))),
+                    );
+                }
+                continue;
+            }
+        };
+        let Some(measured) = known.get(&name).copied() else {
+            continue;
+        };
+        if entry.role == Role::Test && !names_used.contains(&name) {
+            names_used.push(name.clone());
+        }
+        let place = spans.get(&format!("models[{i}].vaf")).cloned();
+        if let Some(stated) = entry.vaf {
+            let written = place.clone().and_then(|span| findings.text.get(span));
+            if (stated - measured).abs() > tolerance(written.unwrap_or_default()) {
+                findings.faults.push(
+                    Fault::error(format!(
+                        "the VAF of `{}` is not {stated}: its file says {measured} for `{}`",
+                        entry.id,
+                        Untrusted(&name)
+                    ))
+                    .at(place)
+                    .hint("leave `vaf` out and it is taken from the file"),
+                );
+                continue;
+            }
+        }
+        entry.vaf = Some(measured);
+    }
+    findings.faults.extend(misses);
+    if let Some(wanted) = &wanted
+        && !names_seen.is_empty()
+        && !names_seen.contains(wanted)
+    {
+        let fault = Fault::error(format!(
+            "no model file has a VAF for `{}`",
+            Untrusted(wanted)
+        ))
+        .at(spans.get("analysis.vaf").cloned());
+        names_seen.sort();
+        names_seen.dedup();
+        let names: Vec<&str> = names_seen.iter().map(String::as_str).collect();
+        findings
+            .faults
+            .push(match did_you_mean(wanted, names.iter().copied()) {
+                Some(near) => fault.label(format!("did you mean `{near}`?")),
+                None => fault.hint(format!("they have {}", names.join(", "))),
+            });
+    }
+    if names_used.len() > 1 {
+        findings.faults.push(
+            Fault::warning(format!(
+                "VAFs on different recordings are compared: {}",
+                names_used.join(", ")
+            ))
+            .hint("name one with `analysis.vaf`"),
+        );
+    }
+}
+
+/// How far a stated VAF may be from the file's: half a unit of its last digit.
+fn tolerance(written: &str) -> f64 {
+    const EXACT: f64 = 1e-9;
+    let decimals = match written.split_once('.') {
+        Some((_, decimals)) if decimals.bytes().all(|b| b.is_ascii_digit()) => decimals.len(),
+        _ => return EXACT,
+    };
+    let digits = i32::try_from(decimals).unwrap_or(i32::MAX);
+    // one digit is too coarse to state a VAF: at least two are compared
+    0.5 * 10f64.powi(-digits.max(2)) + EXACT
+}
+
+/// Tries the order of every row that is planned and reports the first that cannot
+/// be made; says at how many participants a balanced order balances.
+pub(super) fn orders(
+    protocol: &Protocol,
+    orders: Option<&FileOrders>,
+    spans: &Spans,
+    findings: &mut Findings,
+) {
+    let planned = protocol.design.participants.min(MAX_ROWS);
+    let tried = Planner::new(protocol, orders).and_then(|planner| {
+        (1..=planned).try_for_each(|row| planner.plan(Seat::Row(row)).map(drop))
+    });
+    if let Err(error) = tried {
+        let place = keys(&error, protocol)
+            .iter()
+            .find_map(|key| spans.get(*key))
+            .cloned();
+        let mut fault = Fault::error(error.to_string()).at(place);
+        fault.hint = error.hint().map(str::to_owned);
+        findings.faults.push(fault);
+        return;
+    }
+    let realizations = protocol.scheduled_models().count();
+    if let Some(balance) = balances(
+        &protocol.design.order,
+        realizations,
+        protocol.design.repetitions,
+    ) && !u64::from(protocol.design.participants).is_multiple_of(balance.participants)
+    {
+        findings.faults.push(
+            Fault::warning(format!(
+                "the orders balance at every {} participants, not at {}",
+                balance.participants, protocol.design.participants
+            ))
+            .at(spans.get("design.participants").cloned()),
+        );
+    }
+}
+
+/// The keys that a schedule's error is about, the likeliest first.
+fn keys(error: &ScheduleError, protocol: &Protocol) -> &'static [&'static str] {
+    match error {
+        ScheduleError::MinDistance { .. } => &["design.min_distance"],
+        ScheduleError::MaxRun { .. } | ScheduleError::MaxRunZero => &["design.max_run"],
+        ScheduleError::TooLong { .. } | ScheduleError::NoRepetitions => &["design.repetitions"],
+        ScheduleError::Broken { .. } | ScheduleError::TooManyStates { .. } => {
+            &["design.max_run", "design.min_distance", "design.order"]
+        }
+        _ if matches!(protocol.design.order, Order::File(_)) => {
+            &["design.order.file", "design.order"]
+        }
+        _ => &["design.order"],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stated_vaf_may_be_rounded_to_its_digits() {
+        let agrees = |written: &str, measured: f64| {
+            let stated: f64 = written.parse().unwrap();
+            (stated - measured).abs() <= tolerance(written)
+        };
+        assert!(agrees("0.79", 0.7949));
+        assert!(!agrees("0.79", 0.7951));
+        assert!(agrees("0.7949", 0.794_949));
+        assert!(!agrees("0.7949", 0.7951));
+        assert!(!agrees("0.8", 0.7949));
+        assert!(agrees("-0.25", -0.2549));
+        assert!(!agrees("1", 0.99));
+        assert!(!agrees("7.9e-1", 0.7949));
+    }
+}

@@ -1,0 +1,33 @@
+//! Two simple realizations to compare with: what a table without dynamics, and
+//! what a plain spring, make of the same recording.
+//!
+//! * `static`: for each direction the mean force of the samples in
+//!   [node − dx/2, node + dx/2), whatever their speed; m = b = k = 0 and F0 is that
+//!   mean, which is the least-squares fit of F0 alone. A recorded force profile
+//!   played back (Angerilli 2001) is this.
+//! * `spring`: F = k x + F0 by least squares over all samples of both directions.
+
+use super::ewls::{Sorted, Theta};
+use super::resample::{self, Resampled};
+use crate::recording::Recording;
+
+/// Mean force at each node of one direction, as [0, 0, 0, F].
+pub fn static_profile(samples: &Sorted, nodes: &[f64], dx_mm: f64) -> Resampled {
+    let forces: Vec<Theta> = samples.f_n.iter().map(|f| [0.0, 0.0, 0.0, *f]).collect();
+    resample::bin(&samples.x_mm, &forces, nodes, dx_mm)
+}
+
+/// The straight line through all samples, as [0, 0, k, F0].
+pub fn spring(recording: &Recording) -> Theta {
+    let n = recording.len() as f64;
+    let mean_x = recording.x_mm.iter().sum::<f64>() / n;
+    let mean_f = recording.f_n.iter().sum::<f64>() / n;
+    let (mut xx, mut xf) = (0.0, 0.0);
+    for (x, f) in recording.x_mm.iter().zip(&recording.f_n) {
+        xx += (x - mean_x) * (x - mean_x);
+        xf += (x - mean_x) * (f - mean_f);
+    }
+    // x varies in every recording, so xx > 0
+    let k = xf / xx;
+    [0.0, 0.0, k, mean_f - k * mean_x]
+}

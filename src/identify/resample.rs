@@ -1,0 +1,194 @@
+//! From one θ a sample to one θ a node.
+//!
+//! The nodes are the multiples of dx inside the range of both directions, so that
+//! every node has samples of both around it. Two ways to a node:
+//!
+//! * `point`, the paper's literal reading: samples at equal counts of a 5 µm
+//!   encoder, round(x / 0.005), are averaged; between counts it is linear.
+//! * `bin`: the mean over [node − dx/2, node + dx/2). A bin without samples takes
+//!   the straight line between the nearest bins that have some (at an end the
+//!   nearest one) and is counted, because a table that looks complete and is not
+//!   should be known.
+//!
+//! Both are linear in θ, so a shift of the origin of x does not change the force.
+
+use super::ewls::Theta;
+
+/// The count of the encoder of the `point` method, mm.
+pub const COUNT_MM: f64 = 0.005;
+
+/// More nodes than this are a mistake in dx.
+pub const MOST_NODES: usize = crate::model::file::MOST_NODES;
+
+/// How estimates are brought to the nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Resample {
+    /// At the node, between means over equal encoder counts.
+    Point,
+    /// The mean over the bin around the node.
+    Bin,
+}
+
+impl Resample {
+    /// As it stands in model files and arguments.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Bin => "bin",
+        }
+    }
+}
+
+/// The multiples of `dx_mm` in [`low`, `high`]; empty if dx is not positive or
+/// there would be more than [`MOST_NODES`].
+pub fn nodes(low: f64, high: f64, dx_mm: f64) -> Vec<f64> {
+    let first = (low / dx_mm).ceil();
+    let last = (high / dx_mm).floor();
+    // also refuses a NaN
+    if !(dx_mm > 0.0 && last - first < MOST_NODES as f64) {
+        return Vec::new();
+    }
+    let mut nodes = Vec::new();
+    let mut i = first;
+    while i <= last {
+        // + 0.0 turns −0 into 0
+        nodes.push(i * dx_mm + 0.0);
+        i += 1.0;
+    }
+    nodes
+}
+
+/// Values at the nodes, and how many nodes had no sample of their own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resampled {
+    /// One a node.
+    pub theta: Vec<Theta>,
+    /// Nodes filled from their neighbours.
+    pub empty: usize,
+}
+
+/// Values at the nodes, between means over equal counts. `x_mm` ascends and is
+/// not empty.
+pub fn point(x_mm: &[f64], theta: &[Theta], nodes: &[f64]) -> Resampled {
+    let count = |x: f64| (x / COUNT_MM).round_ties_even();
+    let mut places = Vec::new();
+    let mut means = Vec::new();
+    let mut from = 0;
+    while from < x_mm.len() {
+        let here = count(x_mm[from]);
+        let to = from + x_mm[from..].partition_point(|x| count(*x) <= here);
+        places.push(here * COUNT_MM);
+        means.push(mean(&theta[from..to]));
+        from = to;
+    }
+    Resampled {
+        theta: nodes
+            .iter()
+            .map(|node| interpolate(&places, &means, *node))
+            .collect(),
+        empty: 0,
+    }
+}
+
+/// Means over [node − dx/2, node + dx/2). `x_mm` ascends and is not empty.
+pub fn bin(x_mm: &[f64], theta: &[Theta], nodes: &[f64], dx_mm: f64) -> Resampled {
+    let below = |edge: f64| x_mm.partition_point(|x| *x < edge);
+    let mut places = Vec::new();
+    let mut means = Vec::new();
+    for node in nodes {
+        let members = below(node - 0.5 * dx_mm)..below(node + 0.5 * dx_mm);
+        if !members.is_empty() {
+            places.push(*node);
+            means.push(mean(&theta[members]));
+        }
+    }
+    if places.is_empty() {
+        // No node has a sample within dx/2: the samples themselves are all there is.
+        return Resampled {
+            empty: nodes.len(),
+            ..point(x_mm, theta, nodes)
+        };
+    }
+    Resampled {
+        theta: nodes
+            .iter()
+            .map(|node| interpolate(&places, &means, *node))
+            .collect(),
+        empty: nodes.len() - places.len(),
+    }
+}
+
+fn mean(values: &[Theta]) -> Theta {
+    let mut sum = [0.0; 4];
+    for theta in values {
+        for (s, p) in sum.iter_mut().zip(theta) {
+            *s += p;
+        }
+    }
+    sum.map(|s| s / values.len() as f64)
+}
+
+/// Straight lines between (`places`, `values`), the ends held.
+fn interpolate(places: &[f64], values: &[Theta], x: f64) -> Theta {
+    let right = places.partition_point(|place| *place <= x);
+    if right == 0 {
+        return values[0];
+    }
+    let left = right - 1;
+    if right == places.len() || places[left] == x {
+        return values[left];
+    }
+    let weight = (x - places[left]) / (places[right] - places[left]);
+    std::array::from_fn(|i| values[left][i] + weight * (values[right][i] - values[left][i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn theta(f0: f64) -> Theta {
+        [0.0, 0.0, 0.0, f0]
+    }
+
+    fn f0(resampled: &Resampled) -> Vec<f64> {
+        resampled.theta.iter().map(|t| t[3]).collect()
+    }
+
+    #[test]
+    fn nodes_are_the_multiples_inside_the_range() {
+        assert_eq!(nodes(1.2, 4.0, 1.0), [2.0, 3.0, 4.0]);
+        assert_eq!(nodes(-0.4, 0.6, 0.5), [0.0, 0.5]);
+        assert_eq!(nodes(0.2, 0.8, 1.0), [0.0; 0]);
+        for bad in [0.0, -1.0, f64::NAN, 1e-12] {
+            assert!(nodes(0.0, 35.0, bad).is_empty(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_bin_is_closed_on_the_left_and_open_on_the_right() {
+        let x = [0.5, 1.0, 1.4, 1.5, 2.0];
+        let values: Vec<_> = [3.0, 6.0, 9.0, 100.0, 200.0].map(theta).to_vec();
+        let at = bin(&x, &values, &[1.0, 2.0], 1.0);
+        assert_eq!(f0(&at), [6.0, 150.0]);
+        assert_eq!(at.empty, 0);
+    }
+
+    #[test]
+    fn an_empty_bin_is_filled_from_its_neighbours_and_counted() {
+        let x = [1.0, 4.0];
+        let values = [theta(10.0), theta(40.0)];
+        let at = bin(&x, &values, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 1.0);
+        assert_eq!(f0(&at), [10.0, 10.0, 20.0, 30.0, 40.0, 40.0]);
+        assert_eq!(at.empty, 4);
+    }
+
+    #[test]
+    fn points_average_equal_counts_before_they_interpolate() {
+        // two samples within one count of 5 µm, one 10 µm further
+        let x = [0.999, 1.001, 1.010];
+        let values = [theta(1.0), theta(3.0), theta(6.0)];
+        let at = point(&x, &values, &[1.0, 1.005]);
+        assert_eq!(at.theta[0][3], 2.0);
+        assert!((at.theta[1][3] - 4.0).abs() < 1e-9, "{at:?}");
+    }
+}

@@ -1,0 +1,242 @@
+use super::*;
+use proptest::prelude::*;
+
+const SMALL: &str = r#"format = "study-model/1"
+id = "a"
+lookup = "floor"
+direction = { rule = "play", delta_mm = 0.5 }
+trained = { x_mm = [0, 2], v_mm_s = 100 }
+x_mm = [0, 1, 2]
+[provenance]
+method = "by hand"
+[vaf]
+val = 0.5
+[positive]
+m_kg = [0, 0.1, 0]
+b_n_s_per_mm = [0.01, 0.01, 0.01]
+k_n_per_mm = [1, -1, 1]
+f0_n = [-1, 0, 1e-3]
+[negative]
+m_kg = [0, 0, 0]
+b_n_s_per_mm = [0, 0, 0]
+k_n_per_mm = [0, 0, 0]
+f0_n = [-2, -2, -2]
+"#;
+
+/// The faults of [`SMALL`] with one text replaced, as `line: message`.
+fn faults(from: &str, to: &str) -> Vec<String> {
+    assert!(SMALL.contains(from), "{from}");
+    let text = SMALL.replacen(from, to, 1);
+    let (realization, findings) = parse("a.toml", &text);
+    assert_eq!(realization.is_some(), !findings.has_errors());
+    findings
+        .faults
+        .iter()
+        .map(|f| {
+            let line = f
+                .span
+                .as_ref()
+                .map_or(0, |s| findings.line_and_column(s.start).0);
+            format!("{line}: {}", f.message)
+        })
+        .collect()
+}
+
+#[test]
+fn a_model_file_is_read_as_it_says() {
+    let (realization, findings) = parse("a.toml", SMALL);
+    assert_eq!(findings.faults, []);
+    let r = realization.unwrap();
+    assert_eq!(r.id, "a");
+    assert_eq!(r.lookup, Lookup::Floor);
+    assert_eq!(r.direction, Direction::Play { delta_mm: 0.5 });
+    assert_eq!(r.trained.x_mm, [0.0, 2.0]);
+    assert_eq!(r.vaf["val"], 0.5);
+    assert_eq!(r.positive.k_n_per_mm, [1.0, -1.0, 1.0]);
+    assert_eq!(r.negative.f0_n, [-2.0; 3]);
+}
+
+#[test]
+fn every_fault_has_its_line() {
+    for (from, to, said) in [
+        (
+            "[0, 0.1, 0]",
+            "[0, nan, 0]",
+            "12: `positive.m_kg[1]` has to be a finite number, not NaN",
+        ),
+        (
+            "[0, 0.1, 0]",
+            "[0,\n-inf, 0]",
+            "13: `positive.m_kg[1]` has to be a finite number, not -inf",
+        ),
+        (
+            "[0, 1, 2]",
+            "[0, 2, 2]",
+            "6: `x_mm[2]` is 2 after 2: positions have to ascend",
+        ),
+        (
+            "[0, 1, 2]",
+            "[0]",
+            "6: `x_mm` has 1 nodes: a table has 2 to 20000",
+        ),
+        (
+            "[1, -1, 1]",
+            "[1, -1]",
+            "14: `positive.k_n_per_mm` has 2 numbers where `x_mm` has 3",
+        ),
+        (
+            "delta_mm = 0.5",
+            "delta_mm = 0",
+            "4: `direction.delta_mm` has to be a finite number above zero, not 0",
+        ),
+        (
+            "delta_mm = 0.5",
+            "delta = 0.5",
+            "4: [direction] has no `delta_mm`",
+        ),
+        (
+            "\"play\", delta_mm = 0.5",
+            "\"sign\", delta_mm = 0.5",
+            "4: unknown key `delta_mm` in [direction]",
+        ),
+        (
+            "val = 0.5",
+            "val = 79",
+            "10: the VAF on `val` is 79: it is at most 1",
+        ),
+        (
+            "val = 0.5",
+            "val = nan",
+            "10: `vaf.val` has to be a finite number, not NaN",
+        ),
+        (
+            "[0, 2], v",
+            "[2, 0], v",
+            "5: `trained.x_mm` has to ascend: lowest, then highest position",
+        ),
+        (
+            "[0, 2], v",
+            "[0, 1, 2], v",
+            "5: `trained.x_mm` has to be two numbers, not 3",
+        ),
+        (
+            "v_mm_s = 100",
+            "v_mm_s = inf",
+            "5: `trained.v_mm_s` has to be a finite number above zero, not inf",
+        ),
+        (
+            "id = \"a\"",
+            "id = \"../a\"",
+            "2: `../a` is no model id: use 1 to 32 of A-Z a-z 0-9 . _ -",
+        ),
+        ("\"floor\"", "\"flor\"", "3: `lookup` cannot be `flor`"),
+        (
+            "method = \"by hand\"",
+            "lambda = 2",
+            "8: `provenance.lambda` has to be above 0 and at most 1, not 2",
+        ),
+        (
+            "[negative]",
+            "[negatve]",
+            "16: unknown key `negatve` at the top level",
+        ),
+        (
+            "[0, 2], v",
+            "[0, 1.5], v",
+            "6: there are nodes outside `trained.x_mm`",
+        ),
+        (
+            "\"a\"",
+            "7",
+            "2: `id` has to be text in quotes, not a whole number",
+        ),
+    ] {
+        let found = faults(from, to);
+        assert!(found.iter().any(|f| f == said), "{said}\n{found:#?}");
+    }
+}
+
+#[test]
+fn a_newer_format_is_refused_by_its_number_alone() {
+    let newer = "study-model/2\"\ncolour = \"red";
+    assert_eq!(
+        faults("study-model/1", newer),
+        ["1: this is not a study-model/1 file"]
+    );
+    let (_, findings) = parse("a.toml", &SMALL.replacen("/1", "/2", 1));
+    assert_eq!(findings.faults[0].label.as_deref(), Some("a newer format"));
+}
+
+#[test]
+fn text_that_is_no_toml_or_empty_is_a_fault_and_no_panic() {
+    for text in ["", "\0", "x_mm = [", "x_mm = 1\nx_mm = 2", "[[positive]]"] {
+        let (realization, findings) = parse("a.toml", text);
+        assert!(realization.is_none() && findings.has_errors(), "{text:?}");
+    }
+}
+
+#[test]
+fn names_of_recordings_in_any_language_survive() {
+    let (realization, _) = parse("a.toml", SMALL);
+    let mut r = realization.unwrap();
+    for name in ["a.b", "", "ü 1", "a\"b\\c\u{1b}\n", "\u{202e}x"] {
+        r.vaf.insert(name.into(), 0.25);
+        r.provenance.recordings.insert(name.into(), "ff".into());
+    }
+    r.provenance.note = Some("line\nline \"quoted\" \u{7f}".into());
+    let text = write(&r);
+    assert!(!text.contains(['\u{1b}', '\u{202e}', '\u{7f}']));
+    let (back, findings) = parse("a.toml", &text);
+    assert_eq!(findings.faults, []);
+    assert_eq!(back, Some(r));
+}
+
+fn branches(nodes: usize) -> impl Strategy<Value = Branch> {
+    let list = || {
+        prop::collection::vec(
+            prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO,
+            nodes,
+        )
+    };
+    (list(), list(), list(), list()).prop_map(|(m_kg, b_n_s_per_mm, k_n_per_mm, f0_n)| Branch {
+        m_kg,
+        b_n_s_per_mm,
+        k_n_per_mm,
+        f0_n,
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn whatever_is_written_reads_back_as_the_same(
+        (x0, dx, positive, negative) in (2usize..20).prop_flat_map(|n| (
+            -50.0f64..50.0,
+            prop::collection::vec(1e-9f64..3.0, n),
+            branches(n),
+            branches(n),
+        )),
+        rule in 0usize..3,
+        delta_mm in 1e-300f64..1e300,
+        vaf in -1e300f64..=1.0,
+    ) {
+        let mut x_mm = vec![x0];
+        x_mm.extend(dx[1..].iter().scan(x0, |x, dx| { *x += dx; Some(*x) }));
+        let r = Realization {
+            id: "p".into(),
+            provenance: Provenance { method: "x".into(), ..Provenance::default() },
+            vaf: [("v".to_owned(), vaf)].into(),
+            lookup: [Lookup::Linear, Lookup::Floor, Lookup::Nearest][rule],
+            direction: match rule {
+                0 => Direction::Sign,
+                1 => Direction::Play { delta_mm },
+                _ => Direction::Dahl { delta_mm },
+            },
+            trained: Trained { x_mm: [x_mm[0], x_mm[x_mm.len() - 1]], v_mm_s: delta_mm },
+            x_mm, positive, negative,
+        };
+        let (back, findings) = parse("p.toml", &write(&r));
+        prop_assert_eq!(&findings.faults, &[]);
+        prop_assert_eq!(back, Some(r));
+    }
+}

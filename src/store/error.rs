@@ -1,0 +1,278 @@
+//! Why the results folder could not be read or written.
+
+use crate::outcome::State;
+use crate::text::{ParticipantId, Untrusted};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a results folder could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// A file or folder could not be read or written.
+    #[error("{}: {source}", .path.display())]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// There is no room for a session.
+    #[error("{}: no room for a session ({free} bytes free, {needed} needed)", .path.display())]
+    Full {
+        /// Where.
+        path: PathBuf,
+        /// Bytes free.
+        free: u64,
+        /// Bytes that a session needs at the least.
+        needed: u64,
+    },
+    /// The folder is not a study's.
+    #[error("{}: not the results of a study: it has no study.json", .path.display())]
+    NoStudy {
+        /// Which folder.
+        path: PathBuf,
+    },
+    /// A later version of the program wrote this.
+    #[error("{}: written by a newer version of study ({})", .path.display(), Untrusted(.found))]
+    Newer {
+        /// Which file.
+        path: PathBuf,
+        /// The format or event that is not known here.
+        found: String,
+    },
+    /// A file is not what this program writes.
+    #[error("{}: {what}", .path.display())]
+    Damaged {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The study that the folder holds has other stimuli.
+    #[error("{}: the stimuli are not those of the running study `{}`", .path.display(), Untrusted(.study))]
+    StimulusChanged {
+        /// The study's folder.
+        path: PathBuf,
+        /// Its id.
+        study: String,
+    },
+    /// Wording or analysis changed without an amendment.
+    #[error("{}: {what} changed since version {version} of the protocol was frozen", .path.display())]
+    NotAmended {
+        /// The study's folder.
+        path: PathBuf,
+        /// The newest version.
+        version: u32,
+        /// `wording`, `analysis` or both.
+        what: &'static str,
+    },
+    /// An amendment that changes nothing.
+    #[error("{}: nothing differs from version {version} of the protocol", .path.display())]
+    NothingToAmend {
+        /// The study's folder.
+        path: PathBuf,
+        /// The newest version.
+        version: u32,
+    },
+    /// Somebody amended the study after it was opened here.
+    #[error("{}: the protocol was amended meanwhile, to version {version}", .path.display())]
+    AmendedMeanwhile {
+        /// The study's folder.
+        path: PathBuf,
+        /// The newest version.
+        version: u32,
+    },
+    /// All trials are done.
+    #[error("{participant} has finished (session {session})")]
+    Finished {
+        /// Who.
+        participant: ParticipantId,
+        /// Their last session.
+        session: u32,
+    },
+    /// The participant's state allows no session.
+    #[error("{participant} is {}: {}", .state.as_str(), Untrusted(.reason))]
+    InState {
+        /// Who.
+        participant: ParticipantId,
+        /// Their state.
+        state: State,
+        /// Why.
+        reason: String,
+    },
+    /// What the participant gave was erased.
+    #[error("what {participant} gave was erased; the id is not used again")]
+    Erased {
+        /// Who.
+        participant: ParticipantId,
+    },
+    /// Another process has the session open.
+    #[error("session {session} of {participant} is open in another process ({})", .path.display())]
+    Open {
+        /// Who.
+        participant: ParticipantId,
+        /// Which.
+        session: u32,
+        /// Its folder.
+        path: PathBuf,
+    },
+    /// Another process has kept the study locked for long.
+    #[error("{}: another process keeps the study locked", .path.display())]
+    Busy {
+        /// The study's folder.
+        path: PathBuf,
+    },
+    /// A pilot's id for a real session, or the like.
+    #[error("{participant} is a {had} participant and cannot be a {wanted} one")]
+    OtherKind {
+        /// Who.
+        participant: ParticipantId,
+        /// What they are.
+        had: &'static str,
+        /// What was asked for.
+        wanted: &'static str,
+    },
+    /// The id differs from an existing one only in upper and lower case.
+    #[error("`{given}` and the existing `{existing}` differ only in upper and lower case")]
+    Collides {
+        /// As asked for.
+        given: ParticipantId,
+        /// As it is.
+        existing: ParticipantId,
+    },
+    /// No row is free in the range of this rig.
+    #[error("no row from {from} to {to} is free")]
+    NoRow {
+        /// First of the range.
+        from: u32,
+        /// Last of the range.
+        to: u32,
+    },
+    /// Nobody of that id has taken part.
+    #[error("there is no participant `{participant}`{}", .near.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
+    Unknown {
+        /// As asked for.
+        participant: ParticipantId,
+        /// An id that is near.
+        near: Option<ParticipantId>,
+    },
+    /// The state cannot follow on the present one.
+    #[error("{participant} cannot be set to {}: {why}", .state.as_str())]
+    StateRefused {
+        /// Who.
+        participant: ParticipantId,
+        /// Asked for.
+        state: State,
+        /// Why not.
+        why: String,
+    },
+    /// An earlier write to this segment failed: it is not touched again.
+    #[error("{}: an earlier write failed, a new segment is needed", .path.display())]
+    SegmentFailed {
+        /// The segment.
+        path: PathBuf,
+    },
+    /// An event that could not be read back.
+    #[error("{}: an event could not be written so that it reads back: {what}", .path.display())]
+    Unstorable {
+        /// The segment.
+        path: PathBuf,
+        /// What the reader says.
+        what: String,
+    },
+    /// [`super::SessionFolder::journal`] was called twice.
+    #[error("{}: the journal is already open", .path.display())]
+    JournalTaken {
+        /// The session's folder.
+        path: PathBuf,
+    },
+    /// A file name of the protocol that leaves its folder.
+    #[error("`{}` is not a path inside the protocol's folder", Untrusted(.name))]
+    OutsideFolder {
+        /// The name.
+        name: String,
+    },
+}
+
+impl StoreError {
+    /// What to do next, where the message does not say it.
+    pub fn hint(&self) -> Option<String> {
+        Some(match self {
+            Self::Full { .. } => "free some space, then start again".to_owned(),
+            Self::Newer { .. } => {
+                "use the version of study that wrote it, or a later one".to_owned()
+            }
+            Self::StimulusChanged { .. } => {
+                "changed stimuli are a new study: give the protocol another study id".to_owned()
+            }
+            Self::NotAmended { .. } => {
+                "use `study amend RESULTS PROTOCOL --reason TEXT`, or restore the protocol"
+                    .to_owned()
+            }
+            Self::AmendedMeanwhile { .. } => "start again with the amended protocol".to_owned(),
+            Self::Finished { .. } => "each participant needs an id of their own".to_owned(),
+            Self::InState { state, .. } if *state == State::NoShow => {
+                "if they came after all, set the state to void first".to_owned()
+            }
+            Self::InState { .. } | Self::Erased { .. } => {
+                "each participant needs an id of their own".to_owned()
+            }
+            Self::Open { .. } => "go on there, or end that process".to_owned(),
+            Self::Busy { .. } => "wait for it, or end it".to_owned(),
+            Self::Collides { existing, .. } => format!("use `{existing}`, or another id"),
+            Self::NoRow { .. } => "give this rig a larger range with --rows".to_owned(),
+            Self::OtherKind { .. } => "use another id".to_owned(),
+            _ => return None,
+        })
+    }
+
+    /// Whether the request was at fault, not the folder.
+    pub fn is_request(&self) -> bool {
+        matches!(
+            self,
+            Self::StimulusChanged { .. }
+                | Self::NotAmended { .. }
+                | Self::NothingToAmend { .. }
+                | Self::Finished { .. }
+                | Self::InState { .. }
+                | Self::Erased { .. }
+                | Self::OtherKind { .. }
+                | Self::Collides { .. }
+                | Self::NoRow { .. }
+                | Self::Unknown { .. }
+                | Self::StateRefused { .. }
+                | Self::OutsideFolder { .. }
+        )
+    }
+
+    /// Whether the disk is full, so that a reserve helps.
+    pub fn is_full(&self) -> bool {
+        match self {
+            Self::Full { .. } => true,
+            Self::Io { source, .. } => is_full(source),
+            _ => false,
+        }
+    }
+}
+
+/// Whether an error of the operating system says that there is no room.
+pub(super) fn is_full(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
+    )
+}
+
+/// Adds the path to an error of the operating system.
+pub(super) trait At<T> {
+    fn at(self, path: &Path) -> Result<T, StoreError>;
+}
+
+impl<T> At<T> for io::Result<T> {
+    fn at(self, path: &Path) -> Result<T, StoreError> {
+        self.map_err(|source| StoreError::Io {
+            path: path.to_owned(),
+            source,
+        })
+    }
+}

@@ -1,0 +1,185 @@
+//! `study.json`: what the folder is, and every version of its protocol.
+//!
+//! It is the commit point: a version exists when `study.json` names it, and its
+//! files were on the medium before that.
+
+use super::atomic;
+use super::disk::Disk;
+use super::error::{At as _, StoreError};
+use super::layout;
+use super::line::sha256;
+use crate::outcome::Moment;
+use crate::protocol::fingerprint::Fingerprints;
+use chrono::{DateTime, FixedOffset};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The version of the folder's format that this program writes and reads.
+pub const FORMAT: &str = "study-results/1";
+
+/// The content of `study.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// [`FORMAT`].
+    pub format: String,
+    /// The study's id.
+    pub study: String,
+    /// The program that made the folder.
+    pub tool_version: String,
+    /// When it was made.
+    pub created: DateTime<FixedOffset>,
+    /// Versions of the protocol, from 1, without gaps.
+    pub versions: Vec<Version>,
+}
+
+/// A frozen version of the protocol.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Version {
+    /// From 1.
+    pub version: u32,
+    /// When it was frozen.
+    pub at: DateTime<FixedOffset>,
+    /// Why it was amended; empty for the first.
+    pub reason: String,
+    /// The program that froze it.
+    pub tool_version: String,
+    /// What of it may change.
+    pub fingerprints: Fingerprints,
+    /// Path in the frozen folder → SHA-256 of the file.
+    pub files: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+struct FormatOnly {
+    format: String,
+}
+
+impl Manifest {
+    /// Of a study that starts now.
+    pub(super) fn new(study: &str, first: Version, at: Moment) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            study: study.to_owned(),
+            tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+            created: at.wall,
+            versions: vec![first],
+        }
+    }
+
+    /// The newest version of the protocol.
+    pub fn newest(&self) -> &Version {
+        self.versions
+            .last()
+            .expect("reading refuses a manifest without versions")
+    }
+
+    /// Reads the manifest of a study's folder.
+    ///
+    /// # Errors
+    /// [`StoreError`]: none there, of a newer version, or damaged.
+    pub(super) fn read(disk: &dyn Disk, study: &Path) -> Result<Self, StoreError> {
+        let path = study.join(layout::MANIFEST);
+        let bytes = match disk.read(&path) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                return Err(StoreError::NoStudy {
+                    path: study.to_owned(),
+                });
+            }
+            read => read.at(&path)?,
+        };
+        let damaged = |what: String| StoreError::Damaged {
+            path: path.clone(),
+            what,
+        };
+        let FormatOnly { format } =
+            serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
+        if format != FORMAT {
+            return Err(StoreError::Newer {
+                path,
+                found: format,
+            });
+        }
+        let manifest: Self = serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
+        let numbered = (1..).zip(&manifest.versions).all(|(n, v)| v.version == n);
+        if manifest.versions.is_empty() || !numbered {
+            return Err(damaged("the versions are not numbered 1, 2, …".to_owned()));
+        }
+        let mut names = manifest.versions.iter().flat_map(|v| v.files.keys());
+        if let Some(name) = names.find(|name| !is_inside(name)) {
+            return Err(StoreError::OutsideFolder { name: name.clone() });
+        }
+        Ok(manifest)
+    }
+
+    /// Puts it in place of the old one.
+    pub(super) fn write(&self, disk: &dyn Disk, study: &Path) -> Result<(), StoreError> {
+        let mut text = serde_json::to_string_pretty(self).map_err(|e| StoreError::Unstorable {
+            path: study.join(layout::MANIFEST),
+            what: e.to_string(),
+        })?;
+        text.push('\n');
+        atomic::replace(disk, &study.join(layout::MANIFEST), text.as_bytes())
+    }
+}
+
+/// Writes the files of a version to its folder, ready to be named by the manifest.
+/// Left-overs of a process that died before it came so far are replaced.
+pub(super) fn freeze(
+    disk: &dyn Disk,
+    study: &Path,
+    version: u32,
+    frozen: &super::Frozen<'_>,
+    reason: &str,
+    at: Moment,
+) -> Result<Version, StoreError> {
+    if let Some((name, _)) = frozen.files.iter().find(|(name, _)| !is_inside(name)) {
+        return Err(StoreError::OutsideFolder { name: name.clone() });
+    }
+    atomic::folder(disk, &study.join(layout::PROTOCOLS))?;
+    let folder = layout::protocol(study, version);
+    atomic::folder(disk, &folder)?;
+    let mut files = BTreeMap::new();
+    for (name, bytes) in frozen.files {
+        let mut at = folder.clone();
+        let mut parts = name.split('/').peekable();
+        while let Some(part) = parts.next() {
+            at.push(part);
+            if parts.peek().is_some() {
+                atomic::folder(disk, &at)?;
+            }
+        }
+        atomic::replace(disk, &at, bytes)?;
+        files.insert(name.clone(), sha256(bytes));
+    }
+    Ok(Version {
+        version,
+        at: at.wall,
+        reason: reason.to_owned(),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        fingerprints: frozen.fingerprints.clone(),
+        files,
+    })
+}
+
+/// Whether a path with `/` stays in its folder.
+fn is_inside(name: &str) -> bool {
+    !name.contains(['\\', '\0'])
+        && name
+            .split('/')
+            .all(|part| !part.is_empty() && part != "." && part != "..")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_cannot_leave_the_frozen_folder() {
+        for bad in ["../x", "/etc/x", "a/../../x", "a//b", "", "a\\b", "./a"] {
+            assert!(!is_inside(bad), "{bad}");
+        }
+        assert!(is_inside("protocol.toml"));
+        assert!(is_inside("models/lambda-0.9995.toml"));
+    }
+}

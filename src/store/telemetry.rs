@@ -1,0 +1,117 @@
+//! Telemetry of one attempt, as a CSV.
+//!
+//! Buffered: what a crash can lose of it is the last seconds of one playback, and
+//! no rating. A full disk ends it before it takes the journal's reserve.
+
+use super::disk::Appender;
+use super::error::{At as _, StoreError};
+use super::layout;
+use super::session_folder::Held;
+use crate::outcome::Sample;
+use std::fmt;
+use std::io;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Bytes that are gathered before they are written.
+const BUFFER: usize = 32 << 10;
+
+const HEADER: &str = "t_s,x_mm,v_mm_s,force_command_n,force_measured_n\r\n";
+
+/// Writes the telemetry of one attempt. It can be moved to a thread of its own.
+pub struct TelemetryWriter {
+    held: Arc<Held>,
+    file: Box<dyn Appender>,
+    path: PathBuf,
+    buffer: Vec<u8>,
+}
+
+impl fmt::Debug for TelemetryWriter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TelemetryWriter")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
+    }
+}
+
+impl TelemetryWriter {
+    pub(super) fn create(held: Arc<Held>, trial: u32, attempt: u32) -> Result<Self, StoreError> {
+        let folder = held.path.join(layout::TELEMETRY);
+        match held.disk.create_folder(&folder) {
+            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e).at(&folder),
+            _ => {}
+        }
+        let mut copy = 1;
+        let (path, file) = loop {
+            let path = folder.join(layout::telemetry(trial, attempt, copy));
+            match held.disk.create(&path) {
+                Ok(file) => break (path, file),
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => copy += 1,
+                Err(e) => return Err(e).at(&path),
+            }
+        };
+        let mut buffer = Vec::with_capacity(BUFFER + 1024);
+        buffer.extend_from_slice(HEADER.as_bytes());
+        Ok(Self {
+            held,
+            file,
+            path,
+            buffer,
+        })
+    }
+
+    /// Takes samples; they reach the disk some time later.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the disk does not take them. The file then ends here;
+    /// the session can go on.
+    pub fn write(&mut self, samples: &[Sample]) -> Result<(), StoreError> {
+        for sample in samples {
+            let Sample {
+                t_s,
+                x_mm,
+                v_mm_s,
+                force_command_n,
+                force_measured_n,
+            } = sample;
+            let written = write!(self.buffer, "{t_s},{x_mm},{v_mm_s},{force_command_n},");
+            let measured = match force_measured_n {
+                Some(force) => write!(self.buffer, "{force}\r\n"),
+                None => write!(self.buffer, "\r\n"),
+            };
+            written.and(measured).at(&self.path)?;
+            if self.buffer.len() >= BUFFER {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), StoreError> {
+        if self.held.is_full() {
+            return Err(io::Error::from(io::ErrorKind::StorageFull)).at(&self.path);
+        }
+        self.file.write_all(&self.buffer).at(&self.path)?;
+        self.buffer.clear();
+        Ok(())
+    }
+
+    /// Writes what is left and returns when the file is on the medium.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the disk does not take it.
+    pub fn finish(mut self) -> Result<(), StoreError> {
+        self.flush()?;
+        self.file.sync().at(&self.path)?;
+        let folder = self.held.path.join(layout::TELEMETRY);
+        self.held.disk.sync_folder(&folder).at(&folder)
+    }
+}
+
+impl Drop for TelemetryWriter {
+    fn drop(&mut self) {
+        // Who drops it without `finish` has given up on it; what is here may help.
+        let _ = self.flush();
+    }
+}

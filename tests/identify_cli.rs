@@ -1,0 +1,208 @@
+//! `study identify` as somebody types it.
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+const TRAINING: &str = "tests/data/recordings/training_a.csv";
+const VALIDATION: &str = "tests/data/recordings/validation_a.csv";
+
+fn identify(args: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("study").unwrap();
+    command.arg("identify").args(args);
+    command
+}
+
+fn refused(args: &[&str], code: i32, said: &str) {
+    identify(args)
+        .assert()
+        .code(code)
+        .stdout("")
+        .stderr(predicate::str::contains(said));
+}
+
+#[test]
+fn json_has_a_cell_for_every_lambda_and_dx_with_unrounded_vaf() {
+    let out = identify(&[
+        TRAINING,
+        "--validate",
+        VALIDATION,
+        "--method",
+        "ewls",
+        "--lambda",
+        "0.999,0.9995",
+        "--dx",
+        "0.5,1",
+        "--resample",
+        "bin",
+        "--lookup",
+        "linear",
+        "--start",
+        "cold",
+        "--sort",
+        "ascending",
+        "--json",
+    ])
+    .assert()
+    .success();
+    let document: Value = serde_json::from_slice(&out.get_output().stdout).unwrap();
+    assert_eq!(document["format"], "study-identify/1");
+    let cells = document["cells"].as_array().unwrap();
+    let of = |i: usize, key: &str| cells[i][key].as_f64().unwrap();
+    let places: Vec<_> = (0..cells.len())
+        .map(|i| (of(i, "lambda"), of(i, "dx_mm")))
+        .collect();
+    assert_eq!(
+        places,
+        [(0.999, 0.5), (0.999, 1.0), (0.9995, 0.5), (0.9995, 1.0)]
+    );
+    // golden numbers as in tests/identify_golden.rs
+    let vaf = cells[1]["vaf"]["validation_a.csv"].as_f64().unwrap();
+    assert!((vaf - 0.949471).abs() < 0.51e-6, "{vaf}");
+    assert_eq!(cells[0]["method"], "ewls");
+    assert_eq!(cells[0]["resample"], "bin");
+    assert_eq!(cells[0]["lookup"], "linear");
+    assert!((of(0, "memory_mm") - 1.034).abs() < 0.001);
+    assert_eq!(document["best"], 0);
+}
+
+#[test]
+fn the_table_names_the_best_cell_and_what_it_was_chosen_on() {
+    identify(&[
+        TRAINING,
+        "--validate",
+        VALIDATION,
+        "--lambda",
+        "0.999,0.9995",
+        "--dx",
+        "1",
+    ])
+    .assert()
+    .success()
+    .stdout(predicate::str::contains("*  0.999  1.034      1"))
+    .stdout(predicate::str::contains(
+        "highest VAF: 0.949471 on validation_a, chosen on this recording",
+    ))
+    .stdout(predicate::str::contains("\u{1b}").not());
+}
+
+#[test]
+fn a_recording_is_not_validated_on_itself_even_under_another_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let copy = dir.path().join("other.csv");
+    fs::copy(TRAINING, &copy).unwrap();
+    let copy = copy.to_str().unwrap();
+    refused(&[TRAINING, "--validate", copy], 1, "are the same recording");
+    refused(
+        &[TRAINING, "--validate", VALIDATION, "--test", copy],
+        1,
+        "are the same recording",
+    );
+    refused(
+        &[TRAINING, "--validate", VALIDATION, "--test", VALIDATION],
+        1,
+        "are the same recording",
+    );
+}
+
+#[test]
+fn a_model_file_is_written_once_and_overwritten_only_when_asked() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("models");
+    let out = out.to_str().unwrap();
+    let args = [
+        TRAINING,
+        "--validate",
+        VALIDATION,
+        "--lambda",
+        "0.9995",
+        "--dx",
+        "1,2",
+        "--out",
+        out,
+    ];
+    identify(&args).assert().success();
+    let path = Path::new(out).join("lambda-0.9995-dx-1.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains("id = \"lambda-0.9995-dx-1\"\n"), "{text}");
+    fs::write(&path, "mine").unwrap();
+    refused(&args, 1, "lambda-0.9995-dx-1.toml is there already");
+    assert_eq!(fs::read_to_string(&path).unwrap(), "mine");
+    identify(&args).arg("--force").assert().success();
+    assert_eq!(fs::read_to_string(&path).unwrap(), text);
+    assert_eq!(fs::read_dir(out).unwrap().count(), 2);
+}
+
+#[test]
+fn ids_that_collide_or_leave_the_folder_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    let with = |id: &str, said: &str| {
+        refused(
+            &[
+                TRAINING,
+                "--validate",
+                VALIDATION,
+                "--lambda",
+                "0.9995",
+                "--dx",
+                "1,2",
+                "--out",
+                out,
+                "--id",
+                id,
+            ],
+            1,
+            said,
+        );
+    };
+    with("same", "two cells would be called same");
+    with("../{dx}", "is no model id");
+    assert_eq!(fs::read_dir(out).unwrap().count(), 0);
+}
+
+#[test]
+fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
+    let with = |flag: &str, value: &str, code: i32, said: &str| {
+        refused(
+            &[TRAINING, "--validate", VALIDATION, flag, value],
+            code,
+            said,
+        );
+    };
+    with(
+        "--lambda",
+        "1.5",
+        2,
+        "a forgetting factor is above 0 and at most 1",
+    );
+    with(
+        "--lambda",
+        "nan",
+        2,
+        "a forgetting factor is above 0 and at most 1",
+    );
+    with("--dx", "0", 2, "an increment is a length above 0 mm");
+    with("--dx", "40", 1, "dx = 40 mm leaves");
+    with("--resample", "hat", 2, "possible values: point, bin");
+    with(
+        "--method",
+        "magic",
+        2,
+        "possible values: ewls, static, spring",
+    );
+    refused(&[TRAINING], 2, "--validate");
+    refused(&[TRAINING, "--validate", "absent.csv"], 1, "absent.csv: ");
+
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("ragged.csv");
+    fs::write(&path, "t_s,x_mm,f_n\n0,1,1\n1,2\n").unwrap();
+    let path = path.to_str().unwrap();
+    refused(
+        &[TRAINING, "--validate", &format!("v={path}")],
+        1,
+        "ragged.csv: line 3: 2 fields where the columns are 3",
+    );
+}

@@ -1,0 +1,94 @@
+//! Protocols for the tests and benches of the schedule, built without a file.
+
+use std::collections::BTreeMap;
+use study::limits::{Limit, Limits};
+use study::protocol::*;
+use study::text::{ModelId, QuestionId};
+
+/// Realizations `A`, `B`, … and nothing beside the design.
+pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol {
+    let limit = |value| Limit::new(value).unwrap();
+    Protocol {
+        study: Study {
+            id: "example".to_owned(),
+            title: "An example".to_owned(),
+            seed: 2007,
+            authors: Vec::new(),
+            license: None,
+            ethics: None,
+            contact: None,
+            funding: None,
+            doi: None,
+        },
+        text: Text::default(),
+        consent: None,
+        design: Design {
+            participants: 10,
+            repetitions,
+            order,
+            max_run: None,
+            min_distance: None,
+            practice: Vec::new(),
+            breaks: None,
+            max_attempts: 3,
+        },
+        session: SessionRules {
+            entry: Entry::Participant,
+            resume_within_h: 4.0,
+        },
+        device: DeviceRules {
+            kind: DeviceKind::Simulated,
+            limits: Limits {
+                force_n: limit(12.0),
+                velocity_mm_s: limit(1000.0),
+            },
+            uncertified: None,
+        },
+        trial: TrialRules {
+            reference: None,
+            reference_min_s: 0.0,
+            minimum_strokes: 0,
+        },
+        models: (b'A'..=b'Z')
+            .take(models)
+            .map(|c| model(&char::from(c).to_string()))
+            .collect(),
+        questions: Vec::new(),
+        setup: Vec::new(),
+        intake: Vec::new(),
+        outro: Vec::new(),
+        analysis: AnalysisRules {
+            primary: QuestionId::new("realism").unwrap(),
+            vaf: None,
+            realistic_from: None,
+            unfinished: Unfinished::Include,
+            exclude: Vec::new(),
+        },
+    }
+}
+
+/// The same with constraints.
+pub(crate) fn constrained(
+    models: usize,
+    repetitions: u32,
+    order: Order,
+    max_run: Option<u32>,
+    min_distance: Option<u32>,
+) -> Protocol {
+    let mut protocol = design(models, repetitions, order);
+    protocol.design.max_run = max_run;
+    protocol.design.min_distance = min_distance;
+    protocol
+}
+
+fn model(id: &str) -> ModelEntry {
+    ModelEntry {
+        id: ModelId::new(id).unwrap(),
+        file: None,
+        vaf: None,
+        role: Role::Test,
+        duplicate_of: None,
+        device: None,
+        covariates: BTreeMap::new(),
+    }
+}
