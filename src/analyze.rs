@@ -15,8 +15,8 @@ mod describe;
 mod effects;
 mod order;
 mod select;
-mod values;
 mod vaf;
+mod values;
 mod warnings;
 
 pub use select::{Counts, Include, Reason};
@@ -66,7 +66,10 @@ impl Rules {
     pub fn of(protocol: &Protocol, question: &str, include: Include) -> Self {
         use crate::protocol::QuestionKind;
         let primary = protocol.analysis.primary.as_str() == question;
-        let asked = protocol.questions.iter().find(|q| q.id.as_str() == question);
+        let asked = protocol
+            .questions
+            .iter()
+            .find(|q| q.id.as_str() == question);
         Self {
             planned: Some(protocol.design.participants),
             realistic_from: protocol.analysis.realistic_from.filter(|_| primary),

@@ -103,7 +103,12 @@ fn every_statistic_agrees_with_its_reference() {
             }
         }
     }
-    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "{} wrong:\n{}",
+        wrong.len(),
+        wrong.join("\n")
+    );
     assert!(passed > 4000, "only {passed} were compared");
 }
 

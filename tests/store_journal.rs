@@ -26,7 +26,10 @@ fn lines() -> Vec<Vec<u8>> {
         protocol_version: 1,
     });
     let events = session("P01", 1, Seat::Row(1));
-    let events = events.into_iter().zip(0..).map(|(e, n)| Record::Event(at(n), e));
+    let events = events
+        .into_iter()
+        .zip(0..)
+        .map(|(e, n)| Record::Event(at(n), e));
     let mut prev = line::NO_LINE.to_owned();
     [claim]
         .into_iter()
@@ -98,7 +101,11 @@ fn every_flipped_bit_and_every_missing_byte_is_noticed_and_costs_one_record() {
             let mut bytes = whole.clone();
             let removed = bytes.remove(byte);
             // One of two equal neighbours: the bytes are the same as without the other.
-            check(&bytes, n, &format!("byte {byte} ({removed}) of line {n} removed"));
+            check(
+                &bytes,
+                n,
+                &format!("byte {byte} ({removed}) of line {n} removed"),
+            );
             checked += 1;
         }
         start += line.len();
@@ -192,7 +199,11 @@ fn journal_path() -> std::path::PathBuf {
 #[test]
 fn a_torn_tail_is_set_apart_and_the_session_goes_on() {
     let whole = unfinished(12).read(&journal_path()).unwrap();
-    let last = whole[..whole.len() - 1].iter().rposition(|b| *b == b'\n').unwrap() + 1;
+    let last = whole[..whole.len() - 1]
+        .iter()
+        .rposition(|b| *b == b'\n')
+        .unwrap()
+        + 1;
     for cut in last..=whole.len() {
         for zeros in [0, 5] {
             let disk = unfinished(12);
@@ -208,9 +219,15 @@ fn a_torn_tail_is_set_apart_and_the_session_goes_on() {
             if torn.is_empty() {
                 assert_eq!(claimed.notices, Vec::<String>::new());
             } else {
-                let copy = disk.read(&small().join("sessions/P01/1/torn-1.bin")).unwrap();
+                let copy = disk
+                    .read(&small().join("sessions/P01/1/torn-1.bin"))
+                    .unwrap();
                 assert_eq!(copy, torn, "cut at {cut}");
-                assert!(claimed.notices[0].contains("torn-1.bin"), "{:?}", claimed.notices);
+                assert!(
+                    claimed.notices[0].contains("torn-1.bin"),
+                    "{:?}",
+                    claimed.notices
+                );
             }
             let mut journal = claimed.folder.journal().unwrap();
             let seq = journal.append(at(50), &Event::Paused).unwrap();
@@ -232,7 +249,10 @@ fn a_damaged_line_in_the_middle_stays_and_the_session_goes_on() {
         let start: usize = lines.by_ref().take(damaged).map(<[u8]>::len).sum();
         bytes[start + 30] ^= 4;
         disk.truncate(&journal_path(), 0).unwrap();
-        disk.open(&journal_path()).unwrap().write_all(&bytes).unwrap();
+        disk.open(&journal_path())
+            .unwrap()
+            .write_all(&bytes)
+            .unwrap();
 
         let study = StudyFolder::open_on(Arc::new(disk.clone()), small()).unwrap();
         let mut claimed = study.claim(&real("P01")).unwrap();
@@ -242,11 +262,25 @@ fn a_damaged_line_in_the_middle_stays_and_the_session_goes_on() {
         assert!(!claimed.notices.is_empty());
         let mut journal = claimed.folder.journal().unwrap();
         assert_eq!(journal.append(at(50), &Event::Paused).unwrap(), 13);
-        assert!(disk.read(&journal_path()).unwrap().starts_with(&bytes), "nothing was repaired");
+        assert!(
+            disk.read(&journal_path()).unwrap().starts_with(&bytes),
+            "nothing was repaired"
+        );
         let read = study.sessions().unwrap().remove(0);
         assert_eq!(read.entries.len(), left + 1);
-        assert_eq!(read.damage.iter().filter(|d| matches!(d.kind, DamageKind::Unreadable(_))).count(), 1);
-        let wrong = study.verify(None).unwrap().iter().filter(|f| f.wrong).count();
+        assert_eq!(
+            read.damage
+                .iter()
+                .filter(|d| matches!(d.kind, DamageKind::Unreadable(_)))
+                .count(),
+            1
+        );
+        let wrong = study
+            .verify(None)
+            .unwrap()
+            .iter()
+            .filter(|f| f.wrong)
+            .count();
         assert!(wrong >= 1);
     }
 }

@@ -55,7 +55,12 @@ impl Table {
 
 impl<'a> Cells<'a> {
     pub(super) fn of(ratings: &'a Ratings) -> Self {
-        let rated: Vec<f64> = ratings.rating.iter().copied().filter(|v| v.is_finite()).collect();
+        let rated: Vec<f64> = ratings
+            .rating
+            .iter()
+            .copied()
+            .filter(|v| v.is_finite())
+            .collect();
         let offset = mean(&rated).unwrap_or(0.0).round();
         let centred: Vec<f64> = ratings.rating.iter().map(|v| v - offset).collect();
         let mut order: Vec<usize> = (0..ratings.len())
@@ -90,7 +95,10 @@ impl<'a> Cells<'a> {
 
     /// Centred ratings of a cell, by repetition.
     pub(super) fn of_cell(&self, cell: &Cell) -> Vec<f64> {
-        self.order[cell.rows.clone()].iter().map(|&i| self.centred[i]).collect()
+        self.order[cell.rows.clone()]
+            .iter()
+            .map(|&i| self.centred[i])
+            .collect()
     }
 
     /// Realizations that the study asks about: role test and no hidden repeat.

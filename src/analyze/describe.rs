@@ -71,7 +71,9 @@ fn within<'c>(
 ) -> (f64, usize) {
     let (mut ss, mut df) = (0.0, 0);
     for cell in some.filter(|c| c.rows.len() > 1) {
-        ss += sum_of_squares(&cells.of_cell(cell)).unwrap_or(f64::NAN).max(0.0);
+        ss += sum_of_squares(&cells.of_cell(cell))
+            .unwrap_or(f64::NAN)
+            .max(0.0);
         df += cell.rows.len() - 1;
     }
     (ss, df)
@@ -131,9 +133,8 @@ fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, rules: &Rules, values: 
         g.interval("ci95", ends);
         if let Some(from) = rules.realistic_from {
             let x = &by_model[m];
-            let share = (!x.is_empty()).then(|| {
-                x.iter().filter(|v| **v >= from).count() as f64 / x.len() as f64
-            });
+            let share = (!x.is_empty())
+                .then(|| x.iter().filter(|v| **v >= from).count() as f64 / x.len() as f64);
             let mut g = values.group(format!("realistic/{id}"), "no ratings");
             g.put("n", x.len() as f64);
             g.maybe("share", share);
@@ -200,7 +201,11 @@ fn by_subject(cells: &Cells<'_>, table: &Table, values: &mut Values) {
         let run = run.filter(|_| ordered).map(|n| n as f64);
         g.put_or("longest_run", run, "the order of the trials is not known");
         g.put_or("within_cell_sd", within_cells[s], NO_REPETITION);
-        let r = table.subjects.binary_search(&s).ok().and_then(|i| others[i]);
+        let r = table
+            .subjects
+            .binary_search(&s)
+            .ok()
+            .and_then(|i| others[i]);
         let why = "not all realizations rated, or a constant rater, or nobody else";
         g.put_or("leave_one_out_r", r, why);
     }
@@ -261,8 +266,8 @@ fn alone(cells: &Cells<'_>, values: &mut Values) {
         g.put_or("sd", sd(&x), ONE);
         g.maybe("lag1_autocorrelation", lag1_autocorrelation(&x));
     }
-    let once = cells.cells.iter().all(|c| c.rows.len() == 1)
-        || r.model.iter().all(|m| *m == NO_MODEL);
+    let once =
+        cells.cells.iter().all(|c| c.rows.len() == 1) || r.model.iter().all(|m| *m == NO_MODEL);
     let vaf: Vec<f64> = rows.iter().map(|&i| r.vaf[i]).collect();
     if !once || vaf.len() < 3 || !vaf.iter().all(|v| v.is_finite()) {
         return;

@@ -32,7 +32,9 @@ pub(super) fn effects(cells: &Cells<'_>, values: &mut Values) {
 
 fn ranks(table: &Table, values: &mut Values) {
     let Some(f) = friedman(&table.rows) else {
-        values.group("friedman", FEW).none(&["chi2", "p", "kendall_W"]);
+        values
+            .group("friedman", FEW)
+            .none(&["chi2", "p", "kendall_W"]);
         return;
     };
     let df2 = f.df * (table.rows.len() as f64 - 1.0);
@@ -54,7 +56,11 @@ fn ranks(table: &Table, values: &mut Values) {
 fn anova(table: &Table, values: &mut Values) {
     let wide = table.models.len() > MAX_COLUMNS;
     let Some(a) = one_way(&table.rows).filter(|_| !wide) else {
-        let why = if wide { "more than 300 realizations" } else { FEW };
+        let why = if wide {
+            "more than 300 realizations"
+        } else {
+            FEW
+        };
         values.group("rmanova", why).none(&["F", "p", "p_gg"]);
         return;
     };
@@ -76,7 +82,11 @@ fn anova(table: &Table, values: &mut Values) {
     let why = "two realizations, too few subjects, or a singular covariance";
     g.put_or("mauchly_W", e.mauchly.map(|m| m.w), why);
     g.put_or("mauchly_p", e.mauchly.and_then(|m| m.p), why);
-    g.put_or("mauchly_p_as_R_prints", e.mauchly.and_then(|m| m.p_as_r), why);
+    g.put_or(
+        "mauchly_p_as_R_prints",
+        e.mauchly.and_then(|m| m.p_as_r),
+        why,
+    );
 }
 
 /// Complete subjects whose cells all hold the same repetitions, once each.
@@ -84,7 +94,9 @@ fn anova_with_repetitions(cells: &Cells<'_>, table: &Table, values: &mut Values)
     let why = "not every cell has the same two or more repetitions";
     let Some((rows, repetitions)) = balanced(cells, table) else {
         for effect in ["model", "rep", "inter"] {
-            values.group(format!("rmanova2/{effect}"), why).none(&["F", "p"]);
+            values
+                .group(format!("rmanova2/{effect}"), why)
+                .none(&["F", "p"]);
         }
         return;
     };
@@ -92,7 +104,15 @@ fn anova_with_repetitions(cells: &Cells<'_>, table: &Table, values: &mut Values)
         return;
     };
     for ((effect, ges), name) in a.effects.iter().zip(["model", "rep", "inter"]) {
-        let Effect { df1, df2, f, p, eps_gg, p_gg, .. } = effect;
+        let Effect {
+            df1,
+            df2,
+            f,
+            p,
+            eps_gg,
+            p_gg,
+            ..
+        } = effect;
         let mut g = values.group(format!("rmanova2/{name}"), NO_ERROR);
         g.put("df1", *df1);
         g.put("df2", *df2);
@@ -110,7 +130,10 @@ fn anova_with_repetitions(cells: &Cells<'_>, table: &Table, values: &mut Values)
 fn balanced(cells: &Cells<'_>, table: &Table) -> Option<(Vec<Vec<f64>>, usize)> {
     let r = cells.ratings;
     let labels = |c: &Cell| -> Vec<u32> {
-        cells.order[c.rows.clone()].iter().map(|&i| r.repetition[i]).collect()
+        cells.order[c.rows.clone()]
+            .iter()
+            .map(|&i| r.repetition[i])
+            .collect()
     };
     let mut place = vec![usize::MAX; r.models.len()];
     for (j, &m) in table.models.iter().enumerate() {
@@ -196,11 +219,20 @@ fn repetitions(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
     let own = |c: &&Cell| models.binary_search(&c.model).is_ok();
     let mut labels: Vec<u32> = Vec::new();
     for cell in cells.cells.iter().filter(own) {
-        labels.extend(cells.order[cell.rows.clone()].iter().map(|&i| r.repetition[i]));
+        labels.extend(
+            cells.order[cell.rows.clone()]
+                .iter()
+                .map(|&i| r.repetition[i]),
+        );
     }
     labels.sort_unstable();
     labels.dedup();
-    let units: Vec<Vec<f64>> = cells.cells.iter().filter(own).map(|c| cells.of_cell(c)).collect();
+    let units: Vec<Vec<f64>> = cells
+        .cells
+        .iter()
+        .filter(own)
+        .map(|c| cells.of_cell(c))
+        .collect();
     let complete: Vec<Vec<f64>> = units
         .iter()
         .filter(|u| u.len() == labels.len())
@@ -210,7 +242,14 @@ fn repetitions(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
     let why = "fewer than two cells with two repetitions or more";
     put_icc(found.as_ref(), "icc_repetitions", why, values);
     let mut g = values.group("icc_repetitions", why);
-    g.put("n_cells", if labels.len() > 1 { complete.len() as f64 } else { 0.0 });
+    g.put(
+        "n_cells",
+        if labels.len() > 1 {
+            complete.len() as f64
+        } else {
+            0.0
+        },
+    );
     let sem = found.map(|i| i.ms_error.max(0.0).sqrt());
     g.maybe("sem", sem);
     let change = sem.map(|s| 1.96 * std::f64::consts::SQRT_2 * s);

@@ -32,7 +32,10 @@ pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
     put(cells, "order_previous_rating", &rows, &previous, values);
     let mut by_repetition: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
     for &i in &cells.order {
-        by_repetition.entry(r.repetition[i]).or_default().push(r.rating[i]);
+        by_repetition
+            .entry(r.repetition[i])
+            .or_default()
+            .push(r.rating[i]);
     }
     for (repetition, x) in by_repetition {
         values

@@ -67,7 +67,11 @@ fn between_realizations(
     let line = "the means lie on a line";
     let mut g = values.group("corr/pearson", why);
     g.maybe("r", r);
-    g.put_or("p_t", r.and_then(|r| p_of_r(r, n as f64 - 2.0)), if r.is_some() { line } else { why });
+    g.put_or(
+        "p_t",
+        r.and_then(|r| p_of_r(r, n as f64 - 2.0)),
+        if r.is_some() { line } else { why },
+    );
     let interval = r.and_then(|r| fisher_interval(r, n as f64 - 3.0));
     let no_interval = match r {
         None => why,
@@ -80,7 +84,9 @@ fn between_realizations(
     g.put_or("bf10", bf10, if r.is_some() { line } else { why });
     let rho = enough(spearman(&x, &y));
     values.group("corr/spearman", why).maybe("rho", rho);
-    values.group("corr/kendall", why).maybe("tau_b", enough(kendall(&x, &y)));
+    values
+        .group("corr/kendall", why)
+        .maybe("tau_b", enough(kendall(&x, &y)));
     for (name, statistic) in [
         ("pearson", Statistic::Pearson),
         ("spearman", Statistic::Spearman),
@@ -88,7 +94,11 @@ fn between_realizations(
     ] {
         let test = permutation::test(statistic, &x, &y, rules.seed);
         let mut g = values.group(format!("corr/{name}"), why);
-        let kind = if n > permutation::MAX_EXACT { "monte_carlo" } else { "exact" };
+        let kind = if n > permutation::MAX_EXACT {
+            "monte_carlo"
+        } else {
+            "exact"
+        };
         g.maybe(&format!("p_{kind}_two_sided"), test.map(|t| t.two_sided));
         g.maybe(&format!("p_{kind}_greater"), test.map(|t| t.greater));
         g.maybe("smallest_p_two_sided", test.map(|t| t.smallest));
@@ -103,13 +113,20 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
         let kept = v.iter().enumerate().filter(|(j, _)| *j != i);
         kept.map(|(_, v)| *v).collect()
     };
-    let why = if n == 3 { "leaving one out leaves two" } else { why };
+    let why = if n == 3 {
+        "leaving one out leaves two"
+    } else {
+        why
+    };
     let (mut lowest, mut highest) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let mut complete = n > 3;
     for (i, name) in names.iter().enumerate().filter(|_| n > 3) {
         let (x, y) = (without(i, x), without(i, y));
         let both = [pearson(&x, &y), spearman(&x, &y)];
-        let mut g = values.group(format!("corr/leave_one_out/{name}"), "a constant column is left");
+        let mut g = values.group(
+            format!("corr/leave_one_out/{name}"),
+            "a constant column is left",
+        );
         g.maybe("pearson", both[0]);
         g.maybe("spearman", both[1]);
         for (k, r) in both.iter().enumerate() {
@@ -164,7 +181,11 @@ fn by_subject(cells: &Cells<'_>, table: &Table, vaf: &[f64], values: &mut Values
     let ends = test.and_then(|t| t.ci95);
     g.interval("r_ci95", ends.map(|(l, h)| (l.tanh(), h.tanh())));
     let test = one_sample(&slopes);
-    let why = if enough { "fewer than two complete subjects, or equal slopes" } else { FEW };
+    let why = if enough {
+        "fewer than two complete subjects, or equal slopes"
+    } else {
+        FEW
+    };
     let mut g = values.group("subject_slope", why);
     g.maybe("mean", test.map(|t| t.mean));
     g.maybe("sd", test.map(|t| t.sd));
@@ -186,7 +207,11 @@ fn trend(table: &Table, vaf: &[f64], values: &mut Values) {
     g.maybe("z", p.z);
     g.maybe("p_greater", p.p_greater);
     let why = "realizations share a VAF";
-    g.put_or("p_greater_no_tie_correction", p.p_greater_no_tie_correction, why);
+    g.put_or(
+        "p_greater_no_tie_correction",
+        p.p_greater_no_tie_correction,
+        why,
+    );
 }
 
 fn resampled(table: &Table, vaf: &[f64], rules: &Rules, values: &mut Values) {
@@ -194,7 +219,14 @@ fn resampled(table: &Table, vaf: &[f64], rules: &Rules, values: &mut Values) {
     let why = "fewer than two complete subjects or three realizations, or no correlation";
     let mut g = values.group("bootstrap", why);
     let Some(b) = found else {
-        g.none(&["mean", "se", "percentile_lo", "percentile_hi", "bca_lo", "bca_hi"]);
+        g.none(&[
+            "mean",
+            "se",
+            "percentile_lo",
+            "percentile_hi",
+            "bca_lo",
+            "bca_hi",
+        ]);
         return;
     };
     g.put("mean", b.mean);

@@ -116,6 +116,8 @@ impl Group<'_> {
     }
 
     fn insert(&mut self, name: &str, value: Value) {
-        self.values.0.insert(format!("{}/{name}", self.prefix), value);
+        self.values
+            .0
+            .insert(format!("{}/{name}", self.prefix), value);
     }
 }

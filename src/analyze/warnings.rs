@@ -30,7 +30,10 @@ pub(super) fn warnings(
     let real = counts.participants - counts.pilots - counts.simulated;
     let others = counts.pilots + counts.simulated;
     if others > 0 && real == 0 {
-        warn("no-participants", format!("{}; this is no evidence", who(counts)));
+        warn(
+            "no-participants",
+            format!("{}; this is no evidence", who(counts)),
+        );
     } else if others > 0 {
         warn("mixed", format!("among the participants: {}", who(counts)));
     }
@@ -85,13 +88,18 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
             format!("permutation p from {DRAWS} random orders of the realizations, not from all"),
         );
     }
-    let ends = ["corr/leave_one_out/pearson_min", "corr/leave_one_out/pearson_max"];
+    let ends = [
+        "corr/leave_one_out/pearson_min",
+        "corr/leave_one_out/pearson_max",
+    ];
     if let (Some(low), Some(high)) = (values.number(ends[0]), values.number(ends[1]))
         && (low * high <= 0.0 || high - low > 0.5)
     {
         warn(
             "one-realization",
-            format!("one realization carries the correlation: without it r goes from {low:.3} to {high:.3}"),
+            format!(
+                "one realization carries the correlation: without it r goes from {low:.3} to {high:.3}"
+            ),
         );
     }
     if let Some(rho) = values.number("corr/spearman/rho")
@@ -99,7 +107,9 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
     {
         warn(
             "not-linear",
-            format!("r = {r:.3} and rho = {rho:.3} differ: the relation is no line, or one point is far out"),
+            format!(
+                "r = {r:.3} and rho = {rho:.3} differ: the relation is no line, or one point is far out"
+            ),
         );
     }
     let f = values.number("rmanova/p_gg").is_some_and(|p| p < 0.05);
@@ -125,7 +135,9 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     if incomplete > 0.0 && !cells.ratings.models.is_empty() {
         warn(
             "incomplete",
-            format!("{incomplete} participants did not rate every test realization and are left out of what needs complete tables"),
+            format!(
+                "{incomplete} participants did not rate every test realization and are left out of what needs complete tables"
+            ),
         );
     }
     let sizes: Vec<usize> = cells.cells.iter().map(|c| c.rows.len()).collect();
@@ -143,7 +155,10 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
         if cells.vaf[m].is_none() && own.any(|i| r.vaf[i].is_finite()) {
             warn(
                 "vaf-differs",
-                format!("realization {} has rows with different VAF; it has none here", model.id),
+                format!(
+                    "realization {} has rows with different VAF; it has none here",
+                    model.id
+                ),
             );
         }
     }
@@ -164,11 +179,19 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
         })
         .collect();
     if !constant.is_empty() {
-        let shown = constant.iter().take(5).copied().collect::<Vec<_>>().join(", ");
+        let shown = constant
+            .iter()
+            .take(5)
+            .copied()
+            .collect::<Vec<_>>()
+            .join(", ");
         let more = if constant.len() > 5 { ", …" } else { "" };
         warn(
             "constant-rater",
-            format!("{} gave one rating only: {shown}{more} (kept)", people(constant.len())),
+            format!(
+                "{} gave one rating only: {shown}{more} (kept)",
+                people(constant.len())
+            ),
         );
     }
 }

@@ -1,12 +1,13 @@
 //! `study analyze`
 
-use super::{Console, Failure};
+use super::{Console, Failure, Kind};
 use crate::analyze::{Analysis, Include, Rules, analyze};
 use crate::outcome::ratings::Ratings;
 use crate::outcome::{ParticipantRow, RatingRow};
-use crate::protocol::Protocol;
+use crate::protocol::{self, Protocol};
 use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
+use crate::store::StudyFolder;
 use crate::text::QuestionId;
 use std::fs::{self, File};
 use std::io::{BufReader, Write as _};
@@ -165,30 +166,44 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
     let numeric: Vec<&str> = protocol
         .questions
         .iter()
-        .filter(|q| matches!(q.kind, K::Rating { .. } | K::Slider { .. } | K::Number { .. }))
+        .filter(|q| {
+            matches!(
+                q.kind,
+                K::Rating { .. } | K::Slider { .. } | K::Number { .. }
+            )
+        })
         .map(|q| q.id.as_str())
         .collect();
     if numeric.contains(&id.as_str()) {
         Ok(id)
     } else {
-        Err(Failure::input(format!("no question `{id}` that is answered with a number"))
-            .hint(format!("there is: {}", numeric.join(", "))))
+        Err(
+            Failure::input(format!("no question `{id}` that is answered with a number"))
+                .hint(format!("there is: {}", numeric.join(", "))),
+        )
     }
 }
 
-/// The rows of a study and the newest version of its protocol.
+/// The rows of a study, by the newest version of its protocol.
 fn study_input(folder: &Path) -> Result<StudyInput, Failure> {
-    let _ = StudyInput {
-        protocol: unreachable_protocol(folder)?,
-        protocol_version: 1,
-        rows: Vec::new(),
-        participants: Vec::new(),
+    let study = StudyFolder::open(folder).map_err(Failure::results)?;
+    let path = study.frozen_protocol();
+    let text = fs::read_to_string(&path)
+        .map_err(|e| Failure::results(format!("{}: {e}", path.display())))?;
+    let parsed = protocol::file::parse(&path.display().to_string(), &text);
+    let Some(protocol) = parsed.protocol else {
+        return Err(Failure {
+            kind: Kind::Results,
+            ..Failure::faults(vec![parsed.findings])
+        });
     };
-    Err(Failure::results("not connected to the store yet"))
-}
-
-fn unreachable_protocol(folder: &Path) -> Result<Protocol, Failure> {
-    Err(Failure::results(format!("{}: not connected to the store yet", folder.display())))
+    let derived = study.derive(&protocol).map_err(Failure::results)?;
+    Ok(StudyInput {
+        protocol,
+        protocol_version: study.version(),
+        rows: derived.rows,
+        participants: derived.participants,
+    })
 }
 
 /// The folder itself, if it is a study's, or the studies in it, by name.
@@ -207,9 +222,11 @@ fn studies(results: &Path) -> Result<Vec<PathBuf>, Failure> {
     }
     found.sort();
     if found.is_empty() {
-        return Err(Failure::results(format!("{}: no study in it", results.display())).hint(
-            "a study's folder holds study.json; `study run` and `study rehearse` make one",
-        ));
+        return Err(
+            Failure::results(format!("{}: no study in it", results.display())).hint(
+                "a study's folder holds study.json; `study run` and `study rehearse` make one",
+            ),
+        );
     }
     Ok(found)
 }

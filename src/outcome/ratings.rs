@@ -186,7 +186,9 @@ impl Ratings {
         let (subject_map, subjects) = remap(&self.subjects, rows.iter().map(|&i| self.subject[i]));
         let (model_map, models) = remap(
             &self.models,
-            rows.iter().map(|&i| self.model[i]).filter(|&m| m != NO_MODEL),
+            rows.iter()
+                .map(|&i| self.model[i])
+                .filter(|&m| m != NO_MODEL),
         );
         let mut place = vec![usize::MAX; self.len()];
         for (new, &old) in rows.iter().enumerate() {
@@ -197,7 +199,10 @@ impl Ratings {
         }
         Self {
             question: self.question.clone(),
-            subject: rows.iter().map(|&i| subject_map[self.subject[i] as usize]).collect(),
+            subject: rows
+                .iter()
+                .map(|&i| subject_map[self.subject[i] as usize])
+                .collect(),
             model: rows
                 .iter()
                 .map(|&i| match self.model[i] {
@@ -260,9 +265,10 @@ impl Ratings {
         for (at, row) in rows.into_iter().enumerate() {
             let subject = subjects.partition_point(|s| s.id < row.subject);
             ratings.subject.push(index(subject));
-            ratings.model.push(row.model.map_or(NO_MODEL, |id| {
-                index(models.partition_point(|m| m.id < id))
-            }));
+            ratings.model.push(
+                row.model
+                    .map_or(NO_MODEL, |id| index(models.partition_point(|m| m.id < id))),
+            );
             ratings.repetition.push(row.repetition);
             ratings.rating.push(row.rating);
             ratings.vaf.push(row.vaf);

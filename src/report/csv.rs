@@ -73,7 +73,11 @@ fn descriptives(a: &Analysis) -> Vec<Vec<String>> {
             number(m.vaf),
         ];
         row.extend(STATISTICS.iter().map(|s| get(s)));
-        row.extend(OVER_SUBJECTS.iter().map(|s| get(&format!("subject_mean/{s}"))));
+        row.extend(
+            OVER_SUBJECTS
+                .iter()
+                .map(|s| get(&format!("subject_mean/{s}"))),
+        );
         row.push(get("cousineau_morey/ci95_half"));
         row.push(number(v.number(&format!("realistic/{id}/share"))));
         let hist = v.list(&format!("desc/{id}/hist")).unwrap_or(&[]);
@@ -111,7 +115,13 @@ fn correlation(a: &Analysis) -> Vec<Vec<String>> {
 }
 
 fn comments(a: &Analysis) -> Vec<Vec<String>> {
-    let mut rows = vec![cells(["model", "subject", "repetition", "question", "text"])];
+    let mut rows = vec![cells([
+        "model",
+        "subject",
+        "repetition",
+        "question",
+        "text",
+    ])];
     rows.extend(a.comments.iter().map(|c| {
         vec![
             c.model.clone(),
@@ -125,7 +135,13 @@ fn comments(a: &Analysis) -> Vec<Vec<String>> {
 }
 
 fn excluded(a: &Analysis) -> Vec<Vec<String>> {
-    let mut rows = vec![cells(["subject", "model", "repetition", "rating", "reason"])];
+    let mut rows = vec![cells([
+        "subject",
+        "model",
+        "repetition",
+        "rating",
+        "reason",
+    ])];
     for row in &a.rows {
         if let Some(reason) = &row.excluded {
             rows.push(vec![
@@ -141,7 +157,15 @@ fn excluded(a: &Analysis) -> Vec<Vec<String>> {
 }
 
 fn ratings_used(a: &Analysis) -> Vec<Vec<String>> {
-    let head = ["subject", "model", "repetition", "rating", "vaf", "included", "reason"];
+    let head = [
+        "subject",
+        "model",
+        "repetition",
+        "rating",
+        "vaf",
+        "included",
+        "reason",
+    ];
     let mut rows = vec![cells(head)];
     for row in &a.rows {
         let reason = match (&row.excluded, row.rating) {

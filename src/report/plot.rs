@@ -6,7 +6,11 @@ const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '
 /// One bar for each count, against `most`; what is not empty shows.
 pub fn bars(counts: &[f64], most: f64, gap: &str) -> String {
     let bar = |n: &f64| {
-        let eighths = if most > 0.0 { (n / most * 8.0).round() } else { 0.0 };
+        let eighths = if most > 0.0 {
+            (n / most * 8.0).round()
+        } else {
+            0.0
+        };
         let least = if *n > 0.0 { 1.0 } else { 0.0 };
         // Between 0 and 8, so the cast is exact.
         BARS[eighths.clamp(least, 8.0) as usize].to_string()

@@ -38,11 +38,14 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
         out += &chart(a, &tests, &others, width, paint);
     }
     out += &answers::answers(a, width, paint);
-    for w in a.warnings.iter().filter(|w| w.code != "no-participants") {
+    // The first stands at the top, the second in the answer.
+    let said = ["no-participants", "few-realizations"];
+    let warnings = a.warnings.iter().filter(|w| !said.contains(&w.code));
+    for w in warnings.clone() {
         let text = wrap(&Untrusted(&w.text).to_string(), width, "! ", "  ");
         out += &paint.warn(&text);
     }
-    if !a.warnings.is_empty() {
+    if warnings.count() > 0 {
         out.push('\n');
     }
     out += &counts(a, width);
@@ -285,9 +288,17 @@ fn counts(a: &Analysis, width: usize) -> String {
         some(c.failed, "trial failed", "trials failed"),
         some(c.declined, "rating declined", "ratings declined"),
         some(c.missing, "rating missing", "ratings missing"),
-        some(c.practice, "practice trial not counted", "practice trials not counted"),
+        some(
+            c.practice,
+            "practice trial not counted",
+            "practice trials not counted",
+        ),
         some(c.pilots, "pilot", "pilots"),
-        some(c.simulated, "simulated participant", "simulated participants"),
+        some(
+            c.simulated,
+            "simulated participant",
+            "simulated participants",
+        ),
     ]
     .into_iter()
     .flatten()

@@ -219,7 +219,9 @@ pub fn krippendorff(units: &[Vec<f64>]) -> Alpha {
                 e += margin[c] * margin[k] * d;
             }
         }
-        (e > 0.0).then(|| finite(1.0 - (total - 1.0) * o / e)).flatten()
+        (e > 0.0)
+            .then(|| finite(1.0 - (total - 1.0) * o / e))
+            .flatten()
     };
     Alpha {
         nominal: alpha(&|c, k| f64::from(u8::from(c != k))),
@@ -263,7 +265,10 @@ mod tests {
         let a = krippendorff(&[vec![1.0, 1.0], vec![3.0, 3.0], vec![4.0]]);
         assert_eq!(a.nominal, Some(1.0));
         assert_eq!(a.ordinal, Some(1.0));
-        assert_eq!(krippendorff(&[vec![4.0, 4.0], vec![4.0, 4.0]]).nominal, None);
+        assert_eq!(
+            krippendorff(&[vec![4.0, 4.0], vec![4.0, 4.0]]).nominal,
+            None
+        );
         assert!(icc(&vec![vec![4.0; 3]; 3]).unwrap().icc1.is_none());
     }
 }

@@ -52,7 +52,8 @@ pub fn jzs_bf10(t: f64, n: usize, scale: f64) -> Option<f64> {
         let u = f64::from(i) * step;
         let g = u.exp();
         let wide = n * g * scale * scale;
-        let log = -0.5 * wide.ln_1p() - (df + 1.0) / 2.0 * (t * t / ((1.0 + wide) * df)).ln_1p()
+        let log = -0.5 * wide.ln_1p()
+            - (df + 1.0) / 2.0 * (t * t / ((1.0 + wide) * df)).ln_1p()
             - 0.5 * (2.0 * std::f64::consts::PI).ln()
             - 0.5 * u
             - 0.5 / g;

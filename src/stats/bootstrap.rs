@@ -96,7 +96,11 @@ fn summary(
         .sum::<f64>()
         / defined;
     let share = |keep: &dyn Fn(f64) -> bool| {
-        let kept: u64 = resamples.iter().filter(|(r, _)| keep(*r)).map(|(_, w)| w).sum();
+        let kept: u64 = resamples
+            .iter()
+            .filter(|(r, _)| keep(*r))
+            .map(|(_, w)| w)
+            .sum();
         kept as f64 / defined
     };
     const TIE: f64 = 1e-12;
@@ -262,6 +266,9 @@ mod tests {
 
     #[test]
     fn equal_ratings_have_no_bootstrap() {
-        assert_eq!(correlation(&vec![vec![4.0; 3]; 3], &[1.0, 2.0, 3.0], 1), None);
+        assert_eq!(
+            correlation(&vec![vec![4.0; 3]; 3], &[1.0, 2.0, 3.0], 1),
+            None
+        );
     }
 }

@@ -187,7 +187,11 @@ mod tests {
         close(t_quantile(0.975, 9.0).unwrap(), 2.262157162798205, 1e-12);
         close(t_quantile(0.975, 1.0).unwrap(), 12.70620473617471, 1e-12);
         close(t_two_sided(2.262157162798205, 9.0).unwrap(), 0.05, 1e-12);
-        close(f_quantile(0.95, 4.0, 36.0).unwrap(), 2.633532094011204, 1e-9);
+        close(
+            f_quantile(0.95, 4.0, 36.0).unwrap(),
+            2.633532094011204,
+            1e-9,
+        );
         close(normal_quantile(0.975).unwrap(), 1.959963984540054, 1e-15);
         close(normal_quantile(0.025).unwrap(), -1.959963984540054, 1e-14);
         close(chi2_upper(3.841458820694124, 1.0).unwrap(), 0.05, 1e-12);

@@ -84,7 +84,8 @@ fn exact_p(ranks: &[Vec<i64>], observed: i64, centre: i64) -> Option<f64> {
         let mut next = BTreeMap::new();
         for (state, p) in &states {
             for arrangement in &arrangements {
-                let mut sums: Vec<i64> = state.iter().zip(arrangement).map(|(a, b)| a + b).collect();
+                let mut sums: Vec<i64> =
+                    state.iter().zip(arrangement).map(|(a, b)| a + b).collect();
                 sums.sort_unstable();
                 *next.entry(sums).or_insert(0.0) += p * share;
             }
@@ -105,7 +106,10 @@ fn arrangements(row: &[i64]) -> Vec<Vec<i64>> {
     current.sort_unstable();
     let mut all = vec![current.clone()];
     // Next permutation in lexicographic order (Narayana).
-    while let Some(i) = (1..current.len()).rev().find(|&i| current[i - 1] < current[i]) {
+    while let Some(i) = (1..current.len())
+        .rev()
+        .find(|&i| current[i - 1] < current[i])
+    {
         let j = (i..current.len())
             .rev()
             .find(|&j| current[j] > current[i - 1])
@@ -162,8 +166,7 @@ pub fn page(rows: &[Vec<f64>], order: &[f64]) -> Option<Page> {
         l,
         z,
         p_greater: z.map(normal_upper),
-        p_greater_no_tie_correction: distinct
-            .then(|| normal_upper((l - expected) / untied.sqrt())),
+        p_greater_no_tie_correction: distinct.then(|| normal_upper((l - expected) / untied.sqrt())),
     })
 }
 

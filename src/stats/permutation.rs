@@ -102,14 +102,18 @@ fn smallest(statistic: Statistic, x: &[f64], all: f64) -> f64 {
     let sorted = super::describe::sorted(x);
     let span = sorted[sorted.len() - 1] - sorted[0];
     let mirrored = match statistic {
-        Statistic::Pearson => sorted.iter().zip(sorted.iter().rev()).all(|(a, b)| {
-            (a + b - sorted[0] - sorted[sorted.len() - 1]).abs() <= 1e-9 * span
-        }),
+        Statistic::Pearson => sorted
+            .iter()
+            .zip(sorted.iter().rev())
+            .all(|(a, b)| (a + b - sorted[0] - sorted[sorted.len() - 1]).abs() <= 1e-9 * span),
         // A perfect order and its reverse are as extreme as each other whenever
         // the ties of x lie symmetrically.
         Statistic::Spearman | Statistic::Kendall => {
             let ends = ranks[0] + ranks[ranks.len() - 1];
-            ranks.iter().zip(ranks.iter().rev()).all(|(a, b)| a + b == ends)
+            ranks
+                .iter()
+                .zip(ranks.iter().rev())
+                .all(|(a, b)| a + b == ends)
         }
     };
     (within * if mirrored { 2.0 } else { 1.0 } / all).min(1.0)

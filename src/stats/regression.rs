@@ -102,7 +102,10 @@ pub fn beside_factors(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<Besi
     if n < 3 || levels_b.len() > MAX_LEVELS {
         return None;
     }
-    let groups: Vec<usize> = a.iter().map(|v| levels_a.partition_point(|l| l < v)).collect();
+    let groups: Vec<usize> = a
+        .iter()
+        .map(|v| levels_a.partition_point(|l| l < v))
+        .collect();
     let sweep = |column: &mut [f64]| {
         let mut sums = vec![(0.0, 0.0); levels_a.len()];
         for (v, g) in column.iter().zip(&groups) {
@@ -145,7 +148,11 @@ pub fn beside_factors(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<Besi
     let yy = dot(&y, &y);
     let residual: f64 = x.iter().zip(&y).map(|(u, v)| (v - slope * u).powi(2)).sum();
     let se = finite((residual / df / xx).sqrt())?;
-    let t = if residual > 1e-24 * yy { finite(slope / se) } else { None };
+    let t = if residual > 1e-24 * yy {
+        finite(slope / se)
+    } else {
+        None
+    };
     Some(Beside {
         slope,
         se,

@@ -469,7 +469,10 @@ mod tests {
                    x,SIM001,1,,2,1,1,1,A,test,1,false,false,true,1,5,\"a, b\",true,hm,2,ok,0.8\n\
                    x,SIM001,1,,3,1,2,2,B,low-anchor,1,false,false,true,1,,,false,,1,declined,0.1\n";
         let r = read(csv).unwrap();
-        assert_eq!((r.question.as_str(), r.practice, r.len()), ("realism", 1, 2));
+        assert_eq!(
+            (r.question.as_str(), r.practice, r.len()),
+            ("realism", 1, 2)
+        );
         assert_eq!(r.models[1].role, Role::LowAnchor);
         assert_eq!(r.origin, [Origin::Simulated; 2]);
         assert_eq!((r.attempt[0], r.corrected[0]), (2, true));

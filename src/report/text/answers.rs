@@ -30,7 +30,10 @@ fn r(x: f64) -> String {
     match shown.strip_prefix("-0.") {
         Some("000") => ".000".to_owned(),
         Some(rest) => format!("−.{rest}"),
-        None => shown.strip_prefix('0').map_or(shown.clone(), str::to_owned).replace('-', "−"),
+        None => shown
+            .strip_prefix('0')
+            .map_or(shown.clone(), str::to_owned)
+            .replace('-', "−"),
     }
 }
 
@@ -68,7 +71,11 @@ fn best(a: &Analysis) -> Vec<String> {
         Untrusted(first),
         Untrusted(second)
     );
-    let (low, high) = if first < second { (first, second) } else { (second, first) };
+    let (low, high) = if first < second {
+        (first, second)
+    } else {
+        (second, first)
+    };
     let pair = format!("posthoc/{low}|{high}");
     if let Some(holm) = v.number(&format!("{pair}/p_wilcoxon_exact_holm")) {
         said += &format!(" (Wilcoxon, exact, Holm over all pairs: p {})", p(holm));
@@ -77,9 +84,9 @@ fn best(a: &Analysis) -> Vec<String> {
     let mut all = vec![said];
     if let Some(from) = a.realistic_from {
         let share = v.number(&format!("realistic/{first}/share"));
-        all.extend(share.map(|s| {
-            format!("{:.0} % of its ratings are {from} or higher.", 100.0 * s)
-        }));
+        all.extend(
+            share.map(|s| format!("{:.0} % of its ratings are {from} or higher.", 100.0 * s)),
+        );
     }
     all
 }
@@ -104,10 +111,13 @@ fn differ(a: &Analysis) -> Vec<String> {
         let exact = v.number("friedman/exact_p");
         let kind = if exact.is_some() { "exact p" } else { "p" };
         if let Some(value) = exact.or_else(|| v.number("friedman/p")) {
-            let w = v.number("friedman/kendall_W").map_or_else(String::new, |w| {
-                format!(", Kendall's W = {}", r(w))
-            });
-            parts.push(format!("Friedman χ²({df}) = {chi2:.2}, {kind} {}{w}", p(value)));
+            let w = v
+                .number("friedman/kendall_W")
+                .map_or_else(String::new, |w| format!(", Kendall's W = {}", r(w)));
+            parts.push(format!(
+                "Friedman χ²({df}) = {chi2:.2}, {kind} {}{w}",
+                p(value)
+            ));
         }
     }
     if parts.is_empty() {
@@ -140,9 +150,17 @@ fn predicts(a: &Analysis) -> Vec<String> {
         .number("corr/leave_one_out/pearson_min")
         .zip(v.number("corr/leave_one_out/pearson_max"));
     if let Some((low, high)) = ends {
-        said.push(format!("Leave one out: r from {} to {}.", r(low), r(high)));
-    }
-    if n < 8.0 {
+        let care = if n < 8.0 {
+            format!(" {} points: read with care.", count(n))
+        } else {
+            String::new()
+        };
+        said.push(format!(
+            "Leave one out: r from {} to {}.{care}",
+            r(low),
+            r(high)
+        ));
+    } else if n < 8.0 {
         said.push(format!("{} points: read with care.", count(n)));
     }
     said
@@ -169,9 +187,18 @@ fn interval(a: &Analysis, id: &str) -> String {
 fn permuted(a: &Analysis, name: &str) -> String {
     let get = |id: &str| a.values.number(&format!("corr/{name}/{id}"));
     let least = get("smallest_p_two_sided");
-    match (get("p_exact_two_sided"), get("p_monte_carlo_two_sided"), least) {
+    let n = a.values.number("corr/n_models").unwrap_or(0.0);
+    match (
+        get("p_exact_two_sided"),
+        get("p_monte_carlo_two_sided"),
+        least,
+    ) {
         (Some(exact), _, Some(least)) => {
-            format!(", exact p {} (the smallest possible is {})", p(exact), small(least))
+            format!(
+                ", exact p {} (the smallest possible with {n} is {})",
+                p(exact),
+                small(least)
+            )
         }
         (None, Some(drawn), _) => format!(", permutation p {}", p(drawn)),
         _ => String::new(),
@@ -193,7 +220,9 @@ fn only_these(a: &Analysis) -> Vec<String> {
     if let Some(x) = v.number("subject_corr/r_back") {
         parts.push(format!("mean correlation of a participant {}", r(x)));
     }
-    let ends = v.number("bootstrap/percentile_lo").zip(v.number("bootstrap/percentile_hi"));
+    let ends = v
+        .number("bootstrap/percentile_lo")
+        .zip(v.number("bootstrap/percentile_hi"));
     if let Some((low, high)) = ends {
         parts.push(format!(
             "with other participants r would be {} to {} (bootstrap, 95 %)",
@@ -204,10 +233,17 @@ fn only_these(a: &Analysis) -> Vec<String> {
     if parts.is_empty() {
         return Vec::new();
     }
-    let said = format!("{}. It says nothing about other realizations.", parts.join("; "));
+    let said = format!(
+        "{}. It says nothing about other realizations.",
+        parts.join("; ")
+    );
     let mut letters = said.chars();
     let capital = letters.next().map(|c| c.to_uppercase().to_string());
-    vec![format!("{}{}", capital.unwrap_or_default(), letters.as_str())]
+    vec![format!(
+        "{}{}",
+        capital.unwrap_or_default(),
+        letters.as_str()
+    )]
 }
 
 #[cfg(test)]

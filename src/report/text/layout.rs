@@ -157,7 +157,11 @@ impl Grid {
                 }
             }
             let line = line.trim_end();
-            out.push_str(&if i == 0 { paint.dim(line) } else { line.to_owned() });
+            out.push_str(&if i == 0 {
+                paint.dim(line)
+            } else {
+                line.to_owned()
+            });
             out.push('\n');
             if i == apart && i > 0 && i + 1 < self.rows.len() {
                 out.push('\n');
