@@ -1,6 +1,8 @@
 //! The simulated device as the runner sees it: what it confirms, in which order,
 //! and that nothing but playing ever has force.
 
+#![allow(clippy::unwrap_used)]
+
 use proptest::prelude::*;
 use std::time::Duration;
 use study::device::faults::{FaultPlan, Injected};
