@@ -97,9 +97,15 @@ impl Rater {
                 let steps = (self.share(question, felt) * span).round() as i64;
                 Answer::Rating((from + steps).clamp(*from, *to))
             }
-            QuestionKind::Slider { from, to, .. } => {
-                let value = from + self.share(question, felt) * (to - from);
-                Answer::Number(value.clamp(*from, *to))
+            QuestionKind::Slider { from, to, step, .. } => {
+                let along = self.share(question, felt) * (to - from);
+                // as the keys move it
+                let along = if *step > 0.0 {
+                    (along / step).round() * step
+                } else {
+                    along
+                };
+                Answer::Number((from + along).clamp(*from, *to))
             }
             QuestionKind::Choice { options, multiple } => self.choose(options, *multiple),
             QuestionKind::Number { min, max, .. } => self.number(*min, *max),

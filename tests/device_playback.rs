@@ -1,6 +1,8 @@
 //! The simulated device as the runner sees it: what it confirms, in which order,
 //! and that nothing but playing ever has force.
 
+#![allow(clippy::unwrap_used)]
+
 use proptest::prelude::*;
 use std::time::Duration;
 use study::device::faults::{FaultPlan, Injected};
@@ -10,6 +12,9 @@ use study::limits::{Limit, Limits};
 use study::model::predict::{Direction, Lookup};
 use study::model::{Branch, Realization, Trained};
 use study::outcome::{Playback, Sample};
+
+/// A name and what to do to a `T`.
+type Case<'a, T> = (&'static str, &'a dyn Fn(&mut T));
 
 fn limits(force_n: f64) -> Limits {
     Limits {
@@ -203,7 +208,7 @@ fn a_hand_faster_than_the_limit_trips_the_device_which_stays_limp() {
 
 #[test]
 fn limp_is_no_force_and_no_report_in_every_state() {
-    let states: [(&str, &dyn Fn(&mut VirtualDevice)); 5] = [
+    let states: [Case<'_, VirtualDevice>; 5] = [
         ("idle", &|_| {}),
         ("loading", &|d| {
             d.load(&ordinary(), limits(12.0), ms(0)).unwrap();
@@ -256,7 +261,7 @@ fn commands_out_of_turn_are_refused_with_the_state() {
 
 #[test]
 fn a_table_with_a_hole_is_refused_naming_it() {
-    let damage: [(&str, &dyn Fn(&mut Realization)); 6] = [
+    let damage: [Case<'_, Realization>; 6] = [
         ("positive m_kg is not a finite number at node 4", &|r| {
             r.positive.m_kg[3] = f64::NAN;
         }),

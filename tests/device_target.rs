@@ -1,6 +1,8 @@
 //! The simulated target against a recording of the same switch by another
 //! implementation.
 
+#![allow(clippy::unwrap_used)]
+
 use std::f64::consts::{PI, SQRT_2, TAU};
 use study::model::predict::Motion;
 use study::plant::{DT_S, Parameters, Target};

@@ -17,11 +17,18 @@
 //! 5. beyond the identified range the force of its edge and a spring wall;
 //! 6. slew limit, 7. ramp-in, 8. clamp.
 //!
+//! What comes together on the way is in [`tally`].
+//!
 //! The invariant: the force that comes out is a number within the force limit,
 //! and zero unless the state is playing. A limit that is no positive number
 //! makes the device limp, never free.
 
+mod low_pass;
+pub mod tally;
+
 use crate::model::predict::{self, Direction, DirectionState, Motion, TableView};
+use low_pass::LowPass;
+use tally::Tally;
 
 /// What the device adds to a table, and what it never exceeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,27 +126,6 @@ pub enum State {
     Tripped(Trip),
 }
 
-/// What has come together since the start.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Tally {
-    /// Servo periods.
-    pub steps: u64,
-    /// Energy that the hand has put in, J.
-    pub energy_j: f64,
-    /// Its least value, zero or negative, J.
-    pub least_energy_j: f64,
-    /// Changes of the direction's sign.
-    pub switches: u64,
-    /// How often the force ran into its limit, each run once.
-    pub clamps: u64,
-    /// Servo periods in which the change of force was limited.
-    pub slewed: u64,
-    /// Servo periods in which the mass was held to the least one.
-    pub mass_held: u64,
-    /// Full strokes, each from one end of the range to the other.
-    pub strokes: u32,
-}
-
 /// The servo's memory.
 #[derive(Debug, Clone)]
 pub struct Core {
@@ -148,23 +134,12 @@ pub struct Core {
     state: State,
     direction: DirectionState,
     forwards: bool,
-    last_x_mm: Option<f64>,
     /// Before the ramp, which is no part of what the slew limit guards.
     slewed_n: f64,
     held_n: f64,
     clamping: bool,
-    last_end: Option<End>,
     tally: Tally,
 }
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum End {
-    Low,
-    High,
-}
-
-/// Share of the range at either side that counts as its end.
-const END_SHARE: f64 = 0.2;
 
 /// Share of the limit below which a clamp is over: noise about the limit is one.
 const CLAMP_OVER: f64 = 0.9;
@@ -178,11 +153,9 @@ impl Core {
             state: State::Limp,
             direction: DirectionState::default(),
             forwards: true,
-            last_x_mm: None,
             slewed_n: 0.0,
             held_n: 0.0,
             clamping: false,
-            last_end: None,
             tally: Tally::default(),
         }
     }
@@ -231,25 +204,25 @@ impl Core {
             self.trip(why);
             return 0.0;
         }
-        self.account(what, motion);
+        self.tally.account(self.held_n, motion.x_mm, what.range_mm);
 
         let settings = self.settings;
         let wanted_n = self.table_n(what, motion) + settings.damping_n_s_per_mm * motion.v_mm_s;
-        let step_n = settings.slew_n_s / settings.servo_hz;
-        let change_n = wanted_n - self.slewed_n;
-        // also holds for a NaN, which the check below turns into a trip
-        if !(change_n >= -step_n && change_n <= step_n) {
-            self.tally.slewed += 1;
-        }
-        self.slewed_n += change_n.clamp(-step_n, step_n);
-        let force_n = self.clamped(self.slewed_n * self.ramp());
-        if !force_n.is_finite() {
+        if !wanted_n.is_finite() {
             self.trip(Trip::NotANumber);
             return 0.0;
         }
+        let ramp = self.ramp();
+        self.count_clamps(wanted_n * ramp);
+        // what the slew limit runs after is within the force limit too: otherwise
+        // a force far above it would take its time to come back
+        let change_n = within(wanted_n, settings.force_n) - self.slewed_n;
+        let allowed_n = within(change_n, settings.slew_n_s / settings.servo_hz);
+        self.tally.slewed += u64::from(allowed_n != change_n);
+        self.slewed_n += allowed_n;
+        self.held_n = within(self.slewed_n * ramp, settings.force_n);
         self.tally.steps += 1;
-        self.held_n = force_n;
-        force_n
+        self.held_n
     }
 
     fn danger(&self, what: &Rendering<'_>, motion: Motion) -> Option<Trip> {
@@ -263,40 +236,16 @@ impl Core {
         }
         let beyond = self.settings.overtravel_mm;
         let [low, high] = what.range_mm;
-        // written so that a limit that is no number trips
-        if !(libm::fabs(v_mm_s) <= self.settings.velocity_mm_s) {
-            return Some(Trip::Velocity);
-        }
-        if !(x_mm >= low - beyond && x_mm <= high + beyond) {
-            return Some(Trip::Stroke);
-        }
-        None
-    }
-
-    /// Energy of the period that has passed, and full strokes.
-    fn account(&mut self, what: &Rendering<'_>, motion: Motion) {
-        let tally = &mut self.tally;
-        if let Some(last) = self.last_x_mm {
-            tally.energy_j += self.held_n * (motion.x_mm - last) * 1e-3;
-            if tally.energy_j < tally.least_energy_j {
-                tally.least_energy_j = tally.energy_j;
-            }
-        }
-        self.last_x_mm = Some(motion.x_mm);
-
-        let [low, high] = what.range_mm;
-        let zone = END_SHARE * (high - low);
-        let end = if motion.x_mm <= low + zone {
-            End::Low
-        } else if motion.x_mm >= high - zone {
-            End::High
+        // asked this way round, a limit that is no number trips
+        let slow_enough = libm::fabs(v_mm_s) <= self.settings.velocity_mm_s;
+        let near_enough = x_mm >= low - beyond && x_mm <= high + beyond;
+        if !slow_enough {
+            Some(Trip::Velocity)
+        } else if !near_enough {
+            Some(Trip::Stroke)
         } else {
-            return;
-        };
-        if self.last_end.is_some_and(|last| last != end) {
-            tally.strokes += 1;
+            None
         }
-        self.last_end = Some(end);
     }
 
     /// The table's force inside the identified range, its edge's and the wall's
@@ -311,9 +260,8 @@ impl Core {
         }
 
         let [low, high] = what.range_mm;
-        let x_mm = motion.x_mm.clamp(low, high);
-        let trained = what.trained_mm_s;
-        let v_mm_s = motion.v_mm_s.clamp(-trained, trained);
+        let x_mm = motion.x_mm.max(low).min(high);
+        let v_mm_s = within(motion.v_mm_s, what.trained_mm_s);
         let force_at = |a_m_s2| {
             let felt = Motion {
                 x_mm,
@@ -353,53 +301,24 @@ impl Core {
         0.5 - 0.5 * libm::cos(core::f64::consts::PI * share)
     }
 
-    fn clamped(&mut self, force_n: f64) -> f64 {
-        let limit = self.settings.force_n;
-        if !(limit.is_finite() && limit > 0.0) {
-            return 0.0;
-        }
+    fn count_clamps(&mut self, force_n: f64) {
         let size = libm::fabs(force_n);
-        if size > limit {
-            if !self.clamping {
-                self.tally.clamps += 1;
-            }
+        if size > self.settings.force_n {
+            self.tally.clamps += u64::from(!self.clamping);
             self.clamping = true;
-        } else if size < CLAMP_OVER * limit {
+        } else if size < CLAMP_OVER * self.settings.force_n {
             self.clamping = false;
         }
-        force_n.clamp(-limit, limit)
     }
 }
 
-/// Butterworth, two poles, bilinear transform.
-#[derive(Debug, Clone, Copy)]
-struct LowPass {
-    gain: f64,
-    back: [f64; 2],
-    /// Transposed direct form II.
-    memory: [f64; 2],
-}
-
-impl LowPass {
-    fn new(corner_hz: f64, rate_hz: f64) -> Self {
-        let k = libm::tan(core::f64::consts::PI * corner_hz / rate_hz);
-        let norm = 1.0 / (1.0 + core::f64::consts::SQRT_2 * k + k * k);
-        Self {
-            gain: k * k * norm,
-            back: [
-                2.0 * (k * k - 1.0) * norm,
-                (1.0 - core::f64::consts::SQRT_2 * k + k * k) * norm,
-            ],
-            memory: [0.0; 2],
-        }
-    }
-
-    fn step(&mut self, input: f64) -> f64 {
-        let fed = self.gain * input;
-        let output = fed + self.memory[0];
-        self.memory[0] = 2.0 * fed - self.back[0] * output + self.memory[1];
-        self.memory[1] = fed - self.back[1] * output;
-        output
+/// `value` brought into [−limit, limit]; 0 if the limit is no finite positive
+/// number.
+fn within(value: f64, limit: f64) -> f64 {
+    if limit.is_finite() && limit > 0.0 {
+        value.clamp(-limit, limit)
+    } else {
+        0.0
     }
 }
 
@@ -468,27 +387,7 @@ mod tests {
         swing(&mut core, &damper(&[-0.02; 2]));
         let tally = core.tally();
         assert!(tally.energy_j < -0.1, "{tally:?}");
-        assert_eq!(
-            tally.least_energy_j,
-            tally.energy_j.min(tally.least_energy_j)
-        );
         assert!(tally.least_energy_j < -0.1, "{tally:?}");
-    }
-
-    /// Starts in the middle, then four turns of two crossings each: high, low, …
-    #[test]
-    fn full_strokes_are_counted_and_half_ones_are_not() {
-        let mut core = Core::new(bare());
-        swing(&mut core, &damper(&NONE));
-        assert_eq!(core.tally().strokes, 7);
-        assert_eq!(core.tally().switches, 8);
-
-        core.start();
-        for i in 0..16_000 {
-            let phase = core::f64::consts::TAU * f64::from(i) / 4000.0;
-            core.step(&damper(&NONE), motion(8.0 + 8.0 * libm::sin(phase), 0.0));
-        }
-        assert_eq!(core.tally().strokes, 0);
     }
 
     #[test]
@@ -556,6 +455,19 @@ mod tests {
         }
         assert!((last + 10.0).abs() < 1e-9, "{last}");
         assert!(core.tally().slewed > 30);
+    }
+
+    #[test]
+    fn a_force_far_above_the_limit_comes_back_without_delay() {
+        let what = damper(&[1.0; 2]);
+        let mut core = Core::new(bare());
+        core.start();
+        for _ in 0..4000 {
+            core.step(&what, motion(15.0, 400.0));
+        }
+        assert_eq!(core.held_n(), 12.0);
+        core.step(&what, motion(15.0, 0.0));
+        assert!(core.held_n() < 12.0);
     }
 
     #[test]

@@ -11,7 +11,8 @@
 //! Parameters and formulas are in `docs/simulation.md`. Nothing it reports is
 //! measured.
 
-use super::core::{Core, Rendering, Settings, State, Tally, Trip};
+use super::core::tally::Tally;
+use super::core::{Core, Rendering, Settings, State, Trip};
 use super::faults::{Fate, FaultPlan, Injected};
 use super::{Device, DeviceError, Identity, Report, table};
 use crate::limits::{Limit, Limits};
@@ -38,7 +39,7 @@ const SPEED_HZ: f64 = 200.0;
 pub struct Options {
     /// Decides how the hand moves in each playback.
     pub seed: u64,
-    /// Servo periods per second, held to 500 … 20,000.
+    /// Servo periods per second, held to 500 … 20,000; no number reads as 4000.
     pub servo_hz: f64,
     /// Telemetry samples per second, at most one a servo period.
     pub telemetry_hz: f64,
@@ -143,8 +144,11 @@ enum Ending {
 impl VirtualDevice {
     /// A device that is limp and waits for a table.
     pub fn new(mut options: Options) -> Self {
-        // `max` first: it turns a NaN into the lower bound
-        options.servo_hz = options.servo_hz.max(500.0).min(20_000.0);
+        options.servo_hz = if options.servo_hz.is_nan() {
+            Options::default().servo_hz
+        } else {
+            options.servo_hz.clamp(500.0, 20_000.0)
+        };
         let every = (options.servo_hz / options.telemetry_hz.max(0.1)).round();
         Self {
             decimation: (every as u64).max(1),
@@ -365,7 +369,7 @@ impl Run {
         decimation: u64,
     ) -> (Vec<Sample>, Option<Ending>) {
         let elapsed_s = at.saturating_sub(self.since).as_secs_f64();
-        // a period counts from its beginning; the hair keeps rounding out of it
+        // whole periods that have passed; the hair keeps rounding out of it
         let due = (elapsed_s * options.servo_hz + 1e-6) as u64;
         let period_s = 1.0 / options.servo_hz;
         let what = Rendering {
