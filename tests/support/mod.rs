@@ -1,9 +1,14 @@
 //! Drives the real binary in a pseudo-terminal, as a person would.
 
 #![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(unreachable_pub, reason = "a module of several test files")]
+
+pub mod player;
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use std::io::{Read, Write};
+use std::num::NonZero;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -11,6 +16,11 @@ use std::time::{Duration, Instant};
 /// How long a screen may take to come before the test is given up. Generous: the
 /// machine may be busy; nothing is asserted about time.
 const PATIENCE: Duration = Duration::from_secs(30);
+
+/// The emulator knows no empty screen.
+fn cells(n: u16) -> NonZero<u16> {
+    NonZero::new(n.max(1)).unwrap()
+}
 
 /// The binary in a terminal.
 pub struct Terminal {
@@ -37,7 +47,7 @@ impl Terminal {
         command.env("TERM", "xterm-256color");
         let child = pair.slave.spawn_command(command).unwrap();
         drop(pair.slave);
-        let screen = Arc::new(Mutex::new(vt100::Parser::new(rows, columns, 0)));
+        let screen = Arc::new(Mutex::new(vt100::Parser::new(cells(rows), cells(columns), 0)));
         let mut reader = pair.master.try_clone_reader().unwrap();
         let shown = screen.clone();
         std::thread::spawn(move || {
@@ -119,9 +129,10 @@ impl Terminal {
     /// Sends a signal by name, such as `KILL`.
     pub fn signal(&mut self, name: &str) {
         if let Some(id) = self.child.process_id() {
+            // It may have ended by itself in between.
             let _ = std::process::Command::new("kill")
                 .args([&format!("-{name}"), &id.to_string()])
-                .status();
+                .output();
         }
     }
 
@@ -139,7 +150,7 @@ impl Terminal {
             .lock()
             .unwrap()
             .screen_mut()
-            .set_size(rows, columns);
+            .set_size(cells(rows), cells(columns));
     }
 }
 
