@@ -8,6 +8,8 @@ pub mod load;
 mod amend;
 mod analyze;
 mod check;
+mod completions;
+mod device;
 mod identify;
 mod new;
 mod participant;
@@ -59,6 +61,12 @@ enum Command {
     New(new::Args),
     /// Print the JSON Schema of the protocol file, for editors
     Schema(schema::Args),
+    /// Find playback devices
+    Device(device::Args),
+    /// Print completions for a shell
+    Completions(completions::Args),
+    /// Write manual pages
+    Man(completions::ManArgs),
 }
 
 /// Does what was asked.
@@ -79,6 +87,9 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Identify(args) => identify::run(&args, console),
         Command::New(args) => new::run(&args, console),
         Command::Schema(args) => schema::run(&args, console),
+        Command::Device(args) => device::run(&args, console),
+        Command::Completions(args) => completions::run(&args, console),
+        Command::Man(args) => completions::man(&args, console),
     }
 }
 

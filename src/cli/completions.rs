@@ -1,0 +1,51 @@
+//! `study completions` and `study man`: for the shell and the manual.
+
+use super::{Cli, Console, Failure, Kind};
+use clap::CommandFactory as _;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `study completions`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The shell
+    shell: clap_complete::Shell,
+}
+
+/// Arguments of `study man`.
+#[derive(Debug, clap::Args)]
+pub(super) struct ManArgs {
+    /// Folder for the pages: study.1 and one for each command
+    dir: PathBuf,
+}
+
+/// Prints the completions of a shell.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "study", &mut script);
+    let script = String::from_utf8(script)
+        .map_err(|e| Failure::new(Kind::Bug, format!("completions: {e}")))?;
+    console.out(script)
+}
+
+/// Writes the manual pages.
+pub(super) fn man(args: &ManArgs, console: &mut Console) -> Result<(), Failure> {
+    std::fs::create_dir_all(&args.dir).map_err(|e| Failure::file(&args.dir, &e))?;
+    let command = Cli::command();
+    page(command.clone(), "study", &args.dir)?;
+    let mut pages = 1;
+    for sub in command.get_subcommands() {
+        let name = format!("study-{}", sub.get_name());
+        page(sub.clone().name(name.clone()), &name, &args.dir)?;
+        pages += 1;
+    }
+    console.out(format!("{pages} pages in {}\n", args.dir.display()))
+}
+
+fn page(command: clap::Command, name: &str, dir: &Path) -> Result<(), Failure> {
+    let path = dir.join(format!("{name}.1"));
+    let mut text = Vec::new();
+    clap_mangen::Man::new(command)
+        .render(&mut text)
+        .and_then(|()| std::fs::write(&path, &text))
+        .map_err(|e| Failure::file(&path, &e))
+}

@@ -1,0 +1,90 @@
+//! `study device`: what could play.
+
+use super::{Console, Failure, Kind};
+use crate::text::Untrusted;
+use serialport::SerialPortType;
+
+/// Arguments of `study device`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// List the serial ports of this machine
+    List {
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Does it.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    match args.what {
+        What::List { json } => list(json, console),
+    }
+}
+
+/// A port, and what is plugged into it as far as the system knows.
+struct Port {
+    path: String,
+    what: String,
+    serial_number: Option<String>,
+}
+
+fn list(json: bool, console: &mut Console) -> Result<(), Failure> {
+    let found = serialport::available_ports()
+        .map_err(|e| Failure::new(Kind::Device, format!("the serial ports: {e}")))?;
+    let mut ports: Vec<Port> = found
+        .into_iter()
+        .map(|port| {
+            let (what, serial_number) = describe(port.port_type);
+            Port {
+                path: port.port_name,
+                what,
+                serial_number,
+            }
+        })
+        .collect();
+    ports.sort_by(|a, b| a.path.cmp(&b.path));
+    if json {
+        let ports: Vec<_> = ports
+            .iter()
+            .map(|p| serde_json::json!({"path": p.path, "what": p.what, "serial_number": p.serial_number}))
+            .collect();
+        let document = serde_json::json!({"format": "study-device-list/1", "ports": ports});
+        return console.out(format!("{document:#}\n"));
+    }
+    if ports.is_empty() {
+        return console.out("no serial ports on this machine\n");
+    }
+    let mut out = String::new();
+    for port in &ports {
+        let serial = port.serial_number.as_deref().unwrap_or("");
+        out.push_str(&format!(
+            "{:<24} {} {}\n",
+            Untrusted(&port.path),
+            Untrusted(&port.what),
+            Untrusted(serial)
+        ));
+    }
+    console.out(out)
+}
+
+fn describe(kind: SerialPortType) -> (String, Option<String>) {
+    match kind {
+        SerialPortType::UsbPort(usb) => {
+            let product = usb.product.unwrap_or_else(|| "USB".to_owned());
+            (
+                format!("{product} ({:04x}:{:04x})", usb.vid, usb.pid),
+                usb.serial_number,
+            )
+        }
+        SerialPortType::BluetoothPort => ("Bluetooth".to_owned(), None),
+        SerialPortType::PciPort => ("built in".to_owned(), None),
+        SerialPortType::Unknown => ("unknown".to_owned(), None),
+    }
+}
