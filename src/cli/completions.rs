@@ -2,7 +2,7 @@
 
 use super::{Cli, Console, Failure, Kind};
 use clap::CommandFactory as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `study completions`.
 #[derive(Debug, clap::Args)]
@@ -30,22 +30,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
 /// Writes the manual pages.
 pub(super) fn man(args: &ManArgs, console: &mut Console) -> Result<(), Failure> {
     std::fs::create_dir_all(&args.dir).map_err(|e| Failure::file(&args.dir, &e))?;
-    let command = Cli::command();
-    page(command.clone(), "study", &args.dir)?;
-    let mut pages = 1;
-    for sub in command.get_subcommands() {
-        let name = format!("study-{}", sub.get_name());
-        page(sub.clone().name(name.clone()), &name, &args.dir)?;
-        pages += 1;
-    }
-    console.out(format!("{pages} pages in {}\n", args.dir.display()))
-}
-
-fn page(command: clap::Command, name: &str, dir: &Path) -> Result<(), Failure> {
-    let path = dir.join(format!("{name}.1"));
-    let mut text = Vec::new();
-    clap_mangen::Man::new(command)
-        .render(&mut text)
-        .and_then(|()| std::fs::write(&path, &text))
-        .map_err(|e| Failure::file(&path, &e))
+    clap_mangen::generate_to(Cli::command(), &args.dir)
+        .map_err(|e| Failure::file(&args.dir, &e))?;
+    console.out(format!("manual pages in {}\n", args.dir.display()))
 }
