@@ -1,5 +1,7 @@
 //! A kill, a loss of power and a failing disk at every call that the store makes.
 
+#![allow(clippy::unwrap_used)]
+
 #[path = "store_support/memory.rs"]
 mod memory;
 #[path = "store_support/world.rs"]

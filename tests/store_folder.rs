@@ -1,15 +1,13 @@
-//! The results folder on a real disk: claims, rows, tables, erasure, commands.
+//! The results folder on a real disk: claims, rows, tables, erasure.
+
+#![allow(clippy::unwrap_used)]
 
 #[path = "store_support/world.rs"]
 mod world;
 
-use assert_cmd::Command;
-use predicates::prelude::*;
-use std::collections::BTreeSet;
-use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::fs::PermissionsExt as _;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
+use std::path::Path;
+use std::process::Stdio;
 use study::outcome::{Event, Sample, State, Status};
 use study::protocol::Seat;
 use study::store::{ClaimRequest, Frozen, SeatKind, StateRequest, StoreError, StudyFolder};
@@ -44,84 +42,6 @@ fn set(
     };
     study.set_state(&request, at(500)).map(|c| c.freed_row)
 }
-
-// ---------------------------------------------------------------- processes
-
-/// Not a test of its own: what the child processes below do.
-#[test]
-fn helper_claims() {
-    let (Ok(results), Ok(id)) = (
-        std::env::var("STUDY_TEST_RESULTS"),
-        std::env::var("STUDY_TEST_ID"),
-    ) else {
-        return;
-    };
-    let study = open(Path::new(&results));
-    let claimed = study.claim(&real(&id));
-    match &claimed {
-        Ok(claimed) => println!("\nCLAIMED {}", claimed.seat),
-        Err(StoreError::Open { .. }) => println!("\nOPEN"),
-        Err(e) => println!("\nFAILED {e}"),
-    }
-    // Held until the parent lets go.
-    let _ = std::io::stdin().read(&mut [0]);
-}
-
-fn claimer(results: &Path, id: &str) -> Child {
-    std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "helper_claims", "--nocapture"])
-        .env("STUDY_TEST_RESULTS", results)
-        .env("STUDY_TEST_ID", id)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap()
-}
-
-fn verdicts(children: &mut [Child]) -> Vec<String> {
-    let words = ["CLAIMED", "OPEN", "FAILED"];
-    let verdicts = children
-        .iter_mut()
-        .map(|child| {
-            BufReader::new(child.stdout.as_mut().unwrap())
-                .lines()
-                .map(Result::unwrap)
-                .find(|l| words.iter().any(|w| l.starts_with(w)))
-                .unwrap()
-        })
-        .collect();
-    for child in children {
-        drop(child.stdin.take());
-        child.wait().unwrap();
-    }
-    verdicts
-}
-
-#[test]
-fn of_64_processes_that_claim_one_participant_one_wins_and_none_overwrites() {
-    let results = tempfile::tempdir().unwrap();
-    let mut children: Vec<Child> = (0..64).map(|_| claimer(results.path(), "P01")).collect();
-    let verdicts = verdicts(&mut children);
-    let won = verdicts.iter().filter(|v| *v == "CLAIMED row 1").count();
-    let open_elsewhere = verdicts.iter().filter(|v| *v == "OPEN").count();
-    assert_eq!((won, open_elsewhere), (1, 63), "{verdicts:?}");
-    let sessions = open(results.path()).sessions().unwrap();
-    assert_eq!(sessions.len(), 1);
-    assert_eq!(sessions[0].damage, []);
-}
-
-#[test]
-fn rigs_that_claim_different_participants_at_once_get_different_rows() {
-    let results = tempfile::tempdir().unwrap();
-    let ids: Vec<String> = (1..=8).map(|n| format!("P{n:02}")).collect();
-    let mut children: Vec<Child> = ids.iter().map(|id| claimer(results.path(), id)).collect();
-    let rows: BTreeSet<String> = verdicts(&mut children).into_iter().collect();
-    let expected: BTreeSet<String> = (1..=8).map(|n| format!("CLAIMED row {n}")).collect();
-    assert_eq!(rows, expected);
-}
-
-// ---------------------------------------------------------------- claims, rows
 
 #[test]
 fn a_session_is_picked_up_where_it_stopped_with_its_seat() {
@@ -265,8 +185,6 @@ fn a_no_show_is_on_record_without_a_row_and_can_come_after_all() {
     assert_eq!(run(&study, &real("P01"), 99), Seat::Row(1));
 }
 
-// ---------------------------------------------------------------- the protocol
-
 #[test]
 fn changed_stimuli_are_another_study_and_changed_words_an_amendment() {
     let results = tempfile::tempdir().unwrap();
@@ -370,8 +288,6 @@ fn what_participants_say_is_nobody_elses_business() {
         "given back"
     );
 }
-
-// ---------------------------------------------------------------- tables
 
 #[test]
 fn the_tables_say_what_happened() {
@@ -502,8 +418,6 @@ fn telemetry_is_written_beside_the_journal_and_never_over() {
     );
 }
 
-// ---------------------------------------------------------------- erasure
-
 fn all_bytes(folder: &Path) -> Vec<u8> {
     let mut bytes = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -552,8 +466,6 @@ fn erasure_leaves_a_tombstone_and_nothing_that_was_given() {
     set(&study, "P01", State::Withdrawn, true).unwrap();
     assert!(study.verify(None).unwrap().iter().all(|f| !f.wrong));
 }
-
-// ---------------------------------------------------------------- a full disk
 
 #[test]
 fn the_rating_in_hand_is_saved_on_a_full_disk() {
@@ -617,204 +529,4 @@ fn fill(results: &Path) {
         !study.path().join("sessions/P02").exists(),
         "nothing was claimed"
     );
-}
-
-// ---------------------------------------------------------------- commands
-
-/// A study of the repository's protocol with a finished and an unfinished session.
-fn turn_signal(results: &Path) -> PathBuf {
-    let loaded = study::cli::load::load(Path::new("protocols/turn-signal")).unwrap();
-    let frozen = Frozen {
-        protocol: &loaded.protocol,
-        files: &loaded.files,
-        fingerprints: &loaded.fingerprints,
-    };
-    let folder = StudyFolder::open_or_create(results, &frozen, at(0)).unwrap();
-    for (id, count) in [("P01", 99), ("P02", 14)] {
-        let mut claimed = folder.claim(&real(id)).unwrap();
-        let mut journal = claimed.folder.journal().unwrap();
-        let mut events = session(id, 1, claimed.seat);
-        if let Event::SessionStarted(start) = &mut events[0] {
-            start.fingerprints = loaded.fingerprints.clone();
-        }
-        for (event, n) in events.iter().zip(0..).take(count) {
-            journal.append(at(n), event).unwrap();
-        }
-    }
-    folder.refresh(&loaded.protocol).unwrap();
-    folder.path().to_owned()
-}
-
-fn study_command() -> Command {
-    Command::cargo_bin("study").unwrap()
-}
-
-#[test]
-fn status_tells_who_is_done_and_no_order() {
-    let results = tempfile::tempdir().unwrap();
-    turn_signal(results.path());
-    let said = study_command()
-        .arg("status")
-        .arg(results.path())
-        .assert()
-        .success();
-    let text = String::from_utf8(said.get_output().stdout.clone()).unwrap();
-    for part in [
-        "P01",
-        "done",
-        "3/3",
-        "P02",
-        "unfinished",
-        "1/3",
-        "10 planned",
-        "Next free row: 3",
-    ] {
-        assert!(text.contains(part), "{part} in {text}");
-    }
-    assert!(!text.contains("lambda"), "{text}");
-}
-
-#[test]
-fn verify_is_content_until_a_bit_flips() {
-    let results = tempfile::tempdir().unwrap();
-    let folder = turn_signal(results.path());
-    study_command()
-        .arg("verify")
-        .arg(results.path())
-        .assert()
-        .success();
-    let journal = folder.join("sessions/P01/1/journal.jsonl");
-    let mut bytes = std::fs::read(&journal).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    std::fs::write(&journal, bytes).unwrap();
-    study_command()
-        .arg("verify")
-        .arg(results.path())
-        .assert()
-        .code(4)
-        .stdout(predicate::str::contains(
-            "sessions/P01/1: journal.jsonl, line",
-        ));
-}
-
-#[test]
-fn participant_sets_a_state_and_refuses_what_is_no_id() {
-    let results = tempfile::tempdir().unwrap();
-    let folder = turn_signal(results.path());
-    let set = |id: &str, state: &str| {
-        let mut command = study_command();
-        command.arg("participant").arg(results.path()).arg(id);
-        command.args(["--state", state, "--reason", "test \u{1b}[2J"]);
-        command
-    };
-    set("../../x", "excluded")
-        .assert()
-        .code(1)
-        .stderr(predicate::str::contains("is no participant id"));
-    set("P03", "excluded")
-        .assert()
-        .code(1)
-        .stderr(predicate::str::contains("no participant `P03`"));
-    set("P02", "dropped-out")
-        .assert()
-        .success()
-        .stdout(predicate::str::contains(
-            "Row 2 goes to the next participant",
-        ));
-    set("P01", "withdrawn")
-        .arg("--erase")
-        .assert()
-        .success()
-        .stdout(predicate::str::contains("erased"));
-    let table = std::fs::read_to_string(folder.join("participants.csv")).unwrap();
-    assert!(table.contains("P02,1,dropped-out,"), "{table}");
-    study_command()
-        .arg("status")
-        .arg(results.path())
-        .assert()
-        .success()
-        .stdout(predicate::str::contains("\u{1b}").not());
-    study_command()
-        .arg("verify")
-        .arg(results.path())
-        .assert()
-        .success();
-}
-
-#[test]
-fn amend_keeps_the_old_version_and_refuses_other_stimuli() {
-    let results = tempfile::tempdir().unwrap();
-    let folder = turn_signal(results.path());
-    let copy = tempfile::tempdir().unwrap();
-    for (name, bytes) in study::cli::load::load(Path::new("protocols/turn-signal"))
-        .unwrap()
-        .files
-    {
-        let path = copy.path().join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, bytes).unwrap();
-    }
-    let file = copy.path().join("protocol.toml");
-    let text = std::fs::read_to_string(&file).unwrap();
-    let amend = || {
-        let mut command = study_command();
-        command.arg("amend").arg(results.path()).arg(&file);
-        command.args(["--reason", "a clearer prompt"]);
-        command
-    };
-    amend()
-        .assert()
-        .code(1)
-        .stderr(predicate::str::contains("nothing differs"));
-    let prompt = "reference = \"";
-    assert!(text.contains(prompt));
-    std::fs::write(&file, text.replace(prompt, "reference = \"Please: ")).unwrap();
-    amend()
-        .assert()
-        .success()
-        .stdout(predicate::str::contains("version 2"));
-    assert!(folder.join("protocol/1/protocol.toml").exists());
-    assert!(folder.join("protocol/2/protocol.toml").exists());
-    let design = "repetitions = 3";
-    assert!(text.contains(design));
-    std::fs::write(&file, text.replace(design, "repetitions = 4")).unwrap();
-    amend()
-        .assert()
-        .code(1)
-        .stderr(predicate::str::contains("stimuli"));
-    study_command()
-        .arg("verify")
-        .arg(results.path())
-        .assert()
-        .success();
-}
-
-#[test]
-fn a_folder_that_is_none_or_of_a_newer_version_is_refused() {
-    let results = tempfile::tempdir().unwrap();
-    for command in ["status", "verify"] {
-        study_command()
-            .arg(command)
-            .arg(results.path())
-            .assert()
-            .code(4)
-            .stderr(predicate::str::contains("no results of a study"));
-    }
-    let folder = turn_signal(results.path());
-    let manifest = folder.join("study.json");
-    let text = std::fs::read_to_string(&manifest).unwrap();
-    std::fs::write(
-        &manifest,
-        text.replace("study-results/1", "study-results/2"),
-    )
-    .unwrap();
-    for command in ["status", "verify"] {
-        study_command()
-            .arg(command)
-            .arg(results.path())
-            .assert()
-            .code(4)
-            .stderr(predicate::str::contains("newer version of study"));
-    }
 }

@@ -1,5 +1,7 @@
 //! The journal's bytes: the format as it was shipped, and every kind of damage.
 
+#![allow(clippy::unwrap_used)]
+
 #[path = "store_support/memory.rs"]
 mod memory;
 #[path = "store_support/world.rs"]
