@@ -1,0 +1,164 @@
+//! Which rows count, and why others do not.
+
+use super::Rules;
+use crate::outcome::columns::Status;
+use crate::outcome::event::State;
+use crate::outcome::ratings::{Origin, Ratings};
+use crate::protocol::Unfinished;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Which rows count beside those of participants.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Include {
+    /// Those of pilots.
+    pub pilot: bool,
+    /// Those of simulated participants.
+    pub simulated: bool,
+}
+
+/// Why a row does not count.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Reason {
+    /// Of a pilot, beside real ones.
+    Pilot,
+    /// Of a simulated participant, beside real ones.
+    Simulated,
+    /// Of an unfinished session, and the protocol leaves these out.
+    Unfinished,
+    /// The participant's state, with the reason that was given.
+    State(State, String),
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pilot => f.write_str("pilot"),
+            Self::Simulated => f.write_str("simulated"),
+            Self::Unfinished => f.write_str("unfinished"),
+            Self::State(state, why) if why.is_empty() => f.write_str(state.as_str()),
+            Self::State(state, why) => write!(f, "{}: {why}", state.as_str()),
+        }
+    }
+}
+
+/// The decision about each row; `None`: it counts.
+///
+/// Real rows are analysed alone, unless others are asked for. Where there are
+/// none at all, the others are analysed, under a banner.
+pub(super) fn decide(ratings: &Ratings, rules: &Rules) -> Vec<Option<Reason>> {
+    let real = ratings.origin.contains(&Origin::Real);
+    (0..ratings.len())
+        .map(|i| {
+            let subject = &ratings.subjects[ratings.subject[i] as usize];
+            match ratings.origin[i] {
+                Origin::Pilot if real && !rules.include.pilot => return Some(Reason::Pilot),
+                Origin::Simulated if real && !rules.include.simulated => {
+                    return Some(Reason::Simulated);
+                }
+                Origin::Real | Origin::Pilot | Origin::Simulated => {}
+            }
+            let state = subject.state?;
+            match state {
+                State::Done => None,
+                State::Unfinished | State::DroppedOut => match rules.unfinished {
+                    Unfinished::Include => None,
+                    Unfinished::Exclude => Some(Reason::Unfinished),
+                },
+                State::Void | State::NoShow | State::Excluded | State::Withdrawn => {
+                    Some(Reason::State(state, subject.reason.clone()))
+                }
+            }
+        })
+        .collect()
+}
+
+/// What was counted.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Rows of the table, practice not counted.
+    pub rows: usize,
+    /// Rows that count and have a rating.
+    pub rated: usize,
+    /// Rows that count and should have a rating but have none, for whatever
+    /// reason; the next three are among them.
+    pub without_rating: usize,
+    /// Trials that count and failed for good.
+    pub failed: usize,
+    /// Trials that count whose question was declined.
+    pub declined: usize,
+    /// Trials that count and were never reached, or left empty.
+    pub missing: usize,
+    /// Rows that count with a corrected answer.
+    pub corrected: usize,
+    /// Rows that count after a failed attempt.
+    pub repeated: usize,
+    /// Practice rows, never analysed.
+    pub practice: usize,
+    /// Rows that do not count, by reason.
+    pub excluded: BTreeMap<String, usize>,
+    /// Participants that count.
+    pub participants: usize,
+    /// Of these, those whose session is finished (or whose state is not known).
+    pub finished: usize,
+    /// Participants with at least one row that does not count.
+    pub excluded_participants: usize,
+    /// Planned participants.
+    pub planned: Option<u32>,
+    /// Participants that count and are pilots.
+    pub pilots: usize,
+    /// Participants that count and are simulated.
+    pub simulated: usize,
+}
+
+impl Counts {
+    pub(super) fn of(
+        all: &Ratings,
+        used: &Ratings,
+        decisions: &[Option<Reason>],
+        rules: &Rules,
+    ) -> Self {
+        let with = |status: Status| {
+            (0..used.len())
+                .filter(|&i| used.status[i] == status && used.rating[i].is_nan())
+                .count()
+        };
+        let rated = used.rating.iter().filter(|v| v.is_finite()).count();
+        let mut excluded = BTreeMap::new();
+        let mut gone = vec![false; all.subjects.len()];
+        for (i, decision) in decisions.iter().enumerate() {
+            if let Some(reason) = decision {
+                *excluded.entry(reason.to_string()).or_insert(0) += 1;
+                gone[all.subject[i] as usize] = true;
+            }
+        }
+        let mut origin = vec![Origin::Real; used.subjects.len()];
+        for (&s, &o) in used.subject.iter().zip(&used.origin) {
+            origin[s as usize] = origin[s as usize].max(o);
+        }
+        let finished = |state: Option<State>| matches!(state, None | Some(State::Done));
+        Self {
+            rows: all.len(),
+            rated,
+            without_rating: used.len() - rated,
+            failed: with(Status::Failed),
+            declined: with(Status::Declined),
+            missing: with(Status::Missing) + with(Status::Ok),
+            corrected: used.corrected.iter().filter(|c| **c).count(),
+            repeated: used.attempt.iter().filter(|a| **a > 1).count(),
+            practice: all.practice,
+            excluded,
+            participants: used.subjects.len(),
+            finished: used.subjects.iter().filter(|s| finished(s.state)).count(),
+            excluded_participants: gone.iter().filter(|g| **g).count(),
+            planned: rules.planned,
+            pilots: origin.iter().filter(|o| **o == Origin::Pilot).count(),
+            simulated: origin.iter().filter(|o| **o == Origin::Simulated).count(),
+        }
+    }
+
+    /// Whether fewer have finished than were planned.
+    pub fn interim(&self) -> bool {
+        self.planned.is_some_and(|p| self.finished < p as usize)
+    }
+}

@@ -1,0 +1,205 @@
+//! What a reader has to know before believing a number.
+
+use super::Rules;
+use super::cells::Cells;
+use super::select::Counts;
+use super::values::Values;
+use crate::outcome::ratings::NO_MODEL;
+use crate::stats::permutation::{DRAWS, MAX_EXACT};
+
+/// A warning: a short name that stays, and a sentence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// For programs.
+    pub code: &'static str,
+    /// For people. May hold names from the data: untrusted.
+    pub text: String,
+}
+
+/// Below so many realizations, "VAF predicts the rating" is read with care.
+const ENOUGH_REALIZATIONS: f64 = 8.0;
+
+pub(super) fn warnings(
+    cells: &Cells<'_>,
+    counts: &Counts,
+    rules: &Rules,
+    values: &Values,
+) -> Vec<Warning> {
+    let mut found = Vec::new();
+    let mut warn = |code, text: String| found.push(Warning { code, text });
+    let real = counts.participants - counts.pilots - counts.simulated;
+    let others = counts.pilots + counts.simulated;
+    if others > 0 && real == 0 {
+        warn(
+            "no-participants",
+            format!("{}; this is no evidence", who(counts)),
+        );
+    } else if others > 0 {
+        warn("mixed", format!("among the participants: {}", who(counts)));
+    }
+    if counts.interim() {
+        let planned = counts.planned.unwrap_or(0);
+        warn(
+            "interim",
+            format!(
+                "interim: {} of {planned} planned participants have finished; looking early \
+                 and stopping when it pleases makes every p too small",
+                counts.finished
+            ),
+        );
+    }
+    for rule in &rules.exclusion_rules {
+        warn(
+            "rule-not-applied",
+            format!("the pre-stated exclusion `{rule}` is not applied by this version"),
+        );
+    }
+    headline(&mut warn, values);
+    design(&mut warn, cells, values);
+    raters(&mut warn, cells, values);
+    found
+}
+
+fn who(counts: &Counts) -> String {
+    match (counts.pilots, counts.simulated) {
+        (0, s) => format!("{s} simulated"),
+        (p, 0) => format!("{p} pilots"),
+        (p, s) => format!("{p} pilots and {s} simulated"),
+    }
+}
+
+fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
+    let Some(r) = values.number("corr/pearson/r") else {
+        return;
+    };
+    let n = values.number("corr/n_models").unwrap_or(0.0);
+    if n < ENOUGH_REALIZATIONS {
+        warn(
+            "few-realizations",
+            format!(
+                "VAF varies between {n} realizations only: there are {n} points, however many \
+                 participants rated"
+            ),
+        );
+    }
+    if n > MAX_EXACT as f64 {
+        warn(
+            "monte-carlo",
+            format!("permutation p from {DRAWS} random orders of the realizations, not from all"),
+        );
+    }
+    let ends = [
+        "corr/leave_one_out/pearson_min",
+        "corr/leave_one_out/pearson_max",
+    ];
+    if let (Some(low), Some(high)) = (values.number(ends[0]), values.number(ends[1]))
+        && (low * high <= 0.0 || high - low > 0.5)
+    {
+        warn(
+            "one-realization",
+            format!(
+                "one realization carries the correlation: without it r goes from {low:.3} to {high:.3}"
+            ),
+        );
+    }
+    if let Some(rho) = values.number("corr/spearman/rho")
+        && (r - rho).abs() > 0.3
+    {
+        warn(
+            "not-linear",
+            format!(
+                "r = {r:.3} and rho = {rho:.3} differ: the relation is no line, or one point is far out"
+            ),
+        );
+    }
+    let f = values.number("rmanova/p_gg").is_some_and(|p| p < 0.05);
+    let flat = values.number("corr/pearson/p_t").is_some_and(|p| p >= 0.05);
+    if f && flat {
+        warn(
+            "differ-without-trend",
+            "the realizations differ, but not along VAF: look at their means, not at the slope"
+                .to_owned(),
+        );
+    }
+    warn(
+        "assumptions",
+        "the permutation takes the realizations as exchangeable, which neighbours on one ladder \
+         of lambda are not; VAF goes along with lambda and with activeness"
+            .to_owned(),
+    );
+}
+
+fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
+    let n = |id: &str| values.number(id).unwrap_or(0.0);
+    let incomplete = n("design/n_subjects") - n("design/n_subjects_complete");
+    if incomplete > 0.0 && !cells.ratings.models.is_empty() {
+        warn(
+            "incomplete",
+            format!(
+                "{incomplete} participants did not rate every test realization and are left out of what needs complete tables"
+            ),
+        );
+    }
+    let sizes: Vec<usize> = cells.cells.iter().map(|c| c.rows.len()).collect();
+    if sizes.iter().min() != sizes.iter().max() {
+        warn(
+            "unbalanced",
+            "cells hold different numbers of ratings: the mean over ratings is not the mean over \
+             participants"
+                .to_owned(),
+        );
+    }
+    let r = cells.ratings;
+    for (m, model) in r.models.iter().enumerate() {
+        let mut own = (0..r.len()).filter(|&i| r.model[i] as usize == m);
+        if cells.vaf[m].is_none() && own.any(|i| r.vaf[i].is_finite()) {
+            warn(
+                "vaf-differs",
+                format!(
+                    "realization {} has rows with different VAF; it has none here",
+                    model.id
+                ),
+            );
+        }
+    }
+    if r.model.contains(&NO_MODEL) {
+        warn("no-model", "some ratings name no realization".to_owned());
+    }
+}
+
+fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
+    if cells.ratings.models.len() < 2 {
+        return;
+    }
+    let constant: Vec<&str> = (cells.ratings.subjects.iter())
+        .map(|s| s.id.as_str())
+        .filter(|id| {
+            let n = values.number(&format!("subject/{id}/n")).unwrap_or(0.0);
+            n > 1.0 && values.number(&format!("subject/{id}/distinct")) == Some(1.0)
+        })
+        .collect();
+    if !constant.is_empty() {
+        let shown = constant
+            .iter()
+            .take(5)
+            .copied()
+            .collect::<Vec<_>>()
+            .join(", ");
+        let more = if constant.len() > 5 { ", …" } else { "" };
+        warn(
+            "constant-rater",
+            format!(
+                "{} gave one rating only: {shown}{more} (kept)",
+                people(constant.len())
+            ),
+        );
+    }
+}
+
+fn people(n: usize) -> String {
+    if n == 1 {
+        "1 participant".to_owned()
+    } else {
+        format!("{n} participants")
+    }
+}

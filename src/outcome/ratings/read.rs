@@ -1,0 +1,482 @@
+//! Ratings from a CSV: somebody else's long form, or our own `ratings.csv`.
+
+use super::{Origin, Ratings, Row};
+use crate::outcome::columns::Status;
+use crate::protocol::Role;
+use crate::text::Untrusted;
+use std::collections::{BTreeMap, HashMap};
+use std::io::BufRead;
+
+/// Why a CSV could not be read. Every message names the file and, where there
+/// is one, the line.
+#[derive(Debug, thiserror::Error)]
+pub enum RatingsError {
+    /// It could not be read, or is not UTF-8 or CSV.
+    #[error("{name}: {source}")]
+    Csv {
+        /// The file.
+        name: String,
+        /// What went wrong.
+        #[source]
+        source: csv::Error,
+    },
+    /// The header lacks a column.
+    #[error("{name}: no column `{column}`; a table of ratings has the columns {expected}")]
+    NoColumn {
+        /// The file.
+        name: String,
+        /// The column.
+        column: String,
+        /// What there should be.
+        expected: &'static str,
+    },
+    /// The header has a column twice.
+    #[error("{name}: two columns are named `{column}`")]
+    TwoColumns {
+        /// The file.
+        name: String,
+        /// The column.
+        column: String,
+    },
+    /// A line is shorter or longer than the header.
+    #[error("{name}, line {line}: {found} fields, but the header has {expected}")]
+    Ragged {
+        /// The file.
+        name: String,
+        /// From 1, header included.
+        line: u64,
+        /// Fields there.
+        found: usize,
+        /// Fields of the header.
+        expected: usize,
+    },
+    /// A field holds something that its column cannot.
+    #[error("{name}, line {line}: `{}` in column `{column}` is no {wanted}", Untrusted(.field))]
+    Field {
+        /// The file.
+        name: String,
+        /// From 1, header included.
+        line: u64,
+        /// Which column.
+        column: String,
+        /// What stands there.
+        field: String,
+        /// What should.
+        wanted: &'static str,
+    },
+    /// The same subject, realization and repetition comes twice.
+    #[error(
+        "{name}, line {line}: subject `{}`, model `{}`, repetition {repetition} came already on \
+         line {first}",
+        Untrusted(.subject), Untrusted(.model)
+    )]
+    Twice {
+        /// The file.
+        name: String,
+        /// From 1, header included.
+        line: u64,
+        /// Where it came first.
+        first: u64,
+        /// Who.
+        subject: String,
+        /// What.
+        model: String,
+        /// The how-maniest time.
+        repetition: u32,
+    },
+    /// There is no row.
+    #[error("{name}: no ratings, only a header")]
+    Empty {
+        /// The file.
+        name: String,
+    },
+}
+
+const FOREIGN: &str = "subject,model,repetition,rating,vaf[,trial_index]";
+
+/// Columns of our own table that stand before the questions.
+const BEFORE_QUESTIONS: &str = "protocol_version";
+
+impl Ratings {
+    /// Reads a CSV with the columns `subject,model,repetition,rating,vaf` and
+    /// optionally `trial_index`, in any order, or one with the columns of our own
+    /// `ratings.csv`. Empty fields of model, rating and vaf are missing, and so
+    /// are `NA` and `NaN`; an empty repetition is counted up. A byte order mark
+    /// is skipped. In our own table `question` names the column (default: the
+    /// first after `protocol_version`).
+    ///
+    /// # Errors
+    /// [`RatingsError`], at the first line that is wrong.
+    pub fn read_csv(
+        name: &str,
+        input: impl BufRead,
+        question: Option<&str>,
+    ) -> Result<Self, RatingsError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .flexible(true)
+            .trim(csv::Trim::None)
+            .from_reader(input);
+        let csv_error = |source| RatingsError::Csv {
+            name: name.to_owned(),
+            source,
+        };
+        let header: Vec<String> = reader
+            .headers()
+            .map_err(csv_error)?
+            .iter()
+            .map(|h| h.trim_start_matches('\u{feff}').trim().to_owned())
+            .collect();
+        let columns = Columns::of(name, &header, question)?;
+        let mut rows = Vec::new();
+        let mut practice = 0;
+        let mut seen: HashMap<(String, String, u32), u64> = HashMap::new();
+        let mut next: HashMap<(String, String), u32> = HashMap::new();
+        let mut record = csv::StringRecord::new();
+        let mut number = 0u32;
+        while reader.read_record(&mut record).map_err(csv_error)? {
+            let line = record.position().map_or(0, csv::Position::line);
+            if record.len() != header.len() {
+                return Err(RatingsError::Ragged {
+                    name: name.to_owned(),
+                    line,
+                    found: record.len(),
+                    expected: header.len(),
+                });
+            }
+            number = number.saturating_add(1);
+            let line = Line {
+                name,
+                header: &header,
+                record: &record,
+                line,
+            };
+            let Some(mut row) = columns.row(&line)? else {
+                practice += 1;
+                continue;
+            };
+            row.source_row = number;
+            let model = row.model.clone().unwrap_or_default();
+            let pair = (row.subject.clone(), model.clone());
+            let count = next.entry(pair).or_insert(0);
+            *count += 1;
+            if row.repetition == 0 {
+                row.repetition = *count;
+            }
+            let key = (row.subject.clone(), model, row.repetition);
+            if let Some(&first) = seen.get(&key) {
+                return Err(RatingsError::Twice {
+                    name: name.to_owned(),
+                    line: line.line,
+                    first,
+                    subject: key.0,
+                    model: key.1,
+                    repetition: key.2,
+                });
+            }
+            seen.insert(key, line.line);
+            rows.push(row);
+        }
+        if rows.is_empty() {
+            return Err(RatingsError::Empty {
+                name: name.to_owned(),
+            });
+        }
+        Ok(Self::build(columns.question, rows, practice))
+    }
+}
+
+/// Where the columns of interest stand.
+struct Columns {
+    question: String,
+    subject: usize,
+    model: usize,
+    repetition: usize,
+    rating: usize,
+    vaf: Option<usize>,
+    trial_index: Option<usize>,
+    ours: Option<Ours>,
+}
+
+/// What only our own table has.
+struct Ours {
+    role: Option<usize>,
+    practice: Option<usize>,
+    pilot: Option<usize>,
+    simulated: Option<usize>,
+    status: Option<usize>,
+    corrected: Option<usize>,
+    attempt: Option<usize>,
+    texts: Vec<usize>,
+}
+
+impl Columns {
+    fn of(name: &str, header: &[String], question: Option<&str>) -> Result<Self, RatingsError> {
+        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+        for (i, h) in header.iter().enumerate() {
+            if places.insert(h, i).is_some() {
+                return Err(RatingsError::TwoColumns {
+                    name: name.to_owned(),
+                    column: h.clone(),
+                });
+            }
+        }
+        let find = |column: &str| places.get(column).copied();
+        let need = |column: &str| {
+            find(column).ok_or_else(|| RatingsError::NoColumn {
+                name: name.to_owned(),
+                column: column.to_owned(),
+                expected: FOREIGN,
+            })
+        };
+        let ours = find("participant").zip(find("planned_position"));
+        let Some((subject, _)) = ours else {
+            return Ok(Self {
+                question: question.unwrap_or("rating").to_owned(),
+                subject: need("subject")?,
+                model: need("model")?,
+                repetition: need("repetition")?,
+                rating: need(question.unwrap_or("rating"))?,
+                vaf: find("vaf"),
+                trial_index: find("trial_index"),
+                ours: None,
+            });
+        };
+        let first = find(BEFORE_QUESTIONS).map_or(0, |i| i + 1);
+        let end = find("corrected").unwrap_or(first);
+        let rating = match question {
+            Some(q) => need(q)?,
+            None if first < end => first,
+            None => need("realism")?,
+        };
+        let texts = (first..end).filter(|&i| i != rating).chain(find("remarks"));
+        Ok(Self {
+            question: header[rating].clone(),
+            subject,
+            model: need("model")?,
+            repetition: need("repetition")?,
+            rating,
+            vaf: find("vaf"),
+            trial_index: find("position"),
+            ours: Some(Ours {
+                role: find("role"),
+                practice: find("practice"),
+                pilot: find("pilot"),
+                simulated: find("simulated"),
+                status: find("status"),
+                corrected: find("corrected"),
+                attempt: find("attempt"),
+                texts: texts.collect(),
+            }),
+        })
+    }
+
+    /// `None`: a practice row.
+    fn row(&self, line: &Line<'_>) -> Result<Option<Row>, RatingsError> {
+        let subject = line.text(self.subject);
+        if subject.is_empty() {
+            return Err(line.fault(self.subject, "name of a subject"));
+        }
+        let model = line.text(self.model);
+        let mut row = Row {
+            subject: subject.to_owned(),
+            model: (!model.is_empty()).then(|| model.to_owned()),
+            role: Role::Test,
+            repetition: line.whole(self.repetition)?,
+            rating: line.number(self.rating)?,
+            vaf: self.vaf.map_or(Ok(f64::NAN), |i| line.number(i))?,
+            trial_index: self.trial_index.map_or(Ok(0), |i| line.whole(i))?,
+            origin: Origin::Real,
+            status: Status::Ok,
+            corrected: false,
+            attempt: 0,
+            source_row: 0,
+            covariates: BTreeMap::new(),
+            comments: Vec::new(),
+        };
+        if let Some(ours) = &self.ours {
+            let flag = |at: Option<usize>| at.map_or(Ok(false), |i| line.flag(i));
+            if flag(ours.practice)? {
+                return Ok(None);
+            }
+            row.role = ours.role.map_or(Ok(Role::Test), |i| {
+                line.word(i, &ROLES, "role of a realization")
+            })?;
+            row.status = ours.status.map_or(Ok(Status::Ok), |i| {
+                line.word(i, &STATUSES, "status (ok, failed, declined, missing)")
+            })?;
+            row.origin = match (flag(ours.simulated)?, flag(ours.pilot)?) {
+                (true, _) => Origin::Simulated,
+                (false, true) => Origin::Pilot,
+                (false, false) => Origin::Real,
+            };
+            row.corrected = flag(ours.corrected)?;
+            row.attempt = ours.attempt.map_or(Ok(0), |i| line.whole(i))?;
+            if row.status == Status::Failed {
+                row.rating = f64::NAN;
+            }
+            for &i in &ours.texts {
+                let text = &line.record[i];
+                // Other numeric questions are not comments.
+                if !text.trim().is_empty() && text.trim().parse::<f64>().is_err() {
+                    row.comments.push((line.header[i].clone(), text.to_owned()));
+                }
+            }
+        }
+        if row.rating.is_nan() && row.status == Status::Ok {
+            row.status = Status::Missing;
+        }
+        Ok(Some(row))
+    }
+}
+
+const ROLES: [(&str, Role); 5] = [
+    ("test", Role::Test),
+    ("practice", Role::Practice),
+    ("hidden-reference", Role::HiddenReference),
+    ("low-anchor", Role::LowAnchor),
+    ("physical", Role::Physical),
+];
+
+const STATUSES: [(&str, Status); 4] = [
+    ("ok", Status::Ok),
+    ("failed", Status::Failed),
+    ("declined", Status::Declined),
+    ("missing", Status::Missing),
+];
+
+struct Line<'a> {
+    name: &'a str,
+    header: &'a [String],
+    record: &'a csv::StringRecord,
+    line: u64,
+}
+
+impl Line<'_> {
+    fn text(&self, at: usize) -> &str {
+        self.record[at].trim()
+    }
+
+    fn fault(&self, at: usize, wanted: &'static str) -> RatingsError {
+        RatingsError::Field {
+            name: self.name.to_owned(),
+            line: self.line,
+            column: self.header[at].clone(),
+            field: self.record[at].to_owned(),
+            wanted,
+        }
+    }
+
+    fn number(&self, at: usize) -> Result<f64, RatingsError> {
+        let text = self.text(at);
+        if text.is_empty() || text.eq_ignore_ascii_case("na") || text.eq_ignore_ascii_case("nan") {
+            return Ok(f64::NAN);
+        }
+        text.parse()
+            .ok()
+            .filter(|v: &f64| v.is_finite())
+            .ok_or_else(|| self.fault(at, "finite number"))
+    }
+
+    /// A whole number from 1; empty is 0.
+    fn whole(&self, at: usize) -> Result<u32, RatingsError> {
+        match self.text(at) {
+            "" => Ok(0),
+            text => text
+                .parse()
+                .map_err(|_| self.fault(at, "whole number from 0")),
+        }
+    }
+
+    fn flag(&self, at: usize) -> Result<bool, RatingsError> {
+        match self.text(at) {
+            "true" => Ok(true),
+            "false" | "" => Ok(false),
+            _ => Err(self.fault(at, "`true` or `false`")),
+        }
+    }
+
+    fn word<T: Copy>(
+        &self,
+        at: usize,
+        words: &[(&str, T)],
+        wanted: &'static str,
+    ) -> Result<T, RatingsError> {
+        words
+            .iter()
+            .find(|(word, _)| *word == self.text(at))
+            .map(|(_, value)| *value)
+            .ok_or_else(|| self.fault(at, wanted))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(csv: &str) -> Result<Ratings, RatingsError> {
+        Ratings::read_csv("r.csv", csv.as_bytes(), None)
+    }
+
+    fn says(csv: &str) -> String {
+        read(csv).unwrap_err().to_string()
+    }
+
+    const HEAD: &str = "subject,model,repetition,rating,vaf\n";
+
+    #[test]
+    fn a_byte_order_mark_and_empty_fields_are_no_fault() {
+        let r = read(&format!("\u{feff}{HEAD}S1,,1,,\nS1,,2,4,0.5\n")).unwrap();
+        assert_eq!(r.model, [super::super::NO_MODEL; 2]);
+        assert_eq!((r.len(), r.models.len()), (2, 0));
+        assert_eq!(r.status, [Status::Missing, Status::Ok]);
+    }
+
+    #[test]
+    fn each_fault_names_its_line() {
+        assert_eq!(
+            says(&format!("{HEAD}S1,A,1,4,0.5\nS1,B,1,4\n")),
+            "r.csv, line 3: 4 fields, but the header has 5"
+        );
+        assert_eq!(
+            says(&format!("{HEAD}S1,A,1,four,0.5\n")),
+            "r.csv, line 2: `four` in column `rating` is no finite number"
+        );
+        assert_eq!(
+            says(&format!("{HEAD}S1,A,1,inf,0.5\n")),
+            "r.csv, line 2: `inf` in column `rating` is no finite number"
+        );
+        assert_eq!(
+            says(&format!("{HEAD}S1,A,1,4,0.5\nS1,A,1,5,0.5\n")),
+            "r.csv, line 3: subject `S1`, model `A`, repetition 1 came already on line 2"
+        );
+        assert_eq!(says(HEAD), "r.csv: no ratings, only a header");
+        assert!(says("subject,model,rating\n").contains("no column `repetition`"));
+        assert!(says("subject,subject\n").contains("two columns are named `subject`"));
+    }
+
+    #[test]
+    fn a_hostile_field_is_shown_escaped() {
+        let said = says(&format!("{HEAD}S1,A,1,\u{1b}[2J,0.5\n"));
+        assert!(said.contains("\\u{1b}[2J") && !said.contains('\u{1b}'));
+    }
+
+    #[test]
+    fn our_own_table_is_understood() {
+        let csv = "study,participant,session,row,trial,block,position,planned_position,model,role,\
+                   repetition,practice,pilot,simulated,protocol_version,realism,comment,corrected,\
+                   remarks,attempt,status,vaf\n\
+                   x,SIM001,1,,1,0,,1,Z,practice,0,true,false,true,1,3,,false,,1,ok,\n\
+                   x,SIM001,1,,2,1,1,1,A,test,1,false,false,true,1,5,\"a, b\",true,hm,2,ok,0.8\n\
+                   x,SIM001,1,,3,1,2,2,B,low-anchor,1,false,false,true,1,,,false,,1,declined,0.1\n";
+        let r = read(csv).unwrap();
+        assert_eq!(
+            (r.question.as_str(), r.practice, r.len()),
+            ("realism", 1, 2)
+        );
+        assert_eq!(r.models[1].role, Role::LowAnchor);
+        assert_eq!(r.origin, [Origin::Simulated; 2]);
+        assert_eq!((r.attempt[0], r.corrected[0]), (2, true));
+        let texts: Vec<&str> = r.comments.iter().map(|c| c.text.as_str()).collect();
+        assert_eq!(texts, ["a, b", "hm"]);
+    }
+}

@@ -1,0 +1,68 @@
+//! The analysis as one JSON document, `study-analysis/1`, numbers unrounded.
+
+use super::Source;
+use crate::analyze::{Analysis, Value};
+use serde_json::{Map, Value as Json, json};
+
+/// The name and version of the document.
+pub const FORMAT: &str = "study-analysis/1";
+
+/// The document, with a line feed at its end.
+pub fn document(source: &Source, analysis: &Analysis) -> String {
+    let (mut values, mut undefined) = (Map::new(), Map::new());
+    for (id, value) in analysis.values.iter() {
+        let json = match value {
+            Value::Number(x) => json!(x),
+            Value::List(x) => json!(x),
+            Value::Undefined(why) => {
+                undefined.insert(id.to_owned(), json!(why));
+                Json::Null
+            }
+        };
+        values.insert(id.to_owned(), json);
+    }
+    let c = &analysis.counts;
+    let document = json!({
+        "format": FORMAT,
+        "tool_version": env!("CARGO_PKG_VERSION"),
+        "study": {
+            "id": source.study,
+            "title": source.title,
+            "protocol_version": source.protocol_version,
+            "path": source.path,
+        },
+        "question": analysis.question,
+        "realistic_from": analysis.realistic_from,
+        "values": values,
+        "undefined": undefined,
+        "warnings": analysis.warnings.iter()
+            .map(|w| json!({"code": w.code, "text": w.text})).collect::<Vec<_>>(),
+        "realizations": analysis.realizations.iter()
+            .map(|m| json!({
+                "id": m.id,
+                "role": m.role.as_str(),
+                "duplicate_of": m.duplicate_of,
+                "vaf": m.vaf,
+            })).collect::<Vec<_>>(),
+        "counts": {
+            "rows": c.rows,
+            "rated": c.rated,
+            "without_rating": c.without_rating,
+            "failed": c.failed,
+            "declined": c.declined,
+            "missing": c.missing,
+            "corrected": c.corrected,
+            "repeated": c.repeated,
+            "practice": c.practice,
+            "excluded": c.excluded,
+            "participants": c.participants,
+            "finished": c.finished,
+            "excluded_participants": c.excluded_participants,
+            "planned": c.planned,
+            "pilots": c.pilots,
+            "simulated": c.simulated,
+            "interim": c.interim(),
+        },
+    });
+    format!("{document:#}\n")
+}

@@ -1,0 +1,144 @@
+//! Small charts of characters: histograms in a cell, dots with error bars.
+
+/// Eighths of a full block.
+const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+/// One bar for each count, against `most`; what is not empty shows.
+pub fn bars(counts: &[f64], most: f64, gap: &str) -> String {
+    let bar = |n: &f64| {
+        let eighths = if most > 0.0 {
+            (n / most * 8.0).round()
+        } else {
+            0.0
+        };
+        let least = if *n > 0.0 { 1.0 } else { 0.0 };
+        // Between 0 and 8, so the cast is exact.
+        BARS[eighths.clamp(least, 8.0) as usize].to_string()
+    };
+    counts.iter().map(bar).collect::<Vec<_>>().join(gap)
+}
+
+/// An axis of characters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    low: f64,
+    high: f64,
+    columns: usize,
+}
+
+impl Axis {
+    /// From `low` to `high` over at least two columns. `None` unless the ends are
+    /// finite and apart.
+    pub fn new(low: f64, high: f64, columns: usize) -> Option<Self> {
+        let apart = low.is_finite() && high.is_finite() && (high - low).is_finite();
+        (apart && high > low && columns >= 2).then_some(Self { low, high, columns })
+    }
+
+    /// The column of a number, if it is on the axis.
+    fn column(&self, x: f64) -> Option<usize> {
+        let at = (x - self.low) / (self.high - self.low) * (self.columns - 1) as f64;
+        let at = at.round();
+        // Not negative and below the number of columns, so the cast is exact.
+        (at >= 0.0 && at < self.columns as f64).then_some(at as usize)
+    }
+
+    /// `├──●──┤`: a dot at `x`, a bar of ± `half`. A bar that leaves the axis has
+    /// no cap there; a dot that is not on it is not drawn.
+    pub fn dot(&self, x: f64, half: Option<f64>) -> String {
+        let mut line = vec![' '; self.columns];
+        if let Some(half) = half.filter(|h| h.is_finite()) {
+            let (from, to) = (self.column(x - half), self.column(x + half));
+            let first = from.unwrap_or(0);
+            let last = to.unwrap_or(self.columns - 1);
+            if self.column(x).is_some() && first <= last {
+                line[first..=last].fill('─');
+                if from.is_some() && first < last {
+                    line[first] = '├';
+                }
+                if to.is_some() && first < last {
+                    line[last] = '┤';
+                }
+            }
+        }
+        if let Some(at) = self.column(x) {
+            line[at] = '●';
+        }
+        line.into_iter().collect::<String>().trim_end().to_owned()
+    }
+
+    /// Numbers at round places, centred over their columns; one that would touch
+    /// the one before is left out.
+    pub fn ticks(&self) -> String {
+        let step = step(self.high - self.low, (self.columns / 8).clamp(2, 10));
+        let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+        let mut line = vec![' '; self.columns];
+        let mut free = 0;
+        let mut k = (self.low / step - 1e-9).ceil();
+        while k * step <= self.high + 1e-9 * step {
+            let label: Vec<char> = format!("{:.decimals$}", k * step + 0.0).chars().collect();
+            if let Some(at) = self.column(k * step) {
+                let start = at.saturating_sub(label.len() / 2);
+                let start = start.min(self.columns.saturating_sub(label.len()));
+                if start >= free && start + label.len() <= self.columns {
+                    line[start..start + label.len()].copy_from_slice(&label);
+                    free = start + label.len() + 1;
+                }
+            }
+            // Far out, a double's next neighbour is further than a step.
+            if k + 1.0 <= k {
+                break;
+            }
+            k += 1.0;
+        }
+        line.into_iter().collect::<String>().trim_end().to_owned()
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, so that at most `most` steps fit.
+fn step(span: f64, most: usize) -> f64 {
+    let rough = span / most as f64;
+    let ten = 10f64.powf(rough.log10().floor());
+    [1.0, 2.0, 5.0, 10.0]
+        .iter()
+        .map(|m| m * ten)
+        .find(|s| *s >= rough * (1.0 - 1e-9))
+        .unwrap_or(10.0 * ten)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rare_rating_still_shows() {
+        assert_eq!(bars(&[0.0, 1.0, 50.0, 100.0], 100.0, ""), " ▁▄█");
+        assert_eq!(bars(&[0.0, 0.0], 0.0, " "), "   ");
+    }
+
+    #[test]
+    fn a_dot_lies_within_its_bar() {
+        let axis = Axis::new(1.0, 7.0, 25).unwrap();
+        assert_eq!(axis.dot(4.0, Some(1.0)), "        ├───●───┤");
+        assert_eq!(axis.ticks(), "1   2   3   4   5   6   7");
+    }
+
+    #[test]
+    fn a_bar_that_leaves_the_axis_has_no_cap() {
+        let axis = Axis::new(1.0, 7.0, 7).unwrap();
+        assert_eq!(axis.dot(2.0, Some(3.0)), "─●──┤");
+        assert_eq!(axis.dot(9.0, Some(1.0)), "");
+    }
+
+    #[test]
+    fn an_axis_of_nothing_is_none() {
+        assert_eq!(Axis::new(1.0, 1.0, 20), None);
+        assert_eq!(Axis::new(f64::NAN, 1.0, 20), None);
+        assert_eq!(Axis::new(-1e308, 1e308, 20), None);
+    }
+
+    #[test]
+    fn huge_axes_end() {
+        let axis = Axis::new(1e300, 1.0000001e300, 40).unwrap();
+        assert!(axis.ticks().chars().count() <= 40);
+    }
+}

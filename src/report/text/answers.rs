@@ -1,0 +1,264 @@
+//! The study's questions and their answers, in words with numbers.
+
+use super::layout::{Paint, wrap};
+use super::{asked, listed};
+use crate::analyze::{Analysis, Value};
+use crate::text::Untrusted;
+
+pub(super) fn answers(a: &Analysis, width: usize, paint: Paint) -> String {
+    let mut out = String::new();
+    let mut answer = |question: String, sentences: Vec<String>| {
+        if !sentences.is_empty() {
+            out += &paint.strong(&question);
+            out.push('\n');
+            for s in sentences {
+                out += &wrap(&s, width, "  ", "  ");
+            }
+            out.push('\n');
+        }
+    };
+    answer("Which feels most real?".to_owned(), best(a));
+    answer("Do the realizations differ?".to_owned(), differ(a));
+    answer(format!("Does VAF predict {}?", asked(a)), predicts(a));
+    answer("For these realizations only:".to_owned(), only_these(a));
+    out
+}
+
+/// A correlation: three decimals, no zero before the point.
+fn r(x: f64) -> String {
+    let shown = format!("{x:.3}");
+    match shown.strip_prefix("-0.") {
+        Some("000") => ".000".to_owned(),
+        Some(rest) => format!("−.{rest}"),
+        None => shown
+            .strip_prefix('0')
+            .map_or(shown.clone(), str::to_owned)
+            .replace('-', "−"),
+    }
+}
+
+/// A probability with its sign.
+fn p(x: f64) -> String {
+    if x < 0.00005 {
+        "< .0001".to_owned()
+    } else if x >= 0.99995 {
+        "= 1".to_owned()
+    } else {
+        format!("= {}", format!("{x:.4}").trim_start_matches('0'))
+    }
+}
+
+fn best(a: &Analysis) -> Vec<String> {
+    let v = &a.values;
+    let mut ranked: Vec<(f64, &str)> = listed(a)
+        .0
+        .iter()
+        .filter_map(|m| Some((v.number(&format!("desc/{}/mean", m.id))?, m.id.as_str())))
+        .collect();
+    ranked.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(y.1)));
+    let [(mean, first), (next_mean, second), ..] = ranked[..] else {
+        return Vec::new();
+    };
+    if mean == next_mean {
+        return vec![format!(
+            "{} and {} have the same mean, {mean:.3}.",
+            Untrusted(first),
+            Untrusted(second)
+        )];
+    }
+    let mut said = format!(
+        "{}: mean {mean:.3}; next {} with {next_mean:.3}",
+        Untrusted(first),
+        Untrusted(second)
+    );
+    let (low, high) = if first < second {
+        (first, second)
+    } else {
+        (second, first)
+    };
+    let pair = format!("posthoc/{low}|{high}");
+    if let Some(holm) = v.number(&format!("{pair}/p_wilcoxon_exact_holm")) {
+        said += &format!(" (Wilcoxon, exact, Holm over all pairs: p {})", p(holm));
+    }
+    said.push('.');
+    let mut all = vec![said];
+    if let Some(from) = a.realistic_from {
+        let share = v.number(&format!("realistic/{first}/share"));
+        all.extend(
+            share.map(|s| format!("{:.0} % of its ratings are {from} or higher.", 100.0 * s)),
+        );
+    }
+    all
+}
+
+fn differ(a: &Analysis) -> Vec<String> {
+    let v = &a.values;
+    let mut parts = Vec::new();
+    if let (Some(f), Some(pg), Some(e)) = (
+        v.number("rmanova/F"),
+        v.number("rmanova/p_gg"),
+        v.number("rmanova/eps_gg"),
+    ) && let (Some(df1), Some(df2)) = (v.number("rmanova/df1"), v.number("rmanova/df2"))
+    {
+        parts.push(format!(
+            "F({:.1}, {:.1}) = {f:.2}, p {} (Greenhouse–Geisser)",
+            df1 * e,
+            df2 * e,
+            p(pg)
+        ));
+    }
+    if let (Some(chi2), Some(df)) = (v.number("friedman/chi2"), v.number("friedman/df")) {
+        let exact = v.number("friedman/exact_p");
+        let kind = if exact.is_some() { "exact p" } else { "p" };
+        if let Some(value) = exact.or_else(|| v.number("friedman/p")) {
+            let w = v
+                .number("friedman/kendall_W")
+                .map_or_else(String::new, |w| format!(", Kendall's W = {}", r(w)));
+            parts.push(format!(
+                "Friedman χ²({df}) = {chi2:.2}, {kind} {}{w}",
+                p(value)
+            ));
+        }
+    }
+    if parts.is_empty() {
+        return Vec::new();
+    }
+    vec![format!("{}.", parts.join("; "))]
+}
+
+fn predicts(a: &Analysis) -> Vec<String> {
+    let v = &a.values;
+    let Some(pearson) = v.number("corr/pearson/r") else {
+        // Without any VAF it is no question.
+        let asked = a.realizations.iter().any(|m| m.vaf.is_some());
+        return match v.get("corr/pearson/r") {
+            Some(Value::Undefined(why)) if asked => vec![format!("Not to be said: {why}.")],
+            _ => Vec::new(),
+        };
+    };
+    let n = v.number("corr/n_models").unwrap_or(0.0);
+    let mut said = vec![format!(
+        "r = {} over {n} realizations{}{}.",
+        r(pearson),
+        interval(a, "corr/pearson/ci95"),
+        permuted(a, "pearson")
+    )];
+    if let Some(rho) = v.number("corr/spearman/rho") {
+        said.push(format!("rho = {}{}.", r(rho), permuted(a, "spearman")));
+    }
+    let ends = v
+        .number("corr/leave_one_out/pearson_min")
+        .zip(v.number("corr/leave_one_out/pearson_max"));
+    if let Some((low, high)) = ends {
+        let care = if n < 8.0 {
+            format!(" {} points: read with care.", count(n))
+        } else {
+            String::new()
+        };
+        said.push(format!(
+            "Leave one out: r from {} to {}.{care}",
+            r(low),
+            r(high)
+        ));
+    } else if n < 8.0 {
+        said.push(format!("{} points: read with care.", count(n)));
+    }
+    said
+}
+
+fn count(n: f64) -> String {
+    let words = ["Three", "Four", "Five", "Six", "Seven"];
+    let at = n - 3.0;
+    if (0.0..5.0).contains(&at) && at.fract() == 0.0 {
+        words[at as usize].to_owned()
+    } else {
+        n.to_string()
+    }
+}
+
+fn interval(a: &Analysis, id: &str) -> String {
+    let low = a.values.number(&format!("{id}_lo"));
+    let high = a.values.number(&format!("{id}_hi"));
+    low.zip(high).map_or_else(String::new, |(low, high)| {
+        format!(", 95 % [{}, {}]", r(low), r(high))
+    })
+}
+
+fn permuted(a: &Analysis, name: &str) -> String {
+    let get = |id: &str| a.values.number(&format!("corr/{name}/{id}"));
+    let least = get("smallest_p_two_sided");
+    let n = a.values.number("corr/n_models").unwrap_or(0.0);
+    match (
+        get("p_exact_two_sided"),
+        get("p_monte_carlo_two_sided"),
+        least,
+    ) {
+        (Some(exact), _, Some(least)) => {
+            format!(
+                ", exact p {} (the smallest possible with {n} is {})",
+                p(exact),
+                small(least)
+            )
+        }
+        (None, Some(drawn), _) => format!(", permutation p {}", p(drawn)),
+        _ => String::new(),
+    }
+}
+
+/// A probability without its sign.
+fn small(x: f64) -> String {
+    p(x).trim_start_matches("= ").to_owned()
+}
+
+fn only_these(a: &Analysis) -> Vec<String> {
+    let v = &a.values;
+    let mut parts = Vec::new();
+    if let Some(x) = v.number("rmcorr_cells/r") {
+        let ends = interval(a, "rmcorr_cells/ci95");
+        parts.push(format!("within participants r = {}{ends}", r(x)));
+    }
+    if let Some(x) = v.number("subject_corr/r_back") {
+        parts.push(format!("mean correlation of a participant {}", r(x)));
+    }
+    let ends = v
+        .number("bootstrap/percentile_lo")
+        .zip(v.number("bootstrap/percentile_hi"));
+    if let Some((low, high)) = ends {
+        parts.push(format!(
+            "with other participants r would be {} to {} (bootstrap, 95 %)",
+            r(low),
+            r(high)
+        ));
+    }
+    if parts.is_empty() {
+        return Vec::new();
+    }
+    let said = format!(
+        "{}. It says nothing about other realizations.",
+        parts.join("; ")
+    );
+    let mut letters = said.chars();
+    let capital = letters.next().map(|c| c.to_uppercase().to_string());
+    vec![format!(
+        "{}{}",
+        capital.unwrap_or_default(),
+        letters.as_str()
+    )]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn correlations_and_probabilities_read_as_in_print() {
+        assert_eq!(r(0.97436), ".974");
+        assert_eq!(r(-0.5), "−.500");
+        assert_eq!(r(1.0), "1.000");
+        assert_eq!(r(-1.0), "−1.000");
+        assert_eq!(r(-0.0001), ".000");
+        assert_eq!(p(1.0 / 120.0), "= .0083");
+        assert_eq!(p(1e-9), "< .0001");
+        assert_eq!(small(1.0 / 120.0), ".0083");
+    }
+}

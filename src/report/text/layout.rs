@@ -1,0 +1,197 @@
+//! Columns, wrapping and colour of the terminal page, by display width.
+
+use unicode_segmentation::UnicodeSegmentation as _;
+use unicode_width::UnicodeWidthStr as _;
+
+/// Styles, or none.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Paint(pub(super) bool);
+
+impl Paint {
+    pub(super) fn strong(self, text: &str) -> String {
+        self.style("1", text)
+    }
+
+    pub(super) fn dim(self, text: &str) -> String {
+        self.style("2", text)
+    }
+
+    pub(super) fn warn(self, text: &str) -> String {
+        self.style("33", text)
+    }
+
+    /// Line by line, so that no style runs over a line's end.
+    fn style(self, code: &str, text: &str) -> String {
+        if !self.0 {
+            return text.to_owned();
+        }
+        text.split_inclusive('\n')
+            .map(|line| {
+                let (body, end) = match line.strip_suffix('\n') {
+                    Some(body) => (body, "\n"),
+                    None => (line, ""),
+                };
+                format!("\u{1b}[{code}m{body}\u{1b}[0m{end}")
+            })
+            .collect()
+    }
+}
+
+/// A number with so many decimals; a very large one in exponents.
+pub(super) fn number(x: f64, decimals: usize) -> String {
+    if x.abs() >= 1e12 {
+        format!("{x:.3e}")
+    } else {
+        // The addition turns a rounded −0 into 0.
+        let shown = format!("{x:.decimals$}");
+        match shown.strip_prefix('-') {
+            Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+            _ => shown,
+        }
+    }
+}
+
+/// Text of at most so many columns, with `…` where it was cut.
+pub(super) fn cut(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.to_owned();
+    }
+    let mut out = String::new();
+    let mut used = 1;
+    for g in text.graphemes(true) {
+        used += g.width();
+        if used > width {
+            break;
+        }
+        out.push_str(g);
+    }
+    out.push('…');
+    out
+}
+
+/// Text filled up to so many columns.
+pub(super) fn pad(text: &str, width: usize) -> String {
+    format!("{text}{}", " ".repeat(width.saturating_sub(text.width())))
+}
+
+/// Lines of at most so many columns, broken between words (or, in a word that is
+/// longer than a line, anywhere), each with a line feed.
+pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String {
+    let mut out = String::new();
+    let mut line = first.to_owned();
+    let mut empty = true;
+    let feed = |line: &mut String, out: &mut String| {
+        out.push_str(line.trim_end());
+        out.push('\n');
+        rest.clone_into(line);
+    };
+    for word in text.split(' ').filter(|w| !w.is_empty()) {
+        let space = usize::from(!empty);
+        if !empty && line.width() + space + word.width() > width {
+            feed(&mut line, &mut out);
+            empty = true;
+        }
+        if !empty {
+            line.push(' ');
+        }
+        for g in word.graphemes(true) {
+            if line.width() + g.width() > width {
+                feed(&mut line, &mut out);
+            }
+            line.push_str(g);
+        }
+        empty = false;
+    }
+    feed(&mut line, &mut out);
+    out
+}
+
+/// A table whose first column gives way when the page is narrow.
+pub(super) struct Grid {
+    rows: Vec<Vec<String>>,
+    /// A column that is set to the left, like the first and the last.
+    left: Option<usize>,
+}
+
+impl Grid {
+    pub(super) fn new(head: &[&str], left: Option<usize>) -> Self {
+        Self {
+            rows: vec![head.iter().map(|h| (*h).to_owned()).collect()],
+            left,
+        }
+    }
+
+    pub(super) fn row(&mut self, row: Vec<String>) {
+        self.rows.push(row);
+    }
+
+    /// The table; a blank line after the `apart`-th row, if others follow.
+    pub(super) fn render(&self, width: usize, apart: usize, paint: Paint) -> String {
+        let columns = self.rows[0].len();
+        let mut widths: Vec<usize> = (0..columns)
+            .map(|j| self.rows.iter().map(|r| r[j].width()).max().unwrap_or(0))
+            .collect();
+        let others: usize = widths[1..].iter().map(|w| w + 2).sum();
+        widths[0] = widths[0].min(width.saturating_sub(others).max(8));
+        // Where even that does not fit, the words of the last heading do.
+        let total: usize = widths[0] + others;
+        if total > width {
+            let longest = self.rows[1..].iter().map(|r| r[columns - 1].width()).max();
+            let room = widths[columns - 1].saturating_sub(total - width);
+            widths[columns - 1] = room.max(longest.unwrap_or(0));
+        }
+        let mut out = String::new();
+        for (i, row) in self.rows.iter().enumerate() {
+            let mut line = String::new();
+            for (j, cell) in row.iter().enumerate() {
+                let w = widths[j];
+                let cell = cut(cell, w);
+                if j > 0 {
+                    line.push_str("  ");
+                }
+                if j == 0 || j + 1 == columns || Some(j) == self.left {
+                    line.push_str(&pad(&cell, w));
+                } else {
+                    line.push_str(&" ".repeat(w - cell.width()));
+                    line.push_str(&cell);
+                }
+            }
+            let line = line.trim_end();
+            out.push_str(&if i == 0 {
+                paint.dim(line)
+            } else {
+                line.to_owned()
+            });
+            out.push('\n');
+            if i == apart && i > 0 && i + 1 < self.rows.len() {
+                out.push('\n');
+            }
+        }
+        out.push('\n');
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_wrap_and_long_ones_break() {
+        assert_eq!(wrap("aa bb cc", 5, "", ""), "aa bb\ncc\n");
+        assert_eq!(wrap("aaaaaaa", 4, "! ", "  "), "! aa\n  aa\n  aa\n  a\n");
+    }
+
+    #[test]
+    fn wide_characters_count_twice() {
+        assert_eq!(cut("よかった", 5), "よか…");
+        assert_eq!(pad("よ", 4), "よ  ");
+    }
+
+    #[test]
+    fn no_minus_zero_is_shown() {
+        assert_eq!(number(-0.0001, 2), "0.00");
+        assert_eq!(number(-0.01, 2), "-0.01");
+        assert_eq!(number(1e300, 3), "1.000e300");
+    }
+}

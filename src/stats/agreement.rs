@@ -1,0 +1,274 @@
+//! Agreement: intraclass correlations and Krippendorff's alpha.
+
+use super::distribution::{f_quantile, f_upper};
+use super::finite;
+use super::rank::doubled_ranks;
+
+/// A coefficient with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coefficient {
+    /// The estimate.
+    pub value: f64,
+    /// Its interval.
+    pub ci95: Option<(f64, f64)>,
+}
+
+/// Shrout & Fleiss's six intraclass correlations (1979).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Icc {
+    /// Mean square between targets.
+    pub ms_targets: f64,
+    /// Mean square between raters.
+    pub ms_raters: f64,
+    /// Residual mean square.
+    pub ms_error: f64,
+    /// MST/MSW.
+    pub f_1: Option<f64>,
+    /// Its p.
+    pub p_1: Option<f64>,
+    /// MST/MSE.
+    pub f_3: Option<f64>,
+    /// Its p.
+    pub p_3: Option<f64>,
+    /// Each target by its own raters, one rating.
+    pub icc1: Option<Coefficient>,
+    /// The same, mean of k; no interval here.
+    pub icc1k: Option<f64>,
+    /// Random raters, absolute agreement, one rating.
+    pub icc2: Option<Coefficient>,
+    /// The same, mean of k; its interval is Spearman–Brown's of the single one's.
+    pub icc2k: Option<Coefficient>,
+    /// Fixed raters, consistency, one rating.
+    pub icc3: Option<Coefficient>,
+    /// The same, mean of k.
+    pub icc3k: Option<Coefficient>,
+}
+
+/// Rows are targets, columns raters. With n targets, k raters and mean squares
+/// T, R, E and W (raters and residual together):
+/// ICC1 = (T − W)/(T + (k−1)W), ICC2 = (T − E)/(T + (k−1)E + k(R − E)/n),
+/// ICC3 = (T − E)/(T + (k−1)E). Intervals as in Shrout & Fleiss (1979).
+/// `None` below two of either.
+pub fn icc(rows: &[Vec<f64>]) -> Option<Icc> {
+    let (n, k) = (rows.len(), rows.first()?.len());
+    if n < 2 || k < 2 {
+        return None;
+    }
+    let (nf, kf) = (n as f64, k as f64);
+    let grand = rows.iter().flatten().sum::<f64>() / (nf * kf);
+    let row_means: Vec<f64> = rows.iter().map(|r| r.iter().sum::<f64>() / kf).collect();
+    let column_means: Vec<f64> = (0..k)
+        .map(|j| rows.iter().map(|r| r[j]).sum::<f64>() / nf)
+        .collect();
+    let square = |x: f64| x * x;
+    let targets = kf * row_means.iter().map(|m| square(m - grand)).sum::<f64>() / (nf - 1.0);
+    let raters = nf * column_means.iter().map(|m| square(m - grand)).sum::<f64>() / (kf - 1.0);
+    let mut residual = 0.0;
+    for (row, rm) in rows.iter().zip(&row_means) {
+        for (x, cm) in row.iter().zip(&column_means) {
+            residual += square(x - rm - cm + grand);
+        }
+    }
+    let (df_t, df_e, df_w) = (nf - 1.0, (nf - 1.0) * (kf - 1.0), nf * (kf - 1.0));
+    let error = residual / df_e;
+    let within = (residual + raters * (kf - 1.0)) / df_w;
+    let size: f64 = rows.iter().flatten().map(|x| square(x - grand)).sum();
+    let floor = 1e-24 * size;
+    let f_1 = (within > floor).then(|| targets / within).and_then(finite);
+    let f_3 = (error > floor).then(|| targets / error).and_then(finite);
+    let single = |f: f64| (f - 1.0) / (f + kf - 1.0);
+    let bounds = |f: f64, df: f64| {
+        Some((
+            f / f_quantile(0.975, df_t, df)?,
+            f * f_quantile(0.975, df, df_t)?,
+        ))
+    };
+    let icc2 = icc2(targets, raters, error, nf, kf);
+    let brown = |c: f64| finite(kf * c / (1.0 + (kf - 1.0) * c));
+    Some(Icc {
+        ms_targets: targets,
+        ms_raters: raters,
+        ms_error: error,
+        p_1: f_1.and_then(|f| f_upper(f, df_t, df_w)),
+        p_3: f_3.and_then(|f| f_upper(f, df_t, df_e)),
+        icc1: f_1.map(|f| Coefficient {
+            value: single(f),
+            ci95: bounds(f, df_w).map(|(l, h)| (single(l), single(h))),
+        }),
+        icc1k: f_1.and_then(|f| finite(1.0 - 1.0 / f)),
+        icc2k: icc2.and_then(|c| {
+            Some(Coefficient {
+                value: finite((targets - error) / (targets + (raters - error) / nf))?,
+                ci95: c.ci95.and_then(|(l, h)| Some((brown(l)?, brown(h)?))),
+            })
+        }),
+        icc2,
+        icc3: f_3.map(|f| Coefficient {
+            value: single(f),
+            ci95: bounds(f, df_e).map(|(l, h)| (single(l), single(h))),
+        }),
+        icc3k: f_3.and_then(|f| {
+            Some(Coefficient {
+                value: finite(1.0 - 1.0 / f)?,
+                ci95: bounds(f, df_e).map(|(l, h)| (1.0 - 1.0 / l, 1.0 - 1.0 / h)),
+            })
+        }),
+        f_1,
+        f_3,
+    })
+}
+
+/// ICC2 with Satterthwaite's degrees of freedom for its interval.
+fn icc2(t: f64, r: f64, e: f64, n: f64, k: f64) -> Option<Coefficient> {
+    let below = t + (k - 1.0) * e + k * (r - e) / n;
+    if below <= 0.0 || e <= 0.0 {
+        return None;
+    }
+    let value = finite((t - e) / below)?;
+    let f = r / e;
+    let a = n * (1.0 + (k - 1.0) * value) - k * value;
+    let above = (k - 1.0) * (n - 1.0) * (k * value * f + a).powi(2);
+    let df = above / ((n - 1.0) * (k * value * f).powi(2) + a * a);
+    let interval = || {
+        let upper = f_quantile(0.975, n - 1.0, df)?;
+        let lower = f_quantile(0.975, df, n - 1.0)?;
+        let raters = k * r + (k * n - k - n) * e;
+        Some((
+            finite(n * (t - upper * e) / (upper * raters + n * t))?,
+            finite(n * (lower * t - e) / (raters + n * lower * t))?,
+        ))
+    };
+    Some(Coefficient {
+        value,
+        ci95: interval(),
+    })
+}
+
+/// Krippendorff's alpha with three metrics.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alpha {
+    /// Equal or not.
+    pub nominal: Option<f64>,
+    /// By the ratings that lie between.
+    pub ordinal: Option<f64>,
+    /// Squared difference.
+    pub interval: Option<f64>,
+}
+
+/// Most distinct numbers for which alpha is computed: the work goes with the
+/// square.
+const MAX_DISTINCT: usize = 1000;
+
+/// α = 1 − (n−1) Σ o(c,k) δ²(c,k) / Σ n(c) n(k) δ²(c,k), with o the coincidences
+/// within units (each pair weighs 1/(m − 1) in a unit of m ratings) and n the
+/// margins (Krippendorff 2011). Units of one rating do not count. Undefined if
+/// all ratings are equal.
+pub fn krippendorff(units: &[Vec<f64>]) -> Alpha {
+    const NONE: Alpha = Alpha {
+        nominal: None,
+        ordinal: None,
+        interval: None,
+    };
+    let units: Vec<&Vec<f64>> = units.iter().filter(|u| u.len() >= 2).collect();
+    let all: Vec<f64> = units.iter().flat_map(|u| u.iter().copied()).collect();
+    // Equal numbers share a rank, so ranks name the distinct ones.
+    let ranks = doubled_ranks(&all);
+    let mut distinct: Vec<(i64, f64)> = ranks.iter().copied().zip(all.iter().copied()).collect();
+    distinct.sort_by_key(|d| d.0);
+    distinct.dedup_by_key(|d| d.0);
+    let v = distinct.len();
+    if !(2..=MAX_DISTINCT).contains(&v) {
+        return NONE;
+    }
+    let index = |rank: i64| distinct.partition_point(|d| d.0 < rank);
+    let mut observed = vec![0.0; v * v];
+    let mut margin = vec![0.0; v];
+    let mut at = 0;
+    for unit in &units {
+        let m = unit.len();
+        let mut counts: Vec<(usize, f64)> = Vec::new();
+        let mut places: Vec<usize> = ranks[at..at + m].iter().map(|&r| index(r)).collect();
+        at += m;
+        places.sort_unstable();
+        for group in places.chunk_by(|a, b| a == b) {
+            counts.push((group[0], group.len() as f64));
+        }
+        for &(c, nc) in &counts {
+            margin[c] += nc;
+            for &(k, nk) in &counts {
+                let pairs = if c == k { nc * (nc - 1.0) } else { nc * nk };
+                observed[c * v + k] += pairs / (m as f64 - 1.0);
+            }
+        }
+    }
+    let below: Vec<f64> = margin
+        .iter()
+        .scan(0.0, |sum, n| {
+            let before = *sum;
+            *sum += n;
+            Some(before)
+        })
+        .collect();
+    let total: f64 = margin.iter().sum();
+    let alpha = |distance: &dyn Fn(usize, usize) -> f64| {
+        let (mut o, mut e) = (0.0, 0.0);
+        for c in 0..v {
+            for k in 0..v {
+                let d = distance(c, k);
+                o += observed[c * v + k] * d;
+                e += margin[c] * margin[k] * d;
+            }
+        }
+        (e > 0.0)
+            .then(|| finite(1.0 - (total - 1.0) * o / e))
+            .flatten()
+    };
+    Alpha {
+        nominal: alpha(&|c, k| f64::from(u8::from(c != k))),
+        ordinal: alpha(&|c, k| {
+            let (low, high) = (c.min(k), c.max(k));
+            // Σ of the margins from low to high, less half of the two ends.
+            let between = below[high] + margin[high] - below[low];
+            (between - (margin[low] + margin[high]) / 2.0).powi(2)
+        }),
+        interval: alpha(&|c, k| (distinct[c].1 - distinct[k].1).powi(2)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Shrout & Fleiss (1979), tables 2 to 4: .17, .29, .71, .44, .62, .91.
+    #[test]
+    fn the_worked_example_of_shrout_and_fleiss_comes_out() {
+        let rows = [
+            [9.0, 2.0, 5.0, 8.0],
+            [6.0, 1.0, 3.0, 2.0],
+            [8.0, 4.0, 6.0, 8.0],
+            [7.0, 1.0, 2.0, 6.0],
+            [10.0, 5.0, 6.0, 9.0],
+            [6.0, 2.0, 4.0, 7.0],
+        ];
+        let i = icc(&rows.map(|r| r.to_vec())).unwrap();
+        let two = |x: f64| format!("{x:.2}");
+        assert_eq!(two(i.icc1.unwrap().value), "0.17");
+        assert_eq!(two(i.icc2.unwrap().value), "0.29");
+        assert_eq!(two(i.icc3.unwrap().value), "0.71");
+        assert_eq!(two(i.icc1k.unwrap()), "0.44");
+        assert_eq!(two(i.icc2k.unwrap().value), "0.62");
+        assert_eq!(two(i.icc3k.unwrap().value), "0.91");
+    }
+
+    #[test]
+    fn perfect_agreement_is_one_and_no_variation_is_undefined() {
+        let a = krippendorff(&[vec![1.0, 1.0], vec![3.0, 3.0], vec![4.0]]);
+        assert_eq!(a.nominal, Some(1.0));
+        assert_eq!(a.ordinal, Some(1.0));
+        assert_eq!(
+            krippendorff(&[vec![4.0, 4.0], vec![4.0, 4.0]]).nominal,
+            None
+        );
+        assert!(icc(&vec![vec![4.0; 3]; 3]).unwrap().icc1.is_none());
+    }
+}

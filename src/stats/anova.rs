@@ -1,0 +1,293 @@
+//! Repeated-measures analysis of variance, one-way and two-way, balanced.
+//!
+//! Every effect is a set of orthonormal contrasts C (Helmert's, and Kronecker
+//! products of them). With yₛ = C·(subject s's row): SS = S·|ȳ|², its error
+//! Σ|yₛ − ȳ|², and sphericity is a matter of the covariance of y alone. The grand
+//! mean should be taken off the numbers beforehand, to keep their digits.
+
+use super::distribution::{chi2_upper, f_upper};
+use super::finite;
+
+/// One effect and its error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// Sum of squares.
+    pub ss: f64,
+    /// Sum of squares of its interaction with subjects.
+    pub ss_error: f64,
+    /// Degrees of freedom of the effect.
+    pub df1: f64,
+    /// Degrees of freedom of the error.
+    pub df2: f64,
+    /// Undefined if there is no error variance.
+    pub f: Option<f64>,
+    /// Under sphericity.
+    pub p: Option<f64>,
+    /// Greenhouse & Geisser's ε = (tr Σ)²/(q tr Σ²).
+    pub eps_gg: Option<f64>,
+    /// p with both df times ε.
+    pub p_gg: Option<f64>,
+    /// Huynh & Feldt's ε = (S q ε − 2)/(q(S − 1 − qε)), not clipped.
+    pub eps_hf: Option<f64>,
+    /// p with that ε clipped at 1.
+    pub p_hf: Option<f64>,
+    /// Mauchly's test of sphericity.
+    pub mauchly: Option<Mauchly>,
+}
+
+/// Mauchly's test: W = det Σ/(tr Σ/q)^q.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mauchly {
+    /// The statistic.
+    pub w: f64,
+    /// With Box's second-order term (Anderson 1958, §10.7.4).
+    pub p: Option<f64>,
+    /// As R and car print it, with 3(q + 1) for 3q in that term.
+    pub p_as_r: Option<f64>,
+}
+
+/// One-way: subjects × realizations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OneWay {
+    /// The realizations.
+    pub effect: Effect,
+    /// Between subjects.
+    pub ss_subject: f64,
+    /// SSm/(SSm + SSs + SSe) (Olejnik & Algina 2003).
+    pub ges: Option<f64>,
+    /// SSm/(SSm + SSe).
+    pub pes: Option<f64>,
+}
+
+/// Two-way: subjects × realizations × repetitions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TwoWay {
+    /// Realizations, repetitions, their interaction, each with its generalised
+    /// eta squared: the effect over itself and every subject term.
+    pub effects: [(Effect, Option<f64>); 3],
+}
+
+/// One-way analysis. `None` below two subjects or realizations.
+pub fn one_way(rows: &[Vec<f64>]) -> Option<OneWay> {
+    let k = rows.first()?.len();
+    if rows.len() < 2 || k < 2 {
+        return None;
+    }
+    let effect = effect(rows, &helmert(k), true);
+    let ss_subject = effect_sums(rows, &[unit(k)]).1;
+    let total = effect.ss + ss_subject + effect.ss_error;
+    Some(OneWay {
+        ges: ratio(effect.ss, total),
+        pes: ratio(effect.ss, effect.ss + effect.ss_error),
+        ss_subject,
+        effect,
+    })
+}
+
+/// Two-way analysis; each row holds a subject's ratings, realization by
+/// realization, `repetitions` each. `None` below two of anything.
+pub fn two_way(rows: &[Vec<f64>], repetitions: usize) -> Option<TwoWay> {
+    let width = rows.first()?.len();
+    if rows.len() < 2 || repetitions < 2 || width < 2 * repetitions {
+        return None;
+    }
+    let models = width / repetitions;
+    let (hm, hr) = (helmert(models), helmert(repetitions));
+    let (um, ur) = ([unit(models)], [unit(repetitions)]);
+    let effects = [
+        effect(rows, &kronecker(&hm, &ur), false),
+        effect(rows, &kronecker(&um, &hr), false),
+        effect(rows, &kronecker(&hm, &hr), false),
+    ];
+    let subjects = effect_sums(rows, &[unit(width)]).1;
+    let errors: f64 = effects.iter().map(|e| e.ss_error).sum::<f64>() + subjects;
+    Some(TwoWay {
+        effects: effects.map(|e| {
+            let ges = ratio(e.ss, e.ss + errors);
+            (e, ges)
+        }),
+    })
+}
+
+fn ratio(a: f64, b: f64) -> Option<f64> {
+    if b > 0.0 { finite(a / b) } else { None }
+}
+
+/// q = k − 1 orthonormal contrasts: the j-th compares the first j with the next.
+fn helmert(k: usize) -> Vec<Vec<f64>> {
+    (1..k)
+        .map(|j| {
+            let scale = 1.0 / ((j * (j + 1)) as f64).sqrt();
+            let mut row = vec![0.0; k];
+            row[..j].fill(scale);
+            row[j] = -(j as f64) * scale;
+            row
+        })
+        .collect()
+}
+
+fn unit(k: usize) -> Vec<f64> {
+    vec![1.0 / (k as f64).sqrt(); k]
+}
+
+fn kronecker(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    a.iter()
+        .flat_map(|x| {
+            b.iter().map(move |y| {
+                x.iter()
+                    .flat_map(|u| y.iter().map(move |v| u * v))
+                    .collect()
+            })
+        })
+        .collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Sum of squares, that of its error, and the centred contrasts by subject.
+fn effect_sums(rows: &[Vec<f64>], contrasts: &[Vec<f64>]) -> (f64, f64, Vec<Vec<f64>>) {
+    let n = rows.len() as f64;
+    let mut y: Vec<Vec<f64>> = rows
+        .iter()
+        .map(|row| contrasts.iter().map(|c| dot(c, row)).collect())
+        .collect();
+    let mut ss = 0.0;
+    for j in 0..contrasts.len() {
+        let mean = y.iter().map(|v| v[j]).sum::<f64>() / n;
+        ss += n * mean * mean;
+        for v in &mut y {
+            v[j] -= mean;
+        }
+    }
+    let error = y.iter().map(|v| dot(v, v)).sum();
+    (ss, error, y)
+}
+
+fn effect(rows: &[Vec<f64>], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect {
+    let n = rows.len() as f64;
+    let q = contrasts.len() as f64;
+    let (ss, ss_error, y) = effect_sums(rows, contrasts);
+    let (df1, df2) = (q, q * (n - 1.0));
+    let size: f64 = rows.iter().map(|r| dot(r, r)).sum();
+    // Below this the error is what thirds leave behind.
+    let defined = ss_error > 1e-24 * size && ss_error.is_finite();
+    let f = if defined {
+        finite((ss / df1) / (ss_error / df2))
+    } else {
+        None
+    };
+    let covariance = defined.then(|| covariance(&y));
+    let eps_gg = covariance.as_ref().and_then(|s| {
+        let trace: f64 = (0..s.len()).map(|i| s[i][i]).sum();
+        let squares: f64 = s.iter().map(|r| dot(r, r)).sum();
+        finite(trace * trace / (q * squares))
+    });
+    let eps_hf = eps_gg.and_then(|e| {
+        let below = q * (n - 1.0 - q * e);
+        (below > 0.0).then(|| (n * q * e - 2.0) / below)
+    });
+    let with = |eps: Option<f64>| {
+        let (f, e) = (f?, eps?);
+        (e > 0.0).then(|| f_upper(f, df1 * e, df2 * e)).flatten()
+    };
+    Effect {
+        ss,
+        ss_error,
+        df1,
+        df2,
+        f,
+        p: f.and_then(|f| f_upper(f, df1, df2)),
+        eps_gg,
+        p_gg: with(eps_gg),
+        eps_hf,
+        p_hf: with(eps_hf.map(|e| e.min(1.0))),
+        mauchly: covariance
+            .filter(|_| with_mauchly)
+            .and_then(|s| mauchly(&s, n - 1.0)),
+    }
+}
+
+fn covariance(y: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let q = y.first().map_or(0, Vec::len);
+    let df = y.len() as f64 - 1.0;
+    let mut s = vec![vec![0.0; q]; q];
+    for v in y {
+        for (i, row) in s.iter_mut().enumerate() {
+            for (j, cell) in row.iter_mut().enumerate() {
+                *cell += v[i] * v[j] / df;
+            }
+        }
+    }
+    s
+}
+
+fn mauchly(s: &[Vec<f64>], df: f64) -> Option<Mauchly> {
+    let q = s.len() as f64;
+    if df < q || s.len() < 2 {
+        return None;
+    }
+    let trace: f64 = (0..s.len()).map(|i| s[i][i]).sum();
+    let log_w = log_determinant(s)? - q * (trace / q).ln();
+    let w = finite(log_w.exp())?;
+    let rho = 1.0 - (2.0 * q * q + q + 2.0) / (6.0 * df * q);
+    let z = -df * rho * log_w;
+    let f = q * (q + 1.0) / 2.0 - 1.0;
+    let first = chi2_upper(z, f);
+    let second = chi2_upper(z, f + 4.0);
+    let p = |linear: f64| {
+        let (first, second) = (first?, second?);
+        let w2 = (q + 2.0) * (q - 1.0) * (q - 2.0) * (2.0 * q.powi(3) + 6.0 * q * q + linear + 2.0)
+            / (288.0 * (df * q * rho).powi(2));
+        finite(first + w2 * (second - first)).map(|p| p.clamp(0.0, 1.0))
+    };
+    Some(Mauchly {
+        w,
+        p: p(3.0 * q),
+        p_as_r: p(3.0 * (q + 1.0)),
+    })
+}
+
+/// ln det by Cholesky's decomposition; `None` if the matrix is singular.
+fn log_determinant(s: &[Vec<f64>]) -> Option<f64> {
+    let n = s.len();
+    let mut l = vec![vec![0.0; n]; n];
+    let mut log = 0.0;
+    for i in 0..n {
+        for j in 0..=i {
+            let rest = s[i][j] - dot(&l[i][..j], &l[j][..j]);
+            if i == j {
+                if rest <= 1e-13 * s[i][i] {
+                    return None;
+                }
+                l[i][i] = rest.sqrt();
+                log += rest.ln();
+            } else {
+                l[i][j] = rest / l[j][j];
+            }
+        }
+    }
+    finite(log)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: rows (1,2), (2,4), (3,6): the difference has mean 2, variance 1.
+    #[test]
+    fn two_realizations_give_the_square_of_the_paired_t() {
+        let a = one_way(&[vec![1.0, 2.0], vec![2.0, 4.0], vec![3.0, 6.0]]).unwrap();
+        let t = 2.0 / (1.0f64 / 3.0).sqrt();
+        assert!((a.effect.f.unwrap() - t * t).abs() < 1e-12);
+        assert_eq!(a.effect.mauchly, None);
+        assert!((a.effect.eps_gg.unwrap() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_constant_table_has_no_f() {
+        let a = one_way(&vec![vec![0.0; 4]; 5]).unwrap();
+        assert_eq!((a.effect.f, a.effect.p, a.ges), (None, None, None));
+    }
+}

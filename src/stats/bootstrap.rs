@@ -1,0 +1,274 @@
+//! The bootstrap of the correlation over subjects, exact where it is small.
+//!
+//! All C(2S−1, S) compositions of S draws from S subjects, each with its
+//! multinomial weight (Fisher & Hall 1991): no random numbers, no Monte Carlo
+//! error. It says how the correlation varies with the subjects; it says nothing
+//! about other realizations.
+
+use super::correlation::pearson;
+use super::describe::constant;
+use super::distribution::{normal_cdf, normal_quantile};
+use super::finite;
+use crate::rng::Stream;
+
+/// Most subjects for which all compositions are visited.
+pub const MAX_EXACT: usize = 10;
+
+/// Resamples above [`MAX_EXACT`].
+pub const DRAWS: u32 = 10_000;
+
+/// A bootstrap distribution of the correlation, summed up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bootstrap {
+    /// Mean over the resamples.
+    pub mean: f64,
+    /// Standard deviation over them.
+    pub se: f64,
+    /// 95 % by percentiles: the smallest values with cdf ≥ .025 and ≥ .975.
+    pub percentile: (f64, f64),
+    /// 95 %, bias corrected and accelerated (Efron 1987).
+    pub bca: Option<(f64, f64)>,
+    /// Bias: the normal quantile of P(r* < r), ties counted half.
+    pub z0: Option<f64>,
+    /// Acceleration, from the jackknife.
+    pub acceleration: Option<f64>,
+    /// P(r* ≤ 0).
+    pub p_le_zero: f64,
+    /// Probability of the resamples in which every realization is rated alike,
+    /// which have no correlation and are left out.
+    pub undefined_probability: f64,
+    /// Whether all compositions were visited.
+    pub exact: bool,
+}
+
+/// Resamples the rows (subjects) of a table and correlates the column sums with
+/// `x`. `None` below two subjects or where the correlation is not defined.
+pub fn correlation(rows: &[Vec<f64>], x: &[f64], seed: u64) -> Option<Bootstrap> {
+    if rows.len() < 2 || x.len() < 3 {
+        return None;
+    }
+    let score = Score::new(x)?;
+    let ones = vec![1; rows.len()];
+    let observed = score.of(&weighted(rows, &ones))?;
+    let exact = rows.len() <= MAX_EXACT;
+    let mut resamples = Vec::new();
+    let (mut undefined, mut total) = (0u64, 0u64);
+    let mut count = |sums: &[f64], weight: u64| {
+        total += weight;
+        match score.of(sums) {
+            Some(r) => resamples.push((r, weight)),
+            None => undefined += weight,
+        }
+    };
+    if exact {
+        let mut sums = vec![vec![0.0; x.len()]; rows.len() + 1];
+        compose(rows, 0, rows.len(), 1, &mut sums, &mut count);
+    } else {
+        let mut stream = Stream::new(seed, &["bootstrap"]);
+        let mut draws = vec![0u32; rows.len()];
+        for _ in 0..DRAWS {
+            draws.fill(0);
+            for _ in 0..rows.len() {
+                // Below the number of rows, which is a usize.
+                draws[stream.below(rows.len() as u64) as usize] += 1;
+            }
+            count(&weighted(rows, &draws), 1);
+        }
+    }
+    resamples.sort_by(|a, b| a.0.total_cmp(&b.0));
+    summary(rows, &score, observed, &resamples, undefined, total, exact)
+}
+
+fn summary(
+    rows: &[Vec<f64>],
+    score: &Score,
+    observed: f64,
+    resamples: &[(f64, u64)],
+    undefined: u64,
+    total: u64,
+    exact: bool,
+) -> Option<Bootstrap> {
+    let defined = (total - undefined) as f64;
+    let mean = resamples.iter().map(|(r, w)| r * *w as f64).sum::<f64>() / defined;
+    let variance = resamples
+        .iter()
+        .map(|(r, w)| (r - mean) * (r - mean) * *w as f64)
+        .sum::<f64>()
+        / defined;
+    let share = |keep: &dyn Fn(f64) -> bool| {
+        let kept: u64 = resamples
+            .iter()
+            .filter(|(r, _)| keep(*r))
+            .map(|(_, w)| w)
+            .sum();
+        kept as f64 / defined
+    };
+    const TIE: f64 = 1e-12;
+    let below = share(&|r| r < observed - TIE);
+    let ties = share(&|r| (r - observed).abs() <= TIE);
+    let z0 = normal_quantile(below + 0.5 * ties);
+    let acceleration = acceleration(rows, score);
+    let at = |p: f64| quantile(resamples, p * defined);
+    let bca = z0.zip(acceleration).and_then(|(z0, a)| {
+        let level = |p: f64| {
+            let z = z0 + normal_quantile(p)?;
+            finite(normal_cdf(z0 + z / (1.0 - a * z)))
+        };
+        Some((at(level(0.025)?)?, at(level(0.975)?)?))
+    });
+    Some(Bootstrap {
+        mean: finite(mean)?,
+        se: finite(variance.max(0.0).sqrt())?,
+        percentile: (at(0.025)?, at(0.975)?),
+        bca,
+        z0,
+        acceleration,
+        p_le_zero: share(&|r| r <= 0.0),
+        undefined_probability: undefined as f64 / total as f64,
+        exact,
+    })
+}
+
+/// The smallest value whose cumulated weight reaches `weight`.
+fn quantile(resamples: &[(f64, u64)], weight: f64) -> Option<f64> {
+    let mut sum = 0u64;
+    for (r, w) in resamples {
+        sum += w;
+        if sum as f64 >= weight {
+            return Some(*r);
+        }
+    }
+    resamples.last().map(|(r, _)| *r)
+}
+
+/// Σ(m − mᵢ)³/(6(Σ(m − mᵢ)²)^1.5) over the correlations mᵢ without subject i.
+fn acceleration(rows: &[Vec<f64>], score: &Score) -> Option<f64> {
+    let mut without = Vec::with_capacity(rows.len());
+    for i in 0..rows.len() {
+        let mut draws = vec![1; rows.len()];
+        draws[i] = 0;
+        without.push(score.of(&weighted(rows, &draws))?);
+    }
+    let mean = without.iter().sum::<f64>() / without.len() as f64;
+    let (mut cubes, mut squares) = (0.0, 0.0);
+    for m in &without {
+        let d = mean - m;
+        cubes += d * d * d;
+        squares += d * d;
+    }
+    if squares <= 0.0 {
+        return None;
+    }
+    finite(cubes / (6.0 * squares.powf(1.5)))
+}
+
+fn weighted(rows: &[Vec<f64>], draws: &[u32]) -> Vec<f64> {
+    let mut sums = vec![0.0; rows.first().map_or(0, Vec::len)];
+    for (row, &n) in rows.iter().zip(draws) {
+        if n > 0 {
+            for (s, v) in sums.iter_mut().zip(row) {
+                *s += f64::from(n) * v;
+            }
+        }
+    }
+    sums
+}
+
+/// Every way to draw `left` times from the rows from `row` on; `weight` counts
+/// the sequences that give it (S! / Π kᵢ!, at most 10¹⁰, exact).
+fn compose(
+    rows: &[Vec<f64>],
+    row: usize,
+    left: usize,
+    weight: u64,
+    sums: &mut [Vec<f64>],
+    count: &mut impl FnMut(&[f64], u64),
+) {
+    if left == 0 {
+        count(&sums[row], weight);
+        return;
+    }
+    let last = row + 1 == rows.len();
+    let mut ways = weight;
+    for k in 0..=left {
+        // ways = weight · C(left, k)
+        if k > 0 {
+            ways = ways * (left - k + 1) as u64 / k as u64;
+        }
+        if last && k < left {
+            continue;
+        }
+        let (done, next) = sums.split_at_mut(row + 1);
+        for ((n, s), v) in next[0].iter_mut().zip(&done[row]).zip(&rows[row]) {
+            *n = s + k as f64 * v;
+        }
+        if last {
+            count(&next[0], ways);
+        } else {
+            compose(rows, row + 1, left - k, ways, sums, count);
+        }
+    }
+}
+
+/// Correlation with a fixed x, of column sums.
+struct Score {
+    x: Vec<f64>,
+}
+
+impl Score {
+    fn new(x: &[f64]) -> Option<Self> {
+        if constant(x) {
+            return None;
+        }
+        let mean = x.iter().sum::<f64>() / x.len() as f64;
+        let centred: Vec<f64> = x.iter().map(|v| v - mean).collect();
+        let norm = centred.iter().map(|v| v * v).sum::<f64>().sqrt();
+        pearson(x, x)?;
+        Some(Self {
+            x: centred.iter().map(|v| v / norm).collect(),
+        })
+    }
+
+    fn of(&self, y: &[f64]) -> Option<f64> {
+        let mean = y.iter().sum::<f64>() / y.len() as f64;
+        let (mut xy, mut yy, mut size) = (0.0, 0.0, 0.0f64);
+        for (x, v) in self.x.iter().zip(y) {
+            let d = v - mean;
+            xy += x * d;
+            yy += d * d;
+            size = size.max(v.abs());
+        }
+        // Sums that differ by the rounding of thirds are equal.
+        if !(yy.is_finite() && yy.sqrt() > 1e-12 * size) {
+            return None;
+        }
+        Some((xy / yy.sqrt()).clamp(-1.0, 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_compositions_are_visited_with_their_weights() {
+        let rows: Vec<Vec<f64>> = (0..4).map(|i| vec![f64::from(i), 1.0, 2.0]).collect();
+        let (mut visited, mut weights) = (0, 0);
+        let mut sums = vec![vec![0.0; 3]; 5];
+        compose(&rows, 0, 4, 1, &mut sums, &mut |s, w| {
+            // Every composition draws four rows, so the constant columns are fixed.
+            assert_eq!((s[1], s[2]), (4.0, 8.0));
+            visited += 1;
+            weights += w;
+        });
+        assert_eq!((visited, weights), (35, 256));
+    }
+
+    #[test]
+    fn equal_ratings_have_no_bootstrap() {
+        assert_eq!(
+            correlation(&vec![vec![4.0; 3]; 3], &[1.0, 2.0, 3.0], 1),
+            None
+        );
+    }
+}

@@ -1,0 +1,133 @@
+//! Correlation of two columns: Pearson, Spearman, Kendall, within subjects.
+
+use super::describe::{constant, mean, sum_of_products, sum_of_squares};
+use super::distribution::{normal_quantile, t_two_sided};
+use super::finite;
+use super::rank::{doubled_ranks, mid_ranks};
+
+/// Pearson's r = Sxy/√(Sxx Syy). `None` if a column is constant or shorter
+/// than 2.
+pub fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
+    if x.len() < 2 || constant(x) || constant(y) {
+        return None;
+    }
+    let (xx, yy) = (sum_of_squares(x)?, sum_of_squares(y)?);
+    if !(xx > 0.0 && yy > 0.0) {
+        return None;
+    }
+    finite(sum_of_products(x, y)? / (xx.sqrt() * yy.sqrt())).map(|r| r.clamp(-1.0, 1.0))
+}
+
+/// Spearman's rho: Pearson's r of the mid-ranks.
+pub fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
+    pearson(&mid_ranks(x), &mid_ranks(y))
+}
+
+/// Kendall's tau-b: (concordant − discordant)/√((n₀ − n₁)(n₀ − n₂)), with
+/// n₀ = n(n−1)/2 and n₁, n₂ the tied pairs of either column (Kendall 1945).
+/// `None` if a column is constant, or above 5000 pairs: the work goes with the
+/// square.
+pub fn kendall(x: &[f64], y: &[f64]) -> Option<f64> {
+    if x.len() > 5000 {
+        return None;
+    }
+    let (rx, ry) = (doubled_ranks(x), doubled_ranks(y));
+    let (mut score, mut untied_x, mut untied_y) = (0i64, 0i64, 0i64);
+    for i in 0..rx.len() {
+        for j in 0..i {
+            let (a, b) = ((rx[i] - rx[j]).signum(), (ry[i] - ry[j]).signum());
+            score += a * b;
+            untied_x += a.abs();
+            untied_y += b.abs();
+        }
+    }
+    let below = (untied_x as f64).sqrt() * (untied_y as f64).sqrt();
+    finite(score as f64 / below)
+}
+
+/// Two-sided p of r by t = r√(df/(1 − r²)). `None` for |r| = 1 or df < 1.
+pub fn p_of_r(r: f64, df: f64) -> Option<f64> {
+    if df < 1.0 || r.abs() >= 1.0 {
+        return None;
+    }
+    t_two_sided(r * (df / ((1.0 - r) * (1.0 + r))).sqrt(), df)
+}
+
+/// Fisher's 95 % interval: tanh(atanh r ± z/√`weight`), where `weight` is n − 3
+/// for a plain correlation. `None` for |r| = 1 or a weight not above 0.
+pub fn fisher_interval(r: f64, weight: f64) -> Option<(f64, f64)> {
+    if r.abs() >= 1.0 || weight <= 0.0 {
+        return None;
+    }
+    let half = normal_quantile(0.975)? / weight.sqrt();
+    let z = r.atanh();
+    Some(((z - half).tanh(), (z + half).tanh()))
+}
+
+/// The correlation within subjects.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WithinSubjects {
+    /// The correlation.
+    pub r: f64,
+    /// N − S − 1.
+    pub df: f64,
+    /// Two-sided, by t; undefined for |r| = 1.
+    pub p: Option<f64>,
+    /// By Fisher's z with df − 1.
+    pub ci95: Option<(f64, f64)>,
+}
+
+/// Repeated-measures correlation (Bakdash & Marusich 2017): Pearson's r of the
+/// deviations from each subject's own means, with N − S − 1 degrees of freedom.
+/// `groups` has one (x, y) per subject.
+pub fn within_subjects(groups: &[(Vec<f64>, Vec<f64>)]) -> Option<WithinSubjects> {
+    let (mut dx, mut dy) = (Vec::new(), Vec::new());
+    let mut subjects = 0;
+    for (x, y) in groups.iter().filter(|(x, _)| !x.is_empty()) {
+        let (mx, my) = (mean(x)?, mean(y)?);
+        subjects += 1;
+        // Deviations of a constant are rounding, not data.
+        dx.extend(x.iter().map(|v| if constant(x) { 0.0 } else { v - mx }));
+        dy.extend(y.iter().map(|v| if constant(y) { 0.0 } else { v - my }));
+    }
+    let df = dx.len() as f64 - f64::from(subjects) - 1.0;
+    if df < 1.0 {
+        return None;
+    }
+    let r = pearson(&dx, &dy)?;
+    Some(WithinSubjects {
+        r,
+        df,
+        p: p_of_r(r, df),
+        ci95: fisher_interval(r, df - 1.0),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_correlates_perfectly_and_has_no_t() {
+        let r = pearson(&[1.0, 2.0, 3.0], &[2.0, 4.0, 6.0]).unwrap();
+        assert!((r - 1.0).abs() < 1e-15);
+        assert_eq!(p_of_r(1.0, 1.0), None);
+        assert_eq!(fisher_interval(1.0, 3.0), None);
+    }
+
+    #[test]
+    fn a_constant_column_has_no_correlation() {
+        let third = 1.0 / 3.0;
+        let nearly = [third, 1.0 - 2.0 * third, third];
+        assert_eq!(pearson(&nearly, &[1.0, 2.0, 3.0]), None);
+        assert_eq!(spearman(&nearly, &[1.0, 2.0, 3.0]), None);
+        assert_eq!(kendall(&nearly, &[1.0, 2.0, 3.0]), None);
+    }
+
+    #[test]
+    fn ties_lower_tau_b_as_kendall_has_it() {
+        // 5 concordant of 6 pairs, one tie in y: 5/√(6·5).
+        let tau = kendall(&[1.0, 2.0, 3.0, 4.0], &[1.0, 2.0, 2.0, 3.0]).unwrap();
+        assert!((tau - 5.0 / 30f64.sqrt()).abs() < 1e-15);
+    }
+}

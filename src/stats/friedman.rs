@@ -1,0 +1,197 @@
+//! Friedman's and Page's rank tests over a subjects × realizations table.
+
+use super::distribution::{chi2_upper, f_upper, normal_upper};
+use super::finite;
+use super::rank::{doubled_ranks, mid_ranks};
+use std::collections::BTreeMap;
+
+/// Friedman's test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Friedman {
+    /// Mean mid-rank of each column.
+    pub mean_ranks: Vec<f64>,
+    /// k − 1.
+    pub df: f64,
+    /// Tie-corrected statistic; undefined if every row is constant.
+    pub chi2: Option<f64>,
+    /// By χ².
+    pub p: Option<f64>,
+    /// Kendall's W = χ²/(n(k − 1)).
+    pub kendall_w: Option<f64>,
+    /// Iman & Davenport's F = (n−1)χ²/(n(k−1) − χ²), on k − 1 and (k−1)(n−1).
+    pub iman_davenport: Option<f64>,
+    /// By F.
+    pub iman_davenport_p: Option<f64>,
+    /// P(statistic ≥ observed) over all orders within rows, where it is cheap.
+    pub exact_p: Option<f64>,
+}
+
+/// Most work, in visited states, that the exact distribution may cost.
+const EXACT_WORK: usize = 2_000_000;
+
+/// χ² = (k−1) Σⱼ(Rⱼ − n(k+1)/2)² / (Σᵢⱼ rᵢⱼ² − nk(k+1)²/4), which is Friedman's
+/// with the correction for ties (Conover 1999, §5.8). `None` below two rows or
+/// columns.
+pub fn friedman(rows: &[Vec<f64>]) -> Option<Friedman> {
+    let n = rows.len();
+    let k = rows.first()?.len();
+    if n < 2 || k < 2 {
+        return None;
+    }
+    let ranks: Vec<Vec<i64>> = rows.iter().map(|r| doubled_ranks(r)).collect();
+    let sums: Vec<i64> = (0..k).map(|j| ranks.iter().map(|r| r[j]).sum()).collect();
+    let (nf, kf) = (n as f64, k as f64);
+    // In doubled ranks everything is a whole number: centre n(k+1).
+    let centre = n as i64 * (k as i64 + 1);
+    let above: i64 = sums.iter().map(|s| (s - centre) * (s - centre)).sum();
+    let below: i64 = ranks
+        .iter()
+        .flatten()
+        .map(|r| (r - (k as i64 + 1)) * (r - (k as i64 + 1)))
+        .sum();
+    let chi2 = (below > 0).then(|| (kf - 1.0) * above as f64 / below as f64);
+    let (df1, df2) = (kf - 1.0, (kf - 1.0) * (nf - 1.0));
+    let iman_davenport =
+        chi2.and_then(|c| finite((nf - 1.0) * c / (nf * (kf - 1.0) - c)).filter(|f| *f >= 0.0));
+    Some(Friedman {
+        mean_ranks: sums.iter().map(|&s| s as f64 / (2.0 * nf)).collect(),
+        df: df1,
+        chi2,
+        p: chi2.and_then(|c| chi2_upper(c, df1)),
+        kendall_w: chi2.map(|c| c / (nf * (kf - 1.0))),
+        iman_davenport,
+        iman_davenport_p: iman_davenport.and_then(|f| f_upper(f, df1, df2)),
+        exact_p: chi2.and_then(|_| exact_p(&ranks, above, centre)),
+    })
+}
+
+/// The distribution of Σ(Rⱼ − centre)² over all orders within rows, row by row.
+/// Columns are exchangeable under H₀, so a state is the sorted rank sums.
+fn exact_p(ranks: &[Vec<i64>], observed: i64, centre: i64) -> Option<f64> {
+    let k = ranks.first()?.len();
+    if k > 5 {
+        return None;
+    }
+    let mut states: BTreeMap<Vec<i64>, f64> = BTreeMap::from([(vec![0; k], 1.0)]);
+    let mut work = 0;
+    for row in ranks {
+        let arrangements = arrangements(row);
+        let share = 1.0 / arrangements.len() as f64;
+        work += states.len() * arrangements.len();
+        if work > EXACT_WORK {
+            return None;
+        }
+        let mut next = BTreeMap::new();
+        for (state, p) in &states {
+            for arrangement in &arrangements {
+                let mut sums: Vec<i64> =
+                    state.iter().zip(arrangement).map(|(a, b)| a + b).collect();
+                sums.sort_unstable();
+                *next.entry(sums).or_insert(0.0) += p * share;
+            }
+        }
+        states = next;
+    }
+    let p: f64 = states
+        .iter()
+        .filter(|(s, _)| s.iter().map(|v| (v - centre) * (v - centre)).sum::<i64>() >= observed)
+        .map(|(_, p)| p)
+        .sum();
+    Some(p.min(1.0))
+}
+
+/// The distinct orders of a row; each stands for equally many permutations.
+fn arrangements(row: &[i64]) -> Vec<Vec<i64>> {
+    let mut current = row.to_vec();
+    current.sort_unstable();
+    let mut all = vec![current.clone()];
+    // Next permutation in lexicographic order (Narayana).
+    while let Some(i) = (1..current.len())
+        .rev()
+        .find(|&i| current[i - 1] < current[i])
+    {
+        let j = (i..current.len())
+            .rev()
+            .find(|&j| current[j] > current[i - 1])
+            .unwrap_or(i);
+        current.swap(i - 1, j);
+        current[i..].reverse();
+        all.push(current.clone());
+    }
+    all
+}
+
+/// Page's trend test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Page {
+    /// Σⱼ score ⱼ × rank sum ⱼ.
+    pub l: f64,
+    /// (L − E)/√V with the permutation variance, which keeps the ties.
+    pub z: Option<f64>,
+    /// One-sided, by the normal.
+    pub p_greater: Option<f64>,
+    /// The same with Page's own variance, which knows no ties (Page 1963);
+    /// undefined where the scores are tied.
+    pub p_greater_no_tie_correction: Option<f64>,
+}
+
+/// L = Σⱼ Yⱼ Rⱼ, Y the mid-ranks of `order`; E = nk(k+1)²/4;
+/// V = Σᵢ Σⱼ(Yⱼ − Ȳ)² Σⱼ(rᵢⱼ − r̄)²/(k − 1). `None` below two rows or columns, or
+/// where all scores are equal.
+pub fn page(rows: &[Vec<f64>], order: &[f64]) -> Option<Page> {
+    let n = rows.len();
+    let k = order.len();
+    if n < 2 || k < 2 {
+        return None;
+    }
+    let (nf, kf) = (n as f64, k as f64);
+    let scores = mid_ranks(order);
+    let middle = (kf + 1.0) / 2.0;
+    let spread = |r: &[f64]| r.iter().map(|v| (v - middle) * (v - middle)).sum::<f64>();
+    let score_spread = spread(&scores);
+    if score_spread <= 0.0 {
+        return None;
+    }
+    let (mut l, mut variance) = (0.0, 0.0);
+    for row in rows {
+        let ranks = mid_ranks(row);
+        l += ranks.iter().zip(&scores).map(|(r, y)| r * y).sum::<f64>();
+        variance += score_spread * spread(&ranks) / (kf - 1.0);
+    }
+    let expected = nf * kf * (kf + 1.0) * (kf + 1.0) / 4.0;
+    let z = (variance > 0.0).then(|| (l - expected) / variance.sqrt());
+    let untied = nf * kf * kf * (kf + 1.0) * (kf + 1.0) * (kf - 1.0) / 144.0;
+    let distinct = super::rank::tie_term(order) == 0.0;
+    Some(Page {
+        l,
+        z,
+        p_greater: z.map(normal_upper),
+        p_greater_no_tie_correction: distinct.then(|| normal_upper((l - expected) / untied.sqrt())),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With k = 3 and n = 3 untied the perfect order has 6 of 216 arrangements.
+    #[test]
+    fn three_perfect_rows_of_three_have_exact_p_one_in_36() {
+        let rows = vec![vec![1.0, 2.0, 3.0]; 3];
+        let f = friedman(&rows).unwrap();
+        assert_eq!(f.chi2, Some(6.0));
+        assert!((f.exact_p.unwrap() - 6.0 / 216.0).abs() < 1e-15);
+        assert_eq!(f.kendall_w, Some(1.0));
+        // F would divide by zero.
+        assert_eq!(f.iman_davenport, None);
+    }
+
+    #[test]
+    fn constant_rows_have_ranks_and_no_statistic() {
+        let f = friedman(&vec![vec![4.0; 5]; 5]).unwrap();
+        assert_eq!(f.mean_ranks, [3.0; 5]);
+        assert_eq!((f.chi2, f.p, f.exact_p), (None, None, None));
+        let p = page(&vec![vec![4.0; 5]; 5], &[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
+        assert_eq!((p.l, p.z, p.p_greater), (225.0, None, None));
+    }
+}

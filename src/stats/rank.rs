@@ -1,0 +1,60 @@
+//! Mid-ranks and ties.
+
+use super::describe::tidy;
+
+/// Ranks from 1; numbers that are equal to 10⁻¹⁰ share the mean of their ranks.
+pub fn mid_ranks(x: &[f64]) -> Vec<f64> {
+    doubled_ranks(x).iter().map(|&r| r as f64 / 2.0).collect()
+}
+
+/// Twice the mid-ranks, which are whole numbers: sums of them are exact.
+pub fn doubled_ranks(x: &[f64]) -> Vec<i64> {
+    let tidied: Vec<f64> = x.iter().map(|&v| tidy(v)).collect();
+    let mut order: Vec<usize> = (0..x.len()).collect();
+    order.sort_by(|&a, &b| tidied[a].total_cmp(&tidied[b]));
+    let mut ranks = vec![0; x.len()];
+    let mut start = 0;
+    while start < order.len() {
+        let mut end = start + 1;
+        while end < order.len() && tidied[order[end]] == tidied[order[start]] {
+            end += 1;
+        }
+        // Ranks start+1 … end have the mean (start + 1 + end)/2.
+        for &i in &order[start..end] {
+            ranks[i] = (start + 1 + end) as i64;
+        }
+        start = end;
+    }
+    ranks
+}
+
+/// Σ(t³ − t) over the groups of equal numbers of size t.
+pub fn tie_term(x: &[f64]) -> f64 {
+    let mut ranks = doubled_ranks(x);
+    ranks.sort_unstable();
+    ranks
+        .chunk_by(|a, b| a == b)
+        .map(|group| {
+            let t = group.len() as f64;
+            t * t * t - t
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_numbers_share_their_mean_rank() {
+        assert_eq!(mid_ranks(&[3.0, 1.0, 3.0, 2.0]), [3.5, 1.0, 3.5, 2.0]);
+        assert_eq!(tie_term(&[3.0, 1.0, 3.0, 2.0]), 6.0);
+    }
+
+    #[test]
+    fn thirds_that_are_equal_on_paper_are_ties() {
+        let a = 1.0 / 3.0 + 1.0 / 3.0 + 1.0 / 3.0 + 4.0;
+        let b = 0.1 + 0.2 + 4.7;
+        assert_eq!(mid_ranks(&[a, b]), [1.5, 1.5]);
+    }
+}

@@ -1,0 +1,118 @@
+//! Walls: what `study analyze` prints, writes and refuses.
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::Path;
+
+fn study() -> Command {
+    let mut command = Command::cargo_bin("study").unwrap();
+    command.env("NO_COLOR", "1");
+    command
+}
+
+fn set(name: &str) -> String {
+    format!(
+        "{}/tests/golden/data/{name}/data.csv",
+        env!("CARGO_MANIFEST_DIR")
+    )
+}
+
+fn out(command: &mut Command) -> String {
+    let done = command.assert().success();
+    String::from_utf8(done.get_output().stdout.clone()).unwrap()
+}
+
+fn names(dir: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(dir)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn the_page_of_the_papers_design() {
+    insta::assert_snapshot!(out(study().args(["analyze", &set("sim_paper")])));
+}
+
+#[test]
+fn json_is_one_document_and_nothing_else() {
+    let dir = tempfile::tempdir().unwrap();
+    let text =
+        out(study()
+            .current_dir(dir.path())
+            .args(["analyze", &set("sim_all_equal"), "--json"]));
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(json["format"], "study-analysis/1");
+    assert!(json["values"]["corr/pearson/r"].is_null());
+    let why = json["undefined"]["corr/pearson/r"].as_str().unwrap();
+    assert_eq!(why, "all realizations have the same mean rating");
+    assert_eq!(json["values"]["desc/0.9995/mean"], 4.0);
+    assert!(
+        names(dir.path()).is_empty(),
+        "a CSV gets files only with --out"
+    );
+}
+
+#[test]
+fn tables_go_where_out_says() {
+    let dir = tempfile::tempdir().unwrap();
+    let target = dir.path().join("a/b");
+    study()
+        .args([
+            "analyze",
+            &set("sim_paper"),
+            "--out",
+            target.to_str().unwrap(),
+        ])
+        .assert()
+        .success();
+    let expected = [
+        "comments.csv",
+        "correlation.csv",
+        "descriptives.csv",
+        "excluded.csv",
+        "ratings_used.csv",
+        "values.json",
+    ];
+    assert_eq!(names(&target), expected);
+    let used = fs::read_to_string(target.join("ratings_used.csv")).unwrap();
+    assert_eq!(used.lines().count(), 151);
+    assert!(used.starts_with("subject,model,repetition,rating,vaf,included,reason\r\n"));
+}
+
+#[test]
+fn bad_input_is_one_clear_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("r.csv");
+    fs::write(
+        &path,
+        "subject,model,repetition,rating,vaf\nS1,A,1,4,0.5\nS1,B,1\n",
+    )
+    .unwrap();
+    let done = study().arg("analyze").arg(&path).assert().code(1);
+    let said = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    assert!(
+        said.ends_with("r.csv, line 3: 3 fields, but the header has 5\n"),
+        "{said}"
+    );
+    assert_eq!(said.lines().count(), 1, "{said}");
+    fs::write(
+        &path,
+        b"subject,model,repetition,rating,vaf\nS1,\xff,1,4,0.5\n",
+    )
+    .unwrap();
+    study().arg("analyze").arg(&path).assert().code(1);
+    study()
+        .arg("analyze")
+        .arg(dir.path().join("none"))
+        .assert()
+        .code(1);
+    // A folder without a study is a fault of the results.
+    study().arg("analyze").arg(dir.path()).assert().code(4);
+    study()
+        .args(["analyze", "x", "--include", "everybody"])
+        .assert()
+        .code(2);
+}
