@@ -109,7 +109,8 @@ impl StudyFolder {
             .rev()
             .chain([path.as_path()])
         {
-            if disk.list(folder).is_err() {
+            let known = disk.list(folder);
+            if known.is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound) {
                 atomic::folder(disk.as_ref(), folder)?;
             }
         }

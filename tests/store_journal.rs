@@ -1,5 +1,7 @@
 //! The journal's bytes: the format as it was shipped, and every kind of damage.
 
+#![allow(clippy::unwrap_used)]
+
 #[path = "store_support/memory.rs"]
 mod memory;
 #[path = "store_support/world.rs"]
@@ -13,7 +15,7 @@ use study::outcome::Event;
 use study::protocol::Seat;
 use study::store::disk::Disk as _;
 use study::store::line::{self, Claim, Record};
-use study::store::replay::{Segment, replay};
+use study::store::replay::{Replay, Segment, replay};
 use study::store::{DamageKind, StudyFolder};
 use world::{Kept, at, participant, real, session};
 
@@ -68,49 +70,59 @@ fn a_journal_of_version_1_is_read_as_it_was_meant() {
     assert_eq!(lines().concat(), golden, "version 1 is still written so");
 }
 
+/// What is read of damaged bytes, against the records that were written. `hit` is
+/// the line that the damage is in, `intact` what the whole bytes give.
+fn check_damage(bytes: &[u8], hit: u64, intact: &Replay, why: &str) {
+    let read = replay(&segment(bytes));
+    assert_ne!(read.damage, intact.damage, "{why}: not noticed");
+    let expected: BTreeMap<u64, &Event> =
+        intact.entries.iter().map(|e| (e.seq, &e.event)).collect();
+    for entry in &read.entries {
+        assert_eq!(Some(&&entry.event), expected.get(&entry.seq), "{why}");
+    }
+    for seq in expected.keys().filter(|seq| **seq != hit) {
+        let there = read.entries.iter().any(|e| e.seq == *seq);
+        assert!(there, "{why}: record {seq} is lost as well");
+    }
+    assert!(hit == 0 || read.claim == intact.claim, "{why}");
+}
+
 #[test]
-fn every_flipped_bit_and_every_missing_byte_is_noticed_and_costs_one_record() {
+fn every_missing_byte_is_noticed_and_costs_one_record() {
     let lines = lines();
     let whole = lines.concat();
     let intact = replay(&segment(&whole));
     assert_eq!(intact.damage, []);
-    let expected: BTreeMap<u64, &Event> =
-        intact.entries.iter().map(|e| (e.seq, &e.event)).collect();
-    let check = |bytes: &[u8], hit: usize, why: &str| {
-        let read = replay(&segment(bytes));
-        assert!(!read.damage.is_empty(), "{why}: not noticed");
-        for entry in &read.entries {
-            assert_eq!(Some(&&entry.event), expected.get(&entry.seq), "{why}");
-        }
-        for seq in expected.keys().filter(|seq| **seq != hit as u64) {
-            let there = read.entries.iter().any(|e| e.seq == *seq);
-            assert!(there, "{why}: record {seq} is lost as well");
-        }
-        assert!(hit == 0 || read.claim.is_some(), "{why}");
-    };
-    let mut checked = 0;
     let mut start = 0;
-    for (n, line) in lines.iter().enumerate() {
+    for (line, n) in lines.iter().zip(0..) {
         for byte in start..start + line.len() {
-            for bit in 0..8 {
-                let mut bytes = whole.clone();
-                bytes[byte] ^= 1 << bit;
-                check(&bytes, n, &format!("bit {bit} of byte {byte} in line {n}"));
-                checked += 1;
-            }
             let mut bytes = whole.clone();
-            let removed = bytes.remove(byte);
-            // One of two equal neighbours: the bytes are the same as without the other.
-            check(
-                &bytes,
-                n,
-                &format!("byte {byte} ({removed}) of line {n} removed"),
-            );
-            checked += 1;
+            bytes.remove(byte);
+            check_damage(&bytes, n, &intact, &format!("byte {byte}, line {n}"));
         }
         start += line.len();
     }
-    println!("{checked} kinds of damage to {} bytes", whole.len());
+}
+
+/// Each line between its neighbours: what a line does to others it does to these.
+#[test]
+fn every_flipped_bit_is_noticed_and_costs_one_record() {
+    let lines = lines();
+    for n in 0..lines.len() {
+        let first = n.saturating_sub(1);
+        let near = &lines[first..lines.len().min(n + 2)];
+        let whole = near.concat();
+        let intact = replay(&segment(&whole));
+        let start = if n == 0 { 0 } else { near[0].len() };
+        for byte in start..start + lines[n].len() {
+            for bit in 0..8 {
+                let mut bytes = whole.clone();
+                bytes[byte] ^= 1 << bit;
+                let why = format!("bit {bit} of byte {byte}, line {n}");
+                check_damage(&bytes, n as u64, &intact, &why);
+            }
+        }
+    }
 }
 
 #[test]

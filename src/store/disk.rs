@@ -57,7 +57,8 @@ pub struct Item {
     pub is_folder: bool,
 }
 
-/// A file system. No call follows a symbolic link in the last part of a path.
+/// A file system. No file is opened, made, cut or removed through a symbolic link
+/// in the last part of its path.
 ///
 /// # Errors
 /// Every method gives the error of the operating system.

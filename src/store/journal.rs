@@ -216,3 +216,17 @@ fn set_apart(disk: &dyn Disk, folder: &Path, bytes: &[u8]) -> Result<String, Sto
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::TelemetryWriter;
+
+    /// Saving has a thread of its own, so that a screen that hangs delays nothing.
+    #[test]
+    fn journal_and_telemetry_can_move_to_a_thread() {
+        fn moves<T: Send + 'static>() {}
+        moves::<Journal>();
+        moves::<TelemetryWriter>();
+    }
+}

@@ -111,6 +111,7 @@ struct Version {
 
 #[derive(Deserialize)]
 struct Head {
+    v: u32,
     seq: Option<u64>,
     prev: Option<String>,
     claim: Option<Claim>,
@@ -161,12 +162,16 @@ pub fn decode(bytes: &[u8]) -> Result<Line, BadLine> {
         return Err(BadLine::Checksum);
     }
     let content = |e: serde_json::Error| BadLine::Content(e.to_string());
-    // The version first: the rest of a newer line may have any shape.
-    let Version { v } = serde_json::from_slice(bytes).map_err(content)?;
-    if v > VERSION {
-        return Err(BadLine::Newer(v));
+    let head: Head = serde_json::from_slice(bytes).map_err(|e| {
+        // The rest of a newer line may have any shape.
+        match serde_json::from_slice(bytes) {
+            Ok(Version { v }) if v > VERSION => BadLine::Newer(v),
+            _ => content(e),
+        }
+    })?;
+    if head.v > VERSION {
+        return Err(BadLine::Newer(head.v));
     }
-    let head: Head = serde_json::from_slice(bytes).map_err(content)?;
     let missing = |what: &str| BadLine::Content(format!("{what} is missing"));
     let seq = head.seq.ok_or_else(|| missing("seq"))?;
     let prev = head.prev.ok_or_else(|| missing("prev"))?;

@@ -293,7 +293,12 @@ fn pieces(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     if starts.first() != Some(&0) {
         starts.insert(0, 0);
     }
-    let ends = starts[1..].to_vec().into_iter().chain([bytes.len()]);
+    let ends: Vec<usize> = starts
+        .iter()
+        .skip(1)
+        .copied()
+        .chain([bytes.len()])
+        .collect();
     starts
         .into_iter()
         .zip(ends)

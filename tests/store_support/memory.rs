@@ -4,7 +4,7 @@
 //! The rules are the strict ones that POSIX allows: the bytes of a file are on the
 //! medium after a sync of the file, its name after a sync of the folder, and after
 //! a failed sync the bytes in doubt are lost although a later sync says "ok".
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;

@@ -1,5 +1,5 @@
 //! A small study, for tests of the store.
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 use study::limits::{Limit, Limits};

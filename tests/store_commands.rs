@@ -1,0 +1,211 @@
+//! `study status`, `verify`, `participant` and `amend`, as commands.
+
+#![allow(clippy::unwrap_used)]
+
+#[path = "store_support/world.rs"]
+mod world;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use std::path::{Path, PathBuf};
+use study::outcome::Event;
+use study::store::{Frozen, StudyFolder};
+use world::{at, real, session};
+
+/// A study of the repository's protocol with a finished and an unfinished session.
+fn turn_signal(results: &Path) -> PathBuf {
+    let loaded = study::cli::load::load(Path::new("protocols/turn-signal")).unwrap();
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let folder = StudyFolder::open_or_create(results, &frozen, at(0)).unwrap();
+    for (id, count) in [("P01", 99), ("P02", 14)] {
+        let mut claimed = folder.claim(&real(id)).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let mut events = session(id, 1, claimed.seat);
+        if let Event::SessionStarted(start) = &mut events[0] {
+            start.fingerprints = loaded.fingerprints.clone();
+        }
+        for (event, n) in events.iter().zip(0..).take(count) {
+            journal.append(at(n), event).unwrap();
+        }
+    }
+    folder.refresh(&loaded.protocol).unwrap();
+    folder.path().to_owned()
+}
+
+fn study_command() -> Command {
+    Command::cargo_bin("study").unwrap()
+}
+
+#[test]
+fn status_tells_who_is_done_and_no_order() {
+    let results = tempfile::tempdir().unwrap();
+    turn_signal(results.path());
+    let said = study_command()
+        .arg("status")
+        .arg(results.path())
+        .assert()
+        .success();
+    let text = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    for part in [
+        "P01",
+        "done",
+        "3/3",
+        "P02",
+        "unfinished",
+        "1/3",
+        "10 planned",
+        "Next free row: 3",
+    ] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    assert!(!text.contains("lambda"), "{text}");
+}
+
+#[test]
+fn verify_is_content_until_a_bit_flips() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    study_command()
+        .arg("verify")
+        .arg(results.path())
+        .assert()
+        .success();
+    let journal = folder.join("sessions/P01/1/journal.jsonl");
+    let mut bytes = std::fs::read(&journal).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&journal, bytes).unwrap();
+    study_command()
+        .arg("verify")
+        .arg(results.path())
+        .assert()
+        .code(4)
+        .stdout(predicate::str::contains(
+            "sessions/P01/1: journal.jsonl, line",
+        ));
+}
+
+#[test]
+fn participant_sets_a_state_and_refuses_what_is_no_id() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let set = |id: &str, state: &str| {
+        let mut command = study_command();
+        command.arg("participant").arg(results.path()).arg(id);
+        command.args(["--state", state, "--reason", "test \u{1b}[2J"]);
+        command
+    };
+    set("../../x", "excluded")
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("is no participant id"));
+    set("P03", "excluded")
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("no participant `P03`"));
+    set("P02", "dropped-out")
+        .assert()
+        .success()
+        .stdout(predicate::str::contains(
+            "Row 2 goes to the next participant",
+        ));
+    set("P01", "withdrawn")
+        .arg("--erase")
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("erased"));
+    let table = std::fs::read_to_string(folder.join("participants.csv")).unwrap();
+    assert!(table.contains("P02,1,dropped-out,"), "{table}");
+    study_command()
+        .arg("status")
+        .arg(results.path())
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("\u{1b}").not());
+    study_command()
+        .arg("verify")
+        .arg(results.path())
+        .assert()
+        .success();
+}
+
+#[test]
+fn amend_keeps_the_old_version_and_refuses_other_stimuli() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let copy = tempfile::tempdir().unwrap();
+    for (name, bytes) in study::cli::load::load(Path::new("protocols/turn-signal"))
+        .unwrap()
+        .files
+    {
+        let path = copy.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
+    let file = copy.path().join("protocol.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let amend = || {
+        let mut command = study_command();
+        command.arg("amend").arg(results.path()).arg(&file);
+        command.args(["--reason", "a clearer prompt"]);
+        command
+    };
+    amend()
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("nothing differs"));
+    let prompt = "reference = \"";
+    assert!(text.contains(prompt));
+    std::fs::write(&file, text.replace(prompt, "reference = \"Please: ")).unwrap();
+    amend()
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("version 2"));
+    assert!(folder.join("protocol/1/protocol.toml").exists());
+    assert!(folder.join("protocol/2/protocol.toml").exists());
+    let design = "repetitions = 3";
+    assert!(text.contains(design));
+    std::fs::write(&file, text.replace(design, "repetitions = 4")).unwrap();
+    amend()
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("stimuli"));
+    study_command()
+        .arg("verify")
+        .arg(results.path())
+        .assert()
+        .success();
+}
+
+#[test]
+fn a_folder_that_is_none_or_of_a_newer_version_is_refused() {
+    let results = tempfile::tempdir().unwrap();
+    for command in ["status", "verify"] {
+        study_command()
+            .arg(command)
+            .arg(results.path())
+            .assert()
+            .code(4)
+            .stderr(predicate::str::contains("no results of a study"));
+    }
+    let folder = turn_signal(results.path());
+    let manifest = folder.join("study.json");
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    std::fs::write(
+        &manifest,
+        text.replace("study-results/1", "study-results/2"),
+    )
+    .unwrap();
+    for command in ["status", "verify"] {
+        study_command()
+            .arg(command)
+            .arg(results.path())
+            .assert()
+            .code(4)
+            .stderr(predicate::str::contains("newer version of study"));
+    }
+}
