@@ -56,7 +56,8 @@ pub(crate) struct Rig {
 
 pub(crate) fn start() -> Moment {
     Moment {
-        wall: DateTime::<FixedOffset>::parse_from_rfc3339("2026-03-02T09:00:00+01:00").unwrap(),
+        wall: DateTime::<FixedOffset>::parse_from_rfc3339("2026-03-02T09:00:00+01:00")
+            .expect("a date"),
         mono_ns: 1_000_000_000,
     }
 }
