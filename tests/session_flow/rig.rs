@@ -52,6 +52,7 @@ pub(crate) struct Rig {
     protocol: Arc<Protocol>,
     loads: u32,
     loaded: bool,
+    steps: u32,
 }
 
 pub(crate) fn start() -> Moment {
@@ -107,6 +108,7 @@ impl Rig {
             protocol,
             loads: 0,
             loaded: false,
+            steps: 0,
         };
         for answer in rig.carry_out(effects) {
             rig.send(answer);
@@ -383,6 +385,8 @@ impl Rig {
 
     /// Does the one thing that is to be done now.
     pub(crate) fn step(&mut self) -> &mut Self {
+        self.steps += 1;
+        assert!(self.steps < 5000, "it goes round: {:?}", self.view().screen);
         self.wait(1.0);
         match self.view().screen {
             Screen::Who { .. } => self.identify(),
