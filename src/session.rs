@@ -20,6 +20,7 @@
 //! no [`Input::DeviceLoaded`] for it may follow.
 
 mod course;
+mod failing;
 mod forms;
 mod history;
 pub mod input;

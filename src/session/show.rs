@@ -1,8 +1,8 @@
 //! What may be seen: the view of a session. Nothing here identifies a realization.
 
 use super::course::Cover;
+use super::failing::title;
 use super::phase::{Form, Phase};
-use super::trial::title;
 use super::view::{Banner, Correctable, DeviceState, Progress, Screen, StatusLine, View};
 use super::{Ending, Session};
 use crate::outcome::{Moment, Place};

@@ -1,10 +1,9 @@
-//! One attempt at a trial: prompt, load, play, stop; and how it fails.
+//! One attempt at a trial: load, play, stop, and the way to its rating.
 
-use super::phase::{LOAD_WITHIN_S, Phase, STOP_WITHIN_S, Trouble};
+use super::phase::Phase;
 use super::{Effect, Session};
 use crate::outcome::{Event, Failure, Moment, Playback};
 use crate::protocol::{DeviceKind, Trial};
-use crate::schedule;
 
 impl Session {
     /// Asks the device for the next trial: the event first, so that the journal
@@ -142,7 +141,7 @@ impl Session {
     }
 
     /// Whether the realization is mounted by a person, who may take their time.
-    fn by_hand(&self, trial: &Trial) -> bool {
+    pub(super) fn by_hand(&self, trial: &Trial) -> bool {
         let own = self.protocol.model(&trial.model).and_then(|m| m.device);
         let kind = own.or(self.claim.as_ref().map(|c| c.device_kind));
         kind == Some(DeviceKind::Manual)
@@ -227,177 +226,10 @@ impl Session {
         }
     }
 
-    fn start_pause(&mut self, at: Moment) {
+    pub(super) fn start_pause(&mut self, at: Moment) {
         self.record(Event::Paused, at);
         self.paused = Some(at);
     }
-
-    pub(super) fn device_fault(&mut self, what: &str, at: Moment) {
-        self.trouble_with(what, Failure::DeviceFault, at);
-    }
-
-    pub(super) fn device_gone(&mut self, what: &str, at: Moment) {
-        self.device_lost = true;
-        self.trouble_with(what, Failure::PlaybackLost, at);
-    }
-
-    pub(super) fn device_ready(&mut self) {
-        self.device_lost = false;
-        if self.in_form() {
-            self.trouble = None;
-        }
-    }
-
-    fn trouble_with(&mut self, what: &str, failure: Failure, at: Moment) {
-        self.out.push(Effect::Limp);
-        if !self.phase.under_way() || matches!(self.phase, Phase::End) {
-            return;
-        }
-        if self.phase.armed() {
-            return self.lose_attempt(failure, what, at);
-        }
-        self.say(format!("device: {}", self.safe(what)));
-        self.set_trouble(what, failure);
-    }
-
-    /// The attempt under way is lost through nobody's wish.
-    fn lose_attempt(&mut self, failure: Failure, what: &str, at: Moment) {
-        self.fail(failure, what, at);
-        self.go_on(at);
-        self.set_trouble(what, failure);
-    }
-
-    fn set_trouble(&mut self, what: &str, failure: Failure) {
-        self.trouble = Some(Trouble {
-            what: self.safe(what),
-            fault: failure == Failure::DeviceFault,
-        });
-    }
-
-    pub(super) fn show_trouble_again(&mut self) {
-        self.trouble = Some(Trouble {
-            what: "the device does not answer".to_owned(),
-            fault: false,
-        });
-    }
-
-    pub(super) fn device_deadlines(&mut self, at: Moment) {
-        let (since, within_s, limped, what) = match &self.phase {
-            Phase::Loading { since } => (since, LOAD_WITHIN_S, false, "the table"),
-            Phase::Ready { since } => (since, LOAD_WITHIN_S, false, "the start"),
-            Phase::Stopping { since, limped, .. } => (since, STOP_WITHIN_S, *limped, "the stop"),
-            _ => return,
-        };
-        let by_hand = |s: &Self| s.history.open.as_ref().is_some_and(|o| s.by_hand(&o.trial));
-        if at.seconds_since(since) < within_s || by_hand(self) {
-            return;
-        }
-        let pause = matches!(self.phase, Phase::Stopping { pause: true, .. });
-        self.out.push(Effect::Limp);
-        if limped {
-            self.phase = Phase::Stopped;
-        } else {
-            let what = format!("the device did not confirm {what} within {within_s} s");
-            self.lose_attempt(Failure::PlaybackLost, &what, at);
-        }
-        if pause {
-            self.start_pause(at);
-        }
-    }
-
-    pub(super) fn mark_bad(&mut self, reason: String, at: Moment) {
-        let Some((trial, attempt, number)) = self.markable() else {
-            return self.say("there is no trial to mark");
-        };
-        if let Err(why) = super::forms::check_words(&reason) {
-            return self.say(why);
-        }
-        if self.phase.armed() {
-            self.out.push(Effect::Limp);
-        }
-        let under_way = self.history.open.is_some();
-        self.fail_trial(trial, attempt, Failure::MarkedBad, &reason, at);
-        if under_way || matches!(self.phase, Phase::Reference { .. } | Phase::Form(_)) {
-            self.go_on(at);
-        }
-        self.say(format!("{number} is marked as bad"));
-    }
-
-    /// The trial that could be marked as bad now: the one under way, or else the
-    /// last finished one.
-    pub(super) fn markable(&self) -> Option<(u32, u32, String)> {
-        if let Some(open) = &self.history.open {
-            let practice = open.trial.practice;
-            let number = self.history.closed(practice) + 1;
-            return Some((open.trial.trial, open.attempt, title(practice, number)));
-        }
-        let between = matches!(
-            self.phase,
-            Phase::Reference { .. } | Phase::Break { .. } | Phase::Saving | Phase::Form(_)
-        );
-        let trial = self.history.last_done.filter(|_| between)?;
-        let (attempt, number) = self.history.done_as(trial)?;
-        (!self.history.over()).then(|| (trial, attempt, title(false, number)))
-    }
-
-    /// Closes the attempt under way as failed.
-    pub(super) fn fail(&mut self, failure: Failure, detail: &str, at: Moment) {
-        if let Some(open) = &self.history.open {
-            let (trial, attempt) = (open.trial.trial, open.attempt);
-            self.fail_trial(trial, attempt, failure, detail, at);
-        }
-    }
-
-    /// A failure that was somebody's wish puts the trial first again; any other
-    /// sends it to the end of its block, until it has failed too often.
-    fn fail_trial(
-        &mut self,
-        number: u32,
-        attempt: u32,
-        failure: Failure,
-        detail: &str,
-        at: Moment,
-    ) {
-        let Some(trial) = self.history.planned(number).cloned() else {
-            return;
-        };
-        let planned = |n: &u32| self.history.planned(*n).cloned();
-        let mut rest: Vec<Trial> = self.history.queue.iter().filter_map(planned).collect();
-        rest.retain(|t| t.trial != number);
-        let mut constraint_broken = false;
-        let mut given_up = false;
-        let queue = if !super::history::counts(failure) {
-            rest.insert(0, trial);
-            rest
-        } else if self.history.failures(number) + 1 >= self.protocol.design.max_attempts {
-            given_up = true;
-            rest
-        } else {
-            let felt = self.history.felt();
-            let again = schedule::requeue(&felt, &rest, &trial, &self.protocol.design);
-            constraint_broken = again.constraint_broken;
-            again.queue
-        };
-        let failed = Event::AttemptFailed {
-            trial: number,
-            attempt,
-            failure,
-            detail: detail.to_owned(),
-            queue: queue.iter().map(|t| t.trial).collect(),
-            constraint_broken,
-        };
-        self.record(failed, at);
-        if given_up {
-            let trial = number;
-            self.record(Event::TrialClosed { trial, attempt }, at);
-        }
-    }
-}
-
-/// "trial 7", "practice 1": as on the screen, which is not the planned number.
-pub(super) fn title(practice: bool, number: u32) -> String {
-    let what = if practice { "practice" } else { "trial" };
-    format!("{what} {number}")
 }
 
 fn is_sound(playback: &Playback) -> bool {

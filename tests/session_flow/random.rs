@@ -123,7 +123,12 @@ fn assert_unloaded(input: &Input, effects: &[Effect]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(100))]
+    #![proptest_config(ProptestConfig {
+        cases: 100,
+        max_shrink_iters: 500,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn no_order_of_events_breaks_a_wall_or_keeps_a_session_from_its_end(

@@ -35,6 +35,14 @@ fn eventful() -> Rig {
         by: Author::Experimenter,
     });
     rig.until("Form").send(Input::Pause).wait(20.0);
+    while rig.count(|e| matches!(e, Event::TrialClosed { .. })) == 0 {
+        rig.until("Playing");
+        if rig.session.playing_model() == rig.schedule().last().map(|t| &t.model) {
+            rig.send(Input::DeviceFault("broken".to_owned()));
+        } else {
+            rig.step();
+        }
+    }
     rig.finish();
     rig.assert_whole();
     rig

@@ -52,11 +52,13 @@ pub(crate) struct Rig {
     protocol: Arc<Protocol>,
     loads: u32,
     loaded: bool,
+    steps: u32,
 }
 
 pub(crate) fn start() -> Moment {
     Moment {
-        wall: DateTime::<FixedOffset>::parse_from_rfc3339("2026-03-02T09:00:00+01:00").unwrap(),
+        wall: DateTime::<FixedOffset>::parse_from_rfc3339("2026-03-02T09:00:00+01:00")
+            .expect("a date"),
         mono_ns: 1_000_000_000,
     }
 }
@@ -106,6 +108,7 @@ impl Rig {
             protocol,
             loads: 0,
             loaded: false,
+            steps: 0,
         };
         for answer in rig.carry_out(effects) {
             rig.send(answer);
@@ -382,6 +385,8 @@ impl Rig {
 
     /// Does the one thing that is to be done now.
     pub(crate) fn step(&mut self) -> &mut Self {
+        self.steps += 1;
+        assert!(self.steps < 5000, "it goes round: {:?}", self.view().screen);
         self.wait(1.0);
         match self.view().screen {
             Screen::Who { .. } => self.identify(),

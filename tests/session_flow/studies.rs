@@ -19,7 +19,7 @@ pub(crate) fn question(id: &str, kind: QuestionKind, required: bool) -> Question
 }
 
 pub(crate) fn qid(id: &str) -> QuestionId {
-    QuestionId::new(id).unwrap()
+    QuestionId::new(id).expect("an identifier")
 }
 
 pub(crate) fn rating(id: &str) -> Question {
@@ -37,9 +37,9 @@ pub(crate) fn text(id: &str) -> Question {
 
 /// Three realizations, twice each, one question with a comment.
 pub(crate) fn plain() -> Protocol {
-    let limit = |value| Limit::new(value).unwrap();
+    let limit = |value| Limit::new(value).expect("a positive number");
     let model = |id: &str, role| ModelEntry {
-        id: ModelId::new(id).unwrap(),
+        id: ModelId::new(id).expect("an identifier"),
         file: Some(format!("models/{id}.toml")),
         vaf: Some(0.918_273),
         role,
@@ -121,7 +121,7 @@ pub(crate) fn rich() -> Protocol {
         document: "Information sheet".to_owned(),
         version: "3".to_owned(),
     });
-    protocol.design.practice = vec![ModelId::new(PRACTICE).unwrap()];
+    protocol.design.practice = vec![ModelId::new(PRACTICE).expect("an identifier")];
     protocol.design.breaks = Some(Breaks {
         every: 2,
         at_least_s: 60.0,
