@@ -171,11 +171,7 @@ impl Grid {
                 }
             }
             let line = cut(line.trim_end(), width);
-            out.push_str(&if i == 0 {
-                paint.dim(line)
-            } else {
-                line.to_owned()
-            });
+            out.push_str(&if i == 0 { paint.dim(&line) } else { line });
             out.push('\n');
             if i == apart && i > 0 && i + 1 < self.rows.len() {
                 out.push('\n');
