@@ -4,8 +4,13 @@
 //! reported by a later [`Device::poll`]. Time is an argument, so the same device
 //! runs on a virtual clock. The host never closes the force loop.
 //!
-//! `virtual_device` is the simulated one, in this process.
+//! [`virtual_device`] is the simulated one, in this process; [`core`] the servo
+//! step that it shares with a firmware, [`table`] what it demands of a table,
+//! [`faults`] what it can be told to do wrong.
 
+pub mod core;
+pub mod faults;
+pub mod table;
 pub mod virtual_device;
 
 use crate::limits::Limits;
@@ -63,7 +68,7 @@ pub enum Report {
     },
     /// It has stopped and is limp.
     Stopped(Playback),
-    /// It has tripped and is limp, latched.
+    /// It has tripped and is limp, latched until the next load.
     Fault(String),
     /// It does not answer any more.
     Lost(String),
@@ -96,10 +101,11 @@ pub trait Device: Send {
     /// [`DeviceError`] if nothing is loaded.
     fn start(&mut self, at: Duration) -> Result<(), DeviceError>;
 
-    /// Stops playing; [`Report::Stopped`] follows.
+    /// Stops playing; [`Report::Stopped`] follows, unless a fault or a loss did
+    /// before.
     ///
     /// # Errors
-    /// [`DeviceError`] if it does not answer.
+    /// [`DeviceError`] if it does not answer or nothing was started.
     fn stop(&mut self, at: Duration) -> Result<(), DeviceError>;
 
     /// Zero force at once. Cannot fail: a device that does not hear it goes limp

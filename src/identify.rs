@@ -184,10 +184,9 @@ impl<'r> Training<'r> {
                 });
             }
         }
-        let [low, high] = [positive.range_mm(), negative.range_mm()]
-            .into_iter()
-            .reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])
-            .expect("an array of two is not empty");
+        let (plus, minus) = (positive.range_mm(), negative.range_mm());
+        let low = plus[0].max(minus[0]);
+        let high = plus[1].min(minus[1]);
         if low >= high {
             return Err(IdentifyError::NoOverlap(recording.name.clone()));
         }

@@ -1,1 +1,427 @@
-//! Effects of a session to device, store and operator.
+//! Effects of a session to device, store and operator; the only place with a
+//! clock.
+//!
+//! One turn of the loop: show the view, take the operator's inputs, feed the
+//! session, do what it wants, hear the device and the saver, tick. Nothing in the
+//! loop waits for the disk or the device: saving is a thread of its own
+//! ([`saver`]), the device reports when it is polled. Whatever ends the loop, an
+//! error and a panic included, the device goes limp.
+//!
+//! [`rehearsal`] turns the same loop on a virtual clock.
+
+pub mod clock;
+pub mod rehearsal;
+pub mod saver;
+
+use crate::device::{Device, Report};
+use crate::limits::Limits;
+use crate::model::Realization;
+use crate::outcome::{Event, Moment};
+use crate::protocol::fingerprint::Fingerprints;
+use crate::protocol::{DeviceKind, FileOrders, Protocol};
+use crate::session::{Effect, Ending, Input, Session, View, input::Claim};
+use crate::store::{ClaimRequest, SeatKind, StudyFolder};
+use crate::text::{ModelId, ParticipantId};
+use clock::Clock;
+use saver::{Job, Saver, Word};
+use std::collections::{BTreeMap, VecDeque};
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Longest wait for an input while nothing is expected: clocks move on screen.
+const IDLE: Duration = Duration::from_millis(100);
+/// Longest wait while the device plays: strip and strokes move.
+const PLAYING: Duration = Duration::from_millis(20);
+/// Longest wait while something is on its way to the disk.
+const SAVING: Duration = Duration::from_millis(2);
+/// How much of the telemetry the live strip shows, samples.
+const STRIP_SAMPLES: usize = 3000;
+
+/// Who operates a session: sees the view, gives inputs.
+pub trait Operator {
+    /// Shows `view` and waits at most `timeout` for inputs (possibly none).
+    ///
+    /// # Errors
+    /// [`OperatorError`] if nobody can see or type any more; the session is left
+    /// as after a quit.
+    fn next(
+        &mut self,
+        view: &View,
+        strip: Option<&Strip>,
+        timeout: Duration,
+    ) -> Result<Vec<Input>, OperatorError>;
+}
+
+/// The operator is gone, and why.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct OperatorError(pub String);
+
+/// The live strip: force over position, only shown when asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Strip {
+    /// Position in mm and commanded force in N, oldest first.
+    pub samples: Vec<(f64, f64)>,
+    /// Largest force, N: the strip's upper edge.
+    pub force_limit_n: f64,
+    /// Range of the realizations, mm.
+    pub x_range_mm: [f64; 2],
+}
+
+/// Everything that a session needs from outside.
+pub struct Setup {
+    /// The study file.
+    pub protocol: Arc<Protocol>,
+    /// Its orders, where they come from a file.
+    pub orders: Option<Arc<FileOrders>>,
+    /// Its tables, by the id in the protocol.
+    pub models: BTreeMap<ModelId, Realization>,
+    /// Its fingerprints.
+    pub fingerprints: Fingerprints,
+    /// Where outcomes go.
+    pub study: StudyFolder,
+    /// Real, pilot or simulated.
+    pub kind: SeatKind,
+    /// The rows that may be handed out.
+    pub rows: Option<RangeInclusive<u32>>,
+    /// What kind of device `device` is.
+    pub device_kind: DeviceKind,
+    /// What plays.
+    pub device: Box<dyn Device>,
+    /// Time.
+    pub clock: Box<dyn Clock>,
+    /// Whether telemetry is kept for the live strip.
+    pub live: bool,
+    /// Whether saving has a thread of its own; without one every event is on disk
+    /// before the next input, as a rehearsal on a virtual clock needs it.
+    pub threaded: bool,
+}
+
+/// A running session with its device and its folder.
+pub struct Runner {
+    setup: Setup,
+    session: Session,
+    saver: Option<Saver>,
+    saved: u64,
+    pending: u64,
+    strip: Option<Strip>,
+    ended: Option<Ending>,
+    /// Events that were recorded before a journal was there to take them.
+    early: Vec<(Moment, Event)>,
+}
+
+impl Runner {
+    /// Opens a session; nothing is claimed yet.
+    pub fn new(setup: Setup, config: crate::session::Config) -> Self {
+        let at = setup.clock.now();
+        let (session, effects) =
+            Session::new(setup.protocol.clone(), setup.orders.clone(), config, at);
+        let strip = setup.live.then(|| Strip {
+            samples: Vec::new(),
+            force_limit_n: setup.protocol.device.limits.force_n.get(),
+            x_range_mm: x_range(&setup.models),
+        });
+        let mut runner = Self {
+            setup,
+            session,
+            saver: None,
+            saved: 0,
+            pending: 0,
+            strip,
+            ended: None,
+            early: Vec::new(),
+        };
+        runner.device_limp();
+        runner.perform(effects);
+        runner
+    }
+
+    /// Runs to the end with an operator.
+    pub fn run(&mut self, operator: &mut dyn Operator) -> Ending {
+        loop {
+            let view = self.view();
+            let timeout = if self.pending > 0 {
+                SAVING
+            } else if view.armed {
+                PLAYING
+            } else {
+                IDLE
+            };
+            let inputs = operator
+                .next(&view, self.strip.as_ref(), timeout)
+                .unwrap_or_else(|gone| vec![Input::Abort(gone.0)]);
+            if let Some(ending) = self.step(inputs) {
+                return ending;
+            }
+        }
+    }
+
+    /// One turn: feeds the inputs, hears device and saver, ticks. `Some` when the
+    /// session is over.
+    pub fn step(&mut self, inputs: Vec<Input>) -> Option<Ending> {
+        for input in inputs {
+            self.feed(input);
+        }
+        self.hear_device();
+        self.hear_saver();
+        self.feed(Input::Tick);
+        if self.ended.is_some() {
+            self.close();
+        }
+        self.ended.clone()
+    }
+
+    /// What may be seen now.
+    pub fn view(&self) -> View {
+        self.session.view(self.setup.clock.now())
+    }
+
+    /// The realization that plays or was just felt: for a simulated rater, never
+    /// for a screen.
+    pub fn felt(&self) -> Option<&ModelId> {
+        self.session.playing_model()
+    }
+
+    /// The study's folder.
+    pub fn study(&self) -> &StudyFolder {
+        &self.setup.study
+    }
+
+    fn feed(&mut self, input: Input) {
+        if self.ended.is_some() {
+            return;
+        }
+        let effects = self.session.handle(input, self.setup.clock.now());
+        self.perform(effects);
+    }
+
+    fn perform(&mut self, effects: Vec<Effect>) {
+        let mut queue: VecDeque<Effect> = effects.into();
+        while let Some(effect) = queue.pop_front() {
+            let answer = self.perform_one(effect);
+            // What the session says to the answer comes before what is left of
+            // its earlier wishes only if those are about something else; the
+            // session never relies on it.
+            if let Some(input) = answer {
+                let more = self.session.handle(input, self.setup.clock.now());
+                queue.extend(more);
+            }
+        }
+    }
+
+    /// Does one thing; gives the input that tells the session at once how it went.
+    fn perform_one(&mut self, effect: Effect) -> Option<Input> {
+        match effect {
+            Effect::Claim {
+                participant,
+                operator: _,
+            } => Some(self.claim(participant)),
+            Effect::Record(event) => {
+                self.record(event);
+                None
+            }
+            Effect::Load {
+                trial,
+                attempt,
+                model,
+            } => self.load(trial, attempt, &model),
+            Effect::Start => {
+                let at = self.device_time();
+                let started = self.setup.device.start(at);
+                started.err().map(|e| Input::DeviceFault(e.to_string()))
+            }
+            Effect::Stop => {
+                let at = self.device_time();
+                let stopped = self.setup.device.stop(at);
+                stopped.err().map(|e| Input::DeviceLost(e.to_string()))
+            }
+            Effect::Limp => {
+                self.device_limp();
+                self.send(Job::TelemetryEnd);
+                None
+            }
+            Effect::RetrySave => {
+                self.send(Job::Retry);
+                None
+            }
+            Effect::End(ending) => {
+                self.device_limp();
+                self.ended = Some(ending);
+                None
+            }
+        }
+    }
+
+    fn claim(&mut self, participant: ParticipantId) -> Input {
+        let request = ClaimRequest {
+            participant: participant.clone(),
+            kind: self.setup.kind,
+            rows: self.setup.rows.clone(),
+        };
+        let claimed = self.setup.study.claim(&request);
+        let opened = claimed.and_then(|mut claimed| {
+            let journal = claimed.folder.journal()?;
+            Ok((claimed, journal))
+        });
+        match opened {
+            Err(error) => Input::ClaimRefused(error.to_string()),
+            Ok((claimed, journal)) => {
+                let mut saver = Saver::new(claimed.folder, journal, self.setup.threaded);
+                for (at, event) in self.early.drain(..) {
+                    saver.send(Job::Append(at, event));
+                }
+                self.saver = Some(saver);
+                let identity = self.setup.device.identity();
+                Input::Claimed(Box::new(Claim {
+                    participant,
+                    session: claimed.session,
+                    seat: claimed.seat,
+                    entries: claimed.entries,
+                    protocol_version: claimed.protocol_version,
+                    fingerprints: self.setup.fingerprints.clone(),
+                    device_kind: self.setup.device_kind,
+                    device_id: identity.id,
+                    device_telemetry: identity.telemetry,
+                    notices: claimed.notices,
+                }))
+            }
+        }
+    }
+
+    fn record(&mut self, event: Event) {
+        let at = self.setup.clock.now();
+        self.pending += 1;
+        if self.saver.is_none() {
+            self.early.push((at, event));
+            return;
+        }
+        self.send(Job::Append(at, event));
+    }
+
+    fn load(&mut self, trial: u32, attempt: u32, model: &ModelId) -> Option<Input> {
+        let Some(realization) = self.setup.models.get(model) else {
+            return Some(Input::DeviceFault(
+                "the realization has no table for this device".to_owned(),
+            ));
+        };
+        let limits = playback_limits(&self.setup.protocol, realization);
+        if let Some(strip) = &mut self.strip {
+            strip.samples.clear();
+        }
+        let at = self.device_time();
+        match self.setup.device.load(realization, limits, at) {
+            Ok(()) => {
+                self.send(Job::TelemetryBegin { trial, attempt });
+                None
+            }
+            Err(error) => Some(Input::DeviceFault(error.to_string())),
+        }
+    }
+
+    fn hear_device(&mut self) {
+        let at = self.device_time();
+        for report in self.setup.device.poll(at) {
+            let input = match report {
+                Report::Loaded => Input::DeviceLoaded,
+                Report::Started => Input::DeviceStarted,
+                Report::Telemetry(samples) => {
+                    if let Some(strip) = &mut self.strip {
+                        let new = samples.iter().map(|s| (s.x_mm, s.force_command_n));
+                        strip.samples.extend(new);
+                        let excess = strip.samples.len().saturating_sub(STRIP_SAMPLES);
+                        strip.samples.drain(..excess);
+                    }
+                    self.send(Job::Telemetry(samples));
+                    continue;
+                }
+                Report::Progress { strokes, clamps } => Input::DeviceProgress { strokes, clamps },
+                Report::Stopped(playback) => {
+                    self.send(Job::TelemetryEnd);
+                    Input::DeviceStopped(playback)
+                }
+                Report::Fault(what) => {
+                    self.send(Job::TelemetryEnd);
+                    Input::DeviceFault(what)
+                }
+                Report::Lost(what) => {
+                    self.send(Job::TelemetryEnd);
+                    Input::DeviceLost(what)
+                }
+                Report::Ready => Input::DeviceReady,
+            };
+            self.feed(input);
+        }
+    }
+
+    fn hear_saver(&mut self) {
+        let words = self.saver.as_mut().map(Saver::words).unwrap_or_default();
+        for word in words {
+            let input = match word {
+                Word::Saved => {
+                    self.saved += 1;
+                    self.pending = self.pending.saturating_sub(1);
+                    Input::Saved { count: self.saved }
+                }
+                Word::Failed(why) => Input::SaveFailed(why),
+            };
+            self.feed(input);
+        }
+    }
+
+    fn send(&mut self, job: Job) {
+        if let Some(saver) = &mut self.saver {
+            saver.send(job);
+        }
+    }
+
+    fn close(&mut self) {
+        self.device_limp();
+        if let Some(saver) = self.saver.take() {
+            saver.finish();
+        }
+    }
+
+    fn device_time(&self) -> Duration {
+        Duration::from_nanos(self.setup.clock.now().mono_ns)
+    }
+
+    fn device_limp(&mut self) {
+        let at = self.device_time();
+        self.setup.device.limp(at);
+    }
+}
+
+impl Drop for Runner {
+    /// Also runs while a panic unwinds: no path out of a session leaves force on.
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// The limits for a table: the protocol's, and under its `uncertified` permission
+/// the lower force of that for a table with negative mass or damping, which can
+/// put energy into the hand.
+fn playback_limits(protocol: &Protocol, realization: &Realization) -> Limits {
+    let mut limits = protocol.device.limits;
+    let branches = [&realization.positive, &realization.negative];
+    let active = branches
+        .iter()
+        .flat_map(|b| b.m_kg.iter().chain(&b.b_n_s_per_mm))
+        .any(|value| *value < 0.0);
+    if let (true, Some(uncertified)) = (active, &protocol.device.uncertified) {
+        limits.force_n = limits.force_n.capped_at(uncertified.force_n);
+    }
+    limits
+}
+
+/// The range that all tables span together, mm.
+fn x_range(models: &BTreeMap<ModelId, Realization>) -> [f64; 2] {
+    let ends = models
+        .values()
+        .filter_map(|m| Some((*m.x_mm.first()?, *m.x_mm.last()?)));
+    let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (x, y)| {
+        (a.min(x), b.max(y))
+    });
+    if low < high { [low, high] } else { [0.0, 35.0] }
+}

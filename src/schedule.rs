@@ -330,7 +330,7 @@ impl Planner {
                     .collect()
             }
             Source::Fixed => (0..repetitions).flat_map(|_| 0..n).collect(),
-            Source::File(file) => self.from_file(file, seat)?,
+            Source::File(file) => self.row_of(file, seat)?,
         })
     }
 
@@ -338,7 +338,7 @@ impl Planner {
     ///
     /// A pilot or simulated participant takes the rows of the file in turn, from
     /// the first again after the last.
-    fn from_file(&self, file: &FileOrders, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
+    fn row_of(&self, file: &FileOrders, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
         let row = match seat {
             Seat::Row(row) => row,
             Seat::Pilot(number) | Seat::Simulated(number) => {

@@ -1,1 +1,194 @@
 //! An operator on a terminal.
+//!
+//! [`Tui`] shows a session's [`View`] and turns keys, clicks and pasted text into
+//! its [`Input`]s. It knows neither device nor store, decides nothing about the
+//! study, and shows nothing that is not in the view or was typed here. It is two
+//! halves: the [`Surface`], which is pure and holds everything that is shown and
+//! typed, and the terminal, which is taken at [`Tui::open`] and given back on
+//! every way out: drop, panic in any thread, a signal, Ctrl-Z, a terminal that
+//! has gone away.
+//!
+//! Text of others (protocol, comments, the device's words) passes through
+//! [`crate::text::Untrusted`] in [`wrap`] before it reaches a cell.
+
+pub mod draft;
+pub mod editor;
+pub mod keys;
+pub mod surface;
+mod terminal;
+pub mod theme;
+pub mod views;
+pub mod widgets;
+pub mod wrap;
+
+pub use surface::Surface;
+pub use theme::Colour;
+
+use crate::runner::{Operator, OperatorError, Strip};
+use crate::session::{Input, Screen, View};
+use crossterm::event::{Event, MouseEventKind};
+use std::time::{Duration, Instant};
+use terminal::Terminal;
+
+/// How a terminal is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Whether clicks choose. The terminal's own marking of text then needs
+    /// Shift.
+    pub mouse: bool,
+    /// Whether the live strip is drawn when there is one.
+    pub live: bool,
+    /// Its colours.
+    pub colour: Colour,
+}
+
+/// Why there is no session on this terminal.
+#[derive(Debug, thiserror::Error)]
+pub enum TuiError {
+    /// Input or output is a file or a pipe.
+    #[error("a session needs a terminal, and input or output is none")]
+    NoTerminal,
+    /// It can show nothing at a place.
+    #[error("the terminal (TERM={0:?}) cannot show a page")]
+    DumbTerminal(String),
+    /// It cannot be used.
+    #[error("the terminal cannot be used: {0}")]
+    Terminal(#[source] std::io::Error),
+}
+
+impl TuiError {
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::NoTerminal => {
+                "start it in a terminal window, without pipes; `study rehearse` needs none"
+            }
+            Self::DumbTerminal(_) => {
+                "use a terminal such as xterm, or set TERM to what it really is; \
+                 `study rehearse` needs none"
+            }
+            Self::Terminal(_) => "try another terminal window",
+        }
+    }
+}
+
+/// How often the terminal is looked after while nothing happens.
+const SLICE: Duration = Duration::from_millis(50);
+/// How long Ctrl-Z waits for the device to stop before the program stops.
+const SUSPEND_WAIT: Duration = Duration::from_secs(2);
+
+/// An operator on a terminal.
+pub struct Tui {
+    terminal: Terminal,
+    surface: Surface,
+    live: bool,
+    drawn: Option<(View, Option<Strip>)>,
+    suspend_since: Option<Instant>,
+}
+
+impl Tui {
+    /// Takes the terminal.
+    ///
+    /// # Errors
+    /// [`TuiError`] if there is none or it cannot be used.
+    pub fn open(options: Options) -> Result<Self, TuiError> {
+        Ok(Self {
+            terminal: Terminal::open(options.mouse)?,
+            surface: Surface::new(options.colour),
+            live: options.live,
+            drawn: None,
+            suspend_since: None,
+        })
+    }
+
+    /// Draws, if something that is shown has changed.
+    fn draw(&mut self, view: &View, strip: Option<&Strip>) -> Result<(), OperatorError> {
+        let now = (as_shown(view), strip.cloned());
+        if self.drawn.as_ref() == Some(&now) {
+            return Ok(());
+        }
+        let surface = &mut self.surface;
+        let drawn = self.terminal.screen().draw(|frame| {
+            let area = frame.area();
+            surface.follow(view, area);
+            if let Some(at) = surface.draw(view, strip, area, frame.buffer_mut()) {
+                frame.set_cursor_position(at);
+            }
+        });
+        drawn.map_err(|e| OperatorError(format!("the terminal cannot be written: {e}")))?;
+        self.drawn = Some(now);
+        Ok(())
+    }
+
+    /// Goes to the background once the device has stopped.
+    fn suspend_if_asked(&mut self, view: &View) -> Result<(), OperatorError> {
+        if self.surface.take_suspend() {
+            self.suspend_since = Some(Instant::now());
+        }
+        let Some(since) = self.suspend_since else {
+            return Ok(());
+        };
+        if view.armed && since.elapsed() < SUSPEND_WAIT {
+            return Ok(());
+        }
+        self.suspend_since = None;
+        self.drawn = None;
+        self.terminal.suspend().map_err(OperatorError)
+    }
+}
+
+impl Operator for Tui {
+    fn next(
+        &mut self,
+        view: &View,
+        strip: Option<&Strip>,
+        timeout: Duration,
+    ) -> Result<Vec<Input>, OperatorError> {
+        let strip = strip.filter(|_| self.live);
+        let until = Instant::now() + timeout;
+        self.suspend_if_asked(view)?;
+        loop {
+            if let Some(signal) = self.terminal.take_signal() {
+                return Ok(vec![Input::Abort(format!("the program got {signal}"))]);
+            }
+            if self.terminal.check().map_err(OperatorError)? {
+                self.drawn = None;
+            }
+            self.draw(view, strip)?;
+            let left = until.saturating_duration_since(Instant::now());
+            match self
+                .terminal
+                .event(left.min(SLICE))
+                .map_err(OperatorError)?
+            {
+                Some(Event::Mouse(mouse)) if mouse.kind == MouseEventKind::Moved => {}
+                Some(event) => {
+                    self.drawn = None;
+                    let inputs = self.surface.event(&event, view);
+                    if !inputs.is_empty() {
+                        return Ok(inputs);
+                    }
+                }
+                None if left.is_zero() => return Ok(Vec::new()),
+                None => {}
+            }
+        }
+    }
+}
+
+/// The view with its times as coarse as they are drawn, so that equal pictures
+/// are not drawn again.
+fn as_shown(view: &View) -> View {
+    let mut view = view.clone();
+    view.line.elapsed_s = view.line.elapsed_s.floor();
+    match &mut view.screen {
+        Screen::Playing { since_s, .. } | Screen::Paused { since_s } => {
+            *since_s = since_s.floor();
+        }
+        Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => {
+            *wait_s = wait_s.ceil();
+        }
+        _ => {}
+    }
+    view
+}

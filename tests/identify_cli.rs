@@ -1,5 +1,7 @@
 //! `study identify` as somebody types it.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
 use assert_cmd::Command;
 use predicates::prelude::*;
 use serde_json::Value;

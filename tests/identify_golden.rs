@@ -5,6 +5,8 @@
 //! last one and a twentieth of that, because one (0.015941852, printed .0159418)
 //! was rounded twice.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! What has to hold of identification whatever the numbers are.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
 use std::fmt::Write as _;
 use study::identify::grid::{self, Plan};
 use study::identify::resample::Resample;

@@ -2,6 +2,8 @@
 //! recordings in tests/data, to the last byte; and a file of this format's first
 //! day still reads as it did.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufReader;

@@ -16,7 +16,7 @@ use study::schedule::plan;
 fn order(protocol: &Protocol, seat: Seat) -> String {
     let mut text = String::new();
     let mut block = 1;
-    for trial in plan(protocol, None, seat).unwrap() {
+    for trial in plan(protocol, None, seat).expect("the design is feasible") {
         if trial.block != block {
             text.push(' ');
             block = trial.block;

@@ -10,8 +10,13 @@ use study::protocol::Order::{Blocked, Fixed, LatinSquare, Shuffled, Williams};
 use study::protocol::{Order, Seat};
 use study::schedule::Planner;
 
-/// models, repetitions, order, max_run, min_distance, numbers up to
-const DESIGNS: [(usize, u32, Order, Option<u32>, Option<u32>, u32); 19] = [
+/// Models, repetitions, order, `max_run`, `min_distance`, numbers up to.
+type Case = (usize, u32, Order, Option<u32>, Option<u32>, u32);
+
+/// Makes a seat of a number.
+type Kind = fn(u32) -> Seat;
+
+const DESIGNS: [Case; 19] = [
     (5, 3, Blocked, None, None, 5),
     (5, 3, Blocked, Some(1), None, 5),
     (5, 3, Blocked, Some(2), None, 5),
@@ -44,7 +49,8 @@ fn a_script_written_from_the_document_makes_the_same_orders() {
         let protocol = constrained(models, repetitions, order.clone(), max_run, min_distance);
         let planner = Planner::new(&protocol, None).unwrap();
         let ids: Vec<_> = planner.models().iter().map(ToString::to_string).collect();
-        for kind in [Seat::Row, Seat::Pilot, Seat::Simulated] {
+        let kinds: [(Kind, u32); 3] = [(Seat::Row, last), (Seat::Pilot, 1), (Seat::Simulated, 1)];
+        for (kind, last) in kinds {
             let mut ours = String::from("kind,number,position,model\n");
             for number in 1..=last {
                 for trial in planner.plan(kind(number)).unwrap() {

@@ -29,6 +29,24 @@ impl std::fmt::Debug for Console {
     }
 }
 
+/// A progress bar on standard error, only on a terminal and only for work that
+/// takes over a second.
+pub(super) fn progress(length: u64, unit: &'static str) -> indicatif::ProgressBar {
+    if !io::stderr().is_terminal() {
+        return indicatif::ProgressBar::hidden();
+    }
+    let bar = indicatif::ProgressBar::with_draw_target(
+        Some(length),
+        indicatif::ProgressDrawTarget::stderr_with_hz(5),
+    );
+    let template = "{bar:40} {pos} of {len} {msg} · {eta} left";
+    if let Ok(style) = indicatif::ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.set_message(unit);
+    bar
+}
+
 impl Console {
     /// The process's own.
     pub fn of_process() -> Self {

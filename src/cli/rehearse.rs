@@ -1,12 +1,155 @@
-//! `study rehearse`
+//! `study rehearse`: a whole study with simulated participants.
 
-use super::{Console, Failure};
+use super::{Console, Failure, Kind, load};
+use crate::device::faults::FaultPlan;
+use crate::device::virtual_device::{Options, VirtualDevice};
+use crate::outcome::{State, Status};
+use crate::protocol::{DeviceKind, Seat};
+use crate::rater::{Effect, Impression, Rater};
+use crate::runner::Setup;
+use crate::runner::clock::{Clock as _, VirtualClock};
+use crate::runner::rehearsal::{first_day, run_one};
+use crate::store::{Frozen, SeatKind, StudyFolder};
+use crate::text::ModelId;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// How likely a playback meets a fault with `--faults`.
+const FAULT_PROBABILITY: f64 = 0.08;
 
 /// Arguments of `study rehearse`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+pub(super) struct Args {
+    /// A protocol.toml or the folder that holds one
+    protocol: PathBuf,
+    /// How many simulated participants
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=9999))]
+    participants: u32,
+    /// Seed of the raters; the orders always follow the protocol's own
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "rehearsal")]
+    out: PathBuf,
+    /// Let the device fail now and then
+    #[arg(long)]
+    faults: bool,
+    /// Whether ratings depend on the realization
+    #[arg(long, value_enum, default_value_t = EffectArg::BuiltIn)]
+    effect: EffectArg,
+    /// Telemetry samples a second
+    #[arg(long, value_name = "HZ", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=4000))]
+    telemetry: u32,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum EffectArg {
+    /// Realizations nearer to the target and less active are rated higher
+    BuiltIn,
+    /// A study in which there is nothing to find
+    None,
+}
 
 /// Does it.
-pub(super) fn run(_args: &Args, _console: &mut Console) -> Result<(), Failure> {
-    Err(Failure::input("not built yet"))
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let loaded = load::load(&args.protocol)?;
+    let clock = VirtualClock::starting_at(first_day());
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let study = StudyFolder::open_or_create(&args.out, &frozen, clock.now())?;
+    let folder = study.path().to_owned();
+    refuse_occupied(&study, &folder)?;
+
+    let impressions: BTreeMap<ModelId, Impression> = loaded
+        .models
+        .iter()
+        .map(|(id, realization)| (id.clone(), Impression::of(realization)))
+        .collect();
+    let effect = match args.effect {
+        EffectArg::BuiltIn => Effect::BuiltIn,
+        EffectArg::None => Effect::None,
+    };
+    let seed = args.seed.unwrap_or(loaded.protocol.study.seed);
+    let protocol = Arc::new(loaded.protocol);
+    let orders = loaded.orders.map(Arc::new);
+    let mut study = Some(study);
+    let progress = super::console::progress(u64::from(args.participants), "participants");
+    for number in 1..=args.participants {
+        let clock =
+            VirtualClock::starting_at(first_day() + chrono::Days::new(u64::from(number - 1)));
+        let device_seed = seed.wrapping_add(u64::from(number) << 32);
+        let options = Options {
+            seed: device_seed,
+            telemetry_hz: f64::from(args.telemetry),
+            faults: if args.faults {
+                FaultPlan::random(device_seed, FAULT_PROBABILITY)
+            } else {
+                FaultPlan::none()
+            },
+            ..Options::default()
+        };
+        let here = match study.take() {
+            Some(first) => first,
+            None => StudyFolder::open(&folder)?,
+        };
+        let setup = Setup {
+            protocol: protocol.clone(),
+            orders: orders.clone(),
+            models: loaded.models.clone(),
+            fingerprints: loaded.fingerprints.clone(),
+            study: here,
+            kind: SeatKind::Simulated,
+            rows: None,
+            device_kind: DeviceKind::Simulated,
+            device: Box::new(VirtualDevice::new(options)),
+            clock: Box::new(clock.clone()),
+            live: false,
+            threaded: false,
+        };
+        let mut rater = Rater::new(seed, number, effect);
+        let id = format!("SIM{number:03}");
+        run_one(setup, &id, &clock, &mut rater, &impressions)
+            .map_err(|e| Failure::new(Kind::Results, e))?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    let study = StudyFolder::open(&folder)?;
+    let derived = study.refresh(&protocol)?;
+    let done = derived
+        .participants
+        .iter()
+        .filter(|p| p.state == State::Done)
+        .count();
+    let rated = derived
+        .rows
+        .iter()
+        .filter(|row| !row.practice && row.status == Status::Ok)
+        .count();
+    let shown = folder.display();
+    console.out(format!(
+        "{done} simulated participants, {rated} rated trials in {shown}.\nSimulated: their liking is built in (docs/simulation.md) and is no evidence of anything.\nNext: study analyze {shown}\n"
+    ))
+}
+
+/// A rehearsal never mixes with anything that is there already.
+fn refuse_occupied(study: &StudyFolder, folder: &Path) -> Result<(), Failure> {
+    let sessions = study.sessions()?;
+    if sessions.is_empty() {
+        return Ok(());
+    }
+    let simulated = sessions
+        .iter()
+        .filter(|s| s.seat.is_some_and(Seat::is_simulated))
+        .count();
+    let what = if simulated == sessions.len() {
+        format!("already holds {simulated} rehearsed sessions")
+    } else {
+        "holds sessions with people".to_owned()
+    };
+    Err(Failure::results(format!("{} {what}", folder.display()))
+        .hint("name another folder with --out"))
 }

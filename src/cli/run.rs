@@ -1,12 +1,157 @@
-//! `study run`
+//! `study run`: the session, in the terminal.
 
-use super::{Console, Failure};
+use super::{Console, Failure, Kind, load};
+use crate::device::Device;
+use crate::device::virtual_device::{Options, VirtualDevice};
+use crate::protocol::DeviceKind;
+use crate::runner::clock::{Clock as _, RealClock};
+use crate::runner::{Runner, Setup};
+use crate::session::{Config, Ending};
+use crate::store::{Frozen, SeatKind, StudyFolder};
+use crate::tui::{self, Tui};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Arguments of `study run`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+pub(super) struct Args {
+    /// A protocol.toml or the folder that holds one
+    protocol: PathBuf,
+    /// Participant's pseudonym; asked on the first screen if left out
+    #[arg(long, value_name = "ID")]
+    participant: Option<String>,
+    /// Operator's initials or code; asked on the first screen if left out
+    #[arg(long, value_name = "NAME")]
+    operator: Option<String>,
+    /// Play on another kind of device than the protocol's: makes it a pilot
+    #[arg(long, value_name = "KIND", value_parser = device_kind)]
+    device: Option<DeviceKind>,
+    /// Serial port of the device
+    #[arg(long, value_name = "PATH")]
+    port: Option<String>,
+    /// Try the study out: kept apart from real data, takes no row
+    #[arg(long)]
+    pilot: bool,
+    /// Rows that may be handed out, such as 1-40: give each of two rigs its own
+    #[arg(long, value_name = "A-B", value_parser = super::schedule::parse_rows)]
+    rows: Option<std::ops::RangeInclusive<u32>>,
+    /// Folder that holds the results of all studies
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    results: PathBuf,
+    /// Show the live strip of force and position
+    #[arg(long)]
+    live: bool,
+    /// Leave the mouse to the terminal
+    #[arg(long)]
+    no_mouse: bool,
+}
+
+fn device_kind(given: &str) -> Result<DeviceKind, String> {
+    [
+        DeviceKind::Simulated,
+        DeviceKind::Serial,
+        DeviceKind::Process,
+        DeviceKind::Manual,
+    ]
+    .into_iter()
+    .find(|kind| kind.as_str() == given)
+    .ok_or_else(|| "it is one of simulated, serial, process, manual".to_owned())
+}
 
 /// Does it.
-pub(super) fn run(_args: &Args, _console: &mut Console) -> Result<(), Failure> {
-    Err(Failure::input("not built yet"))
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let loaded = load::load(&args.protocol)?;
+    console.findings(&loaded.findings);
+    let kind = args.device.unwrap_or(loaded.protocol.device.kind);
+    if kind != DeviceKind::Simulated {
+        return Err(Failure::new(
+            Kind::Device,
+            format!(
+                "this version plays on the simulated device only, and the study wants a {} one",
+                kind.as_str()
+            ),
+        )
+        .hint("`--device simulated` tries the study out as a pilot"));
+    }
+    if let Some(port) = &args.port {
+        return Err(Failure::new(
+            Kind::Usage,
+            format!("--port {port} makes no sense with the simulated device"),
+        ));
+    }
+    // A person on the simulated device feels nothing: that is never real data.
+    let seats = SeatKind::Pilot;
+    let clock = RealClock::default();
+    let at = clock.now();
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    // The terminal first: without one, nothing is created.
+    let mut tui = Tui::open(tui::Options {
+        mouse: !args.no_mouse,
+        live: args.live,
+        colour: tui::Colour::detect(|name| std::env::var(name).ok()),
+    })
+    .map_err(|e| Failure::new(Kind::Usage, &e).hint(e.hint()))?;
+    let study = StudyFolder::open_or_create(&args.results, &frozen, at)?;
+    let folder = study.path().to_owned();
+    let device: Box<dyn Device> = Box::new(VirtualDevice::new(Options {
+        seed: loaded.protocol.study.seed,
+        ..Options::default()
+    }));
+    let protocol = Arc::new(loaded.protocol);
+    let setup = Setup {
+        protocol: protocol.clone(),
+        orders: loaded.orders.map(Arc::new),
+        models: loaded.models,
+        fingerprints: loaded.fingerprints,
+        study,
+        kind: seats,
+        rows: args.rows.clone(),
+        device_kind: kind,
+        device,
+        clock: Box::new(clock),
+        live: args.live,
+        threaded: true,
+    };
+    let config = Config {
+        participant: args.participant.clone().unwrap_or_default(),
+        operator: args.operator.clone().unwrap_or_default(),
+        auto_identify: false,
+    };
+    let mut runner = Runner::new(setup, config);
+    let ending = runner.run(&mut tui);
+    drop(runner);
+    drop(tui);
+    finish(console, &folder, &protocol, &ending, args)
+}
+
+/// Writes the derived tables and says what comes next.
+fn finish(
+    console: &mut Console,
+    folder: &std::path::Path,
+    protocol: &crate::protocol::Protocol,
+    ending: &Ending,
+    args: &Args,
+) -> Result<(), Failure> {
+    if *ending != Ending::Nothing {
+        let study = StudyFolder::open(folder)?;
+        study.refresh(protocol)?;
+    }
+    let shown = folder.display();
+    match ending {
+        Ending::Finished => console.out(format!(
+            "The session is finished and saved in {shown}.\nNext: study status {shown} · study analyze {shown}\n"
+        )),
+        Ending::Interrupted => console.out(format!(
+            "The session is not finished; everything answered is saved in {shown}.\nIt goes on with: study run {}\n",
+            args.protocol.display()
+        )),
+        Ending::DroppedOut => console.out(format!(
+            "The participant has left the study; what was given is kept in {shown}.\n"
+        )),
+        Ending::Nothing => console.out("Nothing was recorded.\n"),
+    }
 }

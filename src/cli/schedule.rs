@@ -1,12 +1,283 @@
-//! `study schedule`
+//! `study schedule`: the reproducible orders of a protocol, and their balance.
 
-use super::{Console, Failure};
+mod table;
+
+use super::{Console, Failure, Kind};
+use crate::protocol::{FileOrders, Protocol, Seat, Trial};
+use crate::schedule::{Planner, ScheduleError};
+use crate::text::Untrusted;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+/// More rows than this at once are taken for a slip of the finger.
+const MAX_ROWS: u32 = 100_000;
+
+/// Rows of CSV that are written at once.
+const CHUNK: usize = 1000;
 
 /// Arguments of `study schedule`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+pub(super) struct Args {
+    /// A protocol.toml or the folder that holds one
+    protocol: PathBuf,
+    /// Rows to show, such as 7 or 1-40 [default: all planned participants]
+    #[arg(long, value_name = "RANGE", value_parser = parse_rows)]
+    rows: Option<RangeInclusive<u32>>,
+    /// Print row,trial,block,position,model,repetition,practice as CSV
+    #[arg(long)]
+    csv: bool,
+    /// Where results are; the orders of a started study are not shown
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    results: PathBuf,
+}
 
 /// Does it.
-pub(super) fn run(_args: &Args, _console: &mut Console) -> Result<(), Failure> {
-    Err(Failure::input("not built yet"))
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let loaded = super::load::load(&args.protocol)?;
+    let protocol = &loaded.protocol;
+    if started(&args.results, protocol) {
+        return Err(Failure::results(format!(
+            "`{}` has started in {}: an order that is seen could steer a session",
+            Untrusted(&protocol.study.id),
+            args.results.display()
+        ))
+        .hint("`study status` shows who is done and which row is next, without any order"));
+    }
+    let rows = args
+        .rows
+        .clone()
+        .unwrap_or(1..=protocol.design.participants.max(1));
+    show(protocol, loaded.orders.as_ref(), rows, args.csv, console)
+}
+
+/// Whether the study has a results folder, so that its orders are of people who
+/// take part.
+fn started(results: &Path, protocol: &Protocol) -> bool {
+    results.join(&protocol.study.id).join("study.json").exists()
+}
+
+/// Prints the orders of some rows.
+fn show(
+    protocol: &Protocol,
+    orders: Option<&FileOrders>,
+    rows: RangeInclusive<u32>,
+    as_csv: bool,
+    console: &mut Console,
+) -> Result<(), Failure> {
+    if rows.end() - rows.start() >= MAX_ROWS {
+        return Err(Failure::new(
+            Kind::Usage,
+            format!("at most {MAX_ROWS} rows can be shown at once"),
+        ));
+    }
+    let planner = Planner::new(protocol, orders).map_err(infeasible)?;
+    let plan = |row| planner.plan(Seat::Row(row)).map_err(infeasible);
+    if as_csv {
+        let rows: Vec<u32> = rows.collect();
+        for (i, chunk) in rows.chunks(CHUNK).enumerate() {
+            let plans = chunk
+                .iter()
+                .map(|&row| Ok((row, plan(row)?)))
+                .collect::<Result<Vec<_>, Failure>>()?;
+            console.out(csv(i == 0, &plans)?)?;
+        }
+        Ok(())
+    } else {
+        let plans = rows
+            .map(|row| Ok((row, plan(row)?)))
+            .collect::<Result<Vec<_>, Failure>>()?;
+        console.out(table::render(
+            protocol,
+            planner.models(),
+            &plans,
+            console.width,
+        ))
+    }
+}
+
+fn infeasible(error: ScheduleError) -> Failure {
+    let failure = Failure::input(&error);
+    match error.hint() {
+        Some(hint) => failure.hint(hint),
+        None => failure,
+    }
+}
+
+/// Orders as CSV, RFC 4180.
+fn csv(header: bool, plans: &[(u32, Vec<Trial>)]) -> Result<String, Failure> {
+    let broken = |e: &dyn std::fmt::Display| Failure::new(Kind::Bug, format!("CSV: {e}"));
+    let mut out = csv::WriterBuilder::new()
+        .terminator(csv::Terminator::CRLF)
+        .from_writer(Vec::new());
+    if header {
+        out.write_record([
+            "row",
+            "trial",
+            "block",
+            "position",
+            "model",
+            "repetition",
+            "practice",
+        ])
+        .map_err(|e| broken(&e))?;
+    }
+    for (row, plan) in plans {
+        for t in plan {
+            out.write_record([
+                row.to_string().as_str(),
+                t.trial.to_string().as_str(),
+                t.block.to_string().as_str(),
+                t.position.to_string().as_str(),
+                t.model.as_str(),
+                t.repetition.to_string().as_str(),
+                if t.practice { "true" } else { "false" },
+            ])
+            .map_err(|e| broken(&e))?;
+        }
+    }
+    let bytes = out.into_inner().map_err(|e| broken(&e))?;
+    String::from_utf8(bytes).map_err(|e| broken(&e))
+}
+
+/// Reads `7` or `1-40`.
+pub(super) fn parse_rows(given: &str) -> Result<RangeInclusive<u32>, String> {
+    let number = |text: &str| {
+        let text = text.trim();
+        match text.parse::<u32>() {
+            Ok(0) => Err("rows count from 1".to_owned()),
+            Ok(row) => Ok(row),
+            Err(_) if !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit()) => {
+                Err(format!("there are at most {} rows", u32::MAX))
+            }
+            Err(_) => Err("give a row such as 7 or a range such as 1-40".to_owned()),
+        }
+    };
+    let (first, last) = match given.split_once('-') {
+        Some((first, last)) => (number(first)?, number(last)?),
+        None => (number(given)?, number(given)?),
+    };
+    if first > last {
+        return Err(format!("the range goes down: did you mean {last}-{first}?"));
+    }
+    Ok(first..=last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::example::protocol;
+    use crate::protocol::{ModelEntry, Order, Role};
+    use crate::text::ModelId;
+    use std::cell::RefCell;
+    use std::io::Write;
+    use std::rc::Rc;
+
+    #[derive(Clone, Default)]
+    struct Shared(Rc<RefCell<Vec<u8>>>);
+
+    impl Write for Shared {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.borrow_mut().extend_from_slice(bytes);
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn shown(p: &Protocol, rows: RangeInclusive<u32>, csv: bool) -> Result<String, Failure> {
+        let out = Shared::default();
+        let mut console = Console::to(out.clone(), Vec::new());
+        show(p, None, rows, csv, &mut console)?;
+        let bytes = out.0.borrow().clone();
+        Ok(String::from_utf8(bytes).unwrap())
+    }
+
+    /// Two realizations and one for practice.
+    fn small() -> Protocol {
+        let mut p = protocol(2, 2);
+        p.design.order = Order::Fixed;
+        let practice = ModelEntry {
+            id: ModelId::new("spring").unwrap(),
+            role: Role::Practice,
+            ..p.models[0].clone()
+        };
+        p.design.practice = vec![practice.id.clone()];
+        p.models.push(practice);
+        p
+    }
+
+    #[test]
+    fn the_csv_has_every_trial_of_every_row() {
+        let text = shown(&small(), 3..=4, true).unwrap();
+        let expected = "row,trial,block,position,model,repetition,practice\r\n\
+            3,1,0,1,spring,0,true\r\n\
+            3,2,1,1,A,1,false\r\n\
+            3,3,1,2,B,1,false\r\n\
+            3,4,2,3,A,2,false\r\n\
+            3,5,2,4,B,2,false\r\n\
+            4,1,0,1,spring,0,true\r\n";
+        assert_eq!(&text[..expected.len()], expected);
+        assert_eq!(text.lines().count(), 11);
+    }
+
+    #[test]
+    fn a_long_csv_has_one_header() {
+        let text = shown(&small(), 1..=2500, true).unwrap();
+        assert_eq!(text.matches("row,trial").count(), 1);
+        assert_eq!(text.lines().count(), 1 + 2500 * 5);
+    }
+
+    #[test]
+    fn rows_are_a_number_or_a_range() {
+        assert_eq!(parse_rows("7"), Ok(7..=7));
+        assert_eq!(parse_rows("1-40"), Ok(1..=40));
+        assert_eq!(parse_rows(" 1 - 40 "), Ok(1..=40));
+        for (bad, says) in [
+            ("0", "count from 1"),
+            ("0-4", "count from 1"),
+            ("40-1", "did you mean 1-40?"),
+            ("4294967296", "at most 4294967295"),
+            ("", "1-40"),
+            ("-", "1-40"),
+            ("1-", "1-40"),
+            ("-3", "1-40"),
+            ("1-2-3", "1-40"),
+            ("1..4", "1-40"),
+            ("all", "1-40"),
+        ] {
+            let said = parse_rows(bad).unwrap_err();
+            assert!(said.contains(says), "{bad}: {said}");
+        }
+    }
+
+    #[test]
+    fn too_many_rows_are_refused_before_anything_is_printed() {
+        let failure = shown(&small(), 1..=u32::MAX, true).unwrap_err();
+        assert_eq!(failure.exit_code(), 2);
+    }
+
+    #[test]
+    fn an_infeasible_design_says_what_to_do() {
+        let mut p = small();
+        p.design.min_distance = Some(6);
+        let failure = shown(&p, 1..=2, false).unwrap_err();
+        assert_eq!(failure.exit_code(), 1);
+        assert_eq!(
+            failure.message,
+            "min_distance = 6 needs at least 6 realizations, there are 2"
+        );
+        assert!(failure.hint.is_some());
+    }
+
+    #[test]
+    fn the_orders_of_a_started_study_are_not_shown() {
+        let folder = tempfile::tempdir().unwrap();
+        let p = small();
+        assert!(!started(folder.path(), &p));
+        let study = folder.path().join(&p.study.id);
+        std::fs::create_dir(&study).unwrap();
+        std::fs::write(study.join("study.json"), "{}").unwrap();
+        assert!(started(folder.path(), &p));
+    }
 }

@@ -71,10 +71,10 @@ impl<'t> Document<'t> {
         }
     }
 
-    /// Whether anything was wrong so far; right after [`Document::parse`], whether
-    /// the syntax is broken.
-    pub fn has_faults(&self) -> bool {
-        !self.notes.borrow().faults.is_empty()
+    /// How many faults there are so far; right after [`Document::parse`], those of
+    /// the syntax.
+    pub fn fault_count(&self) -> usize {
+        self.notes.borrow().faults.len()
     }
 
     /// Adds a fault.

@@ -155,8 +155,8 @@ fn branch_force_n(branch: &BranchView<'_>, left: usize, weight: f64, motion: Mot
 /// The node to the left of x and how far x lies towards the next, in [0, 1).
 fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
     let last = nodes.len() - 1;
-    // not(x > first) also holds for a NaN, which then reads the first node
-    if !(x_mm > nodes[0]) {
+    // a NaN reads the first node
+    if x_mm.is_nan() || x_mm <= nodes[0] {
         return (0, 0.0);
     }
     if x_mm >= nodes[last] {

@@ -139,7 +139,7 @@ fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     let so = match n {
         0..=2 => "no correlation of ratings with VAF can be tested".to_owned(),
         _ => format!(
-            "|r| with VAF has to exceed {:.2} for p < .05",
+            "|r| with VAF has to exceed {:.3} for p < .05",
             critical_r(n)
         ),
     };
@@ -340,7 +340,7 @@ mod tests {
         let found = messages(&example::protocol(5, 3));
         assert_eq!(
             found,
-            ["5 test realizations: |r| with VAF has to exceed 0.88 for p < .05"]
+            ["5 test realizations: |r| with VAF has to exceed 0.878 for p < .05"]
         );
     }
 

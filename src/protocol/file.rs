@@ -10,6 +10,7 @@
 mod agree;
 mod analysis;
 mod design;
+mod device;
 mod models;
 mod orders;
 mod questions;
@@ -19,12 +20,10 @@ pub use analysis::EXCLUSIONS;
 pub use orders::parse_orders;
 
 use super::{
-    Consent, DeviceKind, DeviceRules, Entry, FORMAT, Order, Protocol, Question, SessionRules,
-    Study, Text, TrialRules, Uncertified,
+    Consent, Entry, FORMAT, Order, Protocol, Question, SessionRules, Study, Text, TrialRules,
 };
 use crate::diagnostic::table::{Document, Table};
 use crate::diagnostic::{Fault, Findings};
-use crate::limits::{Limit, Limits};
 use crate::text::Untrusted;
 use reader::{Reader, prose};
 use std::collections::BTreeMap;
@@ -74,10 +73,10 @@ pub fn parse(path: &str, text: &str) -> Parsed {
         };
     }
     let document = Document::parse(text);
-    let broken = document.has_faults();
+    let broken = document.fault_count();
     let reader = Reader {
         document: &document,
-        broken,
+        broken: broken > 0,
     };
     let mut named = Vec::new();
     let protocol = if format_is_ours(&reader) {
@@ -87,6 +86,7 @@ pub fn parse(path: &str, text: &str) -> Parsed {
     };
     let read = document.finish();
     findings.faults = read.faults;
+    drop_echoes(&mut findings.faults, broken);
     findings.sort();
     Parsed {
         protocol: protocol.filter(|_| !findings.has_errors()),
@@ -94,6 +94,25 @@ pub fn parse(path: &str, text: &str) -> Parsed {
         spans: read.spans,
         named,
     }
+}
+
+/// Where the syntax is broken (the first `broken` faults), the reader stumbles a
+/// second time over what was put there instead: that is not a fault of its own.
+fn drop_echoes(faults: &mut Vec<Fault>, broken: usize) {
+    let holes: Vec<Range<usize>> = faults[..broken]
+        .iter()
+        .filter_map(|f| f.span.clone())
+        .collect();
+    let mut at = 0;
+    faults.retain(|fault| {
+        at += 1;
+        at <= broken
+            || !fault.span.as_ref().is_some_and(|span| {
+                holes
+                    .iter()
+                    .any(|hole| span.start <= hole.end && hole.start <= span.end)
+            })
+    });
 }
 
 /// A file of another format is not read any further: every key would be a fault.
@@ -141,7 +160,7 @@ fn read<'d, 't>(reader: &Reader<'d, 't>, named: &mut Vec<Named>) -> Option<Proto
     let consent = root.table("consent").map(|table| consent(reader, table));
     let design = design::read(reader, &mut root);
     let session = root.table("session").map(|table| session(reader, table));
-    let device = device(reader, &mut root);
+    let device = device::read(reader, &mut root);
     let trial = root.table("trial").map(|table| trial(reader, table));
     let models = models::read(reader, &mut root);
     let questions = questions::read(reader, &mut root, "questions");
@@ -327,99 +346,6 @@ fn session<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> Session
         entry,
         resume_within_h,
     }
-}
-
-fn device<'d, 't>(reader: &Reader<'d, 't>, root: &mut Table<'d, 't>) -> Option<DeviceRules> {
-    let mut table = reader.section(root, "device", "such as kind = \"simulated\"")?;
-    let kind = reader
-        .need(
-            &mut table,
-            "kind",
-            "one of `simulated`, `serial`, `process`, `manual`",
-        )
-        .and_then(|v| v.word(&models::DEVICES));
-    let value = if kind == Some(DeviceKind::Manual) {
-        table.value("limits")
-    } else {
-        reader.need(
-            &mut table,
-            "limits",
-            "such as limits = { force_n = 12.0, velocity_mm_s = 1000.0 }",
-        )
-    };
-    let given = value.is_some();
-    let limits = value.and_then(|v| v.table()).and_then(|mut limits| {
-        let force_n = reader.need_limit(&mut limits, "force_n", "the largest force, N");
-        let velocity_mm_s = reader.need_limit(
-            &mut limits,
-            "velocity_mm_s",
-            "the speed at which the device trips, mm/s",
-        );
-        limits.finish();
-        Some(Limits {
-            force_n: force_n?,
-            velocity_mm_s: velocity_mm_s?,
-        })
-    });
-    let uncertified = table
-        .table("uncertified")
-        .map(|table| uncertified(reader, table, limits.as_ref()));
-    table.finish();
-    let limits = match limits {
-        Some(limits) => limits,
-        // A sample mounted by hand plays no table: nothing is ever held to these.
-        None if !given && kind == Some(DeviceKind::Manual) => unplayed_limits()?,
-        None => return None,
-    };
-    Some(DeviceRules {
-        kind: kind?,
-        limits,
-        uncertified: match uncertified {
-            Some(uncertified) => Some(uncertified?),
-            None => None,
-        },
-    })
-}
-
-fn unplayed_limits() -> Option<Limits> {
-    Some(Limits {
-        force_n: Limit::new(12.0).ok()?,
-        velocity_mm_s: Limit::new(1000.0).ok()?,
-    })
-}
-
-fn uncertified<'d, 't>(
-    reader: &Reader<'d, 't>,
-    mut table: Table<'d, 't>,
-    limits: Option<&Limits>,
-) -> Option<Uncertified> {
-    let play = reader
-        .need(&mut table, "play", "true or false")
-        .and_then(|v| v.bool());
-    let force_n = reader.need_limit(&mut table, "force_n", "the largest force for them, N");
-    let reason = reader.need_text(&mut table, "reason", "it stands in every session");
-    table.finish();
-    if let (Some(force), Some(limits)) = (force_n, limits)
-        && force > limits.force_n
-    {
-        table_fault_above(reader, force, limits.force_n);
-    }
-    Some(Uncertified {
-        play: play?,
-        force_n: force_n?,
-        reason: reason?,
-    })
-}
-
-fn table_fault_above(reader: &Reader<'_, '_>, force: Limit, limit: Limit) {
-    reader.document.fault(
-        Fault::error(format!(
-            "`device.uncertified.force_n` is {} N, above `device.limits.force_n`, {} N",
-            force.get(),
-            limit.get()
-        ))
-        .at(reader.document.span_of("device.uncertified.force_n")),
-    );
 }
 
 fn trial<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> TrialRules {

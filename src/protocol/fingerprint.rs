@@ -256,7 +256,9 @@ mod tests {
     }
 
     /// These stand in results folders: do not change the test. If it fails, a
-    /// study that is running could not be continued with this version.
+    /// study that is running could not be continued with this version. The first was
+    /// reproduced from the description above with Python's `json.dumps(…,
+    /// sort_keys=True, separators=(",", ":"))`.
     #[test]
     fn the_fingerprint_of_an_example_never_changes() {
         let prints = print(&example::protocol(3, 2));

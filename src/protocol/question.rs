@@ -158,8 +158,9 @@ impl Question {
             }
             (QuestionKind::Choice { options, multiple }, Answer::Choice(chosen)) => {
                 let known = chosen.iter().all(|c| options.contains(c));
+                let once = (1..chosen.len()).all(|i| !chosen[..i].contains(&chosen[i]));
                 let count = *multiple || chosen.len() <= 1;
-                if !known || !count {
+                if !known || !once || !count {
                     Err("choose from the list".to_owned())
                 } else if chosen.is_empty() && self.required {
                     Err("choose one".to_owned())
@@ -200,4 +201,108 @@ pub fn cut_to_fit(text: &str) -> (&str, bool) {
         .last()
         .unwrap_or(0);
     (&text[..end], true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(kind: QuestionKind, required: bool) -> Question {
+        Question {
+            id: QuestionId::new("q").unwrap(),
+            prompt: "?".to_owned(),
+            kind,
+            required,
+        }
+    }
+
+    #[test]
+    fn a_rating_is_on_the_scale() {
+        let rating = question(
+            QuestionKind::Rating {
+                from: 1,
+                to: 7,
+                labels: BTreeMap::new(),
+            },
+            true,
+        );
+        for (given, good) in [(0, false), (1, true), (7, true), (8, false)] {
+            assert_eq!(
+                rating.accepts(&Answer::Rating(given)).is_ok(),
+                good,
+                "{given}"
+            );
+        }
+        assert!(rating.accepts(&Answer::Number(3.0)).is_err());
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_refused() {
+        let slider = question(
+            QuestionKind::Slider {
+                from: 0.0,
+                to: 1.0,
+                step: 0.1,
+                labels: BTreeMap::new(),
+            },
+            true,
+        );
+        let number = question(
+            QuestionKind::Number {
+                unit: None,
+                min: None,
+                max: Some(99.0),
+            },
+            true,
+        );
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 100.0] {
+            assert!(slider.accepts(&Answer::Number(bad)).is_err(), "{bad}");
+            assert!(number.accepts(&Answer::Number(bad)).is_err(), "{bad}");
+        }
+        assert!(slider.accepts(&Answer::Number(0.25)).is_ok());
+        assert_eq!(
+            number.accepts(&Answer::Number(100.0)),
+            Err("a number up to 99".to_owned())
+        );
+    }
+
+    #[test]
+    fn a_choice_is_from_the_list_and_each_option_once() {
+        let choose = |multiple, required, chosen: &[&str]| {
+            let options = vec!["a".to_owned(), "b".to_owned()];
+            question(QuestionKind::Choice { options, multiple }, required)
+                .accepts(&Answer::Choice(
+                    chosen.iter().map(|c| (*c).to_owned()).collect(),
+                ))
+                .is_ok()
+        };
+        assert!(choose(false, true, &["a"]));
+        assert!(!choose(false, true, &["a", "b"]));
+        assert!(!choose(false, true, &["c"]));
+        assert!(!choose(true, true, &[]));
+        assert!(choose(true, false, &[]));
+        assert!(choose(true, true, &["b", "a"]));
+        assert!(!choose(true, true, &["a", "a"]));
+    }
+
+    #[test]
+    fn any_question_can_be_declined_with_a_reason() {
+        let text = question(QuestionKind::Text, true);
+        let declined = |reason: &str| Answer::Declined {
+            reason: reason.to_owned(),
+        };
+        assert!(text.accepts(&declined("too personal")).is_ok());
+        assert!(text.accepts(&declined(" ")).is_err());
+        assert!(text.accepts(&Answer::Text(" ".to_owned())).is_err());
+    }
+
+    #[test]
+    fn long_text_is_cut_between_characters() {
+        let flag = "🇩🇪"; // one character of two code points, 8 bytes
+        let long = "x".repeat(MAX_TEXT_BYTES - 4) + flag;
+        let (cut, was_cut) = cut_to_fit(&long);
+        assert!(was_cut);
+        assert_eq!(cut.len(), MAX_TEXT_BYTES - 4);
+        assert_eq!(cut_to_fit("short"), ("short", false));
+    }
 }

@@ -11,7 +11,7 @@ use std::io::{BufRead, Read as _};
 
 /// Second differences need three.
 pub(super) const LEAST_ROWS: usize = 3;
-/// An hour and a half at 10 kHz, 2.4 GB of columns.
+/// A hundred minutes at 10 kHz, 2.4 GB of columns.
 pub(super) const MOST_ROWS: usize = 60_000_000;
 /// Longer lines are no rows of numbers.
 pub(super) const MOST_LINE_BYTES: usize = 65_536;

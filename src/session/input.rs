@@ -25,7 +25,9 @@ pub enum Input {
     Consent(bool),
     /// Enter, where there is nothing to answer.
     Advance,
-    /// Confirmed answers to questions of the form on the screen.
+    /// Confirmed answers to all questions of the page on the screen, in any order.
+    /// An optional one may be absent: a text or choice then counts as left empty.
+    /// If one is not accepted, none is taken.
     Answer(Vec<(QuestionId, Answer)>),
     /// A remark, at any time.
     Remark {
@@ -52,7 +54,8 @@ pub enum Input {
         /// Why; not empty.
         reason: String,
     },
-    /// Esc, or Space while a table is loaded or playing: stop the device.
+    /// Esc, or Space while a table is loaded or playing: stop the device. A second
+    /// one during a stop makes it limp whatever becomes of the playback.
     Stop,
     /// After a stop: play the same trial again.
     PlayAgain,
@@ -60,7 +63,8 @@ pub enum Input {
     RateStopped,
     /// Pause.
     Pause,
-    /// Leave the program; the operator confirmed it.
+    /// Leave the program; the operator confirmed it. It waits for the disk; a
+    /// second one does not.
     Quit,
     /// The terminal is gone, a signal came: leave at once.
     Abort(String),
@@ -83,8 +87,8 @@ pub enum Input {
     DeviceLost(String),
     /// The device is back and limp.
     DeviceReady,
-    /// The event that the session sent as its `n`-th (from 0, of this process)
-    /// is on disk.
+    /// All events are on disk that the session sent before its `count`-th (from 0,
+    /// of this process).
     Saved {
         /// How many events of this process are on disk now.
         count: u64,
@@ -133,6 +137,7 @@ pub enum Effect {
         operator: String,
     },
     /// Write the event to the journal, in this order, and say when it is on disk.
+    /// After [`Input::SaveFailed`] it is only kept, until [`Effect::RetrySave`].
     Record(Event),
     /// Give the device this realization, for this trial and attempt.
     Load {
@@ -147,7 +152,8 @@ pub enum Effect {
     Start,
     /// Stop playing; the device confirms.
     Stop,
-    /// Go limp at once, whatever happens.
+    /// Go limp at once, whatever happens. Cancels a load as well: no
+    /// [`Input::DeviceLoaded`] for it may follow.
     Limp,
     /// Rewrite what is not acknowledged to a new journal segment.
     RetrySave,

@@ -34,7 +34,7 @@ pub struct View {
 pub struct Progress {
     /// Whether these are practice trials.
     pub practice: bool,
-    /// From 1: how many different trials were begun, this one included.
+    /// From 1: trials closed, and one. A trial that came back looks like any other.
     pub current: u32,
     /// How many there are.
     pub total: u32,
@@ -160,7 +160,9 @@ pub enum Screen {
     },
     /// Stop is asked, the confirmation on its way.
     Stopping,
-    /// Stopped by Esc, Space or a pause.
+    /// Stopped by Esc, Space or a pause, or with too few strokes:
+    /// [`PlayAgain`](super::Input::PlayAgain) or, where it can be rated,
+    /// [`RateStopped`](super::Input::RateStopped).
     Stopped {
         /// Whether what was felt can be rated: the device confirmed its end and
         /// the strokes suffice.
@@ -217,7 +219,8 @@ pub enum MessageKind {
 pub struct Correctable {
     /// Where it was asked.
     pub place: Place,
-    /// "trial 6", "intake".
+    /// "trial 6", "practice 1", "set-up", "intake", "closing questions". The number
+    /// is the one that was on the screen.
     pub title: String,
     /// The question.
     pub question: Question,

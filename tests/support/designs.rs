@@ -7,7 +7,7 @@ use study::text::{ModelId, QuestionId};
 
 /// Realizations `A`, `B`, … and nothing beside the design.
 pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol {
-    let limit = |value| Limit::new(value).unwrap();
+    let limit = |value| Limit::new(value).expect("a positive number");
     Protocol {
         study: Study {
             id: "example".to_owned(),
@@ -58,7 +58,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         intake: Vec::new(),
         outro: Vec::new(),
         analysis: AnalysisRules {
-            primary: QuestionId::new("realism").unwrap(),
+            primary: QuestionId::new("realism").expect("an identifier"),
             vaf: None,
             realistic_from: None,
             unfinished: Unfinished::Include,
@@ -83,7 +83,7 @@ pub(crate) fn constrained(
 
 fn model(id: &str) -> ModelEntry {
     ModelEntry {
-        id: ModelId::new(id).unwrap(),
+        id: ModelId::new(id).expect("an identifier"),
         file: None,
         vaf: None,
         role: Role::Test,

@@ -1,0 +1,387 @@
+//! Orders and their balance as text for a terminal.
+
+use crate::protocol::{Design, Order, Protocol, Role, Trial};
+use crate::schedule::balance::{Balance, Balances, Spread, balances};
+use crate::text::{ModelId, Untrusted};
+use std::collections::HashMap;
+use std::fmt::Write as _;
+
+/// Ids up to this length stand for themselves in the tables.
+const SHORT: usize = 3;
+
+/// Everything that `study schedule` shows; lines are at most `width` columns
+/// where the numbers allow it.
+pub(super) fn render(
+    protocol: &Protocol,
+    models: &[ModelId],
+    plans: &[(u32, Vec<Trial>)],
+    width: usize,
+) -> String {
+    let codes = Codes::of(models);
+    let balance = Balance::of(models, plans.iter().map(|(_, plan)| plan.as_slice()));
+    let mut out = format!(
+        "{}\n{}\n",
+        Untrusted(&protocol.study.title),
+        headline(&protocol.design, models.len())
+    );
+    if codes.are_ids {
+        out.push('\n');
+    } else {
+        legend(&mut out, protocol, models, &codes);
+    }
+    if !protocol.design.practice.is_empty() {
+        let ids: Vec<_> = protocol
+            .design
+            .practice
+            .iter()
+            .map(ModelId::as_str)
+            .collect();
+        let _ = writeln!(out, "Practice, before every order: {}\n", ids.join(", "));
+    }
+    orders(&mut out, plans, &codes, width);
+
+    let rows = match (plans.first(), plans.last()) {
+        (Some((first, _)), Some((last, _))) if first < last => format!("rows {first}–{last}"),
+        (Some((row, _)), _) => format!("row {row}"),
+        _ => return out,
+    };
+    if balance.blocks > 1 {
+        let _ = writeln!(out, "\nTimes at each place of a block, {rows}");
+        counts(
+            &mut out,
+            &codes,
+            &numbers(&balance.by_place),
+            &balance.by_place,
+            width,
+        );
+    }
+    let _ = writeln!(out, "\nTimes at each position of the session, {rows}");
+    counts(
+        &mut out,
+        &codes,
+        &numbers(&balance.by_position),
+        &balance.by_position,
+        width,
+    );
+    if balance.blocks > 1 {
+        let _ = writeln!(
+            out,
+            "\nTimes that the column follows the line within a block, {rows}"
+        );
+        counts(&mut out, &codes, &codes.names, &balance.carry_over, width);
+        let _ = writeln!(
+            out,
+            "\nTimes that the column begins the block after the line ended one, {rows}"
+        );
+        counts(
+            &mut out,
+            &codes,
+            &codes.names,
+            &balance.between_blocks,
+            width,
+        );
+    } else {
+        let _ = writeln!(out, "\nTimes that the column follows the line, {rows}");
+        counts(&mut out, &codes, &codes.names, &balance.carry_over, width);
+    }
+    out.push('\n');
+    for line in verdict(&protocol.design, &balance) {
+        let _ = writeln!(out, "{line}");
+    }
+    out
+}
+
+/// What stands for a realization in the tables.
+struct Codes {
+    names: Vec<String>,
+    by_id: HashMap<ModelId, usize>,
+    are_ids: bool,
+}
+
+impl Codes {
+    fn of(models: &[ModelId]) -> Self {
+        let are_ids = models.iter().all(|m| m.as_str().len() <= SHORT);
+        let names = match models {
+            _ if are_ids => models.iter().map(ToString::to_string).collect(),
+            _ if models.len() <= 26 => (b'A'..=b'Z')
+                .take(models.len())
+                .map(|c| char::from(c).to_string())
+                .collect(),
+            _ => (1..=models.len()).map(|i| i.to_string()).collect(),
+        };
+        Self {
+            names,
+            by_id: models.iter().cloned().zip(0..).collect(),
+            are_ids,
+        }
+    }
+
+    fn of_model<'a>(&'a self, model: &'a ModelId) -> &'a str {
+        self.by_id
+            .get(model)
+            .map_or(model.as_str(), |&i| &self.names[i])
+    }
+
+    fn width(&self) -> usize {
+        self.names.iter().map(String::len).max().unwrap_or(1)
+    }
+}
+
+fn headline(design: &Design, models: usize) -> String {
+    let order = match &design.order {
+        Order::Blocked => "blocked".to_owned(),
+        Order::Shuffled => "shuffled".to_owned(),
+        Order::Williams => "williams".to_owned(),
+        Order::LatinSquare => "latin-square".to_owned(),
+        Order::Fixed => "fixed".to_owned(),
+        Order::File(path) => format!("orders from {}", Untrusted(path)),
+    };
+    let mut line = format!(
+        "{order}, {models} realizations × {} repetitions",
+        design.repetitions
+    );
+    if let Some(k) = design.max_run {
+        let _ = write!(line, ", max_run = {k}");
+    }
+    if let Some(d) = design.min_distance {
+        let _ = write!(line, ", min_distance = {d}");
+    }
+    line
+}
+
+fn legend(out: &mut String, protocol: &Protocol, models: &[ModelId], codes: &Codes) {
+    out.push('\n');
+    for (code, id) in codes.names.iter().zip(models) {
+        let role = match protocol.model(id).map(|m| m.role) {
+            Some(Role::Test) | None => String::new(),
+            Some(role) => format!("  ({})", role.as_str()),
+        };
+        let _ = writeln!(out, "{code:>width$}  {id}{role}", width = codes.width());
+    }
+    out.push('\n');
+}
+
+/// One line for each row, broken between trials where it is too long.
+fn orders(out: &mut String, plans: &[(u32, Vec<Trial>)], codes: &Codes, width: usize) {
+    let label = plans.last().map_or(1, |(row, _)| row.to_string().len());
+    let cell = codes.width();
+    for (row, plan) in plans {
+        let _ = write!(out, "row {row:>label$} ");
+        let indent = 5 + label;
+        let mut column = indent;
+        let mut block = None;
+        for trial in plan.iter().filter(|t| !t.practice) {
+            let bar = if block.is_some_and(|b| b != trial.block) {
+                " │"
+            } else {
+                ""
+            };
+            block = Some(trial.block);
+            let needed = bar.chars().count() + 1 + cell;
+            if column + needed > width && column > indent {
+                let _ = write!(out, "{bar}\n{:indent$}", "");
+                column = indent;
+            } else {
+                out.push_str(bar);
+                column += bar.chars().count();
+            }
+            let _ = write!(out, " {:>cell$}", codes.of_model(&trial.model));
+            column += 1 + cell;
+        }
+        out.push('\n');
+    }
+}
+
+fn numbers(table: &[Vec<u32>]) -> Vec<String> {
+    let columns = table.first().map_or(0, Vec::len);
+    (1..=columns).map(|i| i.to_string()).collect()
+}
+
+/// A table of counts, in parts below each other where it is too wide.
+fn counts(out: &mut String, codes: &Codes, heads: &[String], table: &[Vec<u32>], width: usize) {
+    let largest = table.iter().flatten().map(|c| c.to_string().len()).max();
+    let head = heads.iter().map(String::len).max().unwrap_or(1);
+    let cell = largest.unwrap_or(1).max(head) + 1;
+    let label = codes.width() + 2;
+    let columns = (width.saturating_sub(label) / cell).max(1);
+    for from in (0..heads.len()).step_by(columns) {
+        let part = from..heads.len().min(from + columns);
+        let _ = write!(out, "{:label$}", "");
+        for head in &heads[part.clone()] {
+            let _ = write!(out, "{head:>cell$}");
+        }
+        out.push('\n');
+        for (name, line) in codes.names.iter().zip(table) {
+            let _ = write!(out, "{name:>label$}");
+            for count in &line[part.clone()] {
+                match count {
+                    0 => drop(write!(out, "{:>cell$}", "·")),
+                    count => drop(write!(out, "{count:>cell$}")),
+                }
+            }
+            out.push('\n');
+        }
+    }
+}
+
+/// The balance in words.
+fn verdict(design: &Design, balance: &Balance) -> Vec<String> {
+    let (place, within) = if balance.blocks > 1 {
+        ("place of a block", " within blocks")
+    } else {
+        ("position", "")
+    };
+    let mut lines = Vec::new();
+    if let Some(spread) = balance.places() {
+        lines.push(format!(
+            "Positions: {}.",
+            evenness(
+                spread,
+                &format!("each realization comes {{}} at each {place}")
+            )
+        ));
+    }
+    if let Some(spread) = balance.carry_overs() {
+        lines.push(format!(
+            "Carry-over: {}.",
+            evenness(
+                spread,
+                &format!("each realization follows each other one {{}}{within}")
+            )
+        ));
+    }
+    lines.push(promise(
+        design,
+        balances(&design.order, balance.models.len(), design.repetitions),
+    ));
+    lines
+}
+
+fn evenness(spread: Spread, sentence: &str) -> String {
+    if spread.is_even() {
+        format!("even; {}", sentence.replace("{}", &times(spread.least)))
+    } else {
+        let range = format!("{} to {} times", spread.least, spread.most);
+        let even = (spread.even * 10.0).round() / 10.0;
+        format!("uneven; {} (even: {even})", sentence.replace("{}", &range))
+    }
+}
+
+fn times(n: u32) -> String {
+    match n {
+        0 => "never".to_owned(),
+        1 => "once".to_owned(),
+        n => format!("{n} times"),
+    }
+}
+
+/// What the design promises, whatever rows are shown.
+fn promise(design: &Design, balances: Option<Balances>) -> String {
+    match (&design.order, balances) {
+        (_, Some(b)) => {
+            let what = if b.carry_over {
+                "Positions and carry-over are"
+            } else {
+                "Positions (not carry-over) are"
+            };
+            let planned = u64::from(design.participants);
+            let fits = if planned.is_multiple_of(b.participants) {
+                format!("{planned} are planned, which fits")
+            } else {
+                let below = planned / b.participants * b.participants;
+                let above = below + b.participants;
+                match below {
+                    0 => format!("{planned} are planned; take {above}"),
+                    below => format!("{planned} are planned; take {below} or {above}"),
+                }
+            };
+            match b.participants {
+                1 => format!("{what} even for any number of participants."),
+                n => format!("{what} even at every {n} participants; {fits}."),
+            }
+        }
+        (Order::Fixed, _) => {
+            "Everybody feels the same order: its effect cannot be told from the realizations'."
+                .to_owned()
+        }
+        (Order::File(_), _) => "The orders are those of the file.".to_owned(),
+        _ => "The orders are random: even on average over many participants, not in any few."
+            .to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::Seat;
+    use crate::protocol::example::protocol;
+    use crate::schedule::Planner;
+
+    fn rendered(p: &Protocol, rows: u32, width: usize) -> String {
+        let planner = Planner::new(p, None).unwrap();
+        let plans: Vec<_> = (1..=rows)
+            .map(|row| (row, planner.plan(Seat::Row(row)).unwrap()))
+            .collect();
+        render(p, planner.models(), &plans, width)
+    }
+
+    #[test]
+    fn the_orders_stand_above_their_counts_and_a_verdict() {
+        let mut p = protocol(4, 3);
+        p.design.order = Order::Williams;
+        p.design.max_run = Some(1);
+        p.design.participants = 6;
+        let text = rendered(&p, 4, 80);
+        insta::assert_snapshot!(text);
+    }
+
+    #[test]
+    fn long_ids_get_letters_and_a_legend() {
+        let mut p = protocol(3, 2);
+        p.models[1].id = ModelId::new("lambda-0.9995").unwrap();
+        p.models[2].role = Role::LowAnchor;
+        let text = rendered(&p, 2, 80);
+        assert!(text.contains("B  lambda-0.9995\n"), "{text}");
+        assert!(text.contains("C  C  (low-anchor)\n"), "{text}");
+        assert!(text.contains("The orders are random"), "{text}");
+    }
+
+    #[test]
+    fn lines_are_broken_at_the_width() {
+        let mut p = protocol(12, 3);
+        p.study.title = "An \u{1b}[2Jexample".to_owned();
+        for order in [Order::Blocked, Order::Shuffled] {
+            p.design.order = order;
+            let text = rendered(&p, 12, 60);
+            assert!(!text.contains('\u{1b}'));
+            let counted = text
+                .lines()
+                .filter(|l| !l.contains(". ") && !l.ends_with('.'));
+            for line in counted.filter(|l| !l.starts_with("Times")) {
+                assert!(line.chars().count() <= 60, "{line}");
+            }
+            // Nothing is lost: 36 trials in the first row.
+            let orders = text
+                .split("row  2")
+                .next()
+                .unwrap()
+                .split("row  1")
+                .nth(1)
+                .unwrap();
+            let trials = orders.split_whitespace().filter(|w| *w != "│");
+            assert_eq!(trials.count(), 36, "{text}");
+        }
+    }
+
+    #[test]
+    fn an_uneven_design_says_how_far_it_is_from_even() {
+        let mut p = protocol(5, 3);
+        p.design.order = Order::Williams;
+        p.design.participants = 12;
+        let text = rendered(&p, 7, 80);
+        assert!(text.contains("Positions: uneven; "), "{text}");
+        assert!(text.contains("(even: 4.2)"), "{text}");
+        assert!(text.contains("12 are planned; take 10 or 20."), "{text}");
+        assert!(rendered(&p, 10, 80).contains("Carry-over: even; "));
+    }
+}

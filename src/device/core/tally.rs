@@ -1,0 +1,94 @@
+//! What comes together while a device plays: energy, strokes, counts.
+
+/// What has come together since the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Tally {
+    /// Servo periods.
+    pub steps: u64,
+    /// Energy that the hand has put in, J.
+    pub energy_j: f64,
+    /// Its least value, zero or negative, J.
+    pub least_energy_j: f64,
+    /// Changes of the direction's sign.
+    pub switches: u64,
+    /// How often the force ran into its limit, each run once.
+    pub clamps: u64,
+    /// Servo periods in which the change of force was limited.
+    pub slewed: u64,
+    /// Servo periods in which the mass was held to the least one.
+    pub mass_held: u64,
+    /// Full strokes, each from one end of the range to the other.
+    pub strokes: u32,
+    last_x_mm: Option<f64>,
+    last_end: Option<End>,
+}
+
+/// Where a full stroke begins or ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    Low,
+    High,
+}
+
+/// Share of the range at either side that counts as its end.
+const END_SHARE: f64 = 0.2;
+
+impl Tally {
+    /// Takes in where the handle is after a period in which `held_n` was held.
+    pub(super) fn account(&mut self, held_n: f64, x_mm: f64, range_mm: [f64; 2]) {
+        if let Some(last) = self.last_x_mm {
+            self.energy_j += held_n * (x_mm - last) * 1e-3;
+            self.least_energy_j = self.least_energy_j.min(self.energy_j);
+        }
+        self.last_x_mm = Some(x_mm);
+
+        let [low, high] = range_mm;
+        let zone = END_SHARE * (high - low);
+        let end = if x_mm <= low + zone {
+            End::Low
+        } else if x_mm >= high - zone {
+            End::High
+        } else {
+            return;
+        };
+        if self.last_end.is_some_and(|last| last != end) {
+            self.strokes += 1;
+        }
+        self.last_end = Some(end);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Full strokes of four seconds of 15 mm ± `amplitude` at 1 Hz over 0 … 30 mm.
+    fn strokes(centre_mm: f64, amplitude_mm: f64) -> u32 {
+        let mut tally = Tally::default();
+        for i in 0..16_000 {
+            let phase = core::f64::consts::TAU * f64::from(i) / 4000.0;
+            let x_mm = centre_mm + amplitude_mm * libm::sin(phase);
+            tally.account(0.0, x_mm, [0.0, 30.0]);
+        }
+        tally.strokes
+    }
+
+    /// From the middle up, then down and up three times and down once more.
+    #[test]
+    fn full_strokes_are_counted_and_half_ones_are_not() {
+        assert_eq!(strokes(15.0, 14.0), 7);
+        assert_eq!(strokes(8.0, 8.0), 0);
+        assert_eq!(strokes(15.0, 8.0), 0);
+    }
+
+    /// 2 N over 10 mm and back, then 3 N over the same way back only.
+    #[test]
+    fn energy_is_what_the_hand_has_put_in_and_its_least_value_stays() {
+        let mut tally = Tally::default();
+        for (held_n, x_mm) in [(0.0, 10.0), (2.0, 20.0), (3.0, 10.0), (3.0, 20.0)] {
+            tally.account(held_n, x_mm, [0.0, 30.0]);
+        }
+        assert!((tally.energy_j - 0.020).abs() < 1e-12);
+        assert!((tally.least_energy_j + 0.010).abs() < 1e-12);
+    }
+}

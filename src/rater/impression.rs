@@ -1,0 +1,279 @@
+//! What a realization is like beside the target, as a rater feels it.
+//!
+//! One fixed exploration, the same for all: x = 17.5 + 15·sin 2πφ(t) mm with
+//! φ' = 1 − 0.5·cos(2πt/6) Hz for 6 s, from slow to 1.5 Hz and back. The target's
+//! force under it is simulated once; a realization's force is predicted from the
+//! same motion. Both are smoothed over 21 ms, as the recordings are filtered,
+//! because the target's impacts last a millisecond and no table has them.
+
+use crate::model::Realization;
+use crate::model::predict::{DirectionState, Motion, force_n};
+use crate::plant::{DT_S, HandParameters, Parameters, Target};
+use std::f64::consts::TAU;
+use std::sync::LazyLock;
+
+/// How a realization compares with the target A. Deterministic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impression {
+    /// Root mean square difference from the target's force, N.
+    pub force_error_n: f64,
+    /// The same within 3 mm of the ends of the exploration, N.
+    pub end_error_n: f64,
+    /// How much the table pushes on its own: mean over nodes and directions of the
+    /// negative part of m over the slider's mass plus that of b over the hand's
+    /// damping. 0: never; 1: all of either taken away.
+    pub activeness: f64,
+    /// Largest force, as a share of the target's.
+    pub detent: f64,
+    /// Standard deviation of the rate of force, as a share of the target's.
+    pub crispness: f64,
+}
+
+const SECONDS: f64 = 6.0;
+const CENTRE_MM: f64 = 17.5;
+const AMPLITUDE_MM: f64 = 15.0;
+const END_MM: f64 = 3.0;
+/// Plant steps between two samples: 1 kHz.
+const EVERY: usize = 40;
+/// Samples to either side that a sample is averaged with.
+const SMOOTH: usize = 10;
+
+/// The target under the exploration.
+static REFERENCE: LazyLock<Reference> = LazyLock::new(Reference::new);
+
+struct Reference {
+    motion: Vec<Motion>,
+    force_n: Vec<f64>,
+    largest_n: f64,
+    rate: f64,
+}
+
+impl Reference {
+    fn new() -> Self {
+        let mut target = Target::new(Parameters::a(), CENTRE_MM)
+            .expect("a unit test checks the built-in parameters");
+        let steps = (SECONDS / DT_S) as usize;
+        let mut sampled = Vec::with_capacity(steps / EVERY + 1);
+        let mut felt = Vec::with_capacity(steps / EVERY + 1);
+        for i in 0..steps {
+            let motion = exploration(i as f64 * DT_S);
+            let force_n = target.step(motion);
+            if i % EVERY == 0 {
+                sampled.push(motion);
+                felt.push(force_n);
+            }
+        }
+        let felt = smoothed(&felt);
+        Self {
+            largest_n: largest(&felt),
+            rate: rate(&felt),
+            motion: sampled,
+            force_n: felt,
+        }
+    }
+}
+
+/// The fixed exploration at `t_s`.
+fn exploration(t_s: f64) -> Motion {
+    let turn = TAU / SECONDS;
+    // φ and its two derivatives, in radians
+    let phase = TAU * t_s - 0.5 * SECONDS * libm::sin(turn * t_s);
+    let rate = TAU * (1.0 - 0.5 * libm::cos(turn * t_s));
+    let change = TAU * 0.5 * turn * libm::sin(turn * t_s);
+    let (sin, cos) = (libm::sin(phase), libm::cos(phase));
+    Motion {
+        x_mm: CENTRE_MM + AMPLITUDE_MM * sin,
+        v_mm_s: AMPLITUDE_MM * cos * rate,
+        a_m_s2: 1e-3 * AMPLITUDE_MM * (cos * change - sin * rate * rate),
+    }
+}
+
+impl Impression {
+    /// What a realization is like. Takes about a millisecond, and once a process
+    /// the time to simulate the target.
+    pub fn of(realization: &Realization) -> Self {
+        let reference = &*REFERENCE;
+        let table = realization.table();
+        let [low, high] = realization.trained.x_mm;
+        let trained = realization.trained.v_mm_s;
+        let mut state = DirectionState::default();
+        let predicted: Vec<f64> = reference
+            .motion
+            .iter()
+            .map(|motion| {
+                let z = state.step(realization.direction, *motion);
+                // as the device plays it: nothing is known beyond what was trained
+                let known = Motion {
+                    x_mm: motion.x_mm.max(low).min(high),
+                    v_mm_s: motion.v_mm_s.max(-trained).min(trained),
+                    ..*motion
+                };
+                force_n(&table, z, known)
+            })
+            .collect();
+        let predicted = smoothed(&predicted);
+        let difference = |keep: &dyn Fn(&Motion) -> bool| {
+            let squares: Vec<f64> = reference
+                .motion
+                .iter()
+                .zip(reference.force_n.iter().zip(&predicted))
+                .filter(|(motion, _)| keep(motion))
+                .map(|(_, (target, model))| (target - model).powi(2))
+                .collect();
+            (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+        };
+        Self {
+            force_error_n: difference(&|_| true),
+            end_error_n: difference(&|motion| {
+                (motion.x_mm - CENTRE_MM).abs() > AMPLITUDE_MM - END_MM
+            }),
+            activeness: activeness(realization),
+            detent: largest(&predicted) / reference.largest_n,
+            crispness: rate(&predicted) / reference.rate,
+        }
+    }
+
+    /// What a rater without bias or noise would say on a scale from 1 to 7.
+    ///
+    /// A question whose id speaks of crispness or detents is about that alone, 5
+    /// being as in the target; every other is about the whole.
+    pub(super) fn opinion(&self, question: &str) -> f64 {
+        if question.contains("crisp") {
+            1.0 + 4.0 * self.crispness
+        } else if question.contains("detent") {
+            1.0 + 4.0 * self.detent
+        } else {
+            BEST - PER_NEWTON * self.force_error_n - PER_ACTIVENESS * self.activeness
+        }
+    }
+}
+
+/// Opinion of the target itself.
+const BEST: f64 = 6.0;
+/// What a newton of difference costs.
+const PER_NEWTON: f64 = 0.7;
+/// What full activeness costs.
+const PER_ACTIVENESS: f64 = 0.5;
+
+fn activeness(realization: &Realization) -> f64 {
+    let hand = HandParameters::default();
+    let negative = |values: &[f64], unit: f64| {
+        let missing: f64 = values.iter().filter(|v| **v < 0.0).map(|v| v.abs()).sum();
+        missing / (unit * values.len() as f64)
+    };
+    [&realization.positive, &realization.negative]
+        .iter()
+        .map(|branch| {
+            negative(&branch.m_kg, hand.slider_kg)
+                + negative(&branch.b_n_s_per_mm, hand.damping_n_s_per_mm)
+        })
+        .sum::<f64>()
+        / 2.0
+}
+
+/// Moving average, shorter at the ends.
+fn smoothed(values: &[f64]) -> Vec<f64> {
+    (0..values.len())
+        .map(|i| {
+            let from = i.saturating_sub(SMOOTH);
+            let to = (i + SMOOTH + 1).min(values.len());
+            values[from..to].iter().sum::<f64>() / (to - from) as f64
+        })
+        .collect()
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, v| most.max(v.abs()))
+}
+
+/// Root mean square of the change from sample to sample.
+fn rate(values: &[f64]) -> f64 {
+    let squares: f64 = values.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
+    (squares / (values.len() - 1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::predict::{Direction, Lookup};
+    use crate::model::{Branch, Provenance, Trained};
+    use std::collections::BTreeMap;
+
+    /// A table of nothing but the given mass and the target's quasi-static force
+    /// of each direction, scaled.
+    fn table(scale: f64, mass: f64) -> Realization {
+        let nodes: Vec<f64> = (4..=66).map(|i| f64::from(i) * 0.5).collect();
+        let branch = |direction: f64| {
+            let start = if direction > 0.0 { 1.0 } else { 34.0 };
+            let mut target = Target::new(Parameters::a(), start).unwrap();
+            let mut force = vec![0.0; nodes.len()];
+            let speed = 20.0 * direction;
+            let steps = (33.0 / 20.0 / DT_S) as usize;
+            for i in 0..steps {
+                let motion = Motion {
+                    x_mm: start + speed * i as f64 * DT_S,
+                    v_mm_s: speed,
+                    a_m_s2: 0.0,
+                };
+                let felt = target.step(motion);
+                let nearest = ((motion.x_mm - 2.0) / 0.5).round();
+                if (0.0..nodes.len() as f64).contains(&nearest) {
+                    force[nearest as usize] = felt;
+                }
+            }
+            Branch {
+                m_kg: vec![mass; nodes.len()],
+                b_n_s_per_mm: vec![0.0; nodes.len()],
+                k_n_per_mm: vec![0.0; nodes.len()],
+                f0_n: force.iter().map(|f| scale * f).collect(),
+            }
+        };
+        Realization {
+            id: "t".to_owned(),
+            provenance: Provenance::default(),
+            vaf: BTreeMap::new(),
+            lookup: Lookup::Linear,
+            direction: Direction::Play { delta_mm: 0.8 },
+            trained: Trained {
+                x_mm: [1.5, 33.5],
+                v_mm_s: 140.0,
+            },
+            x_mm: nodes.clone(),
+            positive: branch(1.0),
+            negative: branch(-1.0),
+        }
+    }
+
+    #[test]
+    fn the_motion_is_the_derivative_of_the_position() {
+        let step = 1e-6;
+        for i in 1..60 {
+            let t = f64::from(i) * 0.1;
+            let (before, now, after) =
+                (exploration(t - step), exploration(t), exploration(t + step));
+            let v = (after.x_mm - before.x_mm) / (2.0 * step);
+            let a = (after.v_mm_s - before.v_mm_s) / (2.0 * step) * 1e-3;
+            assert!((v - now.v_mm_s).abs() < 1e-5, "{t}");
+            assert!((a - now.a_m_s2).abs() < 1e-5, "{t}");
+        }
+    }
+
+    #[test]
+    fn the_targets_own_profile_is_near_and_half_of_it_is_far() {
+        let own = Impression::of(&table(1.0, 0.0));
+        let half = Impression::of(&table(0.5, 0.0));
+        assert!(own.force_error_n < 1.6, "{own:?}");
+        assert!(half.force_error_n > own.force_error_n + 0.5, "{half:?}");
+        assert!((0.8..1.2).contains(&own.detent), "{own:?}");
+        assert!((0.4..0.6).contains(&half.detent), "{half:?}");
+        assert!(own.opinion("realism") > half.opinion("realism"));
+        assert_eq!(own, Impression::of(&table(1.0, 0.0)));
+    }
+
+    #[test]
+    fn only_negative_mass_is_active() {
+        assert_eq!(Impression::of(&table(1.0, 0.3)).activeness, 0.0);
+        let active = Impression::of(&table(1.0, -0.3)).activeness;
+        assert!((active - 0.5).abs() < 1e-12, "{active}");
+    }
+}

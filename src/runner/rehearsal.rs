@@ -1,0 +1,224 @@
+//! A study without people: the same runner, store, device and session on a
+//! virtual clock, with simulated participants who answer.
+//!
+//! The rater sees what a person would (the view) and additionally feels: the
+//! runner tells it which realization played. It never changes what the session
+//! does. Dates are virtual and start at [`first_day`], one day a participant, so
+//! that the same protocol and seed give the same bytes.
+
+use super::clock::VirtualClock;
+use super::{Runner, Setup};
+use crate::protocol::{Answer, Question};
+use crate::rater::{Impression, Rater};
+use crate::session::{Config, Ending, Input, Screen, View};
+use crate::text::{ModelId, QuestionId};
+use chrono::{DateTime, FixedOffset};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// How long a rater looks at a screen that asks nothing of it, s.
+const GLANCE_S: f64 = 2.0;
+/// Turns after which a session that does not end is given up: a bug, not a wait.
+const MAX_TURNS: u32 = 5_000_000;
+
+/// When the first simulated participant comes.
+pub fn first_day() -> DateTime<FixedOffset> {
+    DateTime::parse_from_rfc3339("2007-03-22T09:00:00+00:00").expect("a valid date")
+}
+
+/// Why a rehearsal went wrong.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RehearsalError {
+    /// The session could not be opened.
+    #[error("the session of {participant} could not be opened: {why}")]
+    Refused {
+        /// Whose.
+        participant: String,
+        /// The store's words.
+        why: String,
+    },
+    /// An event could not be written.
+    #[error("the session of {participant} could not be saved: {why}")]
+    NotSaved {
+        /// Whose.
+        participant: String,
+        /// The store's words.
+        why: String,
+    },
+    /// It does not end.
+    #[error("the session of {participant} does not end: it stays at {screen}")]
+    Stuck {
+        /// Whose.
+        participant: String,
+        /// Where.
+        screen: String,
+    },
+}
+
+/// Runs one simulated participant's session from the first screen to the last.
+///
+/// # Errors
+/// [`RehearsalError`] if the session cannot be opened, saved or ended.
+pub fn run_one(
+    setup: Setup,
+    participant: &str,
+    clock: &VirtualClock,
+    rater: &mut Rater,
+    impressions: &BTreeMap<ModelId, Impression>,
+) -> Result<Ending, RehearsalError> {
+    let config = Config {
+        participant: participant.to_owned(),
+        operator: "simulated".to_owned(),
+        auto_identify: true,
+    };
+    let mut runner = Runner::new(setup, config);
+    let mut plan = Plan::default();
+    for _ in 0..MAX_TURNS {
+        let view = runner.view();
+        match &view.screen {
+            Screen::Who {
+                claiming: false, ..
+            } => {
+                if let Some(why) = view.notice.clone() {
+                    return Err(RehearsalError::Refused {
+                        participant: participant.to_owned(),
+                        why,
+                    });
+                }
+            }
+            Screen::SaveTrouble { what } => {
+                return Err(RehearsalError::NotSaved {
+                    participant: participant.to_owned(),
+                    why: what.clone(),
+                });
+            }
+            _ => {}
+        }
+        let felt = runner.felt().and_then(|id| impressions.get(id));
+        let inputs = plan.turn(&view, rater, felt, clock);
+        if let Some(ending) = runner.step(inputs) {
+            return Ok(ending);
+        }
+    }
+    Err(RehearsalError::Stuck {
+        participant: participant.to_owned(),
+        screen: screen_name(&runner.view().screen).to_owned(),
+    })
+}
+
+/// What the rater is doing.
+#[derive(Debug, Default)]
+struct Plan {
+    /// Seconds that it still explores; `None`: not decided for this playback.
+    exploring_s: Option<f64>,
+}
+
+impl Plan {
+    /// Lets the time pass that a person would take, then says what they would.
+    fn turn(
+        &mut self,
+        view: &View,
+        rater: &mut Rater,
+        felt: Option<&Impression>,
+        clock: &VirtualClock,
+    ) -> Vec<Input> {
+        let pass = |s: f64| clock.advance(Duration::from_secs_f64(s.max(0.0)));
+        if !matches!(view.screen, Screen::Playing { .. }) {
+            self.exploring_s = None;
+        }
+        match &view.screen {
+            Screen::Who { .. } | Screen::Loading | Screen::Stopping | Screen::Saving => {
+                pass(0.02);
+                Vec::new()
+            }
+            Screen::ResumeChoice { .. } => vec![Input::Resume(crate::outcome::Choice::Continue)],
+            Screen::Consent { .. } => {
+                pass(GLANCE_S);
+                vec![Input::Consent(true)]
+            }
+            Screen::Message { .. } | Screen::End { .. } | Screen::Paused { .. } => {
+                pass(GLANCE_S);
+                vec![Input::Advance]
+            }
+            Screen::Reference { wait_s, .. } => {
+                pass(rater.reference_s().max(*wait_s));
+                vec![Input::Advance]
+            }
+            Screen::Break { wait_s, .. } => {
+                pass(wait_s + GLANCE_S);
+                vec![Input::Advance]
+            }
+            Screen::Playing {
+                strokes_missing, ..
+            } => {
+                // In pieces, so that telemetry flows as it would.
+                const PIECE_S: f64 = 0.25;
+                let left = self
+                    .exploring_s
+                    .get_or_insert_with(|| rater.exploration_s());
+                pass(PIECE_S.min(left.max(0.02)));
+                *left -= PIECE_S;
+                if *left <= 0.0 && *strokes_missing == 0 {
+                    vec![Input::Advance]
+                } else {
+                    Vec::new()
+                }
+            }
+            Screen::Stopped { can_rate } => {
+                pass(GLANCE_S);
+                vec![if *can_rate {
+                    Input::RateStopped
+                } else {
+                    Input::PlayAgain
+                }]
+            }
+            Screen::DeviceTrouble { can_go_on, .. } => {
+                pass(0.5);
+                if *can_go_on {
+                    vec![Input::Advance]
+                } else {
+                    Vec::new()
+                }
+            }
+            Screen::Form { questions, .. } => {
+                pass(rater.response_s());
+                vec![Input::Answer(answers(questions, rater, felt))]
+            }
+            Screen::SaveTrouble { .. } => Vec::new(),
+        }
+    }
+}
+
+/// An answer to each question of a page; an empty optional text is none.
+fn answers(
+    questions: &[Question],
+    rater: &mut Rater,
+    felt: Option<&Impression>,
+) -> Vec<(QuestionId, Answer)> {
+    questions
+        .iter()
+        .map(|q| (q.id.clone(), rater.answer(q, felt)))
+        .filter(|(_, answer)| !matches!(answer, Answer::Text(text) if text.is_empty()))
+        .collect()
+}
+
+fn screen_name(screen: &Screen) -> &'static str {
+    match screen {
+        Screen::Who { .. } => "the first screen",
+        Screen::ResumeChoice { .. } => "the choice to resume",
+        Screen::Consent { .. } => "the consent",
+        Screen::Message { .. } => "a message",
+        Screen::Form { .. } => "a form",
+        Screen::Reference { .. } => "the reference prompt",
+        Screen::Loading => "loading",
+        Screen::Playing { .. } => "playing",
+        Screen::Stopping => "stopping",
+        Screen::Stopped { .. } => "a stopped playback",
+        Screen::DeviceTrouble { .. } => "a device fault",
+        Screen::Saving => "saving",
+        Screen::SaveTrouble { .. } => "a failure to save",
+        Screen::Break { .. } => "a break",
+        Screen::Paused { .. } => "a pause",
+        Screen::End { .. } => "the end",
+    }
+}

@@ -1,0 +1,411 @@
+//! One attempt at a trial: prompt, load, play, stop; and how it fails.
+
+use super::phase::{LOAD_WITHIN_S, Phase, STOP_WITHIN_S, Trouble};
+use super::{Effect, Session};
+use crate::outcome::{Event, Failure, Moment, Playback};
+use crate::protocol::{DeviceKind, Trial};
+use crate::schedule;
+
+impl Session {
+    /// Asks the device for the next trial: the event first, so that the journal
+    /// never knows less than the hand.
+    pub(super) fn begin_attempt(&mut self, reference_s: f64, at: Moment) {
+        let Some(trial) = self.history.next_trial().cloned() else {
+            return self.go_on(at);
+        };
+        let attempt = self.history.attempts(trial.trial) + 1;
+        let started = Event::AttemptStarted {
+            trial: trial.trial,
+            attempt,
+            position: self.history.position(&trial),
+            model: trial.model.clone(),
+            reference_s,
+        };
+        self.record(started, at);
+        self.out.push(Effect::Load {
+            trial: trial.trial,
+            attempt,
+            model: trial.model,
+        });
+        self.phase = Phase::Loading { since: at };
+    }
+
+    pub(super) fn device_loaded(&mut self, at: Moment) {
+        if matches!(self.phase, Phase::Loading { .. }) {
+            self.out.push(Effect::Start);
+            self.phase = Phase::Ready { since: at };
+        }
+    }
+
+    /// A device that starts unasked is made limp, and with it what was on its way.
+    pub(super) fn device_started(&mut self, at: Moment) {
+        match (&mut self.phase, &self.history.open) {
+            (Phase::Ready { .. }, Some(open)) => {
+                let started = Event::PlaybackStarted {
+                    trial: open.trial.trial,
+                    attempt: open.attempt,
+                };
+                self.record(started, at);
+                self.phase = Phase::Playing {
+                    since: at,
+                    strokes: 0,
+                    clamps: 0,
+                };
+            }
+            (Phase::Playing { .. }, _) => {}
+            (Phase::Loading { .. }, _) => {
+                self.out.push(Effect::Limp);
+                self.lose_attempt(Failure::DeviceFault, "the device started unasked", at);
+            }
+            (Phase::Stopping { limped, .. }, _) => {
+                *limped = true;
+                self.out.push(Effect::Limp);
+            }
+            _ => self.out.push(Effect::Limp),
+        }
+    }
+
+    pub(super) fn device_progress(&mut self, now_strokes: u32, now_clamps: u64) {
+        if let Phase::Playing {
+            strokes, clamps, ..
+        } = &mut self.phase
+        {
+            *strokes = now_strokes;
+            *clamps = now_clamps;
+        }
+    }
+
+    /// The confirmed end. Only from here does a way lead to the rating.
+    pub(super) fn device_stopped(&mut self, playback: Playback, at: Moment) {
+        let (broken_off, pause) = match self.phase {
+            Phase::Playing { .. } => (false, false),
+            Phase::Stopping {
+                broken_off, pause, ..
+            } => (broken_off, pause),
+            _ => return,
+        };
+        let Some(open) = &self.history.open else {
+            return;
+        };
+        if !is_sound(&playback) {
+            self.out.push(Effect::Limp);
+            return self.lose_attempt(
+                Failure::PlaybackLost,
+                "the device's account of the playback is no number",
+                at,
+            );
+        }
+        let ended = Event::PlaybackEnded {
+            trial: open.trial.trial,
+            attempt: open.attempt,
+            playback,
+            stopped: broken_off,
+        };
+        self.record(ended, at);
+        self.after_playback(at);
+        if pause {
+            self.start_pause(at);
+        }
+    }
+
+    /// To the rating, or to the choice if it was broken off or too short.
+    pub(super) fn after_playback(&mut self, at: Moment) {
+        let Some(open) = &self.history.open else {
+            return self.go_on(at);
+        };
+        let begun = self.history.any_answer(open.place());
+        let broken_off = open.ended.is_none_or(|(_, stopped)| stopped);
+        if begun || (!broken_off && self.can_rate()) {
+            self.open_trial_form(at);
+        } else {
+            self.phase = Phase::Stopped;
+        }
+    }
+
+    /// Whether the attempt under way has a confirmed end and strokes enough.
+    pub(super) fn can_rate(&self) -> bool {
+        let Some(open) = &self.history.open else {
+            return false;
+        };
+        open.ended
+            .is_some_and(|(playback, _)| playback.strokes >= self.minimum_strokes(&open.trial))
+    }
+
+    /// Strokes that a rating needs; none where nobody counts them.
+    pub(super) fn minimum_strokes(&self, trial: &Trial) -> u32 {
+        let counted = self.claim.as_ref().is_some_and(|c| c.device_telemetry);
+        if counted && !self.by_hand(trial) {
+            self.protocol.trial.minimum_strokes
+        } else {
+            0
+        }
+    }
+
+    /// Whether the realization is mounted by a person, who may take their time.
+    fn by_hand(&self, trial: &Trial) -> bool {
+        let own = self.protocol.model(&trial.model).and_then(|m| m.device);
+        let kind = own.or(self.claim.as_ref().map(|c| c.device_kind));
+        kind == Some(DeviceKind::Manual)
+    }
+
+    pub(super) fn rate_stopped(&mut self, at: Moment) {
+        if !matches!(self.phase, Phase::Stopped) {
+        } else if self.can_rate() {
+            self.open_trial_form(at);
+        } else {
+            self.say("too little was felt to be rated");
+        }
+    }
+
+    pub(super) fn play_again(&mut self, at: Moment) {
+        if !matches!(self.phase, Phase::Stopped) {
+            return;
+        }
+        self.fail(Failure::Stopped, "played again", at);
+        if self.device_lost {
+            self.go_on(at);
+            self.show_trouble_again();
+        } else {
+            self.begin_attempt(0.0, at);
+        }
+    }
+
+    /// Stops playing in order to rate.
+    pub(super) fn finish_playing(&mut self, strokes: u32, at: Moment) {
+        let Some(open) = &self.history.open else {
+            return;
+        };
+        let missing = self.minimum_strokes(&open.trial).saturating_sub(strokes);
+        if missing > 0 {
+            return self.say(format!("{missing} more full strokes first"));
+        }
+        self.ask_to_stop(false, false, at);
+    }
+
+    fn ask_to_stop(&mut self, broken_off: bool, pause: bool, at: Moment) {
+        self.out.push(Effect::Stop);
+        self.phase = Phase::Stopping {
+            since: at,
+            broken_off,
+            limped: false,
+            pause,
+        };
+    }
+
+    /// Esc. A stop keeps the device's account of what was felt; asked twice, or
+    /// where nothing plays, the device is simply made limp.
+    pub(super) fn stop(&mut self, at: Moment) {
+        match &mut self.phase {
+            Phase::Playing { .. } => self.ask_to_stop(true, false, at),
+            Phase::Stopping {
+                broken_off, limped, ..
+            } => {
+                *broken_off = true;
+                *limped = true;
+                self.out.push(Effect::Limp);
+            }
+            Phase::Loading { .. } | Phase::Ready { .. } => {
+                self.out.push(Effect::Limp);
+                self.fail(Failure::Stopped, "stopped before it played", at);
+                self.go_on(at);
+                self.say("stopped");
+            }
+            _ => self.out.push(Effect::Limp),
+        }
+    }
+
+    pub(super) fn pause(&mut self, at: Moment) {
+        match &mut self.phase {
+            Phase::Playing { .. } => self.ask_to_stop(true, true, at),
+            Phase::Stopping { pause, .. } => *pause = true,
+            Phase::Loading { .. } | Phase::Ready { .. } => {
+                self.stop(at);
+                self.start_pause(at);
+            }
+            Phase::ResumeChoice { .. } | Phase::End => self.say("there is nothing to pause"),
+            _ => self.start_pause(at),
+        }
+    }
+
+    fn start_pause(&mut self, at: Moment) {
+        self.record(Event::Paused, at);
+        self.paused = Some(at);
+    }
+
+    pub(super) fn device_fault(&mut self, what: &str, at: Moment) {
+        self.trouble_with(what, Failure::DeviceFault, at);
+    }
+
+    pub(super) fn device_gone(&mut self, what: &str, at: Moment) {
+        self.device_lost = true;
+        self.trouble_with(what, Failure::PlaybackLost, at);
+    }
+
+    pub(super) fn device_ready(&mut self) {
+        self.device_lost = false;
+        if self.in_form() {
+            self.trouble = None;
+        }
+    }
+
+    fn trouble_with(&mut self, what: &str, failure: Failure, at: Moment) {
+        self.out.push(Effect::Limp);
+        if !self.phase.under_way() || matches!(self.phase, Phase::End) {
+            return;
+        }
+        if self.phase.armed() {
+            return self.lose_attempt(failure, what, at);
+        }
+        self.say(format!("device: {}", self.safe(what)));
+        self.set_trouble(what, failure);
+    }
+
+    /// The attempt under way is lost through nobody's wish.
+    fn lose_attempt(&mut self, failure: Failure, what: &str, at: Moment) {
+        self.fail(failure, what, at);
+        self.go_on(at);
+        self.set_trouble(what, failure);
+    }
+
+    fn set_trouble(&mut self, what: &str, failure: Failure) {
+        self.trouble = Some(Trouble {
+            what: self.safe(what),
+            fault: failure == Failure::DeviceFault,
+        });
+    }
+
+    pub(super) fn show_trouble_again(&mut self) {
+        self.trouble = Some(Trouble {
+            what: "the device does not answer".to_owned(),
+            fault: false,
+        });
+    }
+
+    pub(super) fn device_deadlines(&mut self, at: Moment) {
+        let (since, within_s, limped, what) = match &self.phase {
+            Phase::Loading { since } => (since, LOAD_WITHIN_S, false, "the table"),
+            Phase::Ready { since } => (since, LOAD_WITHIN_S, false, "the start"),
+            Phase::Stopping { since, limped, .. } => (since, STOP_WITHIN_S, *limped, "the stop"),
+            _ => return,
+        };
+        let by_hand = |s: &Self| s.history.open.as_ref().is_some_and(|o| s.by_hand(&o.trial));
+        if at.seconds_since(since) < within_s || by_hand(self) {
+            return;
+        }
+        let pause = matches!(self.phase, Phase::Stopping { pause: true, .. });
+        self.out.push(Effect::Limp);
+        if limped {
+            self.phase = Phase::Stopped;
+        } else {
+            let what = format!("the device did not confirm {what} within {within_s} s");
+            self.lose_attempt(Failure::PlaybackLost, &what, at);
+        }
+        if pause {
+            self.start_pause(at);
+        }
+    }
+
+    pub(super) fn mark_bad(&mut self, reason: String, at: Moment) {
+        let Some((trial, attempt, number)) = self.markable() else {
+            return self.say("there is no trial to mark");
+        };
+        if let Err(why) = super::forms::check_words(&reason) {
+            return self.say(why);
+        }
+        if self.phase.armed() {
+            self.out.push(Effect::Limp);
+        }
+        let under_way = self.history.open.is_some();
+        self.fail_trial(trial, attempt, Failure::MarkedBad, &reason, at);
+        if under_way || matches!(self.phase, Phase::Reference { .. } | Phase::Form(_)) {
+            self.go_on(at);
+        }
+        self.say(format!("{number} is marked as bad"));
+    }
+
+    /// The trial that could be marked as bad now: the one under way, or else the
+    /// last finished one.
+    pub(super) fn markable(&self) -> Option<(u32, u32, String)> {
+        if let Some(open) = &self.history.open {
+            let practice = open.trial.practice;
+            let number = self.history.closed(practice) + 1;
+            return Some((open.trial.trial, open.attempt, title(practice, number)));
+        }
+        let between = matches!(
+            self.phase,
+            Phase::Reference { .. } | Phase::Break { .. } | Phase::Saving | Phase::Form(_)
+        );
+        let trial = self.history.last_done.filter(|_| between)?;
+        let (attempt, number) = self.history.done_as(trial)?;
+        (!self.history.over()).then(|| (trial, attempt, title(false, number)))
+    }
+
+    /// Closes the attempt under way as failed.
+    pub(super) fn fail(&mut self, failure: Failure, detail: &str, at: Moment) {
+        if let Some(open) = &self.history.open {
+            let (trial, attempt) = (open.trial.trial, open.attempt);
+            self.fail_trial(trial, attempt, failure, detail, at);
+        }
+    }
+
+    /// A failure that was somebody's wish puts the trial first again; any other
+    /// sends it to the end of its block, until it has failed too often.
+    fn fail_trial(
+        &mut self,
+        number: u32,
+        attempt: u32,
+        failure: Failure,
+        detail: &str,
+        at: Moment,
+    ) {
+        let Some(trial) = self.history.planned(number).cloned() else {
+            return;
+        };
+        let planned = |n: &u32| self.history.planned(*n).cloned();
+        let mut rest: Vec<Trial> = self.history.queue.iter().filter_map(planned).collect();
+        rest.retain(|t| t.trial != number);
+        let mut constraint_broken = false;
+        let mut given_up = false;
+        let queue = if !super::history::counts(failure) {
+            rest.insert(0, trial);
+            rest
+        } else if self.history.failures(number) + 1 >= self.protocol.design.max_attempts {
+            given_up = true;
+            rest
+        } else {
+            let felt = self.history.felt();
+            let again = schedule::requeue(&felt, &rest, &trial, &self.protocol.design);
+            constraint_broken = again.constraint_broken;
+            again.queue
+        };
+        let failed = Event::AttemptFailed {
+            trial: number,
+            attempt,
+            failure,
+            detail: detail.to_owned(),
+            queue: queue.iter().map(|t| t.trial).collect(),
+            constraint_broken,
+        };
+        self.record(failed, at);
+        if given_up {
+            let trial = number;
+            self.record(Event::TrialClosed { trial, attempt }, at);
+        }
+    }
+}
+
+/// "trial 7", "practice 1": as on the screen, which is not the planned number.
+pub(super) fn title(practice: bool, number: u32) -> String {
+    let what = if practice { "practice" } else { "trial" };
+    format!("{what} {number}")
+}
+
+fn is_sound(playback: &Playback) -> bool {
+    [
+        playback.exploration_s,
+        playback.least_energy_j,
+        playback.switches_per_s,
+    ]
+    .iter()
+    .all(|n| n.is_finite())
+}

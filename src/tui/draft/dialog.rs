@@ -1,0 +1,302 @@
+//! What opens above a screen: help, a remark, a correction, a reason, a question
+//! back. A dialog changes nothing until it is confirmed, and Esc closes it.
+
+use super::field::Field;
+use crate::outcome::{Author, Choice};
+use crate::protocol::Answer;
+use crate::session::view::{Correctable, View};
+use crate::session::{Input, Screen};
+use crate::tui::editor::{Editor, Taken};
+use crate::tui::keys::Key;
+
+/// What is open above the screen.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Dialog {
+    /// The keys.
+    Help,
+    /// Something to remark.
+    Remark {
+        /// Who says it.
+        by: Author,
+        /// What.
+        text: Editor,
+    },
+    /// A correction of an earlier answer.
+    Correct(Box<Correct>),
+    /// Why a trial is bad.
+    MarkBad {
+        /// "trial 7".
+        trial: String,
+        /// Why.
+        reason: Editor,
+    },
+    /// Why the question on the screen is declined.
+    Decline {
+        /// Why.
+        reason: Editor,
+    },
+    /// A question back before something that cannot be undone.
+    Confirm(Confirm),
+}
+
+/// What has to be confirmed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Confirm {
+    /// Leaving the program.
+    Quit,
+    /// The participant does not come back.
+    DropOut,
+    /// Consent is refused.
+    Refuse,
+}
+
+/// A correction, step by step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correct {
+    /// What can be corrected, newest first, as it was when this opened.
+    pub items: Vec<Correctable>,
+    /// Which one.
+    pub cursor: usize,
+    /// How far it is.
+    pub step: Step,
+}
+
+/// How far a correction is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// Which answer.
+    List,
+    /// The new answer.
+    Answer(Field),
+    /// Why.
+    Reason {
+        /// The new answer; `None`: declined, for the same reason.
+        answer: Option<Answer>,
+        /// Who wants it.
+        by: Author,
+        /// Why.
+        reason: Editor,
+    },
+}
+
+/// What a key did to a dialog.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// It goes on.
+    Open(Taken),
+    /// It is confirmed and closes; this is to be sent.
+    Done(Vec<Input>),
+    /// It closes and the form on the screen is sent with its question declined.
+    Declined(String),
+    /// It closes.
+    Closed,
+}
+
+impl Dialog {
+    /// A remark; who says it can be changed.
+    pub fn remark() -> Self {
+        Self::Remark {
+            by: Author::Experimenter,
+            text: Editor::new(""),
+        }
+    }
+
+    /// A correction of one of the view's earlier answers.
+    pub fn correct(view: &View) -> Self {
+        Self::Correct(Box::new(Correct {
+            items: view.correctable.clone(),
+            cursor: 0,
+            step: Step::List,
+        }))
+    }
+
+    /// Whether a character is text here, Space included.
+    pub fn is_text(&self) -> bool {
+        match self {
+            Self::Help | Self::Confirm(_) => false,
+            Self::Remark { .. } | Self::MarkBad { .. } | Self::Decline { .. } => true,
+            Self::Correct(correct) => match &correct.step {
+                Step::List => false,
+                Step::Answer(field) => field.is_text(),
+                Step::Reason { .. } => true,
+            },
+        }
+    }
+
+    /// Where text is typed.
+    pub fn editor(&mut self) -> Option<&mut Editor> {
+        match self {
+            Self::Help | Self::Confirm(_) => None,
+            Self::Remark { text, .. } => Some(text),
+            Self::MarkBad { reason, .. } | Self::Decline { reason } => Some(reason),
+            Self::Correct(correct) => match &mut correct.step {
+                Step::List => None,
+                Step::Answer(field) => field.editor(),
+                Step::Reason { reason, .. } => Some(reason),
+            },
+        }
+    }
+
+    /// The key that opened it. It closes it too, without stopping a device that
+    /// plays, unless something is typed.
+    fn own_key(&self) -> Option<Key> {
+        Some(match self {
+            Self::Help => Key::Help,
+            Self::Remark { .. } => Key::Remark,
+            Self::Correct(_) => Key::Correct,
+            Self::MarkBad { .. } => Key::MarkBad,
+            Self::Decline { .. } => Key::Decline,
+            Self::Confirm(_) => return None,
+        })
+    }
+
+    /// Works on the dialog. Esc is the caller's.
+    pub fn key(&mut self, key: Key, screen: &Screen) -> Outcome {
+        if self.own_key() == Some(key) {
+            return match self.editor() {
+                Some(editor) if !editor.is_blank() => {
+                    missing("Something is typed: Enter keeps it, Ctrl-U removes it.")
+                }
+                _ => Outcome::Closed,
+            };
+        }
+        match self {
+            Self::Help => match key {
+                Key::Enter | Key::Char('?' | 'q') => Outcome::Closed,
+                _ => Outcome::Open(Taken::No),
+            },
+            Self::Remark { by, text } => match key {
+                Key::Enter if text.is_blank() => missing("Type the remark first, or Esc."),
+                Key::Enter => Outcome::Done(vec![Input::Remark {
+                    by: *by,
+                    text: text.text().to_owned(),
+                }]),
+                Key::Tab | Key::BackTab => other(by),
+                key => Outcome::Open(text.key(key)),
+            },
+            Self::MarkBad { reason, .. } => match key {
+                Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
+                Key::Enter => Outcome::Done(vec![Input::MarkBad {
+                    reason: reason.text().to_owned(),
+                }]),
+                key => Outcome::Open(reason.key(key)),
+            },
+            Self::Decline { reason } => match key {
+                Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
+                Key::Enter => Outcome::Declined(reason.text().to_owned()),
+                key => Outcome::Open(reason.key(key)),
+            },
+            Self::Confirm(confirm) => confirm.key(key, screen),
+            Self::Correct(correct) => correct.key(key),
+        }
+    }
+}
+
+impl Confirm {
+    fn key(self, key: Key, screen: &Screen) -> Outcome {
+        match key {
+            Key::Char('y' | 'Y') => Outcome::Done(match (self, screen) {
+                (Self::Quit, _) => vec![Input::Quit],
+                (Self::DropOut, Screen::ResumeChoice { .. }) => {
+                    vec![Input::Resume(Choice::DropOut)]
+                }
+                (Self::Refuse, Screen::Consent { .. }) => vec![Input::Consent(false)],
+                // The screen that asked is gone.
+                _ => Vec::new(),
+            }),
+            Key::Char('n' | 'N') => Outcome::Closed,
+            _ => missing("y or n"),
+        }
+    }
+}
+
+impl Correct {
+    /// The answer that is corrected.
+    pub fn item(&self) -> Option<&Correctable> {
+        self.items.get(self.cursor)
+    }
+
+    fn key(&mut self, key: Key) -> Outcome {
+        let last = self.items.len().saturating_sub(1);
+        let Some(item) = self.items.get(self.cursor) else {
+            return Outcome::Closed;
+        };
+        match &mut self.step {
+            Step::List => {
+                self.cursor = match key {
+                    Key::Up => self.cursor.saturating_sub(1),
+                    Key::Down => (self.cursor + 1).min(last),
+                    Key::PageUp => self.cursor.saturating_sub(8),
+                    Key::PageDown => (self.cursor + 8).min(last),
+                    Key::Home => 0,
+                    Key::End => last,
+                    Key::Enter => {
+                        let field = Field::correcting(&item.question, &item.answer);
+                        self.step = Step::Answer(field);
+                        self.cursor
+                    }
+                    _ => return Outcome::Open(Taken::No),
+                };
+                Outcome::Open(Taken::Yes)
+            }
+            Step::Answer(field) => match key {
+                Key::Enter => match field.answer(&item.question) {
+                    Ok(Some(answer)) if answer == item.answer => {
+                        missing("That is the answer as it stands.")
+                    }
+                    Ok(Some(answer)) => self.ask_why(Some(answer)),
+                    Ok(None) if matches!(field, Field::Text(_)) => {
+                        self.ask_why(Some(Answer::Text(String::new())))
+                    }
+                    Ok(None) => missing("Give the new answer first, or Esc."),
+                    Err(why) => missing(&why),
+                },
+                Key::Decline => self.ask_why(None),
+                Key::BackTab => {
+                    self.step = Step::List;
+                    Outcome::Open(Taken::Yes)
+                }
+                key => Outcome::Open(field.key(&item.question, key)),
+            },
+            Step::Reason { answer, by, reason } => match key {
+                Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
+                Key::Enter => {
+                    let reason = reason.text().to_owned();
+                    let declined = Answer::Declined {
+                        reason: reason.clone(),
+                    };
+                    Outcome::Done(vec![Input::Correct {
+                        place: item.place,
+                        question: item.question.id.clone(),
+                        answer: answer.clone().unwrap_or(declined),
+                        reason,
+                        by: *by,
+                    }])
+                }
+                Key::Tab | Key::BackTab => other(by),
+                key => Outcome::Open(reason.key(key)),
+            },
+        }
+    }
+
+    fn ask_why(&mut self, answer: Option<Answer>) -> Outcome {
+        self.step = Step::Reason {
+            answer,
+            by: Author::Experimenter,
+            reason: Editor::new(""),
+        };
+        Outcome::Open(Taken::Yes)
+    }
+}
+
+fn missing(what: &str) -> Outcome {
+    Outcome::Open(Taken::Notice(what.to_owned()))
+}
+
+fn other(by: &mut Author) -> Outcome {
+    *by = match by {
+        Author::Experimenter => Author::Participant,
+        Author::Participant => Author::Experimenter,
+    };
+    Outcome::Open(Taken::Yes)
+}

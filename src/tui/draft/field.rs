@@ -1,0 +1,497 @@
+//! An answer that is being made. None is preset: what nobody chose is not sent.
+
+use crate::protocol::{Answer, Question, QuestionKind};
+use crate::tui::editor::{Editor, Taken};
+use crate::tui::keys::Key;
+use std::collections::BTreeSet;
+
+/// The answer to one question, as far as it goes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Field {
+    /// To a rating.
+    Rating {
+        /// What is chosen.
+        chosen: Option<i64>,
+        /// Digits that may go on: the 1 of 10.
+        typed: String,
+    },
+    /// To a slider.
+    Slider {
+        /// Where the mark is.
+        value: Option<f64>,
+        /// Digits so far.
+        typed: String,
+    },
+    /// To a choice.
+    Choice {
+        /// Where the keys are; nothing is chosen by that.
+        cursor: Option<usize>,
+        /// What is chosen.
+        marked: BTreeSet<usize>,
+    },
+    /// To a number.
+    Number(Editor),
+    /// To a text.
+    Text(Editor),
+}
+
+impl Field {
+    /// Empty, for a question.
+    pub fn new(question: &Question) -> Self {
+        match &question.kind {
+            QuestionKind::Rating { .. } => Self::Rating {
+                chosen: None,
+                typed: String::new(),
+            },
+            QuestionKind::Slider { .. } => Self::Slider {
+                value: None,
+                typed: String::new(),
+            },
+            QuestionKind::Choice { .. } => Self::Choice {
+                cursor: None,
+                marked: BTreeSet::new(),
+            },
+            QuestionKind::Number { .. } => Self::Number(Editor::line("")),
+            QuestionKind::Text => Self::Text(Editor::new("")),
+        }
+    }
+
+    /// For the correction of `old`: a text starts from it, the rest empty.
+    pub fn correcting(question: &Question, old: &Answer) -> Self {
+        match (&question.kind, old) {
+            (QuestionKind::Text, Answer::Text(text)) => Self::Text(Editor::new(text)),
+            _ => Self::new(question),
+        }
+    }
+
+    /// Whether a character is text here, Space included.
+    pub fn is_text(&self) -> bool {
+        matches!(self, Self::Text(_))
+    }
+
+    /// Its editor, if text is typed.
+    pub fn editor(&mut self) -> Option<&mut Editor> {
+        match self {
+            Self::Number(editor) | Self::Text(editor) => Some(editor),
+            _ => None,
+        }
+    }
+
+    /// The answer so far; `None` if there is none yet.
+    ///
+    /// # Errors
+    /// What to do, if what was typed is no answer.
+    pub fn answer(&self, question: &Question) -> Result<Option<Answer>, String> {
+        let answer = match (self, &question.kind) {
+            (Self::Rating { chosen, .. }, _) => chosen.map(Answer::Rating),
+            (Self::Slider { value, .. }, _) => value.map(Answer::Number),
+            (Self::Choice { marked, .. }, QuestionKind::Choice { options, .. })
+                if !marked.is_empty() =>
+            {
+                let chosen = marked.iter().filter_map(|i| options.get(*i).cloned());
+                Some(Answer::Choice(chosen.collect()))
+            }
+            (Self::Number(editor), _) if !editor.is_blank() => {
+                let number = parse(editor.text()).ok_or("Type a number, such as 12.5.")?;
+                Some(Answer::Number(number))
+            }
+            (Self::Text(editor), _) if !editor.is_blank() => {
+                Some(Answer::Text(editor.text().to_owned()))
+            }
+            _ => None,
+        };
+        match &answer {
+            Some(answer) => question.accepts(answer).map_err(|why| sentence(&why))?,
+            None if question.required => return Err(self.ask_for(question)),
+            None => {}
+        }
+        Ok(answer)
+    }
+
+    fn ask_for(&self, question: &Question) -> String {
+        match &question.kind {
+            QuestionKind::Rating { from, to, .. } => {
+                format!("Choose a number from {from} to {to} first.")
+            }
+            QuestionKind::Slider { .. } => "Set the mark first: ← and →.".to_owned(),
+            QuestionKind::Choice { .. } => "Choose from the list first.".to_owned(),
+            QuestionKind::Number { .. } => "Type a number first.".to_owned(),
+            QuestionKind::Text => "Type an answer first.".to_owned(),
+        }
+    }
+
+    /// Works on the answer.
+    pub fn key(&mut self, question: &Question, key: Key) -> Taken {
+        match (self, &question.kind) {
+            (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
+                rating(chosen, typed, *from, *to, key)
+            }
+            (Self::Slider { value, typed }, QuestionKind::Slider { from, to, step, .. }) => {
+                slider(value, typed, (*from, *to, *step), key)
+            }
+            (Self::Choice { cursor, marked }, QuestionKind::Choice { options, multiple }) => {
+                choice(cursor, marked, options.len(), *multiple, key)
+            }
+            (Self::Number(editor), _) => match key {
+                Key::Char(c) if !matches!(c, '0'..='9' | '.' | ',' | '-' | '+' | 'e' | 'E') => {
+                    Taken::No
+                }
+                Key::Up | Key::Down => Taken::No,
+                key => editor.key(key),
+            },
+            (Self::Text(editor), _) => editor.key(key),
+            _ => Taken::No,
+        }
+    }
+
+    /// Takes a click on a number of a scale.
+    pub fn set_number(&mut self, question: &Question, number: f64) {
+        match (self, &question.kind) {
+            (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
+                typed.clear();
+                *chosen = Some((number.round() as i64).clamp(*from, *to));
+            }
+            (Self::Slider { value, typed }, QuestionKind::Slider { from, to, step, .. }) => {
+                typed.clear();
+                *value = Some(on_grid(number, *from, *to, *step));
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes a click on an option of a list.
+    pub fn toggle(&mut self, question: &Question, at: usize) {
+        if let (Self::Choice { cursor, marked }, QuestionKind::Choice { options, multiple }) =
+            (self, &question.kind)
+            && at < options.len()
+        {
+            *cursor = Some(at);
+            mark(marked, at, *multiple);
+        }
+    }
+}
+
+/// What was typed as a number; a comma may stand for the point.
+pub fn parse(text: &str) -> Option<f64> {
+    let number: f64 = text.trim().replace(',', ".").parse().ok()?;
+    number.is_finite().then_some(number)
+}
+
+fn sentence(why: &str) -> String {
+    let mut letters = why.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
+}
+
+fn rating(chosen: &mut Option<i64>, typed: &mut String, from: i64, to: i64, key: Key) -> Taken {
+    if let Key::Char(c @ ('0'..='9' | '-')) = key {
+        for start in [format!("{typed}{c}"), c.to_string()] {
+            let number = start.parse().ok().filter(|n| (from..=to).contains(n));
+            let more = begins_another(&start, from, to);
+            if number.is_some() || more {
+                if number.is_some() {
+                    *chosen = number;
+                }
+                *typed = if more { start } else { String::new() };
+                return Taken::Yes;
+            }
+        }
+        typed.clear();
+        return Taken::Notice(format!("The scale goes from {from} to {to}."));
+    }
+    let big = (to.saturating_sub(from) / 10).max(1);
+    let next = match key {
+        Key::Left => chosen.map_or(to, |n| n.saturating_sub(1)),
+        Key::Right => chosen.map_or(from, |n| n.saturating_add(1)),
+        Key::PageDown => chosen.map_or(to, |n| n.saturating_sub(big)),
+        Key::PageUp => chosen.map_or(from, |n| n.saturating_add(big)),
+        Key::Home => from,
+        Key::End => to,
+        _ => return Taken::No,
+    };
+    typed.clear();
+    *chosen = Some(next.clamp(from, to));
+    Taken::Yes
+}
+
+/// Whether a longer number in the range starts with these digits.
+fn begins_another(start: &str, from: i64, to: i64) -> bool {
+    if start == "-" {
+        return from < 0;
+    }
+    let Ok(n) = start.parse::<i64>() else {
+        return false;
+    };
+    let (mut low, mut high) = (n, n);
+    while n != 0 {
+        let (Some(l), Some(h)) = (low.checked_mul(10), high.checked_mul(10)) else {
+            return false;
+        };
+        (low, high) = if n > 0 {
+            (l, h.saturating_add(9))
+        } else {
+            (l.saturating_sub(9), h)
+        };
+        if low <= to && high >= from {
+            return true;
+        }
+        if (n > 0 && low > to) || (n < 0 && high < from) {
+            return false;
+        }
+    }
+    false
+}
+
+fn slider(
+    value: &mut Option<f64>,
+    typed: &mut String,
+    (from, to, step): (f64, f64, f64),
+    key: Key,
+) -> Taken {
+    if let Key::Char(c @ ('0'..='9' | '.' | ',' | '-')) = key {
+        for start in [format!("{typed}{c}"), c.to_string()] {
+            let number = parse(&start).filter(|n| (from..=to).contains(n));
+            if number.is_some() || matches!(start.as_str(), "-" | "." | "," | "-." | "-,") {
+                if number.is_some() {
+                    *value = number;
+                }
+                *typed = start;
+                return Taken::Yes;
+            }
+        }
+        typed.clear();
+        return Taken::Notice(format!("The scale goes from {from} to {to}."));
+    }
+    // The first key puts the mark in the middle, which favours no end.
+    let moved = |steps: f64| value.map_or((from + to) / 2.0, |v| v + steps * step);
+    let next = match key {
+        Key::Left => moved(-1.0),
+        Key::Right => moved(1.0),
+        Key::PageDown => moved(-10.0),
+        Key::PageUp => moved(10.0),
+        Key::Home => from,
+        Key::End => to,
+        _ => return Taken::No,
+    };
+    typed.clear();
+    *value = Some(on_grid(next, from, to, step));
+    Taken::Yes
+}
+
+/// The nearest whole number of steps from the left end, inside the scale, with
+/// no more decimals than the scale has.
+fn on_grid(value: f64, from: f64, to: f64, step: f64) -> f64 {
+    let steps = ((value - from) / step).round();
+    if !steps.is_finite() {
+        return from;
+    }
+    let decimals = [from, step].map(|n| {
+        let text = n.to_string();
+        text.split_once('.').map_or(0, |(_, d)| d.len())
+    });
+    let decimals = decimals[0].max(decimals[1]).min(15);
+    let exact = from + steps * step;
+    let rounded = format!("{exact:.decimals$}").parse().unwrap_or(exact);
+    rounded.clamp(from, to)
+}
+
+fn choice(
+    cursor: &mut Option<usize>,
+    marked: &mut BTreeSet<usize>,
+    count: usize,
+    multiple: bool,
+    key: Key,
+) -> Taken {
+    let last = count.saturating_sub(1);
+    let at = match key {
+        Key::Up => cursor.map_or(last, |c| c.saturating_sub(1)),
+        Key::Down => cursor.map_or(0, |c| (c + 1).min(last)),
+        Key::PageUp => cursor.map_or(0, |c| c.saturating_sub(8)),
+        Key::PageDown => cursor.map_or(0, |c| (c + 8).min(last)),
+        Key::Home => 0,
+        Key::End => last,
+        Key::Char(' ' | 'x') => {
+            let Some(at) = *cursor else {
+                return Taken::Notice("Move to an entry first: ↑ and ↓.".to_owned());
+            };
+            mark(marked, at, multiple);
+            return Taken::Yes;
+        }
+        Key::Char(c @ '1'..='9') => {
+            let at = c as usize - '1' as usize;
+            if at >= count {
+                return Taken::Notice(format!("The list has {count} entries."));
+            }
+            *cursor = Some(at);
+            mark(marked, at, multiple);
+            return Taken::Yes;
+        }
+        _ => return Taken::No,
+    };
+    if count == 0 {
+        return Taken::No;
+    }
+    *cursor = Some(at);
+    if !multiple {
+        mark(marked, at, false);
+    }
+    Taken::Yes
+}
+
+fn mark(marked: &mut BTreeSet<usize>, at: usize, multiple: bool) {
+    if multiple {
+        if !marked.remove(&at) {
+            marked.insert(at);
+        }
+    } else {
+        marked.clear();
+        marked.insert(at);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::text::QuestionId;
+    use std::collections::BTreeMap;
+
+    fn question(kind: QuestionKind) -> Question {
+        Question {
+            id: QuestionId::new("q").unwrap(),
+            prompt: String::new(),
+            kind,
+            required: true,
+        }
+    }
+
+    fn scale(from: i64, to: i64) -> Question {
+        question(QuestionKind::Rating {
+            from,
+            to,
+            labels: BTreeMap::new(),
+        })
+    }
+
+    fn after(question: &Question, keys: &[Key]) -> Option<f64> {
+        let mut field = Field::new(question);
+        for key in keys {
+            field.key(question, *key);
+        }
+        let answer = field.answer(question).ok().flatten();
+        answer.and_then(|a| a.number())
+    }
+
+    fn digits(text: &str) -> Vec<Key> {
+        text.chars().map(Key::Char).collect()
+    }
+
+    #[test]
+    fn a_digit_chooses_and_another_one_chooses_anew() {
+        assert_eq!(after(&scale(1, 7), &digits("5")), Some(5.0));
+        assert_eq!(after(&scale(1, 7), &digits("53")), Some(3.0));
+        assert_eq!(after(&scale(1, 7), &digits("58")), Some(5.0));
+        assert_eq!(after(&scale(1, 7), &digits("0")), None);
+    }
+
+    #[test]
+    fn numbers_of_several_digits_are_typed() {
+        assert_eq!(after(&scale(1, 10), &digits("1")), Some(1.0));
+        assert_eq!(after(&scale(1, 10), &digits("10")), Some(10.0));
+        assert_eq!(after(&scale(1, 10), &digits("15")), Some(5.0));
+        assert_eq!(after(&scale(0, 100), &digits("37")), Some(37.0));
+        assert_eq!(after(&scale(-3, 3), &digits("-2")), Some(-2.0));
+        assert_eq!(after(&scale(1000, 2000), &digits("1500")), Some(1500.0));
+    }
+
+    #[test]
+    fn arrows_start_at_an_end_and_stay_on_the_scale() {
+        let scale = scale(1, 7);
+        assert_eq!(after(&scale, &[Key::Right]), Some(1.0));
+        assert_eq!(after(&scale, &[Key::Left]), Some(7.0));
+        assert_eq!(after(&scale, &[Key::End, Key::Right]), Some(7.0));
+        assert_eq!(after(&scale, &[Key::Home, Key::Left]), Some(1.0));
+    }
+
+    #[test]
+    fn extreme_scales_do_not_overflow() {
+        let scale = scale(i64::MIN, i64::MAX);
+        assert!(after(&scale, &digits("-9")).is_some());
+        assert_eq!(
+            after(&scale, &[Key::End, Key::Right]),
+            Some(i64::MAX as f64)
+        );
+    }
+
+    #[test]
+    fn a_slider_has_no_mark_until_it_is_moved() {
+        let slider = question(QuestionKind::Slider {
+            from: 0.0,
+            to: 1.0,
+            step: 0.1,
+            labels: BTreeMap::new(),
+        });
+        assert_eq!(after(&slider, &[]), None);
+        assert_eq!(after(&slider, &[Key::Right]), Some(0.5));
+        assert_eq!(
+            after(&slider, &[Key::Home, Key::Right, Key::Right, Key::Right]),
+            Some(0.3)
+        );
+        assert_eq!(after(&slider, &digits("0.75")), Some(0.75));
+        assert_eq!(after(&slider, &digits("2")), None);
+    }
+
+    #[test]
+    fn one_or_several_of_a_list() {
+        let options: Vec<String> = ["a", "b", "c"].map(str::to_owned).to_vec();
+        for (multiple, keys, want) in [
+            (false, vec![Key::Down, Key::Down], vec!["b"]),
+            (false, digits("31"), vec!["a"]),
+            (
+                true,
+                vec![Key::Down, Key::Char(' '), Key::End, Key::Char('x')],
+                vec!["a", "c"],
+            ),
+            (true, digits("323"), vec!["b"]),
+        ] {
+            let question = question(QuestionKind::Choice {
+                options: options.clone(),
+                multiple,
+            });
+            let mut field = Field::new(&question);
+            for key in keys {
+                field.key(&question, key);
+            }
+            let want = want.into_iter().map(str::to_owned).collect();
+            assert_eq!(field.answer(&question), Ok(Some(Answer::Choice(want))));
+        }
+    }
+
+    #[test]
+    fn a_number_may_have_a_comma_and_must_be_in_range() {
+        let number = question(QuestionKind::Number {
+            unit: None,
+            min: Some(0.0),
+            max: Some(120.0),
+        });
+        assert_eq!(after(&number, &digits("12,5")), Some(12.5));
+        let mut field = Field::new(&number);
+        for key in digits("121") {
+            field.key(&number, key);
+        }
+        assert_eq!(
+            field.answer(&number),
+            Err("A number from 0 to 120.".to_owned())
+        );
+        // Letters are no part of a number: "nan" and "inf" cannot be typed.
+        assert_eq!(field.key(&number, Key::Char('n')), Taken::No);
+    }
+
+    #[test]
+    fn an_empty_optional_text_is_no_answer() {
+        let mut text = question(QuestionKind::Text);
+        text.required = false;
+        let mut field = Field::new(&text);
+        field.key(&text, Key::Char(' '));
+        assert_eq!(field.answer(&text), Ok(None));
+    }
+}

@@ -1,0 +1,278 @@
+//! What a key does: first the ones that work everywhere, then the dialog on top,
+//! then the screen.
+
+use super::dialog::{Confirm, Dialog, Outcome};
+use super::{Draft, Here};
+use crate::outcome::Choice;
+use crate::protocol::{Answer, Question};
+use crate::session::{Input, Screen, View};
+use crate::text::QuestionId;
+use crate::tui::editor::Taken;
+use crate::tui::keys::Key;
+
+impl Draft {
+    /// What a key means now.
+    pub(super) fn press(&mut self, key: Key, view: &View) -> Vec<Input> {
+        match key {
+            Key::Esc => {
+                self.dialogs.pop();
+                return vec![Input::Stop];
+            }
+            Key::Char(' ') if view.armed && !self.is_text() => return vec![Input::Stop],
+            Key::Quit => {
+                let quit = Dialog::Confirm(Confirm::Quit);
+                self.dialogs.retain(|open| *open != quit);
+                self.dialogs.push(quit);
+                return Vec::new();
+            }
+            Key::Suspend => {
+                self.suspend = true;
+                return vec![Input::Pause];
+            }
+            Key::Pause => return vec![Input::Pause],
+            Key::Help if self.dialog() != Some(&Dialog::Help) => {
+                self.dialogs.push(Dialog::Help);
+                return Vec::new();
+            }
+            _ => {}
+        }
+        if !self.dialogs.is_empty() {
+            return self.press_in_dialog(key, view);
+        }
+        if let Some(opened) = self.command(key, view) {
+            match opened {
+                Ok(dialog) => self.dialogs.push(dialog),
+                Err(why) => self.notice = Some(why),
+            }
+            return Vec::new();
+        }
+        self.press_on_screen(key, view)
+    }
+
+    /// Whether a character is text now, Space included.
+    fn is_text(&self) -> bool {
+        match (self.dialog(), self.here) {
+            (Some(dialog), _) => dialog.is_text(),
+            (None, Here::Who) => true,
+            (None, Here::Form) => self
+                .form()
+                .and_then(|form| form.fields.get(form.focus))
+                .is_some_and(super::Field::is_text),
+            (None, Here::Elsewhere) => false,
+        }
+    }
+
+    /// The dialog that a key opens, or why it cannot be opened.
+    fn command(&self, key: Key, view: &View) -> Option<Result<Dialog, String>> {
+        let unknown = matches!(view.screen, Screen::Who { .. });
+        Some(match key {
+            Key::Char('?') if !self.is_text() => Ok(Dialog::Help),
+            Key::Remark | Key::Correct | Key::MarkBad if unknown => {
+                Err("That is possible once the session has begun.".to_owned())
+            }
+            Key::Remark => Ok(Dialog::remark()),
+            Key::Correct if view.correctable.is_empty() => {
+                Err("There is no earlier answer to correct.".to_owned())
+            }
+            Key::Correct => Ok(Dialog::correct(view)),
+            Key::MarkBad => match &view.can_mark_bad {
+                Some(trial) => Ok(Dialog::MarkBad {
+                    trial: trial.clone(),
+                    reason: super::Editor::new(""),
+                }),
+                None => Err("There is no trial to mark as bad.".to_owned()),
+            },
+            Key::Decline => match &view.screen {
+                Screen::Form { .. } => Ok(Dialog::Decline {
+                    reason: super::Editor::new(""),
+                }),
+                _ => Err("There is no question to decline.".to_owned()),
+            },
+            _ => return None,
+        })
+    }
+
+    fn press_in_dialog(&mut self, key: Key, view: &View) -> Vec<Input> {
+        let Some(dialog) = self.dialogs.last_mut() else {
+            return Vec::new();
+        };
+        match dialog.key(key, &view.screen) {
+            Outcome::Open(taken) => {
+                self.say(taken);
+                Vec::new()
+            }
+            Outcome::Done(inputs) => {
+                self.dialogs.pop();
+                inputs
+            }
+            Outcome::Closed => {
+                self.dialogs.pop();
+                Vec::new()
+            }
+            Outcome::Declined(reason) => {
+                self.dialogs.pop();
+                match &view.screen {
+                    Screen::Form { questions, .. } => self.submit(questions, Some(reason)),
+                    _ => Vec::new(),
+                }
+            }
+        }
+    }
+
+    fn press_on_screen(&mut self, key: Key, view: &View) -> Vec<Input> {
+        match &view.screen {
+            Screen::Who { claiming, .. } => self.press_who(key, *claiming),
+            Screen::ResumeChoice { .. } => match key {
+                Key::Char('b' | 'B') => vec![Input::Resume(Choice::RestartBlock)],
+                Key::Char('c' | 'C') => vec![Input::Resume(Choice::Continue)],
+                Key::Char('d' | 'D') => self.confirm(Confirm::DropOut),
+                Key::Enter => self.tell("Choose b, c or d."),
+                _ => Vec::new(),
+            },
+            Screen::Consent { .. } => match key {
+                Key::Char('y' | 'Y') => vec![Input::Consent(true)],
+                Key::Char('n' | 'N') => self.confirm(Confirm::Refuse),
+                Key::Enter => self.tell("Choose y or n."),
+                _ => Vec::new(),
+            },
+            Screen::Form { questions, .. } => self.press_form(key, questions),
+            Screen::Message { .. } | Screen::End { .. } | Screen::Break { .. } => {
+                self.press_reading(key, view)
+            }
+            Screen::Stopped { can_rate } => match key {
+                Key::Enter => vec![Input::PlayAgain],
+                Key::Char('r' | 'R') if *can_rate => vec![Input::RateStopped],
+                _ => Vec::new(),
+            },
+            Screen::SaveTrouble { .. } => match key {
+                Key::Enter => vec![Input::RetrySave],
+                _ => Vec::new(),
+            },
+            Screen::Reference { .. }
+            | Screen::Loading
+            | Screen::Playing { .. }
+            | Screen::Stopping
+            | Screen::DeviceTrouble { .. }
+            | Screen::Saving
+            | Screen::Paused { .. } => advance(key, view),
+        }
+    }
+
+    fn press_who(&mut self, key: Key, claiming: bool) -> Vec<Input> {
+        let Some((_, who)) = &mut self.who else {
+            return Vec::new();
+        };
+        if claiming {
+            return Vec::new();
+        }
+        match key {
+            Key::Tab | Key::BackTab | Key::Up | Key::Down => who.on_operator = !who.on_operator,
+            Key::Enter if who.participant.is_blank() => {
+                who.on_operator = false;
+                return self.tell("Type the participant's id first.");
+            }
+            Key::Enter if !who.on_operator && who.operator.is_blank() => who.on_operator = true,
+            Key::Enter => {
+                return vec![Input::Identify {
+                    participant: who.participant.text().trim().to_owned(),
+                    operator: who.operator.text().trim().to_owned(),
+                }];
+            }
+            key => {
+                let taken = who.focused().key(key);
+                self.say(taken);
+            }
+        }
+        Vec::new()
+    }
+
+    fn press_form(&mut self, key: Key, questions: &[Question]) -> Vec<Input> {
+        let Some((_, form)) = &mut self.form else {
+            return Vec::new();
+        };
+        let count = form.fields.len().max(1);
+        match key {
+            Key::Enter => return self.submit(questions, None),
+            Key::Tab => form.focus = (form.focus + 1) % count,
+            Key::BackTab => form.focus = (form.focus + count - 1) % count,
+            key => {
+                let at = form.focus;
+                let (Some(question), Some(field)) = (questions.get(at), form.fields.get_mut(at))
+                else {
+                    return Vec::new();
+                };
+                match field.key(question, key) {
+                    Taken::No if key == Key::Down => form.focus = (at + 1).min(count - 1),
+                    Taken::No if key == Key::Up => form.focus = at.saturating_sub(1),
+                    taken => self.say(taken),
+                }
+            }
+        }
+        Vec::new()
+    }
+
+    /// Sends the form, or says what is missing. With a reason, the first question
+    /// is declined and the others go with it.
+    fn submit(&mut self, questions: &[Question], declined: Option<String>) -> Vec<Input> {
+        let Some((_, form)) = &mut self.form else {
+            return Vec::new();
+        };
+        let mut answers: Vec<(QuestionId, Answer)> = Vec::new();
+        for (at, (question, field)) in questions.iter().zip(&form.fields).enumerate() {
+            let answer = match &declined {
+                Some(reason) if at == 0 => Ok(Some(Answer::Declined {
+                    reason: reason.clone(),
+                })),
+                _ => field.answer(question),
+            };
+            match answer {
+                Ok(Some(answer)) => answers.push((question.id.clone(), answer)),
+                Ok(None) => {}
+                Err(why) => {
+                    form.focus = at;
+                    return self.tell(&why);
+                }
+            }
+        }
+        vec![Input::Answer(answers)]
+    }
+
+    /// A text that is longer than the page is read to its end first.
+    fn press_reading(&mut self, key: Key, view: &View) -> Vec<Input> {
+        let super::Reading {
+            scrolled,
+            most,
+            page,
+        } = self.reading;
+        let page = page.saturating_sub(1).max(1);
+        self.reading.scrolled = match key {
+            Key::Up => scrolled.saturating_sub(1),
+            Key::Down => (scrolled + 1).min(most),
+            Key::PageUp => scrolled.saturating_sub(page),
+            Key::PageDown => (scrolled + page).min(most),
+            Key::Enter if scrolled < most => (scrolled + page).min(most),
+            Key::Home => 0,
+            Key::End => most,
+            key => return advance(key, view),
+        };
+        Vec::new()
+    }
+
+    fn confirm(&mut self, what: Confirm) -> Vec<Input> {
+        self.dialogs.push(Dialog::Confirm(what));
+        Vec::new()
+    }
+
+    fn tell(&mut self, what: &str) -> Vec<Input> {
+        self.notice = Some(what.to_owned());
+        Vec::new()
+    }
+}
+
+fn advance(key: Key, view: &View) -> Vec<Input> {
+    if key == Key::Enter && view.can_advance {
+        vec![Input::Advance]
+    } else {
+        Vec::new()
+    }
+}

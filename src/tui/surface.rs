@@ -1,0 +1,110 @@
+//! The operator's surface without a terminal: events in, inputs and cells out.
+//!
+//! Everything that the terminal shows and does is here, so that whole sessions
+//! can be driven by keys in a test.
+
+use super::draft::Draft;
+use super::theme::{Colour, Theme};
+use super::views::Page;
+use crate::runner::Strip;
+use crate::session::{Input, Screen, View};
+use crossterm::event::{Event, MouseButton, MouseEventKind};
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Position, Rect};
+use ratatui::widgets::Widget as _;
+
+/// A draft, its look and its size.
+#[derive(Debug, Clone)]
+pub struct Surface {
+    draft: Draft,
+    theme: Theme,
+    area: Rect,
+    screen: Option<Screen>,
+}
+
+impl Surface {
+    /// An empty surface of no size yet.
+    pub fn new(colour: Colour) -> Self {
+        Self {
+            draft: Draft::default(),
+            theme: Theme::new(colour),
+            area: Rect::ZERO,
+            screen: None,
+        }
+    }
+
+    /// What is typed and not yet sent.
+    pub fn draft(&self) -> &Draft {
+        &self.draft
+    }
+
+    /// Whether Ctrl-Z was pressed since this was last asked.
+    pub fn take_suspend(&mut self) -> bool {
+        self.draft.take_suspend()
+    }
+
+    /// Follows the view to another screen and size.
+    pub fn follow(&mut self, view: &View, area: Rect) {
+        self.area = area;
+        let old = self.screen.as_ref();
+        if self.draft.follow(view, old) {
+            self.screen = Some(view.screen.clone());
+        }
+        self.measure(view);
+    }
+
+    fn page<'a>(&'a self, view: &'a View, strip: Option<&'a Strip>) -> Page<'a> {
+        Page {
+            view,
+            draft: &self.draft,
+            strip,
+            theme: self.theme,
+        }
+    }
+
+    fn measure(&mut self, view: &View) {
+        let room = self.page(view, None).room(self.area);
+        self.draft.set_room(room.most, room.page);
+        if let Some(columns) = room.columns {
+            self.draft.set_columns(columns);
+        }
+    }
+
+    /// What an event means.
+    pub fn event(&mut self, event: &Event, view: &View) -> Vec<Input> {
+        self.follow(view, self.area);
+        let Event::Mouse(mouse) = event else {
+            let inputs = self.draft.key(event, view);
+            self.measure(view);
+            return inputs;
+        };
+        match mouse.kind {
+            MouseEventKind::Down(MouseButton::Left) => {
+                let place = Position::new(mouse.column, mouse.row);
+                let hit = self.page(view, None).hit(self.area, place);
+                if let Some(target) = hit {
+                    self.draft.pick(target, view);
+                }
+            }
+            MouseEventKind::ScrollDown => self.draft.scroll(true),
+            MouseEventKind::ScrollUp => self.draft.scroll(false),
+            _ => {}
+        }
+        self.measure(view);
+        Vec::new()
+    }
+
+    /// Draws everything; returns where the terminal's cursor belongs.
+    pub fn draw(
+        &self,
+        view: &View,
+        strip: Option<&Strip>,
+        area: Rect,
+        buf: &mut Buffer,
+    ) -> Option<Position> {
+        let page = self.page(view, strip);
+        page.render(area, buf);
+        let cursor = page.cursor(area.intersection(buf.area));
+        cursor.filter(|at| buf.area.contains(*at))
+    }
+}

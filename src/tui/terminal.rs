@@ -1,0 +1,248 @@
+//! The terminal itself: taken, and given back on every way out.
+//!
+//! It is given back when [`Terminal`] is dropped, by a hook when any thread
+//! panics, and around Ctrl-Z. Signals that end the program only raise a flag, so
+//! that the session can stop the device and close its journal first. Events are
+//! read on a thread of their own: reading never returns once a terminal has gone
+//! away, and the device must not wait for that.
+
+use super::TuiError;
+use crossterm::event::{
+    DisableBracketedPaste, DisableMouseCapture, EnableBracketedPaste, EnableMouseCapture, Event,
+};
+use crossterm::terminal::{
+    EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
+};
+use crossterm::{cursor, execute, style};
+use ratatui::backend::CrosstermBackend;
+use rustix::event::{PollFd, PollFlags, Timespec};
+use rustix::process::{Signal, getpid, kill_process};
+use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+use std::io::{self, IsTerminal as _, Stdout};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Once};
+use std::time::Duration;
+
+/// Whether the terminal is ours: raw, on the alternate screen.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+/// Whether the mouse was asked for.
+static MOUSE: AtomicBool = AtomicBool::new(false);
+/// Whether some thread has panicked: the terminal is given back for good.
+static PANICKED: AtomicBool = AtomicBool::new(false);
+static HOOK: Once = Once::new();
+
+/// How long the reading thread waits before it looks whether it should end.
+const READ_SLICE: Duration = Duration::from_millis(100);
+
+/// A terminal that is taken.
+pub(super) struct Terminal {
+    screen: ratatui::Terminal<CrosstermBackend<Stdout>>,
+    events: Receiver<io::Result<Event>>,
+    ended: Arc<AtomicBool>,
+    signal: Arc<AtomicUsize>,
+    continued: Arc<AtomicBool>,
+    registered: Vec<signal_hook::SigId>,
+}
+
+impl Terminal {
+    /// Takes the terminal.
+    pub(super) fn open(mouse: bool) -> Result<Self, TuiError> {
+        if !io::stdin().is_terminal() || !io::stdout().is_terminal() {
+            return Err(TuiError::NoTerminal);
+        }
+        let term = std::env::var("TERM").unwrap_or_default();
+        if term.is_empty() || term == "dumb" {
+            return Err(TuiError::DumbTerminal(term));
+        }
+        HOOK.call_once(|| {
+            let before = std::panic::take_hook();
+            std::panic::set_hook(Box::new(move |info| {
+                PANICKED.store(true, Ordering::SeqCst);
+                give_back();
+                before(info);
+            }));
+        });
+        PANICKED.store(false, Ordering::SeqCst);
+        MOUSE.store(mouse, Ordering::SeqCst);
+
+        let signal = Arc::new(AtomicUsize::new(0));
+        let continued = Arc::new(AtomicBool::new(false));
+        let mut registered = Vec::new();
+        for number in [SIGHUP, SIGINT, SIGQUIT, SIGTERM] {
+            let value = usize::try_from(number).unwrap_or(0);
+            let id = signal_hook::flag::register_usize(number, Arc::clone(&signal), value);
+            registered.push(id.map_err(TuiError::Terminal)?);
+        }
+        let id = signal_hook::flag::register(SIGCONT, Arc::clone(&continued));
+        registered.push(id.map_err(TuiError::Terminal)?);
+
+        take().map_err(TuiError::Terminal)?;
+        let screen = ratatui::Terminal::new(CrosstermBackend::new(io::stdout())).map_err(|e| {
+            give_back();
+            TuiError::Terminal(e)
+        })?;
+        let ended = Arc::new(AtomicBool::new(false));
+        let (send, events) = channel();
+        let stop = Arc::clone(&ended);
+        std::thread::Builder::new()
+            .name("keys".to_owned())
+            .spawn(move || read(&send, &stop))
+            .map_err(|e| {
+                give_back();
+                TuiError::Terminal(e)
+            })?;
+        Ok(Self {
+            screen,
+            events,
+            ended,
+            signal,
+            continued,
+            registered,
+        })
+    }
+
+    /// The screen to draw on.
+    pub(super) fn screen(&mut self) -> &mut ratatui::Terminal<CrosstermBackend<Stdout>> {
+        &mut self.screen
+    }
+
+    /// The name of a signal that asked the program to end, once.
+    pub(super) fn take_signal(&self) -> Option<&'static str> {
+        match i32::try_from(self.signal.swap(0, Ordering::SeqCst)) {
+            Ok(SIGHUP) => Some("SIGHUP"),
+            Ok(SIGINT) => Some("SIGINT"),
+            Ok(SIGQUIT) => Some("SIGQUIT"),
+            Ok(SIGTERM) => Some("SIGTERM"),
+            _ => None,
+        }
+    }
+
+    /// Looks whether the terminal is still there and ours; says whether it was
+    /// emptied and has to be drawn again.
+    pub(super) fn check(&mut self) -> Result<bool, String> {
+        if PANICKED.load(Ordering::SeqCst) {
+            return Err("a part of the program failed; see the message above".to_owned());
+        }
+        if hung_up() {
+            return Err("the terminal is gone".to_owned());
+        }
+        // Somebody stopped the program from outside and let it go on: the shell
+        // may have changed the terminal in between.
+        if self.continued.swap(false, Ordering::SeqCst) {
+            give_back();
+            self.again()?;
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    /// The next event, within a time.
+    pub(super) fn event(&self, timeout: Duration) -> Result<Option<Event>, String> {
+        match self.events.recv_timeout(timeout) {
+            Ok(Ok(event)) => Ok(Some(event)),
+            Ok(Err(error)) => Err(format!("the terminal cannot be read: {error}")),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            Err(RecvTimeoutError::Disconnected) => Err("the terminal is gone".to_owned()),
+        }
+    }
+
+    /// Goes to the background, as Ctrl-Z asks, and comes back with `fg`.
+    pub(super) fn suspend(&mut self) -> Result<(), String> {
+        give_back();
+        let stopped = kill_process(getpid(), Signal::TSTP);
+        self.continued.store(false, Ordering::SeqCst);
+        self.again()?;
+        stopped.map_err(|error| format!("the program cannot be suspended: {error}"))
+    }
+
+    fn again(&mut self) -> Result<(), String> {
+        let gone = |error: io::Error| format!("the terminal cannot be taken again: {error}");
+        take().map_err(gone)?;
+        self.screen.clear().map_err(gone)
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::SeqCst);
+        for id in self.registered.drain(..) {
+            signal_hook::low_level::unregister(id);
+        }
+        give_back();
+    }
+}
+
+/// Raw mode, alternate screen, pasting as one event.
+fn take() -> io::Result<()> {
+    enable_raw_mode()?;
+    TAKEN.store(true, Ordering::SeqCst);
+    let entered = execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste);
+    let entered = entered.and_then(|()| {
+        if MOUSE.load(Ordering::SeqCst) {
+            execute!(io::stdout(), EnableMouseCapture)
+        } else {
+            Ok(())
+        }
+    });
+    if entered.is_err() {
+        give_back();
+    }
+    entered
+}
+
+/// The terminal as it was. Every step is tried: a failed one hides no other.
+fn give_back() {
+    if !TAKEN.swap(false, Ordering::SeqCst) {
+        return;
+    }
+    // Raw mode first: it needs no room in the output, which may be blocked.
+    let _ = disable_raw_mode();
+    if hung_up() {
+        return;
+    }
+    if MOUSE.load(Ordering::SeqCst) {
+        let _ = execute!(io::stdout(), DisableMouseCapture);
+    }
+    let _ = execute!(
+        io::stdout(),
+        DisableBracketedPaste,
+        style::ResetColor,
+        LeaveAlternateScreen,
+        cursor::Show
+    );
+}
+
+/// Whether the terminal's other end is closed. SIGHUP may be ignored, and
+/// reading would not tell.
+fn hung_up() -> bool {
+    let (stdin, stdout) = (io::stdin(), io::stdout());
+    let gone = PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL;
+    let mut ends = [
+        PollFd::new(&stdin, PollFlags::empty()),
+        PollFd::new(&stdout, PollFlags::empty()),
+    ];
+    let now = Timespec {
+        tv_sec: 0,
+        tv_nsec: 0,
+    };
+    match rustix::event::poll(&mut ends, Some(&now)) {
+        Ok(_) => ends.iter().any(|end| end.revents().intersects(gone)),
+        Err(_) => false,
+    }
+}
+
+/// Sends events until it should end or nobody listens.
+fn read(send: &Sender<io::Result<Event>>, stop: &AtomicBool) {
+    while !stop.load(Ordering::SeqCst) && !hung_up() {
+        let event = match crossterm::event::poll(READ_SLICE) {
+            Ok(false) => continue,
+            Ok(true) => crossterm::event::read(),
+            Err(error) => Err(error),
+        };
+        let failed = event.is_err();
+        if send.send(event).is_err() || failed {
+            return;
+        }
+    }
+}

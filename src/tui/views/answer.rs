@@ -1,0 +1,229 @@
+//! The place where one question is answered, whatever its kind.
+
+use super::choice::List;
+use super::scale::{self, Boxes, TRACK_ROWS, Track};
+use crate::protocol::{Question, QuestionKind};
+use crate::tui::draft::Target;
+use crate::tui::draft::field::{self, Field};
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{TextField, left, middle, row};
+use crate::tui::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Position, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+use std::collections::BTreeMap;
+
+/// A question's answer, as far as it goes.
+#[derive(Debug)]
+pub struct AnswerField<'a> {
+    /// The question.
+    pub question: &'a Question,
+    /// The answer.
+    pub field: &'a Field,
+    /// Whether keys go here.
+    pub focused: bool,
+    /// Rows of a rating's boxes.
+    pub tall: u16,
+    /// Whether it stands in the middle or at the left.
+    pub centred: bool,
+    /// Its look.
+    pub theme: Theme,
+}
+
+impl<'a> AnswerField<'a> {
+    fn boxes(&self, columns: u16) -> Option<Boxes<'a>> {
+        match (&self.question.kind, self.field) {
+            (QuestionKind::Rating { from, to, labels }, Field::Rating { chosen, .. })
+                if scale::fits(*from, *to, columns) =>
+            {
+                Some(Boxes {
+                    from: *from,
+                    to: *to,
+                    labels,
+                    chosen: *chosen,
+                    tall: self.tall,
+                    theme: self.theme,
+                })
+            }
+            _ => None,
+        }
+    }
+
+    fn track(&self) -> Option<Track<'a>> {
+        match (&self.question.kind, self.field) {
+            (QuestionKind::Rating { from, to, labels }, Field::Rating { chosen, .. }) => {
+                let label = |n| labels.get(n).map_or("", String::as_str);
+                Some(Track {
+                    from: *from as f64,
+                    to: *to as f64,
+                    low: label(from),
+                    high: label(to),
+                    value: chosen.map(|n| n as f64),
+                    theme: self.theme,
+                })
+            }
+            (
+                QuestionKind::Slider {
+                    from, to, labels, ..
+                },
+                Field::Slider { value, .. },
+            ) => Some(Track {
+                from: *from,
+                to: *to,
+                low: end_label(labels, *from),
+                high: end_label(labels, *to),
+                value: *value,
+                theme: self.theme,
+            }),
+            _ => None,
+        }
+    }
+
+    fn list(&self) -> Option<List<'a>> {
+        match (&self.question.kind, self.field) {
+            (QuestionKind::Choice { options, multiple }, Field::Choice { cursor, marked }) => {
+                Some(List {
+                    options,
+                    multiple: *multiple,
+                    cursor: *cursor,
+                    marked,
+                    theme: self.theme,
+                })
+            }
+            _ => None,
+        }
+    }
+
+    fn text(&self) -> Option<TextField<'a>> {
+        match self.field {
+            Field::Text(editor) | Field::Number(editor) => Some(TextField {
+                editor,
+                focused: self.focused,
+                theme: self.theme,
+            }),
+            _ => None,
+        }
+    }
+
+    /// From the first box to the last, if it is a scale of boxes.
+    pub fn edges(&self, area: Rect) -> Option<Rect> {
+        let at = Rect { height: 3, ..area };
+        let places = self.boxes(area.width)?.places(at);
+        let (first, last) = (places.first()?.1, places.last()?.1);
+        Some(Rect {
+            x: first.x,
+            width: last.right() - first.x,
+            ..area
+        })
+    }
+
+    /// Rows that it takes in so many columns; at most `most`.
+    pub fn rows(&self, columns: u16, most: u16) -> u16 {
+        let rows = if let Some(boxes) = self.boxes(columns) {
+            self.tall + boxes.caption_rows(columns)
+        } else if let Some(track) = self.track() {
+            TRACK_ROWS + track.caption_rows(columns)
+        } else if let Some(list) = self.list() {
+            list.rows(self.inner(Rect::new(0, 0, columns, 1)).width)
+        } else if let Field::Text(editor) = self.field {
+            let area = self.inner(Rect::new(0, 0, columns, 1));
+            let lines = editor.layout(TextField::columns(area)).0.len();
+            u16::try_from(lines).unwrap_or(most).max(3)
+        } else {
+            2
+        };
+        rows.min(most)
+    }
+
+    /// The part of the area that lists and texts use.
+    fn inner(&self, area: Rect) -> Rect {
+        let width = if let Some(list) = self.list() {
+            list.columns().clamp(20, area.width.max(20))
+        } else if matches!(self.field, Field::Number(_)) {
+            36
+        } else {
+            area.width.min(72)
+        };
+        if self.centred {
+            middle(area, width, area.height)
+        } else {
+            Rect {
+                width: width.min(area.width),
+                ..area
+            }
+        }
+    }
+
+    /// What the mouse hits at a place.
+    pub fn hit(&self, area: Rect, at: usize, place: Position) -> Option<Target> {
+        if !area.contains(place) {
+            return None;
+        }
+        if let Some(boxes) = self.boxes(area.width) {
+            let places = boxes.places(area);
+            let hit = places.into_iter().find(|(_, r)| r.contains(place));
+            return hit.map(|(n, _)| Target::Number(at, n as f64));
+        }
+        if let Some(track) = self.track() {
+            let near = Track::line(area);
+            let hit = place.y <= near.y + 1 && place.x >= near.x && place.x < near.right();
+            return hit.then(|| Target::Number(at, track.value_at(area, place.x)));
+        }
+        if let Some(list) = self.list() {
+            let places = list.places(self.inner(area));
+            let hit = places.into_iter().find(|(_, r)| r.contains(place));
+            return hit.map(|(i, _)| Target::Option(at, i));
+        }
+        Some(Target::Field(at))
+    }
+
+    /// Where the terminal's cursor belongs.
+    pub fn cursor(&self, area: Rect) -> Option<Position> {
+        let mut inner = self.inner(area);
+        if matches!(self.field, Field::Number(_)) {
+            inner.height = inner.height.min(1);
+        }
+        self.text()?.cursor(inner)
+    }
+
+    /// Columns for text, where text is typed.
+    pub fn columns(&self, area: Rect) -> usize {
+        TextField::columns(self.inner(area))
+    }
+}
+
+impl Widget for &AnswerField<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        if let Some(boxes) = self.boxes(area.width) {
+            boxes.render(area, buf);
+        } else if let Some(track) = self.track() {
+            track.render(area, buf);
+        } else if let Some(list) = self.list() {
+            list.render(self.inner(area), buf);
+        } else if let (Some(text), QuestionKind::Number { unit, .. }) =
+            (self.text(), &self.question.kind)
+        {
+            let inner = self.inner(area);
+            text.render(row(inner, 0), buf);
+            let unit = unit.as_deref().unwrap_or_default();
+            // What was understood: a comma may have been meant otherwise.
+            let read = match field::parse(text.editor.text()) {
+                Some(number) => format!("= {number} {}", wrap::one_line(unit, 20)),
+                None => wrap::one_line(unit, 24),
+            };
+            let line = Line::from(Span::styled(format!("  {read}"), self.theme.quiet()));
+            left(buf, row(inner, 1), &line);
+        } else if let Some(text) = self.text() {
+            text.render(self.inner(area), buf);
+        }
+    }
+}
+
+/// The words at an end of a slider, whose keys are the ends as text.
+fn end_label(labels: &BTreeMap<String, String>, end: f64) -> &str {
+    let found = labels
+        .iter()
+        .find(|(key, _)| key.trim().parse::<f64>().is_ok_and(|n| n == end));
+    found.map_or("", |(_, label)| label.as_str())
+}

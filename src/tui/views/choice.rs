@@ -1,0 +1,143 @@
+//! A list to choose from; it scrolls where it is longer than its place.
+
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{left, row};
+use crate::tui::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+use std::collections::BTreeSet;
+
+/// Options with a mark before each.
+#[derive(Debug)]
+pub struct List<'a> {
+    /// What there is to choose from.
+    pub options: &'a [String],
+    /// Whether several can be chosen.
+    pub multiple: bool,
+    /// Where the keys are.
+    pub cursor: Option<usize>,
+    /// What is chosen.
+    pub marked: &'a BTreeSet<usize>,
+    /// Its look.
+    pub theme: Theme,
+}
+
+/// Cells before an option's words: digit, cursor and mark.
+const MARGIN: u16 = 8;
+/// Most lines of one option.
+const LINES: usize = 3;
+
+impl List<'_> {
+    /// The words of each option, laid out.
+    fn lines(&self, columns: u16) -> Vec<Vec<String>> {
+        let columns = usize::from(columns.saturating_sub(MARGIN)).max(1);
+        let lay = |option: &String| wrap::paragraph(option, columns, LINES);
+        self.options.iter().map(lay).collect()
+    }
+
+    /// Rows of the whole list.
+    pub fn rows(&self, columns: u16) -> u16 {
+        let all: usize = self.lines(columns).iter().map(Vec::len).sum();
+        u16::try_from(all).unwrap_or(u16::MAX)
+    }
+
+    /// Columns that the widest option takes.
+    pub fn columns(&self) -> u16 {
+        let widest = self
+            .options
+            .iter()
+            .map(|o| wrap::width(&wrap::one_line(o, 400)));
+        u16::try_from(widest.max().unwrap_or(0)).unwrap_or(400) + MARGIN
+    }
+
+    /// The first row of the list that is shown: the cursor stays in sight.
+    fn scrolled(&self, lines: &[Vec<String>], height: u16) -> usize {
+        let height = usize::from(height);
+        let until = self.cursor.unwrap_or(0) + 1;
+        let end: usize = lines.iter().take(until).map(Vec::len).sum();
+        let all: usize = lines.iter().map(Vec::len).sum();
+        // One more line of context, where there is one.
+        (end + 1).min(all).saturating_sub(height)
+    }
+
+    /// Each option that is in sight, and where.
+    pub fn places(&self, area: Rect) -> Vec<(usize, Rect)> {
+        let lines = self.lines(area.width);
+        let first = self.scrolled(&lines, area.height);
+        let mut at = 0;
+        let mut places = Vec::new();
+        for (i, option) in lines.iter().enumerate() {
+            for _ in option {
+                if at >= first && at - first < usize::from(area.height) {
+                    let y = u16::try_from(at - first).unwrap_or(u16::MAX);
+                    places.push((i, row(area, y)));
+                }
+                at += 1;
+            }
+        }
+        places
+    }
+}
+
+impl Widget for &List<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let lines = self.lines(area.width);
+        let first = self.scrolled(&lines, area.height);
+        let mut at = 0;
+        for (i, option) in lines.iter().enumerate() {
+            let marked = self.marked.contains(&i);
+            let here = self.cursor == Some(i);
+            let mark = match (self.multiple, marked) {
+                (true, true) => "[✓]",
+                (true, false) => "[ ]",
+                (false, true) => "(●)",
+                (false, false) => "( )",
+            };
+            for (j, words) in option.iter().enumerate() {
+                let y = at;
+                at += 1;
+                if y < first || y - first >= usize::from(area.height) {
+                    continue;
+                }
+                let style = if marked {
+                    self.theme.chosen()
+                } else if here {
+                    self.theme.strong()
+                } else {
+                    self.theme.text()
+                };
+                let mut spans = if j == 0 {
+                    let digit = if i < 9 {
+                        (i + 1).to_string()
+                    } else {
+                        " ".to_owned()
+                    };
+                    let pointer = if here { "›" } else { " " };
+                    vec![
+                        Span::styled(digit, self.theme.quiet()),
+                        Span::styled(format!(" {pointer} "), self.theme.focus()),
+                        Span::styled(format!("{mark} "), style),
+                    ]
+                } else {
+                    vec![Span::raw(" ".repeat(usize::from(MARGIN)))]
+                };
+                spans.push(Span::styled(words.as_str(), style));
+                let y = u16::try_from(y - first).unwrap_or(u16::MAX);
+                left(buf, row(area, y), &Line::from(spans));
+            }
+        }
+        // More above or below, said in the last column.
+        let more = |y: u16, arrow: &'static str, buf: &mut Buffer| {
+            let line = Line::from(Span::styled(arrow, self.theme.key()));
+            crate::tui::widgets::right(buf, row(area, y), &line);
+        };
+        if first > 0 {
+            more(0, "↑", buf);
+        }
+        if at > first + usize::from(area.height) {
+            more(area.height.saturating_sub(1), "↓", buf);
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! What opens above a screen.
+
+use super::answer::AnswerField;
+use crate::outcome::Author;
+use crate::protocol::Answer;
+use crate::tui::draft::dialog::{Confirm, Correct, Dialog, Step};
+use crate::tui::editor::Editor;
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{TextField, dialog, hints, left, left_all, middle, row, rows};
+use crate::tui::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Position, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+/// A dialog above a page.
+#[derive(Debug)]
+pub struct DialogView<'a> {
+    /// What is open.
+    pub dialog: &'a Dialog,
+    /// Whether Esc also stops a device that is loaded or plays.
+    pub armed: bool,
+    /// Its look.
+    pub theme: Theme,
+}
+
+/// The keys that help lists.
+pub const KEYS: [(&str, &str, &str); 13] = [
+    ("Enter", "", "goes on, confirms, saves"),
+    ("Esc", "", "stops the device, always; closes a dialog"),
+    ("Space", "", "stops the device while it is loaded or plays"),
+    ("1–9  ← →  mouse", "", "choose"),
+    ("Tab", "", "to the comment and back"),
+    ("Alt-Enter", "Ctrl-J", "a new line in a text"),
+    ("F2", "Ctrl-R", "a remark, at any time"),
+    ("F3", "Ctrl-E", "correct an earlier answer"),
+    ("F4", "Ctrl-B", "mark the trial as bad"),
+    ("F5", "Ctrl-P", "pause"),
+    ("F6", "Ctrl-D", "decline the question, with a reason"),
+    ("F10", "Ctrl-Q", "leave; the session can be picked up later"),
+    ("F1", "?", "this page"),
+];
+
+/// An answer in a few words, safe to show.
+pub fn answer_words(answer: &Answer, columns: usize) -> String {
+    match answer {
+        Answer::Declined { reason } => wrap::one_line(&format!("declined: {reason}"), columns),
+        Answer::Text(text) if text.trim().is_empty() => "–".to_owned(),
+        other => wrap::one_line(&other.cell(), columns),
+    }
+}
+
+impl DialogView<'_> {
+    /// The frame, and what is inside it.
+    fn place(&self, area: Rect) -> (&'static str, Rect) {
+        let (title, width, height) = match self.dialog {
+            Dialog::Help => ("Keys", 72, 19),
+            Dialog::Remark { .. } => ("Remark", 68, 11),
+            Dialog::Correct(correct) => match &correct.step {
+                Step::List => ("Correct an answer", 76, 16),
+                Step::Answer(_) => ("Correct an answer", 76, 18),
+                Step::Reason { .. } => ("Correct an answer", 68, 12),
+            },
+            Dialog::MarkBad { .. } => ("Mark as bad", 68, 10),
+            Dialog::Decline { .. } => ("Decline this question", 68, 10),
+            Dialog::Confirm(_) => ("Are you sure?", 60, 8),
+        };
+        (title, middle(area, width, height.min(area.height)))
+    }
+
+    fn inside(&self, area: Rect) -> Rect {
+        let (_, place) = self.place(area);
+        Rect {
+            x: place.x + 3.min(place.width),
+            width: place.width.saturating_sub(6),
+            y: place.y + 1.min(place.height),
+            height: place.height.saturating_sub(2),
+        }
+    }
+
+    /// The text field, and where it is.
+    fn field(&self, area: Rect) -> Option<(&Editor, Rect)> {
+        let inside = self.inside(area);
+        let at = |from: u16| rows(inside, from, inside.height.saturating_sub(from + 2));
+        match self.dialog {
+            Dialog::Help | Dialog::Confirm(_) => None,
+            Dialog::Remark { text, .. } => Some((text, at(3))),
+            Dialog::MarkBad { reason, .. } | Dialog::Decline { reason } => Some((reason, at(3))),
+            Dialog::Correct(correct) => match &correct.step {
+                Step::Reason { reason, .. } => Some((reason, at(5))),
+                _ => None,
+            },
+        }
+    }
+
+    fn answer<'b>(&'b self, area: Rect) -> Option<(AnswerField<'b>, Rect)> {
+        let Dialog::Correct(correct) = self.dialog else {
+            return None;
+        };
+        let (Step::Answer(field), Some(item)) = (&correct.step, correct.item()) else {
+            return None;
+        };
+        let inside = self.inside(area);
+        let answer = AnswerField {
+            question: &item.question,
+            field,
+            focused: true,
+            tall: 3,
+            centred: true,
+            theme: self.theme,
+        };
+        Some((answer, rows(inside, 6, inside.height.saturating_sub(8))))
+    }
+
+    /// Where the terminal's cursor belongs.
+    pub fn cursor(&self, area: Rect) -> Option<Position> {
+        if let Some((editor, at)) = self.field(area) {
+            let field = TextField {
+                editor,
+                focused: true,
+                theme: self.theme,
+            };
+            return field.cursor(at);
+        }
+        let (answer, at) = self.answer(area)?;
+        answer.cursor(at)
+    }
+
+    /// Columns of the text that is typed.
+    pub fn columns(&self, area: Rect) -> Option<usize> {
+        if let Some((_, at)) = self.field(area) {
+            return Some(TextField::columns(at));
+        }
+        let (answer, at) = self.answer(area)?;
+        Some(answer.columns(at))
+    }
+
+    fn keys(&self, buf: &mut Buffer, inside: Rect, keys: &[(&str, &str)]) {
+        let last = row(inside, inside.height.saturating_sub(1));
+        let esc = if self.armed {
+            ("Esc", "closes and STOPS")
+        } else {
+            ("Esc", "closes")
+        };
+        let mut keys = keys.to_vec();
+        match self.dialog {
+            Dialog::Confirm(_) => {}
+            Dialog::Help if !self.armed => {}
+            _ => keys.push(esc),
+        }
+        left(buf, last, &hints(self.theme, &keys));
+    }
+
+    fn by(&self, by: Author) -> Line<'static> {
+        let mark = |author| if by == author { "(●)" } else { "( )" };
+        let style = |author| {
+            if by == author {
+                self.theme.chosen()
+            } else {
+                self.theme.text()
+            }
+        };
+        let one =
+            |author, name: &str| Span::styled(format!("{} {name}   ", mark(author)), style(author));
+        Line::from(vec![
+            Span::styled("Says  ", self.theme.quiet()),
+            one(Author::Experimenter, "experimenter"),
+            one(Author::Participant, "participant"),
+        ])
+    }
+
+    fn help(&self, buf: &mut Buffer, inside: Rect) {
+        for (y, (key, other, what)) in (1u16..).zip(KEYS) {
+            let both = if other.is_empty() {
+                key.to_owned()
+            } else {
+                format!("{key}  {other}")
+            };
+            let line = Line::from(vec![
+                Span::styled(format!("{both:<20}"), self.theme.key()),
+                Span::styled(what, self.theme.text()),
+            ]);
+            left(buf, row(inside, y), &line);
+        }
+        self.keys(buf, inside, &[("Enter", "closes")]);
+    }
+
+    fn correct(&self, buf: &mut Buffer, inside: Rect, correct: &Correct) {
+        let quiet = self.theme.quiet();
+        if correct.step == Step::List {
+            let height = inside.height.saturating_sub(4);
+            let first = (correct.cursor + 1).saturating_sub(usize::from(height));
+            let items = correct.items.iter().enumerate().skip(first);
+            for (y, (i, item)) in (1..=height).zip(items) {
+                let here = i == correct.cursor;
+                let style = if here {
+                    self.theme.chosen()
+                } else {
+                    self.theme.text()
+                };
+                let answer =
+                    answer_words(&item.answer, usize::from(inside.width).saturating_sub(34));
+                let words = format!(
+                    "{} {:<11} {:<18} {answer}",
+                    if here { "›" } else { " " },
+                    wrap::one_line(&item.title, 11),
+                    wrap::one_line(item.question.id.as_str(), 18),
+                );
+                left(buf, row(inside, y), &Line::from(Span::styled(words, style)));
+            }
+            let keys = [("↑ ↓", "which"), ("Enter", "correct it")];
+            self.keys(buf, inside, &keys);
+            return;
+        }
+        let Some(item) = correct.item() else {
+            return;
+        };
+        let columns = usize::from(inside.width);
+        let prompt = wrap::one_line(&item.question.prompt, columns);
+        left(
+            buf,
+            row(inside, 1),
+            &Line::from(Span::styled(prompt, self.theme.strong())),
+        );
+        let now = answer_words(&item.answer, columns.saturating_sub(20));
+        let title = wrap::one_line(&item.title, 12);
+        let arrow = match &correct.step {
+            Step::Reason { answer, .. } => match answer {
+                Some(new) => format!("  →  {}", answer_words(new, columns.saturating_sub(40))),
+                None => "  →  declined".to_owned(),
+            },
+            _ => String::new(),
+        };
+        let line = Line::from(vec![
+            Span::styled(format!("{title}: "), quiet),
+            Span::styled(format!("{now}{arrow}"), self.theme.text()),
+        ]);
+        left(buf, row(inside, 2), &line);
+        match &correct.step {
+            Step::Reason { by, .. } => {
+                left(buf, row(inside, 3), &self.by(*by));
+                let why = Line::from(Span::styled("Why? Both answers are kept.", quiet));
+                left(buf, row(inside, 4), &why);
+                let keys = [("Enter", "corrects"), ("Tab", "who")];
+                self.keys(buf, inside, &keys);
+            }
+            _ => {
+                let new = Line::from(Span::styled("The new answer:", quiet));
+                left(buf, row(inside, 4), &new);
+                let keys = [("Enter", "goes on"), ("F6", "declined")];
+                self.keys(buf, inside, &keys);
+            }
+        }
+    }
+
+    fn ask(&self, buf: &mut Buffer, inside: Rect, words: &str, keys: &[(&str, &str)]) {
+        let lines = wrap::paragraph(words, usize::from(inside.width).max(1), 3);
+        left_all(buf, rows(inside, 1, 3), &lines, self.theme.text());
+        self.keys(buf, inside, keys);
+    }
+}
+
+impl Widget for &DialogView<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let (title, place) = self.place(area);
+        let inside = dialog(buf, place, title, self.theme);
+        match self.dialog {
+            Dialog::Help => self.help(buf, inside),
+            Dialog::Remark { by, .. } => {
+                left(buf, row(inside, 1), &self.by(*by));
+                let keys = [("Enter", "saves"), ("Tab", "who")];
+                self.keys(buf, inside, &keys);
+            }
+            Dialog::Correct(correct) => self.correct(buf, inside, correct),
+            Dialog::MarkBad { trial, .. } => {
+                let trial = wrap::one_line(trial, 20);
+                let words = format!("Why is {trial} bad? It does not count and comes back later.");
+                self.ask(buf, inside, &words, &[("Enter", "marks it")]);
+            }
+            Dialog::Decline { .. } => {
+                let words = "Why is there no answer? The reason is kept.";
+                self.ask(buf, inside, words, &[("Enter", "declines")]);
+            }
+            Dialog::Confirm(confirm) => {
+                let (words, yes) = match confirm {
+                    Confirm::Quit => (
+                        "Leave the session? What was answered is kept, and it can be picked up where it stops.",
+                        "leave",
+                    ),
+                    Confirm::DropOut => (
+                        "The participant does not come back? This ends their part in the study.",
+                        "drop out",
+                    ),
+                    Confirm::Refuse => (
+                        "You do not agree? Then the session ends here, and nothing more is asked.",
+                        "I do not agree",
+                    ),
+                };
+                self.ask(buf, inside, words, &[("y", yes), ("n", "back")]);
+            }
+        }
+        if let Some((editor, at)) = self.field(area) {
+            let field = TextField {
+                editor,
+                focused: true,
+                theme: self.theme,
+            };
+            field.render(at, buf);
+        }
+        if let Some((answer, at)) = self.answer(area) {
+            answer.render(at, buf);
+        }
+    }
+}

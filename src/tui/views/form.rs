@@ -1,0 +1,283 @@
+//! A page of questions: the first in full, an optional text below it.
+//!
+//! The participant sees it in the middle, at arm's length; an experimenter who
+//! types what is said sees the question to ask, compact, with the answers so far.
+
+use super::answer::AnswerField;
+use crate::protocol::{Entry, Question, QuestionKind};
+use crate::session::View;
+use crate::tui::draft::{Form, Target};
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{centre_all, left, left_all, middle, row, rows};
+use crate::tui::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Position, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+/// The form on the screen.
+#[derive(Debug)]
+pub struct FormView<'a> {
+    /// For the mode of entry and the earlier answers.
+    pub view: &'a View,
+    /// The questions.
+    pub questions: &'a [Question],
+    /// Whether the experimenter is asked.
+    pub to_experimenter: bool,
+    /// Their answers.
+    pub form: &'a Form,
+    /// Whether keys go here.
+    pub focused: bool,
+    /// Its look.
+    pub theme: Theme,
+}
+
+/// Where everything of a form is.
+struct Placed {
+    prompt: Rect,
+    words: Vec<String>,
+    answers: Vec<(usize, Option<Rect>, Rect)>,
+    end: u16,
+}
+
+impl FormView<'_> {
+    fn compact(&self) -> bool {
+        self.to_experimenter || self.view.entry == Entry::Experimenter
+    }
+
+    fn answer(&self, at: usize, tall: u16) -> Option<AnswerField<'_>> {
+        Some(AnswerField {
+            question: self.questions.get(at)?,
+            field: self.form.fields.get(at)?,
+            focused: self.focused && self.form.focus == at,
+            tall,
+            centred: !self.compact(),
+            theme: self.theme,
+        })
+    }
+
+    /// The part of the body that is used.
+    fn column(&self, area: Rect) -> Rect {
+        if self.compact() {
+            let left = 4.min(area.width);
+            Rect {
+                x: area.x + left,
+                width: (area.width - left).min(100),
+                ..area
+            }
+        } else {
+            let width = area.width.saturating_sub(12).min(120);
+            middle(area, width, area.height)
+        }
+    }
+
+    fn tall(&self, area: Rect) -> u16 {
+        match area.height {
+            _ if self.compact() => 3,
+            ..14 => 3,
+            14..26 => 5,
+            _ => 7,
+        }
+    }
+
+    fn place(&self, body: Rect) -> Placed {
+        let area = self.column(body);
+        let tall = self.tall(area);
+        let most = if area.height < 14 { 3 } else { 6 };
+        let prompt = self.questions.first().map_or("", |q| q.prompt.as_str());
+        let label = if self.compact() { 8 } else { 0 };
+        let columns = usize::from(area.width).saturating_sub(label).min(72);
+        let words = wrap::paragraph(prompt, columns.max(1), most);
+        let prompt_rows = u16::try_from(words.len()).unwrap_or(1);
+        let mut space = area.height.saturating_sub(prompt_rows);
+
+        // What each answer would like, then less where the page is full.
+        let later = u16::try_from(self.questions.len().saturating_sub(1)).unwrap_or(0);
+        let reserved = later * 3;
+        let mut heights: Vec<u16> = Vec::new();
+        for at in 0..self.questions.len() {
+            let Some(answer) = self.answer(at, tall) else {
+                break;
+            };
+            let titled = u16::from(at > 0);
+            let most = if at == 0 {
+                space.saturating_sub(reserved)
+            } else {
+                space.saturating_sub(titled).min(6)
+            };
+            let height = answer.rows(area.width, most);
+            space = space.saturating_sub(height + titled);
+            heights.push(height);
+        }
+        let wanted = 1 + later;
+        let gap = (space / (wanted + 1)).min(if self.compact() { 1 } else { 2 });
+
+        let used: u16 = heights.iter().sum::<u16>() + prompt_rows + later + gap * wanted;
+        let top = if self.compact() {
+            1.min(area.height.saturating_sub(used))
+        } else {
+            area.height.saturating_sub(used) * 2 / 5
+        };
+        let mut y = top;
+        let prompt = rows(area, y, prompt_rows);
+        y += prompt_rows + gap;
+        let mut answers = Vec::new();
+        // What comes after a scale of boxes keeps to their edges.
+        let boxes = self.answer(0, tall).and_then(|a| a.edges(area));
+        let below = boxes.filter(|edges| edges.width >= 48).unwrap_or(area);
+        for (at, height) in heights.iter().enumerate() {
+            let area = if at > 0 { below } else { area };
+            let title = (at > 0).then(|| {
+                let title = row(area, y);
+                y += 1;
+                title
+            });
+            answers.push((at, title, rows(area, y, *height)));
+            y += height + gap;
+        }
+        Placed {
+            prompt,
+            words,
+            answers,
+            end: y,
+        }
+    }
+
+    /// What the mouse hits at a place.
+    pub fn hit(&self, body: Rect, place: Position) -> Option<Target> {
+        let tall = self.tall(self.column(body));
+        let placed = self.place(body);
+        placed.answers.into_iter().find_map(|(at, title, area)| {
+            if title.is_some_and(|t| t.contains(place)) {
+                return Some(Target::Field(at));
+            }
+            self.answer(at, tall)?.hit(area, at, place)
+        })
+    }
+
+    /// Where the terminal's cursor belongs.
+    pub fn cursor(&self, body: Rect) -> Option<Position> {
+        let tall = self.tall(self.column(body));
+        let placed = self.place(body);
+        let (at, _, area) = placed.answers.get(self.form.focus)?;
+        self.answer(*at, tall)?.cursor(*area)
+    }
+
+    /// Columns of the text that has the focus.
+    pub fn columns(&self, body: Rect) -> Option<usize> {
+        let placed = self.place(body);
+        let (at, _, area) = placed.answers.get(self.form.focus)?;
+        Some(self.answer(*at, 3)?.columns(*area))
+    }
+
+    /// The keys that work here.
+    pub fn hints(&self) -> Vec<(String, &'static str)> {
+        let mut keys = Vec::new();
+        let at = self.form.focus;
+        match self.questions.get(at).map(|q| &q.kind) {
+            Some(QuestionKind::Rating { from, to, .. }) => {
+                keys.push((format!("{from}–{to}").replace('-', "−"), "choose"));
+            }
+            Some(QuestionKind::Slider { .. }) => keys.push(("← →".to_owned(), "move")),
+            Some(QuestionKind::Choice { multiple: true, .. }) => {
+                keys.push(("↑ ↓".to_owned(), "move"));
+                keys.push(("Space".to_owned(), "mark"));
+            }
+            Some(QuestionKind::Choice { .. }) => keys.push(("↑ ↓".to_owned(), "choose")),
+            Some(QuestionKind::Text) => keys.push(("Alt-Enter".to_owned(), "new line")),
+            Some(QuestionKind::Number { .. }) | None => {}
+        }
+        if self.questions.len() > 1 {
+            let other = if at == 0 { "comment" } else { "back" };
+            let is_comment = self
+                .questions
+                .iter()
+                .skip(1)
+                .any(|q| q.id.as_str() == "comment");
+            let other = if at == 0 && !is_comment {
+                "next"
+            } else {
+                other
+            };
+            keys.push(("Tab".to_owned(), other));
+        }
+        keys.push(("Enter".to_owned(), "save"));
+        keys
+    }
+
+    fn so_far(&self, buf: &mut Buffer, area: Rect) {
+        if area.height < 3 || self.view.correctable.is_empty() {
+            return;
+        }
+        let title = Line::from(Span::styled("Before", self.theme.quiet()));
+        left(buf, row(area, 0), &title);
+        for (y, earlier) in (1..area.height).zip(&self.view.correctable) {
+            let columns = usize::from(area.width).saturating_sub(30);
+            let answer = super::dialogs::answer_words(&earlier.answer, columns);
+            let line = Line::from(vec![
+                Span::styled(
+                    format!("{:<10} ", wrap::one_line(&earlier.title, 10)),
+                    self.theme.quiet(),
+                ),
+                Span::styled(
+                    format!("{:<16} ", wrap::one_line(earlier.question.id.as_str(), 16)),
+                    self.theme.quiet(),
+                ),
+                Span::styled(answer, self.theme.quiet()),
+            ]);
+            left(buf, row(area, y), &line);
+        }
+    }
+}
+
+impl Widget for &FormView<'_> {
+    fn render(self, body: Rect, buf: &mut Buffer) {
+        let tall = self.tall(self.column(body));
+        let placed = self.place(body);
+        if self.compact() {
+            let ask = if self.to_experimenter {
+                "Set up"
+            } else {
+                "Ask"
+            };
+            let label = Line::from(Span::styled(ask, self.theme.quiet()));
+            left(buf, row(placed.prompt, 0), &label);
+            let indented = Rect {
+                x: placed.prompt.x + 8.min(placed.prompt.width),
+                width: placed.prompt.width.saturating_sub(8),
+                ..placed.prompt
+            };
+            left_all(buf, indented, &placed.words, self.theme.strong());
+        } else {
+            centre_all(buf, placed.prompt, &placed.words, self.theme.strong());
+        }
+        for (at, title, area) in &placed.answers {
+            let Some(answer) = self.answer(*at, tall) else {
+                continue;
+            };
+            if let Some(title) = title {
+                let question = answer.question;
+                let words = wrap::one_line(
+                    &question.prompt,
+                    usize::from(title.width).saturating_sub(11),
+                );
+                let mut spans = vec![Span::styled(words, self.theme.text())];
+                if !question.required {
+                    spans.push(Span::styled(" (optional)", self.theme.quiet()));
+                }
+                let title = if self.compact() {
+                    *title
+                } else {
+                    middle(*title, 72, 1)
+                };
+                left(buf, title, &Line::from(spans));
+            }
+            answer.render(*area, buf);
+        }
+        if self.compact() {
+            let area = self.column(body);
+            let y = placed.end + 1;
+            self.so_far(buf, rows(area, y, 6));
+        }
+    }
+}

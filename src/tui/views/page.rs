@@ -1,0 +1,284 @@
+//! The page: banner and progress, the screen, a notice, the keys, the
+//! experimenter's line; a dialog above them; a few words where it is too small.
+
+use super::MINIMUM;
+use super::dialogs::DialogView;
+use super::form::FormView;
+use super::playing::Playing;
+use super::prose::{ProseView, prose};
+use super::status::{Status, Top};
+use super::trouble::Trouble;
+use super::who::WhoView;
+use crate::protocol::Entry;
+use crate::runner::Strip;
+use crate::session::view::DeviceState;
+use crate::session::{Screen, View};
+use crate::tui::draft::{Draft, Target};
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{centre, hints, middle, row, rows};
+use crate::tui::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Position, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+/// Where the experimenter types, these keys are in sight always.
+const COMMANDS: &str = "F2 remark  ·  F3 correct  ·  F4 bad trial  ·  F5 pause  ·  F6 declined";
+
+/// Everything that is on the terminal.
+#[derive(Debug)]
+pub struct Page<'a> {
+    /// What the session shows.
+    pub view: &'a View,
+    /// What is typed.
+    pub draft: &'a Draft,
+    /// The live strip, where it was asked for.
+    pub strip: Option<&'a Strip>,
+    /// Its look.
+    pub theme: Theme,
+}
+
+/// What a page says about itself, for the draft to follow.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Room {
+    /// Lines of a long text that can be scrolled away.
+    pub most: usize,
+    /// Lines of a long text that fit.
+    pub page: usize,
+    /// Columns of the text that is typed.
+    pub columns: Option<usize>,
+}
+
+impl<'a> Page<'a> {
+    fn too_small(area: Rect) -> bool {
+        area.width < MINIMUM.0 || area.height < MINIMUM.1
+    }
+
+    /// Where the screen is.
+    fn body(area: Rect) -> Rect {
+        rows(area, 1, area.height.saturating_sub(5))
+    }
+
+    fn form(&self) -> Option<FormView<'a>> {
+        match &self.view.screen {
+            Screen::Form {
+                questions,
+                to_experimenter,
+                ..
+            } => Some(FormView {
+                view: self.view,
+                questions,
+                to_experimenter: *to_experimenter,
+                form: self.draft.form()?,
+                focused: self.draft.dialog().is_none(),
+                theme: self.theme,
+            }),
+            _ => None,
+        }
+    }
+
+    fn who(&self) -> Option<WhoView<'a>> {
+        match &self.view.screen {
+            Screen::Who { claiming, .. } => Some(WhoView {
+                who: self.draft.who()?,
+                claiming: *claiming,
+                focused: self.draft.dialog().is_none(),
+                theme: self.theme,
+            }),
+            _ => None,
+        }
+    }
+
+    fn dialog(&self) -> Option<DialogView<'a>> {
+        Some(DialogView {
+            dialog: self.draft.dialog()?,
+            armed: self.view.armed,
+            theme: self.theme,
+        })
+    }
+
+    /// What the mouse hits at a place.
+    pub fn hit(&self, area: Rect, place: Position) -> Option<Target> {
+        if Self::too_small(area) || self.draft.dialog().is_some() {
+            return None;
+        }
+        self.form()?.hit(Self::body(area), place)
+    }
+
+    /// Where the terminal's cursor belongs.
+    pub fn cursor(&self, area: Rect) -> Option<Position> {
+        if Self::too_small(area) {
+            return None;
+        }
+        let body = Self::body(area);
+        if let Some(dialog) = self.dialog() {
+            return dialog.cursor(body);
+        }
+        if let Some(form) = self.form() {
+            return form.cursor(body);
+        }
+        self.who()?.cursor(body)
+    }
+
+    /// How much fits.
+    pub fn room(&self, area: Rect) -> Room {
+        if Self::too_small(area) {
+            return Room::default();
+        }
+        let body = Self::body(area);
+        let (most, page) = match prose(self.view) {
+            Some(prose) => self.prose(&prose).room(body),
+            None => (0, 0),
+        };
+        let columns = match (self.dialog(), self.form()) {
+            (Some(dialog), _) => dialog.columns(body),
+            (None, Some(form)) => form.columns(body),
+            (None, None) => None,
+        };
+        Room {
+            most,
+            page,
+            columns,
+        }
+    }
+
+    fn prose<'b>(&self, prose: &'b super::prose::Prose) -> ProseView<'b> {
+        ProseView {
+            prose,
+            reading: self.draft.reading(),
+            theme: self.theme,
+        }
+    }
+
+    fn screen(&self, area: Rect, buf: &mut Buffer) {
+        if let Some(form) = self.form() {
+            form.render(area, buf);
+        } else if let Some(who) = self.who() {
+            who.render(area, buf);
+        } else if let Some(trouble) = Trouble::new(&self.view.screen, self.theme) {
+            trouble.render(area, buf);
+        } else if let Screen::Playing {
+            since_s,
+            strokes_missing,
+        } = &self.view.screen
+        {
+            let playing = Playing {
+                view: self.view,
+                since_s: *since_s,
+                strokes_missing: *strokes_missing,
+                strip: self.strip,
+                theme: self.theme,
+            };
+            playing.render(area, buf);
+        } else if let Some(prose) = prose(self.view) {
+            self.prose(&prose).render(area, buf);
+        }
+    }
+
+    /// The keys at the foot of the screen.
+    fn keys(&self) -> Vec<(String, &'static str)> {
+        let own = |keys: &[(&str, &'static str)]| {
+            let own = keys.iter().map(|(key, what)| ((*key).to_owned(), *what));
+            own.collect::<Vec<_>>()
+        };
+        if let Some(form) = self.form() {
+            return form.hints();
+        }
+        match &self.view.screen {
+            Screen::Who {
+                claiming: false, ..
+            } => own(&[("Tab", "other field"), ("Enter", "begin")]),
+            Screen::Playing { .. } if self.view.can_advance => {
+                own(&[("Enter", "to rate"), ("Esc", "stops")])
+            }
+            Screen::Playing { .. } | Screen::Loading => own(&[("Esc", "stops")]),
+            Screen::DeviceTrouble {
+                can_go_on: true, ..
+            } => own(&[("Enter", "goes on"), ("F10", "leaves")]),
+            Screen::DeviceTrouble { .. } => own(&[("F10", "leaves")]),
+            Screen::SaveTrouble { .. } => own(&[("Enter", "tries again")]),
+            _ => {
+                let reading = self.draft.reading();
+                match prose(self.view) {
+                    Some(_) if reading.scrolled < reading.most => {
+                        own(&[("Enter", "reads on"), ("↑ ↓", "scroll")])
+                    }
+                    Some(prose) => own(&prose.keys),
+                    None => Vec::new(),
+                }
+            }
+        }
+    }
+
+    fn small(&self, area: Rect, buf: &mut Buffer) {
+        let stop = if self.view.armed {
+            "Esc or Space stops the device."
+        } else {
+            "Esc stops the device."
+        };
+        let (w, h) = MINIMUM;
+        let lines = [
+            format!(
+                "{w} × {h} is needed, this is {} × {}.",
+                area.width, area.height
+            ),
+            "Make the window larger.".to_owned(),
+            stop.to_owned(),
+        ];
+        let columns = usize::from(area.width).max(1);
+        let wrapped: Vec<String> = lines
+            .iter()
+            .flat_map(|line| wrap::paragraph(line, columns, 3))
+            .collect();
+        let height = u16::try_from(wrapped.len()).unwrap_or(3);
+        let place = middle(area, area.width, height);
+        crate::tui::widgets::centre_all(buf, place, &wrapped, self.theme.text());
+    }
+}
+
+impl Widget for &Page<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let area = area.intersection(buf.area);
+        if area.is_empty() {
+            return;
+        }
+        if Page::too_small(area) {
+            self.small(area, buf);
+            return;
+        }
+        let top = Top {
+            view: self.view,
+            theme: self.theme,
+        };
+        top.render(row(area, 0), buf);
+        let body = Page::body(area);
+        self.screen(body, buf);
+        let keys = self.keys();
+        let keys: Vec<(&str, &str)> = keys.iter().map(|(k, w)| (k.as_str(), *w)).collect();
+        if self.draft.dialog().is_none() {
+            let line = hints(self.theme, &keys);
+            centre(buf, row(area, area.height - 3), &line);
+            if self.view.entry == Entry::Experimenter
+                && self.view.line.device != DeviceState::Unknown
+            {
+                let line = Line::from(Span::styled(COMMANDS, self.theme.quiet()));
+                centre(buf, row(area, area.height - 2), &line);
+            }
+        }
+        if let Some(dialog) = self.dialog() {
+            dialog.render(body, buf);
+        }
+        let notice = self.draft.notice().or(self.view.notice.as_deref());
+        if let Some(notice) = notice {
+            let words = wrap::one_line(notice, usize::from(area.width).saturating_sub(8));
+            let line = Line::from(Span::styled(words, self.theme.notice()));
+            centre(buf, row(area, area.height - 4), &line);
+        }
+        let status = Status {
+            line: &self.view.line,
+            unsaved: matches!(self.view.screen, Screen::SaveTrouble { .. }),
+            theme: self.theme,
+        };
+        status.render(row(area, area.height - 1), buf);
+    }
+}

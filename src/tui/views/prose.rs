@@ -1,0 +1,326 @@
+//! Screens that are mainly words: texts to read, prompts, pauses, choices by a
+//! letter.
+
+use crate::protocol::Entry;
+use crate::session::view::MessageKind;
+use crate::session::{Screen, View};
+use crate::tui::draft::Reading;
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{centre, centre_all, clock, left_all, middle, right, row, rows};
+use crate::tui::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+/// Widest column that is easy to read.
+const COLUMN: u16 = 66;
+
+/// Words in the middle of the page.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Prose {
+    /// One dim line above.
+    pub above: String,
+    /// The large line or lines.
+    pub title: String,
+    /// What comes below, already in the words of the screen.
+    pub body: String,
+    /// Whether the body is a text to read: from the left, and scrolled.
+    pub long: bool,
+    /// Keys in a column, each with what it does and a second line.
+    pub choices: Vec<(&'static str, &'static str, &'static str)>,
+    /// The keys at the foot.
+    pub keys: Vec<(&'static str, &'static str)>,
+}
+
+/// The words of a screen; `None` for the screens that are more than words.
+pub fn prose(view: &View) -> Option<Prose> {
+    let aloud = view.entry == Entry::Experimenter;
+    let read_out = |text: &str| {
+        if aloud {
+            text.to_owned()
+        } else {
+            String::new()
+        }
+    };
+    let ready: &[_] = if view.can_advance {
+        &[("Enter", "when ready")]
+    } else {
+        &[]
+    };
+    let wait = |seconds: f64| {
+        if seconds > 0.0 && seconds.is_finite() {
+            match seconds.ceil() {
+                1.0 => "in 1 second".to_owned(),
+                whole if whole < 100.0 => format!("in {whole} seconds"),
+                whole => format!("in {}", clock(whole)),
+            }
+        } else {
+            String::new()
+        }
+    };
+    Some(match &view.screen {
+        Screen::ResumeChoice { gap_h, done, total } => Prose {
+            title: "This session was not finished.".to_owned(),
+            body: format!(
+                "{done} of {total} trials are done. The last one was {} ago.",
+                hours(*gap_h)
+            ),
+            choices: vec![
+                (
+                    "b",
+                    "restart the block",
+                    "what was felt in it is felt again",
+                ),
+                ("c", "continue where it stopped", "what follows is marked"),
+                ("d", "drop out", "the participant does not come back"),
+            ],
+            ..Prose::default()
+        },
+        Screen::Consent { document, version } => Prose {
+            above: read_out("Ask the participant"),
+            title: "Do you agree to take part?".to_owned(),
+            body: if version.is_empty() {
+                document.clone()
+            } else {
+                format!("{document}, version {version}")
+            },
+            choices: vec![("y", "yes, I agree", ""), ("n", "no", "")],
+            ..Prose::default()
+        },
+        Screen::Message { kind, text } => Prose {
+            above: match kind {
+                MessageKind::Welcome | MessageKind::Instructions => read_out("Read out"),
+                MessageKind::Practice => "Practice".to_owned(),
+                MessageKind::PracticeOver => String::new(),
+            },
+            body: text.clone(),
+            long: true,
+            keys: vec![("Enter", "goes on")],
+            ..Prose::default()
+        },
+        Screen::Reference { prompt, wait_s } => Prose {
+            above: read_out("Tell the participant"),
+            title: prompt.clone(),
+            body: if *wait_s > 0.0 {
+                format!("You can go on {}.", wait(*wait_s))
+            } else {
+                "Take as long as you like.".to_owned()
+            },
+            keys: ready.to_vec(),
+            ..Prose::default()
+        },
+        Screen::Loading => Prose {
+            title: "One moment.".to_owned(),
+            body: "The device gets ready.".to_owned(),
+            ..Prose::default()
+        },
+        Screen::Stopping => Prose {
+            title: "Stopping.".to_owned(),
+            ..Prose::default()
+        },
+        Screen::Stopped { can_rate } => Prose {
+            title: "■  The device is stopped.".to_owned(),
+            body: "It gives no force. This trial is not lost.".to_owned(),
+            choices: if *can_rate {
+                vec![
+                    ("Enter", "play it again", ""),
+                    ("r", "rate what was felt", ""),
+                ]
+            } else {
+                vec![("Enter", "play it again", "")]
+            },
+            ..Prose::default()
+        },
+        Screen::Saving => Prose {
+            title: "Saving …".to_owned(),
+            ..Prose::default()
+        },
+        Screen::Break { text, wait_s } => Prose {
+            above: "Break".to_owned(),
+            body: if text.trim().is_empty() {
+                "Take a rest. Let go of the device, look away from the screen.".to_owned()
+            } else {
+                text.clone()
+            },
+            long: true,
+            title: if *wait_s > 0.0 {
+                format!("It goes on {} at the earliest.", wait(*wait_s))
+            } else {
+                String::new()
+            },
+            keys: ready.to_vec(),
+            ..Prose::default()
+        },
+        Screen::Paused { since_s } => Prose {
+            title: "Paused".to_owned(),
+            body: format!("for {}. The device gives no force.", clock(*since_s)),
+            keys: vec![("Enter", "goes on"), ("F10", "leaves")],
+            ..Prose::default()
+        },
+        Screen::End { text } => Prose {
+            body: if text.trim().is_empty() {
+                "That was all. Thank you!".to_owned()
+            } else {
+                text.clone()
+            },
+            long: true,
+            keys: vec![("Enter", "closes")],
+            ..Prose::default()
+        },
+        Screen::Who { .. }
+        | Screen::Form { .. }
+        | Screen::Playing { .. }
+        | Screen::DeviceTrouble { .. }
+        | Screen::SaveTrouble { .. } => return None,
+    })
+}
+
+fn hours(gap_h: f64) -> String {
+    if !gap_h.is_finite() || gap_h < 0.0 {
+        "some time".to_owned()
+    } else if gap_h < 48.0 {
+        format!("{gap_h:.1} hours")
+    } else {
+        format!("{:.0} days", gap_h / 24.0)
+    }
+}
+
+/// The words of a screen, in its look.
+#[derive(Debug)]
+pub struct ProseView<'a> {
+    /// The words.
+    pub prose: &'a Prose,
+    /// How far a long text is read.
+    pub reading: Reading,
+    /// Its look.
+    pub theme: Theme,
+}
+
+impl ProseView<'_> {
+    /// The lines of a long text, and the place for them.
+    fn text(&self, area: Rect) -> (Vec<String>, Rect) {
+        let column = middle(area, COLUMN.min(area.width.saturating_sub(8)), area.height);
+        let lines = wrap::paragraph(&self.prose.body, usize::from(column.width), usize::MAX);
+        let head = u16::from(!self.prose.above.is_empty()) * 2;
+        let foot = u16::from(!self.prose.title.is_empty()) * 2;
+        let room = area.height.saturating_sub(head + foot).max(1);
+        let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room);
+        let widest = lines.iter().map(|l| wrap::width(l)).max().unwrap_or(0);
+        let used = height + head + foot;
+        let top = head + area.height.saturating_sub(used) * 2 / 5;
+        let narrow = u16::try_from(widest).unwrap_or(column.width);
+        (lines, middle(rows(column, top, height), narrow, height))
+    }
+
+    /// Lines that can be scrolled away, and lines of a page.
+    pub fn room(&self, area: Rect) -> (usize, usize) {
+        if !self.prose.long {
+            return (0, 0);
+        }
+        let (lines, place) = self.text(area);
+        let page = usize::from(place.height);
+        (lines.len().saturating_sub(page), page)
+    }
+
+    fn long(&self, area: Rect, buf: &mut Buffer) {
+        let (lines, place) = self.text(area);
+        let page = usize::from(place.height);
+        let from = self.reading.scrolled.min(lines.len().saturating_sub(page));
+        let style = self.theme.text();
+        if place.y >= area.y + 2 && !self.prose.above.is_empty() {
+            let above = Rect {
+                y: place.y - 2,
+                height: 1,
+                ..area
+            };
+            let line = Line::from(Span::styled(self.prose.above.as_str(), self.theme.quiet()));
+            centre(buf, above, &line);
+        }
+        if lines.len() <= 2 {
+            let wide = Rect {
+                x: area.x,
+                width: area.width,
+                ..place
+            };
+            centre_all(buf, wide, &lines, self.theme.strong());
+        } else {
+            left_all(buf, place, &lines[from..], style);
+        }
+        let more = lines.len() > from + page;
+        let foot = Rect {
+            y: place.bottom() + 1,
+            height: 1,
+            ..area
+        };
+        if foot.bottom() <= area.bottom() && !self.prose.title.is_empty() {
+            let line = Line::from(Span::styled(self.prose.title.as_str(), self.theme.quiet()));
+            centre(buf, foot, &line);
+        }
+        let arrow = |text: &'static str| Line::from(Span::styled(text, self.theme.key()));
+        if from > 0 {
+            right(buf, row(area, 0), &arrow("↑ more  "));
+        }
+        if more {
+            right(
+                buf,
+                row(area, area.height.saturating_sub(1)),
+                &arrow("↓ more  "),
+            );
+        }
+    }
+}
+
+impl Widget for &ProseView<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let prose = self.prose;
+        if prose.long {
+            self.long(area, buf);
+            return;
+        }
+        let columns = usize::from(area.width.saturating_sub(8).min(COLUMN)).max(1);
+        let room = usize::from(area.height / 2).max(1);
+        let above = wrap::paragraph(&prose.above, columns, 1);
+        let title = wrap::paragraph(&prose.title, columns, room);
+        let body = if prose.body.is_empty() {
+            Vec::new()
+        } else {
+            wrap::paragraph(&prose.body, columns, room)
+        };
+        let len = |lines: &[String]| u16::try_from(lines.len()).unwrap_or(0);
+        let has_above = !prose.above.is_empty();
+        let choice_rows = u16::try_from(prose.choices.len() * 2).unwrap_or(0);
+        let used = u16::from(has_above) * 2 + len(&title) + 2 + len(&body) + 1 + choice_rows;
+        let mut y = area.height.saturating_sub(used) * 2 / 5;
+        if has_above {
+            centre_all(buf, rows(area, y, 1), &above, self.theme.quiet());
+            y += 2;
+        }
+        centre_all(buf, rows(area, y, len(&title)), &title, self.theme.strong());
+        y += len(&title) + 1;
+        centre_all(buf, rows(area, y, len(&body)), &body, self.theme.text());
+        y += len(&body) + 2;
+        let widest = |(key, what, more): &(&str, &str, &str)| {
+            let more = if more.is_empty() {
+                0
+            } else {
+                wrap::width(more) + 3
+            };
+            wrap::width(key).max(5) + 2 + wrap::width(what) + more
+        };
+        let wide = prose.choices.iter().map(widest).max().unwrap_or(0);
+        let wide = u16::try_from(wide).unwrap_or(u16::MAX);
+        for (key, what, more) in &prose.choices {
+            let mut spans = vec![
+                Span::styled(format!("{key:>5}"), self.theme.key()),
+                Span::styled(format!("  {what}"), self.theme.text()),
+            ];
+            if !more.is_empty() {
+                spans.push(Span::styled(format!(" – {more}"), self.theme.quiet()));
+            }
+            let at = middle(row(area, y), wide, 1);
+            crate::tui::widgets::left(buf, at, &Line::from(spans));
+            y += 2;
+        }
+    }
+}

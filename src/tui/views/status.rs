@@ -1,0 +1,144 @@
+//! The experimenter's line, the banner and the progress.
+
+use crate::session::view::{Banner, DeviceState, StatusLine};
+use crate::session::{Screen, View};
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{centre, clock, left, right};
+use crate::tui::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+/// The last row.
+#[derive(Debug)]
+pub struct Status<'a> {
+    /// What it says.
+    pub line: &'a StatusLine,
+    /// Whether saving has failed.
+    pub unsaved: bool,
+    /// Its look.
+    pub theme: Theme,
+}
+
+fn device(state: DeviceState) -> String {
+    match state {
+        DeviceState::Unknown => "no session yet".to_owned(),
+        DeviceState::Limp => "device limp".to_owned(),
+        DeviceState::Loading => "device loading".to_owned(),
+        DeviceState::Ready => "device ready".to_owned(),
+        DeviceState::Running { strokes, clamps } => {
+            let stroke = if strokes == 1 { "stroke" } else { "strokes" };
+            let clamp = if clamps == 1 { "clamp" } else { "clamps" };
+            format!("running · {strokes} {stroke} · {clamps} {clamp}")
+        }
+        DeviceState::Stopping => "device stopping".to_owned(),
+        DeviceState::Fault => "DEVICE FAULT".to_owned(),
+        DeviceState::Lost => "DEVICE LOST".to_owned(),
+    }
+}
+
+impl Widget for &Status<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let inside = Rect {
+            x: area.x + 1.min(area.width),
+            width: area.width.saturating_sub(2),
+            ..area
+        };
+        let quiet = self.theme.quiet();
+        let line = self.line;
+        let who = [&line.participant, &line.operator]
+            .into_iter()
+            .filter(|name| !name.is_empty())
+            .map(|name| wrap::one_line(name, 12))
+            .collect::<Vec<_>>()
+            .join(" · ");
+        left(buf, inside, &Line::from(Span::styled(who, quiet)));
+
+        let bad = matches!(line.device, DeviceState::Fault | DeviceState::Lost);
+        let mut spans = vec![Span::styled(
+            device(line.device),
+            if bad {
+                self.theme.trouble_frame()
+            } else {
+                quiet
+            },
+        )];
+        if line.device != DeviceState::Unknown {
+            spans.push(Span::styled(format!(" · {}", clock(line.elapsed_s)), quiet));
+            let (saved, answered) = (line.trials_saved, line.trials_answered);
+            if self.unsaved {
+                let words = format!(" · NOT SAVED {saved} of {answered}");
+                spans.push(Span::styled(words, self.theme.trouble_frame()));
+            } else if !line.all_saved {
+                spans.push(Span::styled(
+                    format!(" · saving … {saved} of {answered}"),
+                    quiet,
+                ));
+            } else if answered > 0 {
+                spans.push(Span::styled(" · saved ", quiet));
+                spans.push(Span::styled("✓", self.theme.saved()));
+                spans.push(Span::styled(format!(" {saved} of {answered}"), quiet));
+            }
+        }
+        centre(buf, inside, &Line::from(spans));
+
+        let help = vec![
+            Span::styled("?", self.theme.key()),
+            Span::styled(" help", quiet),
+        ];
+        right(buf, inside, &Line::from(help));
+    }
+}
+
+/// The first row: why this is no real data, and how far it is.
+#[derive(Debug)]
+pub struct Top<'a> {
+    /// What it says.
+    pub view: &'a View,
+    /// Its look.
+    pub theme: Theme,
+}
+
+impl Widget for &Top<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        if let Some(banner) = self.view.banner {
+            let words = match banner {
+                Banner::Pilot => " PILOT — not analysed with the real data ",
+                Banner::Simulated => " SIMULATED — not analysed with the real data ",
+            };
+            let at = Rect {
+                x: area.x + 1.min(area.width),
+                width: area.width.saturating_sub(2),
+                ..area
+            };
+            left(
+                buf,
+                at,
+                &Line::from(Span::styled(words, self.theme.banner())),
+            );
+        }
+        let mut words = Vec::new();
+        if let Screen::Form { page, pages, .. } = &self.view.screen
+            && *pages > 1
+        {
+            words.push(format!("page {page} of {pages}"));
+        }
+        if let Some(progress) = self.view.progress {
+            let what = if progress.practice {
+                "practice"
+            } else {
+                "trial"
+            };
+            words.push(format!("{what} {} of {}", progress.current, progress.total));
+        }
+        if !words.is_empty() {
+            let words = Span::styled(words.join(" · "), self.theme.quiet());
+            let at = Rect {
+                width: area.width.saturating_sub(1),
+                ..area
+            };
+            right(buf, at, &Line::from(words));
+        }
+    }
+}

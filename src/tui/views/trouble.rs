@@ -1,0 +1,80 @@
+//! Troubles: what happened, what it means, what to do.
+
+use crate::session::Screen;
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{centre, frame, left_all, middle, row, rows};
+use crate::tui::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+/// A framed message that cannot be overlooked.
+#[derive(Debug)]
+pub struct Trouble<'a> {
+    title: &'static str,
+    what: &'a str,
+    then: &'static str,
+    theme: Theme,
+}
+
+impl<'a> Trouble<'a> {
+    /// For a screen; `None` if it is none of these.
+    pub fn new(screen: &'a Screen, theme: Theme) -> Option<Self> {
+        let (title, what, then) = match screen {
+            Screen::DeviceTrouble { what, can_go_on } => (
+                "DEVICE TROUBLE",
+                what,
+                if *can_go_on {
+                    "The device gives no force. Look after the device, then press Enter: \
+                     the trial comes back later. Nothing that was answered is lost."
+                } else {
+                    "The device gives no force. Check its power and its cable; this page \
+                     goes on by itself when it answers again. F10 leaves: the session can \
+                     be picked up later, and nothing that was answered is lost."
+                },
+            ),
+            Screen::SaveTrouble { what } => (
+                "NOT SAVED",
+                what,
+                "The last answer is in memory only. Do not close this window. Make room on \
+                 the disk or plug it in again, then press Enter to try once more.",
+            ),
+            _ => return None,
+        };
+        Some(Self {
+            title,
+            what,
+            then,
+            theme,
+        })
+    }
+}
+
+impl Widget for &Trouble<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let wide = area.width.saturating_sub(8).min(72);
+        let columns = usize::from(wide.saturating_sub(6)).max(1);
+        let room = usize::from(area.height.saturating_sub(6) / 2).max(1);
+        let what = wrap::paragraph(self.what, columns, room);
+        let then = wrap::paragraph(self.then, columns, room.max(4));
+        let what_rows = u16::try_from(what.len()).unwrap_or(1);
+        let then_rows = u16::try_from(then.len()).unwrap_or(1);
+        let place = middle(area, wide, what_rows + then_rows + 7);
+        frame(buf, place, true, self.theme.trouble_frame());
+        let inside = Rect {
+            x: place.x + 3.min(place.width),
+            width: place.width.saturating_sub(6),
+            y: place.y + 1.min(place.height),
+            height: place.height.saturating_sub(2),
+        };
+        let title = Line::from(Span::styled(
+            format!("  {}  ", self.title),
+            self.theme.trouble(),
+        ));
+        centre(buf, row(inside, 1), &title);
+        left_all(buf, rows(inside, 3, what_rows), &what, self.theme.strong());
+        let then_area = rows(inside, 4 + what_rows, then_rows);
+        left_all(buf, then_area, &then, self.theme.text());
+    }
+}

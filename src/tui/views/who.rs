@@ -1,0 +1,98 @@
+//! The first screen: who takes part, who runs the session.
+
+use crate::tui::draft::Who;
+use crate::tui::theme::Theme;
+use crate::tui::widgets::{TextField, centre, left, middle, row};
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Position, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+/// Two fields.
+#[derive(Debug)]
+pub struct WhoView<'a> {
+    /// What is typed.
+    pub who: &'a Who,
+    /// Whether the session folder is being claimed.
+    pub claiming: bool,
+    /// Whether keys go here.
+    pub focused: bool,
+    /// Its look.
+    pub theme: Theme,
+}
+
+/// Columns of both fields with their labels.
+const WIDE: u16 = 56;
+/// Columns of the labels.
+const LABEL: u16 = 14;
+
+impl WhoView<'_> {
+    fn fields(&self, area: Rect) -> [(&'static str, &'static str, TextField<'_>, Rect); 2] {
+        let place = middle(area, WIDE, 9);
+        let at = |y| {
+            let label = LABEL.min(place.width);
+            let all = row(place, y);
+            Rect {
+                x: all.x + label.min(all.width),
+                width: all.width.saturating_sub(label),
+                ..all
+            }
+        };
+        let field = |editor, on| TextField {
+            editor,
+            focused: self.focused && !self.claiming && self.who.on_operator == on,
+            theme: self.theme,
+        };
+        let (participant, operator) = (&self.who.participant, &self.who.operator);
+        [
+            (
+                "Participant",
+                "a pseudonym, such as P01",
+                field(participant, false),
+                at(3),
+            ),
+            (
+                "Operator",
+                "your initials or a code",
+                field(operator, true),
+                at(6),
+            ),
+        ]
+    }
+
+    /// Where the terminal's cursor belongs.
+    pub fn cursor(&self, area: Rect) -> Option<Position> {
+        let fields = self.fields(area);
+        fields
+            .iter()
+            .find_map(|(_, _, field, at)| field.cursor(*at))
+    }
+}
+
+impl Widget for &WhoView<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let place = middle(area, WIDE, 9);
+        let title = if self.claiming {
+            "One moment."
+        } else {
+            "Who takes part?"
+        };
+        let title = Line::from(Span::styled(title, self.theme.strong()));
+        centre(buf, row(place, 0), &title);
+        for (label, hint, field, at) in self.fields(area) {
+            let start = Rect {
+                x: place.x,
+                width: LABEL.min(place.width),
+                ..at
+            };
+            let label = Line::from(Span::styled(label, self.theme.text()));
+            left(buf, start, &label);
+            field.render(at, buf);
+            let below = Rect { y: at.y + 1, ..at };
+            if below.bottom() <= area.bottom() && !at.is_empty() {
+                let hint = Line::from(Span::styled(format!("  {hint}"), self.theme.quiet()));
+                left(buf, below, &hint);
+            }
+        }
+    }
+}

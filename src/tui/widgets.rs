@@ -1,0 +1,217 @@
+//! Small pieces that several views share. Every one keeps inside its area.
+
+use super::editor::Editor;
+use super::theme::Theme;
+use super::wrap;
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Position, Rect};
+use ratatui::style::Style;
+use ratatui::symbols::border;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, Widget};
+
+/// The middle of `area`: `width` cells wide and `height` tall, or less.
+pub fn middle(area: Rect, width: u16, height: u16) -> Rect {
+    let width = width.min(area.width);
+    let height = height.min(area.height);
+    Rect {
+        x: area.x + (area.width - width) / 2,
+        y: area.y + (area.height - height) / 2,
+        width,
+        height,
+    }
+}
+
+/// The `y`-th row of `area`; empty if there is none.
+pub fn row(area: Rect, y: u16) -> Rect {
+    if y >= area.height {
+        return Rect::new(area.x, area.bottom(), 0, 0);
+    }
+    Rect::new(area.x, area.y + y, area.width, 1)
+}
+
+/// `area` without its first `y` rows, at most `height` tall.
+pub fn rows(area: Rect, y: u16, height: u16) -> Rect {
+    let y = y.min(area.height);
+    Rect::new(area.x, area.y + y, area.width, height.min(area.height - y))
+}
+
+/// Draws a line at the left of a row. The text has to be safe already.
+pub fn left(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
+    let area = area.intersection(buf.area);
+    if !area.is_empty() {
+        buf.set_line(area.x, area.y, line, area.width);
+    }
+}
+
+/// Draws a line in the middle of a row.
+pub fn centre(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
+    let width = u16::try_from(line.width()).unwrap_or(u16::MAX);
+    left(buf, middle(area, width, area.height), line);
+}
+
+/// Draws a line at the right of a row.
+pub fn right(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
+    let width = u16::try_from(line.width())
+        .unwrap_or(u16::MAX)
+        .min(area.width);
+    let x = area.right() - width;
+    left(buf, Rect { x, width, ..area }, line);
+}
+
+/// Draws wrapped lines, each in the middle.
+pub fn centre_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
+    for (y, line) in (0..area.height).zip(lines) {
+        let line = Line::from(Span::styled(line.as_str(), style));
+        centre(buf, row(area, y), &line);
+    }
+}
+
+/// Draws wrapped lines from the left.
+pub fn left_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
+    for (y, line) in (0..area.height).zip(lines) {
+        let line = Line::from(Span::styled(line.as_str(), style));
+        left(buf, row(area, y), &line);
+    }
+}
+
+/// Keys and what they do: `Enter save  ·  Tab comment`.
+pub fn hints(theme: Theme, keys: &[(&str, &str)]) -> Line<'static> {
+    let mut spans = Vec::new();
+    for (key, what) in keys {
+        if !spans.is_empty() {
+            spans.push(Span::styled("   ·   ", theme.quiet()));
+        }
+        spans.push(Span::styled((*key).to_owned(), theme.key()));
+        spans.push(Span::styled(format!(" {what}"), theme.quiet()));
+    }
+    Line::from(spans)
+}
+
+/// Minutes and seconds, hours only when there are some. `0:00` for what is no
+/// number.
+pub fn clock(seconds: f64) -> String {
+    let s = if seconds.is_finite() {
+        seconds.clamp(0.0, 1e9) as u64
+    } else {
+        0
+    };
+    if s < 3600 {
+        format!("{}:{:02}", s / 60, s % 60)
+    } else {
+        format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
+    }
+}
+
+/// A frame; thick where it is chosen or urgent, so that no colour is needed.
+pub fn frame(buf: &mut Buffer, area: Rect, thick: bool, style: Style) {
+    let area = area.intersection(buf.area);
+    if area.is_empty() {
+        return;
+    }
+    let set = if thick { border::THICK } else { border::PLAIN };
+    Block::bordered()
+        .border_set(set)
+        .border_style(style)
+        .render(area, buf);
+}
+
+/// Empties an area and frames it, for a dialog. Returns the inside.
+pub fn dialog(buf: &mut Buffer, area: Rect, title: &str, theme: Theme) -> Rect {
+    let area = area.intersection(buf.area);
+    if area.is_empty() {
+        return area;
+    }
+    ratatui::widgets::Clear.render(area, buf);
+    let block = Block::bordered()
+        .border_set(border::ROUNDED)
+        .border_style(theme.focus())
+        .title(Span::styled(format!(" {title} "), theme.strong()));
+    let inside = block.inner(area);
+    block.render(area, buf);
+    Rect {
+        x: inside.x.saturating_add(2).min(inside.right()),
+        width: inside.width.saturating_sub(4),
+        ..inside
+    }
+}
+
+/// A field for text: a bar at its left, thick with the focus, and the text.
+#[derive(Debug)]
+pub struct TextField<'a> {
+    /// What is typed.
+    pub editor: &'a Editor,
+    /// Whether keys go here.
+    pub focused: bool,
+    /// Its look.
+    pub theme: Theme,
+}
+
+impl TextField<'_> {
+    /// The cells for text in an area.
+    pub fn columns(area: Rect) -> usize {
+        usize::from(area.width.saturating_sub(3)).max(1)
+    }
+
+    /// The first line that is shown, and the cursor's line and column.
+    fn window(&self, area: Rect) -> (Vec<wrap::Line>, usize, usize, usize) {
+        let (lines, line, column) = self.editor.layout(Self::columns(area));
+        let height = usize::from(area.height);
+        let first = (line + 1).saturating_sub(height);
+        (lines, first, line, column)
+    }
+
+    /// Where the terminal's cursor belongs.
+    pub fn cursor(&self, area: Rect) -> Option<Position> {
+        if !self.focused || area.width < 3 || area.height == 0 {
+            return None;
+        }
+        let (_, first, line, column) = self.window(area);
+        let x = area.x + 2 + u16::try_from(column).ok()?;
+        let y = area.y + u16::try_from(line - first).ok()?;
+        Some(Position::new(x.min(area.right() - 1), y))
+    }
+}
+
+impl Widget for &TextField<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let (lines, first, _, _) = self.window(area);
+        let (bar, style) = if self.focused {
+            ("┃", self.theme.focus())
+        } else {
+            ("│", self.theme.outline())
+        };
+        for y in 0..area.height {
+            let text = lines.get(first + usize::from(y));
+            let shown = text.map_or("", |line| line.shown.as_str());
+            let line = Line::from(vec![
+                Span::styled(bar, style),
+                Span::raw(" "),
+                Span::styled(shown, self.theme.text()),
+            ]);
+            left(buf, row(area, y), &line);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_shows_any_number() {
+        assert_eq!(clock(0.0), "0:00");
+        assert_eq!(clock(761.9), "12:41");
+        assert_eq!(clock(3600.0), "1:00:00");
+        assert_eq!(clock(f64::NAN), "0:00");
+        assert_eq!(clock(-1.0), "0:00");
+    }
+
+    #[test]
+    fn a_row_outside_is_empty() {
+        let area = Rect::new(3, 4, 10, 2);
+        assert!(row(area, 2).is_empty());
+        assert!(rows(area, 5, 3).is_empty());
+        assert_eq!(middle(area, 20, 20), area);
+    }
+}

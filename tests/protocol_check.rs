@@ -1,0 +1,296 @@
+//! `study check`, `new` and `schema` as a user meets them.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+fn study() -> Command {
+    let mut command = Command::cargo_bin("study").unwrap();
+    command.env("NO_COLOR", "1");
+    command
+}
+
+/// Runs and gives exit code, standard output, standard error.
+fn run(dir: &Path, args: &[&str]) -> (i32, String, String) {
+    let output = study().current_dir(dir).args(args).output().unwrap();
+    (
+        output.status.code().unwrap(),
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
+}
+
+/// A folder with a copy of the paper's study.
+fn turn_signal() -> TempDir {
+    let dir = TempDir::new().unwrap();
+    let from = Path::new(ROOT).join("protocols/turn-signal");
+    fs::create_dir(dir.path().join("models")).unwrap();
+    fs::copy(from.join("protocol.toml"), dir.path().join("protocol.toml")).unwrap();
+    for entry in fs::read_dir(from.join("models")).unwrap() {
+        let path = entry.unwrap().path();
+        fs::copy(
+            &path,
+            dir.path().join("models").join(path.file_name().unwrap()),
+        )
+        .unwrap();
+    }
+    dir
+}
+
+fn edit(dir: &Path, file: &str, from: &str, to: &str) {
+    let path = dir.join(file);
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{from}");
+    fs::write(path, text.replacen(from, to, 1)).unwrap();
+}
+
+/// The messages of the errors and of the warnings.
+fn report(dir: &Path) -> (i32, Vec<String>, Vec<String>) {
+    let (code, out, err) = run(dir, &["check", ".", "--json"]);
+    assert_eq!(err, "");
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["format"], "study-check/1");
+    let messages = |key: &str| -> Vec<String> {
+        json[key]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|f| f["message"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    (code, messages("errors"), messages("warnings"))
+}
+
+#[test]
+fn the_shipped_protocols_are_in_order() {
+    let (code, out, err) = run(Path::new(ROOT), &["check", "protocols/turn-signal"]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(
+        out,
+        "turn-signal: ok, 5 models, 15 trials, about 16 minutes, 1 warning\n"
+    );
+    assert!(err.contains("|r| with VAF has to exceed 0.878"), "{err}");
+
+    let path = "protocols/turn-signal-extended/protocol.toml";
+    let (code, out, err) = run(Path::new(ROOT), &["check", path]);
+    assert_eq!((code, err.as_str()), (0, ""));
+    assert!(
+        out.starts_with("turn-signal-extended: ok, 12 models, 33 trials, "),
+        "{out}"
+    );
+}
+
+#[test]
+fn ten_faults_of_three_files_are_told_at_once() {
+    let dir = turn_signal();
+    let at = dir.path();
+    let file = "protocol.toml";
+    edit(at, file, "seed = 2007", "seed = -2007");
+    edit(at, file, "repetitions = 3", "repetition = 3");
+    edit(at, file, "\"blocked\"\n", "\"blokced\"\n");
+    edit(at, file, "force_n = 12.0", "force_n = nan");
+    edit(
+        at,
+        file,
+        "models/lambda-0.9991.toml",
+        "../lambda-0.9991.toml",
+    );
+    edit(at, file, "models/lambda-0.9993.toml", "models/missing.toml");
+    edit(at, file, "id = \"lambda-0.9999\"", "id = \"Lambda-0.9997\"");
+    edit(at, file, "from = 1\nto = 7", "from = 7\nto = 1");
+    edit(at, file, "primary = \"realism\"", "primary = \"realsim\"");
+    edit(
+        at,
+        "models/lambda-0.9995.toml",
+        "x_mm = [\n  2.0",
+        "x_mm = [\n  nan",
+    );
+    edit(at, "models/lambda-0.9999.toml", "lookup", "look_up");
+
+    let (code, out, err) = run(at, &["check", "."]);
+    assert_eq!((code, out.as_str()), (1, ""));
+    insta::assert_snapshot!(err);
+}
+
+#[test]
+fn a_vaf_that_differs_from_the_file_is_an_error_and_a_rounded_one_is_not() {
+    let dir = turn_signal();
+    let id = "id = \"lambda-0.9995\"\n";
+    edit(
+        dir.path(),
+        "protocol.toml",
+        id,
+        &format!("{id}vaf = 0.82\n"),
+    );
+    assert_eq!(report(dir.path()).0, 0);
+    edit(dir.path(), "protocol.toml", "vaf = 0.82\n", "vaf = 0.79\n");
+    let (code, errors, _) = report(dir.path());
+    assert_eq!(code, 1);
+    assert_eq!(
+        errors,
+        [
+            "the VAF of `lambda-0.9995` is not 0.79: its file says 0.8217722860367234 for `validation-1.5hz`"
+        ]
+    );
+}
+
+#[test]
+fn a_recording_that_no_model_knows_is_an_error() {
+    let dir = turn_signal();
+    edit(
+        dir.path(),
+        "protocol.toml",
+        "validation-1.5hz",
+        "validation-15hz",
+    );
+    let (_, errors, _) = report(dir.path());
+    assert_eq!(errors, ["no model file has a VAF for `validation-15hz`"]);
+}
+
+#[test]
+fn an_order_that_cannot_be_is_an_error_with_its_reason() {
+    let dir = turn_signal();
+    let order = "order = \"blocked\"\n";
+    edit(
+        dir.path(),
+        "protocol.toml",
+        order,
+        &format!("{order}min_distance = 6\n"),
+    );
+    let (code, errors, _) = report(dir.path());
+    assert_eq!(code, 1);
+    assert_eq!(
+        errors,
+        ["min_distance = 6 needs at least 6 realizations, there are 5"]
+    );
+
+    let dir = turn_signal();
+    edit(
+        dir.path(),
+        "protocol.toml",
+        order,
+        "order = { file = \"orders.csv\" }\n",
+    );
+    assert_eq!(
+        report(dir.path()).1,
+        ["the orders file cannot be read: there is no such file"]
+    );
+    fs::write(dir.path().join("orders.csv"), "row,position,model\n1,1\n").unwrap();
+    assert_eq!(report(dir.path()).1, ["line 2 has 2 of 3 columns"]);
+    fs::write(
+        dir.path().join("orders.csv"),
+        "row,position,model\n1,1,lambda-0.9991\n",
+    )
+    .unwrap();
+    assert_eq!(
+        report(dir.path()).1,
+        ["the file of orders, row 1: 1 positions; 15 are needed"]
+    );
+}
+
+#[test]
+fn a_balanced_order_says_at_how_many_participants() {
+    let dir = turn_signal();
+    edit(
+        dir.path(),
+        "protocol.toml",
+        "\"blocked\"\n",
+        "\"williams\"\n",
+    );
+    // only that five realizations are few
+    assert_eq!(report(dir.path()).2.len(), 1);
+    edit(
+        dir.path(),
+        "protocol.toml",
+        "participants = 10",
+        "participants = 12",
+    );
+    let warnings = report(dir.path()).2;
+    assert!(
+        warnings.contains(&"the orders balance at every 10 participants, not at 12".to_owned()),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn what_is_no_protocol_is_one_clear_error() {
+    let dir = TempDir::new().unwrap();
+    for (args, said) in [
+        (["check", "nowhere"], "there is no such file"),
+        (["check", "."], "there is no such file"),
+        (["check", "/dev/null"], "it is no ordinary file"),
+    ] {
+        let (code, out, err) = run(dir.path(), &args);
+        assert_eq!((code, out.as_str()), (1, ""));
+        assert!(err.contains(said), "{err}");
+        assert!(err.contains("or the folder that holds one"), "{err}");
+    }
+    fs::write(dir.path().join("p.toml"), b"a = \"\xff\"").unwrap();
+    let (code, _, err) = run(dir.path(), &["check", "p.toml"]);
+    assert!(code == 1 && err.contains("line 1 is not UTF-8"), "{err}");
+    fs::write(dir.path().join("p.toml"), vec![b'#'; 1024 * 1024 + 1]).unwrap();
+    let (code, _, err) = run(dir.path(), &["check", "p.toml"]);
+    assert!(code == 1 && err.contains("more than 1024 KiB"), "{err}");
+}
+
+#[test]
+fn a_new_study_is_in_order_and_overwrites_nothing() {
+    let dir = TempDir::new().unwrap();
+    let (code, out, err) = run(dir.path(), &["new", "Our Switch"]);
+    assert_eq!((code, err.as_str()), (0, ""));
+    assert!(out.contains("study check Our Switch"), "{out}");
+    let (code, out, _) = run(dir.path(), &["check", "Our Switch"]);
+    assert_eq!(code, 0);
+    assert!(
+        out.starts_with("our-switch: ok, 3 models, 9 trials"),
+        "{out}"
+    );
+
+    let before = fs::read(dir.path().join("Our Switch/protocol.toml")).unwrap();
+    let (code, _, err) = run(dir.path(), &["new", "Our Switch"]);
+    assert_eq!(code, 1);
+    assert!(err.contains("the folder is not empty"), "{err}");
+    let after = fs::read(dir.path().join("Our Switch/protocol.toml")).unwrap();
+    assert_eq!(before, after);
+}
+
+#[test]
+fn a_replication_takes_the_newest_frozen_protocol_with_a_seed_of_its_own() {
+    let dir = TempDir::new().unwrap();
+    let study = dir.path().join("results/turn-signal");
+    for version in ["1", "2"] {
+        let to = study.join("protocol").join(version);
+        fs::create_dir_all(to.join("models")).unwrap();
+        let from = turn_signal();
+        for entry in fs::read_dir(from.path().join("models")).unwrap() {
+            let path = entry.unwrap().path();
+            fs::copy(&path, to.join("models").join(path.file_name().unwrap())).unwrap();
+        }
+        edit(
+            from.path(),
+            "protocol.toml",
+            "title = \"",
+            &format!("title = \"{version} "),
+        );
+        fs::copy(from.path().join("protocol.toml"), to.join("protocol.toml")).unwrap();
+    }
+    for results in ["results", "results/turn-signal"] {
+        let name = format!("again-{}", results.replace('/', "-"));
+        let (code, _, err) = run(dir.path(), &["new", &name, "--from", results]);
+        assert_eq!((code, err.as_str()), (0, ""));
+        let text = fs::read_to_string(dir.path().join(&name).join("protocol.toml")).unwrap();
+        assert!(text.starts_with("# A replication of the study `turn-signal`, version 2"));
+        assert!(text.contains("title = \"2 Realism"));
+        assert!(text.contains("id = \"turn-signal-replication\""));
+        assert!(!text.contains("seed = 2007 "));
+        assert_eq!(run(dir.path(), &["check", &name]).0, 0);
+    }
+    let (code, _, err) = run(dir.path(), &["new", "other", "--from", "."]);
+    assert_eq!(code, 4, "{err}");
+    assert!(!dir.path().join("other").exists());
+}

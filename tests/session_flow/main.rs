@@ -1,0 +1,12 @@
+//! A session from the first screen to the last, with a device and a store that
+//! the tests play. Every step of every test also passes the walls in `rig`.
+
+mod blinding;
+mod device;
+mod forms;
+mod random;
+mod resume;
+mod rig;
+mod saving;
+mod studies;
+mod whole;

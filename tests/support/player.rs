@@ -1,0 +1,69 @@
+//! Somebody who takes part by keys alone, looking only at the screen.
+
+use super::Terminal;
+use std::time::{Duration, Instant};
+
+/// What the player did at a screen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Did {
+    /// Nothing is asked at the moment.
+    Waited,
+    /// Something was typed at one of these.
+    Who,
+    /// A page of questions was answered.
+    Answered,
+    /// A playback was ended to rate it.
+    Felt,
+    /// Something else was confirmed.
+    WentOn,
+}
+
+/// Does the one thing that the screen asks for, and waits for what comes of it.
+pub fn play(terminal: &mut Terminal, participant: &str) -> Did {
+    let screen = terminal.screen();
+    let did = press(terminal, participant, &screen);
+    if did != Did::Waited {
+        terminal.wait_until("the screen to change", |now| now != screen);
+    }
+    did
+}
+
+/// The same, but waits no longer than `until`.
+pub fn play_before(terminal: &mut Terminal, participant: &str, until: Instant) -> Did {
+    let screen = terminal.screen();
+    let did = press(terminal, participant, &screen);
+    while did != Did::Waited && terminal.screen() == screen && Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    did
+}
+
+fn press(terminal: &mut Terminal, participant: &str, screen: &str) -> Did {
+    let shows = |text: &str| screen.contains(text);
+    let (keys, did) = if shows("Who takes part?") && shows("Enter begin") {
+        (format!("\u{15}{participant}\r"), Did::Who)
+    } else if shows("yes, I agree") {
+        ("y".to_owned(), Did::WentOn)
+    } else if shows("Enter to rate") {
+        ("\r".to_owned(), Did::Felt)
+    } else if shows("Feel the device") || shows("saving") {
+        return Did::Waited;
+    } else if shows("Are you sure?") {
+        ("n".to_owned(), Did::WentOn)
+    } else if shows("1–7 choose") {
+        ("5\r".to_owned(), Did::Answered)
+    } else if shows("↑ ↓ choose") {
+        ("1\r".to_owned(), Did::Answered)
+    } else if shows("Enter save") {
+        ("33\r".to_owned(), Did::Answered)
+    } else if ["when ready", "goes on", "reads on", "closes"]
+        .iter()
+        .any(|word| shows(&format!("Enter {word}")))
+    {
+        ("\r".to_owned(), Did::WentOn)
+    } else {
+        return Did::Waited;
+    };
+    terminal.keys(&keys);
+    did
+}
