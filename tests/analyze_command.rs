@@ -108,7 +108,7 @@ fn bad_input_is_one_clear_error() {
         .arg("analyze")
         .arg(dir.path().join("none"))
         .assert()
-        .code(1);
+        .code(4);
     // A folder without a study is a fault of the results.
     study().arg("analyze").arg(dir.path()).assert().code(4);
     study()

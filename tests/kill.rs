@@ -75,7 +75,10 @@ fn kills(seed: u64, count: u32) {
             participant += 1;
         }
     }
-    assert!(survived > 0, "no trial was ever finished: nothing was tested");
+    assert!(
+        survived > 0,
+        "no trial was ever finished: nothing was tested"
+    );
     // what is left of the last session can be finished and is whole
     let id = format!("P{participant:02}");
     let mut terminal = Terminal::start(

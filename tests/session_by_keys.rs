@@ -23,7 +23,11 @@ fn play_until(terminal: &mut Terminal, text: &str) {
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
         turns += 1;
-        assert!(turns < 20_000, "`{text}` never comes:\n{}", terminal.screen());
+        assert!(
+            turns < 20_000,
+            "`{text}` never comes:\n{}",
+            terminal.screen()
+        );
     }
 }
 
@@ -47,7 +51,10 @@ fn eventful(protocol: &str, trials: usize, comment: &str) {
     // the first trial that counts, rated with a comment
     play_until(&mut terminal, "Enter to rate");
     dialog(&mut terminal, F2, "Tab who", "motor hums\r");
-    assert!(terminal.screen().contains("Feel the device"), "the remark ended the playback");
+    assert!(
+        terminal.screen().contains("Feel the device"),
+        "the remark ended the playback"
+    );
     play_until(&mut terminal, "trial 2 of");
     // a bad one
     play_until(&mut terminal, "Enter to rate");
@@ -69,7 +76,11 @@ fn eventful(protocol: &str, trials: usize, comment: &str) {
     terminal.keys("y");
     assert_eq!(terminal.exit_code(), 0);
     assert!(!terminal.alternate());
-    assert!(terminal.screen().contains("not finished"), "{}", terminal.screen());
+    assert!(
+        terminal.screen().contains("not finished"),
+        "{}",
+        terminal.screen()
+    );
 
     let mut terminal = start(folder.path(), protocol);
     play_until(&mut terminal, "Enter closes");
@@ -94,10 +105,24 @@ fn eventful(protocol: &str, trials: usize, comment: &str) {
     let rows: Vec<csv::StringRecord> = ratings.records().map(Result::unwrap).collect();
     let counted: Vec<_> = rows.iter().filter(|r| &r[practice] == "false").collect();
     assert_eq!(counted.len(), trials);
-    assert!(counted.iter().all(|r| &r[status] == "ok" && &r[pilot] == "true"));
+    assert!(
+        counted
+            .iter()
+            .all(|r| &r[status] == "ok" && &r[pilot] == "true")
+    );
     assert_eq!(rows.iter().filter(|r| &r[corrected] == "true").count(), 1);
-    assert_eq!(counted.iter().filter(|r| &r[column("attempt")] == "2").count(), 1);
-    assert!(counted.iter().any(|r| &r[column("remarks")] == "motor hums"));
+    assert_eq!(
+        counted
+            .iter()
+            .filter(|r| &r[column("attempt")] == "2")
+            .count(),
+        1
+    );
+    assert!(
+        counted
+            .iter()
+            .any(|r| &r[column("remarks")] == "motor hums")
+    );
     let attempts = fs::read_to_string(results.join("attempts.csv")).unwrap();
     for word in ["somebody came in", "mistyped", "motor hums"] {
         assert!(attempts.contains(word), "{word}");

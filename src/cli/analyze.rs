@@ -1,10 +1,10 @@
 //! `study analyze`
 
-use super::{Console, Failure, Kind};
+use super::{Console, Failure, results};
 use crate::analyze::{Analysis, Include, Rules, analyze};
 use crate::outcome::ratings::Ratings;
 use crate::outcome::{ParticipantRow, RatingRow};
-use crate::protocol::{self, Protocol};
+use crate::protocol::Protocol;
 use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
 use crate::store::StudyFolder;
@@ -47,21 +47,22 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let (source, analysis) = of_csv(args)?;
         return show(args, &source, &analysis, args.out.as_deref(), console);
     }
-    let studies = studies(&args.results)?;
+    let studies = results::studies(&args.results)?;
     if args.json && studies.len() > 1 {
         return Err(Failure::input(format!(
             "{}: {} studies, and --json prints one",
             args.results.display(),
             studies.len()
         ))
-        .hint(format!("name one, such as {}", studies[0].display())));
+        .hint(format!("name one, such as {}", studies[0].path().display())));
     }
     let several = studies.len() > 1;
-    for (i, folder) in studies.iter().enumerate() {
+    for (i, study) in studies.iter().enumerate() {
         if i > 0 {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
-        let (source, analysis) = of_study(folder, args)?;
+        let (source, analysis) = of_study(study, args)?;
+        let folder = study.path();
         let out = match &args.out {
             Some(out) if several => Some(out.join(folder.file_name().unwrap_or_default())),
             Some(out) => Some(out.clone()),
@@ -137,8 +138,8 @@ struct StudyInput {
     participants: Vec<ParticipantRow>,
 }
 
-fn of_study(folder: &Path, args: &Args) -> Result<(Source, Analysis), Failure> {
-    let input = study_input(folder)?;
+fn of_study(study: &StudyFolder, args: &Args) -> Result<(Source, Analysis), Failure> {
+    let input = study_input(study)?;
     let question = question(&input.protocol, args.question.as_deref())?;
     let mut ratings = Ratings::from_rows(&input.rows, &question);
     ratings.set_states(&input.participants);
@@ -151,7 +152,7 @@ fn of_study(folder: &Path, args: &Args) -> Result<(Source, Analysis), Failure> {
         title: input.protocol.study.title.clone(),
         study: Some(input.protocol.study.id.clone()),
         protocol_version: Some(input.protocol_version),
-        path: folder.display().to_string(),
+        path: study.path().display().to_string(),
     };
     Ok((source, analyze(&ratings, &rules)))
 }
@@ -184,51 +185,17 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
     }
 }
 
-/// The rows of a study, by the newest version of its protocol.
-fn study_input(folder: &Path) -> Result<StudyInput, Failure> {
-    let study = StudyFolder::open(folder).map_err(Failure::results)?;
-    let path = study.frozen_protocol();
-    let text = fs::read_to_string(&path)
-        .map_err(|e| Failure::results(format!("{}: {e}", path.display())))?;
-    let parsed = protocol::file::parse(&path.display().to_string(), &text);
-    let Some(protocol) = parsed.protocol else {
-        return Err(Failure {
-            kind: Kind::Results,
-            ..Failure::faults(vec![parsed.findings])
-        });
-    };
-    let derived = study.derive(&protocol).map_err(Failure::results)?;
+/// The rows of a study, by the newest version of its protocol. The VAF may stand
+/// in the model files only: they are opened too.
+fn study_input(study: &StudyFolder) -> Result<StudyInput, Failure> {
+    let protocol = results::frozen(study)?.protocol;
+    let derived = study.derive(&protocol)?;
     Ok(StudyInput {
         protocol,
         protocol_version: study.version(),
         rows: derived.rows,
         participants: derived.participants,
     })
-}
-
-/// The folder itself, if it is a study's, or the studies in it, by name.
-fn studies(results: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let is_study = |dir: &Path| dir.join("study.json").is_file();
-    if is_study(results) {
-        return Ok(vec![results.to_owned()]);
-    }
-    let entries = fs::read_dir(results).map_err(|e| Failure::file(results, &e))?;
-    let mut found = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(|e| Failure::file(results, &e))?.path();
-        if is_study(&path) {
-            found.push(path);
-        }
-    }
-    found.sort();
-    if found.is_empty() {
-        return Err(
-            Failure::results(format!("{}: no study in it", results.display())).hint(
-                "a study's folder holds study.json; `study run` and `study rehearse` make one",
-            ),
-        );
-    }
-    Ok(found)
 }
 
 /// Each file as a whole or not at all.

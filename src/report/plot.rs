@@ -66,31 +66,37 @@ impl Axis {
         line.into_iter().collect::<String>().trim_end().to_owned()
     }
 
-    /// Numbers at round places, centred over their columns; one that would touch
-    /// the one before is left out.
+    /// Numbers at round places, centred over their columns: as many, up to ten,
+    /// as leave a space between them.
     pub fn ticks(&self) -> String {
-        let step = step(self.high - self.low, (self.columns / 8).clamp(2, 10));
-        let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+        (2..=10)
+            .rev()
+            .find_map(|most| self.ticks_of(step(self.high - self.low, most)))
+            .unwrap_or_default()
+    }
+
+    fn ticks_of(&self, step: f64) -> Option<String> {
+        let decimals = (-(step * 1.000001).log10().floor()).clamp(0.0, 9.0) as usize;
         let mut line = vec![' '; self.columns];
         let mut free = 0;
         let mut k = (self.low / step - 1e-9).ceil();
         while k * step <= self.high + 1e-9 * step {
             let label: Vec<char> = format!("{:.decimals$}", k * step + 0.0).chars().collect();
-            if let Some(at) = self.column(k * step) {
-                let start = at.saturating_sub(label.len() / 2);
-                let start = start.min(self.columns.saturating_sub(label.len()));
-                if start >= free && start + label.len() <= self.columns {
-                    line[start..start + label.len()].copy_from_slice(&label);
-                    free = start + label.len() + 1;
-                }
+            let at = self.column(k * step)?;
+            let start = at.saturating_sub(label.len() / 2);
+            let start = start.min(self.columns.checked_sub(label.len())?);
+            if start < free {
+                return None;
             }
+            line[start..start + label.len()].copy_from_slice(&label);
+            free = start + label.len() + 1;
             // Far out, a double's next neighbour is further than a step.
             if k + 1.0 <= k {
-                break;
+                return None;
             }
             k += 1.0;
         }
-        line.into_iter().collect::<String>().trim_end().to_owned()
+        Some(line.into_iter().collect::<String>().trim_end().to_owned())
     }
 }
 

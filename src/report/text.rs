@@ -136,8 +136,11 @@ fn table(
     paint: Paint,
 ) -> String {
     let v = &a.values;
-    let hist = v.list("desc_all/hist").filter(|h| h.len() <= MAX_BINS);
     let from = v.number("desc_all/hist_from").unwrap_or(0.0);
+    let near = from.abs() < 1000.0;
+    let hist = v
+        .list("desc_all/hist")
+        .filter(|h| near && h.len() <= MAX_BINS);
     let gap = if width >= 96 { " " } else { "" };
     let most = a
         .realizations

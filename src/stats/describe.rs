@@ -47,12 +47,14 @@ pub fn sum(x: &[f64]) -> f64 {
     x.iter().copied().collect::<Sum>().get()
 }
 
-/// The arithmetic mean: x₁ + Σ(xᵢ − x₁)/n, summed with compensation. `None` for
-/// no numbers, or where it overflows.
+/// The arithmetic mean, Σx/n, or Σ(x/n) where the sum overflows. `None` for no
+/// numbers.
 pub fn mean(x: &[f64]) -> Option<f64> {
-    let first = *x.first()?;
-    let shifted: Sum = x.iter().map(|v| v - first).collect();
-    finite(first + shifted.get() / x.len() as f64)
+    if x.is_empty() {
+        return None;
+    }
+    let n = x.len() as f64;
+    finite(sum(x) / n).or_else(|| finite(x.iter().map(|v| v / n).collect::<Sum>().get()))
 }
 
 /// Sum of squared deviations from the mean, Σd² − (Σd)²/n with d taken from the

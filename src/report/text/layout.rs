@@ -106,12 +106,20 @@ pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String 
     out
 }
 
-/// A table whose first column gives way when the page is narrow.
+/// A table that gives way when the page is narrow: first the names, then whole
+/// columns, last the ends of the lines.
 pub(super) struct Grid {
     rows: Vec<Vec<String>>,
-    /// A column that is set to the left, like the first and the last.
+    /// A column that is set to the left, like the first and the last; the first
+    /// to be left out.
     left: Option<usize>,
 }
+
+/// Narrowest first column.
+const MIN_NAME: usize = 8;
+
+/// The median: the second to be left out.
+const MEDIAN: usize = 4;
 
 impl Grid {
     pub(super) fn new(head: &[&str], left: Option<usize>) -> Self {
@@ -128,24 +136,30 @@ impl Grid {
     /// The table; a blank line after the `apart`-th row, if others follow.
     pub(super) fn render(&self, width: usize, apart: usize, paint: Paint) -> String {
         let columns = self.rows[0].len();
-        let mut widths: Vec<usize> = (0..columns)
-            .map(|j| self.rows.iter().map(|r| r[j].width()).max().unwrap_or(0))
-            .collect();
-        let others: usize = widths[1..].iter().map(|w| w + 2).sum();
-        widths[0] = widths[0].min(width.saturating_sub(others).max(8));
-        // Where even that does not fit, the words of the last heading do.
-        let total: usize = widths[0] + others;
-        if total > width {
-            let longest = self.rows[1..].iter().map(|r| r[columns - 1].width()).max();
-            let room = widths[columns - 1].saturating_sub(total - width);
-            widths[columns - 1] = room.max(longest.unwrap_or(0));
+        // Of the last heading the words give way, not the numbers under it.
+        let column = |j: usize| {
+            let skip = usize::from(j + 1 == columns && self.rows.len() > 1);
+            let cells = self.rows[skip..].iter();
+            cells.map(|r| r[j].width()).max().unwrap_or(0)
+        };
+        let mut widths: Vec<usize> = (0..columns).map(column).collect();
+        let mut shown: Vec<usize> = (0..columns).collect();
+        for drop in [self.left, Some(MEDIAN)].into_iter().flatten() {
+            let least: usize = shown[1..].iter().map(|&j| widths[j] + 2).sum();
+            if MIN_NAME.min(widths[0]) + least > width {
+                shown.retain(|&j| j != drop);
+            }
         }
+        let others: usize = shown[1..].iter().map(|&j| widths[j] + 2).sum();
+        widths[0] = widths[0].min(width.saturating_sub(others).max(MIN_NAME));
+        let room = width.saturating_sub(widths[0] + others);
+        widths[columns - 1] += room;
         let mut out = String::new();
         for (i, row) in self.rows.iter().enumerate() {
             let mut line = String::new();
-            for (j, cell) in row.iter().enumerate() {
+            for &j in &shown {
                 let w = widths[j];
-                let cell = cut(cell, w);
+                let cell = cut(&row[j], w);
                 if j > 0 {
                     line.push_str("  ");
                 }
@@ -156,12 +170,8 @@ impl Grid {
                     line.push_str(&cell);
                 }
             }
-            let line = line.trim_end();
-            out.push_str(&if i == 0 {
-                paint.dim(line)
-            } else {
-                line.to_owned()
-            });
+            let line = cut(line.trim_end(), width);
+            out.push_str(&if i == 0 { paint.dim(&line) } else { line });
             out.push('\n');
             if i == apart && i > 0 && i + 1 < self.rows.len() {
                 out.push('\n');
