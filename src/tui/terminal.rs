@@ -15,10 +15,12 @@ use crossterm::terminal::{
 };
 use crossterm::{cursor, execute, style};
 use ratatui::backend::CrosstermBackend;
+use ratatui::layout::Rect;
 use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::process::{Signal, getpid, kill_process};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 use std::io::{self, IsTerminal as _, Stdout};
+use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Once};
@@ -37,7 +39,9 @@ const READ_SLICE: Duration = Duration::from_millis(100);
 
 /// A terminal that is taken.
 pub(super) struct Terminal {
-    screen: ratatui::Terminal<CrosstermBackend<Stdout>>,
+    /// Never dropped: its drop prints to a terminal that may be gone, and panics.
+    /// The cursor is shown again by [`give_back`].
+    screen: ManuallyDrop<ratatui::Terminal<CrosstermBackend<Stdout>>>,
     events: Receiver<io::Result<Event>>,
     ended: Arc<AtomicBool>,
     signal: Arc<AtomicUsize>,
@@ -93,7 +97,7 @@ impl Terminal {
                 TuiError::Terminal(e)
             })?;
         Ok(Self {
-            screen,
+            screen: ManuallyDrop::new(screen),
             events,
             ended,
             signal,
@@ -159,7 +163,11 @@ impl Terminal {
     fn again(&mut self) -> Result<(), String> {
         let gone = |error: io::Error| format!("the terminal cannot be taken again: {error}");
         take().map_err(gone)?;
-        self.screen.clear().map_err(gone)
+        // Not `clear`, which asks the terminal where its cursor is and would wait
+        // for the thread that reads.
+        let size = self.screen.size().map_err(gone)?;
+        let area = Rect::new(0, 0, size.width, size.height);
+        self.screen.resize(area).map_err(gone)
     }
 }
 
