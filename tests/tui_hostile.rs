@@ -1,5 +1,8 @@
 //! Any size, any text, any keys: nothing panics, nothing steers the terminal.
 
+// A helper that unwraps is an assertion here.
+#![allow(clippy::unwrap_used)]
+
 #[path = "tui_support/views.rs"]
 mod support;
 

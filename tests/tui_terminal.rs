@@ -1,6 +1,8 @@
 //! The terminal is given back on every way out. The operator runs in a child
 //! process on a pseudo-terminal: this test program again, with one ignored test.
 
+// A helper that unwraps is an assertion here.
+#![allow(clippy::unwrap_used)]
 #![cfg(unix)]
 
 #[path = "tui_support/views.rs"]
@@ -245,7 +247,8 @@ fn a_terminal_that_has_gone_away_ends_the_session_without_any_signal() {
     desk.types("?");
     desk.writer = None;
     desk.master = None;
-    assert_eq!(desk.report(), "gone: the terminal is gone");
+    let report = desk.report();
+    assert!(report.starts_with("gone: the terminal "), "{report}");
 }
 
 #[test]

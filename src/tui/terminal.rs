@@ -14,16 +14,18 @@ use crossterm::terminal::{
     EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
 };
 use crossterm::{cursor, execute, style};
+use ratatui::Frame;
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
 use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::process::{Signal, getpid, kill_process};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+use std::cell::Cell;
 use std::io::{self, IsTerminal as _, Stdout};
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Once};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError, TryLockError};
 use std::time::Duration;
 
 /// Whether the terminal is ours: raw, on the alternate screen.
@@ -33,6 +35,14 @@ static MOUSE: AtomicBool = AtomicBool::new(false);
 /// Whether some thread has panicked: the terminal is given back for good.
 static PANICKED: AtomicBool = AtomicBool::new(false);
 static HOOK: Once = Once::new();
+/// Held while a page is written, so that another thread's panic does not give the
+/// terminal back in the middle of it.
+static WRITING: Mutex<()> = Mutex::new(());
+
+thread_local! {
+    /// Whether this thread is the one that holds [`WRITING`].
+    static WRITES: Cell<bool> = const { Cell::new(false) };
+}
 
 /// How long the reading thread waits before it looks whether it should end.
 const READ_SLICE: Duration = Duration::from_millis(100);
@@ -106,9 +116,19 @@ impl Terminal {
         })
     }
 
-    /// The screen to draw on.
-    pub(super) fn screen(&mut self) -> &mut ratatui::Terminal<CrosstermBackend<Stdout>> {
-        &mut self.screen
+    /// Draws a page, unless the terminal was given back meanwhile.
+    pub(super) fn draw(&mut self, page: impl FnOnce(&mut Frame<'_>)) -> Result<(), String> {
+        let one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
+        if TAKEN.load(Ordering::SeqCst) {
+            WRITES.set(true);
+            let drawn = self.screen.draw(page).map(drop);
+            WRITES.set(false);
+            drop(one);
+            drawn.map_err(|error| format!("the terminal cannot be written: {error}"))
+        } else {
+            drop(one);
+            self.check().map(drop)
+        }
     }
 
     /// The name of a signal that asked the program to end, once.
@@ -204,6 +224,7 @@ fn give_back() {
     if !TAKEN.swap(false, Ordering::SeqCst) {
         return;
     }
+    let _one = page_written();
     // Raw mode first: it needs no room in the output, which may be blocked.
     let _ = disable_raw_mode();
     if hung_up() {
@@ -219,6 +240,22 @@ fn give_back() {
         LeaveAlternateScreen,
         cursor::Show
     );
+}
+
+/// Waits until no other thread writes a page; not for ever, since a terminal may
+/// have stopped reading.
+fn page_written() -> Option<MutexGuard<'static, ()>> {
+    if WRITES.get() {
+        return None;
+    }
+    for _ in 0..50 {
+        match WRITING.try_lock() {
+            Ok(one) => return Some(one),
+            Err(TryLockError::Poisoned(one)) => return Some(one.into_inner()),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
+        }
+    }
+    None
 }
 
 /// Whether the terminal's other end is closed. SIGHUP may be ignored, and
