@@ -38,9 +38,13 @@ fn child_operates_a_terminal() {
     let end = match Tui::open(options) {
         Err(error) => format!("refused: {error}; {}", error.hint()),
         Ok(mut tui) => {
-            let view = support::view(Screen::Playing {
-                since_s: 1.0,
-                strokes_missing: 0,
+            let view = support::view(if std::env::var("TUI_CHILD_RATES").is_ok() {
+                support::form(vec![support::realism(), support::comment()])
+            } else {
+                Screen::Playing {
+                    since_s: 1.0,
+                    strokes_missing: 0,
+                }
             });
             if fails {
                 std::thread::spawn(|| panic!("planted"));
@@ -49,6 +53,7 @@ fn child_operates_a_terminal() {
                 match tui.next(&view, None, Duration::from_millis(100)) {
                     Ok(inputs) => match &inputs[..] {
                         [Input::Quit] => break "quit".to_owned(),
+                        [Input::Answer(answers)] => break format!("{answers:?}"),
                         [Input::Abort(why)] => break format!("abort: {why}"),
                         _ => {}
                     },
@@ -292,6 +297,32 @@ fn without_a_terminal_it_is_refused() {
     };
     let error = Tui::open(options).err().unwrap();
     assert!(error.to_string().contains("needs a terminal"));
+}
+
+#[test]
+fn typed_and_pasted_text_of_any_language_arrives_whole() {
+    let mut desk = Desk::start(None, &[("TUI_CHILD_RATES", "1")]);
+    desk.shows("How realistic did it feel?");
+    // A click on the box of 5, then the comment.
+    let screen = desk.screen.screen().contents();
+    let row = screen
+        .lines()
+        .position(|line| line.contains("│  5  │"))
+        .unwrap();
+    let line = screen.lines().nth(row).unwrap();
+    let column = line[..line.find("│  5  │").unwrap()].chars().count();
+    desk.types(&format!("\u{1b}[<0;{};{}M", column + 3, row + 1));
+    desk.shows("┃  5  ┃");
+    desk.types("\t日本 é 👍🏽 ");
+    desk.types("\u{1b}[200~שלום\r=1+1\u{1b}[201~");
+    desk.shows("=1+1");
+    desk.shows("日本");
+    desk.types("\r");
+    let report = desk.report();
+    assert!(report.contains("Rating(5)"), "{report}");
+    let text = format!("{:?}", "日本 é 👍🏽 שלום\n=1+1");
+    assert!(report.contains(&text), "{report}");
+    desk.is_given_back();
 }
 
 #[test]
