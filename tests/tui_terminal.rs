@@ -63,6 +63,9 @@ fn child_operates_a_terminal() {
         }
     };
     std::fs::write(report, end).unwrap();
+    if std::env::var("TUI_CHILD_LINGERS").is_ok() {
+        std::thread::sleep(PATIENCE * 2);
+    }
 }
 
 fn cells(n: u16) -> NonZeroU16 {
@@ -228,6 +231,21 @@ fn signals_end_the_session_in_order() {
         desk.signal(signal);
         assert_eq!(desk.report(), format!("abort: the program got {name}"));
         desk.is_given_back();
+    }
+}
+
+#[test]
+fn after_the_session_a_signal_ends_the_program_as_ever() {
+    let mut desk = Desk::start(None, &[("TUI_CHILD_LINGERS", "1")]);
+    desk.shows("Feel the device.");
+    desk.types("\u{11}y");
+    assert_eq!(desk.report(), "quit");
+    desk.is_given_back();
+    desk.signal(Signal::TERM);
+    let start = Instant::now();
+    while desk.child.try_wait().unwrap().is_none() {
+        assert!(start.elapsed() < PATIENCE, "the signal was swallowed");
+        desk.listen();
     }
 }
 

@@ -25,7 +25,7 @@ use std::io::{self, IsTerminal as _, Stdout};
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError, TryLockError};
 use std::time::Duration;
 
 /// Whether the terminal is ours: raw, on the alternate screen.
@@ -35,6 +35,9 @@ static MOUSE: AtomicBool = AtomicBool::new(false);
 /// Whether some thread has panicked: the terminal is given back for good.
 static PANICKED: AtomicBool = AtomicBool::new(false);
 static HOOK: Once = Once::new();
+/// Whether no terminal is open, so that the ending signals do what they do in any
+/// other program. Their handlers stay for good once they are registered.
+static IDLE: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 /// Held while a page is written, so that another thread's panic does not give the
 /// terminal back in the middle of it.
 static WRITING: Mutex<()> = Mutex::new(());
@@ -83,7 +86,14 @@ impl Terminal {
         let signal = Arc::new(AtomicUsize::new(0));
         let continued = Arc::new(AtomicBool::new(false));
         let mut registered = Vec::new();
+        let first = IDLE.get().is_none();
+        let idle = IDLE.get_or_init(Arc::default);
+        idle.store(false, Ordering::SeqCst);
         for number in [SIGHUP, SIGINT, SIGQUIT, SIGTERM] {
+            if first {
+                signal_hook::flag::register_conditional_default(number, Arc::clone(idle))
+                    .map_err(TuiError::Terminal)?;
+            }
             let value = usize::try_from(number).unwrap_or(0);
             let id = signal_hook::flag::register_usize(number, Arc::clone(&signal), value);
             registered.push(id.map_err(TuiError::Terminal)?);
@@ -194,10 +204,13 @@ impl Terminal {
 impl Drop for Terminal {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::SeqCst);
+        give_back();
         for id in self.registered.drain(..) {
             signal_hook::low_level::unregister(id);
         }
-        give_back();
+        if let Some(idle) = IDLE.get() {
+            idle.store(true, Ordering::SeqCst);
+        }
     }
 }
 
