@@ -108,14 +108,14 @@ impl Tui {
             return Ok(());
         }
         let surface = &mut self.surface;
-        let drawn = self.terminal.screen().draw(|frame| {
+        let drawn = self.terminal.draw(|frame| {
             let area = frame.area();
             surface.follow(view, area);
             if let Some(at) = surface.draw(view, strip, area, frame.buffer_mut()) {
                 frame.set_cursor_position(at);
             }
         });
-        drawn.map_err(|e| OperatorError(format!("the terminal cannot be written: {e}")))?;
+        drawn.map_err(OperatorError)?;
         self.drawn = Some(now);
         Ok(())
     }

@@ -1,5 +1,8 @@
 //! What keys, clicks and pasted text do.
 
+// A helper that unwraps is an assertion here.
+#![allow(clippy::unwrap_used)]
+
 #[path = "tui_support/views.rs"]
 mod support;
 
@@ -8,7 +11,7 @@ use crossterm::event::{
 };
 use study::outcome::{Author, Choice, Place};
 use study::protocol::question::MAX_TEXT_BYTES;
-use study::protocol::{Answer, QuestionKind};
+use study::protocol::{Answer, Entry, QuestionKind};
 use study::session::view::{DeviceState, View};
 use study::session::{Input, Screen};
 use study::tui::{Colour, Surface};
@@ -155,6 +158,15 @@ fn esc_works_where_the_terminal_is_too_small_to_draw() {
     drawn(&mut desk.surface, &desk.view, None, 12, 3);
     assert_eq!(desk.press(KeyCode::Esc), [Input::Stop]);
     assert_eq!(desk.types(" "), [Input::Stop]);
+    // Nobody answers or leaves unseen, and a text hides no Space.
+    assert_eq!(desk.enter(), []);
+    assert_eq!(desk.press(KeyCode::F(2)), []);
+    assert_eq!(desk.types("x "), [Input::Stop]);
+    assert_eq!(desk.types("y"), []);
+    desk.control('c');
+    let small = picture(&drawn(&mut desk.surface, &desk.view, None, 60, 20));
+    assert!(small.contains("y leaves"), "{small}");
+    assert_eq!(desk.types("y"), [Input::Quit]);
 }
 
 #[test]
@@ -329,14 +341,12 @@ fn a_trial_is_marked_bad_only_with_a_reason_and_only_if_there_is_one() {
 
 #[test]
 fn leaving_is_confirmed() {
-    for leave in [KeyCode::F(10)] {
-        let mut desk = Desk::with(playing());
-        assert_eq!(desk.press(leave), []);
-        assert_eq!(desk.enter(), []);
-        assert_eq!(desk.types("n"), []);
-        assert_eq!(desk.control('c'), []);
-        assert_eq!(desk.types("y"), [Input::Quit]);
-    }
+    let mut desk = Desk::with(playing());
+    assert_eq!(desk.press(KeyCode::F(10)), []);
+    assert_eq!(desk.enter(), []);
+    assert_eq!(desk.types("n"), []);
+    assert_eq!(desk.control('c'), []);
+    assert_eq!(desk.types("y"), [Input::Quit]);
 }
 
 #[test]
@@ -526,5 +536,21 @@ fn nothing_beyond_the_view_is_on_the_screen_while_it_plays() {
     let known: Vec<&str> = known.split_whitespace().collect();
     for word in desk.look().split_whitespace() {
         assert!(known.contains(&word), "{word}");
+    }
+}
+
+#[test]
+fn a_long_question_is_shown_whole() {
+    let words: Vec<String> = (1..=80).map(|n| format!("word{n}")).collect();
+    let mut long = realism();
+    long.prompt = words.join(" ");
+    for entry in [Entry::Participant, Entry::Experimenter] {
+        let screen = form(vec![long.clone(), comment()]);
+        let mut desk = Desk::at(View {
+            entry,
+            ..view(screen)
+        });
+        let look = desk.look();
+        assert!(look.contains("word80") && look.contains("┌"), "{look}");
     }
 }

@@ -1,5 +1,8 @@
 //! Screens as pictures of their cells.
 
+// A helper that unwraps is an assertion here.
+#![allow(clippy::unwrap_used)]
+
 #[path = "tui_support/views.rs"]
 mod support;
 

@@ -73,6 +73,9 @@ impl Surface {
     /// What an event means.
     pub fn event(&mut self, event: &Event, view: &View) -> Vec<Input> {
         self.follow(view, self.area);
+        if Page::too_small(self.area) {
+            return self.draft.blind(event, view);
+        }
         let Event::Mouse(mouse) = event else {
             let inputs = self.draft.key(event, view);
             self.measure(view);

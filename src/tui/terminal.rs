@@ -14,14 +14,18 @@ use crossterm::terminal::{
     EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
 };
 use crossterm::{cursor, execute, style};
+use ratatui::Frame;
 use ratatui::backend::CrosstermBackend;
+use ratatui::layout::Rect;
 use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::process::{Signal, getpid, kill_process};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+use std::cell::Cell;
 use std::io::{self, IsTerminal as _, Stdout};
+use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Once};
+use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError, TryLockError};
 use std::time::Duration;
 
 /// Whether the terminal is ours: raw, on the alternate screen.
@@ -31,13 +35,26 @@ static MOUSE: AtomicBool = AtomicBool::new(false);
 /// Whether some thread has panicked: the terminal is given back for good.
 static PANICKED: AtomicBool = AtomicBool::new(false);
 static HOOK: Once = Once::new();
+/// Whether no terminal is open, so that the ending signals do what they do in any
+/// other program. Their handlers stay for good once they are registered.
+static IDLE: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+/// Held while a page is written, so that another thread's panic does not give the
+/// terminal back in the middle of it.
+static WRITING: Mutex<()> = Mutex::new(());
+
+thread_local! {
+    /// Whether this thread is the one that holds [`WRITING`].
+    static WRITES: Cell<bool> = const { Cell::new(false) };
+}
 
 /// How long the reading thread waits before it looks whether it should end.
 const READ_SLICE: Duration = Duration::from_millis(100);
 
 /// A terminal that is taken.
 pub(super) struct Terminal {
-    screen: ratatui::Terminal<CrosstermBackend<Stdout>>,
+    /// Never dropped: its drop prints to a terminal that may be gone, and panics.
+    /// The cursor is shown again by [`give_back`].
+    screen: ManuallyDrop<ratatui::Terminal<CrosstermBackend<Stdout>>>,
     events: Receiver<io::Result<Event>>,
     ended: Arc<AtomicBool>,
     signal: Arc<AtomicUsize>,
@@ -69,7 +86,14 @@ impl Terminal {
         let signal = Arc::new(AtomicUsize::new(0));
         let continued = Arc::new(AtomicBool::new(false));
         let mut registered = Vec::new();
+        let first = IDLE.get().is_none();
+        let idle = IDLE.get_or_init(Arc::default);
+        idle.store(false, Ordering::SeqCst);
         for number in [SIGHUP, SIGINT, SIGQUIT, SIGTERM] {
+            if first {
+                signal_hook::flag::register_conditional_default(number, Arc::clone(idle))
+                    .map_err(TuiError::Terminal)?;
+            }
             let value = usize::try_from(number).unwrap_or(0);
             let id = signal_hook::flag::register_usize(number, Arc::clone(&signal), value);
             registered.push(id.map_err(TuiError::Terminal)?);
@@ -93,7 +117,7 @@ impl Terminal {
                 TuiError::Terminal(e)
             })?;
         Ok(Self {
-            screen,
+            screen: ManuallyDrop::new(screen),
             events,
             ended,
             signal,
@@ -102,9 +126,19 @@ impl Terminal {
         })
     }
 
-    /// The screen to draw on.
-    pub(super) fn screen(&mut self) -> &mut ratatui::Terminal<CrosstermBackend<Stdout>> {
-        &mut self.screen
+    /// Draws a page, unless the terminal was given back meanwhile.
+    pub(super) fn draw(&mut self, page: impl FnOnce(&mut Frame<'_>)) -> Result<(), String> {
+        let one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
+        if TAKEN.load(Ordering::SeqCst) {
+            WRITES.set(true);
+            let drawn = self.screen.draw(page).map(drop);
+            WRITES.set(false);
+            drop(one);
+            drawn.map_err(|error| format!("the terminal cannot be written: {error}"))
+        } else {
+            drop(one);
+            self.check().map(drop)
+        }
     }
 
     /// The name of a signal that asked the program to end, once.
@@ -159,17 +193,24 @@ impl Terminal {
     fn again(&mut self) -> Result<(), String> {
         let gone = |error: io::Error| format!("the terminal cannot be taken again: {error}");
         take().map_err(gone)?;
-        self.screen.clear().map_err(gone)
+        // Not `clear`, which asks the terminal where its cursor is and would wait
+        // for the thread that reads.
+        let size = self.screen.size().map_err(gone)?;
+        let area = Rect::new(0, 0, size.width, size.height);
+        self.screen.resize(area).map_err(gone)
     }
 }
 
 impl Drop for Terminal {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::SeqCst);
+        give_back();
         for id in self.registered.drain(..) {
             signal_hook::low_level::unregister(id);
         }
-        give_back();
+        if let Some(idle) = IDLE.get() {
+            idle.store(true, Ordering::SeqCst);
+        }
     }
 }
 
@@ -196,6 +237,7 @@ fn give_back() {
     if !TAKEN.swap(false, Ordering::SeqCst) {
         return;
     }
+    let _one = page_written();
     // Raw mode first: it needs no room in the output, which may be blocked.
     let _ = disable_raw_mode();
     if hung_up() {
@@ -211,6 +253,22 @@ fn give_back() {
         LeaveAlternateScreen,
         cursor::Show
     );
+}
+
+/// Waits until no other thread writes a page; not for ever, since a terminal may
+/// have stopped reading.
+fn page_written() -> Option<MutexGuard<'static, ()>> {
+    if WRITES.get() {
+        return None;
+    }
+    for _ in 0..50 {
+        match WRITING.try_lock() {
+            Ok(one) => return Some(one),
+            Err(TryLockError::Poisoned(one)) => return Some(one.into_inner()),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
+        }
+    }
+    None
 }
 
 /// Whether the terminal's other end is closed. SIGHUP may be ignored, and

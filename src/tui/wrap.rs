@@ -14,7 +14,7 @@ use unicode_width::UnicodeWidthStr as _;
 /// One line of laid-out text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
-    /// The bytes of the source, without the line break and hanging spaces' end.
+    /// The bytes of the source, without the line break.
     pub range: Range<usize>,
     /// What is drawn.
     pub shown: String,
@@ -80,9 +80,11 @@ pub fn wrap(text: &str, columns: usize) -> Vec<Line> {
                 line.break_after = Some((end, line.shown.len(), line.cells));
                 continue;
             }
-            let (cut, next) = line.split(at);
-            lines.push(cut);
-            line = next;
+            while line.cells + cells > columns && line.cells > 0 {
+                let (cut, next) = line.split(at);
+                lines.push(cut);
+                line = next;
+            }
         } else if line.hangs {
             let (cut, next) = line.split(at);
             lines.push(cut);
@@ -154,7 +156,7 @@ pub fn paragraph(text: &str, columns: usize, rows: usize) -> Vec<String> {
         .map(|line| line.shown.trim_end().to_owned())
         .collect();
     if cut && let Some(last) = out.last_mut() {
-        *last = ellipsis(&format!("{last} …"), columns);
+        *last = ellipsis(&format!("{last}…"), columns);
     }
     out
 }
@@ -241,11 +243,12 @@ mod tests {
         #[test]
         fn lines_are_in_order_and_lose_nothing_but_line_breaks(text in "\\PC{0,40}|[ a-z\n\t\u{301}日👍🏽\u{202e}]{0,60}", columns in 1usize..30) {
             let lines = wrap(&text, columns);
+            let widest = text.graphemes(true).map(|g| width(&shown(g))).max();
             let mut at = 0;
             for line in &lines {
                 prop_assert!(text[at..line.range.start].chars().all(|c| matches!(c, '\n' | '\r')));
                 at = line.range.end;
-                prop_assert!(width(&line.shown) <= columns.max(10));
+                prop_assert!(width(&line.shown) <= columns.max(widest.unwrap_or(0)));
             }
             prop_assert_eq!(at, text.len());
         }

@@ -222,24 +222,26 @@ fn begins_another(start: &str, from: i64, to: i64) -> bool {
     let Ok(n) = start.parse::<i64>() else {
         return false;
     };
-    let (mut low, mut high) = (n, n);
-    while n != 0 {
-        let (Some(l), Some(h)) = (low.checked_mul(10), high.checked_mul(10)) else {
+    // Numbers that begin so: [10 n, 10 n + 9], then a hundred of them, and so on.
+    let (mut near, mut far) = (n, n);
+    loop {
+        let tens = (near.checked_mul(10), far.checked_mul(10));
+        let (Some(tenfold), Some(last)) = tens else {
             return false;
         };
-        (low, high) = if n > 0 {
-            (l, h.saturating_add(9))
+        let (low, high) = if n > 0 {
+            (tenfold, last.saturating_add(9))
         } else {
-            (l.saturating_sub(9), h)
+            (last.saturating_sub(9), tenfold)
         };
+        if n == 0 || (n > 0 && low > to) || (n < 0 && high < from) {
+            return false;
+        }
         if low <= to && high >= from {
             return true;
         }
-        if (n > 0 && low > to) || (n < 0 && high < from) {
-            return false;
-        }
+        (near, far) = if n > 0 { (low, high) } else { (high, low) };
     }
-    false
 }
 
 fn slider(
@@ -401,6 +403,8 @@ mod tests {
         assert_eq!(after(&scale(0, 100), &digits("37")), Some(37.0));
         assert_eq!(after(&scale(-3, 3), &digits("-2")), Some(-2.0));
         assert_eq!(after(&scale(1000, 2000), &digits("1500")), Some(1500.0));
+        assert_eq!(after(&scale(-120, -100), &digits("-115")), Some(-115.0));
+        assert_eq!(after(&scale(0, 10), &digits("0")), Some(0.0));
     }
 
     #[test]

@@ -8,7 +8,8 @@ use crate::protocol::{Answer, Question};
 use crate::session::{Input, Screen, View};
 use crate::text::QuestionId;
 use crate::tui::editor::Taken;
-use crate::tui::keys::Key;
+use crate::tui::keys::{self, Key};
+use crossterm::event::Event;
 
 impl Draft {
     /// What a key means now.
@@ -49,8 +50,23 @@ impl Draft {
         self.press_on_screen(key, view)
     }
 
+    /// What a key means where nothing can be drawn: stop, or leave after a
+    /// question back. Nobody answers what they cannot see.
+    pub fn blind(&mut self, event: &Event, view: &View) -> Vec<Input> {
+        let Event::Key(event) = event else {
+            return Vec::new();
+        };
+        let leaving = self.dialog() == Some(&Dialog::Confirm(Confirm::Quit));
+        match keys::read(event) {
+            Some(Key::Char(' ')) if view.armed => vec![Input::Stop],
+            Some(key @ (Key::Esc | Key::Quit)) => self.press(key, view),
+            Some(key @ Key::Char('y' | 'n')) if leaving => self.press(key, view),
+            _ => Vec::new(),
+        }
+    }
+
     /// Whether a character is text now, Space included.
-    fn is_text(&self) -> bool {
+    pub fn is_text(&self) -> bool {
         match (self.dialog(), self.here) {
             (Some(dialog), _) => dialog.is_text(),
             (None, Here::Who) => true,

@@ -126,10 +126,9 @@ impl<'a> AnswerField<'a> {
             TRACK_ROWS + track.caption_rows(columns)
         } else if let Some(list) = self.list() {
             list.rows(self.inner(Rect::new(0, 0, columns, 1)).width)
-        } else if let Field::Text(editor) = self.field {
-            let area = self.inner(Rect::new(0, 0, columns, 1));
-            let lines = editor.layout(TextField::columns(area)).0.len();
-            u16::try_from(lines).unwrap_or(most).max(3)
+        } else if self.field.is_text() {
+            // The same from the first letter on, so that nothing moves.
+            8
         } else {
             2
         };

@@ -36,6 +36,7 @@ pub struct FormView<'a> {
 struct Placed {
     prompt: Rect,
     words: Vec<String>,
+    tall: u16,
     answers: Vec<(usize, Option<Rect>, Rect)>,
     end: u16,
 }
@@ -71,8 +72,9 @@ impl FormView<'_> {
         }
     }
 
-    fn tall(&self, area: Rect) -> u16 {
-        match area.height {
+    /// Rows of a box, by the rows that the question leaves.
+    fn tall(&self, rows: u16) -> u16 {
+        match rows {
             _ if self.compact() => 3,
             ..14 => 3,
             14..26 => 5,
@@ -82,17 +84,18 @@ impl FormView<'_> {
 
     fn place(&self, body: Rect) -> Placed {
         let area = self.column(body);
-        let tall = self.tall(area);
-        let most = if area.height < 14 { 3 } else { 6 };
+        let later = u16::try_from(self.questions.len().saturating_sub(1)).unwrap_or(0);
+        // A question is never cut while there is room for it and an answer.
+        let most = usize::from(area.height.saturating_sub(5 + later * 4)).max(3);
         let prompt = self.questions.first().map_or("", |q| q.prompt.as_str());
         let label = if self.compact() { 8 } else { 0 };
         let columns = usize::from(area.width).saturating_sub(label).min(72);
         let words = wrap::paragraph(prompt, columns.max(1), most);
         let prompt_rows = u16::try_from(words.len()).unwrap_or(1);
         let mut space = area.height.saturating_sub(prompt_rows);
+        let tall = self.tall(space);
 
         // What each answer would like, then less where the page is full.
-        let later = u16::try_from(self.questions.len().saturating_sub(1)).unwrap_or(0);
         let reserved = later * 3;
         let mut heights: Vec<u16> = Vec::new();
         for at in 0..self.questions.len() {
@@ -103,7 +106,7 @@ impl FormView<'_> {
             let most = if at == 0 {
                 space.saturating_sub(reserved)
             } else {
-                space.saturating_sub(titled).min(6)
+                space.saturating_sub(titled).min(3)
             };
             let height = answer.rows(area.width, most);
             space = space.saturating_sub(height + titled);
@@ -138,6 +141,7 @@ impl FormView<'_> {
         Placed {
             prompt,
             words,
+            tall,
             answers,
             end: y,
         }
@@ -145,22 +149,20 @@ impl FormView<'_> {
 
     /// What the mouse hits at a place.
     pub fn hit(&self, body: Rect, place: Position) -> Option<Target> {
-        let tall = self.tall(self.column(body));
         let placed = self.place(body);
         placed.answers.into_iter().find_map(|(at, title, area)| {
             if title.is_some_and(|t| t.contains(place)) {
                 return Some(Target::Field(at));
             }
-            self.answer(at, tall)?.hit(area, at, place)
+            self.answer(at, placed.tall)?.hit(area, at, place)
         })
     }
 
     /// Where the terminal's cursor belongs.
     pub fn cursor(&self, body: Rect) -> Option<Position> {
-        let tall = self.tall(self.column(body));
         let placed = self.place(body);
         let (at, _, area) = placed.answers.get(self.form.focus)?;
-        self.answer(*at, tall)?.cursor(*area)
+        self.answer(*at, placed.tall)?.cursor(*area)
     }
 
     /// Columns of the text that has the focus.
@@ -232,7 +234,6 @@ impl FormView<'_> {
 
 impl Widget for &FormView<'_> {
     fn render(self, body: Rect, buf: &mut Buffer) {
-        let tall = self.tall(self.column(body));
         let placed = self.place(body);
         if self.compact() {
             let ask = if self.to_experimenter {
@@ -252,7 +253,7 @@ impl Widget for &FormView<'_> {
             centre_all(buf, placed.prompt, &placed.words, self.theme.strong());
         }
         for (at, title, area) in &placed.answers {
-            let Some(answer) = self.answer(*at, tall) else {
+            let Some(answer) = self.answer(*at, placed.tall) else {
                 continue;
             };
             if let Some(title) = title {

@@ -13,6 +13,7 @@ use crate::protocol::Entry;
 use crate::runner::Strip;
 use crate::session::view::DeviceState;
 use crate::session::{Screen, View};
+use crate::tui::draft::dialog::{Confirm, Dialog};
 use crate::tui::draft::{Draft, Target};
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, hints, middle, row, rows};
@@ -50,7 +51,8 @@ pub struct Room {
 }
 
 impl<'a> Page<'a> {
-    fn too_small(area: Rect) -> bool {
+    /// Whether an area is too small for any screen.
+    pub fn too_small(area: Rect) -> bool {
         area.width < MINIMUM.0 || area.height < MINIMUM.1
     }
 
@@ -216,6 +218,11 @@ impl<'a> Page<'a> {
         } else {
             "Esc stops the device."
         };
+        let leave = if self.draft.dialog() == Some(&Dialog::Confirm(Confirm::Quit)) {
+            "Leave the session? y leaves, n does not."
+        } else {
+            ""
+        };
         let (w, h) = MINIMUM;
         let lines = [
             format!(
@@ -224,6 +231,7 @@ impl<'a> Page<'a> {
             ),
             "Make the window larger.".to_owned(),
             stop.to_owned(),
+            leave.to_owned(),
         ];
         let columns = usize::from(area.width).max(1);
         let wrapped: Vec<String> = lines
@@ -276,6 +284,7 @@ impl Widget for &Page<'_> {
         }
         let status = Status {
             line: &self.view.line,
+            text: self.draft.is_text(),
             unsaved: matches!(self.view.screen, Screen::SaveTrouble { .. }),
             theme: self.theme,
         };

@@ -39,8 +39,7 @@ pub fn fits(from: i64, to: i64, columns: u16) -> bool {
     let Some(count) = to.checked_sub(from).map(|n| n.saturating_add(1)) else {
         return false;
     };
-    count <= MOST_BOXES
-        && count >= 1
+    (1..=MOST_BOXES).contains(&count)
         && i64::from(columns) >= count * i64::from(NARROW) + count - 1
         && [from, to].iter().all(|n| n.to_string().len() <= 3)
 }

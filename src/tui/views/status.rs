@@ -15,6 +15,8 @@ use ratatui::widgets::Widget;
 pub struct Status<'a> {
     /// What it says.
     pub line: &'a StatusLine,
+    /// Whether `?` is a character now.
+    pub text: bool,
     /// Whether saving has failed.
     pub unsaved: bool,
     /// Its look.
@@ -84,7 +86,7 @@ impl Widget for &Status<'_> {
         centre(buf, inside, &Line::from(spans));
 
         let help = vec![
-            Span::styled("?", self.theme.key()),
+            Span::styled(if self.text { "F1" } else { "?" }, self.theme.key()),
             Span::styled(" help", quiet),
         ];
         right(buf, inside, &Line::from(help));
