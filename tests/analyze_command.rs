@@ -1,4 +1,5 @@
 //! Walls: what `study analyze` prints, writes and refuses.
+#![allow(clippy::unwrap_used)]
 
 use assert_cmd::Command;
 use std::fs;

@@ -1,5 +1,6 @@
 //! Walls: no table makes the analysis panic or print a number that is none, and
 //! what must not matter does not.
+#![allow(clippy::unwrap_used)]
 
 use proptest::prelude::*;
 use study::analyze::{Analysis, Rules, Value, analyze};

@@ -1,4 +1,5 @@
 //! Walls: which rows of a study count, and what is said of the others.
+#![allow(clippy::unwrap_used)]
 
 use chrono::DateTime;
 use std::collections::BTreeMap;

@@ -1,4 +1,5 @@
 //! Walls: from a study's folder on disk to its analysis.
+#![allow(clippy::unwrap_used)]
 
 #[path = "store_support/world.rs"]
 mod world;

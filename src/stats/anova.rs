@@ -42,7 +42,8 @@ pub struct Mauchly {
     pub w: f64,
     /// With Box's second-order term (Anderson 1958, §10.7.4).
     pub p: Option<f64>,
-    /// As R and car print it, with 3(q + 1) for 3q in that term.
+    /// As R and car print it. That their term has 3(q + 1) for 3q was inferred from
+    /// a printed value, not read in their source; it then fits all sets tried.
     pub p_as_r: Option<f64>,
 }
 

@@ -3,7 +3,7 @@
 //! Tails come from the regularised incomplete beta and gamma functions of
 //! statrs, always of the small side, so that a p of 10⁻²⁰ keeps its digits, and
 //! from `libm::erfc` for the normal, where statrs has 11 digits. Quantiles are
-//! roots of these tails: the inverses of statrs are wrong far out (t with one
+//! roots of these tails: the inverses of statrs are reported wrong far out (t with one
 //! degree of freedom at 10⁻¹⁰ is off by 97 %).
 
 use super::finite;
@@ -181,7 +181,8 @@ mod tests {
         assert!((a - b).abs() <= relative * b.abs(), "{a} is not {b}");
     }
 
-    /// Values of R 4.2 `qt`, `pt`, `qf`, `qnorm`, `pchisq`.
+    /// Points of printed tables, to the digits that are commonly quoted; no peer was
+    /// run for them here. The independent check is tests/analyze_golden.rs.
     #[test]
     fn tails_and_quantiles_agree_with_tables() {
         close(t_quantile(0.975, 9.0).unwrap(), 2.262157162798205, 1e-12);

@@ -3,7 +3,6 @@
 use super::distribution::{chi2_upper, f_upper, normal_upper};
 use super::finite;
 use super::rank::{doubled_ranks, mid_ranks};
-use std::collections::BTreeMap;
 
 /// Friedman's test.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +26,7 @@ pub struct Friedman {
 }
 
 /// Most work, in visited states, that the exact distribution may cost.
-const EXACT_WORK: usize = 2_000_000;
+const EXACT_WORK: usize = 200_000;
 
 /// χ² = (k−1) Σⱼ(Rⱼ − n(k+1)/2)² / (Σᵢⱼ rᵢⱼ² − nk(k+1)²/4), which is Friedman's
 /// with the correction for ties (Conover 1999, §5.8). `None` below two rows or
@@ -66,13 +65,15 @@ pub fn friedman(rows: &[Vec<f64>]) -> Option<Friedman> {
 }
 
 /// The distribution of Σ(Rⱼ − centre)² over all orders within rows, row by row.
-/// Columns are exchangeable under H₀, so a state is the sorted rank sums.
+/// Columns are exchangeable under H₀, so a state is the sorted rank sums; they
+/// are packed into one number, 12 bits each.
 fn exact_p(ranks: &[Vec<i64>], observed: i64, centre: i64) -> Option<f64> {
+    const BITS: usize = 12;
     let k = ranks.first()?.len();
-    if k > 5 {
+    if k > 5 || 2 * k * ranks.len() >= 1 << BITS {
         return None;
     }
-    let mut states: BTreeMap<Vec<i64>, f64> = BTreeMap::from([(vec![0; k], 1.0)]);
+    let mut states: Vec<(u64, f64)> = vec![(0, 1.0)];
     let mut work = 0;
     for row in ranks {
         let arrangements = arrangements(row);
@@ -81,20 +82,40 @@ fn exact_p(ranks: &[Vec<i64>], observed: i64, centre: i64) -> Option<f64> {
         if work > EXACT_WORK {
             return None;
         }
-        let mut next = BTreeMap::new();
+        let mut next = Vec::with_capacity(states.len() * arrangements.len());
         for (state, p) in &states {
             for arrangement in &arrangements {
-                let mut sums: Vec<i64> =
-                    state.iter().zip(arrangement).map(|(a, b)| a + b).collect();
-                sums.sort_unstable();
-                *next.entry(sums).or_insert(0.0) += p * share;
+                let mut sums = [0u64; 5];
+                for (j, rank) in arrangement.iter().enumerate() {
+                    // Doubled ranks are positive.
+                    sums[j] = (state >> (BITS * j) & ((1 << BITS) - 1)) + rank.unsigned_abs();
+                }
+                sums[..k].sort_unstable();
+                let packed = (0..k).fold(0, |all, j| all | sums[j] << (BITS * j));
+                next.push((packed, p * share));
             }
         }
+        next.sort_unstable_by_key(|s| s.0);
+        next.dedup_by(|later, kept| {
+            let same = later.0 == kept.0;
+            if same {
+                kept.1 += later.1;
+            }
+            same
+        });
         states = next;
     }
+    let size = |state: u64| -> i64 {
+        (0..k)
+            .map(|j| {
+                let sum = (state >> (BITS * j) & ((1 << BITS) - 1)) as i64;
+                (sum - centre) * (sum - centre)
+            })
+            .sum()
+    };
     let p: f64 = states
         .iter()
-        .filter(|(s, _)| s.iter().map(|v| (v - centre) * (v - centre)).sum::<i64>() >= observed)
+        .filter(|(s, _)| size(*s) >= observed)
         .map(|(_, p)| p)
         .sum();
     Some(p.min(1.0))
