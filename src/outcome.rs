@@ -13,6 +13,9 @@ pub mod ratings;
 pub use columns::{AttemptRow, ParticipantRow, RatingRow, Status};
 pub use event::{Author, Choice, Entry, Event, Failure, Moment, Place, Playback, Start, State};
 
+/// A row says what its realization is; readers of rows need no protocol for it.
+pub use crate::protocol::Role;
+
 use serde::{Deserialize, Serialize};
 
 /// One instant of a playback, as the device reports it.

@@ -10,7 +10,7 @@ mod layout;
 use super::Source;
 use super::plot::{Axis, bars};
 use crate::analyze::{Analysis, Listed};
-use crate::protocol::Role;
+use crate::outcome::Role;
 use crate::text::Untrusted;
 use layout::{Grid, Paint, cut, pad, wrap};
 use unicode_width::UnicodeWidthStr as _;
