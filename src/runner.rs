@@ -364,6 +364,7 @@ impl Runner {
                     Input::Saved { count: self.saved }
                 }
                 Word::Failed(why) => Input::SaveFailed(why),
+                Word::TelemetryLost(why) => Input::Notice(why),
             };
             self.feed(input);
         }

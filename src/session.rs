@@ -167,6 +167,7 @@ impl Session {
             }
             Input::Claimed(claim) => self.claimed(*claim, at),
             Input::ClaimRefused(why) => self.claim_refused(&why),
+            Input::Notice(what) => self.say(what),
             Input::RetrySave => self.retry_save(),
             Input::Advance => self.advance_or_uncover(at),
             _ if !self.phase.under_way() => {}
@@ -209,6 +210,7 @@ fn is_deliberate(input: &Input) -> bool {
     !matches!(
         input,
         Input::Tick
+            | Input::Notice(_)
             | Input::Saved { .. }
             | Input::Claimed(_)
             | Input::DeviceLoaded

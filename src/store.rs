@@ -17,6 +17,7 @@ pub mod layout;
 pub mod line;
 pub mod manifest;
 pub mod replay;
+mod reveals;
 
 mod atomic;
 mod derive;

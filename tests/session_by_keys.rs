@@ -5,12 +5,13 @@
 mod support;
 
 use std::fs;
+use std::path::{Path, PathBuf};
 use support::player::{Did, play};
 use support::{Terminal, repository, study};
 
-fn start(folder: &std::path::Path, protocol: &str) -> Terminal {
-    let path = repository(&format!("protocols/{protocol}"));
-    let mut terminal = Terminal::start(&["run", &path, "--operator", "lw"], folder, 24, 80);
+fn start(folder: &Path, protocol: &Path) -> Terminal {
+    let path = protocol.to_str().unwrap();
+    let mut terminal = Terminal::start(&["run", path, "--operator", "lw"], folder, 24, 80);
     terminal.wait_for("Who takes part?");
     terminal
 }
@@ -45,10 +46,11 @@ const F4: &str = "\u{1b}OS";
 const F10: &str = "\u{1b}[21~";
 
 /// A session with everything that can happen in it.
-fn eventful(protocol: &str, trials: usize, comment: &str) {
+fn eventful(protocol: &Path, id: &str, trials: usize) {
     let folder = tempfile::tempdir().unwrap();
     let mut terminal = start(folder.path(), protocol);
-    // the first trial that counts, rated with a comment
+    // a remark while the first trial that counts plays
+    play_until(&mut terminal, "trial 1 of");
     play_until(&mut terminal, "Enter to rate");
     dialog(&mut terminal, F2, "Tab who", "motor hums\r");
     assert!(
@@ -65,8 +67,7 @@ fn eventful(protocol: &str, trials: usize, comment: &str) {
     terminal.wait_for("Correct");
     terminal.keys("\r");
     terminal.wait_until("the new answer", |s| s.contains("Enter goes on"));
-    terminal.keys(comment);
-    terminal.keys("\r");
+    terminal.keys("3\r");
     terminal.wait_until("the reason", |s| s.contains("Enter corrects"));
     terminal.keys("mistyped\r");
     terminal.wait_until("the dialog to close", |s| !s.contains("Enter corrects"));
@@ -87,7 +88,7 @@ fn eventful(protocol: &str, trials: usize, comment: &str) {
     terminal.keys("\r");
     assert_eq!(terminal.exit_code(), 0);
 
-    let results = folder.path().join("results").join(protocol);
+    let results = folder.path().join("results").join(id);
     let (code, out, err) = study(&["verify", "results"], folder.path());
     assert_eq!(code, 0, "{out}{err}");
     let (code, out, err) = study(&["status", "results"], folder.path());
@@ -131,5 +132,41 @@ fn eventful(protocol: &str, trials: usize, comment: &str) {
 
 #[test]
 fn the_papers_study_with_a_correction_a_remark_a_bad_trial_a_quit_and_a_resume() {
-    eventful("turn-signal", 15, "3");
+    eventful(
+        Path::new(&repository("protocols/turn-signal")),
+        "turn-signal",
+        15,
+    );
+}
+
+/// The extended protocol with one repetition and short waits: nobody is tired here.
+fn shortened(folder: &Path) -> PathBuf {
+    let from = PathBuf::from(repository("protocols/turn-signal-extended"));
+    let to = folder.join("extended");
+    fs::create_dir_all(to.join("models")).unwrap();
+    for file in fs::read_dir(from.join("models")).unwrap() {
+        let file = file.unwrap();
+        fs::copy(file.path(), to.join("models").join(file.file_name())).unwrap();
+    }
+    let mut text = fs::read_to_string(from.join("protocol.toml")).unwrap();
+    for (long, short) in [
+        ("repetitions = 3", "repetitions = 1"),
+        (
+            "breaks = { every = 10, at_least_s = 60 }",
+            "breaks = { every = 4, at_least_s = 1 }",
+        ),
+        ("reference_min_s = 3", "reference_min_s = 0"),
+        ("minimum_strokes = 2", "minimum_strokes = 1"),
+    ] {
+        assert!(text.contains(long), "the protocol has no `{long}` any more");
+        text = text.replace(long, short);
+    }
+    fs::write(to.join("protocol.toml"), text).unwrap();
+    to
+}
+
+#[test]
+fn the_extended_study_with_the_same_and_its_consent_forms_practice_and_breaks() {
+    let folder = tempfile::tempdir().unwrap();
+    eventful(&shortened(folder.path()), "turn-signal-extended", 10);
 }

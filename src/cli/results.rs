@@ -88,9 +88,9 @@ pub(super) fn now() -> Moment {
 /// A reason that says something and is not a book.
 pub(super) fn reason(given: &str) -> Result<&str, Failure> {
     if given.trim().is_empty() {
-        Err(Failure::input("--reason is empty").hint("say why in a few words; it is kept"))
+        Err(Failure::input("the reason is empty").hint("say why in a few words; it is kept"))
     } else if given.len() > MAX_TEXT_BYTES {
-        let long = format!("--reason is longer than {MAX_TEXT_BYTES} bytes");
+        let long = format!("the reason is longer than {MAX_TEXT_BYTES} bytes");
         Err(Failure::input(long))
     } else {
         Ok(given)

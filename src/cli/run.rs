@@ -11,6 +11,7 @@ use crate::store::{Frozen, SeatKind, StudyFolder};
 use crate::tui::{self, Tui};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Arguments of `study run`.
 #[derive(Debug, clap::Args)]
@@ -88,6 +89,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
+    // Past a file size limit a write shall fail, which is told, instead of ending
+    // the program. Where the handler cannot be set it ends as it always did.
+    let _ = signal_hook::flag::register(
+        rustix::process::Signal::XFSZ.as_raw(),
+        Arc::new(AtomicBool::new(false)),
+    );
     // The terminal first: without one, nothing is created.
     let mut tui = Tui::open(tui::Options {
         mouse: !args.no_mouse,
@@ -97,6 +104,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     .map_err(|e| Failure::new(Kind::Usage, &e).hint(e.hint()))?;
     let study = StudyFolder::open_or_create(&args.results, &frozen, at)?;
     let folder = study.path().to_owned();
+    // After a kill the tables are behind the journals: bring them up first.
+    study.refresh(&loaded.protocol)?;
     let device: Box<dyn Device> = Box::new(VirtualDevice::new(Options {
         seed: loaded.protocol.study.seed,
         ..Options::default()
@@ -123,9 +132,28 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let mut runner = Runner::new(setup, config);
     let ending = runner.run(&mut tui);
+    let participant = runner.view().line.participant;
     drop(runner);
     drop(tui);
-    finish(console, &folder, &protocol, &ending, args)
+    finish(
+        console,
+        &folder,
+        &protocol,
+        &ending,
+        &again(args, &participant),
+    )
+}
+
+/// The command that goes on with a session.
+fn again(args: &Args, participant: &str) -> String {
+    let mut command = format!("study run {}", args.protocol.display());
+    if args.results.as_os_str() != "results" {
+        command.push_str(&format!(" --results {}", args.results.display()));
+    }
+    if !participant.is_empty() {
+        command.push_str(&format!(" --participant {participant}"));
+    }
+    command
 }
 
 /// Writes the derived tables and says what comes next.
@@ -134,7 +162,7 @@ fn finish(
     folder: &std::path::Path,
     protocol: &crate::protocol::Protocol,
     ending: &Ending,
-    args: &Args,
+    again: &str,
 ) -> Result<(), Failure> {
     if *ending != Ending::Nothing {
         let study = StudyFolder::open(folder)?;
@@ -146,8 +174,7 @@ fn finish(
             "The session is finished and saved in {shown}.\nNext: study status {shown} · study analyze {shown}\n"
         )),
         Ending::Interrupted => console.out(format!(
-            "The session is not finished; everything answered is saved in {shown}.\nIt goes on with: study run {}\n",
-            args.protocol.display()
+            "The session is not finished; everything answered is saved in {shown}.\nIt goes on with: {again}\n"
         )),
         Ending::DroppedOut => console.out(format!(
             "The participant has left the study; what was given is kept in {shown}.\n"

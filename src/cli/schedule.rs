@@ -2,12 +2,12 @@
 
 mod table;
 
-use super::{Console, Failure, Kind};
+use super::{Console, Failure, Kind, results};
 use crate::protocol::{FileOrders, Protocol, Seat, Trial};
 use crate::schedule::{Planner, ScheduleError};
-use crate::text::Untrusted;
+use crate::store::{StudyFolder, layout};
 use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// More rows than this at once are taken for a slip of the finger.
 const MAX_ROWS: u32 = 100_000;
@@ -29,31 +29,53 @@ pub(super) struct Args {
     /// Where results are; the orders of a started study are not shown
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
+    /// Show orders of a started study all the same; the reason is logged in it
+    #[arg(long, value_name = "REASON")]
+    reveal: Option<String>,
 }
 
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = super::load::load(&args.protocol)?;
     let protocol = &loaded.protocol;
-    if started(&args.results, protocol) {
-        return Err(Failure::results(format!(
-            "`{}` has started in {}: an order that is seen could steer a session",
-            Untrusted(&protocol.study.id),
-            args.results.display()
-        ))
-        .hint("`study status` shows who is done and which row is next, without any order"));
-    }
     let rows = args
         .rows
         .clone()
         .unwrap_or(1..=protocol.design.participants.max(1));
+    let folder = args.results.join(&protocol.study.id);
+    if folder.join(layout::MANIFEST).exists() {
+        let study = StudyFolder::open(&folder)?;
+        reveal(&study, &rows, args.reveal.as_deref(), console)?;
+    }
     show(protocol, loaded.orders.as_ref(), rows, args.csv, console)
 }
 
-/// Whether the study has a results folder, so that its orders are of people who
-/// take part.
-fn started(results: &Path, protocol: &Protocol) -> bool {
-    results.join(&protocol.study.id).join("study.json").exists()
+/// An order that is seen could steer a session: shown only with a reason, which is
+/// on disk before the order is on the screen.
+fn reveal(
+    study: &StudyFolder,
+    rows: &RangeInclusive<u32>,
+    reason: Option<&str>,
+    console: &mut Console,
+) -> Result<(), Failure> {
+    let folder = study.path().display();
+    let Some(reason) = reason else {
+        return Err(Failure::results(format!(
+            "the study has started in {folder}: an order that is seen could steer a session"
+        ))
+        .hint(
+            "`study status` shows who is done and which row is next, without any order; \
+             --reveal REASON shows it all the same and logs that",
+        ));
+    };
+    let reason = results::reason(reason)?;
+    study.log_reveal(rows, reason, results::now())?;
+    console.say(format!(
+        "logged in {folder}: orders of rows {}-{} were shown",
+        rows.start(),
+        rows.end()
+    ));
+    Ok(())
 }
 
 /// Prints the orders of some rows.
@@ -268,16 +290,5 @@ mod tests {
             "min_distance = 6 needs at least 6 realizations, there are 2"
         );
         assert!(failure.hint.is_some());
-    }
-
-    #[test]
-    fn the_orders_of_a_started_study_are_not_shown() {
-        let folder = tempfile::tempdir().unwrap();
-        let p = small();
-        assert!(!started(folder.path(), &p));
-        let study = folder.path().join(&p.study.id);
-        std::fs::create_dir(&study).unwrap();
-        std::fs::write(study.join("study.json"), "{}").unwrap();
-        assert!(started(folder.path(), &p));
     }
 }

@@ -4,7 +4,7 @@
 //! line is on disk, in the order of the events. After a failed write nothing is
 //! acknowledged, and nothing is forgotten, until [`Job::Retry`] has put every
 //! event in doubt into a new segment of the journal. Telemetry that cannot be
-//! written is dropped and told of once: no answer waits for it.
+//! written is dropped and told of: no answer waits for it.
 
 use crate::outcome::{Event, Moment, Sample};
 use crate::store::{Journal, SessionFolder, TelemetryWriter};
@@ -39,6 +39,8 @@ pub enum Word {
     Saved,
     /// An event is not; why, and what to do.
     Failed(String),
+    /// The telemetry of the attempt is not; the answers are.
+    TelemetryLost(String),
 }
 
 /// The saver of one session; holds its folder, and so its lock.
@@ -55,6 +57,8 @@ enum Way {
         jobs: Sender<Job>,
         words: Receiver<Word>,
         handle: JoinHandle<()>,
+        /// Whether its early end has been told.
+        told: bool,
     },
 }
 
@@ -86,12 +90,14 @@ impl Saver {
                         let _ = say.send(word);
                     }
                 }
-                worker.end_telemetry();
+                // Nobody is left to tell.
+                let _ = worker.end_telemetry();
             });
             Way::Thread {
                 jobs,
                 words,
                 handle,
+                told: false,
             }
         } else {
             Way::Inline {
@@ -118,9 +124,15 @@ impl Saver {
     pub fn words(&mut self) -> Vec<Word> {
         match &mut self.way {
             Way::Inline { words, .. } => std::mem::take(words),
-            Way::Thread { words, handle, .. } => {
+            Way::Thread {
+                words,
+                handle,
+                told,
+                ..
+            } => {
                 let mut said: Vec<Word> = words.try_iter().collect();
-                if handle.is_finished() {
+                if handle.is_finished() && !*told {
+                    *told = true;
                     said.push(Word::Failed("the thread that saves has ended".to_owned()));
                 }
                 said
@@ -131,7 +143,10 @@ impl Saver {
     /// Does what is left and closes the folder.
     pub fn finish(self) {
         match self.way {
-            Way::Inline { mut worker, .. } => worker.end_telemetry(),
+            Way::Inline { mut worker, .. } => {
+                // Nobody is left to tell.
+                let _ = worker.end_telemetry();
+            }
             Way::Thread { jobs, handle, .. } => {
                 drop(jobs);
                 // A panic in it has been reported by the hook.
@@ -164,22 +179,28 @@ impl Worker {
                 }
             }
             Job::TelemetryBegin { trial, attempt } => {
-                self.end_telemetry();
-                self.telemetry = self.folder.telemetry(trial, attempt).ok();
-                Vec::new()
+                let mut words = self.end_telemetry();
+                match self.folder.telemetry(trial, attempt) {
+                    Ok(telemetry) => {
+                        self.telemetry = Some(telemetry);
+                    }
+                    Err(error) => words.push(Word::TelemetryLost(error.to_string())),
+                }
+                words
             }
             Job::Telemetry(samples) => {
-                if let Some(telemetry) = &mut self.telemetry
-                    && telemetry.write(&samples).is_err()
-                {
-                    self.telemetry = None;
+                let Some(telemetry) = &mut self.telemetry else {
+                    return Vec::new();
+                };
+                match telemetry.write(&samples) {
+                    Ok(()) => Vec::new(),
+                    Err(error) => {
+                        self.telemetry = None;
+                        vec![Word::TelemetryLost(error.to_string())]
+                    }
                 }
-                Vec::new()
             }
-            Job::TelemetryEnd => {
-                self.end_telemetry();
-                Vec::new()
-            }
+            Job::TelemetryEnd => self.end_telemetry(),
         }
     }
 
@@ -201,11 +222,12 @@ impl Worker {
         words
     }
 
-    fn end_telemetry(&mut self) {
-        if let Some(telemetry) = self.telemetry.take() {
-            // Telemetry is evidence, not an answer: a file cut short shows in
-            // its own line count beside the journal's number of samples.
-            let _ = telemetry.finish();
+    /// Telemetry is evidence, not an answer: no answer waits for it, and a file cut
+    /// short shows beside the number of samples in the journal.
+    fn end_telemetry(&mut self) -> Vec<Word> {
+        match self.telemetry.take().map(TelemetryWriter::finish) {
+            Some(Err(error)) => vec![Word::TelemetryLost(error.to_string())],
+            Some(Ok(())) | None => Vec::new(),
         }
     }
 }

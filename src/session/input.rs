@@ -95,6 +95,9 @@ pub enum Input {
     },
     /// It could not be saved; nothing since is acknowledged.
     SaveFailed(String),
+    /// Something that the operator should know and that changes nothing, such as
+    /// telemetry that could not be written.
+    Notice(String),
     /// Try again to save what is in memory.
     RetrySave,
     /// Time has passed.

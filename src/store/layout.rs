@@ -19,6 +19,8 @@ pub const TELEMETRY: &str = "telemetry";
 pub const RESERVE: &str = "reserve";
 /// The same, before it belongs to a session.
 pub const PROBE: &str = ".probe";
+/// Which orders were shown while the study ran, to whom it may matter.
+pub const REVEALS: &str = "reveals.jsonl";
 /// Derived: one row for each trial.
 pub const RATINGS: &str = "ratings.csv";
 /// Derived: every attempt, answer, correction and failure.
