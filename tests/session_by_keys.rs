@@ -112,20 +112,21 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
             .all(|r| &r[status] == "ok" && &r[pilot] == "true")
     );
     assert_eq!(rows.iter().filter(|r| &r[corrected] == "true").count(), 1);
+    let attempts = fs::read_to_string(results.join("attempts.csv")).unwrap();
+    let again = counted.iter().filter(|r| &r[column("attempt")] == "2");
+    // the simulated device may trip as well, and that trial then comes back too
+    assert!(again.count() >= 1, "{attempts}");
     assert_eq!(
-        counted
-            .iter()
-            .filter(|r| &r[column("attempt")] == "2")
-            .count(),
-        1
+        attempts.matches("somebody came in").count(),
+        1,
+        "{attempts}"
     );
     assert!(
         counted
             .iter()
             .any(|r| &r[column("remarks")] == "motor hums")
     );
-    let attempts = fs::read_to_string(results.join("attempts.csv")).unwrap();
-    for word in ["somebody came in", "mistyped", "motor hums"] {
+    for word in ["mistyped", "motor hums"] {
         assert!(attempts.contains(word), "{word}");
     }
 }
