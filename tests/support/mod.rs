@@ -140,6 +140,17 @@ impl Terminal {
         }
     }
 
+    /// Memory of the process that is in RAM, KiB (Linux; 0 elsewhere).
+    pub fn resident_kib(&self) -> u64 {
+        let Some(id) = self.child.process_id() else {
+            return 0;
+        };
+        let status = std::fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();
+        let line = status.lines().find(|l| l.starts_with("VmRSS:"));
+        line.and_then(|l| l.split_whitespace().nth(1)?.parse().ok())
+            .unwrap_or(0)
+    }
+
     /// Another size.
     pub fn resize(&mut self, rows: u16, columns: u16) {
         self.master
