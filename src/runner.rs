@@ -35,6 +35,9 @@ const IDLE: Duration = Duration::from_millis(100);
 const PLAYING: Duration = Duration::from_millis(20);
 /// Longest wait while something is on its way to the disk.
 const SAVING: Duration = Duration::from_millis(2);
+/// A device with telemetry that is silent for so long while it plays has lost the
+/// playback.
+const SILENCE: Duration = Duration::from_secs(1);
 /// How much of the telemetry the live strip shows, samples.
 const STRIP_SAMPLES: usize = 3000;
 
@@ -109,6 +112,8 @@ pub struct Runner {
     ended: Option<Ending>,
     /// Events that were recorded before a journal was there to take them.
     early: Vec<(Moment, Event)>,
+    /// When the device last said something of the playback under way.
+    heard: Option<Duration>,
 }
 
 impl Runner {
@@ -131,6 +136,7 @@ impl Runner {
             strip,
             ended: None,
             early: Vec::new(),
+            heard: None,
         };
         runner.device_limp();
         runner.perform(effects);
@@ -322,6 +328,11 @@ impl Runner {
     fn hear_device(&mut self) {
         let at = self.device_time();
         for report in self.setup.device.poll(at) {
+            self.heard = match &report {
+                Report::Started if self.setup.device.identity().telemetry => Some(at),
+                Report::Telemetry(_) | Report::Progress { .. } => self.heard.map(|_| at),
+                _ => None,
+            };
             let input = match report {
                 Report::Loaded => Input::DeviceLoaded,
                 Report::Started => Input::DeviceStarted,
@@ -351,6 +362,15 @@ impl Runner {
                 Report::Ready => Input::DeviceReady,
             };
             self.feed(input);
+        }
+        if self
+            .heard
+            .is_some_and(|last| at.saturating_sub(last) > SILENCE)
+        {
+            self.heard = None;
+            self.send(Job::TelemetryEnd);
+            let what = format!("the device has sent nothing for {} s", SILENCE.as_secs());
+            self.feed(Input::PlaybackLost(what));
         }
     }
 
@@ -388,6 +408,7 @@ impl Runner {
     }
 
     fn device_limp(&mut self) {
+        self.heard = None;
         let at = self.device_time();
         self.setup.device.limp(at);
     }

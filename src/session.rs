@@ -156,6 +156,7 @@ impl Session {
             Input::DeviceStopped(playback) => self.device_stopped(playback, at),
             Input::DeviceFault(what) => self.device_fault(&what, at),
             Input::DeviceLost(what) => self.device_gone(&what, at),
+            Input::PlaybackLost(what) => self.playback_lost(&what, at),
             Input::DeviceReady => self.device_ready(),
             Input::Identify {
                 participant,

@@ -146,7 +146,8 @@ fn refuse_occupied(study: &StudyFolder, folder: &Path) -> Result<(), Failure> {
         .filter(|s| s.seat.is_some_and(Seat::is_simulated))
         .count();
     let what = if simulated == sessions.len() {
-        format!("already holds {simulated} rehearsed sessions")
+        let plural = if simulated == 1 { "" } else { "s" };
+        format!("already holds {simulated} rehearsed session{plural}")
     } else {
         "holds sessions with people".to_owned()
     };

@@ -17,6 +17,14 @@ impl Session {
         self.trouble_with(what, Failure::PlaybackLost, at);
     }
 
+    /// A device that has gone mute while it plays: nobody waits for it.
+    pub(super) fn playback_lost(&mut self, what: &str, at: Moment) {
+        self.out.push(Effect::Limp);
+        if self.phase.armed() {
+            self.lose_attempt(Failure::PlaybackLost, what, at);
+        }
+    }
+
     pub(super) fn device_ready(&mut self) {
         self.device_lost = false;
         if self.in_form() {

@@ -85,6 +85,9 @@ pub enum Input {
     DeviceFault(String),
     /// The device does not answer any more; it is limp by its own watchdog.
     DeviceLost(String),
+    /// The device answers, or may, but has said nothing of the playback for too
+    /// long: its end will never be confirmed.
+    PlaybackLost(String),
     /// The device is back and limp.
     DeviceReady,
     /// All events are on disk that the session sent before its `count`-th (from 0,
