@@ -20,7 +20,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let reason = results::reason(&args.reason)?;
     let loaded = load::load(&args.protocol)?;
-    console.findings(&loaded.findings);
+    console.warnings_in_short(&loaded.findings, &args.protocol);
     let id = &loaded.protocol.study.id;
     let mut studies = results::studies(&args.results)?;
     studies.retain(|s| s.manifest().study == *id);

@@ -110,6 +110,21 @@ impl Console {
         }
     }
 
+    /// Says how many warnings there are and where they are shown; nothing if none.
+    pub fn warnings_in_short(
+        &mut self,
+        findings: &[crate::diagnostic::Findings],
+        protocol: &std::path::Path,
+    ) {
+        let count: usize = findings.iter().map(|f| f.faults.len()).sum();
+        let path = protocol.display();
+        match count {
+            0 => {}
+            1 => self.say(format!("1 warning: `study check {path}` shows it")),
+            n => self.say(format!("{n} warnings: `study check {path}` shows them")),
+        }
+    }
+
     /// Prints why a command failed.
     pub fn failure(&mut self, failure: &Failure) {
         self.findings(&failure.findings);

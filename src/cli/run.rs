@@ -62,7 +62,7 @@ fn device_kind(given: &str) -> Result<DeviceKind, String> {
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = load::load(&args.protocol)?;
-    console.findings(&loaded.findings);
+    console.warnings_in_short(&loaded.findings, &args.protocol);
     let kind = args.device.unwrap_or(loaded.protocol.device.kind);
     if kind != DeviceKind::Simulated {
         return Err(Failure::new(

@@ -21,6 +21,9 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// More syntax faults than this help nobody.
+const MAX_SYNTAX_FAULTS: usize = 20;
+
 /// A parsed TOML document and the faults found in it so far.
 #[derive(Debug)]
 pub struct Document<'t> {
@@ -47,10 +50,22 @@ impl<'t> Document<'t> {
     /// Parses TOML; syntax errors become faults and whatever could be read stays.
     pub fn parse(text: &'t str) -> Self {
         let (root, errors) = DeTable::parse_recoverable(text);
-        let faults = errors
-            .iter()
-            .map(|e| Fault::error(e.message().trim().to_owned()).at(e.span()))
-            .collect();
+        let mut faults: Vec<Fault> = Vec::new();
+        for error in &errors {
+            let fault = Fault::error(error.message().trim().to_owned()).at(error.span());
+            // One slip can be found again at each level that it leaves open.
+            if faults
+                .last()
+                .is_none_or(|last| last.message != fault.message)
+            {
+                faults.push(fault);
+            }
+        }
+        let more = faults.len().saturating_sub(MAX_SYNTAX_FAULTS);
+        if more > 0 {
+            faults.truncate(MAX_SYNTAX_FAULTS);
+            faults.push(Fault::error(format!("and {more} more faults of this kind")));
+        }
         Self {
             root,
             notes: RefCell::new(Notes {
@@ -161,17 +176,20 @@ impl<'d, 't> Table<'d, 't> {
 
     /// Reports that a key is missing.
     pub fn missing(&self, key: &str) {
-        let place = if self.path.is_empty() {
-            "the file".to_owned()
-        } else {
-            format!("[{}]", self.path)
-        };
-        let fault = Fault::error(format!("{place} has no `{key}`"));
+        let fault = Fault::error(self.missing_message(key));
         self.document.fault(if self.path.is_empty() {
             fault
         } else {
             fault.at(self.span.clone())
         });
+    }
+
+    fn missing_message(&self, key: &str) -> String {
+        if self.path.is_empty() {
+            format!("the file has no `{key}`")
+        } else {
+            format!("[{}] has no `{key}`", self.path)
+        }
     }
 
     /// A table inside this one.
@@ -265,7 +283,13 @@ impl<'d, 't> Table<'d, 't> {
             let mut fault =
                 Fault::error(format!("unknown key `{}` {place}", Untrusted(&key))).at(span);
             fault = match did_you_mean(&key, self.known.iter().map(AsRef::as_ref)) {
-                Some(near) => fault.label(format!("did you mean `{near}`?")),
+                Some(near) => {
+                    // Then it is there, only misspelled.
+                    let missing = self.missing_message(near);
+                    let mut notes = self.document.notes.borrow_mut();
+                    notes.faults.retain(|f| f.message != missing);
+                    fault.label(format!("did you mean `{near}`?"))
+                }
                 None => {
                     let mut known: Vec<&str> = self.known.iter().map(AsRef::as_ref).collect();
                     known.sort_unstable();
@@ -481,6 +505,33 @@ mod tests {
             Some("did you mean `repetitions`?")
         );
         assert_eq!(&text[read.spans["design.order"].clone()], "\"blokked\"");
+    }
+
+    #[test]
+    fn a_misspelled_key_is_one_fault_and_so_is_a_flood_of_brackets() {
+        let document = Document::parse("[design]\nrepetition = 3\n");
+        let mut root = document.root();
+        let mut design = root.table("design").unwrap();
+        assert!(design.required("repetitions").is_none());
+        assert!(design.required("order").is_none());
+        design.finish();
+        root.finish();
+        let messages: Vec<_> = document
+            .finish()
+            .faults
+            .into_iter()
+            .map(|f| f.message)
+            .collect();
+        assert_eq!(
+            messages,
+            [
+                "[design] has no `order`",
+                "unknown key `repetition` in [design]"
+            ]
+        );
+
+        let flood = format!("a = {}", "[".repeat(100_000));
+        assert!(Document::parse(&flood).finish().faults.len() <= MAX_SYNTAX_FAULTS + 1);
     }
 
     #[test]

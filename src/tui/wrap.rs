@@ -145,6 +145,32 @@ impl Open {
     }
 }
 
+/// A text of the author's as paragraphs: a single line break flows on, a blank line
+/// parts paragraphs, and a line that starts with a list mark or a space stays a line.
+/// Between wide characters, which part words without spaces, nothing is put.
+pub fn flow(text: &str) -> String {
+    let mut out: Vec<String> = Vec::new();
+    for line in text.trim_end().lines() {
+        let line = line.trim_end();
+        let own = line.is_empty()
+            || line.starts_with([' ', '\t', '-', '*', '•', '–'])
+            || line.starts_with(|c: char| c.is_ascii_digit());
+        match out.last_mut() {
+            Some(last) if !own && !last.is_empty() => {
+                let wide = |g: Option<&str>| g.is_some_and(|g| width(g) > 1);
+                let unspaced =
+                    wide(last.graphemes(true).next_back()) && wide(line.graphemes(true).next());
+                if !unspaced {
+                    last.push(' ');
+                }
+                last.push_str(line);
+            }
+            _ => out.push(line.to_owned()),
+        }
+    }
+    out.join("\n")
+}
+
 /// Lines for reading: wrapped, without spaces at their ends, at most `rows`; the
 /// last one ends with `…` if something had to be left out.
 pub fn paragraph(text: &str, columns: usize, rows: usize) -> Vec<String> {
@@ -202,6 +228,18 @@ mod tests {
 
     fn lines(text: &str, columns: usize) -> Vec<String> {
         wrap(text, columns).into_iter().map(|l| l.shown).collect()
+    }
+
+    #[test]
+    fn single_line_breaks_flow_and_blank_lines_part_paragraphs() {
+        assert_eq!(
+            flow("You will feel\nsome switches."),
+            "You will feel some switches."
+        );
+        assert_eq!(flow("one\n\ntwo\nthree\n"), "one\n\ntwo three");
+        assert_eq!(flow("do:\n- this\n- that"), "do:\n- this\n- that");
+        assert_eq!(flow("これは\n長い"), "これは長い");
+        assert_eq!(flow(""), "");
     }
 
     #[test]

@@ -21,8 +21,10 @@ use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
-use ratatui::widgets::Widget;
+use ratatui::widgets::{Clear, Widget};
 
+/// A notice that is longer is cut: it has its most important words first.
+const NOTICE_ROWS: usize = 3;
 /// Where the experimenter types, these keys are in sight always.
 const COMMANDS: &str = "F2 remark  ·  F3 correct  ·  F4 bad trial  ·  F5 pause  ·  F6 declined";
 
@@ -278,9 +280,14 @@ impl Widget for &Page<'_> {
         }
         let notice = self.draft.notice().or(self.view.notice.as_deref());
         if let Some(notice) = notice {
-            let words = wrap::one_line(notice, usize::from(area.width).saturating_sub(8));
-            let line = Line::from(Span::styled(words, self.theme.notice()));
-            centre(buf, row(area, area.height - 4), &line);
+            let columns = usize::from(area.width).saturating_sub(8);
+            let lines = wrap::paragraph(notice, columns, NOTICE_ROWS);
+            for (up, words) in (0..).zip(lines.into_iter().rev()) {
+                let place = row(area, area.height - 4 - up);
+                Clear.render(place, buf);
+                let line = Line::from(Span::styled(words, self.theme.notice()));
+                centre(buf, place, &line);
+            }
         }
         let status = Status {
             line: &self.view.line,

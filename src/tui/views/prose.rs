@@ -14,7 +14,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
 /// Widest column that is easy to read.
-const COLUMN: u16 = 66;
+const COLUMN: u16 = 84;
 
 /// Words in the middle of the page.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -64,7 +64,7 @@ pub fn prose(view: &View) -> Option<Prose> {
             title: "This session was not finished.".to_owned(),
             body: format!(
                 "{done} of {total} trials are done. The last one was {} ago.",
-                hours(*gap_h)
+                ago(*gap_h)
             ),
             choices: vec![
                 (
@@ -94,7 +94,7 @@ pub fn prose(view: &View) -> Option<Prose> {
                 MessageKind::Practice => "Practice".to_owned(),
                 MessageKind::PracticeOver => String::new(),
             },
-            body: text.clone(),
+            body: wrap::flow(text),
             long: true,
             keys: vec![("Enter", "goes on")],
             ..Prose::default()
@@ -141,7 +141,7 @@ pub fn prose(view: &View) -> Option<Prose> {
             body: if text.trim().is_empty() {
                 "Take a rest. Let go of the device, look away from the screen.".to_owned()
             } else {
-                text.clone()
+                wrap::flow(text)
             },
             long: true,
             title: if *wait_s > 0.0 {
@@ -162,7 +162,7 @@ pub fn prose(view: &View) -> Option<Prose> {
             body: if text.trim().is_empty() {
                 "That was all. Thank you!".to_owned()
             } else {
-                text.clone()
+                wrap::flow(text)
             },
             long: true,
             keys: vec![("Enter", "closes")],
@@ -176,13 +176,19 @@ pub fn prose(view: &View) -> Option<Prose> {
     })
 }
 
-fn hours(gap_h: f64) -> String {
+fn ago(gap_h: f64) -> String {
     if !gap_h.is_finite() || gap_h < 0.0 {
         "some time".to_owned()
-    } else if gap_h < 48.0 {
-        format!("{gap_h:.1} hours")
     } else {
-        format!("{:.0} days", gap_h / 24.0)
+        let (count, unit) = match gap_h {
+            h if h < 1.0 / 60.0 => (h * 3600.0, "second"),
+            h if h < 1.0 => (h * 60.0, "minute"),
+            h if h < 48.0 => (h, "hour"),
+            h => (h / 24.0, "day"),
+        };
+        let count = count.floor().max(1.0);
+        let plural = if count > 1.0 { "s" } else { "" };
+        format!("{count} {unit}{plural}")
     }
 }
 
