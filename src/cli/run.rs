@@ -81,7 +81,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         ));
     }
     // A person on the simulated device feels nothing: that is never real data.
-    let seats = SeatKind::Pilot;
+    let overridden = kind != loaded.protocol.device.kind;
+    let seats = if args.pilot || overridden || kind == DeviceKind::Simulated {
+        SeatKind::Pilot
+    } else {
+        SeatKind::Real
+    };
     let clock = RealClock::default();
     let at = clock.now();
     let frozen = Frozen {
