@@ -88,10 +88,10 @@ impl Data {
             mean(&rated).unwrap_or(f64::NAN)
         };
         Self {
+            by_row: by_row && !with_vaf.is_empty(),
             all,
             with_vaf,
             centre,
-            by_row: by_row && !cells.ratings.vaf.iter().all(|v| v.is_nan()),
         }
     }
 

@@ -25,6 +25,8 @@ mod optimize;
 mod profile;
 mod satterthwaite;
 mod start;
+#[cfg(test)]
+mod tests;
 
 pub use data::{Cell, Fixed, Table};
 pub use fit::{Criterion, Fit, Variances, fit};

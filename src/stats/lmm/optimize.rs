@@ -4,7 +4,7 @@
 //! that are free: downhill also where the criterion is not convex. It is halved
 //! until the criterion falls. A bounded coordinate that is 0 and wants to go
 //! below is held at 0 exactly. The search has converged when the step promises
-//! less than 10⁻⁷ of deviance; two more steps then polish the digits.
+//! less than 10⁻⁷ of deviance; three more steps then polish the digits.
 
 use super::differences::second;
 use nalgebra::{DVector, SymmetricEigen};
