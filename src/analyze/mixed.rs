@@ -16,9 +16,16 @@ use crate::stats::lmm::{
 /// The ratings as the models need them.
 struct Data {
     /// Of all test realizations.
-    all: Vec<Cell>,
-    /// Of those with a VAF, the VAF beside.
-    with_vaf: Vec<Cell>,
+    all: Result<Table, LmmError>,
+    /// Of those with a VAF, with the VAF and without.
+    vaf: Result<Table, LmmError>,
+    vaf_null: Result<Table, LmmError>,
+    /// Whether any has a VAF.
+    has_vaf: bool,
+    /// Whether a cell with a VAF has two ratings.
+    repeats: bool,
+    /// The slope beside fixed subjects.
+    within_subjects: Option<f64>,
     /// Mean of the VAF over realizations; over rows if each row has its own.
     centre: f64,
     /// Whether VAF differs between the rows of one realization.
@@ -87,26 +94,34 @@ impl Data {
             let rated: Vec<f64> = rated.iter().filter_map(|&m| cells.vaf[m]).collect();
             mean(&rated).unwrap_or(f64::NAN)
         };
+        let vaf_null = Table::new(&with_vaf, Fixed::Intercept);
+        // Where every realization has its VAF the ratings are the same.
+        let all = if all.len() == with_vaf.len() && !by_row {
+            vaf_null.clone()
+        } else {
+            Table::new(&all, Fixed::Intercept)
+        };
         Self {
-            by_row: by_row && !with_vaf.is_empty(),
+            vaf: (vaf_null.clone()).and_then(|t| t.with(Fixed::Covariate { centre })),
+            vaf_null,
             all,
-            with_vaf,
+            has_vaf: !with_vaf.is_empty(),
+            repeats: with_vaf.iter().any(|c| c.n > 1),
+            within_subjects: within_subjects(&with_vaf),
             centre,
+            by_row: by_row && !with_vaf.is_empty(),
         }
     }
+}
 
-    /// A table of the ratings with a VAF.
-    fn covariate(&self) -> Result<Table, LmmError> {
-        let fixed = Fixed::Covariate {
-            centre: self.centre,
-        };
-        Table::new(&self.with_vaf, fixed)
-    }
+/// A table, or the reason why there is none.
+fn given(table: &Result<Table, LmmError>) -> Result<&Table, LmmError> {
+    table.as_ref().map_err(|e| *e)
 }
 
 /// Why there is nothing about VAF.
 fn why_no_vaf(data: &Data, error: LmmError) -> String {
-    if data.with_vaf.is_empty() {
+    if !data.has_vaf {
         "no test realization has a VAF".to_owned()
     } else {
         error.to_string()
@@ -131,13 +146,12 @@ fn likelihood(g: &mut Group<'_>, null: &Fit<'_>, full: &Fit<'_>, df: f64) {
 
 fn model(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let found = (|| {
-        let table = Table::new(&data.all, Fixed::Models)?;
+        let null = given(&data.all)?;
+        let table = &null.with(Fixed::Models)?;
         if table.models().len() < 2 {
             return Err(LmmError::OneModel);
         }
-        let null = Table::new(&data.all, Fixed::Intercept)?;
         let random = Random::default();
-        let (table, null) = (&table, &null);
         let reml = fit(table, random, Criterion::Reml)?;
         let ml = fit(table, random, Criterion::Ml)?;
         let null = fit(null, random, Criterion::Ml)?;
@@ -231,12 +245,11 @@ fn coefficients(g: &mut Group<'_>, fit: &Fit<'_>, at: f64, offset: f64) -> Contr
 
 fn vaf(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let found = (|| {
-        let table = data.covariate()?;
-        let null = Table::new(&data.with_vaf, Fixed::Intercept)?;
+        let table = given(&data.vaf)?;
         let random = Random::default();
-        let reml = fit(&table, random, Criterion::Reml)?;
-        let ml = fit(&table, random, Criterion::Ml)?;
-        let null = fit(&null, random, Criterion::Ml)?;
+        let reml = fit(table, random, Criterion::Reml)?;
+        let ml = fit(table, random, Criterion::Ml)?;
+        let null = fit(given(&data.vaf_null)?, random, Criterion::Ml)?;
         let mut g = values.group("lmm_vaf", NO_DF);
         let slope = coefficients(&mut g, &reml, -data.centre, cells.offset);
         let v = reml.variances;
@@ -249,7 +262,7 @@ fn vaf(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         Ok(())
     })();
     let mut g = values.group("lmm_vaf", "no subject has two values of VAF");
-    g.maybe("statsmodels_slope", within_subjects(&data.with_vaf));
+    g.maybe("statsmodels_slope", data.within_subjects);
     if let Err(error) = found {
         let mut g = values.group("lmm_vaf", why_no_vaf(data, error));
         g.none(&COVARIATE);
@@ -287,12 +300,12 @@ fn within_subjects(cells: &[Cell]) -> Option<f64> {
 
 fn vaf_slope(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let found = (|| {
-        let table = data.covariate()?;
+        let table = given(&data.vaf)?;
         let random = Random {
             slope: true,
             ..Random::default()
         };
-        let reml = fit(&table, random, Criterion::Reml)?;
+        let reml = fit(table, random, Criterion::Reml)?;
         let mut g = values.group("lmm_vaf_slope", NO_DF);
         coefficients(&mut g, &reml, 0.0, cells.offset);
         let v = reml.variances;
@@ -316,26 +329,22 @@ fn vaf_slope(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     }
 }
 
-fn repeats(cells: &[Cell]) -> bool {
-    cells.iter().any(|c| c.n > 1)
-}
-
 const BY_ROW: &str = "VAF differs between the ratings of one realization";
 
 fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
-    let cell = repeats(&data.with_vaf);
+    let cell = data.repeats;
     let found = (|| {
         if data.by_row {
             return Err(BY_ROW.to_owned());
         }
         let why = |e| why_no_vaf(data, e);
-        let table = data.covariate().map_err(why)?;
+        let table = given(&data.vaf).map_err(why)?;
         let random = Random {
             model: true,
             cell,
             ..Random::default()
         };
-        let reml = fit(&table, random, Criterion::Reml).map_err(why)?;
+        let reml = fit(table, random, Criterion::Reml).map_err(why)?;
         let mut g = values.group("lmm_vaf_crossed", NO_DF);
         coefficients(&mut g, &reml, -data.centre, cells.offset);
         let v = reml.variances;
@@ -359,12 +368,11 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
 
 fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let found = (|| {
-        let table = Table::new(&data.all, Fixed::Intercept)?;
         let random = Random {
             model: true,
             ..Random::default()
         };
-        let reml = fit(&table, random, Criterion::Reml)?;
+        let reml = fit(given(&data.all)?, random, Criterion::Reml)?;
         let mean = reml.t_test(&[1.0]);
         let mut g = values.group("lmm_crossed", NO_DF);
         g.put("reml_deviance", reml.deviance);
@@ -395,13 +403,11 @@ fn variance(data: &Data, values: &mut Values) {
         cell: true,
         ..Random::default()
     };
-    let components = |cells: &[Cell], fixed| -> Result<_, LmmError> {
-        let table = Table::new(cells, fixed)?;
-        let reml = fit(&table, random, Criterion::Reml)?;
-        Ok(reml.variances)
+    let components = |table: &Result<Table, LmmError>| -> Result<_, LmmError> {
+        Ok(fit(given(table)?, random, Criterion::Reml)?.variances)
     };
     let names = ["subject", "model", "subject_model", "error"];
-    match components(&data.all, Fixed::Intercept) {
+    match components(&data.all) {
         Ok(v) => {
             let parts = [v.intercept, v.model, v.cell, v.error];
             let total: f64 = parts.iter().sum();
@@ -419,15 +425,7 @@ fn variance(data: &Data, values: &mut Values) {
         }
     }
     let why = "there is no variance between realizations with a VAF to explain";
-    let (null, full) = (
-        components(&data.with_vaf, Fixed::Intercept),
-        components(
-            &data.with_vaf,
-            Fixed::Covariate {
-                centre: data.centre,
-            },
-        ),
-    );
+    let (null, full) = (components(&data.vaf_null), components(&data.vaf));
     let share = match (null, full) {
         (Ok(null), Ok(full)) if null.model > 0.0 && !data.by_row => {
             Ok(1.0 - full.model / null.model)

@@ -43,6 +43,8 @@ pub enum Fixed {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unit {
     pub(super) model: usize,
+    /// The covariate as it came, and standardised.
+    pub(super) raw: f64,
     pub(super) x: f64,
     pub(super) n: f64,
 }
@@ -88,12 +90,12 @@ const MAX_MODELS: usize = 200;
 const MAX_WORK: usize = 50_000_000;
 
 impl Table {
-    /// Aggregates cells. One subject's cells may come in any order.
+    /// Aggregates cells, for a model with these fixed effects. One subject's
+    /// cells may come in any order.
     ///
     /// # Errors
     /// Where no model of this kind is defined for them.
     pub fn new(cells: &[Cell], fixed: Fixed) -> Result<Self, LmmError> {
-        let n: f64 = cells.iter().map(|c| c.n as f64).sum();
         if cells.is_empty() || cells.iter().any(|c| c.n == 0) {
             return Err(LmmError::NoData);
         }
@@ -103,6 +105,7 @@ impl Table {
         if models.len() > MAX_MODELS {
             return Err(LmmError::TooLarge);
         }
+        let n: f64 = cells.iter().map(|c| c.n as f64).sum();
         let about = |f: &dyn Fn(&Cell) -> f64| -> f64 {
             cells.iter().map(|c| c.n as f64 * f(c)).sum::<f64>() / n
         };
@@ -115,33 +118,21 @@ impl Table {
         if total <= 1e-24 * y_centre * y_centre || total < 1e-200 {
             return Err(LmmError::ConstantRatings);
         }
-        let y_scale = total.sqrt();
-        let (mut x_centre, mut x_scale, mut x_variance) = (0.0, 1.0, 0.0);
-        if let Fixed::Covariate { centre } = fixed {
-            x_centre = centre;
-            let mean = about(&|c| c.x - centre);
-            x_variance = about(&|c| (c.x - centre - mean).powi(2));
-            x_scale = about(&|c| (c.x - centre).powi(2)).sqrt();
-            let defined = x_variance > 1e-24 * centre * centre && x_variance > 1e-200;
-            if !(defined && x_scale.is_finite() && centre.is_finite()) {
-                return Err(LmmError::ConstantCovariate);
-            }
-        }
         let mut table = Self {
             patterns: Vec::new(),
-            fixed,
+            fixed: Fixed::Intercept,
             subjects: 0,
             n,
             cells: cells.len(),
             within: within / total,
             y_centre,
-            y_scale,
-            x_scale,
-            x_variance,
+            y_scale: total.sqrt(),
+            x_scale: 1.0,
+            x_variance: 0.0,
             x_within: false,
             models,
         };
-        table.aggregate(cells, x_centre);
+        table.aggregate(cells);
         if table.subjects < 2 {
             return Err(LmmError::OneSubject);
         }
@@ -150,10 +141,42 @@ impl Table {
             return Err(LmmError::TooLarge);
         }
         table.patterns.iter_mut().for_each(shorten);
+        table.with(fixed)
+    }
+
+    /// The same ratings for other fixed effects; the cells are not visited again.
+    ///
+    /// # Errors
+    /// Where no model of this kind is defined for them.
+    pub fn with(&self, fixed: Fixed) -> Result<Self, LmmError> {
+        let mut table = self.clone();
+        table.fixed = fixed;
+        let (mut centre, mut scale, mut variance) = (0.0, 1.0, 0.0);
+        if let Fixed::Covariate { centre: at } = fixed {
+            centre = at;
+            let about = |f: &dyn Fn(f64) -> f64| -> f64 {
+                let patterns = self.patterns.iter();
+                patterns
+                    .flat_map(|p| p.units.iter().map(|u| p.subjects * u.n * f(u.raw - centre)))
+                    .sum::<f64>()
+                    / self.n
+            };
+            let mean = about(&|x| x);
+            variance = about(&|x| (x - mean).powi(2));
+            scale = about(&|x| x * x).sqrt();
+            let varies = variance > 1e-24 * centre * centre && variance > 1e-200;
+            if !(varies && scale.is_finite() && centre.is_finite()) {
+                return Err(LmmError::ConstantCovariate);
+            }
+        }
+        for unit in table.patterns.iter_mut().flat_map(|p| &mut p.units) {
+            unit.x = (unit.raw - centre) / scale;
+        }
+        (table.x_scale, table.x_variance) = (scale, variance);
         Ok(table)
     }
 
-    fn aggregate(&mut self, cells: &[Cell], x_centre: f64) {
+    fn aggregate(&mut self, cells: &[Cell]) {
         let mut sorted: Vec<&Cell> = cells.iter().collect();
         sorted.sort_by(|a, b| {
             (a.subject, a.model)
@@ -175,7 +198,8 @@ impl Table {
                         .iter()
                         .map(|c| Unit {
                             model: self.models.partition_point(|&m| m < c.model),
-                            x: (c.x - x_centre) / self.x_scale,
+                            raw: c.x,
+                            x: 0.0,
                             n: c.n as f64,
                         })
                         .collect(),

@@ -95,18 +95,21 @@ fn identified(table: &Table, random: Random) -> Result<(), LmmError> {
     if random.cell && table.n <= table.cells as f64 {
         return Err(LmmError::NoRepetition);
     }
-    // The residual with every random effect taken as a fixed one.
-    let all = 1e9;
-    let ratios = Ratios {
-        intercept: all,
-        slope: if random.slope { all } else { 0.0 },
-        model: if random.model { all } else { 0.0 },
-        ..Ratios::default()
+    // The residual with every random effect taken as a fixed one: the penalised
+    // residual is that + c/γ for large γ, and two γ take c out.
+    let rss = |all: f64| {
+        let ratios = Ratios {
+            intercept: all,
+            slope: if random.slope { all } else { 0.0 },
+            model: if random.model { all } else { 0.0 },
+            ..Ratios::default()
+        };
+        profile(table, random, &ratios).map(|p| p.rss)
     };
     let least = if random.cell {
         Some(table.within)
     } else {
-        profile(table, random, &ratios).map(|p| p.rss)
+        rss(1e7).zip(rss(1e8)).map(|(a, b)| (10.0 * b - a) / 9.0)
     };
     match least {
         Some(rss) if rss > NO_ERROR * table.n && weight(table, Criterion::Reml) >= 1.0 => Ok(()),

@@ -194,21 +194,21 @@ fn many_subjects_of_one_pattern_are_as_each_alone() {
     assert_eq!(shared.patterns.len(), 1);
     assert!(shared.patterns[0].rows.len() <= X.len());
     let mut apart = shared.clone();
-    apart.patterns = (0..30)
-        .map(|s| table(&cells[s * 6..]).patterns.remove(0))
+    apart.patterns = cells
+        .chunks(6)
+        .map(|own| {
+            let row: Vec<f64> = own
+                .iter()
+                .map(|c| (c.mean - shared.y_centre) / shared.y_scale)
+                .collect();
+            data::Pattern {
+                subjects: 1.0,
+                units: shared.patterns[0].units.clone(),
+                sum: row.clone(),
+                rows: vec![row],
+            }
+        })
         .collect();
-    for (pattern, own) in apart.patterns.iter_mut().zip(cells.chunks(6)) {
-        let row: Vec<f64> = own
-            .iter()
-            .map(|c| (c.mean - shared.y_centre) / shared.y_scale)
-            .collect();
-        *pattern = data::Pattern {
-            subjects: 1.0,
-            units: shared.patterns[0].units.clone(),
-            sum: row.clone(),
-            rows: vec![row],
-        };
-    }
     let a = fit(&shared, CROSSED, Criterion::Reml).unwrap();
     let b = fit(&apart, CROSSED, Criterion::Reml).unwrap();
     close(a.deviance, b.deviance, 1e-12);
@@ -269,7 +269,7 @@ fn what_is_not_defined_says_why() {
 fn random_small_tables_give_numbers_or_reasons() {
     let mut draws = Stream::new(9, &["small"]);
     let mut fits = 0;
-    for _ in 0..150 {
+    for _ in 0..60 {
         let mut below = |n: f64| ((draws.normal().abs() * 7.0) % n) as usize;
         let (subjects, models) = (1 + below(5.0), 1 + below(5.0));
         let mut cells = Vec::new();
@@ -332,5 +332,5 @@ fn random_small_tables_give_numbers_or_reasons() {
             }
         }
     }
-    assert!(fits > 300, "only {fits} fits");
+    assert!(fits > 120, "only {fits} fits");
 }
