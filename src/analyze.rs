@@ -13,6 +13,7 @@
 mod cells;
 mod describe;
 mod effects;
+mod mixed;
 mod order;
 mod select;
 mod vaf;
@@ -171,6 +172,7 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     effects::effects(&cells, &mut values);
     vaf::against_vaf(&cells, rules, &mut values);
     order::order(&cells, &mut values);
+    mixed::mixed(&cells, &mut values);
     let counts = Counts::of(ratings, &used, &decisions, rules);
     let warnings = warnings::warnings(&cells, &counts, rules, &values);
     Analysis {

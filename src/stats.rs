@@ -13,6 +13,7 @@ pub mod correlation;
 pub mod describe;
 pub mod distribution;
 pub mod friedman;
+pub mod lmm;
 pub mod paired;
 pub mod permutation;
 pub mod rank;

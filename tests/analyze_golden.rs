@@ -14,12 +14,7 @@ use study::analyze::{Rules, Value, Values, analyze};
 use study::outcome::ratings::Ratings;
 
 /// Groups of a later version.
-const NOT_YET: [&str; 11] = [
-    "lmm_model",
-    "lmm_vaf",
-    "lmm_vaf_slope",
-    "lmm_vaf_crossed",
-    "lmm_crossed",
+const NOT_YET: [&str; 6] = [
     "clm_model",
     "clm_vaf",
     "clmm_model_laplace",
@@ -110,7 +105,7 @@ fn every_statistic_agrees_with_its_reference() {
         wrong.len(),
         wrong.join("\n")
     );
-    assert!(passed > 4000, "only {passed} were compared");
+    assert!(passed > 4500, "only {passed} were compared");
 }
 
 #[test]

@@ -1,0 +1,280 @@
+//! Cells to sufficient statistics: subjects with the same cells share a pattern.
+//!
+//! For a pattern with U cells (realization, covariate, n) and K subjects the
+//! criterion needs only Σy and Σyy' of the U cell means: Σyy' is held as the rows
+//! of a factor, at most U of them.
+
+use super::LmmError;
+use nalgebra::{DMatrix, SymmetricEigen};
+use std::collections::BTreeMap;
+
+/// One subject's ratings of one realization (and one value of the covariate).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// Any number for the subject.
+    pub subject: usize,
+    /// Any number for the realization.
+    pub model: usize,
+    /// The covariate; 0 where the model has none.
+    pub x: f64,
+    /// Ratings, 1 or more.
+    pub n: usize,
+    /// Their mean.
+    pub mean: f64,
+    /// Their sum of squares about it.
+    pub within: f64,
+}
+
+/// The fixed effects of a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fixed {
+    /// One mean.
+    Intercept,
+    /// A mean at `centre`, and a slope of the covariate.
+    Covariate {
+        /// Where the intercept (fixed and random) is.
+        centre: f64,
+    },
+    /// A mean for each realization.
+    Models,
+}
+
+/// A cell within a pattern, standardised.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Unit {
+    pub(super) model: usize,
+    /// The covariate as it came, and standardised.
+    pub(super) raw: f64,
+    pub(super) x: f64,
+    pub(super) n: f64,
+}
+
+/// Subjects that have the same cells.
+#[derive(Debug, Clone)]
+pub(super) struct Pattern {
+    pub(super) subjects: f64,
+    pub(super) units: Vec<Unit>,
+    /// Sum over the subjects of their means, by unit.
+    pub(super) sum: Vec<f64>,
+    /// Rows r with Σ rr' = Σ yy'.
+    pub(super) rows: Vec<Vec<f64>>,
+}
+
+/// A table that models can be fitted to: standardised and aggregated.
+#[derive(Debug, Clone)]
+pub struct Table {
+    pub(super) patterns: Vec<Pattern>,
+    pub(super) fixed: Fixed,
+    /// The numbers of the realizations, sorted.
+    pub(super) models: Vec<usize>,
+    pub(super) subjects: usize,
+    /// Ratings.
+    pub(super) n: f64,
+    pub(super) cells: usize,
+    /// Within-cell sum of squares, standardised.
+    pub(super) within: f64,
+    /// What was taken off the ratings, and what they were divided by.
+    pub(super) y_centre: f64,
+    pub(super) y_scale: f64,
+    /// What the centred covariate was divided by.
+    pub(super) x_scale: f64,
+    /// Mean square of the centred covariate about its mean over ratings.
+    pub(super) x_variance: f64,
+    /// Whether a subject has two values of the covariate.
+    pub(super) x_within: bool,
+}
+
+/// Most realizations: the dense factor has so many columns.
+const MAX_MODELS: usize = 200;
+/// Most Σ patterns × realizations²: the work of one evaluation.
+const MAX_WORK: usize = 50_000_000;
+
+impl Table {
+    /// Aggregates cells, for a model with these fixed effects. One subject's
+    /// cells may come in any order.
+    ///
+    /// # Errors
+    /// Where no model of this kind is defined for them.
+    pub fn new(cells: &[Cell], fixed: Fixed) -> Result<Self, LmmError> {
+        if cells.is_empty() || cells.iter().any(|c| c.n == 0) {
+            return Err(LmmError::NoData);
+        }
+        let mut models: Vec<usize> = cells.iter().map(|c| c.model).collect();
+        models.sort_unstable();
+        models.dedup();
+        if models.len() > MAX_MODELS {
+            return Err(LmmError::TooLarge);
+        }
+        let n: f64 = cells.iter().map(|c| c.n as f64).sum();
+        let about = |f: &dyn Fn(&Cell) -> f64| -> f64 {
+            cells.iter().map(|c| c.n as f64 * f(c)).sum::<f64>() / n
+        };
+        let y_centre = about(&|c| c.mean);
+        let within: f64 = cells.iter().map(|c| c.within).sum();
+        let total = about(&|c| (c.mean - y_centre).powi(2)) + within / n;
+        if !(y_centre.is_finite() && total.is_finite()) {
+            return Err(LmmError::NoData);
+        }
+        if total <= 1e-24 * y_centre * y_centre || total < 1e-200 {
+            return Err(LmmError::ConstantRatings);
+        }
+        let mut table = Self {
+            patterns: Vec::new(),
+            fixed: Fixed::Intercept,
+            subjects: 0,
+            n,
+            cells: cells.len(),
+            within: within / total,
+            y_centre,
+            y_scale: total.sqrt(),
+            x_scale: 1.0,
+            x_variance: 0.0,
+            x_within: false,
+            models,
+        };
+        table.aggregate(cells);
+        if table.subjects < 2 {
+            return Err(LmmError::OneSubject);
+        }
+        let width = table.models.len();
+        if table.patterns.len().saturating_mul(width * width) > MAX_WORK {
+            return Err(LmmError::TooLarge);
+        }
+        table.patterns.iter_mut().for_each(shorten);
+        table.with(fixed)
+    }
+
+    /// The same ratings for other fixed effects; the cells are not visited again.
+    ///
+    /// # Errors
+    /// Where no model of this kind is defined for them.
+    pub fn with(&self, fixed: Fixed) -> Result<Self, LmmError> {
+        let mut table = self.clone();
+        table.fixed = fixed;
+        let (mut centre, mut scale, mut variance) = (0.0, 1.0, 0.0);
+        if let Fixed::Covariate { centre: at } = fixed {
+            centre = at;
+            let about = |f: &dyn Fn(f64) -> f64| -> f64 {
+                let patterns = self.patterns.iter();
+                patterns
+                    .flat_map(|p| p.units.iter().map(|u| p.subjects * u.n * f(u.raw - centre)))
+                    .sum::<f64>()
+                    / self.n
+            };
+            let mean = about(&|x| x);
+            variance = about(&|x| (x - mean).powi(2));
+            scale = about(&|x| x * x).sqrt();
+            let varies = variance > 1e-24 * centre * centre && variance > 1e-200;
+            if !(varies && scale.is_finite() && centre.is_finite()) {
+                return Err(LmmError::ConstantCovariate);
+            }
+        }
+        for unit in table.patterns.iter_mut().flat_map(|p| &mut p.units) {
+            unit.x = (unit.raw - centre) / scale;
+        }
+        (table.x_scale, table.x_variance) = (scale, variance);
+        Ok(table)
+    }
+
+    fn aggregate(&mut self, cells: &[Cell]) {
+        let mut sorted: Vec<&Cell> = cells.iter().collect();
+        sorted.sort_by(|a, b| {
+            (a.subject, a.model)
+                .cmp(&(b.subject, b.model))
+                .then(a.x.total_cmp(&b.x))
+        });
+        type Key = Vec<(usize, u64, usize)>;
+        let mut places: BTreeMap<Key, usize> = BTreeMap::new();
+        for own in sorted.chunk_by(|a, b| a.subject == b.subject) {
+            self.subjects += 1;
+            self.x_within |= own.iter().any(|c| c.x != own[0].x);
+            let key: Key = own.iter().map(|c| (c.model, c.x.to_bits(), c.n)).collect();
+            let next = self.patterns.len();
+            let place = *places.entry(key).or_insert(next);
+            if place == next {
+                self.patterns.push(Pattern {
+                    subjects: 0.0,
+                    units: own
+                        .iter()
+                        .map(|c| Unit {
+                            model: self.models.partition_point(|&m| m < c.model),
+                            raw: c.x,
+                            x: 0.0,
+                            n: c.n as f64,
+                        })
+                        .collect(),
+                    sum: vec![0.0; own.len()],
+                    rows: Vec::new(),
+                });
+            }
+            let pattern = &mut self.patterns[place];
+            pattern.subjects += 1.0;
+            let row: Vec<f64> = own
+                .iter()
+                .map(|c| (c.mean - self.y_centre) / self.y_scale)
+                .collect();
+            for (sum, y) in pattern.sum.iter_mut().zip(&row) {
+                *sum += y;
+            }
+            pattern.rows.push(row);
+            // Bounds what a pattern holds while it grows.
+            if pattern.rows.len() >= 1024 + 4 * pattern.units.len() {
+                shorten(pattern);
+            }
+        }
+    }
+
+    /// Number of fixed effects.
+    pub(super) fn columns(&self) -> usize {
+        match self.fixed {
+            Fixed::Intercept => 1,
+            Fixed::Covariate { .. } => 2,
+            Fixed::Models => self.models.len(),
+        }
+    }
+
+    /// The numbers of the realizations, sorted: the order of their means.
+    pub fn models(&self) -> &[usize] {
+        &self.models
+    }
+
+    /// Number of ratings.
+    pub fn ratings(&self) -> f64 {
+        self.n
+    }
+
+    /// Mean square of the covariate about its mean over ratings, n − 1.
+    pub fn covariate_variance(&self) -> f64 {
+        self.x_variance * self.n / (self.n - 1.0)
+    }
+}
+
+/// Replaces the rows by the factor of Σyy' = QΛQ': the rows √λ·q'.
+fn shorten(pattern: &mut Pattern) {
+    let width = pattern.units.len();
+    if pattern.rows.len() <= width {
+        return;
+    }
+    let mut products = DMatrix::<f64>::zeros(width, width);
+    for row in &pattern.rows {
+        for i in 0..width {
+            for j in 0..=i {
+                products[(i, j)] += row[i] * row[j];
+            }
+        }
+    }
+    products.fill_upper_triangle_with_lower_triangle();
+    let eigen = SymmetricEigen::new(products);
+    pattern.rows = (0..width)
+        .filter(|&k| eigen.eigenvalues[k] > 0.0)
+        .map(|k| {
+            let root = eigen.eigenvalues[k].sqrt();
+            eigen
+                .eigenvectors
+                .column(k)
+                .iter()
+                .map(|v| v * root)
+                .collect()
+        })
+        .collect();
+}

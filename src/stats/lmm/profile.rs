@@ -1,0 +1,230 @@
+//! The profiled criterion at given variance ratios.
+//!
+//! With Γ (2 × 2) of the subject, γ_m of the realization, γ_c of the cell, all
+//! relative to σ²:
+//!
+//! * cells: the weight of a mean of n ratings is w = n/(1 + nγ_c); det 1 + nγ_c;
+//! * subjects: with z = (1, x), S = Σwzz': M = W − WZ Γ(I + SΓ)⁻¹ Z'W; det |I + SΓ|;
+//! * realizations: B = Z_m'MZ_m, Ω = M − γ_m MZ_m(I + γ_mB)⁻¹Z_m'M; det |I + γ_mB|.
+//!
+//! Then A = X'ΩX, β = A⁻¹X'Ωy, r² = y'Ωy − β'X'Ωy + within. No root of a variance
+//! is taken, so that the criterion is smooth through the boundary 0.
+
+use super::Random;
+use super::data::{Fixed, Table};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Variances relative to σ², on the standardised scales.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Ratios {
+    pub(super) intercept: f64,
+    pub(super) covariance: f64,
+    pub(super) slope: f64,
+    pub(super) model: f64,
+    pub(super) cell: f64,
+}
+
+/// What the criterion is made of.
+#[derive(Debug, Clone)]
+pub(super) struct Profile {
+    /// log det of the random part.
+    pub(super) log_det_z: f64,
+    /// log det A.
+    pub(super) log_det_x: f64,
+    /// Penalised residual sum of squares.
+    pub(super) rss: f64,
+    pub(super) beta: DVector<f64>,
+    pub(super) factor: Cholesky<f64, Dyn>,
+}
+
+impl Profile {
+    /// A⁻¹: the covariance of β over σ².
+    pub(super) fn inverse(&self) -> DMatrix<f64> {
+        self.factor.inverse()
+    }
+}
+
+/// The sums [columns, y]'M[columns, y], columns those of the realizations (if
+/// random) and then of X.
+struct Sums {
+    /// Lower triangle.
+    matrix: DMatrix<f64>,
+    y: DVector<f64>,
+    yy: f64,
+    log_det: f64,
+}
+
+/// Evaluates; `None` where a determinant is not positive or something overflows.
+pub(super) fn profile(table: &Table, random: Random, ratios: &Ratios) -> Option<Profile> {
+    let models = if random.model { table.models.len() } else { 0 };
+    let p = table.columns();
+    let mut sums = sums(table, random, ratios, models)?;
+    if models > 0 && ratios.model != 0.0 {
+        let g = ratios.model;
+        let mut inner = sums.matrix.view((0, 0), (models, models)).into_owned();
+        inner.fill_upper_triangle_with_lower_triangle();
+        inner *= g;
+        for i in 0..models {
+            inner[(i, i)] += 1.0;
+        }
+        let factor = Cholesky::new(inner)?;
+        sums.log_det += log_det(&factor);
+        // Columns: the cross products of the realizations with X and with y.
+        let mut cross = DMatrix::<f64>::zeros(models, p + 1);
+        for m in 0..models {
+            for j in 0..p {
+                cross[(m, j)] = sums.matrix[(models + j, m)];
+            }
+            cross[(m, p)] = sums.y[m];
+        }
+        let mut solved = cross.clone();
+        factor.solve_mut(&mut solved);
+        let less = cross.transpose() * solved * g;
+        for i in 0..p {
+            for j in 0..=i {
+                sums.matrix[(models + i, models + j)] -= less[(i, j)];
+            }
+            sums.y[models + i] -= less[(i, p)];
+        }
+        sums.yy -= less[(p, p)];
+    }
+    let mut a = sums.matrix.view((models, models), (p, p)).into_owned();
+    a.fill_upper_triangle_with_lower_triangle();
+    let b = sums.y.rows(models, p).into_owned();
+    let factor = Cholesky::new(a)?;
+    let beta = factor.solve(&b);
+    let rss = sums.yy - beta.dot(&b) + table.within;
+    let log_det_x = log_det(&factor);
+    (rss.is_finite() && sums.log_det.is_finite() && log_det_x.is_finite()).then_some(Profile {
+        log_det_z: sums.log_det,
+        log_det_x,
+        rss,
+        beta,
+        factor,
+    })
+}
+
+fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
+    2.0 * factor
+        .l_dirty()
+        .diagonal()
+        .iter()
+        .map(|d| d.ln())
+        .sum::<f64>()
+}
+
+fn sums(table: &Table, random: Random, ratios: &Ratios, models: usize) -> Option<Sums> {
+    let width = models + table.columns();
+    let mut sums = Sums {
+        matrix: DMatrix::zeros(width, width),
+        y: DVector::zeros(width),
+        yy: 0.0,
+        log_det: 0.0,
+    };
+    // The products of the columns with w and with wx.
+    let mut one = vec![0.0; width];
+    let mut slope = vec![0.0; width];
+    for pattern in &table.patterns {
+        let k = pattern.subjects;
+        one.fill(0.0);
+        slope.fill(0.0);
+        let (mut s11, mut s12, mut s22) = (0.0, 0.0, 0.0);
+        let (mut sum1, mut sum2) = (0.0, 0.0);
+        let mut weights = Vec::with_capacity(pattern.units.len());
+        for (unit, &sum) in pattern.units.iter().zip(&pattern.sum) {
+            let det = 1.0 + unit.n * ratios.cell;
+            if det <= 0.0 {
+                return None;
+            }
+            sums.log_det += k * det.ln();
+            let w = unit.n / det;
+            weights.push(w);
+            s11 += w;
+            s12 += w * unit.x;
+            s22 += w * unit.x * unit.x;
+            sum1 += w * sum;
+            sum2 += w * unit.x * sum;
+            // The design row has at most three entries.
+            let fixed: [(usize, f64); 2] = match table.fixed {
+                Fixed::Intercept => [(models, 1.0), (models, 0.0)],
+                Fixed::Covariate { .. } => [(models, 1.0), (models + 1, unit.x)],
+                Fixed::Models => [(models + unit.model, 1.0), (models, 0.0)],
+            };
+            let entries = [
+                if models > 0 {
+                    (unit.model, 1.0)
+                } else {
+                    (0, 0.0)
+                },
+                fixed[0],
+                fixed[1],
+            ];
+            for (a, &(i, u)) in entries.iter().enumerate() {
+                if u == 0.0 {
+                    continue;
+                }
+                one[i] += w * u;
+                slope[i] += w * u * unit.x;
+                sums.y[i] += w * u * sum;
+                for &(j, v) in &entries[..=a] {
+                    if v != 0.0 {
+                        sums.matrix[(i, j)] += k * w * u * v;
+                    }
+                }
+            }
+        }
+        let phi = inner(ratios, random, s11, s12, s22)?;
+        sums.log_det += k * phi.log_det;
+        for i in 0..width {
+            let left1 = phi.p11 * one[i] + phi.p12 * slope[i];
+            let left2 = phi.p12 * one[i] + phi.p22 * slope[i];
+            if left1 == 0.0 && left2 == 0.0 {
+                continue;
+            }
+            sums.y[i] -= left1 * sum1 + left2 * sum2;
+            for j in 0..=i {
+                sums.matrix[(i, j)] -= k * (left1 * one[j] + left2 * slope[j]);
+            }
+        }
+        for row in &pattern.rows {
+            let (mut t1, mut t2) = (0.0, 0.0);
+            for ((unit, w), y) in pattern.units.iter().zip(&weights).zip(row) {
+                sums.yy += w * y * y;
+                t1 += w * y;
+                t2 += w * unit.x * y;
+            }
+            sums.yy -= phi.p11 * t1 * t1 + 2.0 * phi.p12 * t1 * t2 + phi.p22 * t2 * t2;
+        }
+    }
+    Some(sums)
+}
+
+/// Φ = Γ(I + SΓ)⁻¹, symmetric, and log det(I + SΓ).
+struct Inner {
+    p11: f64,
+    p12: f64,
+    p22: f64,
+    log_det: f64,
+}
+
+fn inner(ratios: &Ratios, random: Random, s11: f64, s12: f64, s22: f64) -> Option<Inner> {
+    let (a, b, c) = (ratios.intercept, ratios.slope, ratios.covariance);
+    if !random.slope {
+        let det = 1.0 + a * s11;
+        return (det > 0.0).then(|| Inner {
+            p11: a / det,
+            p12: 0.0,
+            p22: 0.0,
+            log_det: det.ln(),
+        });
+    }
+    // |I + SΓ| = 1 + tr SΓ + |S||Γ|; Γ(I + SΓ)⁻¹ = (Γ + |Γ| adj S)/|I + SΓ|.
+    let gamma = a * b - c * c;
+    let det = 1.0 + a * s11 + 2.0 * c * s12 + b * s22 + gamma * (s11 * s22 - s12 * s12);
+    (det > 0.0).then(|| Inner {
+        p11: (a + gamma * s22) / det,
+        p12: (c - gamma * s12) / det,
+        p22: (b + gamma * s11) / det,
+        log_det: det.ln(),
+    })
+}
