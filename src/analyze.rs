@@ -14,6 +14,7 @@ mod cells;
 mod describe;
 mod effects;
 mod order;
+mod ordinal;
 mod select;
 mod vaf;
 mod values;
@@ -171,6 +172,7 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     effects::effects(&cells, &mut values);
     vaf::against_vaf(&cells, rules, &mut values);
     order::order(&cells, &mut values);
+    ordinal::ordinal(&cells, &mut values);
     let counts = Counts::of(ratings, &used, &decisions, rules);
     let warnings = warnings::warnings(&cells, &counts, rules, &values);
     Analysis {

@@ -28,12 +28,16 @@ mod tests;
 use super::clm::counts::Table;
 use super::clm::newton::{Maximum, Point, maximise};
 use super::clm::{Cause, Fit, clm, fit_of, logistic};
+use std::sync::LazyLock;
 
 /// Nodes of the quadrature that is reported.
 pub const NODES: usize = 60;
 
 /// Nodes on the way there.
 const FEW_NODES: usize = 12;
+
+static RULE: LazyLock<Vec<hermite::Node>> = LazyLock::new(|| hermite::rule(NODES));
+static FEW: LazyLock<Vec<hermite::Node>> = LazyLock::new(|| hermite::rule(FEW_NODES));
 
 /// From here up a standard deviation, in logits, is called infinite: between
 /// two standard deviations the odds differ by e¹⁰⁰.
@@ -83,17 +87,15 @@ pub fn clmm(table: &Table) -> Both {
         .iter()
         .map(|&sd| marginal_to_conditional(&fixed, sd))
         .collect();
-    let start = best(starts, &mut by_laplace);
+    let start = best(&starts, &mut by_laplace);
     let slope = slope_at_zero(table, &fixed);
     let found = start.and_then(|at| maximise(at, &mut by_laplace));
     let laplace = judge(table, &fixed, slope, found.as_ref());
     let start = match (&found, &laplace) {
         (Some(found), Ok(mixed)) if !mixed.boundary => Some(found.at.clone()),
         _ => {
-            let few = hermite::rule(FEW_NODES);
-            let starts = [0.3, 1.0, 3.0].map(|sd| marginal_to_conditional(&fixed, sd));
-            best(starts.to_vec(), &mut |at| {
-                quadrature::point(table, at, &few, &mut modes)
+            best(&starts, &mut |at| {
+                quadrature::point(table, at, &FEW, &mut modes)
             })
         }
     };
@@ -107,13 +109,11 @@ pub fn clmm(table: &Table) -> Both {
 /// The maximum of the integral: with few nodes first, since each step costs as
 /// many passes as there are nodes.
 fn integrate(table: &Table, start: Vec<f64>, modes: &mut [f64]) -> Option<Maximum> {
-    let few = hermite::rule(FEW_NODES);
     let near = maximise(start.clone(), |at| {
-        quadrature::point(table, at, &few, modes)
+        quadrature::point(table, at, &FEW, modes)
     });
-    let rule = hermite::rule(NODES);
     maximise(near.map_or(start, |near| near.at), |at| {
-        quadrature::point(table, at, &rule, modes)
+        quadrature::point(table, at, &RULE, modes)
     })
 }
 
@@ -126,14 +126,14 @@ fn marginal_to_conditional(fixed: &Fit, sd: f64) -> Vec<f64> {
 }
 
 fn best(
-    starts: Vec<Vec<f64>>,
+    starts: &[Vec<f64>],
     at: &mut impl FnMut(&[f64]) -> Option<Point>,
 ) -> Option<Vec<f64>> {
     starts
-        .into_iter()
-        .filter_map(|s| at(&s).map(|p| (p.value, s)))
+        .iter()
+        .filter_map(|s| at(s).map(|p| (p.value, s)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, s)| s)
+        .map(|(_, s)| s.clone())
 }
 
 /// The slope of the marginal log-likelihood in σ² at the fixed model.

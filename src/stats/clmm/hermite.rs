@@ -19,21 +19,13 @@ pub struct Node {
 
 /// The rule with n nodes, ascending; exact for polynomials up to degree 2n − 1.
 pub fn rule(n: usize) -> Vec<Node> {
-    let mut nodes: Vec<Node> = (0..n / 2)
-        .map(|i| {
-            let z = -root(n, i);
-            Node {
-                z: -z,
-                ln_weight: ln_weight(n, z),
-            }
-        })
-        .map(|node| Node { z: node.z, ..node })
-        .collect();
+    let node = |z| Node {
+        z,
+        ln_weight: ln_weight(n, z),
+    };
+    let mut nodes: Vec<Node> = (0..n / 2).map(|i| node(root(n, i))).collect();
     if n % 2 == 1 {
-        nodes.push(Node {
-            z: 0.0,
-            ln_weight: ln_weight(n, 0.0),
-        });
+        nodes.push(node(0.0));
     }
     for i in (0..n / 2).rev() {
         let twin = nodes[i];
