@@ -56,7 +56,11 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     for (g, &m) in (0u32..).zip(&present) {
         place[m as usize] = g;
     }
-    let scale = Scale { names: &names, unit: 1.0, origin: 0.0 };
+    let scale = Scale {
+        names: &names,
+        unit: 1.0,
+        origin: 0.0,
+    };
     let made = if present.len() > MAX_MODELS {
         Err(format!("more than {MAX_MODELS} realizations"))
     } else {
@@ -71,7 +75,11 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
 
 fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     let vaf = |i: usize| cells.ratings.vaf[i];
-    let rows: Vec<usize> = rows.iter().copied().filter(|&i| vaf(i).is_finite()).collect();
+    let rows: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|&i| vaf(i).is_finite())
+        .collect();
     let mut levels: Vec<f64> = Vec::new();
     for &i in &rows {
         if let Err(at) = levels.binary_search_by(|v| v.total_cmp(&vaf(i))) {
@@ -84,7 +92,11 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         _ => (0.0, 0.0),
     };
     let (origin, unit) = (0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low);
-    let scale = Scale { names: &["vaf"], unit, origin };
+    let scale = Scale {
+        names: &["vaf"],
+        unit,
+        origin,
+    };
     let made = if rows.is_empty() {
         Err("no rating has a realization and a VAF".to_owned())
     } else if unit <= 0.0 {
@@ -93,7 +105,10 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         categories(cells, &rows).map(|ratings| {
             let predictors = levels
                 .iter()
-                .map(|v| Predictor { column: 0, x: (v - origin) / unit })
+                .map(|v| Predictor {
+                    column: 0,
+                    x: (v - origin) / unit,
+                })
                 .collect();
             let index = |i: usize| {
                 let found = levels.binary_search_by(|v| v.total_cmp(&vaf(i)));

@@ -21,7 +21,7 @@
 pub mod counts;
 pub mod newton;
 #[cfg(test)]
-mod tests;
+pub(in crate::stats) mod tests;
 
 use counts::Table;
 use newton::{Point, Square, maximise};
@@ -39,7 +39,9 @@ pub enum Cause {
     #[error("one subject has no variance between subjects")]
     OneSubject,
     /// The likelihood rises for ever: an estimate is infinite.
-    #[error("complete separation: the ratings of some realizations do not overlap with others, so an estimate is infinite")]
+    #[error(
+        "complete separation: the ratings of some realizations do not overlap with others, so an estimate is infinite"
+    )]
     Separated,
     /// The standard deviation of the subjects rises for ever.
     #[error("the subjects' ratings do not overlap: their standard deviation is infinite")]

@@ -93,11 +93,9 @@ pub fn clmm(table: &Table) -> Both {
     let laplace = judge(table, &fixed, slope, found.as_ref());
     let start = match (&found, &laplace) {
         (Some(found), Ok(mixed)) if !mixed.boundary => Some(found.at.clone()),
-        _ => {
-            best(&starts, &mut |at| {
-                quadrature::point(table, at, &FEW, &mut modes)
-            })
-        }
+        _ => best(&starts, &mut |at| {
+            quadrature::point(table, at, &FEW, &mut modes)
+        }),
     };
     let found = start.and_then(|at| integrate(table, at, &mut modes));
     Both {
@@ -125,10 +123,7 @@ fn marginal_to_conditional(fixed: &Fit, sd: f64) -> Vec<f64> {
     fixed.map(|v| v * factor).chain([sd.ln()]).collect()
 }
 
-fn best(
-    starts: &[Vec<f64>],
-    at: &mut impl FnMut(&[f64]) -> Option<Point>,
-) -> Option<Vec<f64>> {
+fn best(starts: &[Vec<f64>], at: &mut impl FnMut(&[f64]) -> Option<Point>) -> Option<Vec<f64>> {
     starts
         .iter()
         .filter_map(|s| at(s).map(|p| (p.value, s)))
@@ -138,7 +133,12 @@ fn best(
 
 /// The slope of the marginal log-likelihood in σ² at the fixed model.
 fn slope_at_zero(table: &Table, fixed: &Fit) -> f64 {
-    let at: Vec<f64> = fixed.thresholds.iter().chain(&fixed.beta).copied().collect();
+    let at: Vec<f64> = fixed
+        .thresholds
+        .iter()
+        .chain(&fixed.beta)
+        .copied()
+        .collect();
     let a = table.linear(&at);
     let by_subject = table.by_subject().map(|terms| {
         let (mut first, mut second) = (0.0, 0.0);
@@ -152,12 +152,7 @@ fn slope_at_zero(table: &Table, fixed: &Fit) -> f64 {
     by_subject.sum()
 }
 
-fn judge(
-    table: &Table,
-    fixed: &Fit,
-    slope: f64,
-    found: Option<&Maximum>,
-) -> Result<Mixed, Cause> {
+fn judge(table: &Table, fixed: &Fit, slope: f64, found: Option<&Maximum>) -> Result<Mixed, Cause> {
     let sd = |found: &Maximum| found.at[table.parameters()].exp();
     let zero = Mixed {
         fit: fixed.clone(),

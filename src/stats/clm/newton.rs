@@ -160,15 +160,17 @@ const PROMISE: f64 = 1e-9;
 /// that makes the matrix positive definite, and is halved until the value does
 /// not fall. `at` is `None` where the parameters are not admissible. The last
 /// step, once the promise ½gᵀδ is small, squares what is left of the error.
-pub fn maximise(
-    start: Vec<f64>,
-    mut at: impl FnMut(&[f64]) -> Option<Point>,
-) -> Option<Maximum> {
+pub fn maximise(start: Vec<f64>, mut at: impl FnMut(&[f64]) -> Option<Point>) -> Option<Maximum> {
     let mut here = start;
     let mut point = at(&here)?;
     for _ in 0..MOST_STEPS {
         let (step, newton) = direction(&point)?;
-        let promise: f64 = 0.5 * step.iter().zip(&point.gradient).map(|(a, b)| a * b).sum::<f64>();
+        let promise: f64 = 0.5
+            * step
+                .iter()
+                .zip(&point.gradient)
+                .map(|(a, b)| a * b)
+                .sum::<f64>();
         let last = newton && promise < PROMISE;
         let longest = step.iter().fold(0.0f64, |a, b| a.max(b.abs()));
         let mut share = (LONGEST_STEP / longest).min(1.0);

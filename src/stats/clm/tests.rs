@@ -67,7 +67,11 @@ pub(in crate::stats) fn derivatives_hold(
             let size = 1.0 + a.abs().max(b.abs());
             assert!((a - b).abs() < tolerance * size, "{what}: {a} and {b}");
         };
-        close(here.gradient[i], slope(&|p| p.value), format!("gradient {i}"));
+        close(
+            here.gradient[i],
+            slope(&|p| p.value),
+            format!("gradient {i}"),
+        );
         for j in 0..at.len() {
             close(
                 here.hessian.get(i, j),
@@ -132,30 +136,70 @@ fn separation_is_seen_and_overlap_is_not_called_so() {
     let says = |table: Table| clm(&table).err();
     let separated = Some(Cause::Separated);
     // A realization wholly in the highest category.
-    assert_eq!(says(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[2, 2])])), separated);
+    assert_eq!(
+        says(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[2, 2])])),
+        separated
+    );
     // Wholly in a middle one: finite.
-    assert_eq!(says(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[1, 1])])), None);
-    // No realization links the lower categories with the upper.
-    assert_eq!(says(dummies(4, &[(0, 0, &[0, 1]), (0, 1, &[2, 3])])), separated);
-    assert_eq!(says(dummies(3, &[(0, 0, &[0, 1]), (0, 1, &[1, 2])])), None);
+    assert_eq!(
+        says(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[1, 1])])),
+        None
+    );
+    // One never in the highest, the other never in the lowest.
+    assert_eq!(
+        says(dummies(3, &[(0, 0, &[0, 1]), (0, 1, &[1, 2])])),
+        separated
+    );
+    // No realization links the lower categories with the upper; then one does.
+    let unlinked: [(u32, u32, &[u32]); 3] = [(0, 0, &[0, 1]), (0, 1, &[2, 3]), (0, 2, &[0, 1])];
+    assert_eq!(says(dummies(4, &unlinked)), separated);
+    let linked: [(u32, u32, &[u32]); 3] = [(0, 0, &[0, 1]), (0, 1, &[2, 3]), (0, 2, &[0, 3])];
+    assert_eq!(says(dummies(4, &linked)), None);
     // A covariate may order them although no two have a category in common.
     let x = [-1.0, 0.0, 1.0];
-    assert_eq!(says(covariate(&x, 3, &[(0, 0, &[0]), (0, 1, &[1, 1]), (0, 2, &[2])])), separated);
-    assert_eq!(says(covariate(&x, 3, &[(0, 0, &[1]), (0, 1, &[0, 0]), (0, 2, &[2])])), None);
+    assert_eq!(
+        says(covariate(
+            &x,
+            3,
+            &[(0, 0, &[0]), (0, 1, &[1, 1]), (0, 2, &[2])]
+        )),
+        separated
+    );
+    assert_eq!(
+        says(covariate(
+            &x,
+            3,
+            &[(0, 0, &[1]), (0, 1, &[0, 0]), (0, 2, &[2])]
+        )),
+        None
+    );
     // Ratings that touch in one category only are still ordered.
-    assert_eq!(says(covariate(&x, 2, &[(0, 0, &[0]), (0, 1, &[0, 1]), (0, 2, &[1])])), separated);
+    assert_eq!(
+        says(covariate(
+            &x,
+            2,
+            &[(0, 0, &[0]), (0, 1, &[0, 1]), (0, 2, &[1])]
+        )),
+        separated
+    );
 }
 
 #[test]
 fn what_does_not_vary_has_no_model() {
-    assert_eq!(clm(&dummies(1, &[(0, 0, &[0]), (0, 1, &[0])])), Err(Cause::OneCategory));
-    assert_eq!(clm(&dummies(2, &[(0, 0, &[0, 1])])), Err(Cause::OnePredictor));
+    assert_eq!(
+        clm(&dummies(1, &[(0, 0, &[0]), (0, 1, &[0])])),
+        Err(Cause::OneCategory)
+    );
+    assert_eq!(
+        clm(&dummies(2, &[(0, 0, &[0, 1])])),
+        Err(Cause::OnePredictor)
+    );
     let same = covariate(&[0.5, 0.5], 2, &[(0, 0, &[0, 1]), (0, 1, &[0, 1])]);
     assert_eq!(clm(&same), Err(Cause::OnePredictor));
     assert!(clm(&Table::new(Vec::new(), 0, 0, &[])).is_err());
 }
 
-/// A small table in which every category occurs.
+/// A small table in which every category occurs, and the first predictors.
 pub(in crate::stats) fn any_counts() -> impl Strategy<Value = (usize, Vec<Count>)> {
     let count = (0u32..4, 0u32..3, 0u32..5, 1u32..4);
     prop::collection::vec(count, 1..16).prop_map(|list| {
@@ -163,11 +207,15 @@ pub(in crate::stats) fn any_counts() -> impl Strategy<Value = (usize, Vec<Count>
         used.sort_unstable();
         used.dedup();
         let rank = |c: u32| used.partition_point(|u| *u < c) as u32;
+        let mut asked: Vec<u32> = list.iter().map(|c| c.1).collect();
+        asked.sort_unstable();
+        asked.dedup();
+        let place = |p: u32| asked.partition_point(|u| *u < p) as u32;
         let counts = list
             .iter()
             .map(|&(subject, predictor, category, n)| Count {
                 subject,
-                predictor,
+                predictor: place(predictor),
                 category: rank(category),
                 n,
             })
@@ -183,17 +231,25 @@ proptest! {
     /// them: it never gives up, and never stops half way.
     #[test]
     fn every_table_is_separated_or_fitted((categories, counts) in any_counts()) {
-        let x = [-1.0, 0.1, 1.0].map(|x| Predictor { column: 0, x }).to_vec();
-        let table = Table::new(x, 1, categories, &counts);
-        match clm(&table) {
-            Ok(fit) => {
-                let at: Vec<f64> = fit.thresholds.iter().chain(&fit.beta).copied().collect();
-                let slope = point(&table, &at).unwrap().gradient;
-                prop_assert!(slope.iter().all(|g| g.abs() < 1e-6), "{slope:?}");
-                prop_assert!(fit.thresholds.windows(2).all(|w| w[0] < w[1]));
-                prop_assert!(fit.se.iter().all(|s| s.is_finite() && *s > 0.0));
+        let covariate = [-1.0, 0.1, 1.0].map(|x| Predictor { column: 0, x });
+        let groups = counts.iter().map(|c| c.predictor as usize + 1).max().unwrap_or(0);
+        let dummy = |g: usize| Predictor {
+            column: g.saturating_sub(1),
+            x: f64::from(u8::from(g > 0)),
+        };
+        let dummies: Vec<Predictor> = (0..groups).map(dummy).collect();
+        for (predictors, columns) in [(covariate.to_vec(), 1), (dummies, groups - 1)] {
+            let table = Table::new(predictors, columns, categories, &counts);
+            match clm(&table) {
+                Ok(fit) => {
+                    let at: Vec<f64> = fit.thresholds.iter().chain(&fit.beta).copied().collect();
+                    let slope = point(&table, &at).unwrap().gradient;
+                    prop_assert!(slope.iter().all(|g| g.abs() < 1e-6), "{slope:?}");
+                    prop_assert!(fit.thresholds.windows(2).all(|w| w[0] < w[1]));
+                    prop_assert!(fit.se.iter().all(|s| s.is_finite() && *s > 0.0));
+                }
+                Err(cause) => prop_assert!(cause != Cause::NoMaximum, "{counts:?}"),
             }
-            Err(cause) => prop_assert!(cause != Cause::NoMaximum, "{counts:?}"),
         }
     }
 

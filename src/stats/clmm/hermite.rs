@@ -29,10 +29,7 @@ pub fn rule(n: usize) -> Vec<Node> {
     }
     for i in (0..n / 2).rev() {
         let twin = nodes[i];
-        nodes.push(Node {
-            z: -twin.z,
-            ..twin
-        });
+        nodes.push(Node { z: -twin.z, ..twin });
     }
     nodes
 }

@@ -21,12 +21,7 @@ use std::f64::consts::{PI, SQRT_2};
 const NEGLIGIBLE: f64 = 1e-17;
 
 /// Value, gradient and Hessian of the likelihood at (θ, β, ln σ).
-pub(super) fn point(
-    table: &Table,
-    at: &[f64],
-    rule: &[Node],
-    modes: &mut [f64],
-) -> Option<Point> {
+pub(super) fn point(table: &Table, at: &[f64], rule: &[Node], modes: &mut [f64]) -> Option<Point> {
     let size = table.parameters() + 1;
     let tau = size - 1;
     let precision = (-2.0 * at[tau]).exp();

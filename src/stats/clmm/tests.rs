@@ -34,7 +34,9 @@ fn laplaces_derivatives_are_those_of_its_value() {
 fn the_derivatives_of_the_integral_are_those_of_its_value() {
     let table = covariate(&[-1.0, 0.3, 1.0], 4, &CELLS);
     let at = [-1.2, 0.3, 1.7, 0.8, 0.2];
-    derivatives_hold(&at, 1e-7, |at| quadrature::point(&table, at, &RULE, &mut [0.0; 3]));
+    derivatives_hold(&at, 1e-7, |at| {
+        quadrature::point(&table, at, &RULE, &mut [0.0; 3])
+    });
 }
 
 #[test]
@@ -80,8 +82,9 @@ fn the_quadrature_is_the_integral() {
 fn alike_subjects_lie_on_the_boundary() {
     let alike: &[u32] = &[0, 1, 1, 2];
     let other: &[u32] = &[0, 1, 2, 2];
-    let cells: Vec<(u32, u32, &[u32])> =
-        (0..6).flat_map(|s| [(s, 0, alike), (s, 1, other)]).collect();
+    let cells: Vec<(u32, u32, &[u32])> = (0..6)
+        .flat_map(|s| [(s, 0, alike), (s, 1, other)])
+        .collect();
     let table = dummies(3, &cells);
     let both = clmm(&table);
     for mixed in [both.laplace.unwrap(), both.quadrature.unwrap()] {
@@ -162,7 +165,9 @@ fn repeated_counts_add_up() {
     let cells = counts(&CELLS);
     let mut added: Vec<Count> = Vec::new();
     for c in &cells {
-        let same = |a: &&mut Count| (a.subject, a.predictor, a.category) == (c.subject, c.predictor, c.category);
+        let same = |a: &&mut Count| {
+            (a.subject, a.predictor, a.category) == (c.subject, c.predictor, c.category)
+        };
         match added.iter_mut().find(same) {
             Some(a) => a.n += 1,
             None => added.push(*c),
