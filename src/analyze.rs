@@ -15,6 +15,7 @@ mod describe;
 mod effects;
 mod mixed;
 mod order;
+mod ordinal;
 mod select;
 mod vaf;
 mod values;
@@ -173,6 +174,7 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     vaf::against_vaf(&cells, rules, &mut values);
     order::order(&cells, &mut values);
     mixed::mixed(&cells, &mut values);
+    ordinal::ordinal(&cells, &mut values);
     let counts = Counts::of(ratings, &used, &decisions, rules);
     let warnings = warnings::warnings(&cells, &counts, rules, &values);
     Analysis {

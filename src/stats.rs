@@ -9,6 +9,8 @@ pub mod agreement;
 pub mod anova;
 pub mod bayes;
 pub mod bootstrap;
+pub mod clm;
+pub mod clmm;
 pub mod correlation;
 pub mod describe;
 pub mod distribution;

@@ -193,6 +193,16 @@ const WITH_UNITS: [&str; 15] = [
     "lmm_variance",
 ];
 
+/// Groups in which the ratings are names of categories.
+const ORDINAL: [&str; 6] = [
+    "clm_model",
+    "clm_vaf",
+    "clmm_model_laplace",
+    "clmm_model_quad",
+    "clmm_vaf_laplace",
+    "clmm_vaf_quad",
+];
+
 #[test]
 fn a_shift_and_a_scale_leave_every_standardised_statistic() {
     let a = of(SMALL);
@@ -204,6 +214,7 @@ fn a_shift_and_a_scale_leave_every_standardised_statistic() {
         &[
             &WITH_UNITS[..],
             &["posthoc", "icc_subjects", "icc_repetitions"],
+            &ORDINAL[..],
         ]
         .concat(),
     )
@@ -224,6 +235,13 @@ fn a_shift_and_a_scale_leave_every_standardised_statistic() {
         let (x, y) = (a.values.number(id).unwrap(), b.values.number(id).unwrap());
         assert!((x - y).abs() < 1e-7 * x.abs(), "{id}: {x} and {y}");
     }
+    // The categories have other names and the same order: nothing changes.
+    for group in ORDINAL {
+        for name in ["loglik", "beta/B", "beta/vaf", "se/vaf", "sd_subject"] {
+            let id = format!("{group}/{name}");
+            assert_eq!(a.values.get(&id), b.values.get(&id), "{id}");
+        }
+    }
     let sd = |a: &Analysis| a.values.number("desc/A/sd").unwrap();
     assert!((2.0 * sd(&a) - sd(&b)).abs() < 1e-12);
 }
@@ -240,6 +258,10 @@ fn a_scale_turned_round_turns_the_correlation_round() {
     ] {
         let (x, y) = (a.values.number(id).unwrap(), b.values.number(id).unwrap());
         assert!((x + y).abs() < 1e-12, "{id}: {x} and {y}");
+    }
+    for id in ["clm_vaf/beta/vaf", "clmm_model_quad/beta/B"] {
+        let (x, y) = (a.values.number(id).unwrap(), b.values.number(id).unwrap());
+        assert!((x + y).abs() < 1e-6 * x.abs(), "{id}: {x} and {y}");
     }
     let p = "corr/pearson/p_exact_two_sided";
     assert_eq!(a.values.number(p), b.values.number(p));
