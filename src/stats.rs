@@ -8,6 +8,7 @@
 pub mod agreement;
 pub mod anova;
 pub mod bayes;
+pub mod beside;
 pub mod bootstrap;
 pub mod correlation;
 pub mod describe;
@@ -15,6 +16,8 @@ pub mod distribution;
 pub mod friedman;
 pub mod paired;
 pub mod permutation;
+pub mod possible;
+pub mod proportion;
 pub mod rank;
 pub mod regression;
 

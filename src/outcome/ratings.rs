@@ -241,9 +241,12 @@ impl Ratings {
         let models = self.models.len();
         let place = |i: usize| (self.model[i] as usize).min(models);
         let by_model = counted(0..self.len(), self.len(), models + 1, place);
-        counted(by_model.iter().copied(), self.len(), self.subjects.len(), |i| {
-            self.subject[i] as usize
-        })
+        counted(
+            by_model.iter().copied(),
+            self.len(),
+            self.subjects.len(),
+            |i| self.subject[i] as usize,
+        )
     }
 }
 

@@ -142,7 +142,9 @@ impl Ratings {
                 name: name.to_owned(),
                 line: lines[second].into(),
                 first: lines[first].into(),
-                subject: ratings.subjects[ratings.subject[second] as usize].id.clone(),
+                subject: ratings.subjects[ratings.subject[second] as usize]
+                    .id
+                    .clone(),
                 model: model.map_or_else(String::new, |m| m.id.clone()),
                 repetition: ratings.repetition[second],
             });
@@ -203,7 +205,8 @@ impl Reading {
             match columns.row(&line, number, &mut self.builder)? {
                 Some(row) => {
                     self.builder.push(row);
-                    self.lines.push(u32::try_from(line.line).unwrap_or(u32::MAX));
+                    self.lines
+                        .push(u32::try_from(line.line).unwrap_or(u32::MAX));
                 }
                 None => self.builder.practice(),
             }
@@ -217,7 +220,10 @@ fn number_repetitions(ratings: &mut Ratings) {
         return;
     }
     let order = ratings.by_cell();
-    for rows in cells(ratings, &order).map(<[usize]>::to_vec).collect::<Vec<_>>() {
+    for rows in cells(ratings, &order)
+        .map(<[usize]>::to_vec)
+        .collect::<Vec<_>>()
+    {
         for (n, i) in (1u32..).zip(rows) {
             if ratings.repetition[i] == 0 {
                 ratings.repetition[i] = n;
