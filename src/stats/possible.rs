@@ -6,11 +6,9 @@
 //! Allard 2018). The arithmetic is exact, in whole numbers: no printed digit is
 //! ever turned into a binary fraction.
 //!
-//! For n whole numbers from `low` to `high` with sum T the possible Q are all
-//! those of T's parity from the most even spread to the widest: moving one unit
-//! between two of them changes Q by 2 at least, and every step of 2 between the
-//! extremes is reached for two values; with more values the ends below bound what
-//! is possible, and [`reachable`] settles each single pair by search.
+//! For n whole numbers from `low` to `high` with sum T, Q lies between that of the
+//! most even spread and that of the widest, and has T's parity, since x² and x
+//! have the same. Not every such Q exists; a search settles each.
 
 /// A printed number: all it says is that the true one rounds to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +18,9 @@ pub struct Printed {
     /// Digits after the point.
     pub decimals: u32,
 }
+
+/// Most digits of a printed number: squares of them fit a whole number here.
+const MAX_DIGITS: usize = 12;
 
 /// Why a text is no printed number.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -34,10 +35,8 @@ impl std::str::FromStr for Printed {
         let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
         let unsigned = whole.strip_prefix('-').unwrap_or(whole);
         let plain = |t: &str| t.bytes().all(|b| b.is_ascii_digit());
-        if unsigned.is_empty() || !plain(unsigned) || !plain(decimals) || decimals.len() > 9 {
-            return Err(wrong());
-        }
-        if unsigned.len() > 9 {
+        let many = decimals.len() > 9 || unsigned.len() + decimals.len() > MAX_DIGITS;
+        if unsigned.is_empty() || !plain(unsigned) || !plain(decimals) || many {
             return Err(wrong());
         }
         Ok(Self {
@@ -110,15 +109,23 @@ pub struct Found {
     pub n: u32,
     /// Sums that print as asked, up to [`MAX_SHOWN`].
     pub sums: Vec<Sums>,
-    /// How many there are.
+    /// How many there are; at [`MAX_COUNTED`] the count stops.
     pub count: usize,
+    /// Sums that would print as asked, but that no ratings have, up to
+    /// [`MAX_SHOWN`].
+    pub missed: Vec<Sums>,
 }
 
 /// Most sums that are kept for showing.
 pub const MAX_SHOWN: usize = 5;
 
-/// Most ratings that are examined.
+/// Most sums that are counted.
+pub const MAX_COUNTED: usize = 1000;
+
+/// Most ratings that are examined, and the furthest end of a scale.
 pub const MAX_N: u32 = 5000;
+/// See [`MAX_N`].
+pub const MAX_SCALE: i128 = 10_000;
 
 /// What was printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -129,7 +136,7 @@ pub struct Question {
     pub sd: Printed,
     /// Ratings.
     pub n: u32,
-    /// Ratings of each subject, where they are known.
+    /// Ratings of each subject; not known: every divisor of n is tried.
     pub each: Option<u32>,
     /// Lowest and highest whole rating.
     pub scale: (i128, i128),
@@ -146,17 +153,16 @@ pub fn sums(q: &Question) -> Vec<i128> {
         .collect()
 }
 
-/// Every definition with what it can give. Subject means come in only where
-/// `each` divides n and leaves two subjects or more.
+/// Every definition with what it can give. Subject means come in where the
+/// ratings of each divide n and leave two subjects or more. n has to be from 1 to
+/// [`MAX_N`], the scale within ±[`MAX_SCALE`].
 pub fn possible(q: &Question) -> Vec<Found> {
     let sums = sums(q);
     let mut overs = vec![Over::Ratings];
-    if let Some(each) = q.each
-        && each > 1
-        && q.n.is_multiple_of(each)
-        && q.n / each > 1
-    {
-        overs.push(Over::SubjectMeans { each });
+    for each in 2..=q.n / 2 {
+        if q.n.is_multiple_of(each) && q.each.is_none_or(|known| known == each) {
+            overs.push(Over::SubjectMeans { each });
+        }
     }
     let mut all = Vec::new();
     for over in overs {
@@ -183,38 +189,41 @@ fn find(q: &Question, sums: &[i128], definition: Definition) -> Found {
         n: n as u32,
         sums: Vec::new(),
         count: 0,
+        missed: Vec::new(),
     };
     if divisor < 1 {
         return found;
     }
     for &sum in sums {
-        let (least, most) = extremes(n, sum, low, high);
-        // variance = (nQ − T²)/(n · divisor · each²); Q has the parity of T.
+        // variance = (nQ − T²)/(n · divisor · each²)
         let below = n * divisor * each * each;
-        let start = least + (least - sum).rem_euclid(2);
         let wide = |squares: i128| n * squares - sum * sum;
-        // Q from the lower end of the SD's interval on.
+        // Q at both ends of what rounds to the SD, and a little beyond.
         let unit = 2 * q.sd.unit();
         let at = |digits: i128| {
             let digits = digits.max(0);
             (digits * digits * below / (unit * unit) + sum * sum) / n
         };
-        let first = (at(2 * q.sd.digits - 1) - 2).max(start);
-        let mut squares = first + (first - sum).rem_euclid(2);
-        let last = (at(2 * q.sd.digits + 1) + 2).min(most);
-        while squares <= last {
-            if q.sd.rounds_from_root(wide(squares), below) && reachable(n, sum, squares, low, high)
-            {
+        for squares in at(2 * q.sd.digits - 1) - 2..=at(2 * q.sd.digits + 1) + 2 {
+            if wide(squares) < 0 || !q.sd.rounds_from_root(wide(squares), below) {
+                continue;
+            }
+            let sums = Sums {
+                sum,
+                squares,
+                deviations: wide(squares),
+            };
+            if reachable(n, sum, squares, low, high) {
                 found.count += 1;
                 if found.sums.len() < MAX_SHOWN {
-                    found.sums.push(Sums {
-                        sum,
-                        squares,
-                        deviations: wide(squares),
-                    });
+                    found.sums.push(sums);
                 }
+                if found.count == MAX_COUNTED {
+                    return found;
+                }
+            } else if found.missed.len() < MAX_SHOWN {
+                found.missed.push(sums);
             }
-            squares += 2;
         }
     }
     found
@@ -240,7 +249,8 @@ fn extremes(n: i128, sum: i128, low: i128, high: i128) -> (i128, i128) {
 /// Whether n whole numbers from low to high have this sum and sum of squares: the
 /// largest of them is tried downwards, each with what is left for the others.
 /// What is left is nearly always within its extremes and of the right parity, so
-/// the first try leads through; the depth is n.
+/// the first try leads through; the depth is n. A search that would take too long
+/// excludes nothing.
 fn reachable(n: i128, sum: i128, squares: i128, low: i128, high: i128) -> bool {
     let mut budget = 100_000u32;
     search(n, sum, squares, low, high, &mut budget)
@@ -264,7 +274,7 @@ fn search(n: i128, sum: i128, squares: i128, low: i128, high: i128, budget: &mut
     let mut top = high;
     while top >= low {
         if *budget == 0 {
-            return false;
+            return true;
         }
         *budget -= 1;
         if search(n - 1, sum - top, squares - top * top, low, top, budget) {
@@ -300,6 +310,8 @@ mod tests {
         let s = found[0].sums[0];
         // Q = 720: 720 − 144²/30 = 28.8, here times n.
         assert_eq!((s.sum, s.squares, s.deviations), (144, 720, 864));
+        // With n = 30 in the denominator it would have to be 721, which is odd.
+        assert_eq!(found[1].missed[0].squares, 721);
     }
 
     #[test]

@@ -164,7 +164,7 @@ mod tests {
         let p = parabola(&x, &[1.0, 3.0, 4.0, 4.0, 2.0]).unwrap();
         assert!((p.square + 9.0 / 14.0).abs() < 1e-12);
         // Σwy²-part 81/14, line (−2,−1,0,1,2)·y = 3, 9/10; total 6.8.
-        let residual = 6.8 - 81.0 / 14.0 - 0.9;
+        let residual: f64 = 6.8 - 81.0 / 14.0 - 0.9;
         assert!((p.se - (residual / 2.0 / 14.0).sqrt()).abs() < 1e-12);
         assert!((p.r2 - (1.0 - residual / 6.8)).abs() < 1e-12);
     }

@@ -530,7 +530,7 @@ mod tests {
     #[test]
     fn a_byte_order_mark_and_empty_fields_are_no_fault() {
         let r = read(&format!("\u{feff}{HEAD}S1,,1,,\nS1,,2,4,0.5\n")).unwrap();
-        assert_eq!(r.model, [super::super::NO_MODEL; 2]);
+        assert_eq!(r.model, [NO_MODEL; 2]);
         assert_eq!((r.len(), r.models.len()), (2, 0));
         assert_eq!(r.status, [Status::Missing, Status::Ok]);
     }
