@@ -12,15 +12,23 @@
 
 mod cells;
 mod describe;
+mod deviation;
 mod effects;
+mod exclude;
+mod headline;
+mod memory;
 mod mixed;
 mod order;
 mod ordinal;
+mod reference;
 mod select;
+mod subjects;
 mod vaf;
 mod values;
 mod warnings;
 
+pub use deviation::deviations;
+pub use exclude::{Applied, Exclusion};
 pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
 pub use warnings::Warning;
@@ -28,6 +36,9 @@ pub use warnings::Warning;
 use crate::outcome::ratings::Ratings;
 use crate::protocol::{Protocol, Role, Unfinished};
 use cells::Cells;
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::sync::Arc;
 
 /// What was decided before the data.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,8 +55,14 @@ pub struct Rules {
     pub include: Include,
     /// Of Monte Carlo, where there are too many permutations to visit.
     pub seed: u64,
-    /// Names of the pre-stated rules of exclusion.
-    pub exclusion_rules: Vec<String>,
+    /// Whether the ratings answer the primary question.
+    pub primary: bool,
+    /// The pre-stated rules of exclusion.
+    pub exclude: Vec<Exclusion>,
+    /// Differences from a hidden reference below this count as none.
+    pub equivalence_margin: Option<f64>,
+    /// What was changed of these rules after the study began, in words.
+    pub deviations: Vec<String>,
 }
 
 impl Default for Rules {
@@ -57,14 +74,17 @@ impl Default for Rules {
             unfinished: Unfinished::Include,
             include: Include::default(),
             seed: 2007,
-            exclusion_rules: Vec::new(),
+            primary: true,
+            exclude: Vec::new(),
+            equivalence_margin: None,
+            deviations: Vec::new(),
         }
     }
 }
 
 impl Rules {
-    /// Those of a protocol. The threshold of `realistic_from` and the scale
-    /// belong to the primary question; for another `question` there are none.
+    /// Those of a protocol. `realistic_from` and the margin of equivalence belong
+    /// to the primary question; for another `question` there are none.
     pub fn of(protocol: &Protocol, question: &str, include: Include) -> Self {
         use crate::protocol::QuestionKind;
         let primary = protocol.analysis.primary.as_str() == question;
@@ -85,12 +105,12 @@ impl Rules {
             unfinished: protocol.analysis.unfinished,
             include,
             seed: protocol.study.seed,
-            exclusion_rules: protocol
-                .analysis
-                .exclude
-                .iter()
-                .map(|e| e.rule.clone())
+            primary,
+            exclude: (protocol.analysis.exclude.iter())
+                .filter_map(Exclusion::of)
                 .collect(),
+            equivalence_margin: protocol.analysis.equivalence_margin.filter(|_| primary),
+            deviations: Vec::new(),
         }
     }
 }
@@ -127,9 +147,9 @@ pub struct Listed {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
     /// Subject. Untrusted.
-    pub subject: String,
+    pub subject: Arc<str>,
     /// Realization, empty if there is none. Untrusted.
-    pub model: String,
+    pub model: Arc<str>,
     /// The how-maniest time; 0 unknown.
     pub repetition: u32,
     /// The rating, if there is one.
@@ -137,7 +157,7 @@ pub struct Judged {
     /// The VAF, if there is one.
     pub vaf: Option<f64>,
     /// Why it does not count; `None`: it does.
-    pub excluded: Option<Reason>,
+    pub excluded: Option<Arc<Reason>>,
 }
 
 /// Everything that was computed.
@@ -155,6 +175,10 @@ pub struct Analysis {
     pub counts: Counts,
     /// Every row with the decision about it.
     pub rows: Vec<Judged>,
+    /// What each pre-stated rule of exclusion did, in the protocol's order.
+    pub exclusions: Vec<Applied>,
+    /// What was changed of the rules after the study began, in words.
+    pub deviations: Vec<String>,
     /// Comments of the rows that count, by realization.
     pub comments: Vec<Said>,
     /// The threshold of "realistic".
@@ -165,18 +189,19 @@ pub struct Analysis {
 
 /// Analyses ratings under rules.
 pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
-    let decisions = select::decide(ratings, rules);
-    let used = ratings.keep(|i| decisions[i].is_none());
+    let (decisions, exclusions) = select::decide(ratings, rules);
+    let used = rows(ratings, |i| decisions[i].is_none());
     let cells = Cells::of(&used);
-    let mut values = Values::default();
-    describe::describe(&cells, rules, &mut values);
-    effects::effects(&cells, &mut values);
-    vaf::against_vaf(&cells, rules, &mut values);
-    order::order(&cells, &mut values);
-    mixed::mixed(&cells, &mut values);
-    ordinal::ordinal(&cells, &mut values);
+    let mut values = statistics(&cells, rules);
+    if exclusions.iter().any(|e| e.rows > 0) {
+        let all = rows(ratings, |i| {
+            let reason = decisions[i].as_deref();
+            matches!(reason, None | Some(Reason::Rule(_)))
+        });
+        headline::without_exclusions(&statistics(&Cells::of(&all), rules), &mut values);
+    }
     let counts = Counts::of(ratings, &used, &decisions, rules);
-    let warnings = warnings::warnings(&cells, &counts, rules, &values);
+    let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &values);
     Analysis {
         question: ratings.question.clone(),
         realizations: used
@@ -190,16 +215,9 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
                 vaf: *vaf,
             })
             .collect(),
-        rows: (0..ratings.len())
-            .map(|i| Judged {
-                subject: ratings.subjects[ratings.subject[i] as usize].id.clone(),
-                model: model_name(ratings, i),
-                repetition: ratings.repetition[i],
-                rating: Some(ratings.rating[i]).filter(|v| v.is_finite()),
-                vaf: Some(ratings.vaf[i]).filter(|v| v.is_finite()),
-                excluded: decisions[i].clone(),
-            })
-            .collect(),
+        rows: judged(ratings, decisions),
+        exclusions,
+        deviations: rules.deviations.clone(),
         comments: comments(&used),
         realistic_from: rules.realistic_from,
         scale: rules.scale,
@@ -207,6 +225,73 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
         warnings,
         counts,
     }
+}
+
+/// Some of the rows; all of them are not copied.
+fn rows(ratings: &Ratings, keep: impl Fn(usize) -> bool) -> Cow<'_, Ratings> {
+    if (0..ratings.len()).all(&keep) {
+        Cow::Borrowed(ratings)
+    } else {
+        Cow::Owned(ratings.keep(keep))
+    }
+}
+
+/// Writes a group of statistics.
+type Group = fn(&Cells<'_>, &Rules, &mut Values);
+
+/// Groups that need nothing of each other, the longest first.
+const GROUPS: [Group; 10] = [
+    |cells, _, values| ordinal::ordinal(cells, values),
+    |cells, _, values| mixed::mixed(cells, values),
+    order::order,
+    effects::ranks_and_anova,
+    effects::pairs,
+    effects::agree,
+    vaf::against_vaf,
+    describe::describe,
+    subjects::subjects,
+    reference::reference,
+];
+
+/// Every statistic. Groups are computed side by side; each by itself, so that
+/// the number of threads changes no bit.
+fn statistics(cells: &Cells<'_>, rules: &Rules) -> Values {
+    let parts: Vec<Values> = GROUPS
+        .par_iter()
+        .with_max_len(1)
+        .map(|group| {
+            let mut values = Values::default();
+            group(cells, rules, &mut values);
+            values
+        })
+        .collect();
+    let mut values = Values::default();
+    for part in parts {
+        values.take(part);
+    }
+    memory::memory(cells, rules, &mut values);
+    headline::headline(cells, rules, &mut values);
+    values
+}
+
+fn judged(ratings: &Ratings, decisions: Vec<select::Decision>) -> Vec<Judged> {
+    let subjects: Vec<Arc<str>> = (ratings.subjects.iter())
+        .map(|s| Arc::from(s.id.as_str()))
+        .collect();
+    let models: Vec<Arc<str>> = (ratings.models.iter())
+        .map(|m| Arc::from(m.id.as_str()))
+        .collect();
+    let none: Arc<str> = Arc::from("");
+    (decisions.into_iter().enumerate())
+        .map(|(i, excluded)| Judged {
+            subject: Arc::clone(&subjects[ratings.subject[i] as usize]),
+            model: Arc::clone(models.get(ratings.model[i] as usize).unwrap_or(&none)),
+            repetition: ratings.repetition[i],
+            rating: Some(ratings.rating[i]).filter(|v| v.is_finite()),
+            vaf: Some(ratings.vaf[i]).filter(|v| v.is_finite()),
+            excluded,
+        })
+        .collect()
 }
 
 fn model_name(ratings: &Ratings, row: usize) -> String {

@@ -291,6 +291,10 @@ pub struct AnalysisRules {
     pub vaf: Option<String>,
     /// Ratings from here up count as realistic.
     pub realistic_from: Option<f64>,
+    /// Differences from a hidden reference below this, in points of the primary
+    /// scale, count as none; above 0. Left out of the fingerprint where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equivalence_margin: Option<f64>,
     /// Whether unfinished sessions are analysed.
     pub unfinished: Unfinished,
     /// Pre-stated exclusions.

@@ -8,6 +8,7 @@
 pub mod agreement;
 pub mod anova;
 pub mod bayes;
+pub mod beside;
 pub mod bootstrap;
 pub mod clm;
 pub mod clmm;
@@ -18,6 +19,8 @@ pub mod friedman;
 pub mod lmm;
 pub mod paired;
 pub mod permutation;
+pub mod possible;
+pub mod proportion;
 pub mod rank;
 pub mod regression;
 

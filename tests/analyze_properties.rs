@@ -330,3 +330,100 @@ fn a_page_fits_its_width() {
         }
     }
 }
+
+#[test]
+fn a_hundred_thousand_subjects_are_analysed_and_not_listed() {
+    let mut csv = String::from("subject,model,repetition,rating,vaf,trial_index\n");
+    let mut noise = study::rng::Stream::new(5, &["many"]);
+    for s in 0..100_000 {
+        for (m, vaf) in [("a", 0.7), ("b", 0.75), ("c", 0.9)] {
+            let rating = 1 + noise.below(7);
+            csv += &format!("S{s},{m},1,{rating},{vaf},{}\n", 1 + noise.below(3));
+        }
+    }
+    let a = of(&csv);
+    assert_eq!(a.values.number("design/n_subjects"), Some(100_000.0));
+    assert!(a.values.iter().count() < 1000);
+    assert!(a.warnings.iter().any(|w| w.code == "many-participants"));
+    assert!(a.values.number("bootstrap/percentile_lo").is_some());
+    assert!(has_no_number_that_is_none(&page(
+        &source(),
+        &a,
+        Page {
+            width: 80,
+            colour: false
+        }
+    )));
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let mut csv = String::from("subject,model,repetition,rating,vaf,trial_index\n");
+    let mut noise = study::rng::Stream::new(6, &["threads"]);
+    for s in 0..40 {
+        for trial in 0..15 {
+            let rating = 1 + noise.below(7);
+            csv += &format!(
+                "S{s},m{},{},{rating},0.{},{}\n",
+                trial % 5,
+                trial / 5 + 1,
+                70 + trial % 5,
+                trial + 1
+            );
+        }
+    }
+    let bytes = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| json::document(&source(), &of(&csv)))
+    };
+    assert_eq!(bytes(1), bytes(4));
+}
+
+/// Every row alike but for one thing that should break something.
+#[test]
+fn degenerate_tables_are_analysed() {
+    let head = "subject,model,repetition,rating,vaf,trial_index\n";
+    let tables = [
+        "S,a,1,4,0.5,1\n",
+        "S,,1,4,,\n",
+        "S,a,1,,,\n",
+        "S,a,1,NaN,NA,1\nT,a,1,nan,,1\n",
+        "S,a,1,4,0.5,1\nS,b,1,4,0.5,2\nT,a,1,4,0.5,1\nT,b,1,4,0.5,2\n",
+        "S,a,1,1e308,0.5,1\nS,b,1,-1e308,0.6,2\nT,a,1,1e308,0.5,1\nT,b,1,-1e308,0.6,2\n",
+        "S,a,1,1e308,1e308,1\nS,b,1,1e308,-1e308,1\nT,a,1,1,1e-308,1\nT,b,1,2,0,1\n",
+        "S,a,1,4,0.5,7\nS,a,2,4,0.5,7\nS,b,1,5,0.6,7\nT,a,1,3,0.5,7\nT,b,1,5,0.7,7\n",
+    ];
+    for rows in tables {
+        let a = of(&format!("{head}{rows}"));
+        let text = page(
+            &source(),
+            &a,
+            Page {
+                width: 80,
+                colour: false,
+            },
+        );
+        assert!(has_no_number_that_is_none(&text), "{rows}\n{text}");
+    }
+}
+
+/// Ties everywhere and just too many subjects for the exact distribution.
+#[test]
+fn exact_tests_end_where_there_are_many_ties() {
+    let mut csv = String::from("subject,model,repetition,rating,vaf\n");
+    for s in 0..300 {
+        for m in 0..9 {
+            csv += &format!("S{s},m{m},1,{},{}\n", (s + m) % 2, m % 2);
+        }
+    }
+    let a = of(&csv);
+    assert!(a.values.reason("friedman/exact_p").is_some());
+    assert!(
+        a.values
+            .number("corr/pearson/p_exact_two_sided")
+            .is_some_and(|p| p > 0.0)
+    );
+}

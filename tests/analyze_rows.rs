@@ -3,7 +3,7 @@
 
 use chrono::DateTime;
 use std::collections::BTreeMap;
-use study::analyze::{Analysis, Include, Rules, analyze};
+use study::analyze::{Analysis, Exclusion, Include, Rules, analyze};
 use study::outcome::ratings::Ratings;
 use study::outcome::{ParticipantRow, RatingRow, State, Status};
 use study::protocol::{Answer, DeviceKind, Role, Unfinished};
@@ -292,11 +292,11 @@ fn comments_stand_by_realization_and_stay_text() {
 }
 
 #[test]
-fn a_rule_that_is_not_applied_is_named() {
+fn a_rule_that_cannot_be_judged_is_named() {
     let rules = Rules {
-        exclusion_rules: vec!["constant-rater".to_owned()],
+        exclude: vec![Exclusion::HiddenReferenceBelow(5.0)],
         ..Rules::default()
     };
     let a = analyze(&ratings(&two(), &[]), &rules);
-    assert!(shown(&a).contains("`constant-rater` is not applied"));
+    assert!(shown(&a).contains("the design has no hidden reference"));
 }

@@ -5,18 +5,21 @@
 
 use crate::outcome::ratings::{NO_MODEL, Ratings};
 use crate::protocol::Role;
-use crate::stats::describe::mean;
+use crate::stats::describe::{mean, mean_of, sum_of_squares};
 use std::ops::Range;
 
-/// One subject's ratings of one realization.
+/// One subject's ratings of one realization, with what suffices of them for
+/// every Gaussian model that has no terms of single trials.
 #[derive(Debug, Clone)]
 pub(super) struct Cell {
     pub(super) subject: usize,
     pub(super) model: usize,
-    /// Into [`Cells::order`].
+    /// Into [`Cells::order`] and [`Cells::sorted`].
     pub(super) rows: Range<usize>,
     /// Mean of the centred ratings.
     pub(super) mean: f64,
+    /// Sum of squares about the mean; 0 for one rating.
+    pub(super) squares: f64,
 }
 
 /// The ratings that count, sorted into cells.
@@ -29,6 +32,8 @@ pub(super) struct Cells<'a> {
     pub(super) centred: Vec<f64>,
     /// Rows with a rating and a realization, by subject, model, repetition.
     pub(super) order: Vec<usize>,
+    /// The centred ratings in that order: those of a cell stand together.
+    pub(super) sorted: Vec<f64>,
     /// By subject, then model; none is empty.
     pub(super) cells: Vec<Cell>,
     /// VAF of each model, if its rows agree on one.
@@ -54,34 +59,39 @@ impl Table {
 }
 
 impl<'a> Cells<'a> {
+    /// Linear in the rows, but for sorting the repetitions of cells that do not
+    /// come in their order.
     pub(super) fn of(ratings: &'a Ratings) -> Self {
-        let rated: Vec<f64> = ratings
-            .rating
-            .iter()
-            .copied()
-            .filter(|v| v.is_finite())
-            .collect();
-        let offset = mean(&rated).unwrap_or(0.0).round();
+        let offset = match mean_of(ratings.rating.iter().copied().filter(|v| v.is_finite())) {
+            Some(mean) => mean.round(),
+            None => 0.0,
+        };
         let centred: Vec<f64> = ratings.rating.iter().map(|v| v - offset).collect();
-        let mut order: Vec<usize> = (0..ratings.len())
-            .filter(|&i| centred[i].is_finite() && ratings.model[i] != NO_MODEL)
-            .collect();
-        order.sort_by_key(|&i| (ratings.subject[i], ratings.model[i], ratings.repetition[i]));
+        let mut order = ratings.by_cell();
+        order.retain(|&i| centred[i].is_finite() && ratings.model[i] != NO_MODEL);
         let mut cells = Vec::new();
-        let mut start = 0;
-        for group in order.chunk_by(|&a, &b| {
+        let mut sorted = Vec::with_capacity(order.len());
+        for group in order.chunk_by_mut(|&a, &b| {
             (ratings.subject[a], ratings.model[a]) == (ratings.subject[b], ratings.model[b])
         }) {
-            let numbers: Vec<f64> = group.iter().map(|&i| centred[i]).collect();
-            if let Some(mean) = mean(&numbers) {
+            if !group.is_sorted_by_key(|&i| ratings.repetition[i]) {
+                group.sort_by_key(|&i| ratings.repetition[i]);
+            }
+            let start = sorted.len();
+            sorted.extend(group.iter().map(|&i| centred[i]));
+            let numbers = &sorted[start..];
+            if let Some(mean) = mean(numbers) {
                 cells.push(Cell {
                     subject: ratings.subject[group[0]] as usize,
                     model: ratings.model[group[0]] as usize,
-                    rows: start..start + group.len(),
+                    rows: start..sorted.len(),
                     mean,
+                    squares: match numbers {
+                        [_] => 0.0,
+                        _ => sum_of_squares(numbers).unwrap_or(f64::NAN).max(0.0),
+                    },
                 });
             }
-            start += group.len();
         }
         Self {
             vaf: vafs(ratings),
@@ -89,16 +99,14 @@ impl<'a> Cells<'a> {
             offset,
             centred,
             order,
+            sorted,
             cells,
         }
     }
 
     /// Centred ratings of a cell, by repetition.
-    pub(super) fn of_cell(&self, cell: &Cell) -> Vec<f64> {
-        self.order[cell.rows.clone()]
-            .iter()
-            .map(|&i| self.centred[i])
-            .collect()
+    pub(super) fn of_cell(&self, cell: &Cell) -> &[f64] {
+        &self.sorted[cell.rows.clone()]
     }
 
     /// Realizations that the study asks about: role test and no hidden repeat.
@@ -158,6 +166,16 @@ impl<'a> Cells<'a> {
     pub(super) fn model_name(&self, model: usize) -> &str {
         &self.ratings.models[model].id
     }
+}
+
+/// Sum of squares and degrees of freedom within some cells.
+pub(super) fn within(cells: &[Cell]) -> (f64, usize) {
+    let (mut squares, mut df) = (0.0, 0);
+    for cell in cells {
+        squares += cell.squares;
+        df += cell.rows.len() - 1;
+    }
+    (squares, df)
 }
 
 fn vafs(ratings: &Ratings) -> Vec<Option<f64>> {

@@ -1,43 +1,54 @@
-//! `desc/*`, `desc_all/*`, `design/*`, `subject/*`, `univariate/*`,
-//! `regression/*`, `realistic/*`, `duplicate/*`.
+//! `desc/*`, `desc_all/*`, `design/*`, `univariate/*`, `regression/*`.
 
 use super::Rules;
-use super::cells::{Cells, Table};
+use super::cells::{Cells, Table, within};
 use super::values::Values;
 use crate::outcome::ratings::NO_MODEL;
-use crate::stats::correlation::pearson;
-use crate::stats::describe::{
-    counts, lag1_autocorrelation, mean, quantile, sd, sorted, sum_of_squares, tidy,
-};
+use crate::stats::describe::{counts, lag1_autocorrelation, mean, quantile, sd, sorted};
 use crate::stats::distribution::t_quantile;
-use crate::stats::paired::one_sample;
 use crate::stats::regression::line;
 
 /// Most bins of a histogram.
 const MAX_BINS: f64 = 101.0;
 
-const ONE: &str = "fewer than two ratings";
+pub(super) const ONE: &str = "fewer than two ratings";
 const ONE_SUBJECT: &str = "fewer than two subjects";
-const NO_REPETITION: &str = "no cell has two ratings";
+pub(super) const NO_REPETITION: &str = "no cell has two ratings";
 
-pub(super) fn describe(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
+pub(super) fn describe(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     let table = cells.table(&cells.test_models());
     let bins = whole_scale(cells);
     design(cells, &table, values);
     all(cells, bins, values);
-    by_model(cells, bins, rules, values);
+    by_model(cells, bins, values);
     cousineau_morey(cells, &table, values);
-    by_subject(cells, &table, values);
-    duplicates(cells, values);
     alone(cells, values);
 }
 
 /// Smallest and largest rating, if all are whole and near enough.
 fn whole_scale(cells: &Cells<'_>) -> Option<(f64, f64)> {
-    let rated = sorted(&rated(cells));
-    let (low, high) = (*rated.first()?, *rated.last()?);
-    let whole = rated.iter().all(|v| v.fract() == 0.0);
-    (whole && high - low < MAX_BINS).then_some((low, high))
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for &v in cells.ratings.rating.iter().filter(|v| v.is_finite()) {
+        if v.fract() != 0.0 {
+            return None;
+        }
+        (low, high) = (low.min(v), high.max(v));
+    }
+    (low <= high && high - low < MAX_BINS).then_some((low, high))
+}
+
+/// The ratings in ascending order; whole ones by counting.
+fn ascending(x: &[f64], bins: Option<(f64, f64)>) -> Vec<f64> {
+    let Some((low, high)) = bins else {
+        return sorted(x);
+    };
+    let mut all = Vec::with_capacity(x.len());
+    let mut value = low;
+    for n in counts(x, low, high) {
+        all.resize(all.len() + n as usize, value);
+        value += 1.0;
+    }
+    all
 }
 
 fn rated(cells: &Cells<'_>) -> Vec<f64> {
@@ -64,27 +75,12 @@ fn design(cells: &Cells<'_>, table: &Table, values: &mut Values) {
     g.put("balanced", f64::from(u8::from(balanced)));
 }
 
-/// Sum of squares and degrees of freedom within some cells.
-fn within<'c>(
-    cells: &Cells<'_>,
-    some: impl Iterator<Item = &'c super::cells::Cell>,
-) -> (f64, usize) {
-    let (mut ss, mut df) = (0.0, 0);
-    for cell in some.filter(|c| c.rows.len() > 1) {
-        ss += sum_of_squares(&cells.of_cell(cell))
-            .unwrap_or(f64::NAN)
-            .max(0.0);
-        df += cell.rows.len() - 1;
-    }
-    (ss, df)
-}
-
 fn all(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
     let rated = rated(cells);
     let mut g = values.group("desc_all", "no ratings");
     g.maybe("mean", mean(&rated));
     g.put_or("sd", sd(&rated), ONE);
-    let (ss, df) = within(cells, cells.cells.iter());
+    let (ss, df) = within(&cells.cells);
     let within_sd = (df > 0).then(|| (ss / df as f64).sqrt());
     g.put("within_cell_df", df as f64);
     g.put_or("within_cell_sd", within_sd, NO_REPETITION);
@@ -96,7 +92,7 @@ fn all(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
     }
 }
 
-fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, rules: &Rules, values: &mut Values) {
+fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
     let r = cells.ratings;
     let mut by_model: Vec<Vec<f64>> = vec![Vec::new(); r.models.len()];
     for &i in &cells.order {
@@ -105,7 +101,7 @@ fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, rules: &Rules, values: 
     let subject_means = cells.subject_means();
     for (m, x) in by_model.iter().enumerate() {
         let id = cells.model_name(m);
-        let s = sorted(x);
+        let s = ascending(x, bins);
         let mut g = values.group(format!("desc/{id}"), "no ratings");
         g.put("n", x.len() as f64);
         g.maybe("mean", mean(x));
@@ -131,14 +127,6 @@ fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, rules: &Rules, values: 
         g.maybe("sem", sem);
         let ends = centre.zip(half).map(|(c, h)| (c - h, c + h));
         g.interval("ci95", ends);
-        if let Some(from) = rules.realistic_from {
-            let x = &by_model[m];
-            let share = (!x.is_empty())
-                .then(|| x.iter().filter(|v| **v >= from).count() as f64 / x.len() as f64);
-            let mut g = values.group(format!("realistic/{id}"), "no ratings");
-            g.put("n", x.len() as f64);
-            g.maybe("share", share);
-        }
     }
 }
 
@@ -170,84 +158,6 @@ fn cousineau_morey(cells: &Cells<'_>, table: &Table, values: &mut Values) {
         let mut g = values.group(format!("desc/{id}/cousineau_morey"), why);
         g.maybe("sem", sem);
         g.maybe("ci95_half", sem.zip(t).map(|(a, b)| a * b));
-    }
-}
-
-fn by_subject(cells: &Cells<'_>, table: &Table, values: &mut Values) {
-    let r = cells.ratings;
-    let mut rows: Vec<Vec<usize>> = vec![Vec::new(); r.subjects.len()];
-    for i in (0..r.len()).filter(|&i| r.rating[i].is_finite()) {
-        rows[r.subject[i] as usize].push(i);
-    }
-    let mut within_cells: Vec<Option<f64>> = vec![None; rows.len()];
-    for own in cells.cells.chunk_by(|a, b| a.subject == b.subject) {
-        let (ss, df) = within(cells, own.iter());
-        within_cells[own[0].subject] = (df > 0).then(|| (ss / df as f64).sqrt());
-    }
-    let others = leave_one_out(table);
-    for (s, rows) in rows.iter_mut().enumerate() {
-        let x: Vec<f64> = rows.iter().map(|&i| r.rating[i]).collect();
-        let ordered = rows.iter().all(|&i| r.trial_index[i] > 0);
-        rows.sort_by_key(|&i| r.trial_index[i]);
-        let in_order: Vec<f64> = rows.iter().map(|&i| r.rating[i]).collect();
-        let run = in_order.chunk_by(|a, b| a == b).map(<[f64]>::len).max();
-        let mut distinct = sorted(&x);
-        distinct.dedup();
-        let mut g = values.group(format!("subject/{}", cells.subject_name(s)), "no ratings");
-        g.put("n", x.len() as f64);
-        g.maybe("mean", mean(&x));
-        g.put_or("sd", sd(&x), ONE);
-        g.put("distinct", distinct.len() as f64);
-        let run = run.filter(|_| ordered).map(|n| n as f64);
-        g.put_or("longest_run", run, "the order of the trials is not known");
-        g.put_or("within_cell_sd", within_cells[s], NO_REPETITION);
-        let r = table
-            .subjects
-            .binary_search(&s)
-            .ok()
-            .and_then(|i| others[i]);
-        let why = "not all realizations rated, or a constant rater, or nobody else";
-        g.put_or("leave_one_out_r", r, why);
-    }
-}
-
-/// Each subject's cells against the mean of all the others'.
-fn leave_one_out(table: &Table) -> Vec<Option<f64>> {
-    let m = table.models.len();
-    let sums: Vec<f64> = (0..m).map(|j| table.column(j).iter().sum()).collect();
-    let others = table.rows.len() as f64 - 1.0;
-    table
-        .rows
-        .iter()
-        .map(|row| {
-            if others < 1.0 {
-                return None;
-            }
-            let rest: Vec<f64> = (0..m).map(|j| (sums[j] - row[j]) / others).collect();
-            pearson(row, &rest)
-        })
-        .collect()
-}
-
-/// Hidden repeats against their originals: repeat minus original over subjects.
-fn duplicates(cells: &Cells<'_>, values: &mut Values) {
-    let models = &cells.ratings.models;
-    for (d, model) in models.iter().enumerate() {
-        let Some(original) = &model.duplicate_of else {
-            continue;
-        };
-        let Some(o) = models.iter().position(|m| m.id == *original) else {
-            continue;
-        };
-        let pair = cells.table(&[d, o]);
-        let differences: Vec<f64> = pair.rows.iter().map(|r| tidy(r[0] - r[1])).collect();
-        let sizes: Vec<f64> = differences.iter().map(|v| v.abs()).collect();
-        let test = one_sample(&differences);
-        let mut g = values.group(format!("duplicate/{}", model.id), "fewer than two subjects");
-        g.put("n", differences.len() as f64);
-        g.maybe("mean_diff", test.map(|t| t.mean));
-        g.interval("ci95", test.and_then(|t| t.ci95));
-        g.maybe("mean_absolute_diff", mean(&sizes));
     }
 }
 

@@ -2,13 +2,13 @@
 //! `rmanova2/*`, `posthoc/*`, `icc_*`, `krippendorff_*`. All of them over the
 //! test realizations, hidden repeats left out.
 
+use super::Rules;
 use super::cells::{Cell, Cells, Table};
 use super::values::Values;
 use crate::stats::agreement::{Alpha, Coefficient, Icc, icc, krippendorff};
 use crate::stats::anova::{Effect, one_way, two_way};
 use crate::stats::friedman::friedman;
 use crate::stats::paired::{holm, paired};
-use std::collections::BTreeMap;
 
 /// Most realizations (times repetitions) for an analysis of variance.
 const MAX_COLUMNS: usize = 300;
@@ -16,17 +16,26 @@ const MAX_COLUMNS: usize = 300;
 /// Most realizations that are compared pair by pair.
 const MAX_PAIRED: usize = 8;
 
+/// Most different repetitions that agreement is computed over.
+const MAX_LABELS: usize = 10_000;
+
 const FEW: &str = "fewer than two complete subjects or realizations";
 const NO_ERROR: &str = "the ratings leave no variance of error";
 
-pub(super) fn effects(cells: &Cells<'_>, values: &mut Values) {
-    let models = cells.test_models();
-    let table = cells.table(&models);
+pub(super) fn ranks_and_anova(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+    let table = cells.table(&cells.test_models());
     ranks(&table, values);
     anova(&table, values);
     anova_with_repetitions(cells, &table, values);
-    posthoc(cells, &table, values);
-    agreement(cells, &table, values);
+}
+
+pub(super) fn pairs(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+    posthoc(cells, &cells.table(&cells.test_models()), values);
+}
+
+pub(super) fn agree(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+    let models = cells.test_models();
+    agreement(cells, &cells.table(&models), values);
     repetitions(cells, &models, values);
 }
 
@@ -129,17 +138,13 @@ fn anova_with_repetitions(cells: &Cells<'_>, table: &Table, values: &mut Values)
 
 fn balanced(cells: &Cells<'_>, table: &Table) -> Option<(Vec<Vec<f64>>, usize)> {
     let r = cells.ratings;
-    let labels = |c: &Cell| -> Vec<u32> {
-        cells.order[c.rows.clone()]
-            .iter()
-            .map(|&i| r.repetition[i])
-            .collect()
-    };
+    let labels = |c: &Cell| cells.order[c.rows.clone()].iter().map(|&i| r.repetition[i]);
     let mut place = vec![usize::MAX; r.models.len()];
     for (j, &m) in table.models.iter().enumerate() {
         place[m] = j;
     }
-    let wanted = labels(cells.cells.iter().find(|c| place[c.model] != usize::MAX)?);
+    let first = cells.cells.iter().find(|c| place[c.model] != usize::MAX)?;
+    let wanted: Vec<u32> = labels(first).collect();
     let n = wanted.len();
     let distinct = wanted.windows(2).all(|w| w[0] < w[1]);
     if n < 2 || !distinct || n * table.models.len() > MAX_COLUMNS {
@@ -154,10 +159,10 @@ fn balanced(cells: &Cells<'_>, table: &Table) -> Option<(Vec<Vec<f64>>, usize)> 
         if j == usize::MAX {
             continue;
         }
-        if labels(cell) != wanted {
+        if !labels(cell).eq(wanted.iter().copied()) {
             return None;
         }
-        rows[s][j * n..(j + 1) * n].copy_from_slice(&cells.of_cell(cell));
+        rows[s][j * n..(j + 1) * n].copy_from_slice(cells.of_cell(cell));
     }
     (rows.len() >= 2 && table.models.len() >= 2).then_some((rows, n))
 }
@@ -202,41 +207,52 @@ fn agreement(cells: &Cells<'_>, table: &Table, values: &mut Values) {
     let transposed: Vec<Vec<f64>> = (0..table.models.len()).map(|j| table.column(j)).collect();
     put_icc(icc(&transposed).as_ref(), "icc_subjects", FEW, values);
     let r = cells.ratings;
-    let mut units: BTreeMap<(u32, u32), Vec<f64>> = BTreeMap::new();
-    for &i in &cells.order {
-        if table.models.binary_search(&(r.model[i] as usize)).is_ok() {
-            let unit = units.entry((r.model[i], r.repetition[i])).or_default();
-            unit.push(cells.centred[i]);
+    let labels = labels(cells, &table.models);
+    // Units are realization and repetition; a rating's is found by counting.
+    let mut place = vec![usize::MAX; r.models.len()];
+    for (j, &m) in table.models.iter().enumerate() {
+        place[m] = j;
+    }
+    let mut units = vec![Vec::new(); table.models.len() * labels.len()];
+    for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
+        let j = place[r.model[i] as usize];
+        if let (Ok(k), true) = (labels.binary_search(&r.repetition[i]), j != usize::MAX) {
+            units[j * labels.len() + k].push(v);
         }
     }
-    let units: Vec<Vec<f64>> = units.into_values().collect();
     put_alpha(krippendorff(&units), "krippendorff_subjects", values);
+}
+
+/// The repetitions that there are of some realizations, sorted.
+fn labels(cells: &Cells<'_>, models: &[usize]) -> Vec<u32> {
+    let r = cells.ratings;
+    let mut labels: Vec<u32> = Vec::new();
+    for cell in &cells.cells {
+        if models.binary_search(&cell.model).is_err() {
+            continue;
+        }
+        for &i in &cells.order[cell.rows.clone()] {
+            if let Err(at) = labels.binary_search(&r.repetition[i]) {
+                labels.insert(at, r.repetition[i]);
+            }
+        }
+        // A table that numbers its rows through has no repetitions to speak of.
+        if labels.len() > MAX_LABELS {
+            return Vec::new();
+        }
+    }
+    labels
 }
 
 /// Targets are the cells that hold every repetition, raters the repetitions.
 fn repetitions(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
-    let r = cells.ratings;
-    let own = |c: &&Cell| models.binary_search(&c.model).is_ok();
-    let mut labels: Vec<u32> = Vec::new();
-    for cell in cells.cells.iter().filter(own) {
-        labels.extend(
-            cells.order[cell.rows.clone()]
-                .iter()
-                .map(|&i| r.repetition[i]),
-        );
-    }
-    labels.sort_unstable();
-    labels.dedup();
-    let units: Vec<Vec<f64>> = cells
-        .cells
-        .iter()
-        .filter(own)
+    let labels = labels(cells, models);
+    let units: Vec<&[f64]> = (cells.cells.iter())
+        .filter(|c| models.binary_search(&c.model).is_ok())
         .map(|c| cells.of_cell(c))
         .collect();
-    let complete: Vec<Vec<f64>> = units
-        .iter()
+    let complete: Vec<&[f64]> = (units.iter().copied())
         .filter(|u| u.len() == labels.len())
-        .cloned()
         .collect();
     let found = icc(&complete);
     let why = "fewer than two cells with two repetitions or more";

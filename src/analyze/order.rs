@@ -1,14 +1,16 @@
 //! Learning and carry-over: `order_trial/*`, `order_previous_rating/*`,
 //! `order_repetition/*`.
 
+use super::Rules;
 use super::cells::Cells;
 use super::values::Values;
-use crate::stats::describe::mean;
-use crate::stats::regression::beside_factors;
-use std::collections::{BTreeMap, HashMap};
+use crate::stats::beside::beside_factors;
+use crate::stats::describe::Sum;
+use std::collections::BTreeMap;
 
-pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
+pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     let r = cells.ratings;
+    // Rows of a subject stand together and stay so.
     let known: Vec<usize> = cells
         .order
         .iter()
@@ -18,31 +20,41 @@ pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
     let trial: Vec<f64> = known.iter().map(|&i| f64::from(r.trial_index[i])).collect();
     put(cells, "order_trial", &known, &trial, values);
     // The rating of the trial just before, and of no other.
-    let places: HashMap<(u32, u32), usize> = known
-        .iter()
-        .map(|&i| ((r.subject[i], r.trial_index[i]), i))
-        .collect();
     let (mut rows, mut previous) = (Vec::new(), Vec::new());
-    for &i in &known {
-        if let Some(&before) = places.get(&(r.subject[i], r.trial_index[i] - 1)) {
-            rows.push(i);
-            previous.push(cells.centred[before]);
+    let mut places: Vec<(u32, usize)> = Vec::new();
+    for own in known.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
+        places.clear();
+        places.extend(own.iter().map(|&i| (r.trial_index[i], i)));
+        places.sort_by_key(|p| p.0);
+        for &i in own {
+            let before = r.trial_index[i] - 1;
+            // Of rows that claim the same place, the last.
+            let end = places.partition_point(|p| p.0 <= before);
+            if let Some((_, j)) = places[..end].last().filter(|p| p.0 == before) {
+                rows.push(i);
+                previous.push(cells.centred[*j]);
+            }
         }
     }
     put(cells, "order_previous_rating", &rows, &previous, values);
-    let mut by_repetition: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
-    for &i in &cells.order {
-        by_repetition
-            .entry(r.repetition[i])
-            .or_default()
-            .push(r.rating[i]);
+    let mut by_repetition: BTreeMap<u32, (Sum, f64)> = BTreeMap::new();
+    for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
+        let (sum, n) = by_repetition.entry(r.repetition[i]).or_default();
+        sum.add(v);
+        *n += 1.0;
     }
-    for (repetition, x) in by_repetition {
+    if by_repetition.len() > MAX_REPETITIONS {
+        return;
+    }
+    for (repetition, (sum, n)) in by_repetition {
         values
             .group(format!("order_repetition/{repetition}"), "no ratings")
-            .maybe("mean", mean(&x));
+            .put("mean", sum.get() / n + cells.offset);
     }
 }
+
+/// Most repetitions whose means are listed.
+const MAX_REPETITIONS: usize = 10_000;
 
 /// The slope of the rating on x beside fixed subjects and realizations.
 fn put(cells: &Cells<'_>, id: &str, rows: &[usize], x: &[f64], values: &mut Values) {

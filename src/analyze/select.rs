@@ -1,12 +1,14 @@
 //! Which rows count, and why others do not.
 
 use super::Rules;
+use super::exclude::{self, Applied, Exclusion};
 use crate::outcome::columns::Status;
 use crate::outcome::event::State;
 use crate::outcome::ratings::{Origin, Ratings};
 use crate::protocol::Unfinished;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
+use std::sync::Arc;
 
 /// Which rows count beside those of participants.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -18,7 +20,7 @@ pub struct Include {
 }
 
 /// Why a row does not count.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Reason {
     /// Of a pilot, beside real ones.
     Pilot,
@@ -28,6 +30,8 @@ pub enum Reason {
     Unfinished,
     /// The participant's state, with the reason that was given.
     State(State, String),
+    /// A pre-stated rule of exclusion.
+    Rule(Exclusion),
 }
 
 impl fmt::Display for Reason {
@@ -38,39 +42,49 @@ impl fmt::Display for Reason {
             Self::Unfinished => f.write_str("unfinished"),
             Self::State(state, why) if why.is_empty() => f.write_str(state.as_str()),
             Self::State(state, why) => write!(f, "{}: {why}", state.as_str()),
+            Self::Rule(rule) => write!(f, "rule {rule}"),
         }
     }
 }
 
 /// The decision about each row; `None`: it counts.
+pub(super) type Decision = Option<Arc<Reason>>;
+
+/// Decides about every row, and tells what each pre-stated rule did.
 ///
 /// Real rows are analysed alone, unless others are asked for. Where there are
-/// none at all, the others are analysed, under a banner.
-pub(super) fn decide(ratings: &Ratings, rules: &Rules) -> Vec<Option<Reason>> {
+/// none at all, the others are analysed, under a banner. The rules judge what is
+/// left then.
+pub(super) fn decide(ratings: &Ratings, rules: &Rules) -> (Vec<Decision>, Vec<Applied>) {
     let real = ratings.origin.contains(&Origin::Real);
-    (0..ratings.len())
-        .map(|i| {
-            let subject = &ratings.subjects[ratings.subject[i] as usize];
-            match ratings.origin[i] {
-                Origin::Pilot if real && !rules.include.pilot => return Some(Reason::Pilot),
-                Origin::Simulated if real && !rules.include.simulated => {
-                    return Some(Reason::Simulated);
-                }
-                Origin::Real | Origin::Pilot | Origin::Simulated => {}
-            }
+    let pilot = Arc::new(Reason::Pilot);
+    let simulated = Arc::new(Reason::Simulated);
+    let states: Vec<Decision> = (ratings.subjects.iter())
+        .map(|subject| {
             let state = subject.state?;
             match state {
                 State::Done => None,
                 State::Unfinished | State::DroppedOut => match rules.unfinished {
                     Unfinished::Include => None,
-                    Unfinished::Exclude => Some(Reason::Unfinished),
+                    Unfinished::Exclude => Some(Arc::new(Reason::Unfinished)),
                 },
                 State::Void | State::NoShow | State::Excluded | State::Withdrawn => {
-                    Some(Reason::State(state, subject.reason.clone()))
+                    Some(Arc::new(Reason::State(state, subject.reason.clone())))
                 }
             }
         })
-        .collect()
+        .collect();
+    let mut decisions: Vec<Decision> = (0..ratings.len())
+        .map(|i| match ratings.origin[i] {
+            Origin::Pilot if real && !rules.include.pilot => Some(Arc::clone(&pilot)),
+            Origin::Simulated if real && !rules.include.simulated => Some(Arc::clone(&simulated)),
+            Origin::Real | Origin::Pilot | Origin::Simulated => {
+                states[ratings.subject[i] as usize].clone()
+            }
+        })
+        .collect();
+    let applied = exclude::apply(ratings, rules, &mut decisions);
+    (decisions, applied)
 }
 
 /// What was counted.
@@ -112,25 +126,30 @@ pub struct Counts {
 }
 
 impl Counts {
-    pub(super) fn of(
-        all: &Ratings,
-        used: &Ratings,
-        decisions: &[Option<Reason>],
-        rules: &Rules,
-    ) -> Self {
+    pub(super) fn of(all: &Ratings, used: &Ratings, decisions: &[Decision], rules: &Rules) -> Self {
         let with = |status: Status| {
             (0..used.len())
                 .filter(|&i| used.status[i] == status && used.rating[i].is_nan())
                 .count()
         };
         let rated = used.rating.iter().filter(|v| v.is_finite()).count();
-        let mut excluded = BTreeMap::new();
         let mut gone = vec![false; all.subjects.len()];
+        // Rows share their reasons: each is put into words once.
+        let mut by_reason: Vec<(&Arc<Reason>, usize)> = Vec::new();
+        let mut places: HashMap<*const Reason, usize> = HashMap::new();
         for (i, decision) in decisions.iter().enumerate() {
             if let Some(reason) = decision {
-                *excluded.entry(reason.to_string()).or_insert(0) += 1;
+                let at = *places.entry(Arc::as_ptr(reason)).or_insert_with(|| {
+                    by_reason.push((reason, 0));
+                    by_reason.len() - 1
+                });
+                by_reason[at].1 += 1;
                 gone[all.subject[i] as usize] = true;
             }
+        }
+        let mut excluded = BTreeMap::new();
+        for (reason, rows) in by_reason {
+            *excluded.entry(reason.to_string()).or_insert(0) += rows;
         }
         let mut origin = vec![Origin::Real; used.subjects.len()];
         for (&s, &o) in used.subject.iter().zip(&used.origin) {

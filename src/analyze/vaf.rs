@@ -6,6 +6,7 @@
 
 use super::Rules;
 use super::cells::{Cells, Table};
+use super::subjects::MAX_LISTED;
 use super::values::Values;
 use crate::stats::bayes::{correlation_bf10, jzs_bf10};
 use crate::stats::bootstrap;
@@ -19,6 +20,9 @@ use crate::stats::permutation::{self, Statistic};
 use crate::stats::regression::slope;
 
 const FEW: &str = "fewer than three realizations with a VAF";
+
+/// Most realizations that are left out one by one: the work goes with the square.
+const MAX_LEFT_OUT: usize = 1000;
 
 pub(super) fn against_vaf(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     let models: Vec<usize> = cells
@@ -113,14 +117,18 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
         let kept = v.iter().enumerate().filter(|(j, _)| *j != i);
         kept.map(|(_, v)| *v).collect()
     };
-    let why = if n == 3 {
-        "leaving one out leaves two"
-    } else {
-        why
+    let why = match n {
+        3 => "leaving one out leaves two",
+        n if n > MAX_LEFT_OUT => "more than 1000 realizations",
+        _ => why,
     };
     let (mut lowest, mut highest) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    let mut complete = n > 3;
-    for (i, name) in names.iter().enumerate().filter(|_| n > 3) {
+    let mut complete = n > 3 && n <= MAX_LEFT_OUT;
+    for (i, name) in names
+        .iter()
+        .enumerate()
+        .filter(|_| n > 3 && n <= MAX_LEFT_OUT)
+    {
         let (x, y) = (without(i, x), without(i, y));
         let both = [pearson(&x, &y), spearman(&x, &y)];
         let mut g = values.group(
@@ -153,11 +161,13 @@ fn by_subject(cells: &Cells<'_>, table: &Table, vaf: &[f64], values: &mut Values
     for (&s, row) in table.subjects.iter().zip(&table.rows).filter(|_| enough) {
         let r = pearson(vaf, row);
         let b = slope(vaf, row);
-        let id = format!("subject_corr/{}", cells.subject_name(s));
-        let mut g = values.group(id, "the subject rated all realizations alike");
-        g.maybe("r", r);
-        g.maybe("spearman", spearman(vaf, row));
-        g.maybe("slope", b);
+        if table.subjects.len() <= MAX_LISTED {
+            let id = format!("subject_corr/{}", cells.subject_name(s));
+            let mut g = values.group(id, "the subject rated all realizations alike");
+            g.maybe("r", r);
+            g.maybe("spearman", spearman(vaf, row));
+            g.maybe("slope", b);
+        }
         slopes.extend(b);
         if let Some(r) = r {
             perfect |= 1.0 - r.abs() < 1e-12;
@@ -236,6 +246,7 @@ fn resampled(table: &Table, vaf: &[f64], rules: &Rules, values: &mut Values) {
     g.put("p_le_zero", b.p_le_zero);
     g.put("undefined_probability", b.undefined_probability);
     g.put("exact", f64::from(u8::from(b.exact)));
+    g.put("normal_limit", f64::from(u8::from(b.normal_limit)));
     let why = "the correlation lies at the end of its own distribution";
     g.put_or("z0", b.z0, why);
     g.put_or("bca_lo", b.bca.map(|c| c.0), why);
@@ -248,33 +259,62 @@ fn resampled(table: &Table, vaf: &[f64], rules: &Rules, values: &mut Values) {
 /// realization, only a VAF.
 fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
     let r = cells.ratings;
-    type Group = (Vec<f64>, Vec<f64>);
-    let subjects = r.subjects.len();
-    let mut by_cell: Vec<Group> = vec![Group::default(); subjects];
-    for c in &cells.cells {
-        if let (Ok(_), Some(v)) = (models.binary_search(&c.model), cells.vaf[c.model]) {
-            by_cell[c.subject].0.push(v);
-            by_cell[c.subject].1.push(c.mean);
+    let mut by_cell = Flat::default();
+    for own in cells.cells.chunk_by(|a, b| a.subject == b.subject) {
+        by_cell.next();
+        for c in own {
+            if let (Ok(_), Some(v)) = (models.binary_search(&c.model), cells.vaf[c.model]) {
+                by_cell.push(v, c.mean);
+            }
         }
     }
-    let mut by_trial: Vec<Group> = vec![Group::default(); subjects];
-    let test = cells.test_models();
-    for i in (0..r.len()).filter(|&i| cells.centred[i].is_finite() && r.vaf[i].is_finite()) {
-        let counts = r.models.get(r.model[i] as usize).is_none()
-            || test.binary_search(&(r.model[i] as usize)).is_ok();
-        if counts {
-            let group = &mut by_trial[r.subject[i] as usize];
-            group.0.push(r.vaf[i]);
-            group.1.push(cells.centred[i]);
+    // Whether the trials of a realization count; the last place is for none.
+    let mut counts = vec![false; r.models.len() + 1];
+    counts[r.models.len()] = true;
+    for m in cells.test_models() {
+        counts[m] = true;
+    }
+    let mut by_trial = Flat::default();
+    let order = r.by_cell();
+    for own in order.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
+        by_trial.next();
+        for &i in own {
+            let known = cells.centred[i].is_finite() && r.vaf[i].is_finite();
+            if known && counts[(r.model[i] as usize).min(r.models.len())] {
+                by_trial.push(r.vaf[i], cells.centred[i]);
+            }
         }
     }
     for (id, groups) in [("rmcorr_cells", by_cell), ("rmcorr_trials", by_trial)] {
-        let found = within_subjects(&groups);
+        let found = within_subjects(&groups.x, &groups.y, &groups.lengths);
         let why = "too few ratings with a VAF, or no variation within subjects";
         let mut g = values.group(id, why);
         g.maybe("r", found.map(|w| w.r));
         g.maybe("df", found.map(|w| w.df));
         g.maybe("p", found.and_then(|w| w.p));
         g.interval("ci95", found.and_then(|w| w.ci95));
+    }
+}
+
+/// Pairs by subject, in one piece.
+#[derive(Default)]
+struct Flat {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    lengths: Vec<usize>,
+}
+
+impl Flat {
+    /// Begins the next subject.
+    fn next(&mut self) {
+        self.lengths.push(0);
+    }
+
+    fn push(&mut self, x: f64, y: f64) {
+        self.x.push(x);
+        self.y.push(y);
+        if let Some(n) = self.lengths.last_mut() {
+            *n += 1;
+        }
     }
 }

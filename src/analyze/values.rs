@@ -52,6 +52,18 @@ impl Values {
         self.0.iter().map(|(id, value)| (id.as_str(), value))
     }
 
+    /// Takes over all of another's.
+    pub(super) fn take(&mut self, mut other: Self) {
+        self.0.append(&mut other.0);
+    }
+
+    /// Copies one to another identifier.
+    pub(super) fn copy(&mut self, from: &Self, id: &str, to: String) {
+        if let Some(value) = from.0.get(id) {
+            self.0.insert(to, value.clone());
+        }
+    }
+
     /// A group of statistics under a prefix; `why` is the reason of those that
     /// come without one of their own.
     pub(super) fn group(&mut self, prefix: impl Into<String>, why: impl Into<String>) -> Group<'_> {

@@ -2,7 +2,9 @@
 
 use super::Rules;
 use super::cells::Cells;
+use super::exclude::Applied;
 use super::select::Counts;
+use super::subjects::MAX_LISTED;
 use super::values::Values;
 use crate::outcome::ratings::NO_MODEL;
 use crate::stats::permutation::{DRAWS, MAX_EXACT};
@@ -23,6 +25,7 @@ pub(super) fn warnings(
     cells: &Cells<'_>,
     counts: &Counts,
     rules: &Rules,
+    exclusions: &[Applied],
     values: &Values,
 ) -> Vec<Warning> {
     let mut found = Vec::new();
@@ -48,12 +51,13 @@ pub(super) fn warnings(
             ),
         );
     }
-    for rule in &rules.exclusion_rules {
+    for change in &rules.deviations {
         warn(
-            "rule-not-applied",
-            format!("the pre-stated exclusion `{rule}` is not applied by this version"),
+            "deviation",
+            format!("deviation from what was stated beforehand: {change}"),
         );
     }
+    excluded(&mut warn, exclusions, values);
     headline(&mut warn, values);
     design(&mut warn, cells, values);
     raters(&mut warn, cells, values);
@@ -65,6 +69,40 @@ fn who(counts: &Counts) -> String {
         (0, s) => format!("{s} simulated"),
         (p, 0) => format!("{p} pilots"),
         (p, s) => format!("{p} pilots and {s} simulated"),
+    }
+}
+
+fn excluded(warn: &mut impl FnMut(&'static str, String), exclusions: &[Applied], values: &Values) {
+    for e in exclusions {
+        if let Some(problem) = e.problem {
+            let text = format!("the pre-stated exclusion `{}`: {problem}", e.rule);
+            warn("rule-not-judged", text);
+        }
+        if e.rows > 0 {
+            warn(
+                "excluded",
+                format!(
+                    "the pre-stated exclusion `{}` left out {} of {}",
+                    e.rule,
+                    if e.rows == 1 {
+                        "1 row".to_owned()
+                    } else {
+                        format!("{} rows", e.rows)
+                    },
+                    people(e.participants)
+                ),
+            );
+        }
+    }
+    let both = |id: &str| {
+        let before = values.number(&format!("before_exclusion/{id}"));
+        before.zip(values.number(id))
+    };
+    if let Some((before, after)) = both("corr/pearson/r") {
+        let text = format!(
+            "without the exclusions r would be {before:.3}, not {after:.3}: both are in the tables"
+        );
+        warn("with-and-without", text);
     }
 }
 
@@ -150,9 +188,14 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
         );
     }
     let r = cells.ratings;
+    let mut has_vaf = vec![false; r.models.len()];
+    for (&m, v) in r.model.iter().zip(&r.vaf) {
+        if m != NO_MODEL && v.is_finite() {
+            has_vaf[m as usize] = true;
+        }
+    }
     for (m, model) in r.models.iter().enumerate() {
-        let mut own = (0..r.len()).filter(|&i| r.model[i] as usize == m);
-        if cells.vaf[m].is_none() && own.any(|i| r.vaf[i].is_finite()) {
+        if cells.vaf[m].is_none() && has_vaf[m] {
             warn(
                 "vaf-differs",
                 format!(
@@ -161,6 +204,21 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
                 ),
             );
         }
+    }
+    if values.number("screen/listed") == Some(0.0) {
+        warn(
+            "many-participants",
+            format!(
+                "more than {MAX_LISTED} participants: they are screened, but not listed one by one"
+            ),
+        );
+    }
+    if values.number("bootstrap/normal_limit") == Some(1.0) {
+        warn(
+            "normal-limit",
+            "so many participants that the bootstrap draws means from their normal limit"
+                .to_owned(),
+        );
     }
     if r.model.contains(&NO_MODEL) {
         warn("no-model", "some ratings name no realization".to_owned());
@@ -171,29 +229,26 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     if cells.ratings.models.len() < 2 {
         return;
     }
-    let constant: Vec<&str> = (cells.ratings.subjects.iter())
+    let constant = values.number("screen/n_constant").unwrap_or(0.0) as usize;
+    if constant == 0 {
+        return;
+    }
+    let names = (cells.ratings.subjects.iter())
         .map(|s| s.id.as_str())
         .filter(|id| {
             let n = values.number(&format!("subject/{id}/n")).unwrap_or(0.0);
             n > 1.0 && values.number(&format!("subject/{id}/distinct")) == Some(1.0)
         })
-        .collect();
-    if !constant.is_empty() {
-        let shown = constant
-            .iter()
-            .take(5)
-            .copied()
-            .collect::<Vec<_>>()
-            .join(", ");
-        let more = if constant.len() > 5 { ", …" } else { "" };
-        warn(
-            "constant-rater",
-            format!(
-                "{} gave one rating only: {shown}{more} (kept)",
-                people(constant.len())
-            ),
-        );
-    }
+        .take(5);
+    let shown = names.collect::<Vec<_>>().join(", ");
+    let more = if constant > 5 { ", …" } else { "" };
+    warn(
+        "constant-rater",
+        format!(
+            "{} gave one rating only: {shown}{more} (kept)",
+            people(constant)
+        ),
+    );
 }
 
 fn people(n: usize) -> String {

@@ -1,14 +1,20 @@
 //! `study analyze`
 
+mod possible;
+mod reading;
+
+use super::load::Loaded;
 use super::{Console, Failure, results};
-use crate::analyze::{Analysis, Include, Rules, analyze};
+use crate::analyze::{self, Analysis, Include, Rules, analyze};
+use crate::model::Realization;
 use crate::outcome::ratings::Ratings;
 use crate::outcome::{ParticipantRow, RatingRow};
 use crate::protocol::Protocol;
 use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
 use crate::store::StudyFolder;
-use crate::text::QuestionId;
+use crate::text::{ModelId, QuestionId};
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{BufReader, Write as _};
 use std::path::{Path, PathBuf};
@@ -17,7 +23,16 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A results folder, one study in it, or a CSV: subject,model,repetition,rating,vaf[,trial_index]
-    results: PathBuf,
+    #[arg(required_unless_present = "possible")]
+    results: Option<PathBuf>,
+    /// Say which data can give a printed mean and SD: mean=4.800 sd=0.997 n=30 scale=1..7 [each=3]
+    #[arg(
+        long,
+        num_args = 1..,
+        value_name = "KEY=VALUE",
+        conflicts_with_all = ["results", "out", "question", "include", "comments"]
+    )]
+    possible: Vec<String>,
     /// Print one JSON document, numbers unrounded, and nothing else
     #[arg(long)]
     json: bool,
@@ -43,15 +58,18 @@ enum Who {
 
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    if args.results.is_file() {
-        let (source, analysis) = of_csv(args)?;
+    let Some(results) = &args.results else {
+        return possible::run(&args.possible, args.json, console);
+    };
+    if results.is_file() {
+        let (source, analysis) = of_csv(results, args)?;
         return show(args, &source, &analysis, args.out.as_deref(), console);
     }
-    let studies = results::studies(&args.results)?;
+    let studies = results::studies(results)?;
     if args.json && studies.len() > 1 {
         return Err(Failure::input(format!(
             "{}: {} studies, and --json prints one",
-            args.results.display(),
+            results.display(),
             studies.len()
         ))
         .hint(format!("name one, such as {}", studies[0].path().display())));
@@ -110,12 +128,13 @@ fn include(args: &Args) -> Include {
 }
 
 /// Somebody else's ratings, or our own table without its study.
-fn of_csv(args: &Args) -> Result<(Source, Analysis), Failure> {
-    let path = &args.results;
+fn of_csv(path: &Path, args: &Args) -> Result<(Source, Analysis), Failure> {
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
     let name = path.display().to_string();
-    let ratings = Ratings::read_csv(&name, BufReader::new(file), args.question.as_deref())
-        .map_err(Failure::input)?;
+    let length = file.metadata().map_or(0, |m| m.len());
+    let input = BufReader::with_capacity(1 << 16, reading::Watched::new(file, length));
+    let ratings =
+        Ratings::read_csv(&name, input, args.question.as_deref()).map_err(Failure::input)?;
     let rules = Rules {
         include: include(args),
         ..Rules::default()
@@ -134,6 +153,9 @@ fn of_csv(args: &Args) -> Result<(Source, Analysis), Failure> {
 struct StudyInput {
     protocol: Protocol,
     protocol_version: u32,
+    /// How the realizations came about: λ and memory.
+    models: BTreeMap<ModelId, Realization>,
+    deviations: Vec<String>,
     rows: Vec<RatingRow>,
     participants: Vec<ParticipantRow>,
 }
@@ -147,7 +169,21 @@ fn of_study(study: &StudyFolder, args: &Args) -> Result<(Source, Analysis), Fail
         let original = m.duplicate_of.as_ref()?;
         Some((m.id.as_str(), original.as_str()))
     }));
-    let rules = Rules::of(&input.protocol, question.as_str(), include(args));
+    for (id, model) in &input.models {
+        let told = [
+            ("memory_mm", model.provenance.memory_mm),
+            ("lambda", model.provenance.lambda),
+        ];
+        for (name, value) in told {
+            if let Some(value) = value {
+                ratings.add_covariate(id.as_str(), name, value);
+            }
+        }
+    }
+    let rules = Rules {
+        deviations: input.deviations,
+        ..Rules::of(&input.protocol, question.as_str(), include(args))
+    };
     let source = Source {
         title: input.protocol.study.title.clone(),
         study: Some(input.protocol.study.id.clone()),
@@ -188,14 +224,41 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
 /// The rows of a study, by the newest version of its protocol. The VAF may stand
 /// in the model files only: they are opened too.
 fn study_input(study: &StudyFolder) -> Result<StudyInput, Failure> {
-    let protocol = results::frozen(study)?.protocol;
+    let Loaded {
+        protocol, models, ..
+    } = results::frozen(study)?;
     let derived = study.derive(&protocol)?;
     Ok(StudyInput {
+        deviations: deviations(study)?,
+        models,
         protocol,
         protocol_version: study.version(),
         rows: derived.rows,
         participants: derived.participants,
     })
+}
+
+/// What each later version of the protocol changed of the analysis.
+fn deviations(study: &StudyFolder) -> Result<Vec<String>, Failure> {
+    let mut said = Vec::new();
+    let mut before: Option<Protocol> = None;
+    let versions = &study.manifest().versions;
+    for version in versions.iter().filter(|_| versions.len() > 1) {
+        let after = results::frozen_version(study, version.version)?.protocol;
+        if let Some(before) = &before {
+            let changes = analyze::deviations(before, &after);
+            said.extend(changes.into_iter().map(|change| {
+                format!(
+                    "protocol {} of {}, because \"{}\": {change}",
+                    version.version,
+                    version.at.format("%Y-%m-%d"),
+                    version.reason
+                )
+            }));
+        }
+        before = Some(after);
+    }
+    Ok(said)
 }
 
 /// Each file as a whole or not at all.

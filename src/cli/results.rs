@@ -62,7 +62,13 @@ pub(super) fn one_study(path: &Path) -> Result<StudyFolder, Failure> {
 
 /// The newest frozen protocol of a study, with the VAF of its models.
 pub(super) fn frozen(study: &StudyFolder) -> Result<Loaded, Failure> {
-    load::load(&study.frozen_protocol()).map_err(|mut failure| {
+    frozen_version(study, study.version())
+}
+
+/// The same of an earlier version.
+pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded, Failure> {
+    let file = layout::protocol(study.path(), version).join(layout::PROTOCOL);
+    load::load(&file).map_err(|mut failure| {
         failure.kind = Kind::Results;
         failure
     })

@@ -5,6 +5,7 @@
 //! column and never leaves this crate as a number. Practice rows are counted and
 //! left out at the door. What was excluded, and why, is decided in `analyze`.
 
+mod build;
 mod read;
 
 pub use read::RatingsError;
@@ -13,7 +14,11 @@ use super::columns::{ParticipantRow, RatingRow, Status};
 use super::event::State;
 use crate::protocol::{Answer, Role};
 use crate::text::QuestionId;
-use std::collections::{BTreeMap, BTreeSet};
+use build::{Builder, Row};
+use std::collections::BTreeMap;
+
+/// What stands for strokes that nobody counted.
+pub const NO_STROKES: u32 = u32::MAX;
 
 /// The index of a row without a realization, as some foreign data have it.
 pub const NO_MODEL: u32 = u32::MAX;
@@ -93,6 +98,8 @@ pub struct Ratings {
     pub corrected: Vec<bool>,
     /// The attempt that counts; above 1 the trial was repeated, 0 not known.
     pub attempt: Vec<u32>,
+    /// Full strokes, or [`NO_STROKES`].
+    pub strokes: Vec<u32>,
     /// Row of the source, from 1 (the line of a file, header not counted).
     pub source_row: Vec<u32>,
     /// Texts answered or remarked in trials.
@@ -101,51 +108,40 @@ pub struct Ratings {
     pub practice: usize,
 }
 
-/// One row before names are indices.
-#[derive(Debug, Clone)]
-struct Row {
-    subject: String,
-    model: Option<String>,
-    role: Role,
-    repetition: u32,
-    rating: f64,
-    vaf: f64,
-    trial_index: u32,
-    origin: Origin,
-    status: Status,
-    corrected: bool,
-    attempt: u32,
-    source_row: u32,
-    covariates: BTreeMap<String, f64>,
-    comments: Vec<(String, String)>,
-}
-
 impl Ratings {
     /// From the rows of a study, for one question.
     pub fn from_rows(rows: &[RatingRow], question: &QuestionId) -> Self {
-        let practice = rows.iter().filter(|r| r.practice).count();
-        let counted = rows.iter().enumerate().filter(|(_, r)| !r.practice);
-        let plain = counted.map(|(i, r)| Row {
-            subject: r.participant.to_string(),
-            model: Some(r.model.to_string()),
-            role: r.role,
-            repetition: r.repetition,
-            rating: rated(r, question),
-            vaf: r.vaf.filter(|v| v.is_finite()).unwrap_or(f64::NAN),
-            trial_index: r.position.unwrap_or(0),
-            origin: match (r.simulated, r.pilot) {
-                (true, _) => Origin::Simulated,
-                (false, true) => Origin::Pilot,
-                (false, false) => Origin::Real,
-            },
-            status: r.status,
-            corrected: r.corrected,
-            attempt: r.attempt.unwrap_or(0),
-            source_row: u32::try_from(i + 1).unwrap_or(u32::MAX),
-            covariates: r.covariates.clone(),
-            comments: comments(r),
-        });
-        Self::build(question.to_string(), plain.collect(), practice)
+        let mut builder = Builder::new(question.to_string());
+        for (i, r) in rows.iter().enumerate() {
+            if r.practice {
+                builder.practice();
+                continue;
+            }
+            let subject = builder.subject(r.participant.as_str());
+            let model = builder.model(r.model.as_str(), r.role, || r.covariates.clone());
+            for (question, text) in comments(r) {
+                builder.comment(question, text);
+            }
+            builder.push(Row {
+                subject,
+                model,
+                repetition: r.repetition,
+                rating: rated(r, question),
+                vaf: r.vaf.filter(|v| v.is_finite()).unwrap_or(f64::NAN),
+                trial_index: r.position.unwrap_or(0),
+                origin: match (r.simulated, r.pilot) {
+                    (true, _) => Origin::Simulated,
+                    (false, true) => Origin::Pilot,
+                    (false, false) => Origin::Real,
+                },
+                status: r.status,
+                corrected: r.corrected,
+                attempt: r.attempt.unwrap_or(0),
+                strokes: r.strokes.unwrap_or(NO_STROKES),
+                source_row: u32::try_from(i + 1).unwrap_or(u32::MAX),
+            });
+        }
+        builder.finish()
     }
 
     /// Marks hidden repeats: (repeat, original) each.
@@ -154,6 +150,15 @@ impl Ratings {
             if let Some(model) = self.models.iter_mut().find(|m| m.id == repeat) {
                 model.duplicate_of = Some(original.to_owned());
             }
+        }
+    }
+
+    /// Tells a number about a realization, unless its rows told it already.
+    pub fn add_covariate(&mut self, model: &str, name: &str, value: f64) {
+        if let Some(m) = self.models.iter_mut().find(|m| m.id == model)
+            && value.is_finite()
+        {
+            m.covariates.entry(name.to_owned()).or_insert(value);
         }
     }
 
@@ -190,10 +195,6 @@ impl Ratings {
                 .map(|&i| self.model[i])
                 .filter(|&m| m != NO_MODEL),
         );
-        let mut place = vec![usize::MAX; self.len()];
-        for (new, &old) in rows.iter().enumerate() {
-            place[old] = new;
-        }
         fn pick<T: Copy>(rows: &[usize], column: &[T]) -> Vec<T> {
             rows.iter().map(|&i| column[i]).collect()
         }
@@ -218,14 +219,14 @@ impl Ratings {
             status: pick(&rows, &self.status),
             corrected: pick(&rows, &self.corrected),
             attempt: pick(&rows, &self.attempt),
+            strokes: pick(&rows, &self.strokes),
             source_row: pick(&rows, &self.source_row),
             comments: self
                 .comments
                 .iter()
-                .filter(|c| place[c.row] != usize::MAX)
-                .map(|c| Comment {
-                    row: place[c.row],
-                    ..c.clone()
+                .filter_map(|c| {
+                    let row = rows.binary_search(&c.row).ok()?;
+                    Some(Comment { row, ..c.clone() })
                 })
                 .collect(),
             practice: self.practice,
@@ -234,62 +235,42 @@ impl Ratings {
         }
     }
 
-    fn build(question: String, rows: Vec<Row>, practice: usize) -> Self {
-        let subjects: BTreeSet<&str> = rows.iter().map(|r| r.subject.as_str()).collect();
-        let subjects: Vec<Subject> = subjects
-            .into_iter()
-            .map(|id| Subject {
-                id: id.to_owned(),
-                state: None,
-                reason: String::new(),
-            })
-            .collect();
-        let mut models: BTreeMap<&str, Realization> = BTreeMap::new();
-        for row in &rows {
-            if let Some(id) = &row.model {
-                models.entry(id).or_insert_with(|| Realization {
-                    id: id.clone(),
-                    role: row.role,
-                    duplicate_of: None,
-                    covariates: row.covariates.clone(),
-                });
-            }
-        }
-        let models: Vec<Realization> = models.into_values().collect();
-        let mut ratings = Self {
-            question,
-            practice,
-            ..Self::default()
-        };
-        let index = |i: usize| u32::try_from(i).unwrap_or(NO_MODEL - 1);
-        for (at, row) in rows.into_iter().enumerate() {
-            let subject = subjects.partition_point(|s| s.id < row.subject);
-            ratings.subject.push(index(subject));
-            ratings.model.push(
-                row.model
-                    .map_or(NO_MODEL, |id| index(models.partition_point(|m| m.id < id))),
-            );
-            ratings.repetition.push(row.repetition);
-            ratings.rating.push(row.rating);
-            ratings.vaf.push(row.vaf);
-            ratings.trial_index.push(row.trial_index);
-            ratings.origin.push(row.origin);
-            ratings.status.push(row.status);
-            ratings.corrected.push(row.corrected);
-            ratings.attempt.push(row.attempt);
-            ratings.source_row.push(row.source_row);
-            ratings
-                .comments
-                .extend(row.comments.into_iter().map(|(question, text)| Comment {
-                    row: at,
-                    question,
-                    text,
-                }));
-        }
-        ratings.subjects = subjects;
-        ratings.models = models;
-        ratings
+    /// The rows sorted by subject, then realization (none comes last), otherwise
+    /// as they stand. Linear: two passes of counting.
+    pub fn by_cell(&self) -> Vec<usize> {
+        let models = self.models.len();
+        let place = |i: usize| (self.model[i] as usize).min(models);
+        let by_model = counted(0..self.len(), self.len(), models + 1, place);
+        counted(
+            by_model.iter().copied(),
+            self.len(),
+            self.subjects.len(),
+            |i| self.subject[i] as usize,
+        )
     }
+}
+
+/// Some rows in the order of their keys, equal ones as they come.
+fn counted(
+    rows: impl IntoIterator<Item = usize> + Clone,
+    n: usize,
+    keys: usize,
+    key: impl Fn(usize) -> usize,
+) -> Vec<usize> {
+    let mut next = vec![0; keys + 1];
+    for i in rows.clone() {
+        next[key(i) + 1] += 1;
+    }
+    for k in 1..=keys {
+        next[k] += next[k - 1];
+    }
+    let mut sorted = vec![0; n];
+    for i in rows {
+        let at = &mut next[key(i)];
+        sorted[*at] = i;
+        *at += 1;
+    }
+    sorted
 }
 
 /// The rating of a row, if the trial counts and it is a finite number.
@@ -320,12 +301,15 @@ fn comments(row: &RatingRow) -> Vec<(String, String)> {
 
 /// Keeps the named items that are used; also tells where each of the old went.
 fn remap<T: Clone>(items: &[T], used: impl Iterator<Item = u32>) -> (Vec<u32>, Vec<T>) {
-    let used: BTreeSet<u32> = used.collect();
+    let mut is_used = vec![false; items.len()];
+    for i in used {
+        is_used[i as usize] = true;
+    }
     let mut map = vec![NO_MODEL; items.len()];
-    let mut kept = Vec::with_capacity(used.len());
-    for (new, old) in (0u32..).zip(&used) {
-        map[*old as usize] = new;
-        kept.push(items[*old as usize].clone());
+    let mut kept = Vec::new();
+    for (old, item) in items.iter().enumerate().filter(|(old, _)| is_used[*old]) {
+        map[old] = u32::try_from(kept.len()).unwrap_or(NO_MODEL - 1);
+        kept.push(item.clone());
     }
     (map, kept)
 }

@@ -78,6 +78,7 @@ pub(crate) fn protocol(models: usize, repetitions: u32) -> Protocol {
             primary: id("realism"),
             vaf: None,
             realistic_from: Some(5.0),
+            equivalence_margin: None,
             unfinished: Unfinished::Include,
             exclude: Vec::new(),
         },

@@ -145,8 +145,8 @@ fn excluded(a: &Analysis) -> Vec<Vec<String>> {
     for row in &a.rows {
         if let Some(reason) = &row.excluded {
             rows.push(vec![
-                row.subject.clone(),
-                row.model.clone(),
+                row.subject.to_string(),
+                row.model.to_string(),
                 row.repetition.to_string(),
                 number(row.rating),
                 reason.to_string(),
@@ -174,8 +174,8 @@ fn ratings_used(a: &Analysis) -> Vec<Vec<String>> {
             (None, Some(_)) => String::new(),
         };
         rows.push(vec![
-            row.subject.clone(),
-            row.model.clone(),
+            row.subject.to_string(),
+            row.model.to_string(),
             row.repetition.to_string(),
             number(row.rating),
             number(row.vaf),

@@ -5,6 +5,7 @@
 //! Everything from the data passes through [`Untrusted`].
 
 mod answers;
+mod headline;
 mod layout;
 
 use super::Source;
@@ -38,6 +39,7 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
         out += &chart(a, &tests, &others, width, paint);
     }
     out += &answers::answers(a, width, paint);
+    out += &headline::headline(a, width, paint);
     // The first stands at the top, the second in the answer.
     let said = ["no-participants", "few-realizations"];
     let warnings = a.warnings.iter().filter(|w| !said.contains(&w.code));

@@ -1,8 +1,8 @@
 //! Agreement: intraclass correlations and Krippendorff's alpha.
 
+use super::describe::tidy;
 use super::distribution::{f_quantile, f_upper};
 use super::finite;
-use super::rank::doubled_ranks;
 
 /// A coefficient with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,22 +49,27 @@ pub struct Icc {
 /// ICC1 = (T − W)/(T + (k−1)W), ICC2 = (T − E)/(T + (k−1)E + k(R − E)/n),
 /// ICC3 = (T − E)/(T + (k−1)E). Intervals as in Shrout & Fleiss (1979).
 /// `None` below two of either.
-pub fn icc(rows: &[Vec<f64>]) -> Option<Icc> {
-    let (n, k) = (rows.len(), rows.first()?.len());
+pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
+    let (n, k) = (rows.len(), rows.first()?.as_ref().len());
     if n < 2 || k < 2 {
         return None;
     }
     let (nf, kf) = (n as f64, k as f64);
-    let grand = rows.iter().flatten().sum::<f64>() / (nf * kf);
-    let row_means: Vec<f64> = rows.iter().map(|r| r.iter().sum::<f64>() / kf).collect();
-    let column_means: Vec<f64> = (0..k)
-        .map(|j| rows.iter().map(|r| r[j]).sum::<f64>() / nf)
-        .collect();
+    let rows = || rows.iter().map(AsRef::as_ref);
+    let grand = rows().flatten().sum::<f64>() / (nf * kf);
+    let row_means: Vec<f64> = rows().map(|r| r.iter().sum::<f64>() / kf).collect();
+    let mut column_means = vec![0.0; k];
+    for row in rows() {
+        for (sum, x) in column_means.iter_mut().zip(row) {
+            *sum += x;
+        }
+    }
+    column_means.iter_mut().for_each(|sum| *sum /= nf);
     let square = |x: f64| x * x;
     let targets = kf * row_means.iter().map(|m| square(m - grand)).sum::<f64>() / (nf - 1.0);
     let raters = nf * column_means.iter().map(|m| square(m - grand)).sum::<f64>() / (kf - 1.0);
     let mut residual = 0.0;
-    for (row, rm) in rows.iter().zip(&row_means) {
+    for (row, rm) in rows().zip(&row_means) {
         for (x, cm) in row.iter().zip(&column_means) {
             residual += square(x - rm - cm + grand);
         }
@@ -72,7 +77,7 @@ pub fn icc(rows: &[Vec<f64>]) -> Option<Icc> {
     let (df_t, df_e, df_w) = (nf - 1.0, (nf - 1.0) * (kf - 1.0), nf * (kf - 1.0));
     let error = residual / df_e;
     let within = (residual + raters * (kf - 1.0)) / df_w;
-    let size: f64 = rows.iter().flatten().map(|x| square(x - grand)).sum();
+    let size: f64 = rows().flatten().map(|x| square(x - grand)).sum();
     let floor = 1e-24 * size;
     let f_1 = (within > floor).then(|| targets / within).and_then(finite);
     let f_3 = (error > floor).then(|| targets / error).and_then(finite);
@@ -163,42 +168,52 @@ const MAX_DISTINCT: usize = 1000;
 /// within units (each pair weighs 1/(m − 1) in a unit of m ratings) and n the
 /// margins (Krippendorff 2011). Units of one rating do not count. Undefined if
 /// all ratings are equal.
-pub fn krippendorff(units: &[Vec<f64>]) -> Alpha {
+pub fn krippendorff<U: AsRef<[f64]>>(units: &[U]) -> Alpha {
     const NONE: Alpha = Alpha {
         nominal: None,
         ordinal: None,
         interval: None,
     };
-    let units: Vec<&Vec<f64>> = units.iter().filter(|u| u.len() >= 2).collect();
-    let all: Vec<f64> = units.iter().flat_map(|u| u.iter().copied()).collect();
-    // Equal numbers share a rank, so ranks name the distinct ones.
-    let ranks = doubled_ranks(&all);
-    let mut distinct: Vec<(i64, f64)> = ranks.iter().copied().zip(all.iter().copied()).collect();
-    distinct.sort_by_key(|d| d.0);
-    distinct.dedup_by_key(|d| d.0);
+    let units = || units.iter().map(AsRef::as_ref).filter(|u| u.len() >= 2);
+    // Ascending; there are few, so each rating is looked up among them.
+    let mut distinct: Vec<f64> = Vec::new();
+    for x in units().flatten() {
+        let x = tidy(*x);
+        let at = distinct.partition_point(|d| *d < x);
+        if distinct.get(at) != Some(&x) {
+            if distinct.len() == MAX_DISTINCT {
+                return NONE;
+            }
+            distinct.insert(at, x);
+        }
+    }
     let v = distinct.len();
-    if !(2..=MAX_DISTINCT).contains(&v) {
+    if v < 2 {
         return NONE;
     }
-    let index = |rank: i64| distinct.partition_point(|d| d.0 < rank);
     let mut observed = vec![0.0; v * v];
     let mut margin = vec![0.0; v];
-    let mut at = 0;
-    for unit in &units {
-        let m = unit.len();
-        let mut counts: Vec<(usize, f64)> = Vec::new();
-        let mut places: Vec<usize> = ranks[at..at + m].iter().map(|&r| index(r)).collect();
-        at += m;
-        places.sort_unstable();
-        for group in places.chunk_by(|a, b| a == b) {
-            counts.push((group[0], group.len() as f64));
-        }
-        for &(c, nc) in &counts {
-            margin[c] += nc;
-            for &(k, nk) in &counts {
-                let pairs = if c == k { nc * (nc - 1.0) } else { nc * nk };
-                observed[c * v + k] += pairs / (m as f64 - 1.0);
+    let mut counts = vec![0.0; v];
+    let mut seen: Vec<usize> = Vec::new();
+    for unit in units() {
+        for x in unit {
+            let x = tidy(*x);
+            let place = distinct.partition_point(|d| *d < x);
+            if counts[place] == 0.0 {
+                seen.push(place);
             }
+            counts[place] += 1.0;
+        }
+        let others = unit.len() as f64 - 1.0;
+        for &c in &seen {
+            margin[c] += counts[c];
+            for &k in &seen {
+                let second = if c == k { counts[k] - 1.0 } else { counts[k] };
+                observed[c * v + k] += counts[c] * second / others;
+            }
+        }
+        for c in seen.drain(..) {
+            counts[c] = 0.0;
         }
     }
     let below: Vec<f64> = margin
@@ -231,7 +246,7 @@ pub fn krippendorff(units: &[Vec<f64>]) -> Alpha {
             let between = below[high] + margin[high] - below[low];
             (between - (margin[low] + margin[high]) / 2.0).powi(2)
         }),
-        interval: alpha(&|c, k| (distinct[c].1 - distinct[k].1).powi(2)),
+        interval: alpha(&|c, k| (distinct[c] - distinct[k]).powi(2)),
     }
 }
 

@@ -14,6 +14,16 @@ use crate::rng::Stream;
 /// Most subjects for which all compositions are visited.
 pub const MAX_EXACT: usize = 10;
 
+/// Most subjects that are drawn one by one, and most numbers of a table that is.
+/// Above, means are drawn from the normal distribution that those of resamples
+/// tend to: with 500 subjects and a skewness of 1 its quantiles are off by .02
+/// standard errors, less than the .027 of 10,000 draws.
+pub const MAX_DRAWN: usize = 500;
+const MAX_TABLE: usize = 50_000;
+
+/// Most realizations: the work goes with the square.
+const MAX_COLUMNS: usize = 300;
+
 /// Resamples above [`MAX_EXACT`].
 pub const DRAWS: u32 = 10_000;
 
@@ -39,18 +49,26 @@ pub struct Bootstrap {
     pub undefined_probability: f64,
     /// Whether all compositions were visited.
     pub exact: bool,
+    /// Whether means were drawn from their normal limit.
+    pub normal_limit: bool,
 }
 
 /// Resamples the rows (subjects) of a table and correlates the column sums with
 /// `x`. `None` below two subjects or where the correlation is not defined.
 pub fn correlation(rows: &[Vec<f64>], x: &[f64], seed: u64) -> Option<Bootstrap> {
-    if rows.len() < 2 || x.len() < 3 {
+    let exact = rows.len() <= MAX_EXACT;
+    let normal_limit = !exact && (rows.len() > MAX_DRAWN || rows.len() * x.len() > MAX_TABLE);
+    resample(rows, x, seed, normal_limit)
+}
+
+fn resample(rows: &[Vec<f64>], x: &[f64], seed: u64, normal_limit: bool) -> Option<Bootstrap> {
+    if rows.len() < 2 || !(3..=MAX_COLUMNS).contains(&x.len()) {
         return None;
     }
     let score = Score::new(x)?;
     let ones = vec![1; rows.len()];
     let observed = score.of(&weighted(rows, &ones))?;
-    let exact = rows.len() <= MAX_EXACT;
+    let exact = rows.len() <= MAX_EXACT && !normal_limit;
     let mut resamples = Vec::new();
     let (mut undefined, mut total) = (0u64, 0u64);
     let mut count = |sums: &[f64], weight: u64| {
@@ -63,6 +81,12 @@ pub fn correlation(rows: &[Vec<f64>], x: &[f64], seed: u64) -> Option<Bootstrap>
     if exact {
         let mut sums = vec![vec![0.0; x.len()]; rows.len() + 1];
         compose(rows, 0, rows.len(), 1, &mut sums, &mut count);
+    } else if normal_limit {
+        let mut stream = Stream::new(seed, &["bootstrap"]);
+        let limit = Limit::of(rows)?;
+        for _ in 0..DRAWS {
+            count(&limit.draw(&mut stream), 1);
+        }
     } else {
         let mut stream = Stream::new(seed, &["bootstrap"]);
         let mut draws = vec![0u32; rows.len()];
@@ -76,7 +100,70 @@ pub fn correlation(rows: &[Vec<f64>], x: &[f64], seed: u64) -> Option<Bootstrap>
         }
     }
     resamples.sort_by(|a, b| a.0.total_cmp(&b.0));
-    summary(rows, &score, observed, &resamples, undefined, total, exact)
+    let summed = summary(rows, &score, observed, &resamples, undefined, total)?;
+    Some(Bootstrap {
+        exact,
+        normal_limit,
+        ..summed
+    })
+}
+
+/// The normal distribution that the column sums of resamples tend to.
+struct Limit {
+    sums: Vec<f64>,
+    /// Cholesky's factor of their covariance.
+    lower: Vec<Vec<f64>>,
+}
+
+impl Limit {
+    fn of(rows: &[Vec<f64>]) -> Option<Self> {
+        let k = rows.first()?.len();
+        let n = rows.len() as f64;
+        let sums = weighted(rows, &vec![1; rows.len()]);
+        let mut s = vec![vec![0.0; k]; k];
+        let mut d = vec![0.0; k];
+        for row in rows {
+            for ((d, v), sum) in d.iter_mut().zip(row).zip(&sums) {
+                *d = v - sum / n;
+            }
+            for i in 0..k {
+                for j in 0..=i {
+                    s[i][j] += d[i] * d[j];
+                }
+            }
+        }
+        let mut lower = vec![vec![0.0; k]; k];
+        for i in 0..k {
+            for j in 0..=i {
+                let known: f64 = (0..j).map(|m| lower[i][m] * lower[j][m]).sum();
+                let rest = s[i][j] - known;
+                lower[i][j] = if i == j {
+                    // A column that the others determine adds nothing of its own.
+                    if rest > 1e-12 * s[i][i] {
+                        rest.sqrt()
+                    } else {
+                        0.0
+                    }
+                } else if lower[j][j] > 0.0 {
+                    rest / lower[j][j]
+                } else {
+                    0.0
+                };
+            }
+        }
+        lower
+            .iter()
+            .flatten()
+            .all(|v| v.is_finite())
+            .then_some(Self { sums, lower })
+    }
+
+    fn draw(&self, stream: &mut Stream) -> Vec<f64> {
+        let z: Vec<f64> = self.sums.iter().map(|_| stream.normal()).collect();
+        (self.sums.iter().zip(&self.lower))
+            .map(|(sum, row)| sum + row.iter().zip(&z).map(|(l, z)| l * z).sum::<f64>())
+            .collect()
+    }
 }
 
 fn summary(
@@ -86,7 +173,6 @@ fn summary(
     resamples: &[(f64, u64)],
     undefined: u64,
     total: u64,
-    exact: bool,
 ) -> Option<Bootstrap> {
     let defined = (total - undefined) as f64;
     let mean = resamples.iter().map(|(r, w)| r * *w as f64).sum::<f64>() / defined;
@@ -125,7 +211,8 @@ fn summary(
         acceleration,
         p_le_zero: share(&|r| r <= 0.0),
         undefined_probability: undefined as f64 / total as f64,
-        exact,
+        exact: false,
+        normal_limit: false,
     })
 }
 
@@ -144,10 +231,10 @@ fn quantile(resamples: &[(f64, u64)], weight: f64) -> Option<f64> {
 /// Σ(m − mᵢ)³/(6(Σ(m − mᵢ)²)^1.5) over the correlations mᵢ without subject i.
 fn acceleration(rows: &[Vec<f64>], score: &Score) -> Option<f64> {
     let mut without = Vec::with_capacity(rows.len());
-    for i in 0..rows.len() {
-        let mut draws = vec![1; rows.len()];
-        draws[i] = 0;
-        without.push(score.of(&weighted(rows, &draws))?);
+    let all = weighted(rows, &vec![1; rows.len()]);
+    for row in rows {
+        let rest: Vec<f64> = all.iter().zip(row).map(|(sum, v)| sum - v).collect();
+        without.push(score.of(&rest)?);
     }
     let mean = without.iter().sum::<f64>() / without.len() as f64;
     let (mut cubes, mut squares) = (0.0, 0.0);
@@ -262,6 +349,23 @@ mod tests {
             weights += w;
         });
         assert_eq!((visited, weights), (35, 256));
+    }
+
+    #[test]
+    fn the_normal_limit_agrees_with_drawing_subjects_one_by_one() {
+        let mut noise = Stream::new(3, &["rows"]);
+        let x = [0.1, 0.2, 0.4, 0.5];
+        let rows: Vec<Vec<f64>> = (0..400)
+            .map(|_| x.map(|v| (4.0 + v + noise.normal()).round()).to_vec())
+            .collect();
+        let drawn = resample(&rows, &x, 1, false).unwrap();
+        let limit = resample(&rows, &x, 1, true).unwrap();
+        assert!(limit.normal_limit && !drawn.normal_limit && !drawn.exact);
+        // Each end has a Monte Carlo error of about 1 % of the width.
+        let width = drawn.percentile.1 - drawn.percentile.0;
+        assert!((limit.percentile.0 - drawn.percentile.0).abs() < 0.05 * width);
+        assert!((limit.percentile.1 - drawn.percentile.1).abs() < 0.05 * width);
+        assert!((limit.se - drawn.se).abs() < 0.05 * drawn.se);
     }
 
     #[test]

@@ -79,16 +79,22 @@ pub struct WithinSubjects {
 
 /// Repeated-measures correlation (Bakdash & Marusich 2017): Pearson's r of the
 /// deviations from each subject's own means, with N − S − 1 degrees of freedom.
-/// `groups` has one (x, y) per subject.
-pub fn within_subjects(groups: &[(Vec<f64>, Vec<f64>)]) -> Option<WithinSubjects> {
-    let (mut dx, mut dy) = (Vec::new(), Vec::new());
+/// Each subject's numbers stand together; `lengths` says how many there are of
+/// each.
+pub fn within_subjects(x: &[f64], y: &[f64], lengths: &[usize]) -> Option<WithinSubjects> {
+    let (mut dx, mut dy) = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
     let mut subjects = 0;
-    for (x, y) in groups.iter().filter(|(x, _)| !x.is_empty()) {
-        let (mx, my) = (mean(x)?, mean(y)?);
+    let mut start = 0;
+    for n in lengths.iter().copied().filter(|n| *n > 0) {
+        let (own_x, own_y) = (x.get(start..start + n)?, y.get(start..start + n)?);
+        start += n;
         subjects += 1;
-        // Deviations of a constant are rounding, not data.
-        dx.extend(x.iter().map(|v| if constant(x) { 0.0 } else { v - mx }));
-        dy.extend(y.iter().map(|v| if constant(y) { 0.0 } else { v - my }));
+        for (own, deviations) in [(own_x, &mut dx), (own_y, &mut dy)] {
+            let m = mean(own)?;
+            // Deviations of a constant are rounding, not data.
+            let same = constant(own);
+            deviations.extend(own.iter().map(|v| if same { 0.0 } else { v - m }));
+        }
     }
     let df = dx.len() as f64 - f64::from(subjects) - 1.0;
     if df < 1.0 {

@@ -50,11 +50,20 @@ pub fn sum(x: &[f64]) -> f64 {
 /// The arithmetic mean, Σx/n, or Σ(x/n) where the sum overflows. `None` for no
 /// numbers.
 pub fn mean(x: &[f64]) -> Option<f64> {
-    if x.is_empty() {
+    mean_of(x.iter().copied())
+}
+
+/// The same of numbers that come one by one.
+pub fn mean_of(x: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    let (mut sum, mut n) = (Sum::default(), 0.0);
+    for v in x.clone() {
+        sum.add(v);
+        n += 1.0;
+    }
+    if n < 1.0 {
         return None;
     }
-    let n = x.len() as f64;
-    finite(sum(x) / n).or_else(|| finite(x.iter().map(|v| v / n).collect::<Sum>().get()))
+    finite(sum.get() / n).or_else(|| finite(x.map(|v| v / n).collect::<Sum>().get()))
 }
 
 /// Sum of squared deviations from the mean, Σd² − (Σd)²/n with d taken from the

@@ -1,9 +1,9 @@
 //! Paired and one-sample comparisons: t, Wilcoxon's signed ranks, Holm.
 
 use super::describe::{constant, mean, sd, tidy};
-use super::distribution::{normal_upper, t_quantile, t_two_sided};
+use super::distribution::{normal_upper, t_quantile, t_two_sided, t_upper};
 use super::finite;
-use super::rank::{doubled_ranks, tie_term};
+use super::rank::{doubled_ranks, tie_term_of};
 
 /// Most non-zero differences for which Wilcoxon's exact distribution is built.
 pub const MAX_EXACT: usize = 500;
@@ -41,6 +41,39 @@ pub fn one_sample(x: &[f64]) -> Option<OneSample> {
         t,
         p: t.and_then(|t| t_two_sided(t, df)),
         ci95: Some((m - half, m + half)),
+    })
+}
+
+/// Two one-sided t tests (Schuirmann 1987): whether a mean lies within ±margin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Equivalence {
+    /// t of "the mean is above −margin".
+    pub t_lower: f64,
+    /// t of "the mean is below +margin".
+    pub t_upper: f64,
+    /// The larger of the two p: below .05 the mean is within the margin.
+    pub p: f64,
+    /// mean ± t(.95, n−1)·sd/√n; within ±margin where p is below .05.
+    pub ci90: (f64, f64),
+}
+
+/// The tests of x against ±`margin`. `None` below two numbers, where all are
+/// equal, or for a margin that is not above 0.
+pub fn equivalence(x: &[f64], margin: f64) -> Option<Equivalence> {
+    let test = one_sample(x)?;
+    let sem = test.sd / (test.n as f64).sqrt();
+    if !(margin > 0.0 && sem > 0.0) {
+        return None;
+    }
+    let df = test.n as f64 - 1.0;
+    let t_lower = finite((test.mean + margin) / sem)?;
+    let below = finite((test.mean - margin) / sem)?;
+    let half = t_quantile(0.95, df)? * sem;
+    Some(Equivalence {
+        t_lower,
+        t_upper: below,
+        p: t_upper(t_lower, df)?.max(t_upper(-below, df)?),
+        ci90: (test.mean - half, test.mean + half),
     })
 }
 
@@ -120,7 +153,7 @@ impl Wilcoxon {
             .map(|(r, _)| r)
             .sum();
         Some(Self {
-            ties: tie_term(&sizes),
+            ties: tie_term_of(&ranks),
             ranks,
             plus,
         })
@@ -197,6 +230,19 @@ mod tests {
     fn equal_columns_have_a_difference_and_nothing_else() {
         let p = paired(&[4.0; 3], &[4.0; 3]).unwrap();
         assert_eq!((p.mean_diff, p.t, p.p_exact, p.dz), (0.0, None, None, None));
+    }
+
+    /// By hand: mean 0.2, sd 0.2, n 4, so sem 0.1 and t = 12 and −8 at ±1 with 3
+    /// degrees of freedom: P(t > 8) = .002038 (R: pt(8, 3, lower.tail = FALSE)).
+    #[test]
+    fn a_small_difference_is_within_the_margin_and_a_wide_one_is_not() {
+        let s = 0.03f64.sqrt();
+        let x = [0.2 - s, 0.2 - s, 0.2 + s, 0.2 + s];
+        let e = equivalence(&x, 1.0).unwrap();
+        assert!((e.t_lower - 12.0).abs() < 1e-9 && (e.t_upper + 8.0).abs() < 1e-9);
+        assert!((e.p - 0.002_038).abs() < 1e-6, "{}", e.p);
+        assert!(equivalence(&x, 0.3).unwrap().p > 0.05);
+        assert_eq!(equivalence(&[0.1; 4], 1.0), None);
     }
 
     #[test]

@@ -9,19 +9,15 @@ pub fn mid_ranks(x: &[f64]) -> Vec<f64> {
 
 /// Twice the mid-ranks, which are whole numbers: sums of them are exact.
 pub fn doubled_ranks(x: &[f64]) -> Vec<i64> {
-    let tidied: Vec<f64> = x.iter().map(|&v| tidy(v)).collect();
-    let mut order: Vec<usize> = (0..x.len()).collect();
-    order.sort_by(|&a, &b| tidied[a].total_cmp(&tidied[b]));
+    let mut order: Vec<(f64, usize)> = x.iter().map(|&v| tidy(v)).zip(0..).collect();
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut ranks = vec![0; x.len()];
     let mut start = 0;
-    while start < order.len() {
-        let mut end = start + 1;
-        while end < order.len() && tidied[order[end]] == tidied[order[start]] {
-            end += 1;
-        }
+    for group in order.chunk_by(|a, b| a.0 == b.0) {
+        let end = start + group.len();
         // Ranks start+1 … end have the mean (start + 1 + end)/2.
-        for &i in &order[start..end] {
-            ranks[i] = (start + 1 + end) as i64;
+        for (_, i) in group {
+            ranks[*i] = (start + 1 + end) as i64;
         }
         start = end;
     }
@@ -30,7 +26,12 @@ pub fn doubled_ranks(x: &[f64]) -> Vec<i64> {
 
 /// Σ(t³ − t) over the groups of equal numbers of size t.
 pub fn tie_term(x: &[f64]) -> f64 {
-    let mut ranks = doubled_ranks(x);
+    tie_term_of(&doubled_ranks(x))
+}
+
+/// The same of doubled ranks.
+pub fn tie_term_of(ranks: &[i64]) -> f64 {
+    let mut ranks = ranks.to_vec();
     ranks.sort_unstable();
     ranks
         .chunk_by(|a, b| a == b)

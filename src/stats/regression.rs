@@ -1,8 +1,8 @@
-//! Least squares: a line, and a line beside two fixed factors.
+//! Least squares: a line, and a parabola beside it.
 
 use super::correlation::pearson;
 use super::describe::{Sum, constant, mean, sum_of_products, sum_of_squares};
-use super::distribution::t_two_sided;
+use super::distribution::{f_upper, t_two_sided};
 use super::finite;
 
 /// y = intercept + slope·x.
@@ -73,116 +73,79 @@ pub fn slope(x: &[f64], y: &[f64]) -> Option<f64> {
     finite(sum_of_products(x, y)? / sum_of_squares(x)?)
 }
 
-/// A slope beside fixed subjects and realizations.
+/// y = a + b·x + c·x².
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beside {
-    /// Per unit of x.
-    pub slope: f64,
+pub struct Parabola {
+    /// c.
+    pub square: f64,
     /// Its standard error.
     pub se: f64,
-    /// slope/se; undefined if nothing is left to explain.
+    /// c/se on n − 3; undefined if nothing is left to explain.
     pub t: Option<f64>,
     /// Two-sided.
     pub p: Option<f64>,
-    /// n − rank of the design.
+    /// n − 3.
     pub df: f64,
+    /// Of x and x² together, on 2 and n − 3.
+    pub f: Option<f64>,
+    /// Its p.
+    pub p_f: Option<f64>,
+    /// 1 − residual/total sum of squares.
+    pub r2: f64,
+    /// Where it turns, if it is not straight.
+    pub turn: Option<f64>,
 }
 
-/// Most levels of the second factor: its columns are orthogonalised in turn.
-const MAX_LEVELS: usize = 300;
-
-/// Slope of y on x with two fixed factors, by Frisch, Waugh and Lovell: the
-/// first factor is swept out by centring within it, the second by Gram–Schmidt
-/// on its centred columns, twice for the digits; then y on what is left of x.
-/// `None` if the factors leave nothing of x, or no degree of freedom.
-pub fn beside_factors(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<Beside> {
+/// The parabola through four points or more. What x leaves of (x − x̄)² carries
+/// the curvature. `None` if y is constant or x has fewer than three values.
+pub fn parabola(x: &[f64], y: &[f64]) -> Option<Parabola> {
     let n = x.len();
-    let levels_a = distinct(a);
-    let levels_b = distinct(b);
-    if n < 3 || levels_b.len() > MAX_LEVELS {
+    if n < 4 || constant(x) || constant(y) {
         return None;
     }
-    let groups: Vec<usize> = a
+    let (mx, my) = (mean(x)?, mean(y)?);
+    let z: Vec<f64> = x.iter().map(|v| v - mx).collect();
+    let squares: Vec<f64> = z.iter().map(|v| v * v).collect();
+    let zz = sum_of_squares(&z)?;
+    let along = finite(sum_of_products(&z, &squares)? / zz)?;
+    let ms = mean(&squares)?;
+    let bent: Vec<f64> = z
         .iter()
-        .map(|v| levels_a.partition_point(|l| l < v))
+        .zip(&squares)
+        .map(|(z, s)| s - ms - along * z)
         .collect();
-    let sweep = |column: &mut [f64]| {
-        let mut sums = vec![(0.0, 0.0); levels_a.len()];
-        for (v, g) in column.iter().zip(&groups) {
-            sums[*g].0 += v;
-            sums[*g].1 += 1.0;
-        }
-        for (v, g) in column.iter_mut().zip(&groups) {
-            *v -= sums[*g].0 / sums[*g].1;
-        }
-    };
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    // The first level is the reference: the sum of all is swept out already.
-    for level in levels_b.iter().skip(1) {
-        let mut column: Vec<f64> = b.iter().map(|v| f64::from(u8::from(v == level))).collect();
-        let size = dot(&column, &column).sqrt();
-        sweep(&mut column);
-        clear(&mut column, &basis);
-        let norm = dot(&column, &column).sqrt();
-        if norm > 1e-9 * size {
-            column.iter_mut().for_each(|v| *v /= norm);
-            basis.push(column);
-        }
-    }
-    let centre = |v: &[f64]| -> Option<Vec<f64>> {
-        let m = mean(v)?;
-        Some(v.iter().map(|u| u - m).collect())
-    };
-    let (mut x, mut y) = (centre(x)?, centre(y)?);
-    let size = dot(&x, &x).sqrt();
-    for column in [&mut x, &mut y] {
-        sweep(column);
-        clear(column, &basis);
-    }
-    let xx = dot(&x, &x);
-    let df = n as f64 - levels_a.len() as f64 - basis.len() as f64 - 1.0;
-    if !(xx.sqrt() > 1e-9 * size && df >= 1.0) {
+    let bb: f64 = bent.iter().map(|v| v * v).sum();
+    if bb <= 1e-18 * squares.iter().map(|v| v * v).sum::<f64>() {
         return None;
     }
-    let slope = finite(dot(&x, &y) / xx)?;
-    let yy = dot(&y, &y);
-    let residual: f64 = x.iter().zip(&y).map(|(u, v)| (v - slope * u).powi(2)).sum();
-    let se = finite((residual / df / xx).sqrt())?;
-    let t = if residual > 1e-24 * yy {
-        finite(slope / se)
+    let straight = finite(sum_of_products(&z, y)? / zz)?;
+    let square = finite(bent.iter().zip(y).map(|(w, v)| w * (v - my)).sum::<f64>() / bb)?;
+    let residual: Sum = (0..n)
+        .map(|i| (y[i] - my - straight * z[i] - square * bent[i]).powi(2))
+        .collect();
+    let (residual, total) = (residual.get(), sum_of_squares(y)?);
+    let df = n as f64 - 3.0;
+    let left = residual > 1e-24 * total;
+    let se = finite((residual / df / bb).sqrt())?;
+    let t = if left { finite(square / se) } else { None };
+    let f = if left {
+        finite((total - residual) / 2.0 / (residual / df))
     } else {
         None
     };
-    Some(Beside {
-        slope,
+    // y = … + (straight − square·along)·z + square·z²
+    let turn = finite(mx - (straight - square * along) / (2.0 * square));
+    Some(Parabola {
+        square,
         se,
         t,
         p: t.and_then(|t| t_two_sided(t, df)),
         df,
+        f,
+        p_f: f.and_then(|f| f_upper(f, 2.0, df)),
+        r2: 1.0 - residual / total,
+        turn,
     })
-}
-
-fn distinct(v: &[u32]) -> Vec<u32> {
-    let mut levels = v.to_vec();
-    levels.sort_unstable();
-    levels.dedup();
-    levels
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-/// Takes off what lies in the span of an orthonormal basis, twice.
-fn clear(column: &mut [f64], basis: &[Vec<f64>]) {
-    for _ in 0..2 {
-        for direction in basis {
-            let along = dot(column, direction);
-            for (c, d) in column.iter_mut().zip(direction) {
-                *c -= along * d;
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -190,23 +153,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_is_found_beside_unbalanced_factors() {
-        let a = [0, 0, 0, 1, 1, 1, 2, 2];
-        let b = [0, 1, 2, 0, 1, 1, 2, 0];
-        let x = [1.0, 5.0, 2.0, 7.0, 3.0, 8.0, 4.0, 9.0];
-        let y: Vec<f64> = (0..8)
-            .map(|i| 10.0 * f64::from(a[i]) - 3.0 * f64::from(b[i]) + 0.5 * x[i])
-            .collect();
-        let found = beside_factors(&x, &y, &a, &b).unwrap();
-        assert!((found.slope - 0.5).abs() < 1e-12);
-        assert_eq!((found.df, found.t), (2.0, None));
+    fn a_parabola_turns_where_its_slope_is_zero() {
+        let x = [1.0, 2.0, 3.0, 4.0, 5.0];
+        let y = x.map(|v: f64| 5.0 - (v - 3.4).powi(2));
+        let p = parabola(&x, &y).unwrap();
+        assert!((p.square + 1.0).abs() < 1e-12 && (p.turn.unwrap() - 3.4).abs() < 1e-12);
+        assert_eq!((p.t, p.df), (None, 2.0));
+        // Orthogonal polynomials: the quadratic contrast is (2,−1,−2,−1,2), its
+        // sum of squares 14; Σwy = 2−3−8−4+4 = −9, so c = −9/14.
+        let p = parabola(&x, &[1.0, 3.0, 4.0, 4.0, 2.0]).unwrap();
+        assert!((p.square + 9.0 / 14.0).abs() < 1e-12);
+        // Σwy²-part 81/14, line (−2,−1,0,1,2)·y = 3, 9/10; total 6.8.
+        let residual: f64 = 6.8 - 81.0 / 14.0 - 0.9;
+        assert!((p.se - (residual / 2.0 / 14.0).sqrt()).abs() < 1e-12);
+        assert!((p.r2 - (1.0 - residual / 6.8)).abs() < 1e-12);
     }
 
     #[test]
-    fn an_x_that_is_the_realization_leaves_nothing() {
-        let b = [0, 1, 2, 0, 1, 2];
-        let x = b.map(f64::from);
-        let y = [1.0, 2.0, 2.0, 3.0, 4.0, 4.5];
-        assert_eq!(beside_factors(&x, &y, &[0, 0, 0, 1, 1, 1], &b), None);
+    fn two_values_of_x_have_no_curvature() {
+        assert_eq!(parabola(&[1.0, 1.0, 2.0, 2.0], &[1.0, 2.0, 3.0, 5.0]), None);
     }
 }

@@ -99,6 +99,7 @@ pub(crate) fn plain() -> Protocol {
             primary: qid("realism"),
             vaf: None,
             realistic_from: None,
+            equivalence_margin: None,
             unfinished: Unfinished::Include,
             exclude: Vec::new(),
         },

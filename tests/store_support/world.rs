@@ -104,6 +104,7 @@ pub fn protocol() -> Protocol {
             primary: question("realism"),
             vaf: None,
             realistic_from: None,
+            equivalence_margin: None,
             unfinished: Unfinished::Include,
             exclude: Vec::new(),
         },

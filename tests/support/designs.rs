@@ -61,6 +61,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             primary: QuestionId::new("realism").expect("an identifier"),
             vaf: None,
             realistic_from: None,
+            equivalence_margin: None,
             unfinished: Unfinished::Include,
             exclude: Vec::new(),
         },

@@ -1,10 +1,10 @@
 //! Ratings from a CSV: somebody else's long form, or our own `ratings.csv`.
 
-use super::{Origin, Ratings, Row};
+use super::{Builder, NO_MODEL, NO_STROKES, Origin, Ratings, Row};
 use crate::outcome::columns::Status;
 use crate::protocol::Role;
 use crate::text::Untrusted;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::io::BufRead;
 
 /// Why a CSV could not be read. Every message names the file and, where there
@@ -127,13 +127,65 @@ impl Ratings {
             .map(|h| h.trim_start_matches('\u{feff}').trim().to_owned())
             .collect();
         let columns = Columns::of(name, &header, question)?;
-        let mut rows = Vec::new();
-        let mut practice = 0;
-        let mut seen: HashMap<(String, String, u32), u64> = HashMap::new();
-        let mut next: HashMap<(String, String), u32> = HashMap::new();
+        let mut table = Reading {
+            builder: Builder::new(columns.question.clone()),
+            lines: Vec::new(),
+        };
+        let read = table.read(name, &header, &columns, &mut reader);
+        let lines = table.lines;
+        let mut ratings = table.builder.finish();
+        // A repeated row above a line that cannot be read is the first fault.
+        number_repetitions(&mut ratings);
+        if let Some((first, second)) = repeated(&ratings) {
+            let model = ratings.models.get(ratings.model[second] as usize);
+            return Err(RatingsError::Twice {
+                name: name.to_owned(),
+                line: lines[second].into(),
+                first: lines[first].into(),
+                subject: ratings.subjects[ratings.subject[second] as usize]
+                    .id
+                    .clone(),
+                model: model.map_or_else(String::new, |m| m.id.clone()),
+                repetition: ratings.repetition[second],
+            });
+        }
+        read?;
+        if ratings.is_empty() {
+            return Err(RatingsError::Empty {
+                name: name.to_owned(),
+            });
+        }
+        Ok(ratings)
+    }
+}
+
+/// A table that is being read.
+struct Reading {
+    builder: Builder,
+    /// Line of each row.
+    lines: Vec<u32>,
+}
+
+impl Reading {
+    fn read(
+        &mut self,
+        name: &str,
+        header: &[String],
+        columns: &Columns,
+        reader: &mut csv::Reader<impl BufRead>,
+    ) -> Result<(), RatingsError> {
         let mut record = csv::StringRecord::new();
         let mut number = 0u32;
-        while reader.read_record(&mut record).map_err(csv_error)? {
+        loop {
+            let more = reader
+                .read_record(&mut record)
+                .map_err(|source| RatingsError::Csv {
+                    name: name.to_owned(),
+                    source,
+                })?;
+            if !more {
+                return Ok(());
+            }
             let line = record.position().map_or(0, csv::Position::line);
             if record.len() != header.len() {
                 return Err(RatingsError::Ragged {
@@ -146,43 +198,65 @@ impl Ratings {
             number = number.saturating_add(1);
             let line = Line {
                 name,
-                header: &header,
+                header,
                 record: &record,
                 line,
             };
-            let Some(mut row) = columns.row(&line)? else {
-                practice += 1;
-                continue;
-            };
-            row.source_row = number;
-            let model = row.model.clone().unwrap_or_default();
-            let pair = (row.subject.clone(), model.clone());
-            let count = next.entry(pair).or_insert(0);
-            *count += 1;
-            if row.repetition == 0 {
-                row.repetition = *count;
+            match columns.row(&line, number, &mut self.builder)? {
+                Some(row) => {
+                    self.builder.push(row);
+                    self.lines
+                        .push(u32::try_from(line.line).unwrap_or(u32::MAX));
+                }
+                None => self.builder.practice(),
             }
-            let key = (row.subject.clone(), model, row.repetition);
-            if let Some(&first) = seen.get(&key) {
-                return Err(RatingsError::Twice {
-                    name: name.to_owned(),
-                    line: line.line,
-                    first,
-                    subject: key.0,
-                    model: key.1,
-                    repetition: key.2,
-                });
-            }
-            seen.insert(key, line.line);
-            rows.push(row);
         }
-        if rows.is_empty() {
-            return Err(RatingsError::Empty {
-                name: name.to_owned(),
-            });
-        }
-        Ok(Self::build(columns.question, rows, practice))
     }
+}
+
+/// Counts up the repetitions that a table leaves empty, in the order of its rows.
+fn number_repetitions(ratings: &mut Ratings) {
+    if !ratings.repetition.contains(&0) {
+        return;
+    }
+    let order = ratings.by_cell();
+    for rows in cells(ratings, &order)
+        .map(<[usize]>::to_vec)
+        .collect::<Vec<_>>()
+    {
+        for (n, i) in (1u32..).zip(rows) {
+            if ratings.repetition[i] == 0 {
+                ratings.repetition[i] = n;
+            }
+        }
+    }
+}
+
+/// The rows of each subject and realization.
+fn cells<'o>(ratings: &'o Ratings, order: &'o [usize]) -> impl Iterator<Item = &'o [usize]> {
+    order.chunk_by(|&a, &b| {
+        (ratings.subject[a], ratings.model[a]) == (ratings.subject[b], ratings.model[b])
+    })
+}
+
+/// The first row that repeats another, after that other.
+fn repeated(ratings: &Ratings) -> Option<(usize, usize)> {
+    let order = ratings.by_cell();
+    let mut found: Option<(usize, usize)> = None;
+    for rows in cells(ratings, &order) {
+        let of = |i: &usize| ratings.repetition[*i];
+        if rows.windows(2).all(|w| of(&w[0]) < of(&w[1])) {
+            continue;
+        }
+        let mut rows = rows.to_vec();
+        rows.sort_by_key(of);
+        for w in rows.windows(2).filter(|w| of(&w[0]) == of(&w[1])) {
+            if found.is_none_or(|(_, second)| w[1] < second) {
+                found = Some((w[0], w[1]));
+            }
+        }
+    }
+    found
 }
 
 /// Where the columns of interest stand.
@@ -194,6 +268,10 @@ struct Columns {
     rating: usize,
     vaf: Option<usize>,
     trial_index: Option<usize>,
+    strokes: Option<usize>,
+    /// Those after `vaf` in our own table; of somebody else's, what tells the
+    /// memory of a realization.
+    covariates: Vec<usize>,
     ours: Option<Ours>,
 }
 
@@ -238,6 +316,8 @@ impl Columns {
                 rating: need(question.unwrap_or("rating"))?,
                 vaf: find("vaf"),
                 trial_index: find("trial_index"),
+                strokes: None,
+                covariates: MEMORY.iter().filter_map(|c| find(c)).collect(),
                 ours: None,
             });
         };
@@ -257,6 +337,8 @@ impl Columns {
             rating,
             vaf: find("vaf"),
             trial_index: find("position"),
+            strokes: find("strokes"),
+            covariates: find("vaf").map_or(Vec::new(), |v| (v + 1..header.len()).collect()),
             ours: Some(Ours {
                 role: find("role"),
                 practice: find("practice"),
@@ -271,16 +353,19 @@ impl Columns {
     }
 
     /// `None`: a practice row.
-    fn row(&self, line: &Line<'_>) -> Result<Option<Row>, RatingsError> {
+    fn row(
+        &self,
+        line: &Line<'_>,
+        number: u32,
+        builder: &mut Builder,
+    ) -> Result<Option<Row>, RatingsError> {
         let subject = line.text(self.subject);
         if subject.is_empty() {
             return Err(line.fault(self.subject, "name of a subject"));
         }
-        let model = line.text(self.model);
         let mut row = Row {
-            subject: subject.to_owned(),
-            model: (!model.is_empty()).then(|| model.to_owned()),
-            role: Role::Test,
+            subject: 0,
+            model: NO_MODEL,
             repetition: line.whole(self.repetition)?,
             rating: line.number(self.rating)?,
             vaf: self.vaf.map_or(Ok(f64::NAN), |i| line.number(i))?,
@@ -289,16 +374,16 @@ impl Columns {
             status: Status::Ok,
             corrected: false,
             attempt: 0,
-            source_row: 0,
-            covariates: BTreeMap::new(),
-            comments: Vec::new(),
+            strokes: NO_STROKES,
+            source_row: number,
         };
+        let mut role = Role::Test;
         if let Some(ours) = &self.ours {
             let flag = |at: Option<usize>| at.map_or(Ok(false), |i| line.flag(i));
             if flag(ours.practice)? {
                 return Ok(None);
             }
-            row.role = ours.role.map_or(Ok(Role::Test), |i| {
+            role = ours.role.map_or(Ok(Role::Test), |i| {
                 line.word(i, &ROLES, "role of a realization")
             })?;
             row.status = ours.status.map_or(Ok(Status::Ok), |i| {
@@ -311,6 +396,9 @@ impl Columns {
             };
             row.corrected = flag(ours.corrected)?;
             row.attempt = ours.attempt.map_or(Ok(0), |i| line.whole(i))?;
+            if let Some(i) = self.strokes.filter(|&i| !line.text(i).is_empty()) {
+                row.strokes = line.whole(i)?;
+            }
             if row.status == Status::Failed {
                 row.rating = f64::NAN;
             }
@@ -318,16 +406,32 @@ impl Columns {
                 let text = &line.record[i];
                 // Other numeric questions are not comments.
                 if !text.trim().is_empty() && text.trim().parse::<f64>().is_err() {
-                    row.comments.push((line.header[i].clone(), text.to_owned()));
+                    builder.comment(line.header[i].clone(), text.to_owned());
                 }
             }
         }
         if row.rating.is_nan() && row.status == Status::Ok {
             row.status = Status::Missing;
         }
+        row.subject = builder.subject(subject);
+        let model = line.text(self.model);
+        if !model.is_empty() {
+            row.model = builder.model(model, role, || self.covariates(line));
+        }
         Ok(Some(row))
     }
+
+    /// Those that are numbers.
+    fn covariates(&self, line: &Line<'_>) -> BTreeMap<String, f64> {
+        let number = |i: usize| line.text(i).parse().ok().filter(|v: &f64| v.is_finite());
+        (self.covariates.iter())
+            .filter_map(|&i| Some((line.header[i].clone(), number(i)?)))
+            .collect()
+    }
 }
+
+/// Columns of somebody else's table that tell the memory of a realization.
+const MEMORY: [&str; 2] = ["lambda", "memory_mm"];
 
 const ROLES: [(&str, Role); 5] = [
     ("test", Role::Test),
@@ -426,7 +530,7 @@ mod tests {
     #[test]
     fn a_byte_order_mark_and_empty_fields_are_no_fault() {
         let r = read(&format!("\u{feff}{HEAD}S1,,1,,\nS1,,2,4,0.5\n")).unwrap();
-        assert_eq!(r.model, [super::super::NO_MODEL; 2]);
+        assert_eq!(r.model, [NO_MODEL; 2]);
         assert_eq!((r.len(), r.models.len()), (2, 0));
         assert_eq!(r.status, [Status::Missing, Status::Ok]);
     }

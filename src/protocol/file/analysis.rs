@@ -37,6 +37,17 @@ pub(super) fn read<'d, 't>(
         .and_then(|v| question_id(&v));
     let vaf = reader.text(&mut table, "vaf");
     let realistic_from = reader.number(&mut table, "realistic_from");
+    let equivalence_margin = table.value("equivalence_margin").and_then(|v| {
+        let margin = finite(&v)?;
+        if margin <= 0.0 {
+            v.fault(
+                Fault::error("an equivalence margin has to be above 0")
+                    .hint("differences from a hidden reference below it count as none"),
+            );
+            return None;
+        }
+        Some(margin)
+    });
     let unfinished = table
         .word(
             "unfinished",
@@ -56,6 +67,7 @@ pub(super) fn read<'d, 't>(
         primary: primary?,
         vaf,
         realistic_from,
+        equivalence_margin,
         unfinished,
         exclude,
     })

@@ -25,7 +25,7 @@ pub(super) fn answers(a: &Analysis, width: usize, paint: Paint) -> String {
 }
 
 /// A correlation: three decimals, no zero before the point.
-fn r(x: f64) -> String {
+pub(super) fn r(x: f64) -> String {
     let shown = format!("{x:.3}");
     match shown.strip_prefix("-0.") {
         Some("000") => ".000".to_owned(),
@@ -38,7 +38,7 @@ fn r(x: f64) -> String {
 }
 
 /// A probability with its sign.
-fn p(x: f64) -> String {
+pub(super) fn p(x: f64) -> String {
     if x < 0.00005 {
         "< .0001".to_owned()
     } else if x >= 0.99995 {
@@ -81,14 +81,7 @@ fn best(a: &Analysis) -> Vec<String> {
         said += &format!(" (Wilcoxon, exact, Holm over all pairs: p {})", p(holm));
     }
     said.push('.');
-    let mut all = vec![said];
-    if let Some(from) = a.realistic_from {
-        let share = v.number(&format!("realistic/{first}/share"));
-        all.extend(
-            share.map(|s| format!("{:.0} % of its ratings are {from} or higher.", 100.0 * s)),
-        );
-    }
-    all
+    vec![said]
 }
 
 fn differ(a: &Analysis) -> Vec<String> {

@@ -1,0 +1,169 @@
+//! Rows to columns: names become indices as they come, and are sorted at the end.
+
+use super::{Comment, NO_MODEL, Origin, Ratings, Realization, Subject};
+use crate::outcome::columns::Status;
+use crate::protocol::Role;
+use std::collections::{BTreeMap, HashMap};
+
+/// One row, its names already indices.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    pub(super) subject: u32,
+    pub(super) model: u32,
+    pub(super) repetition: u32,
+    pub(super) rating: f64,
+    pub(super) vaf: f64,
+    pub(super) trial_index: u32,
+    pub(super) origin: Origin,
+    pub(super) status: Status,
+    pub(super) corrected: bool,
+    pub(super) attempt: u32,
+    pub(super) strokes: u32,
+    pub(super) source_row: u32,
+}
+
+/// Names and the index of each, in the order in which they came.
+#[derive(Debug, Default)]
+struct Names {
+    places: HashMap<String, u32>,
+    last: Option<(String, u32)>,
+}
+
+impl Names {
+    /// The index of a name, and whether it is new. Neighbours often share it.
+    fn place(&mut self, name: &str) -> (u32, bool) {
+        if let Some((last, at)) = &self.last
+            && last == name
+        {
+            return (*at, false);
+        }
+        let next = u32::try_from(self.places.len()).unwrap_or(NO_MODEL - 1);
+        let (at, new) = match self.places.get(name) {
+            Some(at) => (*at, false),
+            None => {
+                self.places.insert(name.to_owned(), next);
+                (next, true)
+            }
+        };
+        let (last, place) = self.last.get_or_insert_with(|| (String::new(), at));
+        last.clear();
+        last.push_str(name);
+        *place = at;
+        (at, new)
+    }
+}
+
+/// Ratings in the making.
+#[derive(Debug)]
+pub(super) struct Builder {
+    ratings: Ratings,
+    subjects: Names,
+    models: Names,
+}
+
+impl Builder {
+    pub(super) fn new(question: String) -> Self {
+        Self {
+            ratings: Ratings {
+                question,
+                ..Ratings::default()
+            },
+            subjects: Names::default(),
+            models: Names::default(),
+        }
+    }
+
+    /// Rows so far.
+    pub(super) fn len(&self) -> usize {
+        self.ratings.len()
+    }
+
+    /// One more practice row, which is left out.
+    pub(super) fn practice(&mut self) {
+        self.ratings.practice += 1;
+    }
+
+    /// The index of a subject.
+    pub(super) fn subject(&mut self, id: &str) -> u32 {
+        let (at, new) = self.subjects.place(id);
+        if new {
+            self.ratings.subjects.push(Subject {
+                id: id.to_owned(),
+                state: None,
+                reason: String::new(),
+            });
+        }
+        at
+    }
+
+    /// The index of a realization; its first row tells role and covariates.
+    pub(super) fn model(
+        &mut self,
+        id: &str,
+        role: Role,
+        covariates: impl FnOnce() -> BTreeMap<String, f64>,
+    ) -> u32 {
+        let (at, new) = self.models.place(id);
+        if new {
+            self.ratings.models.push(Realization {
+                id: id.to_owned(),
+                role,
+                duplicate_of: None,
+                covariates: covariates(),
+            });
+        }
+        at
+    }
+
+    /// A text that belongs to the row pushed next.
+    pub(super) fn comment(&mut self, question: String, text: String) {
+        let row = self.len();
+        self.ratings.comments.push(Comment {
+            row,
+            question,
+            text,
+        });
+    }
+
+    pub(super) fn push(&mut self, row: Row) {
+        let r = &mut self.ratings;
+        r.subject.push(row.subject);
+        r.model.push(row.model);
+        r.repetition.push(row.repetition);
+        r.rating.push(row.rating);
+        r.vaf.push(row.vaf);
+        r.trial_index.push(row.trial_index);
+        r.origin.push(row.origin);
+        r.status.push(row.status);
+        r.corrected.push(row.corrected);
+        r.attempt.push(row.attempt);
+        r.strokes.push(row.strokes);
+        r.source_row.push(row.source_row);
+    }
+
+    /// Sorts the names.
+    pub(super) fn finish(self) -> Ratings {
+        let mut r = self.ratings;
+        let subjects = sort(&mut r.subjects, |s| &s.id);
+        let models = sort(&mut r.models, |m| &m.id);
+        for s in &mut r.subject {
+            *s = subjects[*s as usize];
+        }
+        for m in r.model.iter_mut().filter(|m| **m != NO_MODEL) {
+            *m = models[*m as usize];
+        }
+        r
+    }
+}
+
+/// Sorts by name; tells where each item went.
+fn sort<T: Clone>(items: &mut Vec<T>, name: impl Fn(&T) -> &str) -> Vec<u32> {
+    let mut order: Vec<usize> = (0..items.len()).collect();
+    order.sort_by(|&a, &b| name(&items[a]).cmp(name(&items[b])));
+    let mut went = vec![0; items.len()];
+    for (new, &old) in (0u32..).zip(&order) {
+        went[old] = new;
+    }
+    *items = order.iter().map(|&i| items[i].clone()).collect();
+    went
+}

@@ -1,0 +1,73 @@
+//! A share of trials that come in clusters.
+
+use super::distribution::t_quantile;
+use super::finite;
+
+/// A share with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Share {
+    /// Hits over trials.
+    pub share: f64,
+    /// So many independent trials would know it as well.
+    pub n_effective: f64,
+    /// Wilson's (1927), over the effective number; none for one cluster.
+    pub ci95: Option<(f64, f64)>,
+}
+
+/// The share of hits, where each cluster (hits, trials) is a subject and subjects
+/// are what was sampled. Its variance is that of a ratio over clusters,
+/// v = S/(S−1) Σ(hᵢ − p nᵢ)²/N² (Cochran 1977, §6.3), the effective number
+/// p(1 − p)/v, at most N (Korn & Graubard 1998); where all clusters agree, v = 0
+/// and it is the number of clusters, since no more is known. Wilson's interval
+/// has t(.975, S−1) for z. `None` without trials.
+pub fn share(clusters: &[(f64, f64)]) -> Option<Share> {
+    let clusters = || clusters.iter().filter(|c| c.1 > 0.0);
+    let trials: f64 = clusters().map(|c| c.1).sum();
+    let s = clusters().count() as f64;
+    let p = finite(clusters().map(|c| c.0).sum::<f64>() / trials)?;
+    let squares: f64 = clusters().map(|(h, n)| (h - p * n).powi(2)).sum();
+    let variance = s / (s - 1.0) * squares / (trials * trials);
+    let n_effective = if variance > 1e-24 && p * (1.0 - p) > 0.0 {
+        (p * (1.0 - p) / variance).min(trials)
+    } else {
+        s
+    };
+    let ci95 = t_quantile(0.975, s - 1.0).map(|t| {
+        let (z2, n) = (t * t, n_effective);
+        let centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
+        let half = t / (1.0 + z2 / n) * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
+        ((centre - half).max(0.0), (centre + half).min(1.0))
+    });
+    Some(Share {
+        share: p,
+        n_effective,
+        ci95: ci95.filter(|_| s > 1.0),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subjects_that_repeat_themselves_count_once() {
+        // Five who always hit and five who never do, three trials each.
+        let clusters = [(3.0, 3.0); 5].iter().chain(&[(0.0, 3.0); 5]).copied();
+        let found = share(&clusters.collect::<Vec<_>>()).unwrap();
+        // v = 10/9 · 10 · 2.25/900 = 1/36, p(1−p)/v = 9.
+        assert!((found.n_effective - 9.0).abs() < 1e-12);
+        let (low, high) = found.ci95.unwrap();
+        assert!(low > 0.15 && low < 0.25 && (low + high - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn agreement_of_all_is_not_certainty() {
+        let found = share(&[(3.0, 3.0); 10]).unwrap();
+        let (low, high) = found.ci95.unwrap();
+        assert_eq!((found.share, high), (1.0, 1.0));
+        // Wilson with n = 10: 10/(10 + t²), t(.975, 9) = 2.262157
+        assert!((low - 10.0 / (10.0 + 2.262_157f64.powi(2))).abs() < 1e-6);
+        assert_eq!(share(&[(1.0, 3.0)]).unwrap().ci95, None);
+        assert_eq!(share(&[]), None);
+    }
+}
