@@ -136,6 +136,8 @@ pub struct Note {
     pub anchor: Anchor,
     /// Colour.
     pub colour: Colour,
+    /// Whether a white rim keeps it readable over lines.
+    pub rim: bool,
 }
 
 /// Which end of a text stands at its place.
@@ -243,7 +245,7 @@ impl Panel {
 }
 
 impl Note {
-    /// A dark text whose middle stands at a place.
+    /// A dark text with a rim, whose middle stands at a place.
     pub fn new(at: (f64, f64), text: &str) -> Self {
         Self {
             at,
@@ -251,6 +253,7 @@ impl Note {
             text: text.to_owned(),
             anchor: Anchor::Middle,
             colour: Colour::INK,
+            rim: true,
         }
     }
 
@@ -258,6 +261,14 @@ impl Note {
     #[must_use]
     pub fn moved(mut self, right: f64, down: f64) -> Self {
         self.by = (right, down);
+        self
+    }
+
+    /// The same without a rim, in black or white: for text on a filled box.
+    #[must_use]
+    pub fn on(mut self, paper: Colour) -> Self {
+        self.colour = paper.text_on();
+        self.rim = false;
         self
     }
 

@@ -283,11 +283,10 @@ fn note(out: &mut Out, panel: &Panel, f: &Frame, n: &Note) {
     let (Some(x), Some(y)) = (f.x(&panel.x, n.at.0), f.y(&panel.y, n.at.1)) else {
         return;
     };
-    let light = n.colour.luminance() > 0.5;
-    let how = if light {
-        Setting::Plain
-    } else {
+    let how = if n.rim {
         Setting::Rimmed
+    } else {
+        Setting::Plain
     };
     let at = (x + n.by.0, y + n.by.1 + 4.0);
     let text = shortened(&n.text, MAX_TITLE);
