@@ -20,7 +20,6 @@ mod out;
 pub use axis::{Axis, Ticks};
 pub use look::{Colour, Dash, Fill, Look, PALETTE, Shape, ramp};
 
-use frame::Frame;
 use out::Out;
 
 /// The font of every text, first the one that is bundled for PNG.
@@ -84,6 +83,8 @@ pub struct Series {
 pub enum Mark {
     /// Joined points; one that is not finite breaks the line.
     Line(Vec<(f64, f64)>),
+    /// Many small round dots, `stroke` px wide: for thousands of samples.
+    Dots(Vec<(f64, f64)>),
     /// Marker shapes.
     Points(Vec<(f64, f64)>),
     /// Upright bars with caps.

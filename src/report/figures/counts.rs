@@ -43,7 +43,7 @@ pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
         }
     }
     let caption = format!(
-        "How often each {} was given, by realization. All axes are alike.",
+        "How often each rating of {} was given, by realization. All axes are alike.",
         scene.asked
     );
     let title = format!("Counts of {} by realization", scene.asked);

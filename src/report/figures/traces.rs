@@ -69,7 +69,7 @@ pub(super) fn traces(scene: &Scene<'_>, traces: &[Trace]) -> Option<Drawn> {
         ""
     };
     let caption = format!(
-        "Force against position during some of the playbacks ({}{more}), from telemetry, thinned. {}",
+        "Force against position during some of the playbacks ({}{more}), from telemetry, thinned; a colour for each playback. {}",
         labels.join(", "),
         if measured {
             "The force is measured."
@@ -94,8 +94,9 @@ pub(super) fn traces(scene: &Scene<'_>, traces: &[Trace]) -> Option<Drawn> {
             }
             let mut panel = Panel::new(x, y).titled(model);
             for (k, t) in own.iter().enumerate() {
-                let look = Look::nth(k).stroke(1.2);
-                panel = panel.with(look, Mark::Line(thinned(&t.points)));
+                let mut look = Look::nth(k).stroke(2.0);
+                look.opacity = 0.7;
+                panel = panel.with(look, Mark::Dots(thinned(&t.points)));
             }
             figure = figure.with(panel);
         }

@@ -90,7 +90,8 @@ fn real(a: &Analysis) -> Option<Answer> {
             apa::percent(s)
         ),
         None => format!(
-            "The best-rated realization is {best}, mean {}{scale}.",
+            "The best-rated realization is {best}, mean {}{scale}; no rating was stated beforehand \
+             from which one counts as realistic.",
             two(mean)
         ),
     };

@@ -107,7 +107,7 @@ fn of_one(a: &Analysis, group: &[Said], lang: Option<&str>) -> Markup {
     let mean = a.values.number(&format!("desc/{}/mean", group[0].model));
     html! {
         @let model = if group[0].model.is_empty() { "no realization" } else { &group[0].model };
-        details open[group.len() <= 12] {
+        details open {
             summary {
                 (safe(model))
                 @if let Some(mean) = mean { ", mean " (apa::number(mean, 2)) }

@@ -39,8 +39,8 @@ summary { font-weight: bold; cursor: pointer; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .15rem 1rem; margin: .5rem 0; }
 dt { color: #505050; }
 dd { margin: 0; }
-blockquote { margin: .3rem 0 .5rem; padding-left: .8rem; border-left: 3px solid #bbb; }
-blockquote .who { display: block; font-size: .82rem; color: #505050; }
+blockquote { margin: .25rem 0; padding-left: .8rem; border-left: 3px solid #bbb; }
+blockquote .who { font-size: .82rem; color: #505050; margin-right: .6em; }
 footer { margin-top: 3rem; font-size: .85rem; border-top: 1px solid #bbb; padding-top: .5rem; }
 @media (max-width: 44rem) {
   body { padding: 1rem .9rem 2rem; }

@@ -119,6 +119,10 @@ fn mark(out: &mut Out, panel: &Panel, f: &Frame, mark: &Mark, look: Look) {
                 line(out, &places, look);
             }
         }
+        Mark::Dots(points) => {
+            let places: Vec<(f64, f64)> = points.iter().filter_map(place).collect();
+            dots(out, &places, look);
+        }
         Mark::Points(points) => {
             for at in points.iter().filter_map(place) {
                 point(out, at, look);
@@ -185,6 +189,21 @@ fn line(out: &mut Out, places: &[(f64, f64)], look: Look) {
     out.line(&format!(
         "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}{}/>",
         points.join(" "),
+        look.colour.hex(),
+        px(look.stroke),
+        opacity(look)
+    ));
+}
+
+fn dots(out: &mut Out, places: &[(f64, f64)], look: Look) {
+    // A line of no length with round ends is a dot, in a seventh of the bytes.
+    let all: Vec<String> = places
+        .iter()
+        .map(|(x, y)| format!("M{} {}h0", px(*x), px(*y)))
+        .collect();
+    out.line(&format!(
+        "<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linecap=\"round\"{}/>",
+        all.join(""),
         look.colour.hex(),
         px(look.stroke),
         opacity(look)
@@ -298,6 +317,7 @@ fn sample(out: &mut Out, mark: &Mark, look: Look, at: (f64, f64)) {
     let (left, middle, right) = (at.0, at.0 + 10.0, at.0 + 20.0);
     match mark {
         Mark::Line(_) => line(out, &[(left, at.1), (right, at.1)], look),
+        Mark::Dots(_) => dots(out, &[(middle, at.1)], look.stroke(4.0)),
         Mark::Points(_) => point(out, (middle, at.1), look),
         Mark::ErrorBars(_) => {
             whisker(
@@ -348,7 +368,7 @@ fn colour_bar(out: &mut Out, bar: &ColourBar, f: &Frame) {
             out.text((left + 19.0, y + 4.0), &label, SMALL, style, Setting::Plain);
         }
     }
-    let at = (left + 66.0, (f.top + f.bottom) / 2.0);
+    let at = (left + 58.0, (f.top + f.bottom) / 2.0);
     let text = shortened(&bar.label, MAX_TITLE);
     out.text(
         at,

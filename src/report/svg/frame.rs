@@ -46,29 +46,26 @@ impl Frame {
 pub(super) const SAMPLE: f64 = 26.0;
 const LEGEND_LINE: f64 = 18.0;
 
-/// The frames of all panels; left margins of a column are equal, so that the
-/// axes of panels above each other stand above each other.
+/// The frames of all panels; left margins are equal, and lower ones within a row,
+/// so that axes stand above and beside each other.
 pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
     let columns = figure.columns.max(1);
     let cell_width = figure.width / columns as f64;
     let rows: Vec<&[Panel]> = figure.panels.chunks(columns).collect();
     let share = |row: &[Panel]| row.iter().map(|p| p.share).fold(0.1, f64::max);
     let whole: f64 = rows.iter().map(|r| share(r)).sum();
-    let margin = |column: usize| {
-        let own = figure.panels.iter().skip(column).step_by(columns);
-        own.map(left_margin).fold(0.0, f64::max)
-    };
-    let margins: Vec<f64> = (0..columns).map(margin).collect();
+    let margin = figure.panels.iter().map(left_margin).fold(0.0, f64::max);
     let mut frames = Vec::new();
     let mut top = 0.0;
     for row in rows {
         let height = figure.height * share(row) / whole;
         for (j, panel) in row.iter().enumerate() {
             let left = cell_width * j as f64;
+            let label = row.iter().any(|p| !p.x.label.is_empty());
             frames.push(frame(
                 panel,
                 (left, top, left + cell_width, top + height),
-                margins[j],
+                (margin, label),
             ));
         }
         top += height;
@@ -87,12 +84,12 @@ fn left_margin(panel: &Panel) -> f64 {
     label + widest + 8.0
 }
 
-fn frame(panel: &Panel, outer: (f64, f64, f64, f64), margin: f64) -> Frame {
+fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool)) -> Frame {
     let (outer_left, outer_top, outer_right, outer_bottom) = outer;
     let left = outer_left + margin;
     let right = outer_right
         - match &panel.colour_bar {
-            Some(_) => 84.0,
+            Some(_) => 76.0,
             None => 14.0,
         };
     let mut top = outer_top + if panel.title.is_empty() { 8.0 } else { 26.0 };
@@ -111,7 +108,7 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), margin: f64) -> Frame {
             widest * 0.574 + 18.0
         }
     };
-    let label = if panel.x.label.is_empty() { 4.0 } else { 22.0 };
+    let label = if label { 22.0 } else { 4.0 };
     let bottom = (outer_bottom - below - label).max(top + 10.0);
     // At least 22 px from tick to tick.
     let most = ((bottom - top) / 22.0).floor().clamp(2.0, 10.0) as usize;
