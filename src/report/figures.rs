@@ -140,7 +140,7 @@ impl<'a> Scene<'a> {
         Self {
             a,
             models,
-            asked: super::asked(a),
+            asked: super::asked(a).trim_start_matches("the ").to_owned(),
             cells,
             subjects,
         }

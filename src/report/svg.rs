@@ -308,6 +308,17 @@ pub fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(em).sum::<f64>() * size
 }
 
+/// A text that is at most about so many px wide; what is cut off is marked.
+pub fn fitted(text: &str, size: f64, room: f64) -> String {
+    let mut most = text.chars().count();
+    let mut shown = text.to_owned();
+    while most > 1 && text_width(&shown, size) > room {
+        most -= 1;
+        shown = shortened(text, most);
+    }
+    shown
+}
+
 /// A text of at most so many characters; what is cut off is marked.
 pub fn shortened(text: &str, most: usize) -> String {
     if text.chars().count() <= most {

@@ -42,10 +42,12 @@ pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
             data.push(vec![m.id.clone(), rating.to_string(), n.to_string()]);
         }
     }
-    let caption = format!(
-        "How often each rating of {} was given, by realization. All axes are alike.",
-        scene.asked
-    );
+    let of = match scene.asked.as_str() {
+        "rating" => String::new(),
+        asked => format!(" of {asked}"),
+    };
+    let caption =
+        format!("How often each rating{of} was given, by realization. All axes are alike.");
     let title = format!("Counts of {} by realization", scene.asked);
     Some(drawn("histograms", caption, data, |c: Canvas| {
         let columns = c.pick(3, 2).min(scene.models.len());

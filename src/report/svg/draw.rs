@@ -3,13 +3,15 @@
 use super::frame::{Frame, MAX_LABEL, SAMPLE, TITLE_BASE};
 use super::look::{Colour, Fill, Look, Shape, ramp};
 use super::out::{Out, Setting, escape, px};
-use super::{Anchor, ColourBar, Mark, NORMAL, Note, Panel, SMALL, Span, Whisker, shortened};
+use super::{
+    Anchor, ColourBar, Mark, NORMAL, Note, Panel, SMALL, Span, Whisker, fitted, shortened,
+};
 
 /// Half the width of an error bar's cap, px.
 const CAP: f64 = 4.0;
 
-/// Characters of a title or an axis label that are shown.
-const MAX_TITLE: usize = 80;
+/// Characters of a note that are shown.
+const MAX_NOTE: usize = 80;
 
 pub(super) fn panel(out: &mut Out, panel: &Panel, frame: &Frame) {
     grid(out, panel, frame);
@@ -94,17 +96,18 @@ fn axes(out: &mut Out, panel: &Panel, f: &Frame) {
     let style = (Anchor::Middle, ink);
     if !panel.x.label.is_empty() {
         let at = ((f.left + f.right) / 2.0, f.outer_bottom - 8.0);
-        let text = shortened(&panel.x.label, MAX_TITLE);
+        let text = fitted(&panel.x.label, NORMAL, f.right - f.outer_left);
         out.text(at, &text, NORMAL, style, Setting::Plain);
     }
     if !panel.y.label.is_empty() {
         let at = (f.outer_left + 16.0, (f.top + f.bottom) / 2.0);
-        let text = shortened(&panel.y.label, MAX_TITLE);
+        let text = fitted(&panel.y.label, NORMAL, f.outer_bottom - f.outer_top);
         out.text(at, &text, NORMAL, style, Setting::Turned);
     }
     if !panel.title.is_empty() {
         let at = (f.left, f.outer_top + TITLE_BASE);
-        let text = shortened(&panel.title, MAX_TITLE);
+        // Bold letters are a tenth wider.
+        let text = fitted(&panel.title, NORMAL * 1.1, f.right - f.left);
         let style = (Anchor::Start, ink);
         out.text(at, &text, NORMAL, style, Setting::Bold);
     }
@@ -308,7 +311,7 @@ fn note(out: &mut Out, panel: &Panel, f: &Frame, n: &Note) {
         Setting::Plain
     };
     let at = (x + n.by.0, y + n.by.1 + 4.0);
-    let text = shortened(&n.text, MAX_TITLE);
+    let text = shortened(&n.text, MAX_NOTE);
     out.text(at, &text, SMALL, (n.anchor, n.colour), how);
 }
 
@@ -369,7 +372,7 @@ fn colour_bar(out: &mut Out, bar: &ColourBar, f: &Frame) {
         }
     }
     let at = (left + 58.0, (f.top + f.bottom) / 2.0);
-    let text = shortened(&bar.label, MAX_TITLE);
+    let text = shortened(&bar.label, MAX_NOTE);
     out.text(
         at,
         &text,

@@ -1,10 +1,13 @@
 //! Where panels, their margins and their legends lie.
 
 use super::axis::{Axis, Ticks};
-use super::{Figure, NORMAL, Panel, SMALL, text_width};
+use super::{Figure, NORMAL, Panel, SMALL, fitted, text_width};
 
 /// Least distance of two tick labels, px.
 const APART: f64 = 8.0;
+
+/// Width of a slanted label, px: what leaves the first one inside the picture.
+const MAX_SLANTED: f64 = 92.0;
 
 /// Characters of a tick label that are shown.
 pub(super) const MAX_LABEL: usize = 24;
@@ -75,11 +78,11 @@ pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
 
 fn left_margin(panel: &Panel) -> f64 {
     let label = if panel.y.label.is_empty() { 6.0 } else { 24.0 };
-    let widest = panel
-        .y
-        .marks(6)
-        .iter()
-        .map(|(_, l)| text_width(&super::shortened(l, MAX_LABEL), SMALL))
+    // How many there will be is not known yet: the widest of few and of many.
+    let widest = [2, 4, 6, 8, 10]
+        .into_iter()
+        .flat_map(|most| panel.y.marks(most))
+        .map(|(_, l)| text_width(&super::shortened(&l, MAX_LABEL), SMALL))
         .fold(0.0, f64::max);
     label + widest + 8.0
 }
@@ -145,7 +148,8 @@ fn x_ticks(axis: &Axis, room: f64) -> (Vec<(f64, String)>, bool) {
             // At least 16 px, most of a line, from one to the next.
             let fit = (room / 16.0).floor().max(1.0) as usize;
             let every = ticks.len().div_ceil(fit);
-            ticks = ticks.into_iter().step_by(every).collect();
+            let short = |t: (f64, String)| (t.0, fitted(&t.1, SMALL, MAX_SLANTED));
+            ticks = ticks.into_iter().step_by(every).map(short).collect();
         }
         return (ticks, slanted);
     }
