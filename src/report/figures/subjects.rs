@@ -2,7 +2,10 @@
 
 use super::{Canvas, Drawn, Scene, cell, drawn, head, name};
 use crate::report::apa;
-use crate::report::svg::{Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, Span, ramp};
+use crate::report::svg::{
+    Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, SMALL, Span, ramp, shortened,
+    text_width,
+};
 use crate::stats::describe::mean;
 use std::collections::BTreeMap;
 
@@ -74,8 +77,11 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
                 low,
                 high,
             });
-            // Below 26 px a number does not fit into its cell.
-            let wide = (c.width - 170.0) / scene.models.len() as f64 >= 26.0;
+            let widest = (scene.subjects.iter())
+                .map(|s| text_width(&shortened(s, 24), SMALL))
+                .fold(0.0, f64::max);
+            // Beside labels and key; below 26 px a number does not fit into its cell.
+            let wide = (c.width - widest - 110.0) / scene.models.len() as f64 >= 26.0;
             if wide && high.abs() < 1000.0 && low.abs() < 1000.0 {
                 panel.notes = found
                     .iter()
