@@ -1,12 +1,18 @@
-//! An analysis to bytes: the terminal page, CSV tables, one JSON document.
+//! An analysis to bytes: the terminal page, the HTML report, figures, CSV tables,
+//! one JSON document.
 //!
-//! Nothing is computed here: every number stands in the analysis, by its
-//! identifier. Text from the data is escaped on its way to a terminal and stored
-//! as it is in CSV and JSON.
+//! Nothing is inferred here: every statistic stands in the analysis, by its
+//! identifier, and what is absent is left out. Text from the data is escaped on
+//! its way to a terminal, to HTML and to SVG, and stored as it is in CSV and JSON.
 
+mod apa;
 pub mod csv;
+pub mod figures;
+pub mod html;
 pub mod json;
 pub mod plot;
+pub mod png;
+pub mod svg;
 pub mod text;
 
 /// What was analysed, for the head of a report.
@@ -20,4 +26,12 @@ pub struct Source {
     pub protocol_version: Option<u32>,
     /// Where it was read, as the user gave it. Untrusted.
     pub path: String,
+}
+
+/// The question as a noun. Untrusted.
+fn asked(a: &crate::analyze::Analysis) -> String {
+    match a.question.as_str() {
+        "rating" => "the rating".to_owned(),
+        other => other.to_owned(),
+    }
 }

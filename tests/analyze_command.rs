@@ -74,7 +74,9 @@ fn tables_go_where_out_says() {
         "correlation.csv",
         "descriptives.csv",
         "excluded.csv",
+        "figures",
         "ratings_used.csv",
+        "report.html",
         "values.json",
     ];
     assert_eq!(names(&target), expected);

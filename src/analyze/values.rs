@@ -48,7 +48,7 @@ impl Values {
     }
 
     /// All, in the order of their identifiers.
-    pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> + Clone {
         self.0.iter().map(|(id, value)| (id.as_str(), value))
     }
 

@@ -2,6 +2,7 @@
 
 mod possible;
 mod reading;
+mod report;
 
 use super::load::Loaded;
 use super::{Console, Failure, results};
@@ -10,6 +11,8 @@ use crate::model::Realization;
 use crate::outcome::ratings::Ratings;
 use crate::outcome::{ParticipantRow, RatingRow};
 use crate::protocol::Protocol;
+use crate::report::figures::Trace;
+use crate::report::html::Details;
 use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
 use crate::store::StudyFolder;
@@ -36,7 +39,7 @@ pub(super) struct Args {
     /// Print one JSON document, numbers unrounded, and nothing else
     #[arg(long)]
     json: bool,
-    /// Write the tables here (default for a study: its analysis/)
+    /// Write tables, report.html and figures here (default for a study: its analysis/)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Analyse another question than the protocol's primary one
@@ -62,8 +65,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return possible::run(&args.possible, args.json, console);
     };
     if results.is_file() {
-        let (source, analysis) = of_csv(results, args)?;
-        return show(args, &source, &analysis, args.out.as_deref(), console);
+        let input = of_csv(results, args)?;
+        return show(args, &input, args.out.as_deref(), console);
     }
     let studies = results::studies(results)?;
     if args.json && studies.len() > 1 {
@@ -79,7 +82,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         if i > 0 {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
-        let (source, analysis) = of_study(study, args)?;
+        let input = of_study(study, args)?;
         let folder = study.path();
         let out = match &args.out {
             Some(out) if several => Some(out.join(folder.file_name().unwrap_or_default())),
@@ -87,20 +90,42 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             None if args.json => None,
             None => Some(folder.join("analysis")),
         };
-        show(args, &source, &analysis, out.as_deref(), console)?;
+        show(args, &input, out.as_deref(), console)?;
     }
     Ok(())
 }
 
+/// What is shown and written.
+struct Analysed {
+    source: Source,
+    details: Details,
+    traces: Vec<Trace>,
+    analysis: Analysis,
+}
+
 fn show(
     args: &Args,
-    source: &Source,
-    analysis: &Analysis,
+    analysed: &Analysed,
     out: Option<&Path>,
     console: &mut Console,
 ) -> Result<(), Failure> {
+    let Analysed {
+        source,
+        details,
+        traces,
+        analysis,
+    } = analysed;
     if let Some(dir) = out {
-        write_tables(dir, &csv::tables(source, analysis))?;
+        let tables = csv::tables(source, analysis).into_iter();
+        let mut files: Vec<report::Output> = tables
+            .map(|t| report::Output {
+                name: t.name.to_owned(),
+                content: t.content.into_bytes(),
+            })
+            .collect();
+        files.extend(report::files(source, details, analysis, traces)?);
+        write_files(dir, &files)?;
+        report::clear_figures(dir, &files);
     }
     if args.json {
         return console.out(json::document(source, analysis));
@@ -115,7 +140,7 @@ fn show(
         console.out(page(source, analysis, set))?;
     }
     if let Some(dir) = out {
-        console.say(format!("tables: {}", dir.display()));
+        console.say(format!("report: {}", dir.join("report.html").display()));
     }
     Ok(())
 }
@@ -128,7 +153,7 @@ fn include(args: &Args) -> Include {
 }
 
 /// Somebody else's ratings, or our own table without its study.
-fn of_csv(path: &Path, args: &Args) -> Result<(Source, Analysis), Failure> {
+fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
     let name = path.display().to_string();
     let length = file.metadata().map_or(0, |m| m.len());
@@ -146,7 +171,15 @@ fn of_csv(path: &Path, args: &Args) -> Result<(Source, Analysis), Failure> {
         protocol_version: None,
         path: name,
     };
-    Ok((source, analyze(&ratings, &rules)))
+    Ok(Analysed {
+        source,
+        details: Details {
+            seed: Some(rules.seed),
+            ..Details::default()
+        },
+        traces: Vec::new(),
+        analysis: analyze(&ratings, &rules),
+    })
 }
 
 /// What a study's folder gives to the analysis.
@@ -160,7 +193,7 @@ struct StudyInput {
     participants: Vec<ParticipantRow>,
 }
 
-fn of_study(study: &StudyFolder, args: &Args) -> Result<(Source, Analysis), Failure> {
+fn of_study(study: &StudyFolder, args: &Args) -> Result<Analysed, Failure> {
     let input = study_input(study)?;
     let question = question(&input.protocol, args.question.as_deref())?;
     let mut ratings = Ratings::from_rows(&input.rows, &question);
@@ -190,7 +223,19 @@ fn of_study(study: &StudyFolder, args: &Args) -> Result<(Source, Analysis), Fail
         protocol_version: Some(input.protocol_version),
         path: study.path().display().to_string(),
     };
-    Ok((source, analyze(&ratings, &rules)))
+    let analysis = analyze(&ratings, &rules);
+    let written = !args.json || args.out.is_some();
+    Ok(Analysed {
+        source,
+        details: report::details(&input.protocol, study, &input.rows, question.as_str()),
+        // Telemetry is large: only for who looks at it.
+        traces: if written {
+            report::traces(study, &input.rows, &analysis)
+        } else {
+            Vec::new()
+        },
+        analysis,
+    })
 }
 
 /// The question that was asked for, or the primary one; it has to give numbers.
@@ -261,15 +306,20 @@ fn deviations(study: &StudyFolder) -> Result<Vec<String>, Failure> {
     Ok(said)
 }
 
-/// Each file as a whole or not at all.
-fn write_tables(dir: &Path, tables: &[csv::Table]) -> Result<(), Failure> {
-    fs::create_dir_all(dir).map_err(|e| Failure::file(dir, &e))?;
-    for table in tables {
-        let path = dir.join(table.name);
-        let part = dir.join(format!(".{}.{}.part", table.name, std::process::id()));
+/// Each file as a whole or not at all. Only tables and the report are synced:
+/// pictures can be made again at any time.
+fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
+    for item in [dir.to_owned(), dir.join("figures")] {
+        fs::create_dir_all(&item).map_err(|e| Failure::file(&item, &e))?;
+    }
+    for output in files {
+        let path = dir.join(&output.name);
+        let part = path.with_extension(format!("{}.part", std::process::id()));
         let written = File::create(&part).and_then(|mut file| {
-            file.write_all(table.content.as_bytes())?;
-            file.sync_data()?;
+            file.write_all(&output.content)?;
+            if !output.name.starts_with("figures/") {
+                file.sync_data()?;
+            }
             fs::rename(&part, &path)
         });
         if let Err(e) = written {

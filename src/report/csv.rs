@@ -28,19 +28,24 @@ pub fn tables(source: &Source, analysis: &Analysis) -> Vec<Table> {
 }
 
 fn table(name: &'static str, rows: Vec<Vec<String>>) -> Table {
+    Table {
+        name,
+        content: text(&rows),
+    }
+}
+
+/// Rows as CSV; all are equally long.
+pub(super) fn text(rows: &[Vec<String>]) -> String {
     let mut writer = csv::WriterBuilder::new()
         .terminator(csv::Terminator::CRLF)
         .from_writer(Vec::new());
-    for row in &rows {
+    for row in rows {
         writer
             .write_record(row)
             .expect("rows of a table are equally long and memory takes them");
     }
     let bytes = writer.into_inner().expect("memory takes them");
-    Table {
-        name,
-        content: String::from_utf8(bytes).expect("only text was written"),
-    }
+    String::from_utf8(bytes).expect("only text was written")
 }
 
 fn cells<const N: usize>(texts: [&str; N]) -> Vec<String> {

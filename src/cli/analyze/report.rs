@@ -1,0 +1,244 @@
+//! What the report says beyond the analysis, and its files.
+
+use super::super::{Failure, Kind};
+use crate::analyze::Analysis;
+use crate::outcome::{RatingRow, Status};
+use crate::protocol::{Order, Protocol, QuestionKind};
+use crate::report::Source;
+use crate::report::figures::{self, Drawn, Trace};
+use crate::report::html::{self, Details};
+use crate::report::png::{Painter, PngError};
+use crate::store::{StudyFolder, layout};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Samples of a playback that are read.
+const MAX_SAMPLES: usize = 200_000;
+
+/// Playbacks of a realization that are shown.
+const MAX_TRACES: usize = 3;
+
+/// A file of `analysis/`.
+pub(super) struct Output {
+    /// Relative to the folder.
+    pub(super) name: String,
+    pub(super) content: Vec<u8>,
+}
+
+/// The report and the figures' files.
+pub(super) fn files(
+    source: &Source,
+    details: &Details,
+    analysis: &Analysis,
+    traces: &[Trace],
+) -> Result<Vec<Output>, Failure> {
+    let drawn = figures::all(analysis, traces);
+    let mut files = vec![Output {
+        name: "report.html".to_owned(),
+        content: html::document(source, details, analysis, &drawn).into_bytes(),
+    }];
+    let pictures = pictures(&drawn).map_err(|e| Failure::new(Kind::Bug, e))?;
+    for (figure, (svg, png)) in drawn.into_iter().zip(pictures) {
+        let mut add = |ending: &str, content: Vec<u8>| {
+            files.push(Output {
+                name: format!("figures/{}.{ending}", figure.name),
+                content,
+            });
+        };
+        add("svg", svg.into_bytes());
+        add("png", png);
+        add("csv", figure.data.clone().into_bytes());
+    }
+    Ok(files)
+}
+
+/// SVG and PNG of each figure. Threads take figures as they are free; each
+/// figure is drawn by one of them, so that their number changes no byte.
+fn pictures(drawn: &[Drawn]) -> Result<Vec<(String, Vec<u8>)>, PngError> {
+    let painter = Painter::default();
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(BTreeMap::new());
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(drawn.len()) {
+            scope.spawn(|| {
+                while let Some(figure) = drawn.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let svg = figure.wide.to_svg();
+                    let made = painter.png(&svg).map(|png| (svg, png));
+                    done.lock()
+                        .expect("no thread panics while it holds the lock")
+                        .insert(figure.name, made);
+                }
+            });
+        }
+    });
+    let mut done = done
+        .into_inner()
+        .expect("no thread panics while it holds the lock");
+    let own = drawn.iter().filter_map(|f| done.remove(f.name));
+    own.collect()
+}
+
+/// What the study's folder says beyond its ratings.
+pub(super) fn details(
+    protocol: &Protocol,
+    study: &StudyFolder,
+    rows: &[RatingRow],
+    question: &str,
+) -> Details {
+    let asked = protocol
+        .questions
+        .iter()
+        .find(|q| q.id.as_str() == question);
+    let labels = match asked.map(|q| &q.kind) {
+        Some(QuestionKind::Rating { labels, .. }) => {
+            let all = labels.iter();
+            all.map(|(at, l)| (*at as f64, l.clone())).collect()
+        }
+        _ => Vec::new(),
+    };
+    let some = |name: &str, value: &Option<String>| {
+        let value = value.clone()?;
+        Some((name.to_owned(), value))
+    };
+    let s = &protocol.study;
+    let mut facts: Vec<(String, String)> = [
+        some("ethics", &s.ethics),
+        some("contact", &s.contact),
+        some("funding", &s.funding),
+        some("license of the data", &s.license),
+        some("doi", &s.doi),
+        some("VAF on recording", &protocol.analysis.vaf),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    if let Some(u) = &protocol.device.uncertified {
+        facts.push(("uncertified tables played".to_owned(), u.reason.clone()));
+    }
+    let tools: BTreeSet<&str> = rows.iter().map(|r| r.tool_version.as_str()).collect();
+    let manifest = study.manifest();
+    let prints = &manifest.newest().fingerprints;
+    Details {
+        lang: protocol.text.lang.clone(),
+        authors: s.authors.clone(),
+        prompt: asked.map(|q| q.prompt.clone()),
+        labels,
+        facts,
+        repetitions: Some(protocol.design.repetitions),
+        order: Some(order(&protocol.design.order).to_owned()),
+        reference: protocol.trial.reference.clone(),
+        device: Some(protocol.device.kind.as_str().to_owned()),
+        seed: Some(s.seed),
+        tools: tools
+            .into_iter()
+            .filter(|t| !t.is_empty())
+            .map(str::to_owned)
+            .collect(),
+        fingerprints: vec![
+            ("stimulus".to_owned(), prints.stimulus.clone()),
+            ("wording".to_owned(), prints.wording.clone()),
+            ("analysis".to_owned(), prints.analysis.clone()),
+        ],
+        versions: manifest
+            .versions
+            .iter()
+            .map(|v| (v.version, v.at.to_rfc3339(), v.reason.clone()))
+            .collect(),
+    }
+}
+
+fn order(order: &Order) -> &'static str {
+    match order {
+        Order::Blocked => "random within blocks that hold each realization once",
+        Order::Shuffled => "one random order of all trials",
+        Order::Williams => "taken from a Williams design, balanced for first-order carry-over",
+        Order::LatinSquare => "taken from a cyclic Latin square",
+        Order::Fixed => "the same in every repetition",
+        Order::File(_) => "read from a file that was made beforehand",
+    }
+}
+
+/// Force against position of some playbacks that count: the first of each
+/// realization by up to three participants. A file that cannot be read is
+/// passed over: it is a picture, and `study verify` tells what is damaged.
+pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysis) -> Vec<Trace> {
+    let counts: BTreeSet<(&str, &str, u32)> = analysis
+        .rows
+        .iter()
+        .filter(|r| r.excluded.is_none())
+        .map(|r| (&*r.subject, &*r.model, r.repetition))
+        .collect();
+    let mut shown: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    let mut found = Vec::new();
+    for row in rows
+        .iter()
+        .filter(|r| !r.practice && r.status == Status::Ok)
+    {
+        let (model, who) = (row.model.as_str(), row.participant.as_str());
+        let own = shown.entry(model).or_default();
+        let enough = own.len() >= MAX_TRACES || own.contains(who);
+        if enough || !counts.contains(&(who, model, row.repetition)) {
+            continue;
+        }
+        let Some(attempt) = row.attempt else { continue };
+        let path = layout::session(study.path(), &row.participant, row.session)
+            .join(layout::TELEMETRY)
+            .join(layout::telemetry(row.trial, attempt, 1));
+        if let Some((points, measured)) = trace(&path) {
+            own.insert(who);
+            found.push(Trace {
+                model: model.to_owned(),
+                label: format!("{who} trial {}", row.trial),
+                measured,
+                points,
+            });
+        }
+    }
+    found
+}
+
+/// Position and force of a telemetry file, and whether the force was measured.
+fn trace(path: &Path) -> Option<(Vec<(f64, f64)>, bool)> {
+    let mut reader = csv::Reader::from_reader(BufReader::new(File::open(path).ok()?));
+    let head = reader.headers().ok()?.clone();
+    let column = |name: &str| head.iter().position(|h| h == name);
+    let (x, command) = (column("x_mm")?, column("force_command_n")?);
+    let measured = column("force_measured_n");
+    let mut points = Vec::new();
+    let mut all_measured = measured.is_some();
+    let mut record = csv::StringRecord::new();
+    while points.len() < MAX_SAMPLES && matches!(reader.read_record(&mut record), Ok(true)) {
+        let number = |at: usize| record.get(at).and_then(|t| t.parse::<f64>().ok());
+        let force = measured.and_then(number);
+        all_measured &= force.is_some();
+        if let (Some(x), Some(force)) = (number(x), force.or_else(|| number(command))) {
+            points.push((x, force));
+        }
+    }
+    (points.len() > 1).then_some((points, all_measured))
+}
+
+/// Removes pictures of an earlier analysis that this one did not draw again.
+pub(super) fn clear_figures(dir: &Path, files: &[Output]) {
+    let Ok(items) = fs::read_dir(dir.join("figures")) else {
+        return;
+    };
+    for item in items.flatten() {
+        let name = format!("figures/{}", item.file_name().to_string_lossy());
+        let ours = [".svg", ".png", ".csv"].iter().any(|e| name.ends_with(e));
+        if ours
+            && !files.iter().any(|f| f.name == name)
+            && figures::NAMES
+                .iter()
+                .any(|n| name.starts_with(&format!("figures/{n}.")))
+        {
+            // A stale picture that stays is no reason to fail.
+            let _ = fs::remove_file(item.path());
+        }
+    }
+}

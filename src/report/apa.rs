@@ -1,0 +1,108 @@
+//! Numbers as journals of the field print them: a real minus, no zero before
+//! the point where a number cannot exceed 1, p down to "< .001".
+
+/// So many decimals, with a minus that is one; very large and very small ones
+/// as powers of ten.
+pub(super) fn number(x: f64, decimals: usize) -> String {
+    let size = x.abs();
+    let shown = if size >= 1e7 || (size > 0.0 && size < 1e-5) {
+        format!("{x:.2e}")
+    } else {
+        format!("{x:.decimals$}")
+    };
+    let zero = !shown.chars().any(|c| ('1'..='9').contains(&c));
+    match shown.strip_prefix('-') {
+        Some(rest) if zero => rest.to_owned(),
+        _ => shown.replace('-', "−"),
+    }
+}
+
+/// What lies between −1 and 1: no zero before the point.
+pub(super) fn share(x: f64, decimals: usize) -> String {
+    let shown = number(x, decimals);
+    match (shown.strip_prefix("0."), shown.strip_prefix("−0.")) {
+        (Some(rest), _) => format!(".{rest}"),
+        (_, Some(rest)) => format!("−.{rest}"),
+        _ => shown,
+    }
+}
+
+/// A correlation.
+pub(super) fn r(x: f64) -> String {
+    share(x, 3)
+}
+
+/// `p = .023` without its letter.
+pub(super) fn equals_p(x: f64) -> String {
+    if x < 0.0005 {
+        "< .001".to_owned()
+    } else {
+        format!("= {}", p(x))
+    }
+}
+
+/// A probability alone.
+pub(super) fn p(x: f64) -> String {
+    if x < 0.0005 {
+        "< .001".to_owned()
+    } else if x >= 0.9995 {
+        "1".to_owned()
+    } else {
+        share(x, 3)
+    }
+}
+
+/// `[low, high]`.
+pub(super) fn interval(low: f64, high: f64, one: impl Fn(f64) -> String) -> String {
+    format!("[{}, {}]", one(low), one(high))
+}
+
+/// A share in per cent, whole.
+pub(super) fn percent(x: f64) -> String {
+    format!("{} %", number(100.0 * x, 0))
+}
+
+/// As many digits as a reader of a table wants.
+pub(super) fn plain(x: f64) -> String {
+    if x.fract() == 0.0 && x.abs() < 1e7 {
+        number(x, 0)
+    } else {
+        let decimals = match x.abs() {
+            a if a >= 1000.0 => 1,
+            a if a >= 1.0 => 3,
+            _ => 4,
+        };
+        number(x, decimals)
+    }
+}
+
+/// `one` or so many `many`.
+pub(super) fn counted(n: usize, one: &str, many: &str) -> String {
+    if n == 1 {
+        format!("1 {one}")
+    } else {
+        format!("{n} {many}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_as_in_print() {
+        assert_eq!(r(0.97436), ".974");
+        assert_eq!(r(-0.5), "−.500");
+        assert_eq!(r(-0.0001), ".000");
+        assert_eq!(r(1.0), "1.000");
+        assert_eq!(equals_p(1.0 / 120.0), "= .008");
+        assert_eq!(equals_p(0.0004), "< .001");
+        assert_eq!(equals_p(1.0), "= 1");
+        assert_eq!(number(-0.001, 2), "0.00");
+        assert_eq!(number(-3.14159, 2), "−3.14");
+        assert_eq!(number(1.5e300, 2), "1.50e300");
+        assert_eq!(percent(0.565), "56 %");
+        assert_eq!(plain(30.0), "30");
+        assert_eq!(plain(0.12345), "0.1235");
+    }
+}

@@ -1,0 +1,233 @@
+//! Means of the realizations: Fig. 10, Fig. 11, and the mean against VAF.
+
+use super::{Canvas, Drawn, Scene, cell, drawn, head};
+use crate::report::apa;
+use crate::report::svg::{Anchor, Axis, Colour, Figure, Look, Mark, Note, Panel, Whisker};
+use crate::report::svg::{PALETTE, SMALL, shortened, text_width};
+
+/// Mean and its deviation, by realization: (place, mean, half).
+fn deviations(scene: &Scene<'_>) -> Vec<(f64, f64, f64)> {
+    let each = scene.models.iter().enumerate();
+    each.filter_map(|(i, m)| {
+        let mean = scene.number(&m.id, "mean")?;
+        Some((i as f64, mean, scene.number(&m.id, "sd").unwrap_or(0.0)))
+    })
+    .collect()
+}
+
+fn rating_panel(scene: &Scene<'_>, x_label: &str) -> Panel {
+    let means = deviations(scene);
+    let beyond: Vec<f64> = means.iter().flat_map(|m| [m.1 - m.2, m.1 + m.2]).collect();
+    let label = format!("{}, mean ± SD", scene.asked);
+    let look = Look::plain(PALETTE[0]);
+    let bars = means.iter().filter(|m| m.2 > 0.0).map(|m| Whisker {
+        at: m.0,
+        low: m.1 - m.2,
+        high: m.1 + m.2,
+    });
+    Panel::new(
+        Axis::of_names(x_label, &scene.names()),
+        scene.ratings(&label, &beyond),
+    )
+    .with(look, Mark::ErrorBars(bars.collect()))
+    .with(
+        look.size(9.0),
+        Mark::Points(means.iter().map(|m| (m.0, m.1)).collect()),
+    )
+}
+
+pub(super) fn fig10(scene: &Scene<'_>) -> Option<Drawn> {
+    if !scene.drawable() || deviations(scene).is_empty() {
+        return None;
+    }
+    let mut data = vec![head(["model", "n", "mean", "sd"])];
+    for m in &scene.models {
+        let mut row = vec![m.id.clone()];
+        row.extend(["n", "mean", "sd"].map(|s| cell(scene.number(&m.id, s))));
+        data.push(row);
+    }
+    let caption = format!(
+        "Mean {} of each realization. Error bars: one standard deviation over all of its ratings \
+         (n − 1), as in Fig. 10 of the paper.",
+        scene.asked
+    );
+    let title = format!("Mean {} by realization", scene.asked);
+    Some(drawn("fig10-means", caption, data, |c: Canvas| {
+        c.figure("fig10-means", &title, c.pick(300.0, 280.0))
+            .with(rating_panel(scene, "realization"))
+    }))
+}
+
+pub(super) fn fig11(scene: &Scene<'_>) -> Option<Drawn> {
+    let vaf: Vec<(f64, f64)> = scene
+        .models
+        .iter()
+        .enumerate()
+        .filter_map(|(i, m)| Some((i as f64, m.vaf?)))
+        .collect();
+    if !scene.drawable() || vaf.is_empty() || deviations(scene).is_empty() {
+        return None;
+    }
+    let mut data = vec![head(["model", "mean", "sd", "vaf"])];
+    for m in &scene.models {
+        let mut row = vec![m.id.clone()];
+        row.extend(["mean", "sd"].map(|s| cell(scene.number(&m.id, s))));
+        row.push(cell(m.vaf));
+        data.push(row);
+    }
+    let caption = format!(
+        "Mean {} (above) and variance accounted for on the validation recording (below) of each \
+         realization, as in Fig. 11 of the paper.",
+        scene.asked
+    );
+    let title = format!("{} and VAF by realization", scene.asked);
+    Some(drawn("fig11-rating-and-vaf", caption, data, |c: Canvas| {
+        let mut above = rating_panel(scene, "");
+        above.x = above.x.bare();
+        above.share = 1.1;
+        let axis = Axis::around("VAF", vaf.iter().map(|v| v.1));
+        let names = Axis::of_names("realization", &scene.names());
+        let look = Look::nth(1).size(9.0);
+        let below = Panel::new(names, axis).with(look, Mark::Points(vaf.clone()));
+        c.figure("fig11-rating-and-vaf", &title, c.pick(440.0, 420.0))
+            .with(above)
+            .with(below)
+    }))
+}
+
+/// A realization on the plane of VAF and rating.
+struct Dot {
+    nth: usize,
+    vaf: f64,
+    mean: f64,
+    ends: Option<(f64, f64)>,
+}
+
+pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
+    let each = scene.models.iter().enumerate();
+    let dots: Vec<Dot> = each
+        .filter_map(|(nth, m)| {
+            let get = |what: &str| scene.number(&m.id, &format!("subject_mean/{what}"));
+            Some(Dot {
+                nth,
+                vaf: m.vaf?,
+                mean: get("mean")?,
+                ends: get("ci95_lo").zip(get("ci95_hi")),
+            })
+        })
+        .collect();
+    if !scene.drawable() || dots.len() < 2 {
+        return None;
+    }
+    let mut data = vec![head(["model", "vaf", "mean", "ci95_lo", "ci95_hi"])];
+    for d in &dots {
+        data.push(vec![
+            scene.models[d.nth].id.clone(),
+            d.vaf.to_string(),
+            d.mean.to_string(),
+            cell(d.ends.map(|e| e.0)),
+            cell(d.ends.map(|e| e.1)),
+        ]);
+    }
+    let v = &scene.a.values;
+    let found = v.number("corr/pearson/r").map_or_else(String::new, |r| {
+        let p = v
+            .number("corr/pearson/p_exact_two_sided")
+            .or_else(|| v.number("corr/pearson/p_monte_carlo_two_sided"));
+        let p = p.map_or_else(String::new, |p| {
+            format!(", permutation p {}", apa::equals_p(p))
+        });
+        format!(" Over the test realizations r = {}{p}.", apa::r(r))
+    });
+    let caption = format!(
+        "Mean {} over subjects against VAF. Error bars: 95 % t intervals over subjects; they hold \
+         for these realizations and say nothing about others.{found}",
+        scene.asked
+    );
+    let title = format!("Mean {} against VAF", scene.asked);
+    Some(drawn("rating-against-vaf", caption, data, |c: Canvas| {
+        plane(scene, &dots, &title, c)
+    }))
+}
+
+fn plane(scene: &Scene<'_>, dots: &[Dot], title: &str, c: Canvas) -> Figure {
+    let beyond: Vec<f64> = dots
+        .iter()
+        .flat_map(|d| {
+            let (low, high) = d.ends.unwrap_or((d.mean, d.mean));
+            [low, high, d.mean]
+        })
+        .collect();
+    let label = format!("{}, mean [95 %]", scene.asked);
+    let height = c.pick(360.0, 320.0);
+    let mut panel = Panel::new(
+        Axis::around("VAF", dots.iter().map(|d| d.vaf)),
+        scene.ratings(&label, &beyond),
+    );
+    for d in dots {
+        let look = scene.look(d.nth);
+        if let Some((low, high)) = d.ends {
+            let at = d.vaf;
+            let bar = Mark::ErrorBars(vec![Whisker { at, low, high }]);
+            panel = panel.with(look, bar);
+        }
+        panel = panel.with(look.size(10.0), Mark::Points(vec![(d.vaf, d.mean)]));
+    }
+    // About what is left of the figure for the axes.
+    let room = (c.width - 70.0, height - 60.0);
+    panel.notes = labels(scene, dots, &panel, room);
+    c.figure("rating-against-vaf", title, height).with(panel)
+}
+
+/// Names beside the dots, where they cover no other name and no other bar.
+fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> Vec<Note> {
+    let place = |x: f64, y: f64| {
+        let share = |v: f64, axis: &Axis| (v - axis.low) / (axis.high - axis.low);
+        (
+            share(x, &panel.x) * room.0,
+            (1.0 - share(y, &panel.y)) * room.1,
+        )
+    };
+    type Box = (f64, f64, f64, f64);
+    let apart = |a: &Box, b: &Box| a.2 < b.0 || b.2 < a.0 || a.3 < b.1 || b.3 < a.1;
+    let mut taken: Vec<Box> = Vec::new();
+    for d in dots {
+        let (x, y) = place(d.vaf, d.mean);
+        taken.push((x - 5.0, y - 5.0, x + 5.0, y + 5.0));
+        if let Some((low, high)) = d.ends {
+            let (top, bottom) = (place(d.vaf, high).1, place(d.vaf, low).1);
+            taken.push((x - 3.0, top, x + 3.0, bottom));
+        }
+    }
+    let mut notes = Vec::new();
+    for d in dots {
+        let text = shortened(&scene.models[d.nth].id, 20);
+        let (x, y) = place(d.vaf, d.mean);
+        let width = text_width(&text, SMALL);
+        let mut candidates = Vec::new();
+        for down in [0.0, -14.0, 14.0, -28.0, 28.0, -42.0, 42.0] {
+            candidates.push((Anchor::Start, 9.0, down));
+            candidates.push((Anchor::End, -9.0, down));
+        }
+        let boxed = |c: &(Anchor, f64, f64)| -> Box {
+            let left = if c.0 == Anchor::Start {
+                x + c.1
+            } else {
+                x + c.1 - width
+            };
+            (left, y + c.2 - 7.0, left + width, y + c.2 + 7.0)
+        };
+        let free = |c: &&(Anchor, f64, f64)| {
+            let own = boxed(c);
+            own.0 >= 0.0 && own.2 <= room.0 && taken.iter().all(|t| apart(t, &own))
+        };
+        let best = candidates.iter().find(free).unwrap_or(&candidates[0]);
+        taken.push(boxed(best));
+        let mut note = Note::new((d.vaf, d.mean), &text)
+            .moved(best.1, best.2)
+            .anchored(best.0);
+        note.colour = Colour::INK;
+        notes.push(note);
+    }
+    notes
+}

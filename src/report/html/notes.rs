@@ -1,0 +1,164 @@
+//! What a reader has to know: banners, warnings, exclusions, comments, versions.
+
+use super::tables::MAX_ROWS;
+use super::{Details, lines, safe};
+use crate::analyze::{Analysis, Said};
+use crate::report::{Source, apa};
+use maud::{Markup, html};
+
+/// Warnings that stand at the top.
+const AT_THE_TOP: [&str; 3] = ["no-participants", "mixed", "interim"];
+
+pub(super) fn banners(a: &Analysis) -> Markup {
+    let title = |code: &str| match code {
+        "no-participants" if a.counts.simulated > 0 && a.counts.pilots == 0 => {
+            "SIMULATED – NO PARTICIPANTS"
+        }
+        "no-participants" => "NO PARTICIPANTS",
+        "mixed" => "PILOTS OR SIMULATED PARTICIPANTS AMONG THE DATA",
+        _ => "INTERIM",
+    };
+    html! {
+        @for w in a.warnings.iter().filter(|w| AT_THE_TOP.contains(&w.code)) {
+            div.banner role="note" { b { (title(w.code)) } (safe(&w.text)) "." }
+        }
+        @let others: Vec<_> = a.warnings.iter().filter(|w| !AT_THE_TOP.contains(&w.code)).collect();
+        @if !others.is_empty() {
+            details open {
+                summary { (apa::counted(others.len(), "thing", "things")) " to know before believing a number" }
+                ul { @for w in others { li { (safe(&w.text)) "." } } }
+            }
+        }
+    }
+}
+
+pub(super) fn exclusions(a: &Analysis) -> Markup {
+    let c = &a.counts;
+    let facts: Vec<(&str, usize)> = [
+        ("rows, practice not counted", c.rows),
+        ("ratings analysed", c.rated),
+        ("failed for good", c.failed),
+        ("declined", c.declined),
+        ("missing", c.missing),
+        ("corrected", c.corrected),
+        ("after a failed attempt", c.repeated),
+        ("practice", c.practice),
+    ]
+    .into_iter()
+    .collect();
+    let left_out: Vec<_> = a.rows.iter().filter(|r| r.excluded.is_some()).collect();
+    html! {
+        section {
+            h2 { "What was counted and left out" }
+            dl { @for (what, n) in facts { dt { (what) } dd { (n) } } }
+            @if c.excluded.is_empty() {
+                p { "No row was excluded." }
+            } @else {
+                p { (apa::counted(c.excluded_participants, "participant has", "participants have")) " rows that do not count:" }
+                ul {
+                    @for (reason, n) in &c.excluded {
+                        li { (safe(reason)) ": " (apa::counted(*n, "row", "rows")) }
+                    }
+                }
+                details {
+                    summary { "The rows that do not count" }
+                    div.scroll {
+                        table {
+                            thead { tr {
+                                th { "subject" } th { "realization" } th { "repetition" } th { "rating" } th.text { "reason" }
+                            } }
+                            tbody {
+                                @for r in left_out.iter().take(MAX_ROWS) {
+                                    tr {
+                                        td { (safe(&r.subject)) }
+                                        td { (safe(&r.model)) }
+                                        td { (r.repetition) }
+                                        td { (r.rating.map_or_else(|| "–".to_owned(), apa::plain)) }
+                                        td.text { (safe(&r.excluded.as_ref().map(ToString::to_string).unwrap_or_default())) }
+                                    }
+                                }
+                            }
+                        }
+                    }
+                    @if left_out.len() > MAX_ROWS {
+                        p.note { (left_out.len() - MAX_ROWS) " more are in excluded.csv." }
+                    }
+                }
+            }
+        }
+    }
+}
+
+pub(super) fn comments(a: &Analysis, lang: Option<&str>) -> Markup {
+    html! {
+        @if !a.comments.is_empty() {
+            section {
+                h2 { "Comments" }
+                p.note { "As typed. What would steer a terminal or turn the direction of text is shown as its code." }
+                @for group in a.comments.chunk_by(|x, y| x.model == y.model) {
+                    (of_one(a, group, lang))
+                }
+            }
+        }
+    }
+}
+
+fn of_one(a: &Analysis, group: &[Said], lang: Option<&str>) -> Markup {
+    let mean = a.values.number(&format!("desc/{}/mean", group[0].model));
+    html! {
+        @let model = if group[0].model.is_empty() { "no realization" } else { &group[0].model };
+        details open {
+            summary {
+                (safe(model))
+                @if let Some(mean) = mean { ", mean " (apa::number(mean, 2)) }
+                " (" (group.len()) ")"
+            }
+            @for c in group.iter().take(MAX_ROWS) {
+                blockquote {
+                    span.who {
+                        (safe(&c.subject)) ", repetition " (c.repetition)
+                        @if c.question != "comment" { ", " (safe(&c.question)) }
+                    }
+                    span lang=[lang] dir="auto" { (lines(&c.text)) }
+                }
+            }
+            @if group.len() > MAX_ROWS {
+                p.note { (group.len() - MAX_ROWS) " more are in comments.csv." }
+            }
+        }
+    }
+}
+
+pub(super) fn provenance(source: &Source, d: &Details, a: &Analysis) -> Markup {
+    html! {
+        section {
+            h2 { "Where this comes from" }
+            dl {
+                dt { "analysed with" } dd { "study " (env!("CARGO_PKG_VERSION")) }
+                @if let Some(id) = &source.study { dt { "study" } dd { (safe(id)) } }
+                dt { "read from" } dd { code { (safe(&source.path)) } }
+                dt { "question" } dd { (safe(&a.question)) }
+                @if let Some(seed) = d.seed { dt { "seed" } dd { (seed) } }
+                @if !d.tools.is_empty() { dt { "sessions run with" } dd { "study " (safe(&d.tools.join(", "))) } }
+                @if let Some(kind) = &d.device { dt { "device" } dd { (safe(kind)) } }
+                @for (name, value) in &d.facts { dt { (safe(name)) } dd { (safe(value)) } }
+                @for (name, value) in &d.fingerprints {
+                    dt { "fingerprint: " (safe(name)) } dd { code { (safe(value)) } }
+                }
+            }
+            @if !d.versions.is_empty() {
+                details open[d.versions.len() > 1] {
+                    summary { "Versions of the protocol" }
+                    ul {
+                        @for (number, at, why) in &d.versions {
+                            li { (number) ": " (safe(at)) @if !why.is_empty() { ", " (safe(why)) } }
+                        }
+                    }
+                    @if d.versions.len() > 1 {
+                        p.note { "Every version after the first is a deviation from what was stated before the data." }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! Tables that a reader looks for first.
+
+use super::{answers, safe};
+use crate::analyze::{Analysis, Listed, Value};
+use crate::report::apa;
+use maud::{Markup, html};
+
+/// Most rows of a table; the rest is in the CSV.
+pub(super) const MAX_ROWS: usize = 200;
+
+/// A table: head, rows, and which of them stand beside the others.
+struct Table {
+    caption: String,
+    head: Vec<String>,
+    rows: Vec<(bool, Vec<String>)>,
+    /// Rows that are left out.
+    more: usize,
+}
+
+impl Table {
+    fn new(caption: &str, head: &[&str]) -> Self {
+        Self {
+            caption: caption.to_owned(),
+            head: head.iter().map(|h| (*h).to_owned()).collect(),
+            rows: Vec::new(),
+            more: 0,
+        }
+    }
+
+    fn row(&mut self, beside: bool, cells: Vec<String>) {
+        if self.rows.len() < MAX_ROWS {
+            self.rows.push((beside, cells));
+        } else {
+            self.more += 1;
+        }
+    }
+
+    fn render(&self) -> Markup {
+        html! {
+            @if !self.rows.is_empty() {
+                div.scroll tabindex="0" role="region" aria-label=(self.caption) {
+                    table {
+                        caption { (self.caption) }
+                        thead { tr { @for h in &self.head { th scope="col" { (safe(h)) } } } }
+                        tbody {
+                            @for (beside, cells) in &self.rows {
+                                tr.beside[*beside] { @for c in cells { td { (safe(c)) } } }
+                            }
+                        }
+                    }
+                }
+                @if self.more > 0 {
+                    p.note { (self.more) " more rows are in the CSV file." }
+                }
+            }
+        }
+    }
+}
+
+pub(super) fn section(a: &Analysis) -> Markup {
+    html! {
+        section {
+            h2 { "Tables" }
+            (realizations(a).render())
+            p.note {
+                "mean, SD and median are over all ratings of a realization, SD with n − 1; the interval is \
+                 a 95 % t interval over subjects. Realizations in italics stand beside the tested ones."
+            }
+            (pairs(a).render())
+            (shares(a).render())
+            (agreement(a).render())
+            (with_and_without(a).render())
+            (subjects(a).render())
+        }
+    }
+}
+
+fn show(x: Option<f64>, decimals: usize) -> String {
+    x.map_or_else(|| "–".to_owned(), |x| apa::number(x, decimals))
+}
+
+fn role(m: &Listed) -> String {
+    match &m.duplicate_of {
+        Some(of) => format!("repeats {of}"),
+        None => m.role.as_str().to_owned(),
+    }
+}
+
+fn realizations(a: &Analysis) -> Table {
+    let v = &a.values;
+    let share = a.realistic_from.map(|f| format!("≥ {f}"));
+    let mut head = vec![
+        "realization",
+        "role",
+        "VAF",
+        "n",
+        "mean",
+        "SD",
+        "median",
+        "95 % CI",
+    ];
+    head.extend(share.as_deref());
+    let mut table = Table::new("Ratings by realization", &head);
+    let tests = answers::tests(a);
+    let beside = |m: &Listed| !tests.iter().any(|t| t.id == m.id);
+    let mut listed: Vec<&Listed> = a.realizations.iter().collect();
+    listed.sort_by_key(|m| beside(m));
+    for m in listed {
+        let get = |what: &str| v.number(&format!("desc/{}/{what}", m.id));
+        let ends = get("subject_mean/ci95_lo").zip(get("subject_mean/ci95_hi"));
+        let mut row = vec![
+            m.id.clone(),
+            role(m),
+            m.vaf.map_or_else(|| "–".to_owned(), |v| apa::share(v, 3)),
+            show(get("n"), 0),
+            show(get("mean"), 3),
+            show(get("sd"), 3),
+            show(get("median"), 1),
+            ends.map_or_else(
+                || "–".to_owned(),
+                |(l, h)| apa::interval(l, h, |x| apa::number(x, 2)),
+            ),
+        ];
+        if share.is_some() {
+            let s = v.number(&format!("realistic/{}/share", m.id));
+            row.push(s.map_or_else(|| "–".to_owned(), apa::percent));
+        }
+        table.row(beside(m), row);
+    }
+    table
+}
+
+fn pairs(a: &Analysis) -> Table {
+    let head = [
+        "pair (a minus b)",
+        "difference",
+        "dz",
+        "t",
+        "p (t, Holm)",
+        "p (Wilcoxon, Holm)",
+    ];
+    let mut table = Table::new("Pairs of realizations", &head);
+    let v = &a.values;
+    let ids = v.iter().filter_map(|(id, _)| {
+        let pair = id.strip_prefix("posthoc/")?.strip_suffix("/mean_diff")?;
+        Some(pair.to_owned())
+    });
+    for pair in ids {
+        let get = |what: &str| v.number(&format!("posthoc/{pair}/{what}"));
+        let p = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), apa::p);
+        table.row(
+            false,
+            vec![
+                pair.replace('|', " − "),
+                show(get("mean_diff"), 3),
+                show(get("dz"), 2),
+                show(get("t"), 2),
+                p(get("p_t_holm")),
+                p(get("p_wilcoxon_exact_holm")),
+            ],
+        );
+    }
+    table
+}
+
+fn shares(a: &Analysis) -> Table {
+    let mut table = Table::new("Shares of variance", &["of", "share"]);
+    for (name, share) in answers::shares(a) {
+        table.row(false, vec![name.to_owned(), apa::percent(share)]);
+    }
+    table
+}
+
+fn agreement(a: &Analysis) -> Table {
+    let mut table = Table::new("Agreement", &["coefficient", "value", "95 % CI"]);
+    let v = &a.values;
+    for (id, what) in [
+        ("icc_subjects/ICC2", "subjects, one: ICC(2,1)"),
+        ("icc_subjects/ICC2k", "subjects, their mean: ICC(2,k)"),
+        ("icc_repetitions/ICC1", "repetitions, one: ICC(1,1)"),
+        (
+            "krippendorff_subjects/ordinal",
+            "subjects: Krippendorff’s α, ordinal",
+        ),
+        (
+            "krippendorff_repetitions/ordinal",
+            "repetitions: Krippendorff’s α, ordinal",
+        ),
+    ] {
+        let Some(x) = v.number(id) else { continue };
+        let ends = v
+            .number(&format!("{id}/lo"))
+            .zip(v.number(&format!("{id}/hi")));
+        let ends = ends.map_or_else(
+            || "–".to_owned(),
+            |(l, h)| apa::interval(l, h, |x| apa::share(x, 2)),
+        );
+        table.row(false, vec![what.to_owned(), apa::share(x, 3), ends]);
+    }
+    for (id, what) in [
+        ("desc_all/within_cell_sd", "SD within cells"),
+        (
+            "desc_all/repeatability_coefficient",
+            "repeatability coefficient (1.96 √2 SD)",
+        ),
+    ] {
+        if let Some(x) = v.number(id) {
+            table.row(
+                false,
+                vec![what.to_owned(), apa::number(x, 3), "–".to_owned()],
+            );
+        }
+    }
+    table
+}
+
+/// The headline with the exclusions and without them.
+fn with_and_without(a: &Analysis) -> Table {
+    let head = ["statistic", "with the exclusions", "without them"];
+    let mut table = Table::new("The headline with and without the exclusions", &head);
+    let v = &a.values;
+    for (id, value) in v.iter() {
+        let Some(own) = id.strip_prefix("before_exclusion/") else {
+            continue;
+        };
+        let shown =
+            own.starts_with("corr/") || own.starts_with("rmanova/") || own.ends_with("/mean");
+        if let (true, Value::Number(before)) = (shown, value) {
+            let with = v.number(own).map_or_else(|| "–".to_owned(), apa::plain);
+            table.row(false, vec![own.to_owned(), with, apa::plain(*before)]);
+        }
+    }
+    table
+}
+
+fn subjects(a: &Analysis) -> Table {
+    let head = [
+        "subject",
+        "n",
+        "mean",
+        "SD",
+        "distinct",
+        "longest run",
+        "SD within cells",
+        "r with the others",
+        "r with VAF",
+    ];
+    let mut table = Table::new("Subjects: flagged, never dropped", &head);
+    let v = &a.values;
+    let mut names: Vec<&str> = a
+        .rows
+        .iter()
+        .filter(|r| r.excluded.is_none())
+        .map(|r| &*r.subject)
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    for s in names {
+        let get = |what: &str| v.number(&format!("subject/{s}/{what}"));
+        let r = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| apa::share(x, 2));
+        table.row(
+            false,
+            vec![
+                s.to_owned(),
+                show(get("n"), 0),
+                show(get("mean"), 2),
+                show(get("sd"), 2),
+                show(get("distinct"), 0),
+                show(get("longest_run"), 0),
+                show(get("within_cell_sd"), 2),
+                r(get("leave_one_out_r")),
+                r(v.number(&format!("subject_corr/{s}/r"))),
+            ],
+        );
+    }
+    table
+}
