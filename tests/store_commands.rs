@@ -90,6 +90,50 @@ fn verify_is_content_until_a_bit_flips() {
 }
 
 #[test]
+fn analyze_and_status_warn_of_a_damaged_journal_and_an_altered_protocol() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    for command in ["status", "analyze"] {
+        study_command()
+            .arg(command)
+            .arg(results.path())
+            .assert()
+            .success()
+            .stderr(predicate::str::contains("warning").not());
+    }
+    let journal = folder.join("sessions/P01/1/journal.jsonl");
+    let mut bytes = std::fs::read(&journal).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&journal, bytes).unwrap();
+    let frozen = folder.join("protocol/1/protocol.toml");
+    let text = std::fs::read_to_string(&frozen).unwrap();
+    std::fs::write(&frozen, text.replace("realistic", "plausible")).unwrap();
+    let journal = predicate::str::contains("sessions/P01/1: journal.jsonl, line");
+    let protocol = predicate::str::contains("protocol/1/protocol.toml: it is not the file");
+    for command in ["status", "analyze"] {
+        study_command()
+            .arg(command)
+            .arg(results.path())
+            .assert()
+            .success()
+            .stderr(journal.clone())
+            .stderr(protocol.clone())
+            .stderr(predicate::str::contains("hint: `study verify"));
+    }
+    let said = study_command()
+        .args(["analyze", "--json"])
+        .arg(results.path())
+        .assert()
+        .success();
+    let json: serde_json::Value = serde_json::from_slice(&said.get_output().stdout).unwrap();
+    let told = json["warnings"].as_array().unwrap().iter().any(|w| {
+        w["code"] == "damaged-results" && w["text"].as_str().unwrap().contains("sessions/P01/1")
+    });
+    assert!(told, "{}", json["warnings"]);
+}
+
+#[test]
 fn participant_sets_a_state_and_refuses_what_is_no_id() {
     let results = tempfile::tempdir().unwrap();
     let folder = turn_signal(results.path());

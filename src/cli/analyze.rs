@@ -1,7 +1,7 @@
 //! `study analyze`
 
 use super::{Console, Failure, results};
-use crate::analyze::{Analysis, Include, Rules, analyze};
+use crate::analyze::{Analysis, Include, Rules, Warning, analyze};
 use crate::outcome::ratings::Ratings;
 use crate::outcome::{ParticipantRow, RatingRow};
 use crate::protocol::Protocol;
@@ -61,7 +61,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         if i > 0 {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
-        let (source, analysis) = of_study(study, args)?;
+        let (source, mut analysis) = of_study(study, args)?;
+        let damage = results::warn(study, console)?.into_iter();
+        let code = "damaged-results";
+        analysis
+            .warnings
+            .extend(damage.map(|text| Warning { code, text }));
         let folder = study.path();
         let out = match &args.out {
             Some(out) if several => Some(out.join(folder.file_name().unwrap_or_default())),

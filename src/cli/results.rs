@@ -68,6 +68,31 @@ pub(super) fn frozen(study: &StudyFolder) -> Result<Loaded, Failure> {
     })
 }
 
+/// What is wrong with the journals and the frozen protocol of a study, as
+/// `study verify` has it; one sentence each, with the place.
+pub(super) fn warnings(study: &StudyFolder) -> Result<Vec<String>, Failure> {
+    let mut found = study.faults()?;
+    found.extend(super::verify::frozen_versions(study));
+    let path = study.path().display();
+    Ok(found
+        .iter()
+        .map(|f| format!("{path}/{}: {}", f.place, f.what))
+        .collect())
+}
+
+/// Tells of [`warnings`] on standard error and returns them.
+pub(super) fn warn(study: &StudyFolder, console: &mut Console) -> Result<Vec<String>, Failure> {
+    let warnings = warnings(study)?;
+    for warning in &warnings {
+        console.say(format!("warning: {warning}"));
+    }
+    if !warnings.is_empty() {
+        let path = study.path().display();
+        console.say(format!("  hint: `study verify {path}` tells everything"));
+    }
+    Ok(warnings)
+}
+
 /// Writes the derived tables again.
 pub(super) fn refresh(study: &StudyFolder, console: &mut Console) -> Result<(), Failure> {
     study.refresh(&frozen(study)?.protocol)?;

@@ -66,7 +66,7 @@ fn of_study(study: &StudyFolder, found: &[Finding]) -> Result<String, Failure> {
 }
 
 /// Reads each frozen protocol and compares its fingerprints with study.json.
-fn frozen_versions(study: &StudyFolder) -> Vec<Finding> {
+pub(super) fn frozen_versions(study: &StudyFolder) -> Vec<Finding> {
     let mut found = Vec::new();
     for version in &study.manifest().versions {
         let number = version.version;

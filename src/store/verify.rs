@@ -49,17 +49,33 @@ impl StudyFolder {
     /// # Errors
     /// [`StoreError`] if a folder or journal cannot be read at all.
     pub fn verify(&self, protocol: Option<&Protocol>) -> Result<Vec<Finding>, StoreError> {
-        let mut found = Vec::new();
-        self.verify_frozen(&mut found)?;
-        self.verify_names(&mut found)?;
         let sessions = self.sessions()?;
-        for session in &sessions {
-            self.verify_session(session, &mut found)?;
-        }
-        verify_rows(&sessions, &mut found);
+        let mut found = self.verify_journals(&sessions)?;
         if let Some(protocol) = protocol {
             self.verify_tables(&sessions, protocol, &mut found)?;
         }
+        Ok(found)
+    }
+
+    /// What is wrong with the frozen protocol and the journals: whatever is made of
+    /// them is to be read with that in mind.
+    ///
+    /// # Errors
+    /// As [`StudyFolder::verify`].
+    pub fn faults(&self) -> Result<Vec<Finding>, StoreError> {
+        let mut found = self.verify_journals(&self.sessions()?)?;
+        found.retain(|f| f.wrong);
+        Ok(found)
+    }
+
+    fn verify_journals(&self, sessions: &[SessionData]) -> Result<Vec<Finding>, StoreError> {
+        let mut found = Vec::new();
+        self.verify_frozen(&mut found)?;
+        self.verify_names(&mut found)?;
+        for session in sessions {
+            self.verify_session(session, &mut found)?;
+        }
+        verify_rows(sessions, &mut found);
         Ok(found)
     }
 
