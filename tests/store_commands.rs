@@ -178,6 +178,39 @@ fn participant_sets_a_state_and_refuses_what_is_no_id() {
 }
 
 #[test]
+fn erasing_leaves_nothing_in_the_analysis_and_says_so_twice() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    study_command()
+        .arg("analyze")
+        .arg(results.path())
+        .assert()
+        .success();
+    let used = folder.join("analysis/ratings_used.csv");
+    assert!(std::fs::read_to_string(&used).unwrap().contains("P01"));
+    let erase = |state: &str| {
+        let mut command = study_command();
+        command.arg("participant").arg(results.path()).arg("P01");
+        command.args(["--state", state, "--reason", "asked", "--erase"]);
+        command.assert()
+    };
+    erase("excluded")
+        .code(1)
+        .stderr(predicate::str::contains("exclusion keeps the data"))
+        .stderr(predicate::str::contains("--state withdrawn --erase"));
+    assert!(folder.join("sessions/P01/1/journal.jsonl").exists());
+    erase("withdrawn")
+        .success()
+        .stdout(predicate::str::contains("cannot be brought back"))
+        .stdout(predicate::str::contains("analysis/ held some of it"));
+    assert!(!folder.join("analysis").exists());
+    erase("withdrawn")
+        .success()
+        .stdout(predicate::str::contains("was erased already, on 20"))
+        .stdout(predicate::str::contains("Nothing of theirs was left"));
+}
+
+#[test]
 fn amend_keeps_the_old_version_and_refuses_other_stimuli() {
     let results = tempfile::tempdir().unwrap();
     let folder = turn_signal(results.path());

@@ -96,7 +96,7 @@ pub(super) fn warn(study: &StudyFolder, console: &mut Console) -> Result<Vec<Str
 /// Writes the derived tables again.
 pub(super) fn refresh(study: &StudyFolder, console: &mut Console) -> Result<(), Failure> {
     study.refresh(&frozen(study)?.protocol)?;
-    if study.path().join("analysis").exists() {
+    if study.path().join(layout::ANALYSIS).exists() {
         console.say("analysis/ still holds the results from before: run `study analyze` again");
     }
     Ok(())
