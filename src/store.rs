@@ -29,6 +29,7 @@ mod session_folder;
 mod sessions;
 mod tables;
 mod telemetry;
+mod vanished;
 mod verify;
 
 pub use derive::{Columns, Derived};

@@ -211,6 +211,40 @@ fn erasing_leaves_nothing_in_the_analysis_and_says_so_twice() {
 }
 
 #[test]
+fn a_session_that_is_gone_is_told_and_not_dropped_unasked() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let verify = |more: &[&str]| {
+        let mut command = study_command();
+        command.arg("verify").arg(results.path()).args(more);
+        command.assert()
+    };
+    std::fs::remove_dir_all(folder.join("sessions/P02")).unwrap();
+    let names = "participants.csv names P02, whose journal is not there";
+    verify(&[]).code(4).stdout(predicate::str::contains(names));
+    study_command()
+        .arg("analyze")
+        .arg(results.path())
+        .assert()
+        .success()
+        .stderr(predicate::str::contains(names));
+    let table = || std::fs::read_to_string(folder.join("participants.csv")).unwrap();
+    verify(&["--rebuild"])
+        .code(4)
+        .stderr(predicate::str::contains("the tables name P02"))
+        .stderr(predicate::str::contains("--rebuild --drop-missing"));
+    assert!(table().contains("P02"));
+    verify(&["--drop-missing"]).code(2);
+    verify(&["--rebuild", "--drop-missing"]).success();
+    assert!(!table().contains("P02"));
+    // A journal that is gone from a folder that stayed is the same.
+    std::fs::remove_file(folder.join("sessions/P01/1/journal.jsonl")).unwrap();
+    verify(&[]).code(4).stdout(predicate::str::contains(
+        "names P01, whose journal is not there",
+    ));
+}
+
+#[test]
 fn amend_keeps_the_old_version_and_refuses_other_stimuli() {
     let results = tempfile::tempdir().unwrap();
     let folder = turn_signal(results.path());

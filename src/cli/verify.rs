@@ -14,6 +14,9 @@ pub(super) struct Args {
     /// First write the derived tables again from the journals
     #[arg(long)]
     rebuild: bool,
+    /// Let --rebuild take participants out of the tables whose journals are gone
+    #[arg(long, requires = "rebuild")]
+    drop_missing: bool,
 }
 
 /// Prints what was found and fails if anything of it is wrong.
@@ -22,7 +25,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for study in results::studies(&args.results)? {
         let protocol = results::frozen(&study);
         if let (true, Ok(loaded)) = (args.rebuild, &protocol) {
-            study.refresh(&loaded.protocol)?;
+            study.refresh_with(&loaded.protocol, args.drop_missing)?;
         }
         let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
         found.extend(frozen_versions(&study));

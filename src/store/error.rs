@@ -156,6 +156,14 @@ pub enum StoreError {
         /// An id that is near.
         near: Option<ParticipantId>,
     },
+    /// The tables tell of sessions that are not there; they are not written over.
+    #[error("{}: the tables name {who}, whose journal is not there", .path.display())]
+    Vanished {
+        /// The study's folder.
+        path: PathBuf,
+        /// Everybody, safe to print.
+        who: String,
+    },
     /// The state cannot follow on the present one.
     #[error("{participant} cannot be set to {}: {why}", .state.as_str())]
     StateRefused {
@@ -222,6 +230,10 @@ impl StoreError {
             Self::Collides { existing, .. } => format!("use `{existing}`, or another id"),
             Self::NoRow { .. } => "give this rig a larger range with --rows".to_owned(),
             Self::OtherKind { .. } => "use another id".to_owned(),
+            Self::Vanished { path, .. } => format!(
+                "put their folders back into sessions/ from a copy; `study verify {} --rebuild --drop-missing` takes them out of the tables for good",
+                path.display()
+            ),
             _ => return None,
         })
     }

@@ -76,6 +76,10 @@ impl StudyFolder {
             self.verify_session(session, &mut found)?;
         }
         verify_rows(sessions, &mut found);
+        for gone in self.vanished(sessions) {
+            let what = format!("{} names {gone}, whose journal is not there", gone.table);
+            found.push(Finding::wrong(layout::SESSIONS, what));
+        }
         Ok(found)
     }
 
