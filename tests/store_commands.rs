@@ -10,7 +10,7 @@ use predicates::prelude::*;
 use std::path::{Path, PathBuf};
 use study::outcome::Event;
 use study::store::{Frozen, StudyFolder};
-use world::{at, real, session};
+use world::{at, real, session, telemetry};
 
 /// A study of the repository's protocol with a finished and an unfinished session.
 fn turn_signal(results: &Path) -> PathBuf {
@@ -31,6 +31,8 @@ fn turn_signal(results: &Path) -> PathBuf {
         for (event, n) in events.iter().zip(0..).take(count) {
             journal.append(at(n), event).unwrap();
         }
+        let taken = events.len().min(count);
+        telemetry(claimed.folder.path(), &events[..taken]);
     }
     folder.refresh(&loaded.protocol).unwrap();
     folder.path().to_owned()
@@ -242,6 +244,42 @@ fn a_session_that_is_gone_is_told_and_not_dropped_unasked() {
     verify(&[]).code(4).stdout(predicate::str::contains(
         "names P01, whose journal is not there",
     ));
+}
+
+#[test]
+fn verify_misses_telemetry_that_the_journal_counts_and_says_what_it_does_not_check() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let verify = || {
+        let mut command = study_command();
+        command.arg("verify").arg(results.path());
+        command.assert()
+    };
+    verify()
+        .success()
+        .stdout(predicate::str::contains("telemetry").count(1))
+        .stdout(predicate::str::contains(
+            "Not checked: the numbers in telemetry files",
+        ));
+    let file = folder.join("sessions/P01/1/telemetry/002-a1.csv");
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &whole[..whole.len() - 20]).unwrap();
+    verify().success().stdout(predicate::str::contains(
+        "002-a1.csv: 3248 of the 3250 samples",
+    ));
+    std::fs::write(
+        &file,
+        "somebody's notes, longer than the header of a telemetry file\n",
+    )
+    .unwrap();
+    verify().code(4).stdout(predicate::str::contains(
+        "002-a1.csv: it is not what study writes",
+    ));
+    std::fs::remove_file(&file).unwrap();
+    verify()
+        .code(4)
+        .stdout(predicate::str::contains("002-a1.csv: it is not there"))
+        .stdout(predicate::str::contains("made again").not());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::{Console, Failure, results};
 use crate::cli::load;
 use crate::store::{Finding, StudyFolder, layout};
-use crate::text::Untrusted;
+use crate::text::{Untrusted, counted};
 use std::path::PathBuf;
 
 /// Arguments of `study verify`.
@@ -58,11 +58,18 @@ fn of_study(study: &StudyFolder, found: &[Finding]) -> Result<String, Failure> {
         _ => "not all is as it was written",
     };
     out.push_str(&format!(
-        "{}: {} sessions, {events} events: {verdict}\n",
+        "{}: {}, {}: {verdict}\n",
         Untrusted(&path),
-        sessions.len()
+        counted(sessions.len(), "session", "sessions"),
+        counted(events, "event", "events"),
     ));
-    if found.iter().any(|f| f.wrong && f.place.ends_with(".csv")) {
+    out.push_str(
+        "Not checked: the numbers in telemetry files (only that the files and their lines are there) and analysis/.\n",
+    );
+    if found
+        .iter()
+        .any(|f| f.wrong && layout::TABLES.contains(&f.place.as_str()))
+    {
         out.push_str("the tables are made again with --rebuild\n");
     }
     Ok(out)

@@ -1,5 +1,7 @@
 //! Re-reading everything and comparing it.
 
+mod telemetry;
+
 use super::derive::{derive, tables};
 use super::error::{At as _, StoreError};
 use super::ledger::SeatKind;
@@ -44,13 +46,17 @@ impl Finding {
 
 impl StudyFolder {
     /// Re-reads every journal and compares it with itself, the frozen protocol with
-    /// its hashes, and, given a protocol, the tables with what the journals give.
+    /// its hashes, the telemetry with the number of its samples, and, given a protocol, the tables with what the journals give.
     ///
     /// # Errors
     /// [`StoreError`] if a folder or journal cannot be read at all.
     pub fn verify(&self, protocol: Option<&Protocol>) -> Result<Vec<Finding>, StoreError> {
         let sessions = self.sessions()?;
         let mut found = self.verify_journals(&sessions)?;
+        for session in &sessions {
+            let place = place_of(session);
+            self.verify_telemetry(session, &place, &mut found)?;
+        }
         if let Some(protocol) = protocol {
             self.verify_tables(&sessions, protocol, &mut found)?;
         }
@@ -156,12 +162,7 @@ impl StudyFolder {
         session: &SessionData,
         found: &mut Vec<Finding>,
     ) -> Result<(), StoreError> {
-        let place = format!(
-            "{}/{}/{}",
-            layout::SESSIONS,
-            session.participant,
-            session.session
-        );
+        let place = place_of(session);
         if let Some(stone) = &session.tombstone {
             let place = format!("{}/{}", layout::SESSIONS, session.participant);
             if stone.participant != session.participant {
@@ -267,6 +268,11 @@ impl StudyFolder {
         }
         Ok(())
     }
+}
+
+fn place_of(session: &SessionData) -> String {
+    let (id, number) = (&session.participant, session.session);
+    format!("{}/{id}/{number}", layout::SESSIONS)
 }
 
 fn is_torn(damage: &super::Damage) -> bool {
