@@ -283,6 +283,33 @@ fn verify_misses_telemetry_that_the_journal_counts_and_says_what_it_does_not_che
 }
 
 #[test]
+fn an_analysis_is_printed_although_its_tables_have_no_place() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    // A file in the place of the folder stops root too, which no permission does.
+    std::fs::write(folder.join("analysis"), "in the way").unwrap();
+    study_command()
+        .arg("analyze")
+        .arg(results.path())
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("realization"))
+        .stderr(predicate::str::contains(
+            "the tables could not be written: ",
+        ))
+        .stderr(predicate::str::contains("hint: `--out DIR`"));
+    study_command()
+        .arg("analyze")
+        .arg(results.path())
+        .arg("--out")
+        .arg(folder.join("analysis"))
+        .assert()
+        .code(1)
+        .stdout("")
+        .stderr(predicate::str::contains("error: "));
+}
+
+#[test]
 fn amend_keeps_the_old_version_and_refuses_other_stimuli() {
     let results = tempfile::tempdir().unwrap();
     let folder = turn_signal(results.path());

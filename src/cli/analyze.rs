@@ -86,9 +86,12 @@ fn show(
     out: Option<&Path>,
     console: &mut Console,
 ) -> Result<(), Failure> {
-    if let Some(dir) = out {
-        write_tables(dir, &csv::tables(source, analysis))?;
-    }
+    let written = out.map(|dir| (dir, write_tables(dir, &csv::tables(source, analysis))));
+    let written = match written {
+        // Where the user wants the tables they have to go.
+        Some((_, Err(failure))) if args.out.is_some() => return Err(failure),
+        other => other,
+    };
     if args.json {
         return console.out(json::document(source, analysis));
     }
@@ -101,8 +104,10 @@ fn show(
     } else {
         console.out(page(source, analysis, set))?;
     }
-    if let Some(dir) = out {
-        console.say(format!("tables: {}", dir.display()));
+    match written {
+        Some((dir, Ok(()))) => console.say(format!("tables: {}", dir.display())),
+        Some((_, Err(failure))) => results::tables_unwritten(&failure, console),
+        None => {}
     }
     Ok(())
 }

@@ -93,6 +93,15 @@ pub(super) fn warn(study: &StudyFolder, console: &mut Console) -> Result<Vec<Str
     Ok(warnings)
 }
 
+/// An analysis that was printed is no failure although its tables have no place.
+pub(super) fn tables_unwritten(failure: &Failure, console: &mut Console) {
+    console.say(format!(
+        "warning: the tables could not be written: {}",
+        failure.message
+    ));
+    console.say("  hint: `--out DIR` writes them elsewhere");
+}
+
 /// Writes the derived tables again.
 pub(super) fn refresh(study: &StudyFolder, console: &mut Console) -> Result<(), Failure> {
     study.refresh(&frozen(study)?.protocol)?;
