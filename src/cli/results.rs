@@ -5,7 +5,7 @@ use super::load::{self, Loaded};
 use super::{Console, Failure};
 use crate::outcome::Moment;
 use crate::protocol::question::MAX_TEXT_BYTES;
-use crate::store::{StoreError, StudyFolder, layout};
+use crate::store::{StoreError, StudyFolder, layout, plain};
 use std::path::Path;
 
 impl From<StoreError> for Failure {
@@ -28,7 +28,7 @@ pub(super) fn studies(path: &Path) -> Result<Vec<StudyFolder>, Failure> {
     if path.join(layout::MANIFEST).exists() {
         return Ok(vec![StudyFolder::open(path)?]);
     }
-    let failed = |e: &std::io::Error| Failure::results(format!("{}: {e}", path.display()));
+    let failed = |e: &std::io::Error| Failure::results(format!("{}: {}", path.display(), plain(e)));
     let mut folders = Vec::new();
     for item in std::fs::read_dir(path).map_err(|e| failed(&e))? {
         let folder = item.map_err(|e| failed(&e))?.path();

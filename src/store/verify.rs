@@ -3,7 +3,7 @@
 mod telemetry;
 
 use super::derive::{derive, tables};
-use super::error::{At as _, StoreError};
+use super::error::{At as _, StoreError, plain};
 use super::ledger::SeatKind;
 use super::line::sha256;
 use super::manifest::Manifest;
@@ -96,7 +96,7 @@ impl StudyFolder {
             for (name, hash) in &version.files {
                 let place = format!("{}/{}/{name}", layout::PROTOCOLS, version.version);
                 match self.disk.read(&folder.join(name)) {
-                    Err(e) => found.push(Finding::wrong(place, e.to_string())),
+                    Err(e) => found.push(Finding::wrong(place, plain(&e))),
                     Ok(bytes) if sha256(&bytes) != *hash => found.push(Finding::wrong(
                         place,
                         "it is not the file that was frozen (SHA-256 in study.json)",
@@ -263,7 +263,7 @@ impl StudyFolder {
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                     found.push(Finding::note(name, "not written yet"));
                 }
-                Err(e) => found.push(Finding::wrong(name, e.to_string())),
+                Err(e) => found.push(Finding::wrong(name, plain(&e))),
             }
         }
         Ok(())

@@ -8,7 +8,7 @@ use super::Finding;
 use crate::outcome::Event;
 use crate::store::sessions::SessionData;
 use crate::store::telemetry::HEADER;
-use crate::store::{StoreError, StudyFolder, layout};
+use crate::store::{StoreError, StudyFolder, layout, plain};
 use std::collections::BTreeMap;
 use std::io;
 
@@ -53,7 +53,7 @@ impl StudyFolder {
                     }
                     Err(e) if e.kind() == io::ErrorKind::NotFound => break,
                     Err(e) => {
-                        found.push(Finding::wrong(&place, e.to_string()));
+                        found.push(Finding::wrong(&place, plain(&e)));
                         there = true;
                         foreign = true;
                         break;
