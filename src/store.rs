@@ -29,10 +29,11 @@ mod session_folder;
 mod sessions;
 mod tables;
 mod telemetry;
+mod vanished;
 mod verify;
 
 pub use derive::{Columns, Derived};
-pub use error::StoreError;
+pub use error::{StoreError, plain};
 pub use journal::Journal;
 pub use ledger::{ClaimRequest, Claimed, SeatKind};
 pub use manifest::Manifest;

@@ -33,6 +33,11 @@ impl fmt::Display for Untrusted<'_> {
     }
 }
 
+/// "1 session", "2 sessions": a number with the word for what is counted.
+pub fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
 /// Whether a character can steer a terminal or hide the order of what is read:
 /// C0, DEL, C1, line and paragraph separators, bidirectional controls, tags.
 pub fn is_unsafe(c: char) -> bool {

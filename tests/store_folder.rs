@@ -11,7 +11,9 @@ use std::process::Stdio;
 use study::outcome::{Event, Sample, State, Status};
 use study::protocol::Seat;
 use study::store::{ClaimRequest, Frozen, SeatKind, StateRequest, StoreError, StudyFolder};
-use world::{HOSTILE, Kept, at, participant, protocol, question, real, request, session, started};
+use world::{
+    HOSTILE, Kept, at, participant, protocol, question, real, request, session, started, telemetry,
+};
 
 fn open(results: &Path) -> StudyFolder {
     StudyFolder::open_or_create(results, &Kept::new().frozen(), at(0)).unwrap()
@@ -25,6 +27,7 @@ fn run(study: &StudyFolder, request: &ClaimRequest, events: usize) -> Seat {
     for (event, n) in all.iter().zip(0..).take(events).skip(claimed.entries.len()) {
         journal.append(at(n), event).unwrap();
     }
+    telemetry(claimed.folder.path(), &all[..all.len().min(events)]);
     claimed.seat
 }
 

@@ -6,7 +6,7 @@ mod report;
 
 use super::load::Loaded;
 use super::{Console, Failure, results};
-use crate::analyze::{self, Analysis, Include, Rules, analyze};
+use crate::analyze::{self, Analysis, Include, Rules, Warning, analyze};
 use crate::model::Realization;
 use crate::outcome::ratings::Ratings;
 use crate::outcome::{ParticipantRow, RatingRow};
@@ -82,7 +82,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         if i > 0 {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
-        let input = of_study(study, args)?;
+        let mut input = of_study(study, args)?;
+        let damage = results::warn(study, console)?.into_iter();
+        let code = "damaged-results";
+        input
+            .analysis
+            .warnings
+            .extend(damage.map(|text| Warning { code, text }));
         let folder = study.path();
         let out = match &args.out {
             Some(out) if several => Some(out.join(folder.file_name().unwrap_or_default())),
@@ -110,23 +116,14 @@ fn show(
     console: &mut Console,
 ) -> Result<(), Failure> {
     let Analysed {
-        source,
-        details,
-        traces,
-        analysis,
+        source, analysis, ..
     } = analysed;
-    if let Some(dir) = out {
-        let tables = csv::tables(source, analysis).into_iter();
-        let mut files: Vec<report::Output> = tables
-            .map(|t| report::Output {
-                name: t.name.to_owned(),
-                content: t.content.into_bytes(),
-            })
-            .collect();
-        files.extend(report::files(source, details, analysis, traces)?);
-        write_files(dir, &files)?;
-        report::clear_figures(dir, &files);
-    }
+    let written = out.map(|dir| (dir, write_all(dir, analysed)));
+    let written = match written {
+        // Where the user wants the tables they have to go.
+        Some((_, Err(failure))) if args.out.is_some() => return Err(failure),
+        other => other,
+    };
     if args.json {
         return console.out(json::document(source, analysis));
     }
@@ -139,9 +136,34 @@ fn show(
     } else {
         console.out(page(source, analysis, set))?;
     }
-    if let Some(dir) = out {
-        console.say(format!("report: {}", dir.join("report.html").display()));
+    match written {
+        Some((dir, Ok(()))) => {
+            console.say(format!("report: {}", dir.join("report.html").display()));
+        }
+        Some((_, Err(failure))) => results::tables_unwritten(&failure, console),
+        None => {}
     }
+    Ok(())
+}
+
+/// Tables, report and figures into a folder.
+fn write_all(dir: &Path, analysed: &Analysed) -> Result<(), Failure> {
+    let Analysed {
+        source,
+        details,
+        traces,
+        analysis,
+    } = analysed;
+    let tables = csv::tables(source, analysis).into_iter();
+    let mut files: Vec<report::Output> = tables
+        .map(|t| report::Output {
+            name: t.name.to_owned(),
+            content: t.content.into_bytes(),
+        })
+        .collect();
+    files.extend(report::files(source, details, analysis, traces)?);
+    write_files(dir, &files)?;
+    report::clear_figures(dir, &files);
     Ok(())
 }
 

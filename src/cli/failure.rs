@@ -64,7 +64,8 @@ impl Failure {
 
     /// A file could not be read or written.
     pub fn file(path: &std::path::Path, error: &std::io::Error) -> Self {
-        Self::input(format!("{}: {error}", path.display()))
+        let why = crate::store::plain(error);
+        Self::input(format!("{}: {why}", path.display()))
     }
 
     /// The same, with advice.

@@ -2,8 +2,8 @@
 
 use super::{Console, Failure, results};
 use crate::outcome::State;
-use crate::store::StateRequest;
-use crate::text::ParticipantId;
+use crate::store::{StateChange, StateRequest};
+use crate::text::{ParticipantId, counted};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -20,7 +20,8 @@ pub(super) struct Args {
     /// Why; it is kept
     #[arg(long, value_name = "TEXT")]
     reason: String,
-    /// Remove everything that they gave; only the fact that they took part stays
+    /// Remove everything that they gave, for good; only the fact that they took part
+    /// stays. analysis/ is removed too, for ratings and comments of theirs are in it
     #[arg(long)]
     erase: bool,
 }
@@ -54,6 +55,12 @@ impl From<Settable> for State {
 
 /// Sets the state and says what that means for the row.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    if args.erase && matches!(args.state, Settable::Excluded) {
+        return Err(Failure::input(
+            "exclusion keeps the data, and --erase removes them",
+        )
+        .hint("`--state withdrawn --erase` erases; `--state excluded` alone leaves out of the analysis"));
+    }
     let participant = ParticipantId::new(args.id.as_str()).map_err(Failure::input)?;
     let request = StateRequest {
         participant,
@@ -66,25 +73,42 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for notice in &change.notices {
         console.say(notice);
     }
+    console.out(told(&request, &change))?;
+    results::refresh(&study, console)
+}
+
+/// What became of the participant, their data and their row.
+fn told(request: &StateRequest, change: &StateChange) -> String {
     let id = &request.participant;
+    let sessions = counted(change.erased, "session", "sessions");
+    let analysis = if change.analysis_removed {
+        " analysis/ held some of it and is removed too: run `study analyze` again."
+    } else {
+        ""
+    };
+    if let Some(at) = change.erased_before {
+        let when = at.format("%Y-%m-%d %H:%M %:z");
+        let left = match change.erased {
+            0 => "Nothing of theirs was left.".to_owned(),
+            _ => format!("What was left of {sessions} is erased now."),
+        };
+        return format!(
+            "What {id} gave was erased already, on {when}; nothing else is changed. {left}{analysis}\n"
+        );
+    }
     let state = request.state.as_str();
     let mut said = match change.before {
         Some(before) => format!("{id} was {} and is now {state}.", before.as_str()),
         None => format!("{id} is on record as {state}."),
     };
-    if args.erase {
+    if request.erase {
         said.push_str(&format!(
-            " What they gave in {} is erased; tombstone.json says that it was.",
-            match change.erased {
-                1 => "1 session".to_owned(),
-                n => format!("{n} sessions"),
-            }
+            " What they gave in {sessions} is erased and cannot be brought back; tombstone.json says that it was.{analysis} Copies and backups are not touched.",
         ));
     }
     said.push_str(&match change.freed_row {
         Some(row) => format!(" Row {row} goes to the next participant.\n"),
         None => " No row is handed out again.\n".to_owned(),
     });
-    console.out(said)?;
-    results::refresh(&study, console)
+    said
 }

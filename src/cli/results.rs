@@ -5,7 +5,7 @@ use super::load::{self, Loaded};
 use super::{Console, Failure};
 use crate::outcome::Moment;
 use crate::protocol::question::MAX_TEXT_BYTES;
-use crate::store::{StoreError, StudyFolder, layout};
+use crate::store::{StoreError, StudyFolder, layout, plain};
 use std::path::Path;
 
 impl From<StoreError> for Failure {
@@ -28,7 +28,7 @@ pub(super) fn studies(path: &Path) -> Result<Vec<StudyFolder>, Failure> {
     if path.join(layout::MANIFEST).exists() {
         return Ok(vec![StudyFolder::open(path)?]);
     }
-    let failed = |e: &std::io::Error| Failure::results(format!("{}: {e}", path.display()));
+    let failed = |e: &std::io::Error| Failure::results(format!("{}: {}", path.display(), plain(e)));
     let mut folders = Vec::new();
     for item in std::fs::read_dir(path).map_err(|e| failed(&e))? {
         let folder = item.map_err(|e| failed(&e))?.path();
@@ -74,10 +74,44 @@ pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded
     })
 }
 
+/// What is wrong with the journals and the frozen protocol of a study, as
+/// `study verify` has it; one sentence each, with the place.
+pub(super) fn warnings(study: &StudyFolder) -> Result<Vec<String>, Failure> {
+    let mut found = study.faults()?;
+    found.extend(super::verify::frozen_versions(study));
+    let path = study.path().display();
+    Ok(found
+        .iter()
+        .map(|f| format!("{path}/{}: {}", f.place, f.what))
+        .collect())
+}
+
+/// Tells of [`warnings`] on standard error and returns them.
+pub(super) fn warn(study: &StudyFolder, console: &mut Console) -> Result<Vec<String>, Failure> {
+    let warnings = warnings(study)?;
+    for warning in &warnings {
+        console.say(format!("warning: {warning}"));
+    }
+    if !warnings.is_empty() {
+        let path = study.path().display();
+        console.say(format!("  hint: `study verify {path}` tells everything"));
+    }
+    Ok(warnings)
+}
+
+/// An analysis that was printed is no failure although its tables have no place.
+pub(super) fn tables_unwritten(failure: &Failure, console: &mut Console) {
+    console.say(format!(
+        "warning: the tables could not be written: {}",
+        failure.message
+    ));
+    console.say("  hint: `--out DIR` writes them elsewhere");
+}
+
 /// Writes the derived tables again.
 pub(super) fn refresh(study: &StudyFolder, console: &mut Console) -> Result<(), Failure> {
     study.refresh(&frozen(study)?.protocol)?;
-    if study.path().join("analysis").exists() {
+    if study.path().join(layout::ANALYSIS).exists() {
         console.say("analysis/ still holds the results from before: run `study analyze` again");
     }
     Ok(())

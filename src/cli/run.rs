@@ -7,7 +7,7 @@ use crate::protocol::DeviceKind;
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Runner, Setup};
 use crate::session::{Config, Ending};
-use crate::store::{Frozen, SeatKind, StudyFolder};
+use crate::store::{Frozen, SeatKind, StoreError, StudyFolder};
 use crate::tui::{self, Tui};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -161,7 +161,8 @@ fn again(args: &Args, participant: &str) -> String {
     command
 }
 
-/// Writes the derived tables and says what comes next.
+/// Writes the derived tables and says what comes next, also where they cannot be
+/// written: the journals hold everything.
 fn finish(
     console: &mut Console,
     folder: &std::path::Path,
@@ -169,10 +170,10 @@ fn finish(
     ending: &Ending,
     again: &str,
 ) -> Result<(), Failure> {
-    if *ending != Ending::Nothing {
-        let study = StudyFolder::open(folder)?;
-        study.refresh(protocol)?;
-    }
+    let written = match ending {
+        Ending::Nothing => Ok(()),
+        _ => StudyFolder::open(folder).and_then(|study| study.refresh(protocol).map(drop)),
+    };
     let shown = folder.display();
     match ending {
         Ending::Finished => console.out(format!(
@@ -185,5 +186,89 @@ fn finish(
             "The participant has left the study; what was given is kept in {shown}.\n"
         )),
         Ending::Nothing => console.out("Nothing was recorded.\n"),
+    }?;
+    written.map_err(|e| unwritten(&e, folder))
+}
+
+/// What is said of tables that could not be written after a session.
+fn unwritten(why: &StoreError, folder: &std::path::Path) -> Failure {
+    let rebuild = format!("`study verify {} --rebuild`", folder.display());
+    let failure = Failure::results(format!(
+        "the answers are safe in the journals; the tables could not be written: {why}"
+    ));
+    failure.hint(match why {
+        e if e.is_full() => format!("make room, then {rebuild}"),
+        e => match e.hint() {
+            Some(hint) => hint,
+            None => format!("put that right, then {rebuild}"),
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+    use std::path::Path;
+    use std::rc::Rc;
+
+    #[derive(Clone, Default)]
+    struct Said(Rc<RefCell<Vec<u8>>>);
+
+    impl std::io::Write for Said {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.borrow_mut().extend_from_slice(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_session_whose_tables_cannot_be_written_still_says_how_it_goes_on() {
+        let results = tempfile::tempdir().unwrap();
+        let loaded = load::load(Path::new("protocols/turn-signal")).unwrap();
+        let frozen = Frozen {
+            protocol: &loaded.protocol,
+            files: &loaded.files,
+            fingerprints: &loaded.fingerprints,
+        };
+        let at = RealClock::default().now();
+        let study = StudyFolder::open_or_create(results.path(), &frozen, at).unwrap();
+        std::fs::create_dir(study.path().join("ratings.csv")).unwrap();
+        let (out, err) = (Said::default(), Said::default());
+        let mut console = Console::to(out.clone(), err);
+        let ending = Ending::Interrupted;
+        let failure = finish(
+            &mut console,
+            study.path(),
+            &loaded.protocol,
+            &ending,
+            "study run X",
+        )
+        .unwrap_err();
+        assert_eq!(failure.exit_code(), 4);
+        assert!(
+            failure.message.starts_with(
+                "the answers are safe in the journals; the tables could not be written: "
+            ),
+            "{}",
+            failure.message
+        );
+        assert!(failure.hint.unwrap().contains("--rebuild"));
+        let said = String::from_utf8(out.0.borrow().clone()).unwrap();
+        assert!(said.contains("It goes on with: study run X"), "{said}");
+    }
+
+    #[test]
+    fn a_full_disk_is_told_to_make_room() {
+        let full = StoreError::Io {
+            path: "results/x/.ratings.csv.tmp".into(),
+            source: std::io::ErrorKind::StorageFull.into(),
+        };
+        let hint = unwritten(&full, Path::new("results/x")).hint.unwrap();
+        assert_eq!(hint, "make room, then `study verify results/x --rebuild`");
     }
 }

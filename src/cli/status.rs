@@ -20,6 +20,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         if n > 0 {
             console.out("\n")?;
         }
+        results::warn(study, console)?;
         console.out(of_study(study)?)?;
     }
     Ok(())
@@ -52,19 +53,6 @@ fn of_study(study: &StudyFolder) -> Result<String, Failure> {
     }
     let _ = writeln!(out, "\n{}", summary(study, &real));
     let _ = writeln!(out, "Next free row: {}", study.next_row()?);
-    let damaged: Vec<String> = study
-        .sessions()?
-        .iter()
-        .filter(|s| !s.damage.is_empty())
-        .map(|s| s.participant.to_string())
-        .collect();
-    if !damaged.is_empty() {
-        let _ = writeln!(
-            out,
-            "Something is wrong with the journal of {}: see `study verify`",
-            damaged.join(", ")
-        );
-    }
     Ok(out)
 }
 
@@ -138,7 +126,7 @@ fn summary(study: &StudyFolder, real: &[&ParticipantRow]) -> String {
         1 => format!("1 participant: {}", counts.join(", ")),
         n => format!("{n} participants: {}", counts.join(", ")),
     };
-    // A damaged frozen protocol is for `study verify` to tell.
+    // A damaged frozen protocol is told in the warnings.
     match results::frozen(study) {
         Ok(loaded) => format!("{people}; {} planned", loaded.protocol.design.participants),
         Err(_) => people,

@@ -3,7 +3,7 @@
 use super::{Console, Failure, results};
 use crate::cli::load;
 use crate::store::{Finding, StudyFolder, layout};
-use crate::text::Untrusted;
+use crate::text::{Untrusted, counted};
 use std::path::PathBuf;
 
 /// Arguments of `study verify`.
@@ -14,6 +14,9 @@ pub(super) struct Args {
     /// First write the derived tables again from the journals
     #[arg(long)]
     rebuild: bool,
+    /// Let --rebuild take participants out of the tables whose journals are gone
+    #[arg(long, requires = "rebuild")]
+    drop_missing: bool,
 }
 
 /// Prints what was found and fails if anything of it is wrong.
@@ -22,7 +25,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for study in results::studies(&args.results)? {
         let protocol = results::frozen(&study);
         if let (true, Ok(loaded)) = (args.rebuild, &protocol) {
-            study.refresh(&loaded.protocol)?;
+            study.refresh_with(&loaded.protocol, args.drop_missing)?;
         }
         let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
         found.extend(frozen_versions(&study));
@@ -55,18 +58,25 @@ fn of_study(study: &StudyFolder, found: &[Finding]) -> Result<String, Failure> {
         _ => "not all is as it was written",
     };
     out.push_str(&format!(
-        "{}: {} sessions, {events} events: {verdict}\n",
+        "{}: {}, {}: {verdict}\n",
         Untrusted(&path),
-        sessions.len()
+        counted(sessions.len(), "session", "sessions"),
+        counted(events, "event", "events"),
     ));
-    if found.iter().any(|f| f.wrong && f.place.ends_with(".csv")) {
+    out.push_str(
+        "Not checked: the numbers in telemetry files (only that the files and their lines are there) and analysis/.\n",
+    );
+    if found
+        .iter()
+        .any(|f| f.wrong && layout::TABLES.contains(&f.place.as_str()))
+    {
         out.push_str("the tables are made again with --rebuild\n");
     }
     Ok(out)
 }
 
 /// Reads each frozen protocol and compares its fingerprints with study.json.
-fn frozen_versions(study: &StudyFolder) -> Vec<Finding> {
+pub(super) fn frozen_versions(study: &StudyFolder) -> Vec<Finding> {
     let mut found = Vec::new();
     for version in &study.manifest().versions {
         let number = version.version;

@@ -85,10 +85,32 @@ impl StudyFolder {
     /// has the last word.
     ///
     /// # Errors
-    /// As [`StudyFolder::derive`] and [`StudyFolder::write_derived`].
+    /// As [`StudyFolder::derive`] and [`StudyFolder::write_derived`], and if the
+    /// tables name a session that is not there: nobody is dropped unasked.
     pub fn refresh(&self, protocol: &Protocol) -> Result<Derived, StoreError> {
+        self.refresh_with(protocol, false)
+    }
+
+    /// The same; with `drop_missing` sessions that are not there leave the tables.
+    ///
+    /// # Errors
+    /// As [`StudyFolder::refresh`].
+    pub fn refresh_with(
+        &self,
+        protocol: &Protocol,
+        drop_missing: bool,
+    ) -> Result<Derived, StoreError> {
         let _lock = self.lock()?;
-        let derived = self.derive(protocol)?;
+        let sessions = self.sessions()?;
+        let vanished = self.vanished(&sessions);
+        if !drop_missing && !vanished.is_empty() {
+            let who: Vec<String> = vanished.iter().map(ToString::to_string).collect();
+            return Err(StoreError::Vanished {
+                path: self.path.clone(),
+                who: who.join(", "),
+            });
+        }
+        let derived = derive(&sessions, protocol);
         self.replace_tables(&derived)?;
         Ok(derived)
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// A file or folder could not be read or written.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {}", .path.display(), plain(.source))]
     Io {
         /// Which.
         path: PathBuf,
@@ -17,7 +17,7 @@ pub enum StoreError {
         source: io::Error,
     },
     /// There is no room for a session.
-    #[error("{}: no room for a session ({free} bytes free, {needed} needed)", .path.display())]
+    #[error("no room for a session: {} KiB free, {} KiB needed in {}", .free / 1024, .needed.div_ceil(1024), .path.display())]
     Full {
         /// Where.
         path: PathBuf,
@@ -107,7 +107,7 @@ pub enum StoreError {
         participant: ParticipantId,
     },
     /// Another process has the session open.
-    #[error("session {session} of {participant} is open in another process ({})", .path.display())]
+    #[error("{participant}'s session {session} is open in another process ({})", .path.display())]
     Open {
         /// Who.
         participant: ParticipantId,
@@ -155,6 +155,14 @@ pub enum StoreError {
         participant: ParticipantId,
         /// An id that is near.
         near: Option<ParticipantId>,
+    },
+    /// The tables tell of sessions that are not there; they are not written over.
+    #[error("{}: the tables name {who}, whose journal is not there", .path.display())]
+    Vanished {
+        /// The study's folder.
+        path: PathBuf,
+        /// Everybody, safe to print.
+        who: String,
     },
     /// The state cannot follow on the present one.
     #[error("{participant} cannot be set to {}: {why}", .state.as_str())]
@@ -222,6 +230,10 @@ impl StoreError {
             Self::Collides { existing, .. } => format!("use `{existing}`, or another id"),
             Self::NoRow { .. } => "give this rig a larger range with --rows".to_owned(),
             Self::OtherKind { .. } => "use another id".to_owned(),
+            Self::Vanished { path, .. } => format!(
+                "put their folders back into sessions/ from a copy; `study verify {} --rebuild --drop-missing` takes them out of the tables for good",
+                path.display()
+            ),
             _ => return None,
         })
     }
@@ -255,6 +267,30 @@ impl StoreError {
     }
 }
 
+/// An error of the operating system in plain words, where there are some.
+pub fn plain(error: &io::Error) -> String {
+    use io::ErrorKind as K;
+    let words = match error.kind() {
+        K::NotFound => "there is no such file or folder",
+        K::PermissionDenied => "no permission",
+        K::StorageFull => "the disk is full",
+        K::QuotaExceeded => "the disk quota is used up",
+        K::ReadOnlyFilesystem => "the file system is read-only",
+        K::IsADirectory => "it is a folder, not a file",
+        K::NotADirectory => "a part of the path is no folder",
+        K::FileTooLarge => "the file is larger than is allowed",
+        // Another program's words for it are kept, the system's number is not.
+        _ => {
+            let told = error.to_string();
+            return match told.split_once(" (os error ") {
+                Some((words, _)) => words.to_owned(),
+                None => told,
+            };
+        }
+    };
+    words.to_owned()
+}
+
 /// Whether an error of the operating system says that there is no room.
 pub(super) fn is_full(error: &io::Error) -> bool {
     matches!(
@@ -274,5 +310,52 @@ impl<T> At<T> for io::Result<T> {
             path: path.to_owned(),
             source,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::text::ParticipantId;
+
+    fn io(number: i32) -> String {
+        let source = io::Error::from_raw_os_error(number);
+        let path = "results/x/study.json".into();
+        StoreError::Io { path, source }.to_string()
+    }
+
+    #[test]
+    fn an_error_of_the_system_has_words_and_no_number() {
+        // errno.h of Linux: ENOENT 2, EACCES 13, ENOSPC 28, EIO 5.
+        assert_eq!(
+            io(2),
+            "results/x/study.json: there is no such file or folder"
+        );
+        assert_eq!(io(13), "results/x/study.json: no permission");
+        assert_eq!(io(28), "results/x/study.json: the disk is full");
+        assert!(!io(5).contains("os error"), "{}", io(5));
+    }
+
+    #[test]
+    fn room_is_told_in_kib_and_the_path_last() {
+        let path: PathBuf = "results/x".into();
+        let full = StoreError::Full {
+            path: path.clone(),
+            free: 92 * 1024 + 1000,
+            needed: 128 * 1024,
+        };
+        assert_eq!(
+            full.to_string(),
+            "no room for a session: 92 KiB free, 128 KiB needed in results/x"
+        );
+        let open = StoreError::Open {
+            participant: ParticipantId::new("P01").unwrap(),
+            session: 1,
+            path,
+        };
+        assert_eq!(
+            open.to_string(),
+            "P01's session 1 is open in another process (results/x)"
+        );
     }
 }

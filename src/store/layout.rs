@@ -28,6 +28,11 @@ pub const ATTEMPTS: &str = "attempts.csv";
 /// Derived: one row for each participant.
 pub const PARTICIPANTS: &str = "participants.csv";
 
+/// The derived tables.
+pub const TABLES: [&str; 3] = [RATINGS, ATTEMPTS, PARTICIPANTS];
+/// Derived, by `study analyze`: what the ratings come to.
+pub const ANALYSIS: &str = "analysis";
+
 /// The frozen copy of a version of the protocol.
 pub fn protocol(study: &Path, version: u32) -> PathBuf {
     study.join(PROTOCOLS).join(version.to_string())

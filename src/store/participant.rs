@@ -106,6 +106,10 @@ pub struct StateChange {
     pub freed_row: Option<u32>,
     /// Sessions whose data were erased.
     pub erased: usize,
+    /// When the data had been erased before this, if they had.
+    pub erased_before: Option<DateTime<FixedOffset>>,
+    /// Whether `analysis/`, which held what they gave too, was removed.
+    pub analysis_removed: bool,
     /// What the operator should know.
     pub notices: Vec<String>,
 }
@@ -128,12 +132,13 @@ impl StudyFolder {
                     participant: id.clone(),
                 });
             }
-            // An erasure that was killed after its commit.
-            let erased = self.remove_sessions(id, stone.sessions.len())?;
+            // There is something left if it was killed after its commit.
             return Ok(StateChange {
                 before: Some(stone.state),
                 freed_row: None,
-                erased,
+                erased: self.remove_sessions(id)?,
+                erased_before: Some(stone.erased_at),
+                analysis_removed: self.remove_analysis()?,
                 notices: Vec::new(),
             });
         }
@@ -142,17 +147,20 @@ impl StudyFolder {
         let before = last.map(|s| s.standing().state);
         let freed_row = last.and_then(SessionData::held_row);
         let mut notices = Vec::new();
-        let erased = if request.erase {
-            self.erase(request, &own, at)?
+        let (mut erased, mut analysis_removed) = (0, false);
+        if request.erase {
+            erased = self.erase(request, &own, at)?;
+            analysis_removed = self.remove_analysis()?;
         } else {
             let number = last.map_or(1, |s| s.session);
             self.append_state(request, last.is_none(), number, at, &mut notices)?;
-            0
-        };
+        }
         Ok(StateChange {
             before,
             freed_row,
             erased,
+            erased_before: None,
+            analysis_removed,
             notices,
         })
     }
@@ -279,7 +287,6 @@ impl StudyFolder {
                 last_hash: replay.prev,
             });
         }
-        let count = sessions.len();
         let stone = Tombstone {
             format: FORMAT.to_owned(),
             participant: id.clone(),
@@ -297,18 +304,35 @@ impl StudyFolder {
             })?;
         text.push('\n');
         atomic::replace(self.disk.as_ref(), &path, text.as_bytes())?;
-        let erased = self.remove_sessions(id, count);
+        let erased = self.remove_sessions(id);
         drop(held);
         erased
     }
 
-    fn remove_sessions(&self, id: &ParticipantId, count: usize) -> Result<usize, StoreError> {
+    /// Removes the sessions of a participant and says how many there were.
+    fn remove_sessions(&self, id: &ParticipantId) -> Result<usize, StoreError> {
         let folder = layout::participant(&self.path, id);
-        for number in self.session_numbers(&folder)? {
-            remove_all(self.disk.as_ref(), &layout::session(&self.path, id, number))?;
+        let numbers = self.session_numbers(&folder)?;
+        for number in &numbers {
+            let session = layout::session(&self.path, id, *number);
+            remove_all(self.disk.as_ref(), &session)?;
         }
         self.disk.sync_folder(&folder).at(&folder)?;
-        Ok(count)
+        Ok(numbers.len())
+    }
+
+    /// Removes what was derived from everybody's ratings, if it is there: single
+    /// ratings and comments are in it. Anything but a folder of that name is not
+    /// ours and stays.
+    fn remove_analysis(&self) -> Result<bool, StoreError> {
+        let items = self.disk.list(&self.path).at(&self.path)?;
+        let is_analysis = |i: &super::disk::Item| i.name == layout::ANALYSIS && i.is_folder;
+        if !items.iter().any(is_analysis) {
+            return Ok(false);
+        }
+        remove_all(self.disk.as_ref(), &self.path.join(layout::ANALYSIS))?;
+        self.disk.sync_folder(&self.path).at(&self.path)?;
+        Ok(true)
     }
 }
 

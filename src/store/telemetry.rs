@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Bytes that are gathered before they are written.
 const BUFFER: usize = 32 << 10;
 
-const HEADER: &str = "t_s,x_mm,v_mm_s,force_command_n,force_measured_n\r\n";
+pub(super) const HEADER: &str = "t_s,x_mm,v_mm_s,force_command_n,force_measured_n\r\n";
 
 /// Writes the telemetry of one attempt. It can be moved to a thread of its own.
 pub struct TelemetryWriter {

@@ -1,7 +1,9 @@
 //! Re-reading everything and comparing it.
 
+mod telemetry;
+
 use super::derive::{derive, tables};
-use super::error::{At as _, StoreError};
+use super::error::{At as _, StoreError, plain};
 use super::ledger::SeatKind;
 use super::line::sha256;
 use super::manifest::Manifest;
@@ -44,21 +46,45 @@ impl Finding {
 
 impl StudyFolder {
     /// Re-reads every journal and compares it with itself, the frozen protocol with
-    /// its hashes, and, given a protocol, the tables with what the journals give.
+    /// its hashes, the telemetry with the number of its samples, and, given a protocol, the tables with what the journals give.
     ///
     /// # Errors
     /// [`StoreError`] if a folder or journal cannot be read at all.
     pub fn verify(&self, protocol: Option<&Protocol>) -> Result<Vec<Finding>, StoreError> {
+        let sessions = self.sessions()?;
+        let mut found = self.verify_journals(&sessions)?;
+        for session in &sessions {
+            let place = place_of(session);
+            self.verify_telemetry(session, &place, &mut found)?;
+        }
+        if let Some(protocol) = protocol {
+            self.verify_tables(&sessions, protocol, &mut found)?;
+        }
+        Ok(found)
+    }
+
+    /// What is wrong with the frozen protocol and the journals: whatever is made of
+    /// them is to be read with that in mind.
+    ///
+    /// # Errors
+    /// As [`StudyFolder::verify`].
+    pub fn faults(&self) -> Result<Vec<Finding>, StoreError> {
+        let mut found = self.verify_journals(&self.sessions()?)?;
+        found.retain(|f| f.wrong);
+        Ok(found)
+    }
+
+    fn verify_journals(&self, sessions: &[SessionData]) -> Result<Vec<Finding>, StoreError> {
         let mut found = Vec::new();
         self.verify_frozen(&mut found)?;
         self.verify_names(&mut found)?;
-        let sessions = self.sessions()?;
-        for session in &sessions {
+        for session in sessions {
             self.verify_session(session, &mut found)?;
         }
-        verify_rows(&sessions, &mut found);
-        if let Some(protocol) = protocol {
-            self.verify_tables(&sessions, protocol, &mut found)?;
+        verify_rows(sessions, &mut found);
+        for gone in self.vanished(sessions) {
+            let what = format!("{} names {gone}, whose journal is not there", gone.table);
+            found.push(Finding::wrong(layout::SESSIONS, what));
         }
         Ok(found)
     }
@@ -70,7 +96,7 @@ impl StudyFolder {
             for (name, hash) in &version.files {
                 let place = format!("{}/{}/{name}", layout::PROTOCOLS, version.version);
                 match self.disk.read(&folder.join(name)) {
-                    Err(e) => found.push(Finding::wrong(place, e.to_string())),
+                    Err(e) => found.push(Finding::wrong(place, plain(&e))),
                     Ok(bytes) if sha256(&bytes) != *hash => found.push(Finding::wrong(
                         place,
                         "it is not the file that was frozen (SHA-256 in study.json)",
@@ -136,12 +162,7 @@ impl StudyFolder {
         session: &SessionData,
         found: &mut Vec<Finding>,
     ) -> Result<(), StoreError> {
-        let place = format!(
-            "{}/{}/{}",
-            layout::SESSIONS,
-            session.participant,
-            session.session
-        );
+        let place = place_of(session);
         if let Some(stone) = &session.tombstone {
             let place = format!("{}/{}", layout::SESSIONS, session.participant);
             if stone.participant != session.participant {
@@ -242,11 +263,16 @@ impl StudyFolder {
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                     found.push(Finding::note(name, "not written yet"));
                 }
-                Err(e) => found.push(Finding::wrong(name, e.to_string())),
+                Err(e) => found.push(Finding::wrong(name, plain(&e))),
             }
         }
         Ok(())
     }
+}
+
+fn place_of(session: &SessionData) -> String {
+    let (id, number) = (&session.participant, session.session);
+    format!("{}/{id}/{number}", layout::SESSIONS)
 }
 
 fn is_torn(damage: &super::Damage) -> bool {

@@ -317,3 +317,23 @@ pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
     events.push(Event::Finished);
     events
 }
+
+/// As much telemetry as the playbacks among the events say that there was.
+pub fn telemetry(session: &std::path::Path, events: &[Event]) {
+    let folder = session.join("telemetry");
+    std::fs::create_dir_all(&folder).unwrap();
+    let header = "t_s,x_mm,v_mm_s,force_command_n,force_measured_n\r\n";
+    for event in events {
+        if let Event::PlaybackEnded {
+            trial,
+            attempt,
+            playback,
+            ..
+        } = event
+        {
+            let lines = "0.001,0,0,0,\r\n".repeat(playback.samples as usize);
+            let file = folder.join(format!("{trial:03}-a{attempt}.csv"));
+            std::fs::write(file, format!("{header}{lines}")).unwrap();
+        }
+    }
+}
