@@ -57,7 +57,6 @@ fn the_header_is_enough_to_make_the_recording_again_to_the_byte() {
         header[0].starts_with("simulated, not measured"),
         "{header:?}"
     );
-    // what the blank lines of the file were is not kept
     fs::write(path("t.toml"), block(&header, "TRAJECTORY:")).unwrap();
     fs::write(path("p.toml"), block(&header, "PLANT:")).unwrap();
     study()

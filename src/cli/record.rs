@@ -137,7 +137,8 @@ fn header(
         ("PLANT", plant::file::write(target)),
     ] {
         let _ = writeln!(out, "{file}:");
-        for line in text.lines() {
+        // a reader may drop blanks at the end of a line, and then a blank line is lost
+        for line in text.lines().filter(|line| !line.is_empty()) {
             let _ = writeln!(out, "  {line}");
         }
     }
