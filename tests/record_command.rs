@@ -196,9 +196,14 @@ fn switch_a_recorded_here_gives_the_vafs_of_the_shipped_recordings() {
     }
     let swept = Excitation::of(&training);
     let sine = Excitation::of(&validation);
-    assert!(swept.median().unwrap() < 20.0, "{:?}", swept.median());
+    // about 5 and 6500 by the description of the switch
+    assert!(
+        (3.0..8.0).contains(&swept.median().unwrap()),
+        "{:?}",
+        swept.median()
+    );
     assert!(swept.warning().is_none() && sine.warning().is_some());
-    assert!(sine.median().unwrap() > 100.0, "{:?}", sine.median());
+    assert!(sine.median().unwrap() > 1000.0, "{:?}", sine.median());
 }
 
 /// The order of the paper's five realizations on switch B at 10 kHz, dx = 1 mm: a

@@ -192,7 +192,7 @@ fn summary(bytes: &[u8], console: &mut Console) {
     ));
     match delay::accelerometer_s(&recording) {
         Ok(Some(late_s)) => console.say(format!(
-            "the accelerometer is {:.3} ms later than the encoder",
+            "delay of the accelerometer against the encoder: {:.3} ms",
             late_s * 1e3
         )),
         Ok(None) | Err(_) => console.say("the delay of the accelerometer cannot be told"),

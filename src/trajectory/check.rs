@@ -180,7 +180,8 @@ impl Bound {
             return;
         }
         match &mut self.found {
-            Some(found) if self.sign * (value - found.worst) > 0.0 => {
+            // the first of peaks that differ by rounding
+            Some(found) if self.sign * (value - found.worst) > 1e-9 * value.abs() => {
                 found.worst = value;
                 found.worst_s = t_s;
             }

@@ -65,8 +65,9 @@ pub fn samples(reference: &[f64], other: &[f64], most: usize) -> Option<f64> {
     let all: Vec<f64> = (0..=2 * most).map(correlation).collect();
     let top = (0..all.len()).max_by(|a, b| all[*a].total_cmp(&all[*b]))?;
     let own: f64 = middle.iter().map(|a| a * a).sum();
-    // also refuses a NaN, which a constant gives
-    if !(all[top] / libm::sqrt(own) >= LEAST_CORRELATION) || top == 0 || top == 2 * most {
+    let alike = all[top] / libm::sqrt(own);
+    // a constant gives a NaN
+    if alike.is_nan() || alike < LEAST_CORRELATION || top == 0 || top == 2 * most {
         return None;
     }
     let [before, here, after] = [all[top - 1], all[top], all[top + 1]];

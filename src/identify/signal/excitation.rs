@@ -132,7 +132,7 @@ impl Gram {
     /// extreme eigenvalues of its products.
     fn condition(&self) -> f64 {
         let length: [f64; 4] = std::array::from_fn(|i| libm::sqrt(self.sums[i][i]));
-        if length.iter().any(|l| !(*l > 0.0)) {
+        if !length.iter().all(|l| *l > 0.0) {
             return MOST_CONDITION;
         }
         let scaled = std::array::from_fn(|i| {
@@ -180,11 +180,9 @@ fn eigenvalues(mut m: [[f64; 4]; 4]) -> [f64; 4] {
                     row[p] = c * one - s * other;
                     row[q] = s * one + c * other;
                 }
-                for k in 0..4 {
-                    let (one, other) = (m[p][k], m[q][k]);
-                    m[p][k] = c * one - s * other;
-                    m[q][k] = s * one + c * other;
-                }
+                let (one, other) = (m[p], m[q]);
+                m[p] = std::array::from_fn(|k| c * one[k] - s * other[k]);
+                m[q] = std::array::from_fn(|k| s * one[k] + c * other[k]);
             }
         }
     }
