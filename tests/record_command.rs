@@ -207,10 +207,10 @@ fn switch_a_recorded_here_gives_the_vafs_of_the_shipped_recordings() {
 }
 
 /// The order of the paper's five realizations on switch B at 10 kHz, dx = 1 mm: a
-/// peak at λ = 0.9995. Unoptimised this takes a minute:
-/// `cargo test --release --test record_command -- --ignored --nocapture`
+/// peak at λ = 0.9995. Unoptimised this takes twenty seconds:
+/// `cargo test --test record_command -- --ignored`
 #[test]
-#[ignore = "a minute unoptimised"]
+#[ignore = "twenty seconds unoptimised"]
 fn at_10_khz_switch_b_has_its_peak_at_the_papers_lambda() {
     let training = of("training.toml", &Parameters::b(), 10_000.0, 1);
     let validation = of("validation-1.5hz.toml", &Parameters::b(), 10_000.0, 2);
