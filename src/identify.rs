@@ -16,6 +16,7 @@ pub mod baseline;
 pub mod ewls;
 pub mod grid;
 pub mod resample;
+pub mod signal;
 pub mod vaf;
 
 use crate::model::predict::{Direction, Lookup};
