@@ -15,6 +15,7 @@
 pub mod baseline;
 pub mod ewls;
 pub mod grid;
+pub mod lanes;
 pub mod resample;
 pub mod vaf;
 

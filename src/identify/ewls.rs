@@ -17,7 +17,7 @@
 //! Not here: the order of the samples and the choice of nodes.
 
 /// P(0) = START · I.
-const START: f64 = 1e6;
+pub(super) const START: f64 = 1e6;
 
 /// A parameter vector, in the order m (kg), b (N·s/mm), k (N/mm), F0 (N).
 pub type Theta = [f64; 4];
