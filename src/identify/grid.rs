@@ -2,6 +2,7 @@
 
 use super::vaf::{self, Score};
 use super::{Identified, IdentifyError, Method, Training, Warning};
+use crate::identify::method::Ewls;
 use crate::identify::resample::Resample;
 use crate::model::Realization;
 use crate::model::predict::Lookup;
@@ -85,10 +86,7 @@ pub fn run(
             }
             for lambda in lambdas {
                 let estimates = training.estimates(*lambda)?;
-                let method = Method::Ewls {
-                    lambda: *lambda,
-                    resample: *resample,
-                };
+                let method = Method::Ewls(Ewls::paper(*lambda, *resample));
                 for dx in dx_mm {
                     keep(method, training.ewls(&estimates, *dx, *resample, lookup)?);
                 }
