@@ -7,6 +7,7 @@
 pub mod csv;
 pub mod json;
 pub mod plot;
+pub mod svg;
 pub mod text;
 
 /// What was analysed, for the head of a report.

@@ -101,7 +101,7 @@ impl Axis {
 }
 
 /// 1, 2 or 5 times a power of ten, so that at most `most` steps fit.
-fn step(span: f64, most: usize) -> f64 {
+pub(super) fn step(span: f64, most: usize) -> f64 {
     let rough = span / most as f64;
     let ten = 10f64.powf(rough.log10().floor());
     [1.0, 2.0, 5.0, 10.0]

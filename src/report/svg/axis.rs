@@ -1,0 +1,194 @@
+//! An axis: its ends, its ticks and their labels.
+
+use crate::report::plot::step;
+
+/// Which ticks an axis has.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ticks {
+    /// At round numbers, as many as there is room for.
+    Round,
+    /// At these places with these labels. Untrusted.
+    At(Vec<(f64, String)>),
+    /// None.
+    Bare,
+}
+
+/// An axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// What it shows, with its unit; empty for none. Untrusted.
+    pub label: String,
+    /// Value at the left or lower end.
+    pub low: f64,
+    /// Value at the right or upper end.
+    pub high: f64,
+    /// Ticks.
+    pub ticks: Ticks,
+    /// Whether faint lines go from the ticks through the panel.
+    pub grid: bool,
+}
+
+impl Axis {
+    /// From `low` to `high` with round ticks and grid lines. Ends that are not
+    /// finite, or not apart, are replaced so that there is something to draw on;
+    /// `low` above `high` makes an axis that runs backwards.
+    pub fn new(label: &str, low: f64, high: f64) -> Self {
+        let (low, high) = if (high - low).is_finite() && high != low {
+            (low, high)
+        } else if low.is_finite() && low.abs() < 1e300 {
+            let room = (low.abs() * 0.1).max(0.5);
+            (low - room, low + room)
+        } else {
+            (0.0, 1.0)
+        };
+        Self {
+            label: label.to_owned(),
+            low,
+            high,
+            ticks: Ticks::Round,
+            grid: true,
+        }
+    }
+
+    /// One that holds all finite values, with a tenth of room at both ends.
+    pub fn around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let mut low = f64::INFINITY;
+        let mut high = f64::NEG_INFINITY;
+        for v in values.into_iter().filter(|v| v.is_finite()) {
+            low = low.min(v);
+            high = high.max(v);
+        }
+        let room = (high - low) * 0.1;
+        if room > 0.0 {
+            Self::new(label, low - room, high + room)
+        } else {
+            Self::new(label, low, high)
+        }
+    }
+
+    /// Categories at 0, 1, 2 …, half a step of room at both ends, no grid.
+    pub fn of_names<S: AsRef<str>>(label: &str, names: &[S]) -> Self {
+        let at = names.iter().enumerate();
+        Self {
+            ticks: Ticks::At(at.map(|(i, n)| (i as f64, n.as_ref().to_owned())).collect()),
+            grid: false,
+            ..Self::new(label, -0.5, names.len().max(1) as f64 - 0.5)
+        }
+    }
+
+    /// The same with ticks at these places.
+    #[must_use]
+    pub fn at(mut self, ticks: Vec<(f64, String)>) -> Self {
+        self.ticks = Ticks::At(ticks);
+        self
+    }
+
+    /// The same without ticks.
+    #[must_use]
+    pub fn bare(mut self) -> Self {
+        self.ticks = Ticks::Bare;
+        self
+    }
+
+    /// The same without grid lines.
+    #[must_use]
+    pub fn without_grid(mut self) -> Self {
+        self.grid = false;
+        self
+    }
+
+    /// Where a value lies, 0 at the low end and 1 at the high one. Far outside
+    /// it stays near, so that no coordinate overflows.
+    pub(super) fn share(&self, value: f64) -> Option<f64> {
+        let share = (value - self.low) / (self.high - self.low);
+        let share = if value.is_finite() && share.is_infinite() {
+            share.signum() * 50.0
+        } else {
+            share
+        };
+        (!share.is_nan()).then(|| share.clamp(-50.0, 50.0))
+    }
+
+    /// Places and labels, at most about `most`.
+    pub(super) fn marks(&self, most: usize) -> Vec<(f64, String)> {
+        match &self.ticks {
+            Ticks::Bare => Vec::new(),
+            Ticks::At(ticks) => ticks.clone(),
+            Ticks::Round => self.round(most.max(1)),
+        }
+    }
+
+    fn round(&self, most: usize) -> Vec<(f64, String)> {
+        let (low, high) = (self.low.min(self.high), self.low.max(self.high));
+        let step = step(high - low, most);
+        let first = (low / step - 1e-9).ceil();
+        let mut marks = Vec::new();
+        for i in 0..=most {
+            let k = first + i as f64;
+            let at = k * step;
+            // Far out, a double's next neighbour is further than a step.
+            if at > high + 1e-9 * step || k + 1.0 <= k || !at.is_finite() {
+                break;
+            }
+            marks.push((at, label(at, step)));
+        }
+        marks
+    }
+}
+
+/// A tick's number with as many decimals as its step needs.
+fn label(at: f64, step: f64) -> String {
+    let size = at.abs().max(step);
+    let shown = if !(1e-4..1e7).contains(&size) {
+        format!("{at:.2e}")
+    } else {
+        let decimals = (-(step * 1.000_001).log10().floor()).clamp(0.0, 9.0) as usize;
+        // + 0.0: no "-0".
+        format!("{:.decimals$}", at + 0.0)
+    };
+    shown.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(axis: &Axis, most: usize) -> Vec<String> {
+        axis.marks(most).into_iter().map(|m| m.1).collect()
+    }
+
+    #[test]
+    fn ticks_stand_at_round_numbers() {
+        assert_eq!(
+            labels(&Axis::new("", 1.0, 7.0), 8),
+            ["1", "2", "3", "4", "5", "6", "7"]
+        );
+        assert_eq!(
+            labels(&Axis::new("", -0.05, 0.15), 5),
+            ["−0.05", "0.00", "0.05", "0.10", "0.15"]
+        );
+    }
+
+    #[test]
+    fn an_axis_of_nothing_can_still_be_drawn_on() {
+        for (low, high) in [
+            (f64::NAN, 1.0),
+            (2.0, 2.0),
+            (f64::INFINITY, f64::NEG_INFINITY),
+            (-1e308, 1e308),
+            (1e300, 1.000_000_1e300),
+            (1e308, 1e308),
+        ] {
+            let axis = Axis::new("", low, high);
+            assert!((axis.high - axis.low).is_finite() && axis.high != axis.low);
+            assert!(axis.marks(10).len() <= 11);
+        }
+    }
+
+    #[test]
+    fn a_value_far_outside_has_a_small_place() {
+        let axis = Axis::new("", 0.0, 1e-300);
+        assert_eq!(axis.share(1e308), Some(50.0));
+        assert_eq!(axis.share(f64::NAN), None);
+    }
+}

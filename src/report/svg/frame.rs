@@ -1,0 +1,183 @@
+//! Where panels, their margins and their legends lie.
+
+use super::axis::{Axis, Ticks};
+use super::{Figure, NORMAL, Panel, SMALL, text_width};
+
+/// Least distance of two tick labels, px.
+const APART: f64 = 8.0;
+
+/// Characters of a tick label that are shown.
+pub(super) const MAX_LABEL: usize = 24;
+
+/// Where the parts of a panel lie, px.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Frame {
+    /// Of the axes: left, top, right, bottom.
+    pub(super) left: f64,
+    pub(super) top: f64,
+    pub(super) right: f64,
+    pub(super) bottom: f64,
+    /// Left end of the whole panel.
+    pub(super) outer_left: f64,
+    /// Upper end of the whole panel.
+    pub(super) outer_top: f64,
+    /// Lower end of the whole panel.
+    pub(super) outer_bottom: f64,
+    /// Ticks of x and y: place, label.
+    pub(super) x_ticks: Vec<(f64, String)>,
+    pub(super) y_ticks: Vec<(f64, String)>,
+    /// Whether the labels of x are set at a slant.
+    pub(super) slanted: bool,
+    /// Legend: series, place of its sample.
+    pub(super) legend: Vec<(usize, (f64, f64))>,
+}
+
+impl Frame {
+    pub(super) fn x(&self, axis: &Axis, value: f64) -> Option<f64> {
+        Some(self.left + axis.share(value)? * (self.right - self.left))
+    }
+
+    pub(super) fn y(&self, axis: &Axis, value: f64) -> Option<f64> {
+        Some(self.bottom - axis.share(value)? * (self.bottom - self.top))
+    }
+}
+
+/// Width of the sample before a legend entry and of the gap behind it, px.
+pub(super) const SAMPLE: f64 = 26.0;
+const LEGEND_LINE: f64 = 18.0;
+
+/// The frames of all panels; left margins of a column are equal, so that the
+/// axes of panels above each other stand above each other.
+pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
+    let columns = figure.columns.max(1);
+    let cell_width = figure.width / columns as f64;
+    let rows: Vec<&[Panel]> = figure.panels.chunks(columns).collect();
+    let share = |row: &[Panel]| row.iter().map(|p| p.share).fold(0.1, f64::max);
+    let whole: f64 = rows.iter().map(|r| share(r)).sum();
+    let margin = |column: usize| {
+        let own = figure.panels.iter().skip(column).step_by(columns);
+        own.map(left_margin).fold(0.0, f64::max)
+    };
+    let margins: Vec<f64> = (0..columns).map(margin).collect();
+    let mut frames = Vec::new();
+    let mut top = 0.0;
+    for row in rows {
+        let height = figure.height * share(row) / whole;
+        for (j, panel) in row.iter().enumerate() {
+            let left = cell_width * j as f64;
+            frames.push(frame(
+                panel,
+                (left, top, left + cell_width, top + height),
+                margins[j],
+            ));
+        }
+        top += height;
+    }
+    frames
+}
+
+fn left_margin(panel: &Panel) -> f64 {
+    let label = if panel.y.label.is_empty() { 6.0 } else { 24.0 };
+    let widest = panel
+        .y
+        .marks(6)
+        .iter()
+        .map(|(_, l)| text_width(&super::shortened(l, MAX_LABEL), SMALL))
+        .fold(0.0, f64::max);
+    label + widest + 8.0
+}
+
+fn frame(panel: &Panel, outer: (f64, f64, f64, f64), margin: f64) -> Frame {
+    let (outer_left, outer_top, outer_right, outer_bottom) = outer;
+    let left = outer_left + margin;
+    let right = outer_right
+        - match &panel.colour_bar {
+            Some(_) => 84.0,
+            None => 14.0,
+        };
+    let mut top = outer_top + if panel.title.is_empty() { 8.0 } else { 26.0 };
+    let legend = legend(panel, left, right, &mut top);
+    let room = right - left;
+    let (x_ticks, slanted) = x_ticks(&panel.x, room);
+    let below = match (x_ticks.is_empty(), slanted) {
+        (true, _) => 6.0,
+        (false, false) => 22.0,
+        (false, true) => {
+            let widest = x_ticks
+                .iter()
+                .map(|(_, l)| text_width(l, SMALL))
+                .fold(0.0, f64::max);
+            // sin 35° and the height of the letters.
+            widest * 0.574 + 18.0
+        }
+    };
+    let label = if panel.x.label.is_empty() { 4.0 } else { 22.0 };
+    let bottom = (outer_bottom - below - label).max(top + 10.0);
+    // At least 22 px from tick to tick.
+    let most = ((bottom - top) / 22.0).floor().clamp(2.0, 10.0) as usize;
+    let shorten = |t: (f64, String)| (t.0, super::shortened(&t.1, MAX_LABEL));
+    Frame {
+        left,
+        top,
+        right: right.max(left + 10.0),
+        bottom,
+        outer_left,
+        outer_top,
+        outer_bottom,
+        x_ticks,
+        y_ticks: panel.y.marks(most).into_iter().map(shorten).collect(),
+        slanted,
+        legend,
+    }
+}
+
+/// As many ticks as have room beside each other; names that have none are set
+/// at a slant, and if even that is too tight every n-th is shown.
+fn x_ticks(axis: &Axis, room: f64) -> (Vec<(f64, String)>, bool) {
+    let widest = |ticks: &[(f64, String)]| {
+        let all = ticks.iter().map(|(_, l)| text_width(l, SMALL));
+        all.fold(0.0, f64::max)
+    };
+    if let Ticks::At(given) = &axis.ticks {
+        let mut ticks: Vec<(f64, String)> = given
+            .iter()
+            .map(|(at, l)| (*at, super::shortened(l, MAX_LABEL)))
+            .collect();
+        let slanted = (widest(&ticks) + APART) * ticks.len() as f64 > room;
+        if slanted {
+            // At least 16 px, most of a line, from one to the next.
+            let fit = (room / 16.0).floor().max(1.0) as usize;
+            let every = ticks.len().div_ceil(fit);
+            ticks = ticks.into_iter().step_by(every).collect();
+        }
+        return (ticks, slanted);
+    }
+    let ticks = (2..=10)
+        .rev()
+        .map(|most| axis.marks(most))
+        .find(|ticks| (widest(ticks) + APART) * ticks.len() as f64 <= room);
+    (ticks.unwrap_or_default(), false)
+}
+
+fn legend(panel: &Panel, left: f64, right: f64, top: &mut f64) -> Vec<(usize, (f64, f64))> {
+    let mut entries = Vec::new();
+    let (mut x, mut y) = (left, *top + 10.0);
+    for (i, series) in panel.series.iter().enumerate() {
+        let Some(name) = &series.name else { continue };
+        let name = super::shortened(name, MAX_LABEL);
+        let width = SAMPLE + text_width(&name, SMALL) + 14.0;
+        if x > left && x + width > right {
+            x = left;
+            y += LEGEND_LINE;
+        }
+        entries.push((i, (x, y)));
+        x += width;
+    }
+    if !entries.is_empty() {
+        *top = y + LEGEND_LINE - 4.0;
+    }
+    entries
+}
+
+/// Base line of a panel's title below its upper end, px.
+pub(super) const TITLE_BASE: f64 = NORMAL + 4.0;

@@ -1,0 +1,103 @@
+//! What every figure keeps to.
+
+use super::*;
+
+fn sample() -> Figure {
+    let names = ["a", "b", "c"];
+    Figure::new("fig", "three means", 400.0, 240.0).with(
+        Panel::new(
+            Axis::of_names("lambda", &names),
+            Axis::new("rating", 1.0, 7.0),
+        )
+        .titled("means")
+        .named(
+            "mean",
+            Look::nth(0),
+            Mark::Points(vec![(0.0, 2.0), (1.0, f64::NAN), (2.0, 1e308)]),
+        )
+        .with(
+            Look::nth(1),
+            Mark::Bars(vec![Span {
+                x: (0.0, 1.0),
+                y: (1.0, 3.0),
+            }]),
+        )
+        .note(Note::new((1.0, 4.0), "here")),
+    )
+}
+
+#[test]
+fn equal_figures_give_equal_bytes() {
+    assert_eq!(sample().to_svg(), sample().to_svg());
+}
+
+#[test]
+fn what_is_not_finite_is_not_drawn_and_what_is_far_out_stays_near() {
+    let svg = sample().to_svg();
+    assert_eq!(
+        svg.matches("<circle").count(),
+        3,
+        "two of them and the legend's"
+    );
+    assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    assert!(!svg.split('"').any(|part| part.len() > 400), "{svg}");
+}
+
+#[test]
+fn hostile_text_stays_text() {
+    let evil = "</text><script>alert(1)</script>\" onload='x' \u{202e}]]>&\u{0}\u{ffff}";
+    let mut figure = sample();
+    figure.title = evil.to_owned();
+    figure.panels[0].title = evil.to_owned();
+    figure.panels[0].x.label = evil.to_owned();
+    figure.panels[0].x.ticks = Ticks::At(vec![(0.0, evil.to_owned())]);
+    figure.panels[0].series[0].name = Some(evil.to_owned());
+    figure.panels[0].notes[0].text = evil.to_owned();
+    let svg = figure.to_svg();
+    assert!(!svg.contains("<script") && !svg.contains("]]>"), "{svg}");
+    assert!(!svg.contains("onload='"), "{svg}");
+    assert!(!svg.chars().any(|c| c != '\n' && crate::text::is_unsafe(c)));
+}
+
+#[test]
+fn ids_begin_with_the_figures_own_and_are_unique() {
+    let svg = sample().to_svg();
+    let ids: Vec<&str> = svg
+        .split(" id=\"")
+        .skip(1)
+        .filter_map(|rest| rest.split('"').next())
+        .collect();
+    let distinct: std::collections::BTreeSet<&&str> = ids.iter().collect();
+    assert_eq!(ids.len(), distinct.len());
+    assert!(ids.len() >= 3 && ids.iter().all(|id| id.starts_with("fig-")));
+}
+
+#[test]
+fn the_ramp_darkens_all_the_way() {
+    let all: Vec<f64> = (0..=20)
+        .map(|i| ramp(f64::from(i) / 20.0).luminance())
+        .collect();
+    assert!(all.windows(2).all(|w| w[1] < w[0]), "{all:?}");
+}
+
+#[test]
+fn neighbours_in_the_palette_differ_in_grey() {
+    for pair in PALETTE.windows(2) {
+        let (a, b) = (pair[0].luminance() + 0.05, pair[1].luminance() + 0.05);
+        assert!(a.max(b) / a.min(b) > 1.25, "{pair:?}: {a} {b}");
+    }
+    // Marks need a contrast of 3 to white paper (WCAG 2.1, 1.4.11); the lighter
+    // ones are never text.
+    for colour in PALETTE {
+        assert!(1.05 / (colour.luminance() + 0.05) > 2.6, "{colour:?}");
+    }
+}
+
+#[test]
+fn names_that_have_no_room_are_slanted_and_thinned() {
+    let names: Vec<String> = (0..100).map(|i| format!("realization-{i}")).collect();
+    let panel = Panel::new(Axis::of_names("", &names), Axis::new("", 0.0, 1.0));
+    let figure = Figure::new("f", "", 400.0, 200.0).with(panel);
+    let shown = figure.to_svg().matches("rotate(-35").count();
+    assert!((10..=25).contains(&shown), "{shown}");
+}
