@@ -34,6 +34,7 @@ pub mod method;
 mod problem;
 pub mod resample;
 pub mod vaf;
+pub mod validation;
 
 pub use method::Method;
 pub use problem::{IdentifyError, Warning};
@@ -193,19 +194,36 @@ impl<'r> Training<'r> {
         };
         let positive = at_nodes(&self.positive, &estimates.positive);
         let negative = at_nodes(&self.negative, &estimates.negative);
-        let start_up = self.start_up(&estimates.options, &nodes);
+        let options = Ewls {
+            resample,
+            ..estimates.options
+        };
+        Ok(self.ewls_table(options, dx_mm, nodes, positive, negative, lookup))
+    }
+
+    /// A table of the EWLS family from values at its nodes.
+    fn ewls_table(
+        &self,
+        options: Ewls,
+        dx_mm: f64,
+        nodes: Vec<f64>,
+        positive: Resampled,
+        negative: Resampled,
+        lookup: Lookup,
+    ) -> Identified {
+        let start_up = self.start_up(&options, &nodes);
         let mut identified = self.table(nodes, positive, negative, lookup);
         identified.warnings.extend(start_up);
-        let memory = self.memory_mm(estimates.options.lambda);
+        let memory = self.memory_mm(options.lambda);
         identified.realization.provenance = Provenance {
-            method: Method::Ewls(estimates.options).to_string(),
-            lambda: Some(estimates.options.lambda),
+            method: Method::Ewls(options).to_string(),
+            lambda: Some(options.lambda),
             memory_mm: memory.is_finite().then_some(memory),
             dx_mm: Some(dx_mm),
-            resample: Some(resample.word().into()),
+            resample: Some(options.resample.word().into()),
             ..self.provenance()
         };
-        Ok(identified)
+        identified
     }
 
     /// Mean force by position and direction.
@@ -336,20 +354,6 @@ pub struct Identified {
     pub realization: Realization,
     /// What is doubtful.
     pub warnings: Vec<Warning>,
-}
-
-impl Identified {
-    /// Share of the nodes of both directions with a negative mass, and with
-    /// negative damping, 0 to 1.
-    pub fn negative_shares(&self) -> [f64; 2] {
-        let branches = [&self.realization.positive, &self.realization.negative];
-        let share = |of: fn(&Branch) -> &Vec<f64>| {
-            let all = branches.iter().flat_map(|b| of(b));
-            let below = all.clone().filter(|p| **p < 0.0).count();
-            below as f64 / all.count() as f64
-        };
-        [share(|b| &b.m_kg), share(|b| &b.b_n_s_per_mm)]
-    }
 }
 
 fn sorted(recording: &Recording, belongs: impl Fn(f64) -> bool) -> Sorted {

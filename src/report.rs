@@ -5,6 +5,7 @@
 //! as it is in CSV and JSON.
 
 pub mod csv;
+pub mod identification;
 pub mod json;
 pub mod plot;
 pub mod svg;

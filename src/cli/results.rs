@@ -62,7 +62,7 @@ pub(super) fn one_study(path: &Path) -> Result<StudyFolder, Failure> {
 
 /// The newest frozen protocol of a study, with the VAF of its models.
 pub(super) fn frozen(study: &StudyFolder) -> Result<Loaded, Failure> {
-    load::load(&study.frozen_protocol()).map_err(|mut failure| {
+    load::load_frozen(&study.frozen_protocol()).map_err(|mut failure| {
         failure.kind = Kind::Results;
         failure
     })

@@ -65,6 +65,19 @@ impl Sorted {
         }
     }
 
+    /// The same samples from the highest x down; those at the same x keep their
+    /// order in time.
+    pub(super) fn descending(&self) -> Self {
+        let order = descending(&self.x_mm);
+        let pick = |column: &[f64]| order.iter().map(|i| column[*i]).collect();
+        Self {
+            x_mm: pick(&self.x_mm),
+            v_mm_s: pick(&self.v_mm_s),
+            a_m_s2: pick(&self.a_m_s2),
+            f_n: pick(&self.f_n),
+        }
+    }
+
     /// L = 1 / ((1 − λ) ρ), mm; infinite at λ = 1.
     pub fn memory_mm(&self, lambda: f64) -> f64 {
         let [low, high] = self.range_mm();
@@ -89,9 +102,8 @@ pub fn estimate_with(samples: &Sorted, options: &Ewls, backward: bool) -> Vec<Th
     let mut recursion = Recursion::cold(options.lambda);
     let phi = |i: usize| [samples.a_m_s2[i], samples.v_mm_s[i], samples.x_mm[i], 1.0];
     if options.start == Start::Warm {
-        // saturates at λ = 1: all samples
-        let first = (3.0 / (1.0 - options.lambda)).ceil() as usize;
-        for i in order[..first.min(order.len())].iter().rev() {
+        let first = warm_samples(options.lambda).min(order.len());
+        for i in order[..first].iter().rev() {
             recursion.step(phi(*i), samples.f_n[*i]);
         }
     }
@@ -105,6 +117,11 @@ pub fn estimate_with(samples: &Sorted, options: &Ewls, backward: bool) -> Vec<Th
         };
     }
     estimates
+}
+
+/// Samples that a warm start goes back over, 3/(1 − λ); saturates at λ = 1.
+pub(super) fn warm_samples(lambda: f64) -> usize {
+    (3.0 / (1.0 - lambda)).ceil() as usize
 }
 
 /// Indices from the highest x down; samples at the same x keep their order in time.

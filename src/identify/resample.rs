@@ -186,7 +186,7 @@ fn mean(values: &[Theta]) -> Theta {
 }
 
 /// Straight lines between (`places`, `values`), the ends held.
-fn interpolate(places: &[f64], values: &[Theta], x: f64) -> Theta {
+pub(super) fn interpolate(places: &[f64], values: &[Theta], x: f64) -> Theta {
     let right = places.partition_point(|place| *place <= x);
     if right == 0 {
         return values[0];
