@@ -25,14 +25,18 @@
 //!
 //! Reference: Colton & Hollerbach, World Haptics 2007, equation 1 and section 4.
 
+mod banded;
 pub mod baseline;
 pub mod constrained;
 pub mod ewls;
 pub mod grid;
 pub mod lanes;
+mod hat;
+mod hat_table;
 pub mod method;
 mod problem;
 pub mod resample;
+pub mod two_sided;
 pub mod vaf;
 pub mod validation;
 
@@ -43,7 +47,7 @@ use crate::model::predict::{Direction, Lookup};
 use crate::model::{Branch, Provenance, Realization, Trained};
 use crate::recording::Recording;
 use ewls::{Sorted, Theta};
-use method::{Ewls, Sort, Start};
+use method::{Ewls, Sort, Start, TwoSided, Width};
 use problem::START_UP_SAMPLES;
 use resample::{Resample, Resampled};
 
@@ -119,9 +123,11 @@ impl<'r> Training<'r> {
                 let estimates = self.estimates_of(options)?;
                 self.ewls(&estimates, dx_mm, options.resample, lookup)
             }
+            Method::TwoSided(options) => self.two_sided(options, dx_mm, lookup),
+            Method::Hat(options) => self.hat(options, dx_mm, lookup),
             Method::Static => self.static_profile(dx_mm, lookup),
+            Method::Segments(options) => self.segments(options, lookup),
             Method::Spring => Ok(self.spring(lookup)),
-            _ => Err(IdentifyError::Undetermined),
         }
     }
 
@@ -264,6 +270,50 @@ impl<'r> Training<'r> {
         identified
     }
 
+    /// Least squares around each node.
+    fn two_sided(
+        &self,
+        options: TwoSided,
+        dx_mm: f64,
+        lookup: Lookup,
+    ) -> Result<Identified, IdentifyError> {
+        let nodes = self.nodes(dx_mm)?;
+        let width = |samples: &Sorted| match options.width {
+            Width::Mm(mm) => mm,
+            Width::Lambda(lambda) => samples.memory_mm(lambda),
+        };
+        let of = |samples: &Sorted| {
+            let l_mm = width(samples);
+            two_sided::at_nodes(samples, &nodes, options.window, l_mm, options.bounded)
+                .ok_or(IdentifyError::Narrow { width_mm: l_mm })
+        };
+        let (positive, negative) = (of(&self.positive)?, of(&self.negative)?);
+        let mut identified = self.table(nodes, positive, negative, lookup);
+        // what is filled here is not empty but thin
+        for warning in &mut identified.warnings {
+            if let Warning::EmptyBins {
+                positive,
+                negative,
+                of,
+            } = *warning
+            {
+                *warning = Warning::Thin {
+                    positive,
+                    negative,
+                    of,
+                };
+            }
+        }
+        identified.realization.provenance = Provenance {
+            method: Method::TwoSided(options).to_string(),
+            lambda: Method::TwoSided(options).lambda(),
+            memory_mm: Some(width(&self.positive).min(width(&self.negative))),
+            dx_mm: Some(dx_mm),
+            ..self.provenance()
+        };
+        Ok(identified)
+    }
+
     /// The nodes where the recursion of one direction or the other has hardly
     /// begun; with a warm start there are none.
     fn start_up(&self, options: &Ewls, nodes: &[f64]) -> Option<Warning> {
@@ -316,6 +366,8 @@ impl<'r> Training<'r> {
                 of: nodes.len(),
             });
         }
+        let both = [&positive.theta, &negative.theta];
+        warnings.extend(problem::unmeasured(&self.recording.f_n, &nodes, both));
         Identified {
             realization: Realization {
                 id: String::new(),

@@ -1,5 +1,6 @@
 //! Why a recording gives no realization, and what is doubtful about one.
 
+use super::ewls::Theta;
 use super::resample::MOST_NODES;
 use std::fmt;
 
@@ -182,4 +183,42 @@ impl fmt::Display for Warning {
             }
         }
     }
+}
+
+/// Whether the force at rest of a node is more than half the measured range
+/// outside of it: a place where the estimate rests on nothing that was felt.
+pub(super) fn unmeasured(
+    measured_n: &[f64],
+    nodes: &[f64],
+    branches: [&Vec<Theta>; 2],
+) -> Option<Warning> {
+    let low = measured_n.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = measured_n.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (middle, reach) = (0.5 * (low + high), high - low);
+    let mut worst: Option<(f64, Warning)> = None;
+    let mut count = 0;
+    for branch in branches {
+        for (at_mm, theta) in nodes.iter().zip(branch) {
+            let force_n = theta[2] * at_mm + theta[3];
+            let off = (force_n - middle).abs();
+            if off <= reach {
+                continue;
+            }
+            count += 1;
+            if worst.as_ref().is_none_or(|(most, _)| off > *most) {
+                let warning = Warning::Unmeasured {
+                    nodes: count,
+                    force_n,
+                    at_mm: *at_mm,
+                };
+                worst = Some((off, warning));
+            }
+        }
+    }
+    worst.map(|(_, mut warning)| {
+        if let Warning::Unmeasured { nodes, .. } = &mut warning {
+            *nodes = count;
+        }
+        warning
+    })
 }
