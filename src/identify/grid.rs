@@ -59,11 +59,7 @@ impl Plan {
     /// How many realizations it makes.
     pub fn cells(&self) -> usize {
         let of = |method: &Method| {
-            if method.has_dx() {
-                self.dx_mm.len()
-            } else {
-                1
-            }
+            if method.has_dx() { self.dx_mm.len() } else { 1 }
         };
         self.methods.iter().map(of).sum()
     }
@@ -155,7 +151,10 @@ fn identify(
 ) -> Result<Vec<Vec<Identified>>, IdentifyError> {
     let mut made: Vec<Option<Result<Vec<Identified>, IdentifyError>>> = vec![None; methods.len()];
     for (options, members) in families(methods) {
-        let lambdas: Vec<f64> = members.iter().filter_map(|i| methods[*i].lambda()).collect();
+        let lambdas: Vec<f64> = members
+            .iter()
+            .filter_map(|i| methods[*i].lambda())
+            .collect();
         let found = ewls_tables(processor, training, options, &lambdas, tables, lookup);
         for (i, tables) in members.into_iter().zip(found) {
             made[i] = Some(tables);
@@ -239,7 +238,14 @@ fn ewls_tables(
         .into_par_iter()
         .flat_map_iter(|(direction, lambdas)| {
             let samples = training.directions()[direction];
-            pass(processor, options, samples, direction == 1, lambdas, &runs[direction])
+            pass(
+                processor,
+                options,
+                samples,
+                direction == 1,
+                lambdas,
+                &runs[direction],
+            )
         })
         .collect();
     let (plus, minus) = sums.split_at(lambdas.len());

@@ -165,7 +165,12 @@ pub fn detents(recording: &Recording) -> Vec<[f64; 2]> {
     edges.push(f64::INFINITY);
     edges
         .windows(2)
-        .map(|pair| [pair[0].max(low), pair[1].min(high + f64::EPSILON * high.abs())])
+        .map(|pair| {
+            [
+                pair[0].max(low),
+                pair[1].min(high + f64::EPSILON * high.abs()),
+            ]
+        })
         .collect()
 }
 

@@ -229,8 +229,7 @@ fn between(table: &TableView<'_>, i: usize, c: &mut Certificate) {
         // S is straight between jumps; each node's line is read on both sides of it
         let reach = |x: f64, c: &mut Certificate| {
             for node in [i, i + 1] {
-                let gap =
-                    spring(&table.positive, node, x) - spring(&table.negative, node, x);
+                let gap = spring(&table.positive, node, x) - spring(&table.negative, node, x);
                 c.hysteresis.see(gap, x);
             }
         };

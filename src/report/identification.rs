@@ -9,9 +9,7 @@
 
 mod spectrum;
 
-use super::svg::{
-    Axis, ColourBar, Dash, Figure, Look, Mark, Note, PALETTE, Panel, Span, ramp,
-};
+use super::svg::{Axis, ColourBar, Dash, Figure, Look, Mark, Note, PALETTE, Panel, Span, ramp};
 use crate::identify::vaf;
 use crate::model::{Branch, Realization};
 use crate::recording::Recording;
@@ -89,7 +87,13 @@ pub fn surface(places: &[Place], best: Option<usize>, on: &str) -> Option<Drawin
     }
     if let Some(best) = best.and_then(|i| places.get(i)) {
         let (x, y) = place(best);
-        let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5)];
+        let corners = [
+            (-0.5, -0.5),
+            (0.5, -0.5),
+            (0.5, 0.5),
+            (-0.5, 0.5),
+            (-0.5, -0.5),
+        ];
         let frame = corners.iter().map(|(a, b)| (x + a, y + b)).collect();
         let look = Look::plain(PALETTE[1]).stroke(3.0);
         panel = panel.named("highest", look, Mark::Line(frame));
@@ -191,13 +195,18 @@ pub fn force(realization: &Realization, recording: &Recording) -> Drawing {
     )
     .with(Look::plain(PALETTE[6]), line(|r| r[1] - r[2]));
     residual.share = 0.5;
-    let figure = Figure::new("fig6", "Measured and predicted force over time", 820.0, 480.0)
-        .with(
-            Panel::new(time(), Axis::around("force F (N)", forces))
-                .named("measured", measured, line(|r| r[1]))
-                .named("predicted", predicted, line(|r| r[2])),
-        )
-        .with(residual);
+    let figure = Figure::new(
+        "fig6",
+        "Measured and predicted force over time",
+        820.0,
+        480.0,
+    )
+    .with(
+        Panel::new(time(), Axis::around("force F (N)", forces))
+            .named("measured", measured, line(|r| r[1]))
+            .named("predicted", predicted, line(|r| r[2])),
+    )
+    .with(residual);
     let mut csv = String::from("t_s,measured_n,predicted_n\n");
     for [t, f, p] in &rows {
         let _ = writeln!(csv, "{t},{f},{p}");
@@ -236,8 +245,13 @@ pub fn spectra(realization: &Realization, recording: &Recording) -> Drawing {
     }
     Drawing {
         name: "fig7-spectra",
-        figure: Figure::new("fig7", "Spectra of measured and predicted force", 820.0, 420.0)
-            .with(panel),
+        figure: Figure::new(
+            "fig7",
+            "Spectra of measured and predicted force",
+            820.0,
+            420.0,
+        )
+        .with(panel),
         csv,
     }
 }
@@ -251,7 +265,10 @@ pub fn map(by_lambda: &[(f64, &Realization)]) -> Option<Drawing> {
     if sorted.len() < 2 || sorted.iter().any(|(_, r)| r.x_mm != *x) {
         return None;
     }
-    let names: Vec<String> = sorted.iter().map(|(lambda, _)| lambda.to_string()).collect();
+    let names: Vec<String> = sorted
+        .iter()
+        .map(|(lambda, _)| lambda.to_string())
+        .collect();
     let mut figure = Figure::new(
         "fig8",
         "Parameters of the + direction over position and forgetting factor",
@@ -275,7 +292,11 @@ pub fn map(by_lambda: &[(f64, &Realization)]) -> Option<Drawing> {
             .flat_map(|(row, (_, r))| {
                 let values = of(&r.positive);
                 (0..x.len()).map(move |i| {
-                    let left = if i == 0 { x[0] } else { 0.5 * (x[i - 1] + x[i]) };
+                    let left = if i == 0 {
+                        x[0]
+                    } else {
+                        0.5 * (x[i - 1] + x[i])
+                    };
                     let right = x.get(i + 1).map_or(x[i], |next| 0.5 * (x[i] + next));
                     let y = row as f64;
                     let span = Span {

@@ -263,6 +263,12 @@ fn back(processor: Processor, samples: &Sorted, first: usize, state: &mut State)
         a_m_s2: reversed(&samples.a_m_s2),
         f_n: reversed(&samples.f_n),
     };
-    dispatch(processor, &samples, std::slice::from_mut(state), &[], &mut []);
+    dispatch(
+        processor,
+        &samples,
+        std::slice::from_mut(state),
+        &[],
+        &mut [],
+    );
     state.rescale();
 }

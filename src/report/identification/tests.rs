@@ -74,7 +74,10 @@ fn tables_beside_figures_have_their_units_in_the_heads() {
     assert!(five.csv.starts_with(
         "x_mm,positive_m_kg,positive_b_n_s_per_mm,positive_k_n_per_mm,positive_f0_n,negative_m_kg"
     ));
-    assert_eq!(five.csv.lines().nth(1), Some("0,0.1,0.01,0,1,0.1,0.01,0,-1"));
+    assert_eq!(
+        five.csv.lines().nth(1),
+        Some("0,0.1,0.01,0,1,0.1,0.01,0,-1")
+    );
 }
 
 #[test]
