@@ -105,14 +105,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return Err(failure);
     };
     console.findings(&findings);
-    console.out(certificates(&loaded))?;
     console.out(format!(
         "{}: ok, {}, {}, about {minutes:.0} minutes, {}\n",
         loaded.protocol.study.id,
         plural(loaded.protocol.models.len(), "model"),
         plural(trials, "trial"),
         plural(warnings, "warning"),
-    ))
+    ))?;
+    console.out(certificates(&loaded))
 }
 
 fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {

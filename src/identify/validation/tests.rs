@@ -63,8 +63,10 @@ fn the_ceiling_of_a_repetition_is_its_noise() {
     // ±0.2 N, independent of one another: the noise of one is 0.2 N
     let noise = |seed: usize| {
         move |i: usize| {
-            let h = (i + seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
-            if h & 1 == 0 { 0.2 } else { -0.2 }
+            let mut h = (i + seed).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            h = (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            if (h >> 40) & 1 == 0 { 0.2 } else { -0.2 }
         }
     };
     let (one, two) = (noise(3), noise(77_777));

@@ -27,11 +27,14 @@ pub(super) fn amplitudes<const N: usize>(
     if span <= 0.0 {
         return Vec::new();
     }
-    let n = blocks.len() as f64;
-    let means: [f64; N] =
-        std::array::from_fn(|k| blocks.iter().map(|(_, y)| y[k]).sum::<f64>() / n);
     let window = |t: f64| 0.5 - 0.5 * (std::f64::consts::TAU * (t - start) / span).cos();
-    let gain: f64 = blocks.iter().map(|(t, _)| window(*t)).sum::<f64>() / 2.0;
+    let weight: f64 = blocks.iter().map(|(t, _)| window(*t)).sum();
+    // weighted as the signal is, so that nothing is left at 0 Hz
+    let means: [f64; N] = std::array::from_fn(|k| {
+        let weighted = blocks.iter().map(|(t, y)| window(*t) * y[k]);
+        weighted.sum::<f64>() / weight
+    });
+    let gain = 0.5 * weight;
     // half as far apart as the recording can tell, so that no peak falls between
     let step = (0.5 / span).max(TOP_HZ / MOST as f64);
     let count = (TOP_HZ / step) as usize;
