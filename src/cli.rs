@@ -13,12 +13,14 @@ mod device;
 mod identify;
 mod new;
 mod participant;
+mod record;
 mod rehearse;
 mod results;
 mod run;
 mod schedule;
 mod schema;
 mod status;
+mod trajectory;
 mod verify;
 
 pub use console::Console;
@@ -55,6 +57,10 @@ enum Command {
     Amend(amend::Args),
     /// Re-read every journal and compare the derived files
     Verify(verify::Args),
+    /// Draw an excitation and check it against the limits of probe and target
+    Trajectory(trajectory::Args),
+    /// Impose an excitation on the simulated target: a recording
+    Record(record::Args),
     /// From a recording to model files and their VAF
     Identify(identify::Args),
     /// Write a commented protocol to start from
@@ -84,6 +90,8 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Participant(args) => participant::run(&args, console),
         Command::Amend(args) => amend::run(&args, console),
         Command::Verify(args) => verify::run(&args, console),
+        Command::Trajectory(args) => trajectory::run(&args, console),
+        Command::Record(args) => record::run(&args, console),
         Command::Identify(args) => identify::run(&args, console),
         Command::New(args) => new::run(&args, console),
         Command::Schema(args) => schema::run(&args, console),

@@ -36,6 +36,7 @@ pub mod lanes;
 pub mod method;
 mod problem;
 pub mod resample;
+pub mod signal;
 pub mod two_sided;
 pub mod vaf;
 pub mod validation;

@@ -13,7 +13,7 @@
 //! | layer | modules |
 //! |---|---|
 //! | 0 | [`rng`], [`text`], [`limits`], [`diagnostic`] |
-//! | 1 | [`protocol`], [`model`], [`recording`], [`stats`] |
+//! | 1 | [`protocol`], [`model`], [`trajectory`], [`recording`], [`stats`] |
 //! | 2 | [`schedule`], [`outcome`], [`plant`], [`identify`] |
 //! | 3 | [`session`], [`store`], [`device`], [`rater`], [`analyze`] |
 //! | 4 | [`runner`], [`report`] |
@@ -63,4 +63,5 @@ pub mod session;
 pub mod stats;
 pub mod store;
 pub mod text;
+pub mod trajectory;
 pub mod tui;

@@ -1,9 +1,10 @@
 //! The target, and the hand that holds the device.
 //!
-//! Two simulated things stand in for what a lab has on its bench. [`Target`] is
+//! Three simulated things stand in for what a lab has on its bench. [`Target`] is
 //! the turn-signal switch: a spring-loaded follower on a cam with three detents,
 //! with friction, backlash and end stops; a probe imposes a motion on its handle
-//! and feels a force. [`Hand`] is a person's hand on the slider of the playback
+//! and feels a force. [`Probe`] is that probe: it imposes a trajectory and measures
+//! with the noise of its sensors; [`file`](mod@file) holds the parameters of a target as TOML. [`Hand`] is a person's hand on the slider of the playback
 //! device, which it moves back and forth over the stroke.
 //!
 //! Neither is measured on hardware: forces and ranks of methods that come out of
@@ -15,12 +16,16 @@
 //! Same parameters and same motion give the same force, bit for bit, on one
 //! platform.
 
+pub mod file;
+
 mod cam;
 mod friction;
 mod hand;
 mod parameters;
+mod probe;
 mod target;
 
 pub use hand::{Hand, HandParameters};
 pub use parameters::{BadPlant, Parameters, Well};
+pub use probe::{LEAST_RATE_HZ, MOST_RATE_HZ, Measured, Probe, ProbeError, envelope_of};
 pub use target::{DT_S, Target};

@@ -11,6 +11,9 @@
 
 mod motion;
 mod rows;
+mod write;
+
+pub use write::{Columns, write};
 
 use std::fmt;
 use std::io::BufRead;

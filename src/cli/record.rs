@@ -1,0 +1,241 @@
+//! `study record`: the probe imposes a trajectory, a recording comes out.
+//!
+//! The probe and the target are the simulated ones. The header of the recording
+//! holds everything that it takes to make it again, to the byte.
+
+use super::trajectory::{
+    picture, rate, read_plant, read_trajectory, refuse_to_overwrite, write_file,
+};
+use super::{Console, Failure};
+use crate::identify::signal::{Excitation, LowPass, delay, difference, excitation};
+use crate::plant::{self, Measured, Parameters, Probe, ProbeError};
+use crate::recording::{self, Columns};
+use crate::trajectory::{self, Trajectory};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// That of the recordings of the documentation, Hz.
+const FILTER_HZ: f64 = 30.0;
+/// Rows of the picture of the excitation.
+const ROWS: usize = 4;
+
+/// Arguments of `study record`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The trajectory file, TOML with format = "study-trajectory/1"
+    #[arg(value_name = "TRAJECTORY")]
+    trajectory: PathBuf,
+
+    /// Write the recording here [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Samples a second
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
+    rate: f64,
+
+    /// The noise of the sensors
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+
+    /// The target: a, b or a plant file
+    #[arg(long, value_name = "a|b|FILE", default_value = "a")]
+    plant: String,
+
+    /// Corner of the zero-phase filter on x, a and F
+    #[arg(long, value_name = "HZ", default_value_t = FILTER_HZ, conflicts_with = "raw")]
+    filter: f64,
+
+    /// Write what the sensors say: no filter, no velocity
+    #[arg(long)]
+    raw: bool,
+
+    /// Overwrite FILE if it is there
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+/// Does it.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let trajectory = read_trajectory(&args.trajectory, console)?;
+    let (name, target) = read_plant(&args.plant, console)?;
+    refuse_to_overwrite(args.out.as_deref(), args.force)?;
+    let filter = match args.raw {
+        true => None,
+        false => Some(LowPass::new(args.filter, args.rate).map_err(Failure::input)?),
+    };
+    let probe = Probe::default();
+    let measured = probe
+        .impose(&trajectory, &target, args.rate, args.seed)
+        .map_err(|e| refused(args, &e))?;
+    let header = header(args, &trajectory, &name, &target, &probe);
+    let bytes = recording_bytes(&trajectory, &measured, filter, args.rate, &header);
+    summary(&bytes, console);
+    match &args.out {
+        Some(path) => {
+            write_file(path, |sink| sink.write_all(&bytes))?;
+            console.say(format!("wrote {}", path.display()));
+            Ok(())
+        }
+        None => console.out(String::from_utf8_lossy(&bytes)),
+    }
+}
+
+fn refused(args: &Args, error: &ProbeError) -> Failure {
+    let failure = Failure::input(format!("{}: {error}", args.trajectory.display()));
+    match error {
+        ProbeError::Trajectory(_) => failure.hint("nothing moved; `study trajectory` draws it"),
+        _ => failure,
+    }
+}
+
+/// What stands in the header: words, then the files that it was made of.
+fn header(
+    args: &Args,
+    trajectory: &Trajectory,
+    name: &str,
+    target: &Parameters,
+    probe: &Probe,
+) -> String {
+    let mut out = format!(
+        "simulated, not measured: probe and target (plant {name}) of study {}, {} Hz, seed {}\n",
+        env!("CARGO_PKG_VERSION"),
+        args.rate,
+        args.seed
+    );
+    // writing to a String cannot fail
+    let _ = match args.raw {
+        true => writeln!(
+            out,
+            "filter: none; x as the encoder counts, a and F with their noise"
+        ),
+        false => writeln!(
+            out,
+            "filter: zero-phase 2nd-order Butterworth low-pass (forward and backward), {} Hz, the same on x, a and F; v: central difference of x",
+            args.filter
+        ),
+    };
+    let _ = writeln!(
+        out,
+        "probe: encoder {} mm, force noise {} N rms, acceleration noise {} m/s² rms; F is what it applies to the target, positive with +x",
+        probe.encoder_mm, probe.force_noise_n, probe.acceleration_noise_m_s2
+    );
+    let [from_s, to_s] = trajectory.kept_s();
+    let _ = writeln!(out, "kept: {from_s} to {to_s} s, between the ramps");
+    let _ = writeln!(
+        out,
+        "again: study record TRAJECTORY --plant PLANT --rate {} --seed {} {}, with these two files:",
+        args.rate,
+        args.seed,
+        match args.raw {
+            true => "--raw".to_owned(),
+            false => format!("--filter {}", args.filter),
+        }
+    );
+    for (file, text) in [
+        ("TRAJECTORY", trajectory::file::write(trajectory)),
+        ("PLANT", plant::file::write(target)),
+    ] {
+        let _ = writeln!(out, "{file}:");
+        for line in text.lines() {
+            let _ = writeln!(out, "  {line}");
+        }
+    }
+    out
+}
+
+/// The recording between the ramps. The filter sees the ramps too, so its ends are
+/// not in the recording.
+fn recording_bytes(
+    trajectory: &Trajectory,
+    measured: &Measured,
+    filter: Option<LowPass>,
+    rate_hz: f64,
+    header: &str,
+) -> Vec<u8> {
+    let [x_mm, a_m_s2, f_n] = [&measured.x_mm, &measured.a_m_s2, &measured.f_n]
+        .map(|column| filter.map_or_else(|| column.clone(), |f| f.both_ways(column)));
+    let v_mm_s = filter.map(|_| difference(&x_mm, 1.0 / rate_hz));
+    let [from_s, to_s] = trajectory.kept_s();
+    let first = measured.t_s.partition_point(|t| *t < from_s - 1e-9);
+    let last = measured.t_s.partition_point(|t| *t <= to_s + 1e-9);
+    let columns = Columns {
+        t_s: &measured.t_s[first..last],
+        x_mm: &x_mm[first..last],
+        v_mm_s: v_mm_s.as_ref().map(|v| &v[first..last]),
+        a_m_s2: &a_m_s2[first..last],
+        f_n: &f_n[first..last],
+    };
+    let mut bytes = Vec::with_capacity(64 * (last - first));
+    recording::write(&mut bytes, header, columns).expect("memory takes every write");
+    bytes
+}
+
+/// Tells what was recorded, as whoever reads the file will find it.
+fn summary(bytes: &[u8], console: &mut Console) {
+    let recording = match recording::read("the recording", bytes) {
+        Ok(recording) => recording,
+        Err(e) => {
+            console.say(format!("warning: nothing can be identified from it: {e}"));
+            return;
+        }
+    };
+    for warning in &recording.warnings {
+        console.say(format!("warning: {warning}"));
+    }
+    let [low, high] = recording.range_mm();
+    console.say(format!(
+        "{} samples, {:.2} s, {low:.2} to {high:.2} mm",
+        recording.len(),
+        recording.duration_s()
+    ));
+    match delay::accelerometer_s(&recording) {
+        Ok(Some(late_s)) => console.say(format!(
+            "the accelerometer is {:.3} ms later than the encoder",
+            late_s * 1e3
+        )),
+        Ok(None) | Err(_) => console.say("the delay of the accelerometer cannot be told"),
+    }
+    let excitation = Excitation::of(&recording);
+    let Some((median, worst)) = excitation.median().zip(excitation.worst()) else {
+        return;
+    };
+    console.say(format!(
+        "condition number of [a v x 1]: median {median:.1}, worst {:.0} at {:.1} mm, above {} in {:.0} % of the windows",
+        worst.condition,
+        worst.x_mm,
+        excitation::DOUBTFUL,
+        100.0 * excitation.doubtful_share()
+    ));
+    for line in excitation_picture(&excitation).lines() {
+        console.say(line);
+    }
+    if let Some(warning) = excitation.warning() {
+        console.say(format!("warning: {warning}"));
+    }
+}
+
+/// The larger condition number of both directions over x.
+fn excitation_picture(excitation: &Excitation) -> String {
+    let (Some(first), Some(last)) = (excitation.windows.first(), excitation.windows.last()) else {
+        return String::new();
+    };
+    let half = 0.5 * excitation::WINDOW_MM;
+    let range = [first.x_mm - half, last.x_mm + half];
+    // windows are whole and few
+    let count = ((range[1] - range[0]) / excitation::WINDOW_MM).round() as usize;
+    if !(2..=200).contains(&count) {
+        return String::new();
+    }
+    // two characters a window; 0 is empty, 1 the floor of the picture
+    let mut values = vec![0.0f64; 2 * count];
+    for window in &excitation.windows {
+        let place = ((window.x_mm - first.x_mm) / excitation::WINDOW_MM).round() as usize;
+        for value in values.iter_mut().skip(2 * place).take(2) {
+            *value = value.max(window.condition);
+        }
+    }
+    let most = values.iter().copied().fold(1.0, f64::max);
+    let heading = "condition number of [a v x 1] by position (logarithmic from 1)";
+    picture::columns(heading, "mm", range, &values, 1.0 / (1.1 * most), ROWS)
+}

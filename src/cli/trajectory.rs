@@ -1,0 +1,253 @@
+//! `study trajectory`: what an excitation looks like, and whether it can be run.
+
+pub(super) mod picture;
+
+use super::{Console, Failure};
+use crate::plant::{self, MOST_RATE_HZ, Parameters, Probe};
+use crate::text::Untrusted;
+use crate::trajectory::{Trajectory, check, file, spectrum};
+use std::fs::{self, OpenOptions};
+use std::io::{BufWriter, Read as _, Write};
+use std::path::{Path, PathBuf};
+
+/// Trajectory and plant files are small.
+const MOST_BYTES: u64 = 1024 * 1024;
+/// Rows of a curve and of the spectrum, in characters.
+const CURVE_ROWS: usize = 8;
+const SPECTRUM_ROWS: usize = 5;
+/// Frequencies that are shown, as a multiple of the highest asked for.
+const SHOWN_SPECTRUM: f64 = 2.0;
+
+/// Arguments of `study trajectory`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The trajectory file, TOML with format = "study-trajectory/1"
+    #[arg(value_name = "SPEC")]
+    spec: PathBuf,
+
+    /// Write t_s,x_mm,v_mm_s,a_m_s2 as CSV, ramps included
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Rows a second of the CSV
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
+    rate: f64,
+
+    /// The target it has to suit: a, b or a plant file
+    #[arg(long, value_name = "a|b|FILE", default_value = "a")]
+    plant: String,
+
+    /// Overwrite FILE if it is there
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+/// A sampling rate, checked where clap can name the argument.
+pub(super) fn rate(given: &str) -> Result<f64, String> {
+    let value: f64 = given.trim().parse().map_err(|_| "this is no number")?;
+    let least = plant::LEAST_RATE_HZ;
+    if (least..=MOST_RATE_HZ).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("a rate is from {least} to {MOST_RATE_HZ} Hz"))
+    }
+}
+
+/// Does it.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let trajectory = read_trajectory(&args.spec, console)?;
+    let (_, target) = read_plant(&args.plant, console)?;
+    refuse_to_overwrite(args.out.as_deref(), args.force)?;
+    console.out(page(&trajectory, console.width))?;
+    if let Err(violations) = Probe::default().check(&trajectory, &target) {
+        let said: Vec<String> = violations.iter().map(ToString::to_string).collect();
+        return Err(
+            Failure::input(format!("{}: {}", args.spec.display(), said.join("; ")))
+                .hint("lower the amplitude or the frequency of a part, or move offset_mm"),
+        );
+    }
+    if let Some(out) = &args.out {
+        write_file(out, |sink| write_csv(sink, &trajectory, args.rate))?;
+        console.say(format!("wrote {}", out.display()));
+    }
+    Ok(())
+}
+
+fn write_csv(sink: &mut dyn Write, trajectory: &Trajectory, rate_hz: f64) -> std::io::Result<()> {
+    writeln!(sink, "t_s,x_mm,v_mm_s,a_m_s2")?;
+    // bounded by the longest trajectory and the highest rate
+    let rows = (trajectory.total_s() * rate_hz + 1e-6).floor() as usize;
+    for i in 0..=rows {
+        let t_s = i as f64 / rate_hz;
+        let p = trajectory.at(t_s);
+        writeln!(
+            sink,
+            "{t_s:.6},{:.6},{:.5},{:.6}",
+            p.x_mm, p.v_mm_s, p.a_m_s2
+        )?;
+    }
+    Ok(())
+}
+
+/// What is shown: numbers, position and speed over time, spectrum.
+fn page(trajectory: &Trajectory, width: usize) -> String {
+    let columns = width.clamp(40, 120) - picture::LABEL - 2;
+    let e = check::extremes(trajectory);
+    let title = trajectory.title.as_deref().unwrap_or("a trajectory");
+    let mut out = format!(
+        "{}\n{} s, ramps of {} s before and after\nposition {:.2} to {:.2} mm, speed up to {:.1} mm/s, acceleration up to {:.2} m/s²\n",
+        Untrusted(title),
+        trajectory.duration_s,
+        trajectory.ramp_s,
+        e.x_mm[0],
+        e.x_mm[1],
+        e.v_mm_s,
+        e.a_m_s2
+    );
+    let total_s = trajectory.total_s();
+    for (heading, of) in [
+        (
+            "position, mm",
+            (|p| p.x_mm) as fn(crate::trajectory::Point) -> f64,
+        ),
+        ("speed, mm/s", |p| p.v_mm_s),
+    ] {
+        let value = |t_s: f64| of(trajectory.at(t_s));
+        out.push_str(&picture::curve(
+            heading,
+            "s",
+            [0.0, total_s],
+            columns,
+            CURVE_ROWS,
+            value,
+        ));
+    }
+    let to_hz = (SHOWN_SPECTRUM * trajectory.top_hz()).min(100.0);
+    let bands = spectrum::bands(trajectory, to_hz, columns);
+    out.push_str(&picture::columns(
+        "spectrum of the position, mm (logarithmic, four decades)",
+        "Hz",
+        [0.0, to_hz],
+        &bands,
+        1e-4,
+        SPECTRUM_ROWS,
+    ));
+    out
+}
+
+/// Reads a small text file.
+fn text_of(path: &Path) -> Result<String, Failure> {
+    let mut text = String::new();
+    fs::File::open(path)
+        .and_then(|file| file.take(MOST_BYTES + 1).read_to_string(&mut text))
+        .map_err(|e| Failure::file(path, &e))?;
+    if text.len() as u64 > MOST_BYTES {
+        return Err(Failure::input(format!(
+            "{} is larger than {MOST_BYTES} bytes",
+            path.display()
+        )));
+    }
+    Ok(text)
+}
+
+/// Reads a trajectory; its warnings go to standard error.
+pub(super) fn read_trajectory(path: &Path, console: &mut Console) -> Result<Trajectory, Failure> {
+    match file::parse(&path.display().to_string(), &text_of(path)?) {
+        (Some(trajectory), findings) => {
+            console.findings(&[findings]);
+            Ok(trajectory)
+        }
+        (None, findings) => Err(Failure::faults(vec![findings])),
+    }
+}
+
+/// The built-in target of that name, or the one in the file; with what to call it.
+pub(super) fn read_plant(
+    given: &str,
+    console: &mut Console,
+) -> Result<(String, Parameters), Failure> {
+    if let Some(parameters) = Parameters::named(given) {
+        return Ok((given.to_lowercase(), parameters));
+    }
+    let path = Path::new(given);
+    if !path.exists() {
+        return Err(
+            Failure::input(format!("there is no target and no file called {given}"))
+                .hint("--plant is a, b or the path of a plant file"),
+        );
+    }
+    match plant::file::parse(given, &text_of(path)?) {
+        (Some(parameters), findings) => {
+            console.findings(&[findings]);
+            Ok(("of a file".to_owned(), parameters))
+        }
+        (None, findings) => Err(Failure::faults(vec![findings])),
+    }
+}
+
+/// Before any work: the file that would be written is not there, or may go.
+pub(super) fn refuse_to_overwrite(out: Option<&Path>, force: bool) -> Result<(), Failure> {
+    match out {
+        Some(path) if !force && path.exists() => Err(Failure::input(format!(
+            "{} is there already",
+            path.display()
+        ))
+        .hint("--force overwrites it; nothing was written")),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a file as a whole: a reader sees all of it or none.
+pub(super) fn write_file(
+    path: &Path,
+    content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<(), Failure> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let part = path.with_file_name(name);
+    let written = OpenOptions::new()
+        .write(true)
+        .create(true)
+        .truncate(true)
+        .open(&part)
+        .and_then(|file| {
+            let mut sink = BufWriter::with_capacity(1 << 16, file);
+            content(&mut sink)?;
+            sink.flush()?;
+            sink.get_ref().sync_all()
+        })
+        .and_then(|()| fs::rename(&part, path));
+    written.map_err(|e| {
+        // what is left of it is of no use
+        let _ = fs::remove_file(&part);
+        Failure::file(path, &e)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_shows_the_numbers_and_three_pictures() {
+        let text = include_str!("../../protocols/turn-signal/validation-1.5hz.toml");
+        let trajectory = file::parse("v.toml", text).0.unwrap();
+        let page = page(&trajectory, 80);
+        assert!(page.contains("position 2.50 to 32.50 mm"), "{page}");
+        for heading in ["position, mm", "speed, mm/s", "spectrum"] {
+            assert!(page.contains(heading), "{page}");
+        }
+        assert!(
+            page.lines().all(|line| line.chars().count() <= 100),
+            "{page}"
+        );
+    }
+
+    #[test]
+    fn only_a_rate_that_can_be_sampled_is_one() {
+        assert_eq!(rate("1000"), Ok(1000.0));
+        for bad in ["0", "nan", "inf", "-1", "40001", "x"] {
+            assert!(rate(bad).is_err(), "{bad}");
+        }
+    }
+}
