@@ -112,9 +112,8 @@ fn methods() -> Vec<(&'static str, Method)> {
         ("hat dahl, free", hat(State::Dahl(Delta::Scan), false)),
         ("hat dahl", hat(State::Dahl(Delta::Scan), true)),
         ("hat play, ridges 1e-3 1e-2", ridges(1e-3, 1e-2)),
-        ("hat play, ridges 1e-2 1e-1", ridges(1e-2, 1e-1)),
-        ("hat play, ridges 1e-4 1e-1", ridges(1e-4, 1e-1)),
-        ("hat play, ridges 1e-4 1", ridges(1e-4, 1.0)),
+        ("hat play, ridges 3e-3 3e-2", ridges(3e-3, 3e-2)),
+        ("hat play, ridges 1e-2 3e-1", ridges(1e-2, 3e-1)),
     ]
 }
 

@@ -25,7 +25,7 @@ const HALF: usize = 2 * PER_NODE;
 /// b in N·s/mm times this is of the size of m in kg.
 const B_SCALE: f64 = 60.0;
 /// Share of a node's information that keeps m and b at 0 where nothing tells them.
-const FLOOR: f64 = 1e-9;
+const FLOOR: f64 = 1e-12;
 
 /// Weights of the penalties and what m and b may be.
 #[derive(Debug, Clone, Copy)]
@@ -104,6 +104,9 @@ pub(super) fn table(
         })
         .collect();
     let x = normal.solve_bounded(&right, &bounds)?;
+    if !x.iter().all(|value| value.is_finite()) {
+        return None;
+    }
     let side = |side: usize| {
         let of = |node: &[f64]| {
             let p = &node[side * 3..];

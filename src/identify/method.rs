@@ -235,7 +235,7 @@ impl Default for Hat {
         Self {
             state: State::Play(Delta::Scan),
             ridge_force: 3e-3,
-            ridge_dynamics: 3e-2,
+            ridge_dynamics: 1e-1,
             bounded: true,
         }
     }
@@ -360,7 +360,7 @@ mod tests {
         );
         assert_eq!(
             Method::Hat(Hat::default()).to_string(),
-            "hat ridge=0.003,0.03 delta=scan m,b>=0"
+            "hat ridge=0.003,0.1 delta=scan m,b>=0"
         );
     }
 

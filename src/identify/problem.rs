@@ -110,7 +110,7 @@ pub enum Warning {
     StartUp {
         /// How many.
         nodes: usize,
-        /// Up to where, mm.
+        /// The highest of them, mm.
         to_mm: f64,
     },
     /// Nodes with too few samples around them were filled from their neighbours.
@@ -156,7 +156,7 @@ impl fmt::Display for Warning {
             ),
             Self::StartUp { nodes, to_mm } => write!(
                 f,
-                "{nodes} nodes up to {to_mm:.2} mm rest on fewer than {START_UP_SAMPLES} samples"
+                "{nodes} nodes, the last at {to_mm:.2} mm, rest on fewer than {START_UP_SAMPLES} samples"
             ),
             Self::Thin {
                 positive,
