@@ -62,7 +62,14 @@ fn fig4(bencher: divan::Bencher<'_, '_>, rate: u32, processor: Processor) {
     let plan = Plan::ewls(&LAMBDAS, &DX_MM, Resample::Bin);
     alone(|| {
         bencher.bench_local(|| {
-            grid::run_on(processor, &training, &plan, Lookup::Linear, &[&validation], || ())
+            grid::run_on(
+                processor,
+                &training,
+                &plan,
+                Lookup::Linear,
+                &[&validation],
+                || (),
+            )
         });
     });
 }

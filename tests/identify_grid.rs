@@ -169,7 +169,11 @@ fn the_golden_numbers_come_out_of_the_grid_as_well() {
     let (train, validation) = (recording("training_a.csv"), recording("validation_a.csv"));
     let training = Training::new(&train).unwrap();
     for (resample, dx, expected) in [
-        (Resample::Point, 0.5, [0.987545, 0.951895, 0.827907, 0.363831]),
+        (
+            Resample::Point,
+            0.5,
+            [0.987545, 0.951895, 0.827907, 0.363831],
+        ),
         (Resample::Bin, 0.5, [0.988288, 0.951662, 0.827046, 0.363459]),
         (Resample::Bin, 1.0, [0.986332, 0.949471, 0.820778, 0.359412]),
     ] {
@@ -210,7 +214,13 @@ fn a_grid_of_several_methods_keeps_their_order_and_counts_its_cells() {
     .unwrap();
     let found: Vec<_> = cells
         .iter()
-        .map(|c| (c.method.word(), c.method.lambda(), c.realization.provenance.dx_mm))
+        .map(|c| {
+            (
+                c.method.word(),
+                c.method.lambda(),
+                c.realization.provenance.dx_mm,
+            )
+        })
         .collect();
     let mut expected = vec![("spring", None, None)];
     for (word, lambda) in [

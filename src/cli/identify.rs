@@ -8,11 +8,12 @@ pub(super) use args::Args;
 
 use super::{Console, Failure, Kind};
 use crate::identify::grid::{self, Cell, Plan};
+use crate::identify::signal::{self, Excitation};
 use crate::identify::validation::{self, Ceiling, Validation};
 use crate::identify::{IdentifyError, Training};
 use crate::model::certificate::{Certificate, SERVO_RATES_HZ};
 use crate::recording::{self, Recording};
-use args::Named;
+use args::{AccelerationWord, Named};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
 use std::io::BufReader;
@@ -20,6 +21,9 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+
+/// The filter of [`signal::prepare`], for model files.
+const FILTER: &str = "zero-phase low-pass, Butterworth of 2nd order both ways,";
 
 /// What was identified, for [`output`] and [`files`].
 struct Found<'a> {
@@ -53,21 +57,38 @@ impl Found<'_> {
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let plan = args.plan()?;
-    let training = read(&args.training, console)?;
+    let mut training = read(&args.training, args, console)?;
     let mut recordings = Vec::new();
     for named in args.validate.iter().chain(&args.test) {
-        recordings.push((named, read(named, console)?));
+        recordings.push((named, read(named, args, console)?));
     }
     let mut repeats = Vec::new();
     for named in &args.repeat {
-        repeats.push((named, read(named, console)?));
+        repeats.push((named, read(named, args, console)?));
     }
     refuse_reuse(&args.training, &training, &recordings, &repeats)?;
+    if args.thin {
+        let (thinned, gone) = signal::thin(&training, signal::Dwell::default());
+        console.say(format!(
+            "{gone} samples of dwells are left out of the training"
+        ));
+        training = thinned;
+    }
+    if let Some(doubt) = Excitation::of(&training).warning() {
+        console.say(format!(
+            "warning: {}: {doubt}",
+            args.training.path.display()
+        ));
+    }
     let recordings: Vec<(&Named, &Recording)> = recordings.iter().map(|(n, r)| (*n, r)).collect();
     let ceilings = ceilings(&recordings, &repeats)?;
 
-    let cells = identify(args, &plan, &training, &recordings)
+    let mut cells = identify(args, &plan, &training, &recordings)
         .map_err(|e| Failure::input(format!("{}: {e}", args.training.path.display())))?;
+    let filter = signals_in_words(args);
+    for cell in &mut cells {
+        cell.realization.provenance.filter = Some(filter.clone());
+    }
     let best = grid::best(&cells, args.validate.len());
     let detents = validation::detents(&training);
     let validations = recordings
@@ -155,7 +176,22 @@ fn ceilings(
     Ok(ceilings)
 }
 
-fn read(named: &Named, console: &mut Console) -> Result<Recording, Failure> {
+/// A VAF belongs to its filter: this stands beside it and in model files.
+fn signals_in_words(args: &Args) -> String {
+    let mut words = match args.filter {
+        Some(hz) => format!("{FILTER} at {hz} Hz"),
+        None => "as recorded".to_owned(),
+    };
+    if let AccelerationWord::Encoder = args.acceleration {
+        words += ", acceleration from the encoder";
+    }
+    if args.thin {
+        words += ", dwells thinned";
+    }
+    words
+}
+
+fn read(named: &Named, args: &Args, console: &mut Console) -> Result<Recording, Failure> {
     let path = &named.path;
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
     let recording = recording::read(&named.name, BufReader::with_capacity(1 << 16, file))
@@ -163,7 +199,8 @@ fn read(named: &Named, console: &mut Console) -> Result<Recording, Failure> {
     for warning in &recording.warnings {
         console.say(format!("warning: {}: {warning}", path.display()));
     }
-    Ok(recording)
+    signal::prepare(&recording, args.signals())
+        .map_err(|e| Failure::input(format!("{}: {e}", path.display())))
 }
 
 /// Two recordings with the same bytes are not independent, whatever they are

@@ -7,6 +7,7 @@ use crate::identify::method::{
     Delta, Ewls, Hat, Segments, Sort, Start, State, TwoSided, Width, Window,
 };
 use crate::identify::resample::Resample;
+use crate::identify::signal;
 use crate::model::predict::Lookup;
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,18 @@ pub(in crate::cli) struct Args {
     /// Second recordings of the trajectory of a --validate or --test recording: the most that any model could explain
     #[arg(long, value_name = "REC", num_args = 1..)]
     pub(super) repeat: Vec<Named>,
+
+    /// Low-pass x, a and F of all recordings at this corner, without delay
+    #[arg(long, value_name = "HZ", value_parser = length)]
+    pub(super) filter: Option<f64>,
+
+    /// Where the acceleration comes from
+    #[arg(long, value_enum, default_value_t = AccelerationWord::Accelerometer)]
+    pub(super) acceleration: AccelerationWord,
+
+    /// Leave most samples of dwells out of the training recording
+    #[arg(long)]
+    pub(super) thin: bool,
 
     /// The estimator
     #[arg(long, value_enum, default_value_t = MethodWord::Ewls)]
@@ -108,6 +121,14 @@ pub(in crate::cli) struct Args {
     /// Write the figures (SVG) and their numbers (CSV) into this folder
     #[arg(long, value_name = "DIR")]
     pub(super) figures: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum AccelerationWord {
+    /// The column of the recording
+    Accelerometer,
+    /// The second difference of the position
+    Encoder,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -304,7 +325,7 @@ fn increments(given: &str) -> Result<Numbers, String> {
 fn length(given: &str) -> Result<f64, String> {
     match given.trim().parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        Ok(_) => Err("this is no length above 0 mm".into()),
+        Ok(_) => Err("this has to be above 0".into()),
         Err(_) => Err("this is no number".into()),
     }
 }
@@ -327,6 +348,17 @@ const DEFAULT_DX_MM: [f64; 2] = [0.5, 1.0];
 const FIGURE_DX_MM: [f64; 11] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
 
 impl Args {
+    /// How signals are prepared.
+    pub(super) fn signals(&self) -> signal::Settings {
+        signal::Settings {
+            filter_hz: self.filter,
+            acceleration: match self.acceleration {
+                AccelerationWord::Accelerometer => signal::Acceleration::Accelerometer,
+                AccelerationWord::Encoder => signal::Acceleration::Encoder,
+            },
+        }
+    }
+
     /// How parameters between nodes are found.
     pub(super) fn lookup(&self) -> Lookup {
         match self.lookup {
