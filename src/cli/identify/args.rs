@@ -456,10 +456,11 @@ impl Args {
         })
     }
 
-    /// A flag that would be passed over in silence is a mistake.
+    /// A flag that would be passed over in silence is a mistake. Those of the paper's
+    /// recursion are let through, so that one script can make baselines as well.
     fn refuse_what_has_no_meaning(&self) -> Result<(), Failure> {
         use MethodWord::{Constrained, Ewls, Hat, Segments, Static, TwoSided};
-        let given: [(&str, bool, &[MethodWord]); 12] = [
+        let given: [(&str, bool, &[MethodWord]); 9] = [
             (
                 "--lambda",
                 !self.lambda.is_empty(),
@@ -470,9 +471,6 @@ impl Args {
                 !self.dx.is_empty(),
                 &[Ewls, Constrained, TwoSided, Hat, Static],
             ),
-            ("--resample", self.resample.is_some(), &[Ewls, Constrained]),
-            ("--start", self.start.is_some(), &[Ewls, Constrained]),
-            ("--sort", self.sort.is_some(), &[Ewls, Constrained]),
             ("--window", self.window.is_some(), &[TwoSided]),
             ("--width", self.width.is_some(), &[TwoSided]),
             ("--direction", self.direction.is_some(), &[Hat]),
