@@ -45,15 +45,21 @@ impl Lane {
     /// `self` · `b` + `c`, rounded once.
     #[inline(always)]
     pub fn mul_add(self, b: Self, c: Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i].mul_add(b.0[i], c.0[i])))
+        let mut out = c;
+        for i in 0..WIDTH {
+            out.0[i] = self.0[i].mul_add(b.0[i], c.0[i]);
+        }
+        out
     }
 
     /// `c` − `self` · `b`, rounded once.
     #[inline(always)]
     pub fn take_from(self, b: Self, c: Self) -> Self {
-        Self(std::array::from_fn(|i| {
-            (-self.0[i]).mul_add(b.0[i], c.0[i])
-        }))
+        let mut out = c;
+        for i in 0..WIDTH {
+            out.0[i] = (-self.0[i]).mul_add(b.0[i], c.0[i]);
+        }
+        out
     }
 }
 
@@ -63,7 +69,11 @@ macro_rules! operator {
             type Output = Self;
             #[inline(always)]
             fn $name(self, other: Self) -> Self {
-                Self(std::array::from_fn(|i| self.0[i] $symbol other.0[i]))
+                let mut out = self;
+                for i in 0..WIDTH {
+                    out.0[i] = self.0[i] $symbol other.0[i];
+                }
+                out
             }
         }
     };

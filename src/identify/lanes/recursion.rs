@@ -117,6 +117,14 @@ impl Kept {
         theta: [Lane::ZERO; 4],
         moment: [Lane::ZERO; 4],
     };
+
+    #[inline(always)]
+    fn add(&mut self, theta: &[Lane; 4], arm: Lane) {
+        for p in 0..4 {
+            self.theta[p] = self.theta[p] + theta[p];
+            self.moment[p] = arm.mul_add(theta[p], self.moment[p]);
+        }
+    }
 }
 
 impl State {
@@ -153,16 +161,17 @@ impl State {
         let [a, v, x] = phi;
         let q = self.q;
         let theta = self.theta;
-        let g: [Lane; 4] = std::array::from_fn(|i| {
+        let mut g = [Lane::ZERO; 4];
+        for i in 0..4 {
             let row = UPPER[i];
             let x_term = q[row[2]].mul_add(x, q[row[3]]);
-            q[row[0]].mul_add(a, q[row[1]].mul_add(v, x_term))
-        });
+            g[i] = q[row[0]].mul_add(a, q[row[1]].mul_add(v, x_term));
+        }
         let spread = a.mul_add(g[0], v.mul_add(g[1], x.mul_add(g[2], g[3])));
         let d = Lane::all(1.0) / (self.scale + spread);
         let e = force - theta[3];
         let e = a.take_from(theta[0], v.take_from(theta[1], x.take_from(theta[2], e)));
-        let k = g.map(|g| g * d);
+        let k = [g[0] * d, g[1] * d, g[2] * d, g[3] * d];
         for i in 0..4 {
             self.theta[i] = k[i].mul_add(e, theta[i]);
             for (j, k) in k.iter().enumerate().skip(i) {
@@ -211,45 +220,52 @@ fn avx2(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept])
 }
 
 /// `kept` has one entry for each state of the first run, then of the second, …
+///
+/// Here and in what it calls there are functions where closures would do: only what
+/// is inlined is compiled for AVX2, and a closure need not be.
 #[inline(always)]
 fn pass(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept]) {
     let mut at = 0;
     for (run, kept) in runs.iter().zip(kept.chunks_mut(states.len())) {
-        stretch(samples, at..run.from, states, |_, _, _| ());
-        stretch(samples, run.from..run.to, states, |i, x, theta| {
-            let kept = &mut kept[i];
-            let arm = Lane::all(x - run.origin_mm);
-            for (p, theta) in theta.iter().enumerate() {
-                kept.theta[p] = kept.theta[p] + *theta;
-                kept.moment[p] = arm.mul_add(*theta, kept.moment[p]);
-            }
-        });
+        stretch::<false>(samples, at, run.from, states, 0.0, &mut []);
+        stretch::<true>(samples, run.from, run.to, states, run.origin_mm, kept);
         at = run.to;
     }
-    stretch(samples, at..samples.len(), states, |_, _, _| ());
+    stretch::<false>(samples, at, samples.len(), states, 0.0, &mut []);
 }
 
-/// Passes over some samples; after each, `keep` gets the index, x and θ of every
-/// state.
+/// Passes over the samples [`from`, `to`); with `KEEP` adds θ and its moment to
+/// `kept`, one for each state.
 #[inline(always)]
-fn stretch(
+fn stretch<const KEEP: bool>(
     samples: &Sorted,
-    range: std::ops::Range<usize>,
+    from: usize,
+    to: usize,
     states: &mut [State],
-    mut keep: impl FnMut(usize, f64, &[Lane; 4]),
+    origin_mm: f64,
+    kept: &mut [Kept],
 ) {
-    let (x, v) = (&samples.x_mm[range.clone()], &samples.v_mm_s[range.clone()]);
-    let (a, f) = (&samples.a_m_s2[range.clone()], &samples.f_n[range.clone()]);
-    for (n, (((x, v), a), f)) in range.zip(x.iter().zip(v).zip(a).zip(f)) {
-        let phi = [Lane::all(*a), Lane::all(*v), Lane::all(*x)];
-        let force = Lane::all(*f);
-        for (i, state) in states.iter_mut().enumerate() {
-            state.step(phi, force);
-            keep(i, *x, &state.theta);
+    let (x, v) = (&samples.x_mm[from..to], &samples.v_mm_s[from..to]);
+    let (a, f) = (&samples.a_m_s2[from..to], &samples.f_n[from..to]);
+    for i in 0..to - from {
+        let phi = [Lane::all(a[i]), Lane::all(v[i]), Lane::all(x[i])];
+        let force = Lane::all(f[i]);
+        if KEEP {
+            let arm = Lane::all(x[i] - origin_mm);
+            for (state, kept) in states.iter_mut().zip(kept.iter_mut()) {
+                state.step(phi, force);
+                kept.add(&state.theta, arm);
+            }
+        } else {
+            for state in states.iter_mut() {
+                state.step(phi, force);
+            }
         }
         // at places that depend on nothing but the sample
-        if n % RESCALE == RESCALE - 1 {
-            states.iter_mut().for_each(State::rescale);
+        if (from + i) % RESCALE == RESCALE - 1 {
+            for state in states.iter_mut() {
+                state.rescale();
+            }
         }
     }
 }
