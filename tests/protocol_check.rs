@@ -169,7 +169,7 @@ fn a_vaf_that_differs_from_the_file_is_an_error_and_a_rounded_one_is_not() {
     assert_eq!(
         errors,
         [
-            "the VAF of `lambda-0.9995` is not 0.79: its file says 0.8217722860367234 for `validation-1.5hz`"
+            "the VAF of `lambda-0.9995` is not 0.79: its file says 0.82177228603653 for `validation-1.5hz`"
         ]
     );
 }

@@ -9,7 +9,7 @@
 //!
 //! which saves the ten divisions by λ. Every 64 samples Q is divided by w, before w
 //! can become too small. In exact arithmetic θ is that of `ewls`; in double
-//! precision the two agree to about 1e-10 for λ of 0.9 and above (less, where the
+//! precision the two agree to 1e-9 for λ of 0.99 and above (less below, where the
 //! estimates themselves hang on the last digit).
 //!
 //! Memory is that of the sums: no estimate is kept.

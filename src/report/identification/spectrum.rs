@@ -9,7 +9,8 @@
 /// The highest frequency, Hz.
 pub(super) const TOP_HZ: f64 = 10.0;
 /// Length of the blocks, s.
-const BLOCK_S: f64 = 1.0 / 200.0;
+/// A little less, so that rounding of time does not move samples between blocks.
+const BLOCK_S: f64 = (1.0 - 1e-6) / 200.0;
 /// More frequencies than this are no better to look at.
 const MOST: usize = 1000;
 
