@@ -299,7 +299,7 @@ fn pass(
         Start::Warm => ewls::warm_samples(lambda),
     };
     if !(backward && options.sort == Sort::Travel) {
-        return recursion::sums(processor, samples, lambdas, warm, &runs.runs);
+        return recursion::sums(processor, samples, lambdas, warm, &runs.runs, runs.moments);
     }
     let turned = samples.descending();
     let n = samples.len();
@@ -309,7 +309,14 @@ fn pass(
         ..*run
     };
     let turned_runs: Vec<recursion::Run> = runs.runs.iter().rev().map(turn).collect();
-    let mut sums = recursion::sums(processor, &turned, lambdas, warm, &turned_runs);
+    let mut sums = recursion::sums(
+        processor,
+        &turned,
+        lambdas,
+        warm,
+        &turned_runs,
+        runs.moments,
+    );
     for sums in sums.iter_mut().flatten() {
         sums.reverse();
     }

@@ -28,6 +28,8 @@ pub(super) struct Runs {
     sizes: Vec<(f64, f64)>,
     /// One for each table.
     tables: Vec<Recipe>,
+    /// Whether Σ (x − origin) θ is needed.
+    pub(super) moments: bool,
 }
 
 /// How the nodes of a table come of the sums.
@@ -94,6 +96,7 @@ impl Runs {
             runs,
             sizes,
             tables,
+            moments: how == Resample::Hat,
         }
     }
 
@@ -206,9 +209,12 @@ fn points(x_mm: &[f64], tables: &[Nodes]) -> (Vec<Range<usize>>, Vec<Recipe>) {
     (bounds, tables.iter().map(recipe).collect())
 }
 
+/// The runs to the left of a node and to the right.
+type Halves = [Range<usize>; 2];
+
 /// For each table and node [from, middle, to) as indices of samples: the runs
 /// between all of them, and which runs each node has on either side of its middle.
-fn cut(tables: Vec<Vec<[usize; 3]>>) -> (Vec<Range<usize>>, Vec<Vec<[Range<usize>; 2]>>) {
+fn cut(tables: Vec<Vec<[usize; 3]>>) -> (Vec<Range<usize>>, Vec<Vec<Halves>>) {
     let mut edges: Vec<usize> = tables.iter().flatten().flatten().copied().collect();
     edges.sort_unstable();
     edges.dedup();

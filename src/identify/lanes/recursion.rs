@@ -9,7 +9,7 @@
 //!
 //! which saves the ten divisions by λ. Every 64 samples Q is divided by w, before w
 //! can become too small. In exact arithmetic θ is that of `ewls`; in double
-//! precision the two agree to 1e-9 for λ of 0.99 and above (less below, where the
+//! precision the two agree to 1e-8 for λ of 0.998 and above (less below, where the
 //! estimates themselves hang on the last digit).
 //!
 //! Memory is that of the sums: no estimate is kept.
@@ -48,7 +48,7 @@ pub struct Sums {
 ///
 /// `samples` are in the order of the recursion, `runs` ascend and do not overlap.
 /// Before it begins, the recursion passes back over the first `warm(λ)` samples.
-/// `None` for a λ whose estimates are no numbers. λ has to be at least
+/// Without `moments` those are 0. `None` for a λ whose estimates are no numbers. λ has to be at least
 /// [`LEAST_LAMBDA`].
 pub fn sums(
     processor: Processor,
@@ -56,6 +56,7 @@ pub fn sums(
     lambdas: &[f64],
     warm: impl Fn(f64) -> usize,
     runs: &[Run],
+    moments: bool,
 ) -> Vec<Option<Vec<Sums>>> {
     let mut states: Vec<State> = lambdas.chunks(WIDTH).map(State::cold).collect();
     let mut kept = vec![Kept::ZERO; states.len() * runs.len()];
@@ -68,7 +69,7 @@ pub fn sums(
             states[i / WIDTH].take(i % WIDTH, &alone);
         }
     }
-    dispatch(processor, samples, &mut states, runs, &mut kept);
+    dispatch(processor, samples, &mut states, runs, &mut kept, moments);
     (0..lambdas.len())
         .map(|i| {
             let (state, lane) = (i / WIDTH, i % WIDTH);
@@ -119,10 +120,13 @@ impl Kept {
     };
 
     #[inline(always)]
-    fn add(&mut self, theta: &[Lane; 4], arm: Lane) {
-        for p in 0..4 {
-            self.theta[p] = self.theta[p] + theta[p];
-            self.moment[p] = arm.mul_add(theta[p], self.moment[p]);
+    fn add<const MOMENTS: bool>(&mut self, theta: &[Lane; 4], arm: Lane) {
+        let sums = self.theta.iter_mut().zip(&mut self.moment);
+        for ((sum, moment), theta) in sums.zip(theta) {
+            *sum = *sum + *theta;
+            if MOMENTS {
+                *moment = arm.mul_add(*theta, *moment);
+            }
         }
     }
 }
@@ -198,6 +202,7 @@ fn dispatch(
     states: &mut [State],
     runs: &[Run],
     kept: &mut [Kept],
+    moments: bool,
 ) {
     match processor {
         #[cfg(target_arch = "x86_64")]
@@ -206,17 +211,26 @@ fn dispatch(
             // SAFETY: the line above has established that the machine has AVX2 and FMA.
             #[allow(unsafe_code, reason = "the same loop, compiled for AVX2")]
             unsafe {
-                avx2(samples, states, runs, kept);
+                avx2(samples, states, runs, kept, moments);
             }
         }
-        _ => pass(samples, states, runs, kept),
+        _ => either(samples, states, runs, kept, moments),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept]) {
-    pass(samples, states, runs, kept);
+fn avx2(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept], moments: bool) {
+    either(samples, states, runs, kept, moments);
+}
+
+#[inline(always)]
+fn either(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept], moments: bool) {
+    if moments {
+        pass::<true>(samples, states, runs, kept);
+    } else {
+        pass::<false>(samples, states, runs, kept);
+    }
 }
 
 /// `kept` has one entry for each state of the first run, then of the second, …
@@ -224,20 +238,25 @@ fn avx2(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept])
 /// Here and in what it calls there are functions where closures would do: only what
 /// is inlined is compiled for AVX2, and a closure need not be.
 #[inline(always)]
-fn pass(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept]) {
+fn pass<const MOMENTS: bool>(
+    samples: &Sorted,
+    states: &mut [State],
+    runs: &[Run],
+    kept: &mut [Kept],
+) {
     let mut at = 0;
     for (run, kept) in runs.iter().zip(kept.chunks_mut(states.len())) {
-        stretch::<false>(samples, at, run.from, states, 0.0, &mut []);
-        stretch::<true>(samples, run.from, run.to, states, run.origin_mm, kept);
+        stretch::<false, false>(samples, at, run.from, states, 0.0, &mut []);
+        stretch::<true, MOMENTS>(samples, run.from, run.to, states, run.origin_mm, kept);
         at = run.to;
     }
-    stretch::<false>(samples, at, samples.len(), states, 0.0, &mut []);
+    stretch::<false, false>(samples, at, samples.len(), states, 0.0, &mut []);
 }
 
-/// Passes over the samples [`from`, `to`); with `KEEP` adds θ and its moment to
-/// `kept`, one for each state.
+/// Passes over the samples [`from`, `to`); with `KEEP` adds θ, with
+/// `MOMENTS` also its moment, to `kept`, one for each state.
 #[inline(always)]
-fn stretch<const KEEP: bool>(
+fn stretch<const KEEP: bool, const MOMENTS: bool>(
     samples: &Sorted,
     from: usize,
     to: usize,
@@ -254,7 +273,7 @@ fn stretch<const KEEP: bool>(
             let arm = Lane::all(x[i] - origin_mm);
             for (state, kept) in states.iter_mut().zip(kept.iter_mut()) {
                 state.step(phi, force);
-                kept.add(&state.theta, arm);
+                kept.add::<MOMENTS>(&state.theta, arm);
             }
         } else {
             for state in states.iter_mut() {
@@ -285,6 +304,7 @@ fn back(processor: Processor, samples: &Sorted, first: usize, state: &mut State)
         std::slice::from_mut(state),
         &[],
         &mut [],
+        false,
     );
     state.rescale();
 }
