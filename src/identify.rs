@@ -1,163 +1,56 @@
 //! From a recording to a realization.
 //!
 //! A [`Training`] is a recording grouped by direction of travel and sorted by x,
-//! once; [`Training::identify`] makes one realization of it, [`grid::run`] one for
-//! every λ and dx and compares each with other recordings. Samples with v = 0
-//! belong to no direction and are left out; prediction gives them the direction
-//! of the sample before.
+//! once. All estimators stand behind one call:
 //!
-//! In this version: the paper's EWLS with a cold start and ascending order, point
-//! and bin resampling, and two baselines. Not here: filtering (a recording is used
-//! as it is), files, and what a terminal shows.
+//! ```text
+//! Training::new(&recording)?.identify(method, dx_mm, lookup)? → Identified
+//! ```
+//!
+//! * [`Method`]: which estimator, with every option of its own. `Display` is what a
+//!   model file keeps of it.
+//! * [`Identified`]: a [`Realization`] without id and VAF, the same for all methods,
+//!   and what is doubtful about it. A node that rests on nothing is in the warnings.
+//! * [`IdentifyError`]: why there is none.
+//!
+//! [`Training::estimates_of`] and [`Training::ewls`] are the two halves of the EWLS
+//! family, for many dx from one recursion; [`grid::run`] makes a table for every λ
+//! and dx and compares each with other recordings.
+//!
+//! Samples with v = 0 belong to no direction and are left out, except by the hat
+//! table, whose direction state knows them; prediction gives them the direction of
+//! the sample before. The nodes are multiples of dx inside the data of both
+//! directions. Not here: filtering (a recording is used as it is), files, and what
+//! a terminal shows. Formulas and measurements: `docs/estimators.md`.
 //!
 //! Reference: Colton & Hollerbach, World Haptics 2007, equation 1 and section 4.
 
+mod banded;
 pub mod baseline;
+pub mod constrained;
 pub mod ewls;
 pub mod grid;
+mod hat;
+mod hat_table;
+pub mod lanes;
+pub mod method;
+mod problem;
 pub mod resample;
 pub mod signal;
+pub mod two_sided;
 pub mod vaf;
+pub mod validation;
+
+pub use method::Method;
+pub use problem::{IdentifyError, Warning};
 
 use crate::model::predict::{Direction, Lookup};
 use crate::model::{Branch, Provenance, Realization, Trained};
 use crate::recording::Recording;
 use ewls::{Sorted, Theta};
+use method::{Ewls, Sort, Start, TwoSided, Width};
+use problem::START_UP_SAMPLES;
 use resample::{Resample, Resampled};
-use std::fmt;
-
-/// Samples of the recursion before its estimate rests on ten for each parameter.
-const START_UP_SAMPLES: usize = 40;
-
-/// Why a recording gives no realization.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum IdentifyError {
-    /// λ is out of range.
-    #[error("lambda has to be above 0 and at most 1, not {0}")]
-    Lambda(f64),
-    /// dx is no length.
-    #[error("dx has to be a length above 0 mm, not {0}")]
-    Dx(f64),
-    /// Fewer than two nodes fit.
-    #[error("dx = {dx_mm} mm leaves {nodes} nodes in {low} to {high} mm: a table has at least two")]
-    TooCoarse {
-        /// mm.
-        dx_mm: f64,
-        /// How many fit.
-        nodes: usize,
-        /// Where both directions begin, mm.
-        low: f64,
-        /// Where the first of them ends, mm.
-        high: f64,
-    },
-    /// More nodes than a table can have.
-    #[error(
-        "dx = {dx_mm} mm gives more than {most} nodes in {low} to {high} mm",
-        most = resample::MOST_NODES
-    )]
-    TooFine {
-        /// mm.
-        dx_mm: f64,
-        /// Where both directions begin, mm.
-        low: f64,
-        /// Where the first of them ends, mm.
-        high: f64,
-    },
-    /// There is only one direction of travel.
-    #[error("{recording} never moves with v {0} 0: both directions are needed", if *.positive { '>' } else { '<' })]
-    OneDirection {
-        /// Its name.
-        recording: String,
-        /// Which direction is missing.
-        positive: bool,
-    },
-    /// The two directions were never at the same positions.
-    #[error("{0}: the two directions have no range of x in common")]
-    NoOverlap(String),
-    /// The recursion left the range of numbers.
-    #[error(
-        "the estimates with lambda = {lambda} are no numbers: the recording does not excite all parameters; take a larger lambda"
-    )]
-    Diverged {
-        /// The forgetting factor.
-        lambda: f64,
-    },
-}
-
-/// What is doubtful about a realization.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Warning {
-    /// Nodes without a sample of their own were filled from their neighbours.
-    EmptyBins {
-        /// Of the + direction.
-        positive: usize,
-        /// Of the − direction.
-        negative: usize,
-        /// Nodes of the table.
-        of: usize,
-    },
-    /// Nodes where the recursion had hardly begun.
-    StartUp {
-        /// How many.
-        nodes: usize,
-        /// Up to where, mm.
-        to_mm: f64,
-    },
-    /// A spring that pushes away: it has no stable place.
-    NegativeSpring {
-        /// N/mm.
-        k_n_per_mm: f64,
-    },
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::EmptyBins {
-                positive,
-                negative,
-                of,
-            } => write!(
-                f,
-                "of {of} nodes {positive} in + and {negative} in - have no sample and were filled from their neighbours"
-            ),
-            Self::StartUp { nodes, to_mm } => write!(
-                f,
-                "{nodes} nodes up to {to_mm:.2} mm rest on fewer than {START_UP_SAMPLES} samples"
-            ),
-            Self::NegativeSpring { k_n_per_mm } => {
-                write!(f, "the spring pushes away, {k_n_per_mm:.4} N/mm")
-            }
-        }
-    }
-}
-
-/// How a realization is identified.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Method {
-    /// The paper's, with forgetting factor `lambda` in (0, 1].
-    Ewls {
-        /// Forgetting factor.
-        lambda: f64,
-        /// How the estimates are brought to the nodes.
-        resample: Resample,
-    },
-    /// Mean force by position and direction.
-    Static,
-    /// One straight line.
-    Spring,
-}
-
-impl Method {
-    /// As it stands in model files and arguments.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Ewls { .. } => "ewls",
-            Self::Static => "static",
-            Self::Spring => "spring",
-        }
-    }
-}
 
 /// A recording ready to be identified from.
 #[derive(Debug)]
@@ -211,25 +104,59 @@ impl<'r> Training<'r> {
             .min(self.negative.memory_mm(lambda))
     }
 
-    /// One θ a sample in both directions.
+    /// A realization by any method. dx has no meaning for some, see
+    /// [`Method::has_dx`].
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if an option is out of range or the recording does not
+    /// suit the method.
+    pub fn identify(
+        &self,
+        method: Method,
+        dx_mm: f64,
+        lookup: Lookup,
+    ) -> Result<Identified, IdentifyError> {
+        method.check()?;
+        match method {
+            Method::Ewls(options) => {
+                // a fault of dx before the work begins
+                self.nodes(dx_mm)?;
+                let estimates = self.estimates_of(options)?;
+                self.ewls(&estimates, dx_mm, options.resample, lookup)
+            }
+            Method::TwoSided(options) => self.two_sided(options, dx_mm, lookup),
+            Method::Hat(options) => self.hat(options, dx_mm, lookup),
+            Method::Static => self.static_profile(dx_mm, lookup),
+            Method::Segments(options) => self.segments(options, lookup),
+            Method::Spring => Ok(self.spring(lookup)),
+        }
+    }
+
+    /// One θ a sample in both directions, by the paper's own recursion.
     ///
     /// # Errors
     /// [`IdentifyError`] if λ is not in (0, 1] or the estimates are no numbers.
     pub fn estimates(&self, lambda: f64) -> Result<Estimates, IdentifyError> {
-        if !(lambda > 0.0 && lambda <= 1.0) {
-            return Err(IdentifyError::Lambda(lambda));
-        }
-        let of = |samples| {
-            let theta = ewls::estimate(samples, lambda);
+        self.estimates_of(Ewls::paper(lambda, Resample::Point))
+    }
+
+    /// One θ a sample in both directions; `options.resample` has no part in it.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] if λ is not in (0, 1] or the estimates are no numbers.
+    pub fn estimates_of(&self, options: Ewls) -> Result<Estimates, IdentifyError> {
+        Method::Ewls(options).check()?;
+        let of = |samples, backward| {
+            let theta = ewls::estimate_with(samples, &options, backward);
             let finite = theta.iter().flatten().all(|p| p.is_finite());
-            finite
-                .then_some(theta)
-                .ok_or(IdentifyError::Diverged { lambda })
+            finite.then_some(theta).ok_or(IdentifyError::Diverged {
+                lambda: options.lambda,
+            })
         };
         Ok(Estimates {
-            lambda,
-            positive: of(&self.positive)?,
-            negative: of(&self.negative)?,
+            options,
+            positive: of(&self.positive, false)?,
+            negative: of(&self.negative, true)?,
         })
     }
 
@@ -257,7 +184,7 @@ impl<'r> Training<'r> {
         Ok(nodes)
     }
 
-    /// A table of the paper's method from estimates that were made before.
+    /// A table of the EWLS family from estimates that were made before.
     ///
     /// # Errors
     /// [`IdentifyError`] if dx does not suit the recording.
@@ -269,31 +196,41 @@ impl<'r> Training<'r> {
         lookup: Lookup,
     ) -> Result<Identified, IdentifyError> {
         let nodes = self.nodes(dx_mm)?;
-        let at_nodes = |samples: &Sorted, theta: &[Theta]| match resample {
-            Resample::Point => resample::point(&samples.x_mm, theta, &nodes),
-            Resample::Bin => resample::bin(&samples.x_mm, theta, &nodes, dx_mm),
+        let at_nodes = |samples: &Sorted, theta: &[Theta]| {
+            resample::at_nodes(resample, &samples.x_mm, theta, &nodes, dx_mm)
         };
         let positive = at_nodes(&self.positive, &estimates.positive);
         let negative = at_nodes(&self.negative, &estimates.negative);
-        let start_up = self.start_up_mm();
-        let early = nodes.iter().filter(|node| **node < start_up).count();
+        let options = Ewls {
+            resample,
+            ..estimates.options
+        };
+        Ok(self.ewls_table(options, dx_mm, nodes, positive, negative, lookup))
+    }
+
+    /// A table of the EWLS family from values at its nodes.
+    fn ewls_table(
+        &self,
+        options: Ewls,
+        dx_mm: f64,
+        nodes: Vec<f64>,
+        positive: Resampled,
+        negative: Resampled,
+        lookup: Lookup,
+    ) -> Identified {
+        let start_up = self.start_up(&options, &nodes);
         let mut identified = self.table(nodes, positive, negative, lookup);
-        if early > 0 {
-            identified.warnings.push(Warning::StartUp {
-                nodes: early,
-                to_mm: start_up,
-            });
-        }
-        let memory = self.memory_mm(estimates.lambda);
+        identified.warnings.extend(start_up);
+        let memory = self.memory_mm(options.lambda);
         identified.realization.provenance = Provenance {
-            method: "ewls".into(),
-            lambda: Some(estimates.lambda),
+            method: Method::Ewls(options).to_string(),
+            lambda: Some(options.lambda),
             memory_mm: memory.is_finite().then_some(memory),
             dx_mm: Some(dx_mm),
-            resample: Some(resample.word().into()),
+            resample: Some(options.resample.word().into()),
             ..self.provenance()
         };
-        Ok(identified)
+        identified
     }
 
     /// Mean force by position and direction.
@@ -334,12 +271,75 @@ impl<'r> Training<'r> {
         identified
     }
 
-    /// Up to where the recursion of one direction or the other has hardly begun.
-    fn start_up_mm(&self) -> f64 {
-        self.directions()
-            .into_iter()
-            .map(|samples| samples.x_mm[START_UP_SAMPLES.min(samples.len() - 1)])
-            .fold(f64::NEG_INFINITY, f64::max)
+    /// Least squares around each node.
+    fn two_sided(
+        &self,
+        options: TwoSided,
+        dx_mm: f64,
+        lookup: Lookup,
+    ) -> Result<Identified, IdentifyError> {
+        let nodes = self.nodes(dx_mm)?;
+        let width = |samples: &Sorted| match options.width {
+            Width::Mm(mm) => mm,
+            Width::Lambda(lambda) => samples.memory_mm(lambda),
+        };
+        let of = |samples: &Sorted| {
+            let l_mm = width(samples);
+            two_sided::at_nodes(samples, &nodes, options.window, l_mm, options.bounded)
+                .ok_or(IdentifyError::Narrow { width_mm: l_mm })
+        };
+        let (positive, negative) = (of(&self.positive)?, of(&self.negative)?);
+        let mut identified = self.table(nodes, positive, negative, lookup);
+        // what is filled here is not empty but thin
+        for warning in &mut identified.warnings {
+            if let Warning::EmptyBins {
+                positive,
+                negative,
+                of,
+            } = *warning
+            {
+                *warning = Warning::Thin {
+                    positive,
+                    negative,
+                    of,
+                };
+            }
+        }
+        identified.realization.provenance = Provenance {
+            method: Method::TwoSided(options).to_string(),
+            lambda: Method::TwoSided(options).lambda(),
+            memory_mm: Some(width(&self.positive).min(width(&self.negative))),
+            dx_mm: Some(dx_mm),
+            ..self.provenance()
+        };
+        Ok(identified)
+    }
+
+    /// The nodes where the recursion of one direction or the other has hardly
+    /// begun; with a warm start there are none.
+    fn start_up(&self, options: &Ewls, nodes: &[f64]) -> Option<Warning> {
+        if options.start == Start::Warm {
+            return None;
+        }
+        let fortieth = |x: &[f64]| x[START_UP_SAMPLES.min(x.len() - 1)];
+        let mut low = fortieth(&self.positive.x_mm);
+        let mut high = f64::INFINITY;
+        match options.sort {
+            Sort::Ascending => low = low.max(fortieth(&self.negative.x_mm)),
+            Sort::Travel => {
+                let x = &self.negative.x_mm;
+                high = x[x.len() - 1 - START_UP_SAMPLES.min(x.len() - 1)];
+            }
+        }
+        let early: Vec<f64> = nodes
+            .iter()
+            .copied()
+            .filter(|node| *node < low || *node > high)
+            .collect();
+        early.last().map(|last| Warning::StartUp {
+            nodes: early.len(),
+            to_mm: *last,
+        })
     }
 
     fn provenance(&self) -> Provenance {
@@ -367,6 +367,8 @@ impl<'r> Training<'r> {
                 of: nodes.len(),
             });
         }
+        let both = [&positive.theta, &negative.theta];
+        warnings.extend(problem::unmeasured(&self.recording.f_n, &nodes, both));
         Identified {
             realization: Realization {
                 id: String::new(),
@@ -390,8 +392,8 @@ impl<'r> Training<'r> {
 /// One θ a sample, in the order of [`Training::directions`].
 #[derive(Debug, Clone)]
 pub struct Estimates {
-    /// Forgetting factor.
-    pub lambda: f64,
+    /// How they were made.
+    pub options: Ewls,
     /// Of v > 0.
     pub positive: Vec<Theta>,
     /// Of v < 0.
@@ -405,20 +407,6 @@ pub struct Identified {
     pub realization: Realization,
     /// What is doubtful.
     pub warnings: Vec<Warning>,
-}
-
-impl Identified {
-    /// Share of the nodes of both directions with a negative mass, and with
-    /// negative damping, 0 to 1.
-    pub fn negative_shares(&self) -> [f64; 2] {
-        let branches = [&self.realization.positive, &self.realization.negative];
-        let share = |of: fn(&Branch) -> &Vec<f64>| {
-            let all = branches.iter().flat_map(|b| of(b));
-            let below = all.clone().filter(|p| **p < 0.0).count();
-            below as f64 / all.count() as f64
-        };
-        [share(|b| &b.m_kg), share(|b| &b.b_n_s_per_mm)]
-    }
 }
 
 fn sorted(recording: &Recording, belongs: impl Fn(f64) -> bool) -> Sorted {

@@ -3,12 +3,15 @@
 //! The paper's equation 1, F = m±(x) a + b±(x) v + k±(x) x + F0±(x), sampled at
 //! the nodes `x_mm`. Units: x mm, v mm/s, a m/s², F N, so m kg, b N·s/mm, k N/mm,
 //! F0 N. F is the force that the probe applies to the target, positive with +x.
-//! Reading and writing of model files is in [`file`], the force in [`predict`],
-//! which uses nothing but `core` and slices so that a firmware can share it.
+//! Reading and writing of model files is in [`file`]; the force in [`predict`] and
+//! whether it can be active in [`certificate`] use nothing but `core` and slices, so
+//! that a firmware can share them.
 
+pub mod certificate;
 pub mod file;
 pub mod predict;
 
+use certificate::Certificate;
 use predict::{BranchView, Direction, Lookup, TableView};
 use std::collections::BTreeMap;
 
@@ -90,6 +93,15 @@ impl Realization {
             negative: self.negative.view(),
             lookup: self.lookup,
         }
+    }
+
+    /// Whether it can put energy into a hand, over the range that it was trained in.
+    pub fn certificate(&self) -> Certificate {
+        let range = certificate::Range {
+            x_mm: self.trained.x_mm,
+            v_mm_s: self.trained.v_mm_s,
+        };
+        certificate::certify(&self.table(), self.direction, range)
     }
 }
 

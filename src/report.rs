@@ -9,6 +9,7 @@ mod apa;
 pub mod csv;
 pub mod figures;
 pub mod html;
+pub mod identification;
 pub mod json;
 pub mod plot;
 pub mod png;

@@ -422,16 +422,13 @@ impl Drop for Runner {
 }
 
 /// The limits for a table: the protocol's, and under its `uncertified` permission
-/// the lower force of that for a table with negative mass or damping, which can
-/// put energy into the hand.
+/// the lower force of that for a table that fails its certificate, which can put
+/// energy into the hand.
 fn playback_limits(protocol: &Protocol, realization: &Realization) -> Limits {
     let mut limits = protocol.device.limits;
-    let branches = [&realization.positive, &realization.negative];
-    let active = branches
-        .iter()
-        .flat_map(|b| b.m_kg.iter().chain(&b.b_n_s_per_mm))
-        .any(|value| *value < 0.0);
-    if let (true, Some(uncertified)) = (active, &protocol.device.uncertified) {
+    if let Some(uncertified) = &protocol.device.uncertified
+        && !realization.certificate().passes()
+    {
         limits.force_n = limits.force_n.capped_at(uncertified.force_n);
     }
     limits

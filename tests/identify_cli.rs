@@ -188,12 +188,19 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
     );
     with("--dx", "0", 2, "an increment is a length above 0 mm");
     with("--dx", "40", 1, "dx = 40 mm leaves");
-    with("--resample", "hat", 2, "possible values: point, bin");
+    with("--resample", "mean", 2, "possible values: point, bin, hat");
+    with(
+        "--window",
+        "tricube",
+        2,
+        "--window has no meaning for this method",
+    );
+    with("--dx", "0.1:1", 2, "a range is FROM:TO:STEP");
     with(
         "--method",
         "magic",
         2,
-        "possible values: ewls, static, spring",
+        "possible values: ewls, constrained, two-sided, hat, static, segments, spring",
     );
     refused(&[TRAINING], 2, "--validate");
     refused(&[TRAINING, "--validate", "absent.csv"], 1, "absent.csv: ");

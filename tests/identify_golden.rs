@@ -126,11 +126,8 @@ fn the_paper_grid_falls_with_lambda_at_1_khz_and_does_not_peak() {
     let recording_a = recording("training_a.csv");
     let validation = recording("validation_a.csv");
     let training = Training::new(&recording_a).unwrap();
-    let plan = Plan::Ewls {
-        lambdas: vec![0.9991, 0.9993, 0.9995, 0.9997, 0.9999],
-        dx_mm: vec![1.0],
-        resample: Resample::Point,
-    };
+    let lambdas = [0.9991, 0.9993, 0.9995, 0.9997, 0.9999];
+    let plan = Plan::ewls(&lambdas, &[1.0], Resample::Point);
     let cells = grid::run(&training, &plan, Lookup::Linear, &[&validation], || ()).unwrap();
     assert!(
         cells

@@ -74,11 +74,7 @@ fn vaf_does_not_depend_on_the_origin_of_x() {
         let train = recording("t", 20, shift, PLUS, MINUS, 3.0);
         let other = recording("o", 7, shift, PLUS, MINUS, 3.0);
         let training = Training::new(&train).unwrap();
-        let plan = Plan::Ewls {
-            lambdas: vec![0.999],
-            dx_mm: vec![0.5],
-            resample,
-        };
+        let plan = Plan::ewls(&[0.999], &[0.5], resample);
         let cells = grid::run(&training, &plan, Lookup::Linear, &[&other], || ()).unwrap();
         cells[0].scores[0].vaf
     };

@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
-use study::identify::Training;
 use study::identify::grid::{self, Plan};
 use study::identify::resample::Resample;
+use study::identify::{Method, Training};
 use study::model::predict::{Direction, Lookup};
 use study::model::{Branch, Provenance, Realization, Trained, file};
 use study::recording::{self, Recording};
@@ -52,11 +52,7 @@ fn shipped(dir: &str) -> BTreeMap<String, String> {
 }
 
 fn ewls(lambdas: &[f64], dx_mm: &[f64]) -> Plan {
-    Plan::Ewls {
-        lambdas: lambdas.to_vec(),
-        dx_mm: dx_mm.to_vec(),
-        resample: Resample::Point,
-    }
+    Plan::ewls(lambdas, dx_mm, Resample::Point)
 }
 
 const PAPER: [f64; 5] = [0.9991, 0.9993, 0.9995, 0.9997, 0.9999];
@@ -98,8 +94,8 @@ fn the_extended_realizations_come_from_the_recording() {
             ("lambda-{lambda}-dx-{dx}", ewls(&[0.99], &[0.5, 1.0])),
             ("lambda-{lambda}-dx-{dx}", ewls(&[0.999], &[0.5])),
             ("practice-lambda-{lambda}-dx-{dx}", ewls(&[0.998], &[2.0])),
-            ("static", Plan::Static { dx_mm: vec![1.0] }),
-            ("spring", Plan::Spring),
+            ("static", Plan::one(Method::Static, &[1.0])),
+            ("spring", Plan::one(Method::Spring, &[])),
         ],
     );
 }

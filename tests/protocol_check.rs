@@ -70,9 +70,16 @@ fn report(dir: &Path) -> (i32, Vec<String>, Vec<String>) {
 fn the_shipped_protocols_are_in_order() {
     let (code, out, err) = run(Path::new(ROOT), &["check", "protocols/turn-signal"]);
     assert_eq!(code, 0, "{err}");
-    assert_eq!(
-        out,
-        "turn-signal: ok, 5 models, 15 trials, about 16 minutes, 1 warning\n"
+    assert!(
+        out.starts_with("turn-signal: ok, 5 models, 15 trials, about 16 minutes, 1 warning\n"),
+        "{out}"
+    );
+    assert!(out.contains("lambda-0.9995: FAIL: least m -"), "{out}");
+    assert!(
+        out.contains(
+            "5 of 5 tables fail their certificate; `uncertified` has them played up to 9 N"
+        ),
+        "{out}"
     );
     assert!(err.contains("|r| with VAF has to exceed 0.878"), "{err}");
 
@@ -83,6 +90,34 @@ fn the_shipped_protocols_are_in_order() {
         out.starts_with("turn-signal-extended: ok, 12 models, 33 trials, "),
         "{out}"
     );
+}
+
+#[test]
+fn a_table_that_fails_its_certificate_is_refused_without_permission() {
+    let dir = turn_signal();
+    let path = dir.path().join("protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let without: String = text
+        .lines()
+        .filter(|line| !line.starts_with("uncertified"))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    assert_ne!(text, without);
+    fs::write(&path, without).unwrap();
+    for command in [
+        &["check", "."][..],
+        &["run", "."],
+        &["rehearse", ".", "--participants", "1"],
+    ] {
+        let (code, _, err) = run(dir.path(), command);
+        assert_eq!(code, 1, "{err}");
+        assert!(err.contains("the table of `lambda-0.9991` can put energy into a hand"));
+        assert!(err.contains("FAIL: least m -"), "{err}");
+        assert!(err.contains("uncertified = {"), "{err}");
+    }
+    // permission that is not given is none
+    fs::write(&path, text.replace("play = true", "play = false")).unwrap();
+    assert_eq!(run(dir.path(), &["check", "."]).0, 1);
 }
 
 #[test]
@@ -134,7 +169,7 @@ fn a_vaf_that_differs_from_the_file_is_an_error_and_a_rounded_one_is_not() {
     assert_eq!(
         errors,
         [
-            "the VAF of `lambda-0.9995` is not 0.79: its file says 0.8217722860367234 for `validation-1.5hz`"
+            "the VAF of `lambda-0.9995` is not 0.79: its file says 0.82177228603653 for `validation-1.5hz`"
         ]
     );
 }

@@ -3,6 +3,7 @@
 use super::{Console, Failure, load};
 use crate::diagnostic::{Findings, Severity};
 use crate::protocol::check;
+use crate::text::Untrusted;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -28,6 +29,28 @@ struct Report<'a> {
     trials: Option<usize>,
     minutes: Option<f64>,
     fingerprints: Option<&'a crate::protocol::fingerprint::Fingerprints>,
+    certificates: Vec<Certified<'a>>,
+}
+
+/// The certificate of one model. A margin that nothing can mend is null.
+#[derive(Debug, Serialize)]
+struct Certified<'a> {
+    model: &'a str,
+    pass: bool,
+    margins: Vec<Margin>,
+    negative_mass: f64,
+    negative_damping: f64,
+    /// Null where the spring force jumps.
+    stiffness_n_per_mm: f64,
+    damping_n_s_per_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Margin {
+    condition: &'static str,
+    unit: &'static str,
+    value: f64,
+    at_mm: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -58,6 +81,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             trials,
             minutes,
             fingerprints: loaded.as_ref().map(|l| &l.fingerprints),
+            certificates: loaded.as_ref().map(certified).unwrap_or_default(),
         };
         let document = serde_json::to_string_pretty(&report)
             .map_err(|e| Failure::new(super::Kind::Bug, format!("the report: {e}")))?;
@@ -87,7 +111,57 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         plural(loaded.protocol.models.len(), "model"),
         plural(trials, "trial"),
         plural(warnings, "warning"),
-    ))
+    ))?;
+    console.out(certificates(&loaded))
+}
+
+fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
+    loaded
+        .models
+        .iter()
+        .map(|(id, realization)| {
+            let certificate = realization.certificate();
+            Certified {
+                model: id.as_str(),
+                pass: certificate.passes(),
+                margins: certificate
+                    .conditions()
+                    .iter()
+                    .map(|(condition, margin)| Margin {
+                        condition: condition.word(),
+                        unit: condition.unit(),
+                        value: margin.value,
+                        at_mm: margin.at_mm,
+                    })
+                    .collect(),
+                negative_mass: certificate.negative_mass,
+                negative_damping: certificate.negative_damping,
+                stiffness_n_per_mm: certificate.stiffness_n_per_mm,
+                damping_n_s_per_mm: certificate.damping_n_s_per_mm,
+            }
+        })
+        .collect()
+}
+
+/// A line for each model's certificate, and what those that fail mean.
+fn certificates(loaded: &load::Loaded) -> String {
+    let mut out = String::new();
+    let mut failing = 0;
+    for (id, realization) in &loaded.models {
+        let certificate = realization.certificate();
+        failing += usize::from(!certificate.passes());
+        out += &format!("{id}: {certificate}\n");
+        out += &format!("    {}\n", super::identify::needs(&certificate));
+    }
+    if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {
+        out += &format!(
+            "note: {failing} of {} fail their certificate; `uncertified` has them played up to {} N: {}\n",
+            plural(loaded.models.len(), "table"),
+            permission.force_n.get(),
+            Untrusted(&permission.reason),
+        );
+    }
+    out
 }
 
 fn plural(n: usize, word: &str) -> String {

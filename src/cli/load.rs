@@ -69,9 +69,26 @@ pub fn load(path: &Path) -> Result<Loaded, Failure> {
     }
 }
 
+/// Opens the frozen protocol of a study that has begun, to read what was gathered:
+/// what would only be refused to be played is not refused.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_frozen(path: &Path) -> Result<Loaded, Failure> {
+    match open(path, false) {
+        (Some(loaded), _) => Ok(loaded),
+        (None, findings) => Err(Failure::faults(findings)),
+    }
+}
+
 /// Opens the protocol at `path` and tells everything that was found, errors and
 /// warnings. The protocol is there if there are no errors.
 pub fn examine(path: &Path) -> (Option<Loaded>, Vec<Findings>) {
+    open(path, true)
+}
+
+/// `to_play`: tables that fail their certificate are refused, unless permitted.
+fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
     let path = if path.is_dir() {
         path.join(FILE_NAME)
     } else {
@@ -113,6 +130,9 @@ pub fn examine(path: &Path) -> (Option<Loaded>, Vec<Findings>) {
     };
     others.assign(&protocol);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
+    if to_play {
+        join::certificates(&protocol, &others, &spans, &mut findings);
+    }
     let orders = others.orders.take();
     // Without its file an order is not infeasible, only unknown.
     if orders.is_some() || !matches!(protocol.design.order, Order::File(_)) {

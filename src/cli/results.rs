@@ -68,7 +68,7 @@ pub(super) fn frozen(study: &StudyFolder) -> Result<Loaded, Failure> {
 /// The same of an earlier version.
 pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded, Failure> {
     let file = layout::protocol(study.path(), version).join(layout::PROTOCOL);
-    load::load(&file).map_err(|mut failure| {
+    load::load_frozen(&file).map_err(|mut failure| {
         failure.kind = Kind::Results;
         failure
     })

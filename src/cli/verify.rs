@@ -81,7 +81,7 @@ pub(super) fn frozen_versions(study: &StudyFolder) -> Vec<Finding> {
     for version in &study.manifest().versions {
         let number = version.version;
         let path = layout::protocol(study.path(), number).join(layout::PROTOCOL);
-        let what = match load::load(&path) {
+        let what = match load::load_frozen(&path) {
             Ok(loaded) if loaded.fingerprints == version.fingerprints => continue,
             Ok(_) => "its fingerprints are not those in study.json".to_owned(),
             Err(_) => format!("it cannot be read; see `study check {}`", path.display()),

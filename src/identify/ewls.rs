@@ -11,13 +11,23 @@
 //! sample leaves one θ. Only the upper triangle of P is computed, so P stays
 //! symmetric. P(0) = I would bias the start, 10¹² loses six digits.
 //!
+//! Where it departs from the paper: a "warm" start takes θ and P from a pass back
+//! over the first 3/(1 − λ) samples, so that the first nodes rest on as much as the
+//! others; order "travel" passes the − direction from the highest x down, as it was
+//! moved; bounds give each sample the estimate of least cost with m, b ≥ 0, without
+//! touching the recursion.
+//!
 //! What the forgetting factor does depends on how densely x was sampled: λ
 //! remembers L = 1 / ((1 − λ) ρ) mm, ρ samples per mm and direction.
 //!
 //! Not here: the order of the samples and the choice of nodes.
 
+use super::constrained;
+use super::method::{Ewls, Sort, Start};
+use super::resample::Resample;
+
 /// P(0) = START · I.
-const START: f64 = 1e6;
+pub(super) const START: f64 = 1e6;
 
 /// A parameter vector, in the order m (kg), b (N·s/mm), k (N/mm), F0 (N).
 pub type Theta = [f64; 4];
@@ -55,6 +65,19 @@ impl Sorted {
         }
     }
 
+    /// The same samples from the highest x down; those at the same x keep their
+    /// order in time.
+    pub(super) fn descending(&self) -> Self {
+        let order = descending(&self.x_mm);
+        let pick = |column: &[f64]| order.iter().map(|i| column[*i]).collect();
+        Self {
+            x_mm: pick(&self.x_mm),
+            v_mm_s: pick(&self.v_mm_s),
+            a_m_s2: pick(&self.a_m_s2),
+            f_n: pick(&self.f_n),
+        }
+    }
+
     /// L = 1 / ((1 − λ) ρ), mm; infinite at λ = 1.
     pub fn memory_mm(&self, lambda: f64) -> f64 {
         let [low, high] = self.range_mm();
@@ -63,16 +86,49 @@ impl Sorted {
     }
 }
 
-/// One θ a sample, in the order of `samples`. λ has to be in (0, 1].
+/// One θ a sample of the paper's own recursion, in the order of `samples`. λ has
+/// to be in (0, 1].
 pub fn estimate(samples: &Sorted, lambda: f64) -> Vec<Theta> {
-    let mut recursion = Recursion::cold(lambda);
-    let mut estimates = Vec::with_capacity(samples.len());
-    for i in 0..samples.len() {
-        let phi = [samples.a_m_s2[i], samples.v_mm_s[i], samples.x_mm[i], 1.0];
-        recursion.step(phi, samples.f_n[i]);
-        estimates.push(recursion.theta);
+    estimate_with(samples, &Ewls::paper(lambda, Resample::Point), false)
+}
+
+/// One θ a sample, in the order of `samples` whatever the order of the recursion.
+/// λ has to be in (0, 1]; `backward` says that these samples travelled down.
+pub fn estimate_with(samples: &Sorted, options: &Ewls, backward: bool) -> Vec<Theta> {
+    let order = match options.sort {
+        Sort::Travel if backward => descending(&samples.x_mm),
+        Sort::Travel | Sort::Ascending => (0..samples.len()).collect(),
+    };
+    let mut recursion = Recursion::cold(options.lambda);
+    let phi = |i: usize| [samples.a_m_s2[i], samples.v_mm_s[i], samples.x_mm[i], 1.0];
+    if options.start == Start::Warm {
+        let first = warm_samples(options.lambda).min(order.len());
+        for i in order[..first].iter().rev() {
+            recursion.step(phi(*i), samples.f_n[*i]);
+        }
+    }
+    let mut estimates = vec![[0.0; 4]; samples.len()];
+    for i in order {
+        recursion.step(phi(i), samples.f_n[i]);
+        estimates[i] = if options.bounded {
+            recursion.bounded()
+        } else {
+            recursion.theta
+        };
     }
     estimates
+}
+
+/// Samples that a warm start goes back over, 3/(1 − λ); saturates at λ = 1.
+pub(super) fn warm_samples(lambda: f64) -> usize {
+    (3.0 / (1.0 - lambda)).ceil() as usize
+}
+
+/// Indices from the highest x down; samples at the same x keep their order in time.
+fn descending(x_mm: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..x_mm.len()).collect();
+    order.sort_by(|a, b| x_mm[*b].total_cmp(&x_mm[*a]));
+    order
 }
 
 /// The state of the recursion between two samples.
@@ -113,6 +169,14 @@ impl Recursion {
                 p[i][j] = (p[i][j] - f[i] * f[j] * d) * forget;
             }
         }
+    }
+}
+
+impl Recursion {
+    /// The estimate of least cost with m, b ≥ 0.
+    fn bounded(&self) -> Theta {
+        let p = &self.p;
+        constrained::bounded(self.theta, p[0], [p[0][1], p[1][1], p[1][2], p[1][3]])
     }
 }
 

@@ -1,41 +1,67 @@
-//! A realization for every λ and dx, each compared with other recordings.
+//! A realization for every method and dx, each compared with other recordings.
+//!
+//! What a grid of the paper's method repeats is done once: the samples are passed
+//! once for all λ ([`lanes::recursion`]) and all dx ([`runs`]), and no estimate is
+//! kept, only sums over runs of samples. A recording is walked once for all tables
+//! with the same nodes ([`lanes::errors`]). Memory is that of the recordings and
+//! the tables. The rest runs side by side in chunks that do not depend on the number
+//! of threads, so neither do the numbers.
+//!
+//! Sums depend on where the runs of all dx cut them: in the last digits a table made
+//! together with other dx can differ from the same table made alone (not with
+//! `point`, whose runs are the same).
 
+mod runs;
+
+use super::lanes::errors::errors;
+use super::lanes::recursion::{self, Sums};
+use super::lanes::{LAMBDAS_A_PASS, Processor};
+use super::method::{Ewls, Sort, Start};
+use super::resample::{Resample, Resampled};
 use super::vaf::{self, Score};
-use super::{Identified, IdentifyError, Method, Training, Warning};
-use crate::identify::resample::Resample;
+use super::{Identified, IdentifyError, Method, Training, Warning, ewls};
 use crate::model::Realization;
-use crate::model::predict::Lookup;
+use crate::model::certificate::Certificate;
+use crate::model::predict::{Direction, Lookup};
 use crate::recording::Recording;
+use rayon::prelude::*;
+use runs::{Nodes, Runs};
 
-/// What to identify.
+/// What to identify: every method with every dx.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Plan {
-    /// The paper's method, for each λ and dx.
-    Ewls {
-        /// Forgetting factors.
-        lambdas: Vec<f64>,
-        /// Resampling increments, mm.
-        dx_mm: Vec<f64>,
-        /// How estimates are brought to the nodes.
-        resample: Resample,
-    },
-    /// Mean force by position and direction, for each dx.
-    Static {
-        /// Resampling increments, mm.
-        dx_mm: Vec<f64>,
-    },
-    /// One straight line.
-    Spring,
+pub struct Plan {
+    /// Methods with their options.
+    pub methods: Vec<Method>,
+    /// Resampling increments, mm, for those methods that have them.
+    pub dx_mm: Vec<f64>,
 }
 
 impl Plan {
+    /// The paper's method with each λ.
+    pub fn ewls(lambdas: &[f64], dx_mm: &[f64], resample: Resample) -> Self {
+        Self {
+            methods: lambdas
+                .iter()
+                .map(|lambda| Method::Ewls(Ewls::paper(*lambda, resample)))
+                .collect(),
+            dx_mm: dx_mm.to_vec(),
+        }
+    }
+
+    /// One method.
+    pub fn one(method: Method, dx_mm: &[f64]) -> Self {
+        Self {
+            methods: vec![method],
+            dx_mm: dx_mm.to_vec(),
+        }
+    }
+
     /// How many realizations it makes.
     pub fn cells(&self) -> usize {
-        match self {
-            Self::Ewls { lambdas, dx_mm, .. } => lambdas.len() * dx_mm.len(),
-            Self::Static { dx_mm } => dx_mm.len(),
-            Self::Spring => 1,
-        }
+        let of = |method: &Method| {
+            if method.has_dx() { self.dx_mm.len() } else { 1 }
+        };
+        self.methods.iter().map(of).sum()
     }
 }
 
@@ -48,16 +74,14 @@ pub struct Cell {
     pub realization: Realization,
     /// In the order of the recordings.
     pub scores: Vec<Score>,
-    /// Share of the nodes with m < 0, 0 to 1.
-    pub negative_mass: f64,
-    /// Share of the nodes with b < 0, 0 to 1.
-    pub negative_damping: f64,
+    /// Whether it can put energy into a hand.
+    pub certificate: Certificate,
     /// What is doubtful.
     pub warnings: Vec<Warning>,
 }
 
-/// Identifies every cell, λ by λ, and scores it on `recordings`. `done` is told
-/// after each cell.
+/// Identifies every cell, method by method, and scores it on `recordings`. `done`
+/// is told after each cell.
 ///
 /// # Errors
 /// [`IdentifyError`] of the first cell that cannot be identified.
@@ -66,54 +90,306 @@ pub fn run(
     plan: &Plan,
     lookup: Lookup,
     recordings: &[&Recording],
-    mut done: impl FnMut(),
+    done: impl Fn() + Sync,
 ) -> Result<Vec<Cell>, IdentifyError> {
-    let mut cells = Vec::with_capacity(plan.cells());
-    let mut keep = |method, identified| {
-        cells.push(cell(method, identified, recordings));
-        done();
-    };
-    match plan {
-        Plan::Ewls {
-            lambdas,
-            dx_mm,
-            resample,
-        } => {
-            // faults of dx before the work begins
-            for dx in dx_mm {
-                training.nodes(*dx)?;
-            }
-            for lambda in lambdas {
-                let estimates = training.estimates(*lambda)?;
-                let method = Method::Ewls {
-                    lambda: *lambda,
-                    resample: *resample,
-                };
-                for dx in dx_mm {
-                    keep(method, training.ewls(&estimates, *dx, *resample, lookup)?);
-                }
-            }
-        }
-        Plan::Static { dx_mm } => {
-            for dx in dx_mm {
-                keep(Method::Static, training.static_profile(*dx, lookup)?);
-            }
-        }
-        Plan::Spring => keep(Method::Spring, training.spring(lookup)),
-    }
-    Ok(cells)
+    run_on(Processor::best(), training, plan, lookup, recordings, done)
 }
 
-fn cell(method: Method, identified: Identified, recordings: &[&Recording]) -> Cell {
-    let [negative_mass, negative_damping] = identified.negative_shares();
+/// [`run`] on the loops of one kind of processor.
+///
+/// # Errors
+/// As [`run`].
+///
+/// # Panics
+/// If this machine does not have that processor.
+pub fn run_on(
+    processor: Processor,
+    training: &Training<'_>,
+    plan: &Plan,
+    lookup: Lookup,
+    recordings: &[&Recording],
+    done: impl Fn() + Sync,
+) -> Result<Vec<Cell>, IdentifyError> {
+    // faults of the arguments before the work begins
+    for method in &plan.methods {
+        method.check()?;
+    }
+    let mut tables = Vec::new();
+    if plan.methods.iter().any(|m| m.has_dx()) {
+        for dx_mm in &plan.dx_mm {
+            tables.push(Nodes {
+                dx_mm: *dx_mm,
+                x_mm: training.nodes(*dx_mm)?,
+            });
+        }
+    }
+    let identified = identify(processor, training, &plan.methods, &tables, lookup)?;
+    let methods: Vec<Method> = plan
+        .methods
+        .iter()
+        .zip(&identified)
+        .flat_map(|(method, made)| vec![*method; made.len()])
+        .collect();
+    let identified: Vec<Identified> = identified.into_iter().flatten().collect();
+    let realizations: Vec<&Realization> = identified.iter().map(|i| &i.realization).collect();
+    let scores = score(processor, &realizations, recordings, done);
+    Ok(methods
+        .into_iter()
+        .zip(identified)
+        .zip(scores)
+        .map(|((method, identified), scores)| cell(method, identified, scores, recordings))
+        .collect())
+}
+
+/// The tables of each method, in the order of dx.
+fn identify(
+    processor: Processor,
+    training: &Training<'_>,
+    methods: &[Method],
+    tables: &[Nodes],
+    lookup: Lookup,
+) -> Result<Vec<Vec<Identified>>, IdentifyError> {
+    let mut made: Vec<Option<Result<Vec<Identified>, IdentifyError>>> = vec![None; methods.len()];
+    for (options, members) in families(methods) {
+        let lambdas: Vec<f64> = members
+            .iter()
+            .filter_map(|i| methods[*i].lambda())
+            .collect();
+        let found = ewls_tables(processor, training, options, &lambdas, tables, lookup);
+        for (i, tables) in members.into_iter().zip(found) {
+            made[i] = Some(tables);
+        }
+    }
+    made.into_par_iter()
+        .zip(methods)
+        .map(|(made, method)| made.unwrap_or_else(|| each(training, *method, tables, lookup)))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
+}
+
+/// One method by itself.
+fn each(
+    training: &Training<'_>,
+    method: Method,
+    tables: &[Nodes],
+    lookup: Lookup,
+) -> Result<Vec<Identified>, IdentifyError> {
+    if let Method::Ewls(options) = method {
+        let estimates = training.estimates_of(options)?;
+        return tables
+            .iter()
+            .map(|nodes| training.ewls(&estimates, nodes.dx_mm, options.resample, lookup))
+            .collect();
+    }
+    if !method.has_dx() {
+        let any = 1.0;
+        return Ok(vec![training.identify(method, any, lookup)?]);
+    }
+    tables
+        .par_iter()
+        .map(|nodes| training.identify(method, nodes.dx_mm, lookup))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
+}
+
+/// The unbounded EWLS methods that differ in λ only, by their indices.
+fn families(methods: &[Method]) -> Vec<(Ewls, Vec<usize>)> {
+    let mut families: Vec<(Ewls, Vec<usize>)> = Vec::new();
+    for (i, method) in methods.iter().enumerate() {
+        let Method::Ewls(options) = method else {
+            continue;
+        };
+        if options.bounded || options.lambda < recursion::LEAST_LAMBDA {
+            continue;
+        }
+        let same = |family: &Ewls| {
+            Ewls {
+                lambda: options.lambda,
+                ..*family
+            } == *options
+        };
+        match families.iter_mut().find(|(family, _)| same(family)) {
+            Some((_, members)) => members.push(i),
+            None => families.push((*options, vec![i])),
+        }
+    }
+    families
+}
+
+/// The tables of each λ, all from one pass over the samples for every dozen of λ.
+fn ewls_tables(
+    processor: Processor,
+    training: &Training<'_>,
+    options: Ewls,
+    lambdas: &[f64],
+    tables: &[Nodes],
+    lookup: Lookup,
+) -> Vec<Result<Vec<Identified>, IdentifyError>> {
+    let runs = training
+        .directions()
+        .map(|samples| Runs::new(options.resample, &samples.x_mm, tables));
+    let passes: Vec<(usize, &[f64])> = [0, 1]
+        .into_iter()
+        .flat_map(|direction| lambdas.chunks(LAMBDAS_A_PASS).map(move |l| (direction, l)))
+        .collect();
+    let sums: Vec<Option<Vec<Sums>>> = passes
+        .into_par_iter()
+        .flat_map_iter(|(direction, lambdas)| {
+            let samples = training.directions()[direction];
+            pass(
+                processor,
+                options,
+                samples,
+                direction == 1,
+                lambdas,
+                &runs[direction],
+            )
+        })
+        .collect();
+    let (plus, minus) = sums.split_at(lambdas.len());
+    lambdas
+        .par_iter()
+        .zip(plus)
+        .zip(minus)
+        .map(|((lambda, plus), minus)| {
+            let options = Ewls {
+                lambda: *lambda,
+                ..options
+            };
+            let (Some(plus), Some(minus)) = (plus, minus) else {
+                return Err(IdentifyError::Diverged { lambda: *lambda });
+            };
+            let table = |(i, nodes): (usize, &Nodes)| {
+                let found: Option<[Resampled; 2]> = runs[0]
+                    .table(i, nodes, plus)
+                    .zip(runs[1].table(i, nodes, minus))
+                    .map(Into::into);
+                match found {
+                    Some([positive, negative]) => Ok(training.ewls_table(
+                        options,
+                        nodes.dx_mm,
+                        nodes.x_mm.clone(),
+                        positive,
+                        negative,
+                        lookup,
+                    )),
+                    // no node has a sample of its own: see `resample`
+                    None => training.identify(Method::Ewls(options), nodes.dx_mm, lookup),
+                }
+            };
+            tables.iter().enumerate().map(table).collect()
+        })
+        .collect()
+}
+
+/// The sums of one direction for a dozen of λ, in ascending order of x whatever the
+/// order of the recursion.
+fn pass(
+    processor: Processor,
+    options: Ewls,
+    samples: &ewls::Sorted,
+    backward: bool,
+    lambdas: &[f64],
+    runs: &Runs,
+) -> Vec<Option<Vec<Sums>>> {
+    let warm = |lambda: f64| match options.start {
+        Start::Cold => 0,
+        Start::Warm => ewls::warm_samples(lambda),
+    };
+    if !(backward && options.sort == Sort::Travel) {
+        return recursion::sums(processor, samples, lambdas, warm, &runs.runs, runs.moments);
+    }
+    let turned = samples.descending();
+    let n = samples.len();
+    let turn = |run: &recursion::Run| recursion::Run {
+        from: n - run.to,
+        to: n - run.from,
+        ..*run
+    };
+    let turned_runs: Vec<recursion::Run> = runs.runs.iter().rev().map(turn).collect();
+    let mut sums = recursion::sums(
+        processor,
+        &turned,
+        lambdas,
+        warm,
+        &turned_runs,
+        runs.moments,
+    );
+    for sums in sums.iter_mut().flatten() {
+        sums.reverse();
+    }
+    sums
+}
+
+/// The scores of every realization on every recording.
+fn score(
+    processor: Processor,
+    realizations: &[&Realization],
+    recordings: &[&Recording],
+    done: impl Fn() + Sync,
+) -> Vec<Vec<Score>> {
+    let variances: Vec<f64> = recordings.iter().map(|r| vaf::variance(&r.f_n)).collect();
+    // those with the same nodes are walked through together
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (i, r) in realizations.iter().enumerate() {
+        let alike = |group: &Vec<usize>| {
+            let first = realizations[group[0]];
+            group.len() < LAMBDAS_A_PASS
+                && r.direction == Direction::Sign
+                && first.direction == Direction::Sign
+                && first.x_mm == r.x_mm
+        };
+        match groups.iter_mut().find(|group| alike(group)) {
+            Some(group) => group.push(i),
+            None => groups.push(vec![i]),
+        }
+    }
+    let scored: Vec<Vec<Vec<Score>>> = groups
+        .par_iter()
+        .map(|group| {
+            let alike: Vec<&Realization> = group.iter().map(|i| realizations[*i]).collect();
+            let mut scores = vec![Vec::new(); group.len()];
+            for (recording, variance) in recordings.iter().zip(&variances) {
+                if alike[0].direction == Direction::Sign {
+                    let errors = errors(processor, &alike, recording);
+                    for (scores, errors) in scores.iter_mut().zip(errors) {
+                        scores.push(Score {
+                            vaf: 1.0 - errors.variance_n2 / variance,
+                            bias_n: errors.mean_n,
+                            residual_n: errors.variance_n2.sqrt(),
+                        });
+                    }
+                } else {
+                    scores[0].push(vaf::score(alike[0], recording));
+                }
+            }
+            for _ in group {
+                done();
+            }
+            scores
+        })
+        .collect();
+    let mut by_realization = vec![Vec::new(); realizations.len()];
+    for (group, scores) in groups.into_iter().zip(scored) {
+        for (i, scores) in group.into_iter().zip(scores) {
+            by_realization[i] = scores;
+        }
+    }
+    by_realization
+}
+
+fn cell(
+    method: Method,
+    identified: Identified,
+    scores: Vec<Score>,
+    recordings: &[&Recording],
+) -> Cell {
     let Identified {
         mut realization,
         warnings,
     } = identified;
-    let scores: Vec<Score> = recordings
-        .iter()
-        .map(|recording| vaf::score(&realization, recording))
-        .collect();
     for (recording, score) in recordings.iter().zip(&scores) {
         let name = recording.name.clone();
         let hash = recording.sha256.clone();
@@ -122,10 +398,9 @@ fn cell(method: Method, identified: Identified, recordings: &[&Recording]) -> Ce
     }
     Cell {
         method,
+        certificate: realization.certificate(),
         realization,
         scores,
-        negative_mass,
-        negative_damping,
         warnings,
     }
 }

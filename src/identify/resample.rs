@@ -1,7 +1,7 @@
 //! From one θ a sample to one θ a node.
 //!
 //! The nodes are the multiples of dx inside the range of both directions, so that
-//! every node has samples of both around it. Two ways to a node:
+//! every node has samples of both around it. Three ways to a node:
 //!
 //! * `point`, the paper's literal reading: samples at equal counts of a 5 µm
 //!   encoder, round(x / 0.005), are averaged; between counts it is linear.
@@ -10,7 +10,10 @@
 //!   nearest one) and is counted, because a table that looks complete and is not
 //!   should be known.
 //!
-//! Both are linear in θ, so a shift of the origin of x does not change the force.
+//! * `hat`: the mean weighted with 1 − |x − node|/dx, over (node − dx, node + dx):
+//!   the share that a linear look-up takes of the node. Without samples as `bin`.
+//!
+//! All are linear in θ, so a shift of the origin of x does not change the force.
 
 use super::ewls::Theta;
 
@@ -27,6 +30,8 @@ pub enum Resample {
     Point,
     /// The mean over the bin around the node.
     Bin,
+    /// The mean weighted by how near the node is.
+    Hat,
 }
 
 impl Resample {
@@ -35,6 +40,7 @@ impl Resample {
         match self {
             Self::Point => "point",
             Self::Bin => "bin",
+            Self::Hat => "hat",
         }
     }
 }
@@ -67,6 +73,21 @@ pub struct Resampled {
     pub empty: usize,
 }
 
+/// Values at the nodes by one of the ways. `x_mm` ascends and is not empty.
+pub fn at_nodes(
+    how: Resample,
+    x_mm: &[f64],
+    theta: &[Theta],
+    nodes: &[f64],
+    dx_mm: f64,
+) -> Resampled {
+    match how {
+        Resample::Point => point(x_mm, theta, nodes),
+        Resample::Bin => bin(x_mm, theta, nodes, dx_mm),
+        Resample::Hat => hat(x_mm, theta, nodes, dx_mm),
+    }
+}
+
 /// Values at the nodes, between means over equal counts. `x_mm` ascends and is
 /// not empty.
 pub fn point(x_mm: &[f64], theta: &[Theta], nodes: &[f64]) -> Resampled {
@@ -93,29 +114,65 @@ pub fn point(x_mm: &[f64], theta: &[Theta], nodes: &[f64]) -> Resampled {
 /// Means over [node − dx/2, node + dx/2). `x_mm` ascends and is not empty.
 pub fn bin(x_mm: &[f64], theta: &[Theta], nodes: &[f64], dx_mm: f64) -> Resampled {
     let below = |edge: f64| x_mm.partition_point(|x| *x < edge);
-    let mut places = Vec::new();
-    let mut means = Vec::new();
-    for node in nodes {
+    means(x_mm, theta, nodes, |node| {
         let members = below(node - 0.5 * dx_mm)..below(node + 0.5 * dx_mm);
-        if !members.is_empty() {
-            places.push(*node);
-            means.push(mean(&theta[members]));
+        (!members.is_empty()).then(|| mean(&theta[members]))
+    })
+}
+
+/// Means weighted with 1 − |x − node|/dx. `x_mm` ascends and is not empty.
+pub fn hat(x_mm: &[f64], theta: &[Theta], nodes: &[f64], dx_mm: f64) -> Resampled {
+    means(x_mm, theta, nodes, |node| {
+        let first = x_mm.partition_point(|x| *x <= node - dx_mm);
+        let mut total = 0.0;
+        let mut sum = [0.0; 4];
+        for (x, theta) in x_mm[first..].iter().zip(&theta[first..]) {
+            let weight = 1.0 - (x - node).abs() / dx_mm;
+            if *x > node && weight <= 0.0 {
+                break;
+            }
+            let weight = weight.max(0.0);
+            total += weight;
+            for (s, p) in sum.iter_mut().zip(theta) {
+                *s += weight * p;
+            }
         }
-    }
+        (total > 0.0).then(|| sum.map(|s| s / total))
+    })
+}
+
+/// The nodes' own means, and straight lines between them where there is none.
+fn means(
+    x_mm: &[f64],
+    theta: &[Theta],
+    nodes: &[f64],
+    own: impl Fn(f64) -> Option<Theta>,
+) -> Resampled {
+    let own: Vec<Option<Theta>> = nodes.iter().map(|node| own(*node)).collect();
+    filled(nodes, &own).unwrap_or_else(|| Resampled {
+        // No node has a sample around it: the samples themselves are all there is.
+        empty: nodes.len(),
+        ..point(x_mm, theta, nodes)
+    })
+}
+
+/// Fills nodes without a value from their neighbours; `None` if all are.
+pub(super) fn filled(nodes: &[f64], own: &[Option<Theta>]) -> Option<Resampled> {
+    let (places, values): (Vec<f64>, Vec<Theta>) = nodes
+        .iter()
+        .zip(own)
+        .filter_map(|(node, theta)| theta.map(|theta| (*node, theta)))
+        .unzip();
     if places.is_empty() {
-        // No node has a sample within dx/2: the samples themselves are all there is.
-        return Resampled {
-            empty: nodes.len(),
-            ..point(x_mm, theta, nodes)
-        };
+        return None;
     }
-    Resampled {
+    Some(Resampled {
         theta: nodes
             .iter()
-            .map(|node| interpolate(&places, &means, *node))
+            .map(|node| interpolate(&places, &values, *node))
             .collect(),
         empty: nodes.len() - places.len(),
-    }
+    })
 }
 
 fn mean(values: &[Theta]) -> Theta {
@@ -129,7 +186,7 @@ fn mean(values: &[Theta]) -> Theta {
 }
 
 /// Straight lines between (`places`, `values`), the ends held.
-fn interpolate(places: &[f64], values: &[Theta], x: f64) -> Theta {
+pub(super) fn interpolate(places: &[f64], values: &[Theta], x: f64) -> Theta {
     let right = places.partition_point(|place| *place <= x);
     if right == 0 {
         return values[0];
@@ -180,6 +237,16 @@ mod tests {
         let at = bin(&x, &values, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 1.0);
         assert_eq!(f0(&at), [10.0, 10.0, 20.0, 30.0, 40.0, 40.0]);
         assert_eq!(at.empty, 4);
+    }
+
+    #[test]
+    fn a_hat_weighs_by_the_distance_and_leaves_out_the_next_node() {
+        let x = [0.0, 0.5, 1.0, 1.75, 2.0];
+        let values: Vec<_> = [100.0, 2.0, 8.0, 4.0, 100.0].map(theta).to_vec();
+        let at = hat(&x, &values, &[1.0, 4.0], 1.0);
+        // (0.5·2 + 1·8 + 0.25·4) / 1.75; 4.0 has none within 1 mm and takes it
+        assert_eq!(f0(&at), [10.0 / 1.75, 10.0 / 1.75]);
+        assert_eq!(at.empty, 1);
     }
 
     #[test]

@@ -54,8 +54,13 @@ pub fn score(realization: &Realization, recording: &Recording) -> Score {
     }
 }
 
+/// Variance (÷ n).
+pub(super) fn variance(values: &[f64]) -> f64 {
+    mean_and_variance(values).1
+}
+
 /// Mean and variance (÷ n) in two passes: a large mean costs no digits.
-fn mean_and_variance(values: &[f64]) -> (f64, f64) {
+pub(super) fn mean_and_variance(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();

@@ -1,81 +1,19 @@
-//! What `study identify` prints and writes.
+//! What `study identify` prints.
 
-use super::{Args, Failure, Found, MethodWord};
+use super::Found;
+use super::args::Named;
 use crate::identify::Method;
 use crate::identify::grid::Cell;
-use crate::model::file::{self, lookup_word};
-use crate::text::{ModelId, Untrusted};
+use crate::identify::validation::{JUST_NOTICEABLE_N, Part};
+use crate::model::certificate::Certificate;
+use crate::model::file::lookup_word;
+use crate::text::Untrusted;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
-use std::fs::{self, OpenOptions};
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
 use unicode_width::UnicodeWidthStr as _;
 
-/// Gives every cell its id and makes its file.
-pub(super) fn files(
-    cells: &mut [Cell],
-    args: &Args,
-    dir: &Path,
-) -> Result<Vec<(PathBuf, String)>, Failure> {
-    let template = args.id.as_deref().unwrap_or(match args.method {
-        MethodWord::Ewls => "lambda-{lambda}-dx-{dx}",
-        MethodWord::Static => "static-dx-{dx}",
-        MethodWord::Spring => "spring",
-    });
-    let mut ids: Vec<ModelId> = Vec::new();
-    let mut files = Vec::new();
-    for cell in cells {
-        let number = |n: Option<f64>| n.map_or(String::new(), |n| n.to_string());
-        let provenance = &cell.realization.provenance;
-        let id = template
-            .replace("{lambda}", &number(provenance.lambda))
-            .replace("{dx}", &number(provenance.dx_mm));
-        let id = ModelId::new(id).map_err(Failure::input)?;
-        if ids.iter().any(|other| other.collides_with(&id)) {
-            return Err(Failure::input(format!("two cells would be called {id}"))
-                .hint("the template needs {lambda} or {dx}, or the list is too long"));
-        }
-        cell.realization.id = id.to_string();
-        files.push((
-            dir.join(format!("{id}.toml")),
-            file::write(&cell.realization),
-        ));
-        ids.push(id);
-    }
-    Ok(files)
-}
-
-/// Writes the files; without `force` none if one of them is there.
-pub(super) fn write(dir: &Path, files: &[(PathBuf, String)], force: bool) -> Result<(), Failure> {
-    fs::create_dir_all(dir).map_err(|e| Failure::file(dir, &e))?;
-    if !force && let Some((path, _)) = files.iter().find(|(path, _)| path.exists()) {
-        return Err(
-            Failure::input(format!("{} is there already", path.display()))
-                .hint("--force overwrites it; nothing was written"),
-        );
-    }
-    for (path, text) in files {
-        // A reader never sees half a file: the whole one takes the name at once.
-        let part = path.with_extension("toml.part");
-        let written = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .open(&part)
-            .and_then(|mut file| {
-                file.write_all(text.as_bytes())
-                    .and_then(|()| file.sync_all())
-            })
-            .and_then(|()| fs::rename(&part, path));
-        if let Err(e) = written {
-            // what is left of it is of no use
-            let _ = fs::remove_file(&part);
-            return Err(Failure::file(path, &e));
-        }
-    }
-    Ok(())
-}
+/// More cells than this are shown as a surface instead of a list.
+const MOST_ROWS: usize = 30;
 
 /// `study-identify/1`.
 pub(super) fn json(found: &Found<'_>) -> String {
@@ -102,17 +40,20 @@ pub(super) fn json(found: &Found<'_>) -> String {
                 "lookup": lookup_word(cell.realization.lookup),
                 "start": start(cell.method),
                 "sort": sort(cell.method),
+                "estimator": provenance.method,
+                "filter": provenance.filter,
                 "nodes": cell.realization.x_mm.len(),
                 "vaf": by_file(|s| s.vaf),
                 "bias_n": by_file(|s| s.bias_n),
                 "residual_n": by_file(|s| s.residual_n),
-                "negative_mass": cell.negative_mass,
-                "negative_damping": cell.negative_damping,
+                "negative_mass": cell.certificate.negative_mass,
+                "negative_damping": cell.certificate.negative_damping,
+                "certificate": certificate(&cell.certificate),
                 "warnings": warnings,
             })
         })
         .collect();
-    let recording = |named: &super::Named, sha256: &str, role: &str| {
+    let recording = |named: &Named, sha256: &str, role: &str| {
         json!({
             "file": key(found, named),
             "name": named.name,
@@ -133,27 +74,88 @@ pub(super) fn json(found: &Found<'_>) -> String {
             )
         })
         .collect();
+    let validation: Map<String, Value> = found
+        .recordings
+        .iter()
+        .zip(found.validations.iter().zip(&found.ceilings))
+        .filter_map(|((named, _), (validation, ceiling))| {
+            let v = validation.as_ref()?;
+            let detents: Vec<Value> = v
+                .detents
+                .iter()
+                .map(|(x_mm, p)| json!({ "x_mm": x_mm, "part": p.as_ref().map(part) }))
+                .collect();
+            let document = json!({
+                "whole": part(&v.whole),
+                "positive": v.positive.as_ref().map(part),
+                "negative": v.negative.as_ref().map(part),
+                "detents": detents,
+                "ceiling": ceiling.map(|c| json!({
+                    "vaf": c.vaf, "noise_n": c.noise_n, "apart_mm": c.apart_mm,
+                })),
+            });
+            Some((key(found, named), document))
+        })
+        .collect();
     let document = json!({
         "format": "study-identify/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
         "training": recording(&found.args.training, &found.training.sha256, "training"),
         "recordings": recordings,
         "best": found.best,
+        "validation": validation,
         "cells": cells,
     });
     format!("{document:#}\n")
 }
 
+fn part(part: &Part) -> Value {
+    json!({
+        "samples": part.samples,
+        "vaf": part.vaf,
+        "bias_n": part.bias_n,
+        "residual_n": part.residual_n,
+        "nrmse": part.nrmse,
+    })
+}
+
+/// What is not finite, such as a margin that nothing can mend, is null.
+fn certificate(certificate: &Certificate) -> Value {
+    let margins: Map<String, Value> = certificate
+        .conditions()
+        .iter()
+        .map(|(condition, margin)| {
+            let document = json!({
+                "value": margin.value, "unit": condition.unit(), "at_mm": margin.at_mm,
+            });
+            (condition.word().to_owned(), document)
+        })
+        .collect();
+    json!({
+        "pass": certificate.passes(),
+        "margins": margins,
+        "stiffness_n_per_mm": certificate.stiffness_n_per_mm,
+        "damping_n_s_per_mm": certificate.damping_n_s_per_mm,
+        "mass_kg": certificate.mass_kg,
+    })
+}
+
 fn start(method: Method) -> Option<&'static str> {
-    matches!(method, Method::Ewls { .. }).then_some("cold")
+    match method {
+        Method::Ewls(options) => Some(options.start.word()),
+        _ => None,
+    }
 }
 
 fn sort(method: Method) -> Option<&'static str> {
-    matches!(method, Method::Ewls { .. }).then_some("ascending")
+    match method {
+        Method::Ewls(options) => Some(options.sort.word()),
+        _ => None,
+    }
 }
 
 /// The file's name; the whole path where two recordings have the same.
-fn key(found: &Found<'_>, named: &super::Named) -> String {
+fn key(found: &Found<'_>, named: &Named) -> String {
     let name = named.file_name();
     let same = found
         .recordings
@@ -169,14 +171,6 @@ fn key(found: &Found<'_>, named: &super::Named) -> String {
 
 /// The table for a terminal, and what to make of it.
 pub(super) fn table(found: &Found<'_>) -> String {
-    let mut rows = vec![heads(found)];
-    rows.extend(
-        found
-            .cells
-            .iter()
-            .enumerate()
-            .map(|(i, cell)| row(cell, found.best == Some(i))),
-    );
     let mut out = String::new();
     let _ = writeln!(
         out,
@@ -192,13 +186,130 @@ pub(super) fn table(found: &Found<'_>) -> String {
         let _ = writeln!(out, "{}", how(cell));
     }
     out.push('\n');
-    out.push_str(&align(&rows));
+    match surface(found) {
+        Some(rows) => {
+            let name = Untrusted(&found.recordings[0].0.name);
+            let _ = writeln!(out, "VAF on {name}, by lambda (and L in mm) and dx in mm:");
+            out.push_str(&align(&rows));
+        }
+        None => {
+            let mut rows = vec![heads(found)];
+            let cells = found.cells.iter().enumerate();
+            rows.extend(cells.map(|(i, cell)| row(cell, found.best == Some(i))));
+            out.push_str(&align(&rows));
+        }
+    }
     out.push('\n');
     out.push_str(&verdict(found));
+    out.push_str(&worth(found));
     for (said, cells) in warnings(found) {
         let _ = writeln!(out, "warning: {said} ({cells})");
     }
     out
+}
+
+/// A large grid as rows of lambda and columns of dx.
+fn surface(found: &Found<'_>) -> Option<Vec<Vec<String>>> {
+    if found.cells.len() <= MOST_ROWS {
+        return None;
+    }
+    let mut increments: Vec<f64> = Vec::new();
+    let mut rows: Vec<(f64, Vec<String>)> = Vec::new();
+    for (i, cell) in found.cells.iter().enumerate() {
+        let provenance = &cell.realization.provenance;
+        let (lambda, dx) = (provenance.lambda?, provenance.dx_mm?);
+        if !increments.contains(&dx) {
+            increments.push(dx);
+        }
+        let mark = if found.best == Some(i) { "*" } else { "" };
+        let vaf = format!("{mark}{:.4}", cell.scores.first()?.vaf);
+        match rows.last_mut() {
+            Some((last, row)) if *last == lambda => row.push(vaf),
+            _ => {
+                let memory = provenance
+                    .memory_mm
+                    .map_or("all".into(), |l| format!("{l:.3}"));
+                rows.push((lambda, vec![lambda.to_string(), memory, vaf]));
+            }
+        }
+    }
+    let mut heads = vec!["lambda".to_owned(), "L".to_owned()];
+    heads.extend(increments.iter().map(ToString::to_string));
+    let mut table = vec![heads];
+    table.extend(rows.into_iter().map(|(_, row)| row));
+    let columns = table[0].len();
+    table
+        .iter()
+        .all(|row| row.len() == columns)
+        .then_some(table)
+}
+
+/// The best cell in parts, its ceiling and its certificate.
+fn worth(found: &Found<'_>) -> String {
+    let Some(cell) = found.best.map(|best| &found.cells[best]) else {
+        return String::new();
+    };
+    let mut rows = vec![
+        ["", "VAF", "NRMSE", "bias N", "residual N", "noticed"]
+            .map(String::from)
+            .to_vec(),
+    ];
+    let mut ceilings = String::new();
+    for ((named, _), (validation, ceiling)) in found
+        .recordings
+        .iter()
+        .zip(found.validations.iter().zip(&found.ceilings))
+    {
+        let Some(v) = validation else { continue };
+        let mut row = |what: String, part: &Option<Part>| {
+            if let Some(part) = part {
+                rows.push(vec![
+                    what,
+                    format!("{:.4}", part.vaf),
+                    format!("{:.3}", part.nrmse),
+                    format!("{:+.3}", part.bias_n),
+                    format!("{:.3}", part.residual_n),
+                    format!("{:.1}x", part.noticeable()),
+                ]);
+            }
+        };
+        row(short_name(named), &Some(v.whole));
+        row("v > 0".into(), &v.positive);
+        row("v < 0".into(), &v.negative);
+        for ([low, high], part) in &v.detents {
+            row(format!("x {low:.1} to {high:.1} mm"), part);
+        }
+        if let Some(c) = ceiling {
+            let _ = writeln!(
+                ceilings,
+                "the most that any model could reach on {}: {:.6}, by its repetition ({:.3} N does not come back)",
+                Untrusted(&named.name),
+                c.vaf,
+                c.noise_n
+            );
+        }
+    }
+    let provenance = &cell.realization.provenance;
+    let filter = provenance.filter.as_deref().unwrap_or("unknown");
+    format!(
+        "\nthe {} cell in parts, signals {filter}; `noticed` in just noticeable differences of {JUST_NOTICEABLE_N} N\n{}{ceilings}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n",
+        if found.cells.len() == 1 {
+            "only"
+        } else {
+            "best"
+        },
+        align(&rows),
+        cell.certificate,
+        super::needs(&cell.certificate),
+        100.0 * cell.certificate.negative_mass,
+        100.0 * cell.certificate.negative_damping,
+    )
+}
+
+/// A name as long as a path would push the numbers off the screen.
+fn short_name(named: &Named) -> String {
+    let name: String = named.name.chars().take(24).collect();
+    Untrusted(&name).to_string()
 }
 
 /// What all cells have in common.
@@ -220,14 +331,13 @@ fn how(cell: &Cell) -> String {
 fn heads(found: &Found<'_>) -> Vec<String> {
     let mut heads: Vec<String> = ["", "lambda", "L mm", "dx mm"].map(String::from).to_vec();
     for (named, _) in &found.recordings {
-        // A name as long as a path would push the numbers off the screen.
-        let name: String = named.name.chars().take(24).collect();
-        heads.push(format!("VAF {}", Untrusted(&name)));
+        heads.push(format!("VAF {}", short_name(named)));
         heads.push("bias N".into());
         heads.push("residual N".into());
     }
     heads.push("m<0".into());
     heads.push("b<0".into());
+    heads.push("passive".into());
     heads
 }
 
@@ -250,8 +360,19 @@ fn row(cell: &Cell, best: bool) -> Vec<String> {
         row.push(format!("{:+.4}", score.bias_n));
         row.push(format!("{:.4}", score.residual_n));
     }
-    row.push(format!("{:.0} %", 100.0 * cell.negative_mass));
-    row.push(format!("{:.0} %", 100.0 * cell.negative_damping));
+    row.push(format!("{:.0} %", 100.0 * cell.certificate.negative_mass));
+    row.push(format!(
+        "{:.0} %",
+        100.0 * cell.certificate.negative_damping
+    ));
+    row.push(
+        if cell.certificate.passes() {
+            "PASS"
+        } else {
+            "FAIL"
+        }
+        .into(),
+    );
     row
 }
 

@@ -104,6 +104,40 @@ pub(super) fn vaf(
     }
 }
 
+/// Refuses tables that fail their certificate, unless the protocol permits them.
+pub(super) fn certificates(
+    protocol: &Protocol,
+    others: &Others<'_>,
+    spans: &Spans,
+    findings: &mut Findings,
+) {
+    if protocol.device.uncertified.as_ref().is_some_and(|u| u.play) {
+        return;
+    }
+    let mut seen = Vec::new();
+    for (i, entry) in protocol.models.iter().enumerate() {
+        let Some(realization) = others.realization(&entry.id) else {
+            continue;
+        };
+        let certificate = realization.certificate();
+        if certificate.passes() || seen.contains(&entry.file.as_ref()) {
+            continue;
+        }
+        seen.push(entry.file.as_ref());
+        findings.faults.push(
+            Fault::error(format!(
+                "the table of `{}` can put energy into a hand",
+                entry.id
+            ))
+            .at(spans.get(&format!("models[{i}].file")).cloned())
+            .label(certificate.to_string())
+            .hint(
+                "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }",
+            ),
+        );
+    }
+}
+
 /// How far a stated VAF may be from the file's: half a unit of its last digit.
 fn tolerance(written: &str) -> f64 {
     const EXACT: f64 = 1e-9;

@@ -1,0 +1,233 @@
+//! Which runs of samples the tables of several dx need the sums of, and how the
+//! nodes come of them.
+//!
+//! All three ways of resampling are sums over runs of neighbouring samples. The
+//! edges of all tables together cut the samples into runs, each sample is in at
+//! most one, and every node is put together from a few: so one more table costs
+//! nothing at a sample. The values are those of [`resample`] up to the order of
+//! addition.
+
+use crate::identify::ewls::Theta;
+use crate::identify::lanes::recursion::{Run, Sums};
+use crate::identify::resample::{self, COUNT_MM, Resample, Resampled};
+use std::ops::Range;
+
+/// The nodes of one table.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Nodes {
+    pub(super) dx_mm: f64,
+    pub(super) x_mm: Vec<f64>,
+}
+
+/// The runs of one direction of travel.
+#[derive(Debug)]
+pub(super) struct Runs {
+    /// Ascending, without overlap.
+    pub(super) runs: Vec<Run>,
+    /// Samples of each run and Σ(x − origin), mm.
+    sizes: Vec<(f64, f64)>,
+    /// One for each table.
+    tables: Vec<Recipe>,
+    /// Whether Σ (x − origin) θ is needed.
+    pub(super) moments: bool,
+}
+
+/// How the nodes of a table come of the sums.
+#[derive(Debug)]
+enum Recipe {
+    /// Straight lines between the means of runs at these places.
+    Point { places: Vec<f64>, runs: Vec<usize> },
+    /// The mean of the runs of each node.
+    Bin(Vec<Range<usize>>),
+    /// The weighted mean of the runs to the left and to the right of each node.
+    Hat(Vec<[Range<usize>; 2]>),
+}
+
+impl Runs {
+    /// For samples at `x_mm`, ascending and not empty.
+    pub(super) fn new(how: Resample, x_mm: &[f64], tables: &[Nodes]) -> Self {
+        let (bounds, tables) = match how {
+            Resample::Point => points(x_mm, tables),
+            Resample::Bin => {
+                let ranges = |t: &Nodes| -> Vec<[usize; 3]> {
+                    let below = |edge: f64| x_mm.partition_point(|x| *x < edge);
+                    let of = |node: &f64| {
+                        let from = below(node - 0.5 * t.dx_mm);
+                        [from, from, below(node + 0.5 * t.dx_mm)]
+                    };
+                    t.x_mm.iter().map(of).collect()
+                };
+                let (bounds, found) = cut(tables.iter().map(ranges).collect());
+                let whole = |node: [Range<usize>; 2]| node[0].start..node[1].end;
+                let recipe = |nodes: Vec<_>| Recipe::Bin(nodes.into_iter().map(whole).collect());
+                (bounds, found.into_iter().map(recipe).collect())
+            }
+            Resample::Hat => {
+                let ranges = |t: &Nodes| -> Vec<[usize; 3]> {
+                    let of = |node: &f64| {
+                        [
+                            x_mm.partition_point(|x| *x <= node - t.dx_mm),
+                            x_mm.partition_point(|x| x < node),
+                            x_mm.partition_point(|x| *x < node + t.dx_mm),
+                        ]
+                    };
+                    t.x_mm.iter().map(of).collect()
+                };
+                let (bounds, found) = cut(tables.iter().map(ranges).collect());
+                (bounds, found.into_iter().map(Recipe::Hat).collect())
+            }
+        };
+        let runs: Vec<Run> = bounds
+            .iter()
+            .map(|range| Run {
+                from: range.start,
+                to: range.end,
+                origin_mm: x_mm[range.start],
+            })
+            .collect();
+        let sizes = runs
+            .iter()
+            .map(|run| {
+                let arms = x_mm[run.from..run.to].iter().map(|x| x - run.origin_mm);
+                ((run.to - run.from) as f64, arms.sum())
+            })
+            .collect();
+        Self {
+            runs,
+            sizes,
+            tables,
+            moments: how == Resample::Hat,
+        }
+    }
+
+    /// The nodes of table `i`; `None` if not one has a sample of its own.
+    pub(super) fn table(&self, i: usize, nodes: &Nodes, sums: &[Sums]) -> Option<Resampled> {
+        match &self.tables[i] {
+            Recipe::Point { places, runs } => {
+                let mean = |run: &usize| sums[*run].theta.map(|s| s / self.sizes[*run].0);
+                let means: Vec<Theta> = runs.iter().map(mean).collect();
+                let at = |node: &f64| resample::interpolate(places, &means, *node);
+                Some(Resampled {
+                    theta: nodes.x_mm.iter().map(at).collect(),
+                    empty: 0,
+                })
+            }
+            Recipe::Bin(ranges) => {
+                let own: Vec<Option<Theta>> = ranges
+                    .iter()
+                    .map(|range| {
+                        let samples: f64 = self.sizes[range.clone()].iter().map(|s| s.0).sum();
+                        let mut sum = [0.0; 4];
+                        for run in &sums[range.clone()] {
+                            add(&mut sum, 1.0, &run.theta);
+                        }
+                        (samples > 0.0).then(|| sum.map(|s| s / samples))
+                    })
+                    .collect();
+                resample::filled(&nodes.x_mm, &own)
+            }
+            Recipe::Hat(ranges) => {
+                let own: Vec<Option<Theta>> = nodes
+                    .x_mm
+                    .iter()
+                    .zip(ranges)
+                    .map(|(node, halves)| self.hat(*node, nodes.dx_mm, halves, sums))
+                    .collect();
+                resample::filled(&nodes.x_mm, &own)
+            }
+        }
+    }
+
+    /// Σ w θ / Σ w with w = 1 ∓ (x − node)/dx to the right and left.
+    fn hat(
+        &self,
+        node: f64,
+        dx_mm: f64,
+        halves: &[Range<usize>; 2],
+        sums: &[Sums],
+    ) -> Option<Theta> {
+        let mut total = 0.0;
+        let mut sum = [0.0; 4];
+        for (half, slope) in halves.iter().zip([1.0 / dx_mm, -1.0 / dx_mm]) {
+            for i in half.clone() {
+                // w = base + slope · (x − origin)
+                let base = 1.0 + slope * (self.runs[i].origin_mm - node);
+                total += base * self.sizes[i].0 + slope * self.sizes[i].1;
+                add(&mut sum, base, &sums[i].theta);
+                add(&mut sum, slope, &sums[i].moment);
+            }
+        }
+        (total > 0.0).then(|| sum.map(|s| s / total))
+    }
+}
+
+fn add(sum: &mut Theta, factor: f64, theta: &Theta) {
+    for (s, p) in sum.iter_mut().zip(theta) {
+        *s += factor * p;
+    }
+}
+
+/// Groups at equal counts, those next to nodes only.
+fn points(x_mm: &[f64], tables: &[Nodes]) -> (Vec<Range<usize>>, Vec<Recipe>) {
+    let count = |x: f64| (x / COUNT_MM).round_ties_even();
+    let mut groups = Vec::new();
+    let mut places = Vec::new();
+    let mut from = 0;
+    while from < x_mm.len() {
+        let here = count(x_mm[from]);
+        let to = from + x_mm[from..].partition_point(|x| count(*x) <= here);
+        places.push(here * COUNT_MM);
+        groups.push(from..to);
+        from = to;
+    }
+    let beside = |node: &f64| {
+        let right = places.partition_point(|place| place <= node);
+        [right.saturating_sub(1), right.min(places.len() - 1)]
+    };
+    let mut used = vec![false; groups.len()];
+    for node in tables.iter().flat_map(|t| &t.x_mm) {
+        for group in beside(node) {
+            used[group] = true;
+        }
+    }
+    // group → run
+    let mut number = vec![0; groups.len()];
+    let mut bounds = Vec::new();
+    for (group, range) in groups.into_iter().enumerate().filter(|(g, _)| used[*g]) {
+        number[group] = bounds.len();
+        bounds.push(range);
+    }
+    let recipe = |t: &Nodes| {
+        let mut own: Vec<usize> = t.x_mm.iter().flat_map(beside).collect();
+        own.sort_unstable();
+        own.dedup();
+        Recipe::Point {
+            places: own.iter().map(|group| places[*group]).collect(),
+            runs: own.iter().map(|group| number[*group]).collect(),
+        }
+    };
+    (bounds, tables.iter().map(recipe).collect())
+}
+
+/// The runs to the left of a node and to the right.
+type Halves = [Range<usize>; 2];
+
+/// For each table and node [from, middle, to) as indices of samples: the runs
+/// between all of them, and which runs each node has on either side of its middle.
+fn cut(tables: Vec<Vec<[usize; 3]>>) -> (Vec<Range<usize>>, Vec<Vec<Halves>>) {
+    let mut edges: Vec<usize> = tables.iter().flatten().flatten().copied().collect();
+    edges.sort_unstable();
+    edges.dedup();
+    let run = |edge: usize| edges.partition_point(|e| *e < edge);
+    let found = tables
+        .iter()
+        .map(|nodes| {
+            nodes
+                .iter()
+                .map(|[from, middle, to]| [run(*from)..run(*middle), run(*middle)..run(*to)])
+                .collect()
+        })
+        .collect();
+    let bounds = edges.windows(2).map(|pair| pair[0]..pair[1]).collect();
+    (bounds, found)
+}
