@@ -62,7 +62,7 @@ enum Command {
     /// Impose an excitation on the simulated target: a recording
     Record(record::Args),
     /// From a recording to model files and their VAF
-    Identify(identify::Args),
+    Identify(Box<identify::Args>),
     /// Write a commented protocol to start from
     New(new::Args),
     /// Print the JSON Schema of the protocol file, for editors
