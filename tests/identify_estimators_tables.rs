@@ -398,10 +398,10 @@ fn what_no_method_can_do_is_refused_by_each() {
     ));
 }
 
-/// What a dwell does to a recursion: P grows by 1/λ a sample where nothing is
-/// excited. A table that is ruined has to say so; a hat table is not.
+/// P of a recursion grows by 1/λ a sample where nothing is excited; with noise on
+/// position and force it recovers, and the table with it.
 #[test]
-fn a_dwell_is_survived_or_told() {
+fn eight_seconds_at_one_place_ruin_no_table() {
     let mut r = target("r", 20, 0.05);
     let mut noise = Stream::new(5, &["dwell"]);
     let t = r.t_s[r.len() - 1];
@@ -412,27 +412,14 @@ fn a_dwell_is_survived_or_told() {
         r.a_m_s2.push(0.05 * noise.normal());
         r.f_n.push(4.0 * 7.5f64.sin() + 0.05 * noise.normal());
     }
-    let training = Training::new(&r).unwrap();
     let probe = target("o", 7, 0.0);
     for method in every_method() {
-        match training.identify(method, 1.0, Lookup::Linear) {
-            Err(IdentifyError::Diverged { .. }) => {}
-            Err(other) => panic!("{method}: {other}"),
-            Ok(found) => {
-                let vaf = vaf::score(&found.realization, &probe).vaf;
-                let told = found
-                    .warnings
-                    .iter()
-                    .any(|w| matches!(w, Warning::Unmeasured { .. }));
-                assert!(
-                    vaf > 0.0 || told || method == Method::Spring,
-                    "{method}: {vaf}"
-                );
-                if let Method::Hat(_) = method {
-                    assert!(vaf > 0.95, "{method}: {vaf}");
-                }
-            }
+        if method == Method::Spring {
+            continue;
         }
+        let found = identified(&r, method, 1.0);
+        let vaf = vaf::score(&found.realization, &probe).vaf;
+        assert!(vaf > 0.97, "{method}: {vaf}");
     }
 }
 

@@ -86,8 +86,9 @@ impl Banded {
                     .sum();
                 let left = factor[at] - done;
                 factor[at] = if i == j {
-                    // also refuses a NaN
-                    if !(left > NO_RANK * self.lower[at]) {
+                    // false for a NaN
+                    let has_rank = left > NO_RANK * self.lower[at];
+                    if !has_rank {
                         return None;
                     }
                     left.sqrt()

@@ -222,3 +222,27 @@ pub(super) fn unmeasured(
         warning
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_that_nobody_felt_are_counted_with_the_worst() {
+        let measured = [-4.0, 0.0, 4.0];
+        let at = |k: f64, f0: f64| [0.0, 0.0, k, f0];
+        // at 2 mm: 7.9 N is within half the range of what was measured, 8.1 N is not
+        let nodes = [1.0, 2.0];
+        let fine = vec![at(0.0, 4.0), at(3.0, 1.9)];
+        assert_eq!(unmeasured(&measured, &nodes, [&fine, &fine]), None);
+        let off = vec![at(0.0, -30.0), at(3.0, 2.1)];
+        assert_eq!(
+            unmeasured(&measured, &nodes, [&fine, &off]),
+            Some(Warning::Unmeasured {
+                nodes: 2,
+                force_n: -30.0,
+                at_mm: 1.0
+            })
+        );
+    }
+}

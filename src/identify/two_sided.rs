@@ -133,8 +133,9 @@ fn inverse(r: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
     // positive definite with a diagonal of ones: no pivoting needed
     for p in 0..4 {
         let pivot = left[p][p];
-        // also refuses a NaN
-        if !(pivot > 1e-14) {
+        // false for a NaN
+        let has_rank = pivot > 1e-14;
+        if !has_rank {
             return None;
         }
         let (row, unit) = (
@@ -194,8 +195,8 @@ fn tricube(samples: &Sorted, nodes: &[f64], reach_mm: f64) -> Vec<Sums> {
             let first = x.partition_point(|x| *x <= node - reach_mm);
             let end = x.partition_point(|x| *x < node + reach_mm);
             let mut sums = Sums::default();
-            for i in first..end {
-                let u = ((x[i] - node) / reach_mm).abs();
+            for (i, x) in x.iter().enumerate().take(end).skip(first) {
+                let u = ((x - node) / reach_mm).abs();
                 let bow = (1.0 - u * u * u).max(0.0);
                 sums.add(samples, i, *node, bow * bow * bow);
             }

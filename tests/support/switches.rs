@@ -3,6 +3,9 @@
 //! 1 kHz and passed forwards and backwards through a Butterworth filter of second
 //! order at 30 Hz. Simulation, not measurement.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(unreachable_pub, reason = "a module of a test and a bench")]
+
 use std::f64::consts::TAU;
 use study::model::predict::Motion;
 use study::plant::{DT_S, Parameters, Target};
