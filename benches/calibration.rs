@@ -116,10 +116,9 @@ fn count(world: World, studies: u32) -> BTreeMap<String, (u32, u32)> {
                     counts.insert((*id).to_owned(), (u32::from(p <= 0.05), 1));
                 }
             }
-            let pairs = a.values.iter().filter(|(id, _)| id.starts_with("posthoc/"));
+            let pairs = || a.values.iter().filter(|(id, _)| id.starts_with("posthoc/"));
             for name in ["p_t_holm", "p_wilcoxon_exact_holm"] {
-                let smallest = pairs
-                    .clone()
+                let smallest = pairs()
                     .filter(|(id, _)| id.ends_with(name))
                     .filter_map(|(id, _)| a.values.number(id))
                     .fold(f64::INFINITY, f64::min);

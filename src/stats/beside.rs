@@ -148,8 +148,9 @@ impl Groups {
                 sums[j] = (0.0, 0.0, 0.0);
             }
         }
-        for j in 1..p {
-            normal[0][j] = normal[j][0];
+        let (slope, levels) = normal.split_at_mut(1);
+        for (cell, row) in slope[0][1..].iter_mut().zip(levels) {
+            *cell = row[0];
         }
         (normal, right, yy)
     }
