@@ -164,7 +164,7 @@ impl Table {
             let mean = about(&|x| x);
             variance = about(&|x| (x - mean).powi(2));
             scale = about(&|x| x * x).sqrt();
-            let varies = variance > 1e-24 * centre * centre && variance > 1e-200;
+            let varies = variance > 1e-24 * (centre * centre + scale * scale) && variance > 1e-200;
             if !(varies && scale.is_finite() && centre.is_finite()) {
                 return Err(LmmError::ConstantCovariate);
             }
