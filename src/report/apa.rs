@@ -99,7 +99,7 @@ mod tests {
         assert_eq!(equals_p(0.0004), "< .001");
         assert_eq!(equals_p(1.0), "= 1");
         assert_eq!(number(-0.001, 2), "0.00");
-        assert_eq!(number(-3.14159, 2), "−3.14");
+        assert_eq!(number(-2.3456, 2), "−2.35");
         assert_eq!(number(1.5e300, 2), "1.50e300");
         assert_eq!(percent(0.565), "56 %");
         assert_eq!(plain(30.0), "30");
