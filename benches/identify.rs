@@ -47,21 +47,21 @@ fn pair(rate: u32) -> (Recording, Recording) {
     )
 }
 
-/// On one thread.
-fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+/// One thread.
+fn alone() -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
         .expect("a thread can be started")
-        .install(work)
 }
 
 fn fig4(bencher: divan::Bencher<'_, '_>, rate: u32, processor: Processor) {
     let (train, validation) = pair(rate);
     let training = Training::new(&train).expect("both directions are there");
     let plan = Plan::ewls(&LAMBDAS, &DX_MM, Resample::Bin);
-    alone(|| {
-        bencher.bench_local(|| {
+    let pool = alone();
+    bencher.bench_local(|| {
+        pool.install(|| {
             grid::run_on(
                 processor,
                 &training,
@@ -70,7 +70,7 @@ fn fig4(bencher: divan::Bencher<'_, '_>, rate: u32, processor: Processor) {
                 &[&validation],
                 || (),
             )
-        });
+        })
     });
 }
 
@@ -110,13 +110,14 @@ mod per_sample_and_lambda {
         let (train, _) = pair(10_000);
         let training = Training::new(&train).expect("both directions are there");
         let plan = Plan::ewls(lambdas, &[0.5], Resample::Bin);
-        alone(|| {
-            bencher
-                .counter(divan::counter::ItemsCount::new(train.len() * lambdas.len()))
-                .bench_local(|| {
+        let pool = alone();
+        bencher
+            .counter(divan::counter::ItemsCount::new(train.len() * lambdas.len()))
+            .bench_local(|| {
+                pool.install(|| {
                     grid::run_on(processor, &training, &plan, Lookup::Linear, &[], || ())
-                });
-        });
+                })
+            });
     }
 
     #[divan::bench(sample_count = 20)]

@@ -14,8 +14,7 @@ use study::analyze::{Rules, Value, Values, analyze};
 use study::outcome::ratings::Ratings;
 
 /// Groups of a later version.
-const NOT_YET: [&str; 0] = [
-];
+const NOT_YET: [&str; 0] = [];
 
 /// Left out on purpose: where F is not defined, the reference has 0 for its
 /// corrected p and its eta squared. An invented 0 is no result.

@@ -60,7 +60,7 @@ impl Data {
         };
         let all: Vec<Cell> = own
             .iter()
-            .filter_map(|c| of_rows(c.subject, c.model, 0.0, &cells.of_cell(c)))
+            .filter_map(|c| of_rows(c.subject, c.model, 0.0, cells.of_cell(c)))
             .collect();
         let vafs: Vec<f64> = models.iter().filter_map(|&m| cells.vaf[m]).collect();
         let by_row = vafs.is_empty();
