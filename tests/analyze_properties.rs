@@ -175,7 +175,7 @@ fn changed(csv: &str, rating: impl Fn(f64) -> f64, name: impl Fn(&str) -> String
 }
 
 /// Groups that have the unit of a rating, or its origin.
-const WITH_UNITS: [&str; 15] = [
+const WITH_UNITS: [&str; 16] = [
     "desc",
     "desc_all",
     "subject",
@@ -191,6 +191,7 @@ const WITH_UNITS: [&str; 15] = [
     "lmm_vaf_crossed",
     "lmm_crossed",
     "lmm_variance",
+    "variance",
 ];
 
 /// Groups in which the ratings are names of categories.
@@ -416,7 +417,7 @@ fn exact_tests_end_where_there_are_many_ties() {
     let mut csv = String::from("subject,model,repetition,rating,vaf\n");
     for s in 0..300 {
         for m in 0..9 {
-            csv += &format!("S{s},m{m},1,{},{}\n", (s + m) % 2, m % 2);
+            csv += &format!("S{s},m{m},1,{},{}\n", (s + m) % 2 + m / 8, m % 2);
         }
     }
     let a = of(&csv);

@@ -120,10 +120,10 @@ pub struct Found {
 pub const MAX_SHOWN: usize = 5;
 
 /// Most sums that are counted.
-pub const MAX_COUNTED: usize = 1000;
+pub const MAX_COUNTED: usize = 100;
 
 /// Most ratings that are examined, and the furthest end of a scale.
-pub const MAX_N: u32 = 5000;
+pub const MAX_N: u32 = 1000;
 /// See [`MAX_N`].
 pub const MAX_SCALE: i128 = 10_000;
 
@@ -252,7 +252,7 @@ fn extremes(n: i128, sum: i128, low: i128, high: i128) -> (i128, i128) {
 /// the first try leads through; the depth is n. A search that would take too long
 /// excludes nothing.
 fn reachable(n: i128, sum: i128, squares: i128, low: i128, high: i128) -> bool {
-    let mut budget = 100_000u32;
+    let mut budget = 20_000u32;
     search(n, sum, squares, low, high, &mut budget)
 }
 
