@@ -76,8 +76,15 @@ fn the_program_of_today_rehearses_the_example() {
         rows(&folder.join("ratings.csv"))
             .iter()
             .map(|row| {
-                ["participant", "trial", "model", "realism", "comment", "status"]
-                    .map(|column| row[column].clone())
+                [
+                    "participant",
+                    "trial",
+                    "model",
+                    "realism",
+                    "comment",
+                    "status",
+                ]
+                .map(|column| row[column].clone())
             })
             .collect()
     };
