@@ -12,6 +12,7 @@
 pub mod core;
 pub mod faults;
 pub mod frame;
+pub mod handler;
 pub mod table;
 pub mod virtual_device;
 pub mod wire;
