@@ -11,6 +11,7 @@
 
 pub mod core;
 pub mod faults;
+pub mod firmware;
 pub mod frame;
 pub mod handler;
 pub mod table;
