@@ -4,14 +4,19 @@
 //! reported by a later [`Device::poll`]. Time is an argument, so the same device
 //! runs on a virtual clock. The host never closes the force loop.
 //!
+//! [`wire`] is what host and device say to each other, in [`frame`]s.
 //! [`virtual_device`] is the simulated one, in this process; [`core`] the servo
 //! step that it shares with a firmware, [`table`] what it demands of a table,
 //! [`faults`] what it can be told to do wrong.
 
 pub mod core;
 pub mod faults;
+pub mod firmware;
+pub mod frame;
+pub mod handler;
 pub mod table;
 pub mod virtual_device;
+pub mod wire;
 
 use crate::limits::Limits;
 use crate::model::Realization;
