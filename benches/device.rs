@@ -3,7 +3,7 @@
 use divan::{Bencher, black_box};
 use std::time::Duration;
 use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::{Device, Report};
+use study::device::{Device, Report, Stimulus};
 use study::limits::{Limit, Limits};
 use study::model::predict::{Direction, Lookup};
 use study::model::{Branch, Realization, Trained};
@@ -47,7 +47,9 @@ fn play(device: &mut VirtualDevice, realization: &Realization, since: Duration) 
         velocity_mm_s: Limit::new(1000.0).expect("positive"),
     };
     let at = |ms| since + Duration::from_millis(ms);
-    device.load(realization, limits, at(0)).expect("a table");
+    device
+        .load(&Stimulus::of_table(realization), limits, at(0))
+        .expect("a table");
     device.poll(at(20));
     device.start(at(20)).expect("loaded");
     let reports = device.poll(at(12_022));

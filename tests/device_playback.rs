@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use std::time::Duration;
 use study::device::faults::{FaultPlan, Injected};
 use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::{Device, DeviceError, Report};
+use study::device::{Device, DeviceError, Report, Stimulus};
 use study::limits::{Limit, Limits};
 use study::model::predict::{Direction, Lookup};
 use study::model::{Branch, Realization, Trained};
@@ -63,7 +63,9 @@ fn ms(ms: u64) -> Duration {
 /// Loads and starts; the device plays from 22 ms on.
 fn playing(options: Options, realization: &Realization) -> VirtualDevice {
     let mut device = VirtualDevice::new(options);
-    device.load(realization, limits(12.0), ms(0)).unwrap();
+    device
+        .load(&Stimulus::of_table(realization), limits(12.0), ms(0))
+        .unwrap();
     assert_eq!(device.poll(ms(20)), [Report::Loaded]);
     device.start(ms(20)).unwrap();
     device
@@ -102,7 +104,9 @@ fn played(realization: &Realization, seed: u64) -> (Playback, Vec<Sample>) {
 fn a_confirmed_start_comes_before_any_telemetry_and_a_stop_after_all_of_it() {
     let mut device = VirtualDevice::new(Options::default());
     assert_eq!(device.poll(ms(0)), []);
-    device.load(&ordinary(), limits(12.0), ms(0)).unwrap();
+    device
+        .load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(0))
+        .unwrap();
     assert_eq!(device.poll(ms(19)), [], "not loaded yet");
     assert_eq!(device.poll(ms(20)), [Report::Loaded]);
     device.start(ms(30)).unwrap();
@@ -194,7 +198,9 @@ fn a_hand_faster_than_the_limit_trips_the_device_which_stays_limp() {
     let mut slow = limits(12.0);
     slow.velocity_mm_s = Limit::new(20.0).unwrap();
     let mut device = VirtualDevice::new(Options::default());
-    device.load(&ordinary(), slow, ms(0)).unwrap();
+    device
+        .load(&Stimulus::of_table(&ordinary()), slow, ms(0))
+        .unwrap();
     device.poll(ms(20));
     device.start(ms(20)).unwrap();
     let reports = device.poll(ms(12_000));
@@ -211,20 +217,24 @@ fn limp_is_no_force_and_no_report_in_every_state() {
     let states: [Case<'_, VirtualDevice>; 5] = [
         ("idle", &|_| {}),
         ("loading", &|d| {
-            d.load(&ordinary(), limits(12.0), ms(0)).unwrap();
+            d.load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(0))
+                .unwrap();
         }),
         ("loaded", &|d| {
-            d.load(&ordinary(), limits(12.0), ms(0)).unwrap();
+            d.load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(0))
+                .unwrap();
             d.poll(ms(20));
         }),
         ("playing", &|d| {
-            d.load(&ordinary(), limits(12.0), ms(0)).unwrap();
+            d.load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(0))
+                .unwrap();
             d.poll(ms(20));
             d.start(ms(20)).unwrap();
             d.poll(ms(2000));
         }),
         ("stopping", &|d| {
-            d.load(&ordinary(), limits(12.0), ms(0)).unwrap();
+            d.load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(0))
+                .unwrap();
             d.poll(ms(20));
             d.start(ms(20)).unwrap();
             d.stop(ms(2000)).unwrap();
@@ -240,7 +250,11 @@ fn limp_is_no_force_and_no_report_in_every_state() {
         assert_eq!(device.held_n(), 0.0, "{name}");
         assert_eq!(device.poll(ms(9000)), [], "{name}");
         assert!(device.start(ms(9000)).is_err(), "{name}: nothing is loaded");
-        assert!(device.load(&ordinary(), limits(12.0), ms(9000)).is_ok());
+        assert!(
+            device
+                .load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(9000))
+                .is_ok()
+        );
     }
 }
 
@@ -255,7 +269,11 @@ fn commands_out_of_turn_are_refused_with_the_state() {
     assert!(device.stop(ms(0)).is_err());
     let mut device = playing(Options::default(), &ordinary());
     device.poll(ms(100));
-    assert!(device.load(&ordinary(), limits(12.0), ms(100)).is_err());
+    assert!(
+        device
+            .load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(100))
+            .is_err()
+    );
     assert!(device.start(ms(100)).is_err());
 }
 
@@ -284,7 +302,7 @@ fn a_table_with_a_hole_is_refused_naming_it() {
         damage(&mut realization);
         let mut device = VirtualDevice::new(Options::default());
         let refused = device
-            .load(&realization, limits(12.0), ms(0))
+            .load(&Stimulus::of_table(&realization), limits(12.0), ms(0))
             .unwrap_err()
             .to_string();
         assert!(refused.contains(expected), "{refused}");
@@ -299,31 +317,47 @@ fn each_injected_fault_does_what_it_says() {
         ..Options::default()
     };
     let mut device = VirtualDevice::new(with(Injected::RefuseLoad));
-    let refused = device.load(&ordinary(), limits(12.0), ms(0));
+    let refused = device.load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(0));
     assert!(matches!(refused, Err(DeviceError::Refused(_))));
-    assert!(device.load(&ordinary(), limits(12.0), ms(1)).is_ok());
+    assert!(
+        device
+            .load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(1))
+            .is_ok()
+    );
 
     let mut device = playing(with(Injected::Trip), &ordinary());
     let reports = device.poll(ms(3000));
     assert!(matches!(reports.last(), Some(Report::Fault(_))));
     assert_eq!(device.held_n(), 0.0);
     assert!(device.start(ms(3000)).is_err(), "latched");
-    assert!(device.load(&ordinary(), limits(12.0), ms(3000)).is_ok());
+    assert!(
+        device
+            .load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(3000))
+            .is_ok()
+    );
 
     let mut device = playing(with(Injected::LosePlayback), &ordinary());
     let before = samples(&device.poll(ms(3000))).len();
     assert_eq!(before, 500, "silent after half a second");
     device.stop(ms(3000)).unwrap();
     assert_eq!(device.poll(ms(9000)), [], "no stop is confirmed");
-    assert!(device.load(&ordinary(), limits(12.0), ms(9000)).is_ok());
+    assert!(
+        device
+            .load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(9000))
+            .is_ok()
+    );
 
     let mut device = playing(with(Injected::Unplug), &ordinary());
     let reports = device.poll(ms(1000));
     assert!(matches!(reports.last(), Some(Report::Lost(_))));
-    let gone = device.load(&ordinary(), limits(12.0), ms(1000));
+    let gone = device.load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(1000));
     assert!(matches!(gone, Err(DeviceError::Lost(_))));
     assert_eq!(device.poll(ms(4000)), [Report::Ready]);
-    assert!(device.load(&ordinary(), limits(12.0), ms(4000)).is_ok());
+    assert!(
+        device
+            .load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(4000))
+            .is_ok()
+    );
 }
 
 #[test]
@@ -390,7 +424,7 @@ proptest! {
         seed in any::<u64>(),
     ) {
         let mut device = VirtualDevice::new(Options { seed, ..Options::default() });
-        device.load(&table, limits(force_n), ms(0)).unwrap();
+        device.load(&Stimulus::of_table(&table), limits(force_n), ms(0)).unwrap();
         device.start(ms(20)).unwrap();
         let allowed = force_n.min(15.0);
         let mut fault = false;

@@ -14,7 +14,7 @@
 use super::core::tally::Tally;
 use super::core::{Core, Rendering, Settings, State, Trip};
 use super::faults::{Fate, FaultPlan, Injected};
-use super::{Device, DeviceError, Identity, Report, table};
+use super::{Device, DeviceError, Identity, Report, Stimulus, table};
 use crate::limits::{Limit, Limits};
 use crate::model::Realization;
 use crate::model::predict::Motion;
@@ -287,11 +287,12 @@ impl Device for VirtualDevice {
 
     fn load(
         &mut self,
-        realization: &Realization,
+        what: &Stimulus<'_>,
         limits: Limits,
         at: Duration,
     ) -> Result<(), DeviceError> {
         self.advance(at);
+        let realization = what.need_table()?;
         match self.phase {
             Phase::Idle | Phase::Loading { .. } | Phase::Loaded => {}
             Phase::Tripped | Phase::Silent => {}
