@@ -4,6 +4,7 @@
 //! reported by a later [`Device::poll`]. Time is an argument, so the same device
 //! runs on a virtual clock. The host never closes the force loop.
 //!
+//! [`wire`] is what host and device say to each other, in [`frame`]s.
 //! [`virtual_device`] is the simulated one, in this process; [`core`] the servo
 //! step that it shares with a firmware, [`table`] what it demands of a table,
 //! [`faults`] what it can be told to do wrong. [`process`] is a child program of
@@ -11,10 +12,12 @@
 
 pub mod core;
 pub mod faults;
+pub mod frame;
 pub mod manual;
 pub mod process;
 pub mod table;
 pub mod virtual_device;
+pub mod wire;
 
 use crate::limits::Limits;
 use crate::model::Realization;
