@@ -13,6 +13,7 @@
 pub mod core;
 pub mod faults;
 pub mod frame;
+pub mod host;
 pub mod manual;
 pub mod process;
 pub mod table;
