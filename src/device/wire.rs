@@ -165,15 +165,27 @@ pub struct Commit {
     pub crc: u32,
 }
 
-/// Starts to play a table or to follow a path.
+/// Starts to play a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Play {
-    /// The host's number for this playback.
+    /// The host's number for this playback, not 0.
     pub playback: u32,
-    /// Of what has to be loaded.
+    /// Of the table that has to be loaded.
     pub crc: u32,
     /// After so long the device stops by itself, ms.
     pub longest_ms: u32,
+    /// One telemetry sample in so many servo periods; 0: none. The device takes
+    /// fewer samples if this is more than its telemetry can carry.
+    pub every: u16,
+}
+
+/// Starts to follow a path and to record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Record {
+    /// The host's number for this recording, not 0.
+    pub playback: u32,
+    /// Of the path that has to be loaded.
+    pub crc: u32,
 }
 
 /// Ends a playback.
@@ -227,7 +239,7 @@ pub enum Request {
     /// It is complete.
     PathCommit(Commit),
     /// Follow it and record.
-    Record(Play),
+    Record(Record),
 }
 
 /// From the device to the host.
@@ -337,10 +349,15 @@ impl Request {
             Self::TableBegin(begin) => begin.write(&mut out),
             Self::TableChunk(chunk) => chunk.write(&mut out),
             Self::TableCommit(commit) | Self::PathCommit(commit) => out.u32(commit.crc),
-            Self::Play(play) | Self::Record(play) => {
+            Self::Play(play) => {
                 out.u32(play.playback);
                 out.u32(play.crc);
                 out.u32(play.longest_ms);
+                out.u16(play.every);
+            }
+            Self::Record(record) => {
+                out.u32(record.playback);
+                out.u32(record.crc);
             }
             Self::Stop(stop) => out.u32(stop.playback),
             Self::Heartbeat(beat) => {
@@ -365,7 +382,12 @@ impl Request {
             kind::TABLE_BEGIN => Self::TableBegin(TableBegin::read(&mut from)?),
             kind::TABLE_CHUNK => Self::TableChunk(TableChunk::read(&mut from)?),
             kind::TABLE_COMMIT => Self::TableCommit(Commit { crc: from.u32()? }),
-            kind::PLAY => Self::Play(play(&mut from)?),
+            kind::PLAY => Self::Play(Play {
+                playback: from.u32()?,
+                crc: from.u32()?,
+                longest_ms: from.u32()?,
+                every: from.u16()?,
+            }),
             kind::STOP => Self::Stop(Stop {
                 playback: from.u32()?,
             }),
@@ -379,20 +401,15 @@ impl Request {
             kind::PATH_BEGIN => Self::PathBegin(PathBegin::read(&mut from)?),
             kind::PATH_CHUNK => Self::PathChunk(PathChunk::read(&mut from)?),
             kind::PATH_COMMIT => Self::PathCommit(Commit { crc: from.u32()? }),
-            kind::RECORD => Self::Record(play(&mut from)?),
+            kind::RECORD => Self::Record(Record {
+                playback: from.u32()?,
+                crc: from.u32()?,
+            }),
             other => return Err(WireError::UnknownType(other)),
         };
         from.done()?;
         Ok((header, request))
     }
-}
-
-fn play(from: &mut Reader<'_>) -> Result<Play, WireError> {
-    Ok(Play {
-        playback: from.u32()?,
-        crc: from.u32()?,
-        longest_ms: from.u32()?,
-    })
 }
 
 impl Reply {
