@@ -114,6 +114,26 @@ struct Flight {
     tries: u32,
 }
 
+/// How a host works.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Heartbeats stop so long after [`Host::fed`]. `None`: whoever lets time pass is
+    /// alive, as in virtual time.
+    pub stall: Option<Duration>,
+    /// Telemetry samples per second that are asked for.
+    pub telemetry_hz: f64,
+}
+
+impl Default for Settings {
+    /// [`STALL`] and 1 kHz.
+    fn default() -> Self {
+        Self {
+            stall: Some(STALL),
+            telemetry_hz: 1000.0,
+        }
+    }
+}
+
 /// What the link has been like.
 #[derive(Debug, Clone, Default)]
 pub struct Health {
@@ -159,14 +179,13 @@ pub struct Host {
     /// Since when nothing has come back.
     unheard: Option<Duration>,
     fed: Option<Duration>,
-    stall: Option<Duration>,
+    settings: Settings,
     health: Health,
 }
 
 impl Host {
-    /// A host without a port. With `stall`, heartbeats stop so long after
-    /// [`Host::fed`]; `nonce` tells its connections from those of another host.
-    pub fn new(nonce: u32, stall: Option<Duration>) -> Self {
+    /// A host without a port. `nonce` tells its connections from those of another.
+    pub fn new(nonce: u32, settings: Settings) -> Self {
         Self {
             stage: Stage::Unlinked,
             identity: None,
@@ -188,7 +207,7 @@ impl Host {
             beats: VecDeque::new(),
             unheard: None,
             fed: None,
-            stall,
+            settings,
             health: Health::default(),
         }
     }
@@ -277,7 +296,8 @@ impl Host {
         self.todo.extend(upload.requests);
         self.rest = Some((at, at + REST_WITHIN));
         self.stage = Stage::Loading { since: at };
-        self.next_beat = self.next_beat.min(at + BEAT);
+        self.next_beat = at;
+        self.beat(at);
         self.next_request(at);
         Ok(())
     }
@@ -298,6 +318,7 @@ impl Host {
             playback: self.playback,
             crc: self.crc,
             longest_ms: LONGEST_MS.min(device.longest_ms),
+            every: every(device.servo_hz, self.settings.telemetry_hz),
         };
         (self.received, self.lost, self.told) = (0, 0, (0, 0));
         self.stage = Stage::Starting;
@@ -462,7 +483,7 @@ impl Host {
         }
         let pause = if self.stage.armed() { BEAT } else { PING };
         self.next_beat = at + pause;
-        let alive = match (self.stall, self.fed) {
+        let alive = match (self.settings.stall, self.fed) {
             (None, _) => true,
             (Some(stall), Some(fed)) => at.saturating_sub(fed) < stall,
             (Some(_), None) => false,
@@ -771,6 +792,12 @@ impl Host {
             });
         }
     }
+}
+
+/// Servo periods between two samples, at least one.
+fn every(servo_hz: f64, telemetry_hz: f64) -> u16 {
+    // `as` saturates, and makes 0 of what is no number
+    ((servo_hz / telemetry_hz).round() as u16).max(1)
 }
 
 /// What a device says of itself, for a session; `None` if it is no device's.
