@@ -13,6 +13,7 @@
 pub mod core;
 pub mod faults;
 pub mod frame;
+pub mod handler;
 pub mod host;
 pub mod link;
 pub mod manual;

@@ -1,6 +1,6 @@
 //! A table as the requests that carry it.
 
-use crate::device::wire::{Commit, Few, Node, Request, TableBegin, TableChunk, TableCrc};
+use crate::device::wire::{Commit, Few, Identity, Node, Request, TableBegin, TableChunk, TableCrc};
 use crate::limits::Limits;
 use crate::model::{Branch, Realization};
 
@@ -11,12 +11,22 @@ pub(super) struct Upload {
     pub(super) crc: u32,
 }
 
-/// A table that was checked, under limits. One that fails its certificate is armed
-/// for the force limit if that is permitted; else the device refuses it.
-pub(super) fn of(table: &Realization, limits: Limits, permitted: bool) -> Result<Upload, String> {
+/// A table that was checked, under limits. One that fails its certificate or is
+/// stiffer than the device renders is armed for the force limit if that is
+/// permitted; else the device refuses it.
+pub(super) fn of(
+    table: &Realization,
+    limits: Limits,
+    permitted: bool,
+    device: &Identity,
+) -> Result<Upload, String> {
     let count = table.x_mm.len();
     let nodes = u16::try_from(count).map_err(|_| format!("it has {count} nodes"))?;
-    let armed = permitted && !table.certificate().passes();
+    let certificate = table.certificate();
+    let sound = certificate.passes()
+        && certificate.stiffness_n_per_mm <= device.stiffness_n_per_mm
+        && certificate.damping_n_s_per_mm <= device.damping_n_s_per_mm;
+    let armed = permitted && !sound;
     let begin = TableBegin {
         nodes,
         lookup: table.lookup,

@@ -149,6 +149,10 @@ codes! {
         NoProbe = 16, "the device has no probe mode";
         /// STOP names another playback than the one under way; the detail is that.
         OtherPlayback = 17, "another playback is under way";
+        /// The sequence number was used for another request.
+        Reused = 18, "the sequence number was used for another request";
+        /// No fresh heartbeat: nothing is armed for a host that may be dead.
+        NoHeartbeat = 19, "no fresh heartbeat";
     }
 }
 
