@@ -12,6 +12,7 @@
 
 pub mod core;
 pub mod faults;
+pub mod firmware;
 pub mod frame;
 pub mod handler;
 pub mod host;

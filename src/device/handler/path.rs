@@ -154,12 +154,21 @@ impl<const N: usize> Path<N> {
             return None;
         }
         let reached = self.ticks == 0 || at(self.ticks - 1) as usize != point;
-        let x_mm = fixed::from_nm(self.x_nm[point]);
-        let next_mm = fixed::from_nm(self.x_nm[(point + 1).min(self.len - 1)]);
-        let share = now - point as f64;
+        let near = |offset: usize| {
+            // the point itself is 1 away, the ends stand still
+            let at = (point + offset).saturating_sub(1).min(self.len - 1);
+            fixed::from_nm(self.x_nm[at])
+        };
+        let [before, x, next, after] = [near(0), near(1), near(2), near(3)];
+        // a cubic with the slopes of the central differences, so that the speed has
+        // no steps
+        let (slope, next_slope) = (0.5 * (next - before), 0.5 * (after - x));
+        let square = 3.0 * (next - x) - 2.0 * slope - next_slope;
+        let cube = slope + next_slope - 2.0 * (next - x);
+        let u = now - point as f64;
         Some((
-            x_mm + share * (next_mm - x_mm),
-            (next_mm - x_mm) * rate_hz,
+            x + u * (slope + u * (square + u * cube)),
+            (slope + u * (2.0 * square + u * 3.0 * cube)) * rate_hz,
             reached,
         ))
     }
