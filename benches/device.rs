@@ -50,8 +50,8 @@ fn play(device: &mut VirtualDevice, realization: &Realization, since: Duration) 
     device
         .load(&Stimulus::of_table(realization), limits, at(0))
         .expect("a table");
-    device.poll(at(20));
-    device.start(at(20)).expect("loaded");
+    device.poll(at(40));
+    device.start(at(40)).expect("loaded");
     let reports = device.poll(at(12_022));
     device.stop(at(12_022)).expect("playing");
     let telemetry = |report: &Report| match report {

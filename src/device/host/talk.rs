@@ -1,6 +1,6 @@
 //! What the host does with each reply.
 
-use super::{GREET_AGAIN, Host, PING, RETRY, Stage, upload};
+use super::{GREET_AGAIN, Host, RETRY, Stage, upload};
 use crate::device::Report;
 use crate::device::host::DeviceClock;
 use crate::device::wire::{
@@ -68,7 +68,7 @@ impl Host {
         self.identity = Some(identity);
         self.health.clock = DeviceClock::default();
         self.health.clock.note(flight.sent, at, identity.clock_ms);
-        self.next_beat = at + PING;
+        self.next_beat = at;
         self.stage = Stage::Idle;
         self.reports.push(Report::Ready);
     }
