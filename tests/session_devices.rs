@@ -7,6 +7,7 @@ mod support;
 use std::fs;
 use std::path::{Path, PathBuf};
 use support::player::{Did, play};
+use support::simulator::Simulator;
 use support::{Terminal, repository, study};
 
 /// The paper's protocol with one repetition, changed.
@@ -162,4 +163,217 @@ fn a_sample_among_tables_is_mounted_and_a_stopped_mounting_comes_again() {
     assert_eq!(rows.len(), 5);
     let mounted = rows.iter().find(|r| r["model"] == "lambda-0.9995").unwrap();
     assert_eq!((&*mounted["status"], &*mounted["attempt"]), ("ok", "2"));
+}
+
+/// Device on a port, program in a terminal.
+struct Rig {
+    folder: tempfile::TempDir,
+    device: Simulator,
+    terminal: Terminal,
+}
+
+impl Rig {
+    fn start(faults: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let device = Simulator::start(folder.path(), faults);
+        let protocol = protocol(folder.path(), &[("\"simulated\"", "\"serial\"")]);
+        let port = device.port.to_str().unwrap().to_owned();
+        let arguments = [
+            "run",
+            protocol.to_str().unwrap(),
+            "--operator",
+            "lw",
+            "--port",
+            &port,
+        ];
+        let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
+        terminal.wait_for("Who takes part?");
+        Self {
+            folder,
+            device,
+            terminal,
+        }
+    }
+
+    fn to(&mut self, text: &str) {
+        play_until(&mut self.terminal, text);
+    }
+
+    /// Plays to the end; the rows, and the journal's events.
+    fn finish(mut self) -> (Vec<Row>, Vec<serde_json::Value>) {
+        self.to("Enter closes");
+        self.terminal.keys("\r");
+        assert_eq!(self.terminal.exit_code(), 0);
+        let (code, out, err) = study(&["verify", "results"], self.folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        let results = self.folder.path().join("results/turn-signal");
+        let rows = ratings(&results.join("ratings.csv"));
+        assert_eq!(rows.len(), 5);
+        for row in &rows {
+            assert_eq!(row["status"], "ok");
+            assert_eq!(row["device_kind"], "serial");
+            assert_eq!(row["device_id"], "simulated-1");
+            assert_eq!(row["pilot"], "true", "a simulated device is no real data");
+        }
+        let journal = fs::read_to_string(results.join("sessions/P01/1/journal.jsonl")).unwrap();
+        let events = journal
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        let events: Vec<serde_json::Value> = events.collect();
+        no_rating_without_a_playback(&events);
+        (rows, events)
+    }
+}
+
+/// The part of an entry that says what happened.
+fn event(entry: &serde_json::Value) -> &serde_json::Value {
+    if entry["event"].is_string() {
+        entry
+    } else {
+        &entry["event"]
+    }
+}
+
+fn no_rating_without_a_playback(entries: &[serde_json::Value]) {
+    let mut ended = std::collections::BTreeSet::new();
+    let mut answers = 0;
+    for entry in entries {
+        let event = event(entry);
+        let attempt = |of: &serde_json::Value| (of["trial"].as_u64(), of["attempt"].as_u64());
+        match event["event"].as_str() {
+            Some("playback_ended") => {
+                ended.insert(attempt(event));
+            }
+            Some("answered") => {
+                let place = &event["place"]["trial"];
+                if place.is_object() {
+                    answers += 1;
+                    assert!(ended.contains(&attempt(place)), "{entry}");
+                }
+            }
+            _ => {}
+        }
+    }
+    assert!(answers >= 5, "the journal's form has changed: {answers}");
+}
+
+#[test]
+fn a_session_over_a_port_with_telemetry_that_is_whole() {
+    let rig = Rig::start(&[]);
+    let telemetry = rig
+        .folder
+        .path()
+        .join("results/turn-signal/sessions/P01/1/telemetry");
+    let folder = rig.folder.path().to_owned();
+    // the files are looked at before the folder goes with the rig
+    let mut rig = rig;
+    rig.to("Enter closes");
+    let files: Vec<PathBuf> = fs::read_dir(&telemetry)
+        .unwrap()
+        .map(|f| f.unwrap().path())
+        .collect();
+    assert_eq!(files.len(), 5);
+    let lines: usize = files
+        .iter()
+        .map(|f| fs::read_to_string(f).unwrap().lines().count() - 1)
+        .sum();
+    assert!(folder.exists());
+    let (_, events) = rig.finish();
+    let ended = events
+        .iter()
+        .map(event)
+        .filter(|e| e["event"] == "playback_ended");
+    let (mut samples, mut lost) = (0, 0);
+    for event in ended {
+        samples += event["playback"]["samples"].as_u64().unwrap();
+        lost += event["playback"]["samples_lost"].as_u64().unwrap();
+    }
+    assert!(samples > 0);
+    assert_eq!((samples as usize, lost), (lines, 0));
+}
+
+/// The cable comes out while a table is waited for, while it plays, while the rating
+/// is typed and between two trials, and the device loses its power while it plays.
+#[test]
+fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
+    let mut rig = Rig::start(&[]);
+    // before the first trial
+    rig.to("Operate the real switch");
+    rig.device.control("unplug");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    assert!(
+        rig.terminal.screen().contains("unplugged"),
+        "{}",
+        rig.terminal.screen()
+    );
+    rig.device.control("plug");
+    // while it plays
+    rig.to("Enter to rate");
+    rig.device.control("unplug");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    rig.device.control("plug");
+    // while the rating is typed: it is not disturbed
+    rig.to("1–7 choose");
+    rig.device.control("unplug");
+    rig.terminal.keys("6\r");
+    rig.terminal
+        .wait_until("the rating to be taken", |s| !s.contains("1–7 choose"));
+    // the next trial has to wait for the device
+    rig.to("DEVICE TROUBLE");
+    rig.device.control("plug");
+    // power, while it plays
+    rig.to("Enter to rate");
+    rig.device.control("reset");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    // the stop button of the device
+    rig.to("Enter to rate");
+    rig.device.control("trip");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    let (rows, events) = rig.finish();
+    assert!(rows.iter().any(|row| row["realism"] == "6"));
+    let failed = events
+        .iter()
+        .map(event)
+        .filter(|e| e["event"] == "attempt_failed");
+    assert!(failed.count() >= 3);
+}
+
+/// One frame in fifty is damaged, lost, doubled or late, each way.
+#[test]
+fn a_bad_line_costs_telemetry_and_no_answer() {
+    let faults = ["corrupt", "drop", "duplicate", "reorder", "delay"];
+    let faults: Vec<String> = faults.iter().map(|f| format!("{f}=0.005")).collect();
+    let faults: Vec<&str> = faults.iter().flat_map(|f| ["--fault", f]).collect();
+    let rig = Rig::start(&faults);
+    let (rows, _) = rig.finish();
+    assert_eq!(rows.len(), 5);
+}
+
+#[test]
+fn what_is_wrong_with_a_port_is_said_before_anything_is_created() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"serial\"")]);
+    let path = protocol.to_str().unwrap();
+    let (code, _, err) = study(&["run", path], folder.path());
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("needs a port") && err.contains("--port"),
+        "{err}"
+    );
+    let (code, _, err) = study(&["run", path, "--port", "/dev/no-such-port"], folder.path());
+    assert_eq!(code, 3);
+    assert!(
+        err.contains("/dev/no-such-port: there is no such port"),
+        "{err}"
+    );
+    let file = folder.path().join("file");
+    fs::write(&file, "x").unwrap();
+    let (code, _, err) = study(
+        &["run", path, "--port", file.to_str().unwrap()],
+        folder.path(),
+    );
+    assert_eq!(code, 3);
+    assert!(err.contains("it is no serial port"), "{err}");
+    assert_eq!(fs::read(&file).unwrap(), b"x");
+    assert!(!folder.path().join("results").exists());
 }

@@ -1,5 +1,7 @@
 //! `study device`: what could play.
 
+mod simulate;
+
 use super::{Console, Failure, Kind, load};
 use crate::protocol::DeviceKind;
 use crate::text::Untrusted;
@@ -21,6 +23,8 @@ enum What {
         #[arg(long)]
         json: bool,
     },
+    /// Be a simulated device on a pseudo-terminal, whose path is the first line
+    Simulate(simulate::Args),
     /// Show what to write on the samples of a study: for who labels them, not for
     /// the experimenter
     Codes {
@@ -33,6 +37,7 @@ enum What {
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     match &args.what {
         What::List { json } => list(*json, console),
+        What::Simulate(args) => simulate::run(args, console),
         What::Codes { protocol } => codes(protocol, console),
     }
 }

@@ -47,9 +47,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = load::load(&args.protocol)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
     let kind = args.playback.device.unwrap_or(loaded.protocol.device.kind);
+    // The device before the terminal: what is wrong with it is read in peace.
+    refuse_tableless(kind, &loaded)?;
+    let device = playback::open(&args.playback.place, kind, &loaded.protocol)?;
     // A person on the simulated device feels nothing: that is never real data.
     let overridden = kind != loaded.protocol.device.kind;
-    let seats = if args.pilot || overridden || kind == DeviceKind::Simulated {
+    let seats = if args.pilot || overridden || device.identity().simulated {
         SeatKind::Pilot
     } else {
         SeatKind::Real
@@ -67,9 +70,6 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         rustix::process::Signal::XFSZ.as_raw(),
         Arc::new(AtomicBool::new(false)),
     );
-    // The device before the terminal: what is wrong with it is read in peace.
-    let device = playback::open(&args.playback.place, kind, &loaded.protocol)?;
-    refuse_tableless(kind, &loaded)?;
     // The terminal before the folder: without one, nothing is created.
     let mut tui = Tui::open(tui::Options {
         mouse: !args.no_mouse,

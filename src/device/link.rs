@@ -7,6 +7,7 @@
 //! loop polls. [`memory`] is a link without a port, in virtual time.
 
 pub mod memory;
+pub mod pty;
 
 use super::host::{Health, Host, Settings};
 use super::{Device, DeviceError, Identity, Report, Stimulus, wire};
