@@ -3,7 +3,7 @@
 //! The paper's equation 1, F = m±(x) a + b±(x) v + k±(x) x + F0±(x), sampled at
 //! the nodes `x_mm`. Units: x mm, v mm/s, a m/s², F N, so m kg, b N·s/mm, k N/mm,
 //! F0 N. F is the force that the probe applies to the target, positive with +x.
-//! Reading and writing of model files is in [`file`]; the force in [`predict`] and
+//! Reading and writing of model files is in [`mod@file`]; the force in [`predict`] and
 //! whether it can be active in [`certificate`] use nothing but `core` and slices, so
 //! that a firmware can share them.
 

@@ -3,7 +3,7 @@
 //! A [`Protocol`] is the content of a `protocol.toml`: plain data, complete, and
 //! true in itself (ids do not collide, scales go up, limits are limits). It knows
 //! nothing of the models' contents; whoever opens files joins the two.
-//! Reading is in [`file`], what can be doubted about a readable file in [`check`].
+//! Reading is in [`mod@file`], what can be doubted about a readable file in [`check`].
 
 pub mod check;
 pub mod columns;

@@ -5,7 +5,7 @@
 //! again. [`Trajectory::at`] gives position, velocity and acceleration at any
 //! instant in closed form, so a trajectory has no sampling rate and nothing is ever
 //! differentiated. [`check`] compares it with what probe and target can do before
-//! anything moves; [`file`] reads and writes it as TOML.
+//! anything moves; [`mod@file`] reads and writes it as TOML.
 //!
 //! Not here: what the target answers (`plant`), files, and pictures.
 //!

@@ -483,7 +483,7 @@ fn a_long_text_is_read_to_its_end_before_enter_goes_on() {
     let lines: Vec<String> = (1..=60).map(|n| format!("line {n}")).collect();
     let mut desk = Desk::with(Screen::Message {
         kind: study::session::view::MessageKind::Instructions,
-        text: lines.join("\n"),
+        text: lines.join("\n\n"),
     });
     let mut presses = 0;
     while desk.enter().is_empty() {

@@ -6,7 +6,7 @@
 //!
 //! In this order, each period:
 //!
-//! 1. trips on the measured motion: not a number, too fast, too far;
+//! 1. trips on the measured motion: not a number, too fast, too far, a jump;
 //! 2. energy of the period that has passed: E += F_held·Δx, exact because the
 //!    force was held. F is the force that the hand has to apply, so E is what the
 //!    hand has put in; a device that gives more than it got has E < 0;
@@ -52,6 +52,8 @@ pub struct Settings {
     pub wall_n_s_per_mm: f64,
     /// How far beyond the identified range the device trips, mm.
     pub overtravel_mm: f64,
+    /// Further than this no handle moves in a servo period, mm.
+    pub jump_mm: f64,
     /// Fastest change of force, N/s.
     pub slew_n_s: f64,
     /// Time from zero to full force at the start, s.
@@ -71,6 +73,7 @@ impl Default for Settings {
             wall_n_per_mm: 10.0,
             wall_n_s_per_mm: 0.01,
             overtravel_mm: 2.5,
+            jump_mm: 1.0,
             slew_n_s: 2000.0,
             ramp_s: 0.4,
         }
@@ -99,6 +102,8 @@ pub enum Trip {
     Stroke,
     /// A position, speed, acceleration or force that is no number.
     NotANumber,
+    /// The position jumped further than the handle can move in a servo period.
+    Encoder,
     /// Told so from outside: an injected fault, a watchdog, a button.
     Told,
 }
@@ -110,6 +115,7 @@ impl Trip {
             Self::Velocity => "velocity limit exceeded",
             Self::Stroke => "stroke exceeded",
             Self::NotANumber => "a measured or computed value is not a number",
+            Self::Encoder => "the encoder jumped",
             Self::Told => "stopped by the device's supervision",
         }
     }
@@ -131,6 +137,8 @@ pub enum State {
 pub struct Core {
     settings: Settings,
     filter: LowPass,
+    /// What is slow in the force; the rest is roughness.
+    steady: LowPass,
     state: State,
     direction: DirectionState,
     forwards: bool,
@@ -143,6 +151,8 @@ pub struct Core {
 
 /// Share of the limit below which a clamp is over: noise about the limit is one.
 const CLAMP_OVER: f64 = 0.9;
+/// Above this frequency force is roughness, Hz.
+const ROUGH_HZ: f64 = 20.0;
 
 impl Core {
     /// A limp servo.
@@ -150,6 +160,7 @@ impl Core {
         Self {
             settings,
             filter: LowPass::new(settings.acceleration_hz, settings.servo_hz),
+            steady: LowPass::new(ROUGH_HZ, settings.servo_hz),
             state: State::Limp,
             direction: DirectionState::default(),
             forwards: true,
@@ -221,7 +232,8 @@ impl Core {
         self.tally.slewed += u64::from(allowed_n != change_n);
         self.slewed_n += allowed_n;
         self.held_n = within(self.slewed_n * ramp, settings.force_n);
-        self.tally.steps += 1;
+        let rough_n = self.held_n - self.steady.step(self.held_n);
+        self.tally.held(self.held_n, rough_n);
         self.held_n
     }
 
@@ -239,10 +251,16 @@ impl Core {
         // asked this way round, a limit that is no number trips
         let slow_enough = libm::fabs(v_mm_s) <= self.settings.velocity_mm_s;
         let near_enough = x_mm >= low - beyond && x_mm <= high + beyond;
+        let steady = self
+            .tally
+            .last_x_mm()
+            .is_none_or(|last| libm::fabs(x_mm - last) <= self.settings.jump_mm);
         if !slow_enough {
             Some(Trip::Velocity)
         } else if !near_enough {
             Some(Trip::Stroke)
+        } else if !steady {
+            Some(Trip::Encoder)
         } else {
             None
         }
@@ -398,6 +416,7 @@ mod tests {
             (motion(33.0, 0.0), Trip::Stroke),
             (motion(-3.0, 0.0), Trip::Stroke),
             (motion(f64::NAN, 0.0), Trip::NotANumber),
+            (motion(5.0, 0.0), Trip::Encoder),
             (motion(15.0, f64::INFINITY), Trip::NotANumber),
         ] {
             let mut core = Core::new(bare());
@@ -480,6 +499,7 @@ mod tests {
             force = core.step(&what, motion(30.5, 0.0));
         }
         assert!((force - 5.0).abs() < 1e-9, "{force}");
+        core.start();
         for _ in 0..4000 {
             force = core.step(&what, motion(-0.5, 0.0));
         }

@@ -1,9 +1,9 @@
 //! A realization for every method and dx, each compared with other recordings.
 //!
 //! What a grid of the paper's method repeats is done once: the samples are passed
-//! once for all λ ([`lanes::recursion`]) and all dx ([`runs`]), and no estimate is
+//! once for all λ (`lanes::recursion`) and all dx (`runs`), and no estimate is
 //! kept, only sums over runs of samples. A recording is walked once for all tables
-//! with the same nodes ([`lanes::errors`]). Memory is that of the recordings and
+//! with the same nodes (`lanes::errors`). Memory is that of the recordings and
 //! the tables. The rest runs side by side in chunks that do not depend on the number
 //! of threads, so neither do the numbers.
 //!

@@ -1,7 +1,7 @@
 //! From what a probe measured to signals that can be identified from.
 //!
 //! [`prepare`] low-passes position, acceleration and force with one and the same
-//! zero-phase filter and derives velocity by central difference; [`thin`] takes
+//! zero-phase filter and derives velocity by central difference; [`thin()`] takes
 //! the samples of a dwell away; [`excitation`] says whether a, v and x move
 //! independently enough to tell their parameters apart; [`delay`] compares the
 //! accelerometer with the encoder in time.

@@ -6,9 +6,10 @@
 //! left out at the door. What was excluded, and why, is decided in `analyze`.
 
 mod build;
+mod error;
 mod read;
 
-pub use read::RatingsError;
+pub use error::RatingsError;
 
 use super::columns::{ParticipantRow, RatingRow, Status};
 use super::event::State;

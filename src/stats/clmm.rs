@@ -7,8 +7,8 @@
 //! f(b) = Σ (nₖaₖ − mₖs(aₖ)) − b²/(2σ²) − ln σ,   aₖ = θⱼ − xβ − b
 //! ```
 //!
-//! which is concave in b. Two integrals: [`laplace`], f(b̂) − ½ ln H with H =
-//! −f″(b̂), which is what most software prints; and [`quadrature`], adaptive
+//! which is concave in b. Two integrals: `laplace`, f(b̂) − ½ ln H with H =
+//! −f″(b̂), which is what most software prints; and `quadrature`, adaptive
 //! Gauss–Hermite (Pinheiro & Bates 1995), which is the integral itself. Both are
 //! maximised over (θ, β, ln σ) by Newton's method with second derivatives of the
 //! marginal likelihood, so that the standard errors are those of the observed

@@ -1,7 +1,11 @@
 //! Protocols that the sessions are run with.
 
+#[path = "../support/designs.rs"]
+#[allow(dead_code)]
+mod designs;
+
+use designs::design;
 use std::collections::BTreeMap;
-use study::limits::{Limit, Limits};
 use study::protocol::*;
 use study::text::{ModelId, QuestionId};
 
@@ -37,7 +41,6 @@ pub(crate) fn text(id: &str) -> Question {
 
 /// Three realizations, twice each, one question with a comment.
 pub(crate) fn plain() -> Protocol {
-    let limit = |value| Limit::new(value).expect("a positive number");
     let model = |id: &str, role| ModelEntry {
         id: ModelId::new(id).expect("an identifier"),
         file: Some(format!("models/{id}.toml")),
@@ -50,59 +53,9 @@ pub(crate) fn plain() -> Protocol {
     let mut models: Vec<_> = MODELS[..3].iter().map(|id| model(id, Role::Test)).collect();
     models.push(model(PRACTICE, Role::Practice));
     Protocol {
-        study: Study {
-            id: "example".to_owned(),
-            title: "An example".to_owned(),
-            seed: 2007,
-            authors: Vec::new(),
-            license: None,
-            ethics: None,
-            contact: None,
-            funding: None,
-            doi: None,
-        },
-        text: Text::default(),
-        consent: None,
-        design: Design {
-            participants: 10,
-            repetitions: 2,
-            order: Order::Blocked,
-            max_run: None,
-            min_distance: None,
-            practice: Vec::new(),
-            breaks: None,
-            max_attempts: 3,
-        },
-        session: SessionRules {
-            entry: Entry::Participant,
-            resume_within_h: 4.0,
-        },
-        device: DeviceRules {
-            kind: DeviceKind::Simulated,
-            limits: Limits {
-                force_n: limit(12.0),
-                velocity_mm_s: limit(1000.0),
-            },
-            uncertified: None,
-        },
-        trial: TrialRules {
-            reference: None,
-            reference_min_s: 0.0,
-            minimum_strokes: 0,
-        },
         models,
         questions: vec![rating("realism"), text("comment")],
-        setup: Vec::new(),
-        intake: Vec::new(),
-        outro: Vec::new(),
-        analysis: AnalysisRules {
-            primary: qid("realism"),
-            vaf: None,
-            realistic_from: None,
-            equivalence_margin: None,
-            unfinished: Unfinished::Include,
-            exclude: Vec::new(),
-        },
+        ..design(0, 2, Order::Blocked)
     }
 }
 

@@ -1,8 +1,11 @@
 //! A small study, for tests of the store.
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
 
+#[path = "../support/designs.rs"]
+mod designs;
+
+use designs::design;
 use std::collections::BTreeMap;
-use study::limits::{Limit, Limits};
 use study::outcome::{Author, Event, Failure, Moment, Place, Playback, Start};
 use study::protocol::fingerprint::Fingerprints;
 use study::protocol::*;
@@ -32,7 +35,6 @@ fn text_question(id: &str) -> Question {
 
 /// Models A, B, C; realism 1–7 and a comment; an intake question `age`.
 pub fn protocol() -> Protocol {
-    let limit = |n| Limit::new(n).unwrap();
     let entry = |(i, id): (usize, &str)| ModelEntry {
         id: model(id),
         file: None,
@@ -42,47 +44,11 @@ pub fn protocol() -> Protocol {
         device: None,
         covariates: BTreeMap::from([("lambda".to_owned(), 0.9 + 0.01 * i as f64)]),
     };
+    let mut small = design(0, 1, Order::Blocked);
+    "small".clone_into(&mut small.study.id);
+    "A small study".clone_into(&mut small.study.title);
+    small.design.participants = 4;
     Protocol {
-        study: Study {
-            id: "small".to_owned(),
-            title: "A small study".to_owned(),
-            seed: 2007,
-            authors: Vec::new(),
-            license: None,
-            ethics: None,
-            contact: None,
-            funding: None,
-            doi: None,
-        },
-        text: Text::default(),
-        consent: None,
-        design: Design {
-            participants: 4,
-            repetitions: 1,
-            order: Order::Blocked,
-            max_run: None,
-            min_distance: None,
-            practice: Vec::new(),
-            breaks: None,
-            max_attempts: 3,
-        },
-        session: SessionRules {
-            entry: Entry::Participant,
-            resume_within_h: 4.0,
-        },
-        device: DeviceRules {
-            kind: DeviceKind::Simulated,
-            limits: Limits {
-                force_n: limit(12.0),
-                velocity_mm_s: limit(1000.0),
-            },
-            uncertified: None,
-        },
-        trial: TrialRules {
-            reference: None,
-            reference_min_s: 0.0,
-            minimum_strokes: 0,
-        },
         models: ["A", "B", "C"].into_iter().enumerate().map(entry).collect(),
         questions: vec![
             Question {
@@ -97,17 +63,8 @@ pub fn protocol() -> Protocol {
             },
             text_question("comment"),
         ],
-        setup: Vec::new(),
         intake: vec![text_question("age")],
-        outro: Vec::new(),
-        analysis: AnalysisRules {
-            primary: question("realism"),
-            vaf: None,
-            realistic_from: None,
-            equivalence_margin: None,
-            unfinished: Unfinished::Include,
-            exclude: Vec::new(),
-        },
+        ..small
     }
 }
 

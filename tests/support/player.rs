@@ -51,14 +51,20 @@ fn press(terminal: &mut Terminal, participant: &str, screen: &str) -> Did {
     } else if shows("Are you sure?") {
         ("n".to_owned(), Did::WentOn)
     } else if shows("1–7 choose") {
-        ("5\r".to_owned(), Did::Answered)
+        (format!("{}\r", rating(screen)), Did::Answered)
     } else if shows("↑ ↓ choose") {
         ("1\r".to_owned(), Did::Answered)
     } else if shows("Enter save") {
         ("33\r".to_owned(), Did::Answered)
-    } else if ["when ready", "goes on", "reads on", "closes"]
-        .iter()
-        .any(|word| shows(&format!("Enter {word}")))
+    } else if [
+        "when ready",
+        "it is mounted",
+        "goes on",
+        "reads on",
+        "closes",
+    ]
+    .iter()
+    .any(|word| shows(&format!("Enter {word}")))
     {
         ("\r".to_owned(), Did::WentOn)
     } else {
@@ -66,4 +72,12 @@ fn press(terminal: &mut Terminal, participant: &str, screen: &str) -> Did {
     };
     terminal.keys(&keys);
     did
+}
+
+/// An opinion that changes from trial to trial: somebody who always says the same
+/// is left out of an analysis.
+fn rating(screen: &str) -> u32 {
+    let (_, after) = screen.split_once("trial ").unwrap_or_default();
+    let trial: String = after.chars().take_while(char::is_ascii_digit).collect();
+    2 + trial.parse::<u32>().unwrap_or(3) % 5
 }

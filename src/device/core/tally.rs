@@ -19,6 +19,10 @@ pub struct Tally {
     pub mass_held: u64,
     /// Full strokes, each from one end of the range to the other.
     pub strokes: u32,
+    /// Largest size of the force, N.
+    pub most_force_n: f64,
+    /// Sum of the squares of the force above 20 Hz, N².
+    rough_sum: f64,
     last_x_mm: Option<f64>,
     last_end: Option<End>,
 }
@@ -34,6 +38,27 @@ enum End {
 const END_SHARE: f64 = 0.2;
 
 impl Tally {
+    /// Mean square of the force above 20 Hz, N²: how rough it feels.
+    pub fn rough_n2(&self) -> f64 {
+        if self.steps == 0 {
+            0.0
+        } else {
+            self.rough_sum / self.steps as f64
+        }
+    }
+
+    /// Where the handle was last, mm.
+    pub(super) fn last_x_mm(&self) -> Option<f64> {
+        self.last_x_mm
+    }
+
+    /// Counts a servo period in which `held_n` is held, `rough_n` of it above 20 Hz.
+    pub(super) fn held(&mut self, held_n: f64, rough_n: f64) {
+        self.steps += 1;
+        self.most_force_n = self.most_force_n.max(libm::fabs(held_n));
+        self.rough_sum += rough_n * rough_n;
+    }
+
     /// Takes in where the handle is after a period in which `held_n` was held.
     pub(super) fn account(&mut self, held_n: f64, x_mm: f64, range_mm: [f64; 2]) {
         if let Some(last) = self.last_x_mm {

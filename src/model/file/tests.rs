@@ -92,8 +92,9 @@ fn every_fault_has_its_line() {
         (
             "delta_mm = 0.5",
             "delta = 0.5",
-            "4: [direction] has no `delta_mm`",
+            "4: unknown key `delta` in [direction]",
         ),
+        (", delta_mm = 0.5", "", "4: [direction] has no `delta_mm`"),
         (
             "\"play\", delta_mm = 0.5",
             "\"sign\", delta_mm = 0.5",

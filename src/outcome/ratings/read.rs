@@ -1,96 +1,11 @@
 //! Ratings from a CSV: somebody else's long form, or our own `ratings.csv`.
 
+use super::error::RatingsError;
 use super::{Builder, NO_MODEL, NO_STROKES, Origin, Ratings, Row};
 use crate::outcome::columns::Status;
 use crate::protocol::Role;
-use crate::text::Untrusted;
 use std::collections::BTreeMap;
 use std::io::BufRead;
-
-/// Why a CSV could not be read. Every message names the file and, where there
-/// is one, the line.
-#[derive(Debug, thiserror::Error)]
-pub enum RatingsError {
-    /// It could not be read, or is not UTF-8 or CSV.
-    #[error("{name}: {source}")]
-    Csv {
-        /// The file.
-        name: String,
-        /// What went wrong.
-        #[source]
-        source: csv::Error,
-    },
-    /// The header lacks a column.
-    #[error("{name}: no column `{column}`; a table of ratings has the columns {expected}")]
-    NoColumn {
-        /// The file.
-        name: String,
-        /// The column.
-        column: String,
-        /// What there should be.
-        expected: &'static str,
-    },
-    /// The header has a column twice.
-    #[error("{name}: two columns are named `{column}`")]
-    TwoColumns {
-        /// The file.
-        name: String,
-        /// The column.
-        column: String,
-    },
-    /// A line is shorter or longer than the header.
-    #[error("{name}, line {line}: {found} fields, but the header has {expected}")]
-    Ragged {
-        /// The file.
-        name: String,
-        /// From 1, header included.
-        line: u64,
-        /// Fields there.
-        found: usize,
-        /// Fields of the header.
-        expected: usize,
-    },
-    /// A field holds something that its column cannot.
-    #[error("{name}, line {line}: `{}` in column `{column}` is no {wanted}", Untrusted(.field))]
-    Field {
-        /// The file.
-        name: String,
-        /// From 1, header included.
-        line: u64,
-        /// Which column.
-        column: String,
-        /// What stands there.
-        field: String,
-        /// What should.
-        wanted: &'static str,
-    },
-    /// The same subject, realization and repetition comes twice.
-    #[error(
-        "{name}, line {line}: subject `{}`, model `{}`, repetition {repetition} came already on \
-         line {first}",
-        Untrusted(.subject), Untrusted(.model)
-    )]
-    Twice {
-        /// The file.
-        name: String,
-        /// From 1, header included.
-        line: u64,
-        /// Where it came first.
-        first: u64,
-        /// Who.
-        subject: String,
-        /// What.
-        model: String,
-        /// The how-maniest time.
-        repetition: u32,
-    },
-    /// There is no row.
-    #[error("{name}: no ratings, only a header")]
-    Empty {
-        /// The file.
-        name: String,
-    },
-}
 
 const FOREIGN: &str = "subject,model,repetition,rating,vaf[,trial_index]";
 
@@ -116,16 +31,20 @@ impl Ratings {
             .flexible(true)
             .trim(csv::Trim::None)
             .from_reader(input);
-        let csv_error = |source| RatingsError::Csv {
-            name: name.to_owned(),
-            source,
-        };
         let header: Vec<String> = reader
             .headers()
-            .map_err(csv_error)?
+            .map_err(|source| RatingsError::csv(name, source))?
             .iter()
             .map(|h| h.trim_start_matches('\u{feff}').trim().to_owned())
             .collect();
+        if let [only] = header.as_slice()
+            && let Some(separator) = [';', '\t'].into_iter().find(|c| only.contains(*c))
+        {
+            return Err(RatingsError::Separator {
+                name: name.to_owned(),
+                separator,
+            });
+        }
         let columns = Columns::of(name, &header, question)?;
         let mut table = Reading {
             builder: Builder::new(columns.question.clone()),
@@ -179,10 +98,7 @@ impl Reading {
         loop {
             let more = reader
                 .read_record(&mut record)
-                .map_err(|source| RatingsError::Csv {
-                    name: name.to_owned(),
-                    source,
-                })?;
+                .map_err(|source| RatingsError::csv(name, source))?;
             if !more {
                 return Ok(());
             }
@@ -556,6 +472,18 @@ mod tests {
         assert_eq!(says(HEAD), "r.csv: no ratings, only a header");
         assert!(says("subject,model,rating\n").contains("no column `repetition`"));
         assert!(says("subject,subject\n").contains("two columns are named `subject`"));
+        assert_eq!(
+            says("subject;model;repetition;rating;vaf\nS1;A;1;4,5;0,5\n"),
+            "r.csv: the columns are separated by `;`; save it with commas between the columns \
+             and points in the numbers"
+        );
+        let latin = [HEAD.as_bytes(), b"S1,A,1,4,0.5\nM\xfcller,A,1,4,0.5\n"].concat();
+        assert_eq!(
+            Ratings::read_csv("r.csv", latin.as_slice(), None)
+                .unwrap_err()
+                .to_string(),
+            "r.csv, line 3: this is no UTF-8; save it as CSV in UTF-8"
+        );
     }
 
     #[test]
