@@ -8,7 +8,7 @@ use study::device::virtual_device::{Options, VirtualDevice};
 use study::device::wire::{
     Commit, Few, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, TableCrc,
 };
-use study::device::{Device, Report};
+use study::device::{Device, Report, Stimulus};
 use study::limits::{Limit, Limits};
 use study::model::predict::{Direction, Lookup, Motion};
 use study::model::{Branch, Realization, Trained};
@@ -52,9 +52,11 @@ fn play(device: &mut VirtualDevice, realization: &Realization, since: Duration) 
         velocity_mm_s: Limit::new(1000.0).expect("positive"),
     };
     let at = |ms| since + Duration::from_millis(ms);
-    device.load(realization, limits, at(0)).expect("a table");
-    device.poll(at(20));
-    device.start(at(20)).expect("loaded");
+    device
+        .load(&Stimulus::of_table(realization), limits, at(0))
+        .expect("a table");
+    device.poll(at(40));
+    device.start(at(40)).expect("loaded");
     let reports = device.poll(at(12_022));
     device.stop(at(12_022)).expect("playing");
     let telemetry = |report: &Report| match report {

@@ -13,6 +13,7 @@ mod device;
 mod identify;
 mod new;
 mod participant;
+mod playback;
 mod record;
 mod rehearse;
 mod results;

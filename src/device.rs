@@ -7,13 +7,19 @@
 //! [`wire`] is what host and device say to each other, in [`frame`]s.
 //! [`virtual_device`] is the simulated one, in this process; [`core`] the servo
 //! step that it shares with a firmware, [`table`] what it demands of a table,
-//! [`faults`] what it can be told to do wrong.
+//! [`faults`] what it can be told to do wrong. [`process`] is a child program of
+//! the lab's, [`manual`] an experimenter who mounts samples.
 
 pub mod core;
 pub mod faults;
 pub mod firmware;
 pub mod frame;
 pub mod handler;
+pub mod host;
+pub mod link;
+pub mod manual;
+pub mod process;
+pub mod serial;
 pub mod table;
 pub mod virtual_device;
 pub mod wire;
@@ -55,11 +61,52 @@ pub enum DeviceError {
     Lost(String),
 }
 
+/// What is to be played.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stimulus<'a> {
+    /// The realization's id. Never shown to anybody in the session.
+    pub model: &'a str,
+    /// Its table; a physical sample and a child program may do without.
+    pub table: Option<&'a Realization>,
+    /// What it is called towards people: opaque, see [`manual::codes`].
+    pub code: &'a str,
+    /// Whether a person mounts it.
+    pub by_hand: bool,
+    /// Whether a table that fails its certificate may be played: the device is
+    /// armed for it explicitly.
+    pub permitted: bool,
+}
+
+impl<'a> Stimulus<'a> {
+    /// A table alone, permitted.
+    pub fn of_table(table: &'a Realization) -> Self {
+        Self {
+            model: &table.id,
+            table: Some(table),
+            code: "",
+            by_hand: false,
+            permitted: true,
+        }
+    }
+
+    /// The table, for a device that plays nothing else.
+    ///
+    /// # Errors
+    /// [`DeviceError::Refused`] if there is none.
+    pub fn need_table(&self) -> Result<&'a Realization, DeviceError> {
+        let none = || DeviceError::Refused("the realization has no table".to_owned());
+        self.table.ok_or_else(none)
+    }
+}
+
 /// What a device says between two polls, in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Report {
     /// The table is there and valid.
     Loaded,
+    /// Instead of [`Report::Loaded`]: the sample with this code is to be mounted
+    /// by a person, and started when that is done.
+    Mount(String),
     /// It plays.
     Started,
     /// What it measured since the last report.
@@ -88,14 +135,14 @@ pub trait Device: Send {
     /// Who it is.
     fn identity(&self) -> Identity;
 
-    /// Sends a table; [`Report::Loaded`] follows. The device plays it under
-    /// `limits`, or its own where they are lower.
+    /// Sends what is to be played; [`Report::Loaded`] or [`Report::Mount`] follows.
+    /// The device plays it under `limits`, or its own where they are lower.
     ///
     /// # Errors
     /// [`DeviceError`] if it cannot even be asked.
     fn load(
         &mut self,
-        realization: &Realization,
+        what: &Stimulus<'_>,
         limits: Limits,
         at: Duration,
     ) -> Result<(), DeviceError>;

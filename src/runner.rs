@@ -13,12 +13,12 @@ pub mod clock;
 pub mod rehearsal;
 pub mod saver;
 
-use crate::device::{Device, Report};
+use crate::device::{Device, Report, Stimulus, manual};
 use crate::limits::Limits;
 use crate::model::Realization;
 use crate::outcome::{Event, Moment};
 use crate::protocol::fingerprint::Fingerprints;
-use crate::protocol::{DeviceKind, FileOrders, Protocol};
+use crate::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol};
 use crate::session::{Effect, Ending, Input, Session, View, input::Claim};
 use crate::store::{ClaimRequest, SeatKind, StudyFolder};
 use crate::text::{ModelId, ParticipantId};
@@ -114,6 +114,10 @@ pub struct Runner {
     early: Vec<(Moment, Event)>,
     /// When the device last said something of the playback under way.
     heard: Option<Duration>,
+    /// What each realization is called on a sample.
+    codes: BTreeMap<ModelId, String>,
+    /// Whether what plays reports samples.
+    speaks: bool,
 }
 
 impl Runner {
@@ -127,6 +131,7 @@ impl Runner {
             force_limit_n: setup.protocol.device.limits.force_n.get(),
             x_range_mm: x_range(&setup.models),
         });
+        let codes = sample_codes(&setup.protocol);
         let mut runner = Self {
             setup,
             session,
@@ -137,6 +142,8 @@ impl Runner {
             ended: None,
             early: Vec::new(),
             heard: None,
+            codes,
+            speaks: false,
         };
         runner.device_limp();
         runner.perform(effects);
@@ -306,17 +313,31 @@ impl Runner {
     }
 
     fn load(&mut self, trial: u32, attempt: u32, model: &ModelId) -> Option<Input> {
-        let Some(realization) = self.setup.models.get(model) else {
+        let protocol = &self.setup.protocol;
+        let entry = protocol.model(model);
+        let own = entry.and_then(|m: &ModelEntry| m.device);
+        let kind = own.unwrap_or(self.setup.device_kind);
+        let by_hand = kind == DeviceKind::Manual;
+        let table = self.setup.models.get(model);
+        if table.is_none() && !by_hand && kind != DeviceKind::Process {
             return Some(Input::DeviceFault(
                 "the realization has no table for this device".to_owned(),
             ));
+        }
+        let limits = playback_limits(protocol, table);
+        self.speaks = !by_hand && self.setup.device.identity().telemetry;
+        let stimulus = Stimulus {
+            model: model.as_str(),
+            table,
+            code: self.codes.get(model).map_or("", String::as_str),
+            by_hand,
+            permitted: protocol.device.uncertified.as_ref().is_some_and(|u| u.play),
         };
-        let limits = playback_limits(&self.setup.protocol, realization);
         if let Some(strip) = &mut self.strip {
             strip.samples.clear();
         }
         let at = self.device_time();
-        match self.setup.device.load(realization, limits, at) {
+        match self.setup.device.load(&stimulus, limits, at) {
             Ok(()) => {
                 self.send(Job::TelemetryBegin { trial, attempt });
                 None
@@ -329,12 +350,13 @@ impl Runner {
         let at = self.device_time();
         for report in self.setup.device.poll(at) {
             self.heard = match &report {
-                Report::Started if self.setup.device.identity().telemetry => Some(at),
+                Report::Started if self.speaks => Some(at),
                 Report::Telemetry(_) | Report::Progress { .. } => self.heard.map(|_| at),
                 _ => None,
             };
             let input = match report {
                 Report::Loaded => Input::DeviceLoaded,
+                Report::Mount(code) => Input::DeviceMount(code),
                 Report::Started => Input::DeviceStarted,
                 Report::Telemetry(samples) => {
                     if let Some(strip) = &mut self.strip {
@@ -421,13 +443,20 @@ impl Drop for Runner {
     }
 }
 
+/// What stands on the samples of a study: for whoever labels them, and for the
+/// experimenter's prompt, which shows nothing else of what is mounted.
+pub fn sample_codes(protocol: &Protocol) -> BTreeMap<ModelId, String> {
+    let ids: Vec<&ModelId> = protocol.models.iter().map(|m| &m.id).collect();
+    manual::codes(protocol.study.seed, &ids)
+}
+
 /// The limits for a table: the protocol's, and under its `uncertified` permission
 /// the lower force of that for a table that fails its certificate, which can put
 /// energy into the hand.
-fn playback_limits(protocol: &Protocol, realization: &Realization) -> Limits {
+fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limits {
     let mut limits = protocol.device.limits;
     if let Some(uncertified) = &protocol.device.uncertified
-        && !realization.certificate().passes()
+        && table.is_some_and(|table| !table.certificate().passes())
     {
         limits.force_n = limits.force_n.capped_at(uncertified.force_n);
     }

@@ -151,6 +151,7 @@ impl Session {
             Input::Quit => self.quit("the operator quit", false, at),
             Input::Abort(reason) => self.quit(&reason, true, at),
             Input::DeviceLoaded => self.device_loaded(at),
+            Input::DeviceMount(code) => self.device_mount(code),
             Input::DeviceStarted => self.device_started(at),
             Input::DeviceProgress { strokes, clamps } => self.device_progress(strokes, clamps),
             Input::DeviceStopped(playback) => self.device_stopped(playback, at),
@@ -215,6 +216,7 @@ fn is_deliberate(input: &Input) -> bool {
             | Input::Saved { .. }
             | Input::Claimed(_)
             | Input::DeviceLoaded
+            | Input::DeviceMount(_)
             | Input::DeviceStarted
             | Input::DeviceProgress { .. }
             | Input::DeviceStopped(_)

@@ -71,7 +71,7 @@ fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
 }
 
 /// Modules that may touch files, clocks, terminals, processes or the network.
-const WITH_IO: [&str; 7] = [
+const WITH_IO: [&str; 8] = [
     "store",
     "tui",
     "runner",
@@ -79,6 +79,7 @@ const WITH_IO: [&str; 7] = [
     "main",
     "device/link",
     "device/serial",
+    "device/process",
 ];
 const IO: [&str; 8] = [
     "std::fs",

@@ -1,8 +1,12 @@
 //! `study device`: what could play.
 
-use super::{Console, Failure, Kind};
+mod simulate;
+
+use super::{Console, Failure, Kind, load};
+use crate::protocol::DeviceKind;
 use crate::text::Untrusted;
 use serialport::SerialPortType;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `study device`.
 #[derive(Debug, clap::Args)]
@@ -19,13 +23,44 @@ enum What {
         #[arg(long)]
         json: bool,
     },
+    /// Be a simulated device on a pseudo-terminal, whose path is the first line
+    Simulate(simulate::Args),
+    /// Show what to write on the samples of a study: for who labels them, not for
+    /// the experimenter
+    Codes {
+        /// A protocol.toml or the folder that holds one
+        protocol: PathBuf,
+    },
 }
 
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    match args.what {
-        What::List { json } => list(json, console),
+    match &args.what {
+        What::List { json } => list(*json, console),
+        What::Simulate(args) => simulate::run(args, console),
+        What::Codes { protocol } => codes(protocol, console),
     }
+}
+
+fn codes(path: &Path, console: &mut Console) -> Result<(), Failure> {
+    let loaded = load::load(path)?;
+    let codes = crate::runner::sample_codes(&loaded.protocol);
+    let kind = loaded.protocol.device.kind;
+    let mut out = String::new();
+    for model in &loaded.protocol.models {
+        if model.device.unwrap_or(kind) == DeviceKind::Manual
+            && let Some(code) = codes.get(&model.id)
+        {
+            out.push_str(&format!("{code}  {}\n", model.id));
+        }
+    }
+    if out.is_empty() {
+        return Err(
+            Failure::input(format!("{}: no sample is mounted by hand", path.display()))
+                .hint("say device = \"manual\" at the model, or kind = \"manual\" in [device]"),
+        );
+    }
+    console.out(out)
 }
 
 /// A port, and what is plugged into it as far as the system knows.

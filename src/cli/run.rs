@@ -1,8 +1,7 @@
 //! `study run`: the session, in the terminal.
 
+use super::playback::{self, PlaybackArgs};
 use super::{Console, Failure, Kind, load};
-use crate::device::Device;
-use crate::device::virtual_device::{Options, VirtualDevice};
 use crate::protocol::DeviceKind;
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Runner, Setup};
@@ -24,12 +23,8 @@ pub(super) struct Args {
     /// Operator's initials or code; asked on the first screen if left out
     #[arg(long, value_name = "NAME")]
     operator: Option<String>,
-    /// Play on another kind of device than the protocol's: makes it a pilot
-    #[arg(long, value_name = "KIND", value_parser = device_kind)]
-    device: Option<DeviceKind>,
-    /// Serial port of the device
-    #[arg(long, value_name = "PATH")]
-    port: Option<String>,
+    #[command(flatten)]
+    playback: PlaybackArgs,
     /// Try the study out: kept apart from real data, takes no row
     #[arg(long)]
     pilot: bool,
@@ -47,42 +42,17 @@ pub(super) struct Args {
     no_mouse: bool,
 }
 
-fn device_kind(given: &str) -> Result<DeviceKind, String> {
-    [
-        DeviceKind::Simulated,
-        DeviceKind::Serial,
-        DeviceKind::Process,
-        DeviceKind::Manual,
-    ]
-    .into_iter()
-    .find(|kind| kind.as_str() == given)
-    .ok_or_else(|| "it is one of simulated, serial, process, manual".to_owned())
-}
-
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = load::load(&args.protocol)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
-    let kind = args.device.unwrap_or(loaded.protocol.device.kind);
-    if kind != DeviceKind::Simulated {
-        return Err(Failure::new(
-            Kind::Device,
-            format!(
-                "this version plays on the simulated device only, and the study wants a {} one",
-                kind.as_str()
-            ),
-        )
-        .hint("`--device simulated` tries the study out as a pilot"));
-    }
-    if let Some(port) = &args.port {
-        return Err(Failure::new(
-            Kind::Usage,
-            format!("--port {port} makes no sense with the simulated device"),
-        ));
-    }
+    let kind = args.playback.device.unwrap_or(loaded.protocol.device.kind);
+    // The device before the terminal: what is wrong with it is read in peace.
+    refuse_tableless(kind, &loaded)?;
+    let device = playback::open(&args.playback.place, kind, &loaded.protocol)?;
     // A person on the simulated device feels nothing: that is never real data.
     let overridden = kind != loaded.protocol.device.kind;
-    let seats = if args.pilot || overridden || kind == DeviceKind::Simulated {
+    let seats = if args.pilot || overridden || device.identity().simulated {
         SeatKind::Pilot
     } else {
         SeatKind::Real
@@ -100,7 +70,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         rustix::process::Signal::XFSZ.as_raw(),
         Arc::new(AtomicBool::new(false)),
     );
-    // The terminal first: without one, nothing is created.
+    // The terminal before the folder: without one, nothing is created.
     let mut tui = Tui::open(tui::Options {
         mouse: !args.no_mouse,
         live: args.live,
@@ -111,10 +81,6 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let folder = study.path().to_owned();
     // After a kill the tables are behind the journals: bring them up first.
     study.refresh(&loaded.protocol)?;
-    let device: Box<dyn Device> = Box::new(VirtualDevice::new(Options {
-        seed: loaded.protocol.study.seed,
-        ..Options::default()
-    }));
     let protocol = Arc::new(loaded.protocol);
     let setup = Setup {
         protocol: protocol.clone(),
@@ -149,11 +115,44 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     )
 }
 
+/// A device that plays tables cannot stand in for one that needs none.
+fn refuse_tableless(kind: DeviceKind, loaded: &load::Loaded) -> Result<(), Failure> {
+    if !matches!(kind, DeviceKind::Simulated | DeviceKind::Serial) {
+        return Ok(());
+    }
+    let missing = loaded
+        .protocol
+        .models
+        .iter()
+        .find(|m| m.device != Some(DeviceKind::Manual) && !loaded.models.contains_key(&m.id));
+    match missing {
+        None => Ok(()),
+        Some(model) => Err(Failure::input(format!(
+            "model `{}` has no table for a {} device",
+            model.id,
+            kind.as_str()
+        ))
+        .hint("add its `file`, or play it on the protocol's own kind of device")),
+    }
+}
+
 /// The command that goes on with a session.
 fn again(args: &Args, participant: &str) -> String {
     let mut command = format!("study run {}", args.protocol.display());
     if args.results.as_os_str() != "results" {
         command.push_str(&format!(" --results {}", args.results.display()));
+    }
+    if let Some(kind) = args.playback.device {
+        command.push_str(&format!(" --device {}", kind.as_str()));
+    }
+    if let Some(port) = &args.playback.place.port {
+        command.push_str(&format!(" --port {port}"));
+    }
+    if let Some(program) = &args.playback.place.command {
+        command.push_str(&format!(" --command '{program}'"));
+    }
+    if args.pilot {
+        command.push_str(" --pilot");
     }
     if !participant.is_empty() {
         command.push_str(&format!(" --participant {participant}"));

@@ -136,7 +136,10 @@ impl Plan {
                 pass(GLANCE_S);
                 vec![Input::Consent(true)]
             }
-            Screen::Message { .. } | Screen::End { .. } | Screen::Paused { .. } => {
+            Screen::Message { .. }
+            | Screen::Mount { .. }
+            | Screen::End { .. }
+            | Screen::Paused { .. } => {
                 pass(GLANCE_S);
                 vec![Input::Advance]
             }
@@ -211,6 +214,7 @@ fn screen_name(screen: &Screen) -> &'static str {
         Screen::Form { .. } => "a form",
         Screen::Reference { .. } => "the reference prompt",
         Screen::Loading => "loading",
+        Screen::Mount { .. } => "a sample to be mounted",
         Screen::Playing { .. } => "playing",
         Screen::Stopping => "stopping",
         Screen::Stopped { .. } => "a stopped playback",

@@ -200,6 +200,7 @@ impl Session {
                     self.begin_attempt(shown_s, at);
                 }
             }
+            Phase::Mounting { .. } => self.mounted(at),
             Phase::Playing { strokes, .. } => self.finish_playing(*strokes, at),
             Phase::Stopped => self.say("choose: play it again, or rate it"),
             Phase::Break { since, rested_s } => {

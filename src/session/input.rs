@@ -70,6 +70,8 @@ pub enum Input {
     Abort(String),
     /// The device has taken the table.
     DeviceLoaded,
+    /// The sample with this opaque code is to be mounted by hand.
+    DeviceMount(String),
     /// The device confirms that it plays.
     DeviceStarted,
     /// Strokes and clamps so far, from telemetry.

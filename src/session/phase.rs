@@ -36,6 +36,10 @@ pub(super) enum Phase {
     Loading {
         since: Moment,
     },
+    /// Somebody mounts the sample with this code.
+    Mounting {
+        code: String,
+    },
     /// The start was asked for then.
     Ready {
         since: Moment,
@@ -82,6 +86,7 @@ impl Phase {
         matches!(
             self,
             Self::Loading { .. }
+                | Self::Mounting { .. }
                 | Self::Ready { .. }
                 | Self::Playing { .. }
                 | Self::Stopping { .. }

@@ -68,7 +68,7 @@ impl Session {
                     self.retry_save();
                 }
             }
-            Phase::Loading { .. } | Phase::Ready { .. } => {
+            Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
                 self.fail(Failure::Stopped, "the journal could not be written", at);
                 self.go_on(at);
             }

@@ -91,6 +91,7 @@ impl Session {
                 wait_s: self.reference_wait_s(at),
             },
             Phase::Loading { .. } | Phase::Ready { .. } => Screen::Loading,
+            Phase::Mounting { code } => Screen::Mount { code: code.clone() },
             Phase::Playing { since, strokes, .. } => Screen::Playing {
                 since_s: at.seconds_since(since),
                 strokes_missing: self.strokes_needed().saturating_sub(*strokes),
@@ -268,7 +269,7 @@ fn banner(seat: Seat) -> Option<Banner> {
 fn can_advance(screen: &Screen) -> bool {
     match screen {
         Screen::Message { .. } | Screen::SaveTrouble { .. } | Screen::Paused { .. } => true,
-        Screen::End { .. } => true,
+        Screen::End { .. } | Screen::Mount { .. } => true,
         Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => *wait_s <= 0.0,
         Screen::Playing {
             strokes_missing, ..

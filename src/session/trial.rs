@@ -36,6 +36,19 @@ impl Session {
         }
     }
 
+    /// A sample is mounted by a person, who says when it is done.
+    pub(super) fn device_mount(&mut self, code: String) {
+        if matches!(self.phase, Phase::Loading { .. }) {
+            self.phase = Phase::Mounting { code };
+        }
+    }
+
+    /// It is mounted: what is felt from here on counts.
+    pub(super) fn mounted(&mut self, at: Moment) {
+        self.out.push(Effect::Start);
+        self.phase = Phase::Ready { since: at };
+    }
+
     /// A device that starts unasked is made limp, and with it what was on its way.
     pub(super) fn device_started(&mut self, at: Moment) {
         match (&mut self.phase, &self.history.open) {
@@ -52,7 +65,7 @@ impl Session {
                 };
             }
             (Phase::Playing { .. }, _) => {}
-            (Phase::Loading { .. }, _) => {
+            (Phase::Loading { .. } | Phase::Mounting { .. }, _) => {
                 self.out.push(Effect::Limp);
                 self.lose_attempt(Failure::DeviceFault, "the device started unasked", at);
             }
@@ -203,7 +216,7 @@ impl Session {
                 *limped = true;
                 self.out.push(Effect::Limp);
             }
-            Phase::Loading { .. } | Phase::Ready { .. } => {
+            Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
                 self.out.push(Effect::Limp);
                 self.fail(Failure::Stopped, "stopped before it played", at);
                 self.go_on(at);
@@ -217,7 +230,7 @@ impl Session {
         match &mut self.phase {
             Phase::Playing { .. } => self.ask_to_stop(true, true, at),
             Phase::Stopping { pause, .. } => *pause = true,
-            Phase::Loading { .. } | Phase::Ready { .. } => {
+            Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
                 self.stop(at);
                 self.start_pause(at);
             }

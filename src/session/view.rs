@@ -151,6 +151,11 @@ pub enum Screen {
     },
     /// The table is on its way.
     Loading,
+    /// The experimenter mounts a sample; Enter says that it is there.
+    Mount {
+        /// What stands on the sample: says nothing about what it is.
+        code: String,
+    },
     /// The device plays.
     Playing {
         /// Since the confirmed start, s.

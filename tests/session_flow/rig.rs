@@ -398,6 +398,7 @@ impl Rig {
             Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => {
                 self.wait(wait_s).send(Input::Advance)
             }
+            Screen::Mount { .. } => self.send(Input::Advance).send(Input::DeviceStarted),
             Screen::Loading => self.send(Input::DeviceLoaded).send(Input::DeviceStarted),
             Screen::Playing { .. } => self
                 .send(Input::DeviceProgress {
@@ -509,6 +510,7 @@ pub(crate) fn name(screen: &Screen) -> &'static str {
         Screen::Form { .. } => "Form",
         Screen::Reference { .. } => "Reference",
         Screen::Loading => "Loading",
+        Screen::Mount { .. } => "Mount",
         Screen::Playing { .. } => "Playing",
         Screen::Stopping => "Stopping",
         Screen::Stopped { .. } => "Stopped",

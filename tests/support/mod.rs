@@ -5,6 +5,7 @@
 #![allow(unreachable_pub, reason = "a module of several test files")]
 
 pub mod player;
+pub mod simulator;
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use std::io::{Read, Write};

@@ -56,9 +56,15 @@ fn press(terminal: &mut Terminal, participant: &str, screen: &str) -> Did {
         ("1\r".to_owned(), Did::Answered)
     } else if shows("Enter save") {
         ("33\r".to_owned(), Did::Answered)
-    } else if ["when ready", "goes on", "reads on", "closes"]
-        .iter()
-        .any(|word| shows(&format!("Enter {word}")))
+    } else if [
+        "when ready",
+        "it is mounted",
+        "goes on",
+        "reads on",
+        "closes",
+    ]
+    .iter()
+    .any(|word| shows(&format!("Enter {word}")))
     {
         ("\r".to_owned(), Did::WentOn)
     } else {

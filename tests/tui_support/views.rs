@@ -103,7 +103,10 @@ pub(crate) fn form(questions: Vec<Question>) -> Screen {
 }
 
 pub(crate) fn view(screen: Screen) -> View {
-    let armed = matches!(screen, Screen::Playing { .. } | Screen::Loading);
+    let armed = matches!(
+        screen,
+        Screen::Playing { .. } | Screen::Loading | Screen::Mount { .. }
+    );
     let device = match screen {
         Screen::Playing { .. } => DeviceState::Running {
             strokes: 4,
@@ -122,6 +125,7 @@ pub(crate) fn view(screen: Screen) -> View {
             strokes_missing, ..
         } => *strokes_missing == 0,
         Screen::Message { .. } | Screen::Paused { .. } | Screen::End { .. } => true,
+        Screen::Mount { .. } => true,
         Screen::DeviceTrouble { can_go_on, .. } => *can_go_on,
         _ => false,
     };
@@ -274,6 +278,12 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             }),
         ),
         ("loading", view(Screen::Loading)),
+        (
+            "mount",
+            view(Screen::Mount {
+                code: "417".to_owned(),
+            }),
+        ),
         (
             "playing",
             view(Screen::Playing {

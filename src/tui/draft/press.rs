@@ -166,6 +166,7 @@ impl Draft {
             },
             Screen::Reference { .. }
             | Screen::Loading
+            | Screen::Mount { .. }
             | Screen::Playing { .. }
             | Screen::Stopping
             | Screen::DeviceTrouble { .. }

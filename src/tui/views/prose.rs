@@ -115,6 +115,13 @@ pub fn prose(view: &View) -> Option<Prose> {
             body: "The device gets ready.".to_owned(),
             ..Prose::default()
         },
+        Screen::Mount { code } => Prose {
+            above: "For the experimenter".to_owned(),
+            title: format!("Mount sample {code}."),
+            body: "Press Enter when it can be felt.".to_owned(),
+            keys: vec![("Enter", "it is mounted"), ("Esc", "stops")],
+            ..Prose::default()
+        },
         Screen::Stopping => Prose {
             title: "Stopping.".to_owned(),
             ..Prose::default()

@@ -1,0 +1,231 @@
+//! Which device plays: from the protocol, the arguments and `device.toml`.
+
+use super::{Failure, Kind};
+use crate::device::host::Settings;
+use crate::device::link::Threaded;
+use crate::device::manual::{Beside, Manual};
+use crate::device::process::ProcessDevice;
+use crate::device::serial::{BAUD, SerialOpener};
+use crate::device::virtual_device::{Options, VirtualDevice};
+use crate::device::{Device, DeviceError};
+use crate::protocol::{DeviceKind, Protocol};
+use crate::text::Untrusted;
+use serde::Deserialize;
+use std::path::Path;
+
+/// What a rig has, in the folder that `study` is started in.
+const RIG_FILE: &str = "device.toml";
+
+/// Arguments that say where a device is.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(super) struct PlaybackArgs {
+    /// Play on another kind of device than the protocol's: makes it a pilot
+    #[arg(long, value_name = "KIND", value_parser = device_kind)]
+    pub(super) device: Option<DeviceKind>,
+    #[command(flatten)]
+    pub(super) place: Place,
+}
+
+/// Where a device is.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(super) struct Place {
+    /// Serial port of the device
+    #[arg(long, value_name = "PATH")]
+    pub(super) port: Option<String>,
+    /// Bits per second of a serial port that is not USB [default: 460800]
+    #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(9600..=4_000_000))]
+    pub(super) baud: Option<u32>,
+    /// Program and arguments of a process device, split at spaces
+    #[arg(long, value_name = "COMMAND")]
+    pub(super) command: Option<String>,
+}
+
+/// The kinds of device, as words.
+pub(super) fn device_kind(given: &str) -> Result<DeviceKind, String> {
+    [
+        DeviceKind::Simulated,
+        DeviceKind::Serial,
+        DeviceKind::Process,
+        DeviceKind::Manual,
+    ]
+    .into_iter()
+    .find(|kind| kind.as_str() == given)
+    .ok_or_else(|| "it is one of simulated, serial, process, manual".to_owned())
+}
+
+/// `device.toml`: what stays with a rig and never stands in a protocol.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Rig {
+    #[serde(default)]
+    serial: RigSerial,
+    #[serde(default)]
+    process: RigProcess,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RigSerial {
+    port: Option<String>,
+    baud: Option<u32>,
+    usb_serial: Option<String>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RigProcess {
+    command: Option<Vec<String>>,
+}
+
+impl Rig {
+    fn read(path: &Path) -> Result<Self, Failure> {
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(e) => return Err(Failure::file(path, &e)),
+        };
+        toml::from_str(&text).map_err(|e| {
+            Failure::input(format!("{}: {}", path.display(), e.message()))
+                .hint("it has [serial] with port, baud, usb_serial and [process] with command")
+        })
+    }
+}
+
+impl Place {
+    /// Arguments that the kind of device has no use for are refused.
+    fn suits(&self, kind: DeviceKind) -> Result<(), Failure> {
+        let useless = match kind {
+            DeviceKind::Serial => [("--command", self.command.is_some()), ("", false)],
+            DeviceKind::Process => [
+                ("--port", self.port.is_some()),
+                ("--baud", self.baud.is_some()),
+            ],
+            DeviceKind::Simulated | DeviceKind::Manual => [
+                ("--port", self.port.is_some() || self.baud.is_some()),
+                ("--command", self.command.is_some()),
+            ],
+        };
+        match useless.iter().find(|(_, given)| *given) {
+            None => Ok(()),
+            Some((argument, _)) => Err(Failure::new(
+                Kind::Usage,
+                format!("{argument} makes no sense with a {} device", kind.as_str()),
+            )),
+        }
+    }
+
+    /// The serial port, from the arguments or `device.toml`.
+    pub(super) fn serial(&self) -> Result<SerialOpener, Failure> {
+        let rig = Rig::read(Path::new(RIG_FILE))?.serial;
+        let given = self.port.clone();
+        // a port that is named is meant, whatever is plugged in elsewhere
+        let usb_serial = rig.usb_serial.filter(|_| given.is_none());
+        let port = given.or(rig.port);
+        if port.is_none() && usb_serial.is_none() {
+            return Err(
+                Failure::new(Kind::Usage, "a serial device needs a port").hint(format!(
+                    "--port PATH, or [serial] port = \"PATH\" in {RIG_FILE}; `study device list` shows them"
+                )),
+            );
+        }
+        let baud = self.baud.or(rig.baud).unwrap_or(BAUD);
+        let port = port.unwrap_or_default();
+        Ok(SerialOpener::new(&port, baud, usb_serial))
+    }
+
+    fn process(&self) -> Result<Vec<String>, Failure> {
+        let given = self.command.as_deref();
+        let given = given.map(|c| c.split_whitespace().map(str::to_owned).collect());
+        let command: Option<Vec<String>> = match given {
+            Some(command) => Some(command),
+            None => Rig::read(Path::new(RIG_FILE))?.process.command,
+        };
+        command.filter(|c| !c.is_empty()).ok_or_else(|| {
+            Failure::new(Kind::Usage, "a process device needs a program").hint(format!(
+                "--command \"PROGRAM ARGUMENTS\", or [process] command = [\"PROGRAM\", \"ARGUMENT\"] in {RIG_FILE}"
+            ))
+        })
+    }
+
+    /// Opens the device behind a serial port.
+    pub(super) fn open_serial(&self, settings: Settings) -> Result<Threaded, Failure> {
+        let opener = self.serial()?;
+        Threaded::open(Box::new(opener), settings).map_err(|e| unopened(&e))
+    }
+}
+
+/// Opens what plays `kind`, together with a person if some samples are mounted by
+/// hand.
+pub(super) fn open(
+    place: &Place,
+    kind: DeviceKind,
+    protocol: &Protocol,
+) -> Result<Box<dyn Device>, Failure> {
+    place.suits(kind)?;
+    let device: Box<dyn Device> = match kind {
+        DeviceKind::Simulated => Box::new(VirtualDevice::new(Options {
+            seed: protocol.study.seed,
+            ..Options::default()
+        })),
+        DeviceKind::Serial => Box::new(place.open_serial(Settings::default())?),
+        DeviceKind::Process => {
+            let command = place.process()?;
+            Box::new(ProcessDevice::open(command).map_err(|e| unopened(&e))?)
+        }
+        DeviceKind::Manual => return Ok(Box::new(Manual::default())),
+    };
+    let by_hand = protocol
+        .models
+        .iter()
+        .any(|m| m.device == Some(DeviceKind::Manual));
+    Ok(if by_hand {
+        Box::new(Beside::new(device))
+    } else {
+        device
+    })
+}
+
+fn unopened(why: &DeviceError) -> Failure {
+    let text = why.to_string();
+    Failure::new(Kind::Device, Untrusted(&text))
+        .hint("`study device list` shows the ports, docs/devices.md how a device is set up")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_rig_has_is_read_strictly() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(RIG_FILE);
+        assert_eq!(Rig::read(&path).unwrap(), Rig::default());
+        std::fs::write(
+            &path,
+            "[serial]\nport = \"/dev/ttyUSB0\"\nbaud = 921600\n[process]\ncommand = [\"a\", \"b c\"]\n",
+        )
+        .unwrap();
+        let rig = Rig::read(&path).unwrap();
+        assert_eq!(rig.serial.baud, Some(921_600));
+        assert_eq!(rig.process.command.unwrap(), ["a", "b c"]);
+        std::fs::write(&path, "[serial]\nprot = \"/dev/ttyUSB0\"\n").unwrap();
+        let failure = Rig::read(&path).unwrap_err();
+        assert!(failure.message.contains("prot"), "{}", failure.message);
+    }
+
+    #[test]
+    fn an_argument_that_does_not_suit_the_kind_is_refused() {
+        let place = |port: bool, command: bool| Place {
+            port: port.then(|| "/dev/ttyUSB0".to_owned()),
+            command: command.then(|| "a b".to_owned()),
+            ..Place::default()
+        };
+        assert!(place(true, false).suits(DeviceKind::Serial).is_ok());
+        assert!(place(false, true).suits(DeviceKind::Serial).is_err());
+        assert!(place(false, true).suits(DeviceKind::Process).is_ok());
+        assert!(place(true, false).suits(DeviceKind::Process).is_err());
+        assert!(place(true, false).suits(DeviceKind::Simulated).is_err());
+        assert!(place(false, true).suits(DeviceKind::Manual).is_err());
+        assert!(place(false, false).suits(DeviceKind::Manual).is_ok());
+    }
+}

@@ -1,0 +1,196 @@
+//! A link without a port: two queues, virtual time, and faults on purpose.
+//!
+//! What goes in at a moment comes out after the latency, in pieces as it was
+//! written. Faults strike single writes, by a seed; a line that is dead takes bytes
+//! and gives none.
+
+use crate::rng::Stream;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// Shares of the writes that meet a fault, each 0 … 1.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Noise {
+    /// A bit is flipped.
+    pub corrupt: f64,
+    /// Nothing arrives.
+    pub drop: f64,
+    /// It arrives twice.
+    pub duplicate: f64,
+    /// It overtakes the one before, if that is still on its way.
+    pub reorder: f64,
+    /// It takes [`Noise::late`] longer, and what follows waits for it.
+    pub delay: f64,
+    /// How much longer.
+    pub late: Duration,
+}
+
+impl Noise {
+    fn shares(&self) -> [f64; 5] {
+        [
+            self.corrupt,
+            self.drop,
+            self.duplicate,
+            self.reorder,
+            self.delay,
+        ]
+    }
+}
+
+/// One direction of a line.
+#[derive(Debug)]
+pub struct Line {
+    latency: Duration,
+    noise: Noise,
+    stream: Stream,
+    queue: VecDeque<(Duration, Vec<u8>)>,
+    dead: bool,
+}
+
+impl Line {
+    /// A line that takes so long; `name` keeps its faults apart from another's.
+    pub fn new(latency: Duration, noise: Noise, seed: u64, name: &str) -> Self {
+        Self {
+            latency,
+            noise,
+            stream: Stream::new(seed, &["line", name]),
+            queue: VecDeque::new(),
+            dead: false,
+        }
+    }
+
+    /// Other faults from now on.
+    pub fn set_noise(&mut self, noise: Noise) {
+        self.noise = noise;
+    }
+
+    /// A dead line takes bytes and gives none; what was on its way is lost.
+    pub fn set_dead(&mut self, dead: bool) {
+        self.dead = dead;
+        self.queue.clear();
+    }
+
+    /// Takes bytes.
+    pub fn send(&mut self, mut bytes: Vec<u8>, at: Duration) {
+        if bytes.is_empty() || self.dead {
+            return;
+        }
+        let mut due = at + self.latency;
+        let shares = self.noise.shares();
+        if shares.iter().all(|share| *share <= 0.0) {
+            self.queue.push_back((due, bytes));
+            return;
+        }
+        // always the same draws, so that one fault does not move the next
+        let [corrupt, drop, duplicate, reorder, delay] =
+            shares.map(|share| self.stream.unit() < share);
+        let bit = self.stream.below(8 * bytes.len() as u64);
+        if corrupt {
+            // below the length, which is a usize
+            bytes[(bit / 8) as usize] ^= 1 << (bit % 8);
+        }
+        if drop {
+            return;
+        }
+        if delay {
+            due += self.noise.late;
+        }
+        if let Some((last, _)) = self.queue.back() {
+            due = due.max(*last);
+        }
+        if duplicate {
+            self.queue.push_back((due, bytes.clone()));
+        }
+        self.queue.push_back((due, bytes));
+        let last = self.queue.len() - 1;
+        if reorder && last > 0 {
+            let earlier = self.queue[last - 1].0;
+            self.queue.swap(last, last - 1);
+            self.queue[last - 1].0 = earlier;
+            self.queue[last].0 = due;
+        }
+    }
+
+    /// What has arrived by now.
+    pub fn arrived(&mut self, at: Duration) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while let Some((due, _)) = self.queue.front()
+            && *due <= at
+        {
+            if let Some((_, piece)) = self.queue.pop_front() {
+                bytes.extend(piece);
+            }
+        }
+        bytes
+    }
+
+    /// When the next bytes arrive.
+    pub fn next(&self) -> Duration {
+        self.queue.front().map_or(Duration::MAX, |(due, _)| *due)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn bytes_arrive_in_order_after_the_latency() {
+        let mut line = Line::new(2 * MS, Noise::default(), 1, "a");
+        line.send(vec![1, 2], MS);
+        line.send(vec![3], 2 * MS);
+        assert!(line.arrived(2 * MS).is_empty());
+        assert_eq!(line.next(), 3 * MS);
+        assert_eq!(line.arrived(3 * MS), [1, 2]);
+        line.send(vec![4], 4 * MS);
+        assert_eq!(line.arrived(9 * MS), [3, 4]);
+        line.set_dead(true);
+        line.send(vec![5], 9 * MS);
+        line.set_dead(false);
+        assert!(line.arrived(99 * MS).is_empty());
+    }
+
+    #[test]
+    fn each_fault_does_what_it_says_about_as_often_as_asked() {
+        let through = |noise: Noise| {
+            let mut line = Line::new(MS, noise, 7, "b");
+            let mut came = Vec::new();
+            for i in 0..10_000u32 {
+                line.send(vec![1], i * 10 * MS);
+                line.send(vec![2], i * 10 * MS);
+                came.push(line.arrived((i * 10 + 5) * MS));
+            }
+            came
+        };
+        let part = |came: &[Vec<u8>], hit: &dyn Fn(&[u8]) -> bool| {
+            came.iter().filter(|c| hit(c)).count() as f64 / came.len() as f64
+        };
+        let none = Noise::default();
+        assert_eq!(part(&through(none), &|c| c == [1, 2]), 1.0);
+        let dropped = through(Noise { drop: 0.1, ..none });
+        assert!((part(&dropped, &|c| c.len() < 2) - 0.19).abs() < 0.02);
+        let twice = through(Noise {
+            duplicate: 0.1,
+            ..none
+        });
+        assert!((part(&twice, &|c| c.len() > 2) - 0.19).abs() < 0.02);
+        let swapped = through(Noise {
+            reorder: 0.1,
+            ..none
+        });
+        assert!((part(&swapped, &|c| c == [2, 1]) - 0.1).abs() < 0.02);
+        let broken = through(Noise {
+            corrupt: 0.1,
+            ..none
+        });
+        assert!((part(&broken, &|c| c != [1, 2]) - 0.19).abs() < 0.02);
+        let late = through(Noise {
+            delay: 0.1,
+            late: 6 * MS,
+            ..none
+        });
+        assert!((part(&late, &|c| c.len() < 2) - 0.19).abs() < 0.02);
+    }
+}

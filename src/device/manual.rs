@@ -1,0 +1,266 @@
+//! An experimenter who mounts samples: the oldest playback device.
+//!
+//! A load asks for the sample with a code ([`Report::Mount`]); the session starts
+//! the playback once somebody says that it is mounted. Nothing is measured but how
+//! long it was felt.
+//!
+//! The codes are three digits, as samples are labelled in sensory tests: they say
+//! nothing about what is mounted. [`Beside`] joins a person to a device, for studies
+//! in which only some samples are physical.
+
+use super::{Device, DeviceError, Identity, Report, Stimulus};
+use crate::limits::{Limit, Limits};
+use crate::outcome::Playback;
+use crate::rng::Stream;
+use crate::text::ModelId;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+/// Codes of three digits that there are, 100 to 999.
+const CODES: u64 = 900;
+
+/// A code for each realization, distinct, from the study's seed and the order of
+/// the ids: one that is added at the end changes no other. Studies of more than 450
+/// realizations get more digits. A code is never part of an id.
+pub fn codes(seed: u64, ids: &[&ModelId]) -> BTreeMap<ModelId, String> {
+    let mut stream = Stream::new(seed, &["manual", "codes"]);
+    let mut from = 100;
+    let mut range = CODES;
+    while (ids.len() as u64) * 2 > range {
+        from *= 10;
+        range *= 10;
+    }
+    let mut taken = BTreeSet::new();
+    let mut codes = BTreeMap::new();
+    for id in ids {
+        let code = loop {
+            let code = from + stream.below(range);
+            let told = ids.iter().any(|id| id.as_str().contains(&code.to_string()));
+            // ids that hold every number cannot keep it from ending
+            if !taken.contains(&code) && (!told || taken.len() as u64 * 4 > range) {
+                break code;
+            }
+            if told {
+                taken.insert(code);
+            }
+        };
+        taken.insert(code);
+        codes.insert((*id).clone(), code.to_string());
+    }
+    codes
+}
+
+/// A person who mounts what they are asked to.
+#[derive(Debug)]
+pub struct Manual {
+    phase: Phase,
+    reports: Vec<Report>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    Idle,
+    Mounting,
+    Felt { since: Duration },
+}
+
+impl Default for Manual {
+    fn default() -> Self {
+        Self {
+            phase: Phase::Idle,
+            reports: Vec::new(),
+        }
+    }
+}
+
+/// A sample exerts no force of its own: these bound nothing.
+const UNBOUNDED: [f64; 2] = [1e3, 1e5];
+
+impl Device for Manual {
+    fn identity(&self) -> Identity {
+        let [force_n, velocity_mm_s] =
+            UNBOUNDED.map(|value| Limit::new(value).expect("a positive constant"));
+        Identity {
+            id: "manual".to_owned(),
+            simulated: false,
+            telemetry: false,
+            limits: Limits {
+                force_n,
+                velocity_mm_s,
+            },
+        }
+    }
+
+    fn load(&mut self, what: &Stimulus<'_>, _: Limits, _: Duration) -> Result<(), DeviceError> {
+        self.reports = vec![Report::Mount(what.code.to_owned())];
+        self.phase = Phase::Mounting;
+        Ok(())
+    }
+
+    fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
+        if self.phase != Phase::Mounting {
+            return Err(DeviceError::WrongState {
+                command: "start",
+                state: "nothing is mounted",
+            });
+        }
+        self.phase = Phase::Felt { since: at };
+        self.reports.push(Report::Started);
+        Ok(())
+    }
+
+    fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
+        let Phase::Felt { since } = self.phase else {
+            return Err(DeviceError::WrongState {
+                command: "stop",
+                state: "nothing is felt",
+            });
+        };
+        self.phase = Phase::Idle;
+        self.reports.push(Report::Stopped(Playback {
+            exploration_s: at.saturating_sub(since).as_secs_f64(),
+            ..Playback::default()
+        }));
+        Ok(())
+    }
+
+    fn limp(&mut self, _: Duration) {
+        self.phase = Phase::Idle;
+        self.reports.clear();
+    }
+
+    fn poll(&mut self, _: Duration) -> Vec<Report> {
+        std::mem::take(&mut self.reports)
+    }
+}
+
+/// A device, and a person for the samples that it cannot play.
+pub struct Beside {
+    device: Box<dyn Device>,
+    person: Manual,
+    by_hand: bool,
+}
+
+impl Beside {
+    /// Joins a person to a device.
+    pub fn new(device: Box<dyn Device>) -> Self {
+        Self {
+            device,
+            person: Manual::default(),
+            by_hand: false,
+        }
+    }
+}
+
+impl Device for Beside {
+    fn identity(&self) -> Identity {
+        self.device.identity()
+    }
+
+    fn load(
+        &mut self,
+        what: &Stimulus<'_>,
+        limits: Limits,
+        at: Duration,
+    ) -> Result<(), DeviceError> {
+        // whatever played before: no force while somebody has their hands in it
+        self.limp(at);
+        self.by_hand = what.by_hand;
+        if what.by_hand {
+            self.person.load(what, limits, at)
+        } else {
+            self.device.load(what, limits, at)
+        }
+    }
+
+    fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
+        if self.by_hand {
+            self.person.start(at)
+        } else {
+            self.device.start(at)
+        }
+    }
+
+    fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
+        if self.by_hand {
+            self.person.stop(at)
+        } else {
+            self.device.stop(at)
+        }
+    }
+
+    fn limp(&mut self, at: Duration) {
+        self.person.limp(at);
+        self.device.limp(at);
+    }
+
+    fn poll(&mut self, at: Duration) -> Vec<Report> {
+        let mut reports = self.device.poll(at);
+        reports.extend(self.person.poll(at));
+        reports
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn id(name: &str) -> ModelId {
+        ModelId::new(name).unwrap()
+    }
+
+    #[test]
+    fn codes_are_distinct_stable_and_say_nothing() {
+        let names: Vec<ModelId> = (0..400).map(|i| id(&format!("m{i}"))).collect();
+        let all: Vec<&ModelId> = names.iter().collect();
+        let codes_of_all = codes(2007, &all);
+        let distinct: BTreeSet<&String> = codes_of_all.values().collect();
+        assert_eq!(distinct.len(), 400);
+        assert!(distinct.iter().all(|c| c.len() == 3));
+        for (name, code) in &codes_of_all {
+            assert!(!name.as_str().contains(code.as_str()));
+        }
+        // the same ids again, and with one more at the end
+        let names: Vec<ModelId> = ["real", "copy", "spring"].map(id).to_vec();
+        let three: Vec<&ModelId> = names.iter().collect();
+        let first = codes(2007, &three[..2]);
+        let then = codes(2007, &three);
+        assert!(first.iter().all(|(id, code)| then[id] == *code));
+        assert_ne!(codes(2008, &three), then);
+        // more than three digits can tell apart
+        let names: Vec<ModelId> = (0..2000).map(|i| id(&format!("x{i}"))).collect();
+        let many: Vec<&ModelId> = names.iter().collect();
+        let distinct: BTreeSet<String> = codes(1, &many).into_values().collect();
+        assert_eq!(distinct.len(), 2000);
+    }
+
+    #[test]
+    fn a_sample_is_asked_for_by_its_code_and_felt_from_the_start_on() {
+        let at = Duration::from_secs;
+        let limits = Manual::default().identity().limits;
+        let what = Stimulus {
+            model: "the-real-switch",
+            table: None,
+            code: "417",
+            by_hand: true,
+            permitted: false,
+        };
+        let mut person = Manual::default();
+        assert!(person.start(at(0)).is_err(), "nothing is mounted");
+        person.load(&what, limits, at(1)).unwrap();
+        assert_eq!(person.poll(at(1)), [Report::Mount("417".to_owned())]);
+        person.start(at(20)).unwrap();
+        assert_eq!(person.poll(at(20)), [Report::Started]);
+        person.stop(at(32)).unwrap();
+        let reports = person.poll(at(32));
+        let [Report::Stopped(playback)] = &reports[..] else {
+            panic!("{reports:?}");
+        };
+        assert_eq!(playback.exploration_s, 12.0);
+        // a limp takes everything back
+        person.load(&what, limits, at(40)).unwrap();
+        person.limp(at(41));
+        assert_eq!(person.poll(at(41)), []);
+        assert!(person.start(at(42)).is_err());
+    }
+}

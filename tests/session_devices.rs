@@ -1,0 +1,379 @@
+//! Whole sessions by keys on each way to a device.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod support;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use support::player::{Did, play};
+use support::simulator::Simulator;
+use support::{Terminal, repository, study};
+
+/// The paper's protocol with one repetition, changed.
+fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
+    let from = PathBuf::from(repository("protocols/turn-signal"));
+    let to = folder.join("protocol");
+    fs::create_dir_all(to.join("models")).unwrap();
+    for file in fs::read_dir(from.join("models")).unwrap() {
+        let file = file.unwrap();
+        fs::copy(file.path(), to.join("models").join(file.file_name())).unwrap();
+    }
+    let mut text = fs::read_to_string(from.join("protocol.toml")).unwrap();
+    for (old, new) in [("repetitions = 3", "repetitions = 1")]
+        .iter()
+        .chain(changes)
+    {
+        assert!(text.contains(old), "the protocol has no `{old}` any more");
+        text = text.replacen(old, new, 1);
+    }
+    fs::write(to.join("protocol.toml"), text).unwrap();
+    to
+}
+
+/// Plays on until the screen contains `text`; every screen that was seen.
+fn play_until(terminal: &mut Terminal, text: &str) -> Vec<String> {
+    let mut seen: Vec<String> = Vec::new();
+    let mut turns = 0;
+    while !terminal.screen().contains(text) {
+        let screen = terminal.screen();
+        if seen.last() != Some(&screen) {
+            seen.push(screen);
+        }
+        if play(terminal, "P01") == Did::Waited {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        turns += 1;
+        assert!(
+            turns < 20_000,
+            "`{text}` never comes:\n{}",
+            terminal.screen()
+        );
+    }
+    seen
+}
+
+/// A finished session; what was seen, and the rows of ratings.csv by column.
+fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<Row>) {
+    let path = protocol.to_str().unwrap();
+    let mut arguments = vec!["run", path, "--operator", "lw"];
+    arguments.extend(more);
+    let mut terminal = Terminal::start(&arguments, folder, 24, 80);
+    terminal.wait_for("Who takes part?");
+    let seen = play_until(&mut terminal, "Enter closes");
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+    let (code, out, err) = study(&["verify", "results"], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    (
+        seen,
+        ratings(&folder.join("results/turn-signal/ratings.csv")),
+    )
+}
+
+type Row = std::collections::BTreeMap<String, String>;
+
+fn ratings(path: &Path) -> Vec<Row> {
+    let mut file = csv::Reader::from_path(path).unwrap();
+    file.deserialize().map(Result::unwrap).collect()
+}
+
+#[test]
+fn a_session_on_a_child_program_is_real_data_with_telemetry() {
+    if std::process::Command::new("python3")
+        .arg("--version")
+        .output()
+        .is_err()
+    {
+        eprintln!("SKIPPED: python3 is not on this machine");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
+    let command = format!("python3 {}", repository("docs/process_device.py"));
+    let (_, rows) = session(folder.path(), &protocol, &["--command", &command]);
+    assert_eq!(rows.len(), 5);
+    for row in &rows {
+        assert_eq!(row["status"], "ok");
+        assert_eq!(row["pilot"], "false");
+        assert_eq!(row["device_kind"], "process");
+        assert_eq!(row["device_id"], "example-1");
+    }
+    let telemetry = folder
+        .path()
+        .join("results/turn-signal/sessions/P01/1/telemetry");
+    assert_eq!(fs::read_dir(telemetry).unwrap().count(), 5);
+}
+
+/// Samples have a code that names nothing; the codes are for who labels them.
+#[test]
+fn a_session_on_samples_mounted_by_hand_shows_their_codes_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"manual\"")]);
+    let path = protocol.to_str().unwrap();
+    let (code, codes, err) = study(&["device", "codes", path], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let codes: Vec<(&str, &str)> = codes
+        .lines()
+        .map(|line| line.split_once("  ").unwrap())
+        .collect();
+    assert_eq!(codes.len(), 5);
+    let (seen, rows) = session(folder.path(), &protocol, &[]);
+    assert_eq!(rows.len(), 5);
+    // the order of the codes on the screen is that of the realizations in the file
+    let mut asked: Vec<&str> = Vec::new();
+    for screen in &seen {
+        if let Some((_, after)) = screen.split_once("Mount sample ") {
+            let code = after.split('.').next().unwrap();
+            let (code, model) = codes.iter().find(|(c, _)| *c == code).unwrap();
+            if asked.last() != Some(model) {
+                asked.push(model);
+            }
+            assert!(!screen.contains(model), "{code}: {screen}");
+        }
+        assert!(!screen.contains("lambda"), "{screen}");
+    }
+    let felt: Vec<&str> = rows.iter().map(|row| row["model"].as_str()).collect();
+    assert_eq!(asked, felt);
+    for row in &rows {
+        assert_eq!(row["device_kind"], "manual");
+        assert_eq!(row["pilot"], "false");
+        assert!(row["exploration_s"].parse::<f64>().unwrap() > 0.0);
+    }
+}
+
+/// One physical sample among tables, and Esc while it is being mounted.
+#[test]
+fn a_sample_among_tables_is_mounted_and_a_stopped_mounting_comes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let manual = "id = \"lambda-0.9995\"\ndevice = \"manual\"";
+    let protocol = protocol(folder.path(), &[("id = \"lambda-0.9995\"", manual)]);
+    let path = protocol.to_str().unwrap();
+    let mut terminal = Terminal::start(&["run", path, "--operator", "lw"], folder.path(), 24, 80);
+    terminal.wait_for("Who takes part?");
+    play_until(&mut terminal, "Mount sample");
+    terminal.keys("\u{1b}");
+    terminal.wait_for("Operate the real switch");
+    let seen = play_until(&mut terminal, "Enter closes");
+    let mounts = seen.iter().filter(|s| s.contains("Mount sample"));
+    assert!(mounts.count() >= 1);
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+    let rows = ratings(&folder.path().join("results/turn-signal/ratings.csv"));
+    assert_eq!(rows.len(), 5);
+    let mounted = rows.iter().find(|r| r["model"] == "lambda-0.9995").unwrap();
+    assert_eq!((&*mounted["status"], &*mounted["attempt"]), ("ok", "2"));
+}
+
+/// Device on a port, program in a terminal.
+struct Rig {
+    folder: tempfile::TempDir,
+    device: Simulator,
+    terminal: Terminal,
+}
+
+impl Rig {
+    fn start(faults: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let device = Simulator::start(folder.path(), faults);
+        let protocol = protocol(folder.path(), &[("\"simulated\"", "\"serial\"")]);
+        let port = device.port.to_str().unwrap().to_owned();
+        let arguments = [
+            "run",
+            protocol.to_str().unwrap(),
+            "--operator",
+            "lw",
+            "--port",
+            &port,
+        ];
+        let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
+        terminal.wait_for("Who takes part?");
+        Self {
+            folder,
+            device,
+            terminal,
+        }
+    }
+
+    fn to(&mut self, text: &str) {
+        play_until(&mut self.terminal, text);
+    }
+
+    /// Plays to the end; the rows, and the journal's events.
+    fn finish(mut self) -> (Vec<Row>, Vec<serde_json::Value>) {
+        self.to("Enter closes");
+        self.terminal.keys("\r");
+        assert_eq!(self.terminal.exit_code(), 0);
+        let (code, out, err) = study(&["verify", "results"], self.folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        let results = self.folder.path().join("results/turn-signal");
+        let rows = ratings(&results.join("ratings.csv"));
+        assert_eq!(rows.len(), 5);
+        for row in &rows {
+            assert_eq!(row["status"], "ok");
+            assert_eq!(row["device_kind"], "serial");
+            assert_eq!(row["device_id"], "simulated-1");
+            assert_eq!(row["pilot"], "true", "a simulated device is no real data");
+        }
+        let journal = fs::read_to_string(results.join("sessions/P01/1/journal.jsonl")).unwrap();
+        let events = journal
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        let events: Vec<serde_json::Value> = events.collect();
+        no_rating_without_a_playback(&events);
+        (rows, events)
+    }
+}
+
+/// The part of an entry that says what happened.
+fn event(entry: &serde_json::Value) -> &serde_json::Value {
+    if entry["event"].is_string() {
+        entry
+    } else {
+        &entry["event"]
+    }
+}
+
+fn no_rating_without_a_playback(entries: &[serde_json::Value]) {
+    let mut ended = std::collections::BTreeSet::new();
+    let mut answers = 0;
+    for entry in entries {
+        let event = event(entry);
+        let attempt = |of: &serde_json::Value| (of["trial"].as_u64(), of["attempt"].as_u64());
+        match event["event"].as_str() {
+            Some("playback_ended") => {
+                ended.insert(attempt(event));
+            }
+            Some("answered") => {
+                let place = &event["place"]["trial"];
+                if place.is_object() {
+                    answers += 1;
+                    assert!(ended.contains(&attempt(place)), "{entry}");
+                }
+            }
+            _ => {}
+        }
+    }
+    assert!(answers >= 5, "the journal's form has changed: {answers}");
+}
+
+#[test]
+fn a_session_over_a_port_with_telemetry_that_is_whole() {
+    let rig = Rig::start(&[]);
+    let telemetry = rig
+        .folder
+        .path()
+        .join("results/turn-signal/sessions/P01/1/telemetry");
+    let folder = rig.folder.path().to_owned();
+    // the files are looked at before the folder goes with the rig
+    let mut rig = rig;
+    rig.to("Enter closes");
+    let files: Vec<PathBuf> = fs::read_dir(&telemetry)
+        .unwrap()
+        .map(|f| f.unwrap().path())
+        .collect();
+    assert_eq!(files.len(), 5);
+    let lines: usize = files
+        .iter()
+        .map(|f| fs::read_to_string(f).unwrap().lines().count() - 1)
+        .sum();
+    assert!(folder.exists());
+    let (_, events) = rig.finish();
+    let ended = events
+        .iter()
+        .map(event)
+        .filter(|e| e["event"] == "playback_ended");
+    let (mut samples, mut lost) = (0, 0);
+    for event in ended {
+        samples += event["playback"]["samples"].as_u64().unwrap();
+        lost += event["playback"]["samples_lost"].as_u64().unwrap();
+    }
+    assert!(samples > 0);
+    assert_eq!((samples as usize, lost), (lines, 0));
+}
+
+/// The cable comes out while a table is waited for, while it plays, while the rating
+/// is typed and between two trials, and the device loses its power while it plays.
+#[test]
+fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
+    let mut rig = Rig::start(&[]);
+    // before the first trial
+    rig.to("Operate the real switch");
+    rig.device.control("unplug");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    assert!(
+        rig.terminal.screen().contains("unplugged"),
+        "{}",
+        rig.terminal.screen()
+    );
+    rig.device.control("plug");
+    // while it plays
+    rig.to("Enter to rate");
+    rig.device.control("unplug");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    rig.device.control("plug");
+    // while the rating is typed: it is not disturbed
+    rig.to("1–7 choose");
+    rig.device.control("unplug");
+    rig.terminal.keys("6\r");
+    rig.terminal
+        .wait_until("the rating to be taken", |s| !s.contains("1–7 choose"));
+    // the next trial has to wait for the device
+    rig.to("DEVICE TROUBLE");
+    rig.device.control("plug");
+    // power, while it plays
+    rig.to("Enter to rate");
+    rig.device.control("reset");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    // the stop button of the device
+    rig.to("Enter to rate");
+    rig.device.control("trip");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    let (rows, events) = rig.finish();
+    assert!(rows.iter().any(|row| row["realism"] == "6"));
+    let failed = events
+        .iter()
+        .map(event)
+        .filter(|e| e["event"] == "attempt_failed");
+    assert!(failed.count() >= 3);
+}
+
+/// One frame in fifty is damaged, lost, doubled or late, each way.
+#[test]
+fn a_bad_line_costs_telemetry_and_no_answer() {
+    let faults = ["corrupt", "drop", "duplicate", "reorder", "delay"];
+    let faults: Vec<String> = faults.iter().map(|f| format!("{f}=0.005")).collect();
+    let faults: Vec<&str> = faults.iter().flat_map(|f| ["--fault", f]).collect();
+    let rig = Rig::start(&faults);
+    let (rows, _) = rig.finish();
+    assert_eq!(rows.len(), 5);
+}
+
+#[test]
+fn what_is_wrong_with_a_port_is_said_before_anything_is_created() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"serial\"")]);
+    let path = protocol.to_str().unwrap();
+    let (code, _, err) = study(&["run", path], folder.path());
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("needs a port") && err.contains("--port"),
+        "{err}"
+    );
+    let (code, _, err) = study(&["run", path, "--port", "/dev/no-such-port"], folder.path());
+    assert_eq!(code, 3);
+    assert!(
+        err.contains("/dev/no-such-port: there is no such port"),
+        "{err}"
+    );
+    let file = folder.path().join("file");
+    fs::write(&file, "x").unwrap();
+    let (code, _, err) = study(
+        &["run", path, "--port", file.to_str().unwrap()],
+        folder.path(),
+    );
+    assert_eq!(code, 3);
+    assert!(err.contains("it is no serial port"), "{err}");
+    assert_eq!(fs::read(&file).unwrap(), b"x");
+    assert!(!folder.path().join("results").exists());
+}
