@@ -358,3 +358,54 @@ fn mutated_frames() {
     assert_eq!(fuzz.count.most_share, 1.0, "the limit was never reached");
     assert_ne!(fuzz.device.state(), State::Boot);
 }
+
+/// What a device may send a host: any bytes behind a header that is one. What is a
+/// message is the same message when it is sent on.
+#[test]
+fn random_replies() {
+    let mut fuzz = Fuzz::new(3);
+    let kinds = [
+        kind::ACK,
+        kind::IDENTITY,
+        kind::OUTCOME,
+        kind::PULSE,
+        kind::TELEMETRY,
+        kind::EVENT,
+        kind::RECORDED,
+    ];
+    // the length of each, as far as it is fixed, so that most are not refused for it
+    let lengths = [12, 153, 91, 11, 21, 15, 13];
+    let mut messages = 0u64;
+    for _ in 0..frames() {
+        let which = fuzz.below(7) as usize;
+        let samples = fuzz.below(4) as usize;
+        let mut body = vec![1, kinds[which], 0, 0];
+        let more = match kinds[which] {
+            kind::TELEMETRY => 20 * samples,
+            kind::RECORDED => 12 * samples,
+            _ => 0,
+        };
+        let small = fuzz.below(2) == 0;
+        for i in 0..lengths[which] + more {
+            // small bytes are codes more often than not
+            let byte = fuzz.below(if small && i < 12 { 9 } else { 256 });
+            body.push(byte as u8);
+        }
+        if more > 0 {
+            body[4 + lengths[which] - 1] = samples as u8;
+        }
+        let Ok((header, reply)) = Reply::decode(&body) else {
+            continue;
+        };
+        messages += 1;
+        let frame = reply.frame(header.sequence);
+        let mut decoder = Decoder::new();
+        let again = frame.as_bytes().iter().find_map(|byte| {
+            let body = decoder.push(*byte)?;
+            Some(Reply::decode(body.unwrap()).unwrap())
+        });
+        assert_eq!(again, Some((header, reply)));
+    }
+    eprintln!("random replies: {messages} were messages");
+    assert!(messages > frames() / 10, "{messages}");
+}

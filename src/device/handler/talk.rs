@@ -25,7 +25,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         if header.kind == kind::LIMP {
             self.latch(State::Limp, Fault::Told, now_ms);
             self.answer(header, Ok(()), now_ms, out);
-            return self.tell(now_ms, out);
+            return self.tell(out);
         }
         match Request::decode(body) {
             Ok((header, request)) if request.sequenced() => {
@@ -44,7 +44,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
                 self.answer(header, Err(refusal), now_ms, out);
             }
         }
-        self.tell(now_ms, out);
+        self.tell(out);
     }
 
     fn answer(&self, header: Header, answer: Answer, now_ms: u32, out: Out<'_>) {
