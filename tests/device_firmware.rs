@@ -4,7 +4,9 @@
 
 mod wire_support;
 
-use study::device::firmware::Options;
+use std::time::Duration;
+
+use study::device::firmware::{Flaw, Options};
 use study::device::wire::probe::PathCrc;
 use study::device::wire::{
     Commit, Event, Fault, Few, Happening, Hello, Loaded, Node, PathBegin, PathChunk, Play, Record,
@@ -667,4 +669,187 @@ fn held_still_the_sign_chatters_and_a_direction_state_does_not() {
             assert_eq!(held(direction, servo_hz, 1.0), 0.0, "{direction:?}");
         }
     }
+}
+
+/// What each planted defect looks like from the other end of the wire.
+#[test]
+fn every_flaw_shows() {
+    let flawed = |flaw| Options {
+        flaw: Some(flaw),
+        ..Options::default()
+    };
+    let playing = |flaw| Host::playing(flawed(flaw), ms(1000));
+
+    let mut host = Host::opened(flawed(Flaw::TakesDamaged));
+    let mut damaged = Request::State.frame(9).as_bytes().to_vec();
+    damaged[6] ^= 0x10;
+    assert!(matches!(host.send(&damaged), Some(Reply::Outcome(_))));
+
+    let mut host = Host::new(flawed(Flaw::OtherVersion));
+    let ack = host.ack(Request::Hello(Hello { nonce: 1 }));
+    assert_eq!((ack.refusal, ack.detail), (Refusal::Version, 2));
+
+    let mut host = playing(Flaw::DeafToLimp);
+    assert_eq!(host.ack(Request::Limp).state, State::Limp);
+    assert_eq!(host.device.state(), State::Run);
+
+    let mut host = playing(Flaw::Repeats);
+    let first = host.ask_as(5000, Request::Rearm).unwrap();
+    host.live(ms(10));
+    assert_ne!(host.ask_as(5000, Request::Rearm), Some(first));
+
+    let mut host = playing(Flaw::Unlatched);
+    host.wait(ms(100));
+    assert_eq!(host.outcome().state, State::Idle);
+    assert_eq!(host.device.state(), State::Limp);
+
+    let mut host = playing(Flaw::TakesStale);
+    let clock = host.clock_ms();
+    assert!(host.beat_as(1_000_000, clock.wrapping_sub(500)).fresh);
+
+    let mut host = playing(Flaw::LateWatchdog);
+    host.beat();
+    host.wait(ms(250));
+    assert_eq!(host.device.state(), State::Run);
+    let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1 })) else {
+        panic!();
+    };
+    assert_eq!(identity.watchdog_ms, 30);
+
+    for (flaw, spoil) in [
+        (Flaw::TakesBadTables, f64::NAN),
+        (Flaw::TakesUncertified, -0.1),
+    ] {
+        let mut host = Host::opened(flawed(flaw));
+        let mut nodes = detents(0.05, 0.02);
+        nodes[3].positive[0] = spoil;
+        assert_eq!(host.upload(begin(&nodes), &nodes).0.refusal, Refusal::None);
+        assert_eq!(host.device.state(), State::Idle);
+    }
+
+    let most = |flaw| {
+        let mut host = Host::playing(flawed(flaw), ms(3000));
+        (host.outcome().most_force_n, host)
+    };
+    let (plain, _) = most(Flaw::SlowStop);
+    let (more, _) = most(Flaw::NoClamp);
+    assert_eq!(more, 1.5 * plain);
+
+    let (_, host) = most(Flaw::LosesTelemetry);
+    let mut expected = 0;
+    let gaps = host.heard.iter().filter(|reply| match reply {
+        Reply::Telemetry(telemetry) => {
+            let gap = telemetry.first != expected;
+            expected = telemetry.first + telemetry.samples.as_slice().len() as u32;
+            gap
+        }
+        _ => false,
+    });
+    assert!(gaps.count() > 20);
+
+    let mut host = Host::new(flawed(Flaw::SlowReplies));
+    let hello = Request::Hello(Hello { nonce: 1 });
+    assert!(host.send(hello.frame(1).as_bytes()).is_none());
+    host.wait(ms(49));
+    assert_eq!(host.heard, []);
+    host.wait(ms(2));
+    assert!(matches!(host.heard[..], [Reply::Identity(_)]));
+
+    let mut host = playing(Flaw::SlowStop);
+    let stop = Request::Stop(Stop { playback: 7 });
+    assert!(host.send(stop.frame(9000).as_bytes()).is_none());
+    host.live(ms(190));
+    assert_eq!(host.device.state(), State::Run);
+    host.live(ms(20));
+    assert_eq!(host.device.state(), State::Loaded);
+}
+
+/// A host that dies at any moment, over a link that takes its time: in virtual
+/// time, so this is the device's promise and not a computer's.
+#[test]
+fn whenever_the_host_dies_the_force_is_zero_within_50_ms() {
+    let mut worst = ms(0);
+    for death in 0..200u64 {
+        let mut host = Host::playing(Options::default(), ms(700));
+        // heartbeats arrive up to 9 ms after they were made, at any phase
+        let late = death % 10;
+        for _ in 0..death % 7 {
+            let deadline = host.clock_ms() + 40;
+            host.wait(ms(late));
+            host.beat_as(1_000_000 + host.clock_ms(), deadline);
+            host.wait(ms(10 - late));
+        }
+        let made = host.at;
+        let deadline = host.clock_ms() + 40;
+        host.wait(Duration::from_micros(1000 * late + 37 * death % 1000));
+        host.beat_as(2_000_000, deadline);
+        while host.device.state().forceful() {
+            host.wait(Duration::from_micros(250));
+            assert!(host.at - made <= ms(50), "{death}");
+        }
+        assert_eq!(host.device.held_n(), 0.0);
+        assert_eq!(host.device.fault(), Fault::Watchdog);
+        worst = worst.max(host.at - made);
+    }
+    assert!(worst > ms(30) && worst <= ms(41), "{worst:?}");
+}
+
+fn recording(x_mm: impl Fn(f64) -> f64) -> (Host, u32) {
+    let mut host = Host::opened(Options::default());
+    let begin = PathBegin {
+        points: 500,
+        rate_hz: 1000.0,
+        force_n: 15.0,
+        velocity_mm_s: 150.0,
+    };
+    let x_nm: Vec<i32> = (0..500)
+        .map(|i| fixed::nm(x_mm(f64::from(i) * 1e-3)))
+        .collect();
+    let mut crc = PathCrc::of(&begin);
+    x_nm.iter().for_each(|x| crc.point(*x));
+    host.ack(Request::PathBegin(begin));
+    for (i, some) in x_nm.chunks(PathChunk::MOST).enumerate() {
+        let first = (i * PathChunk::MOST) as u32;
+        let x_nm = Few::of(some);
+        host.ack(Request::PathChunk(PathChunk { first, x_nm }));
+    }
+    host.beat();
+    (host, crc.value())
+}
+
+#[test]
+fn a_path_that_cannot_be_followed_is_refused_and_a_recording_can_be_stopped() {
+    type Path = fn(f64) -> f64;
+    let cases: [(Path, Refusal, u32); 3] = [
+        (|t| 17.5 + 151.0 * t, Refusal::BadTable, 1),
+        (|t| -19.9 - t, Refusal::Limit, 3),
+        (
+            |t| if t < 0.3 { 17.5 } else { 17.7 },
+            Refusal::BadTable,
+            300,
+        ),
+    ];
+    for (path, refusal, detail) in cases {
+        let (mut host, crc) = recording(path);
+        let ack = host.ack(Request::PathCommit(Commit { crc }));
+        assert_eq!((ack.refusal, ack.detail), (refusal, detail));
+    }
+    let (mut host, crc) = recording(|t| 17.5 + 20.0 * t);
+    host.ack(Request::PathCommit(Commit { crc }));
+    host.ack(Request::Record(Record { playback: 4, crc }));
+    host.live(ms(700));
+    assert_eq!(host.device.state(), State::Run);
+    assert_ne!(host.device.held_n(), 0.0);
+    assert_eq!(host.stop(4).state, State::Stopping);
+    assert_eq!(host.device.held_n(), 0.0);
+    host.wait(ms(1));
+    let outcome = host.outcome();
+    assert_eq!((outcome.loaded, outcome.fault), (Loaded::Path, Fault::None));
+    assert!((190..=210).contains(&outcome.samples), "{outcome:?}");
+    // and the host's death
+    host.beat();
+    host.ack(Request::Record(Record { playback: 5, crc }));
+    host.wait(ms(31));
+    assert_eq!(host.device.fault(), Fault::Watchdog);
+    assert_eq!(host.device.held_n(), 0.0);
 }
