@@ -261,10 +261,10 @@ fn random_frames() {
     let mut fuzz = Fuzz::new(1);
     while fuzz.count.frames < frames() {
         let i = fuzz.count.frames;
-        if i % 1000 == 0 {
+        if i.is_multiple_of(1000) {
             fuzz.play();
         }
-        if i % 10 == 0 {
+        if i.is_multiple_of(10) {
             fuzz.beat();
         }
         let body = match fuzz.below(4) {
@@ -294,7 +294,7 @@ fn random_frames() {
         let frame = Frame::of(&body).unwrap();
         fuzz.send(frame.as_bytes());
         fuzz.count.frames += 1;
-        if i % 16 == 0 {
+        if i.is_multiple_of(16) {
             fuzz.in_step();
         }
     }
@@ -312,10 +312,10 @@ fn random_frames() {
 fn mutated_frames() {
     let mut fuzz = Fuzz::new(2);
     for i in 0..frames() {
-        if i % 1000 == 0 {
+        if i.is_multiple_of(1000) {
             fuzz.play();
         }
-        if i % 10 == 0 {
+        if i.is_multiple_of(10) {
             fuzz.beat();
         }
         let mut request = fuzz.request();
@@ -345,7 +345,7 @@ fn mutated_frames() {
         }
         fuzz.send(&bytes);
         fuzz.count.frames += 1;
-        if i % 16 == 0 {
+        if i.is_multiple_of(16) {
             fuzz.in_step();
         }
     }
