@@ -770,7 +770,12 @@ fn every_flaw_shows() {
 fn whenever_the_host_dies_the_force_is_zero_within_50_ms() {
     let mut worst = ms(0);
     for death in 0..200u64 {
-        let mut host = Host::playing(Options::default(), ms(700));
+        // a slow servo: many deaths in little time
+        let options = Options {
+            servo_hz: 1000.0,
+            ..Options::default()
+        };
+        let mut host = Host::playing(options, ms(450));
         // heartbeats arrive up to 9 ms after they were made, at any phase
         let late = death % 10;
         for _ in 0..death % 7 {
@@ -852,4 +857,220 @@ fn a_path_that_cannot_be_followed_is_refused_and_a_recording_can_be_stopped() {
     host.wait(ms(31));
     assert_eq!(host.device.fault(), Fault::Watchdog);
     assert_eq!(host.device.held_n(), 0.0);
+}
+
+fn in_state(state: State) -> Host {
+    let loaded = || {
+        let mut host = Host::opened(Options::default());
+        let nodes = detents(0.05, 0.02);
+        host.upload(begin(&nodes), &nodes);
+        host
+    };
+    let mut host = match state {
+        State::Boot => Host::new(Options::default()),
+        State::Idle => Host::opened(Options::default()),
+        State::Loaded => loaded(),
+        State::Ramp => Host::playing(Options::default(), ms(200)),
+        State::Run => Host::playing(Options::default(), ms(1000)),
+        // nothing can come in between a stop and the end of its telemetry
+        State::Stopping => unreachable!(),
+        State::Limp => {
+            let mut host = loaded();
+            host.ask(Request::Limp);
+            host
+        }
+        State::Fault => {
+            let mut host = loaded();
+            host.device.trip(Fault::External, host.at);
+            host
+        }
+    };
+    host.wait(ms(1));
+    assert_eq!(host.device.state(), state);
+    host
+}
+
+/// The table of states in the document: every state, every request.
+#[test]
+fn every_request_in_every_state_does_what_the_document_says() {
+    use Refusal::{NoHeartbeat, NoHello, None as Done, OtherPlayback, WrongState};
+    use State::{Boot, Fault, Idle, Limp, Loaded, Ramp, Run};
+
+    let nodes = detents(0.05, 0.02);
+    let begin = begin(&nodes);
+    let mut crc = study::device::wire::TableCrc::of(&begin);
+    nodes.iter().for_each(|node| crc.node(node));
+    let crc = crc.value();
+    let path = PathBegin {
+        points: 2,
+        rate_hz: 1000.0,
+        force_n: 1.0,
+        velocity_mm_s: 1.0,
+    };
+    let chunk = Request::TableChunk(TableChunk {
+        first: 0,
+        nodes: Few::of(&nodes[..3]),
+    });
+    let points = Request::PathChunk(PathChunk {
+        first: 0,
+        x_nm: Few::of(&[0, 0]),
+    });
+    let play = Request::Play(Play {
+        playback: 7,
+        crc,
+        longest_ms: 1000,
+        every: 4,
+    });
+    let stop = Request::Stop(Stop { playback: 7 });
+    let hello = Request::Hello(Hello { nonce: 2 });
+    let record = Request::Record(Record { playback: 7, crc });
+    let states = [Boot, Idle, Loaded, Ramp, Run, Limp, Fault];
+    let stay = |refusal| {
+        states.map(|state| {
+            if state == Boot {
+                (NoHello, Boot)
+            } else {
+                (refusal, state)
+            }
+        })
+    };
+    let cases: [(Request, [(Refusal, State); 7]); 14] = [
+        (
+            Request::TableBegin(begin),
+            [
+                (NoHello, Boot),
+                (Done, Idle),
+                (Done, Idle),
+                (WrongState, Ramp),
+                (WrongState, Run),
+                (WrongState, Limp),
+                (WrongState, Fault),
+            ],
+        ),
+        (
+            Request::PathBegin(path),
+            [
+                (NoHello, Boot),
+                (Done, Idle),
+                (Done, Idle),
+                (WrongState, Ramp),
+                (WrongState, Run),
+                (WrongState, Limp),
+                (WrongState, Fault),
+            ],
+        ),
+        (chunk, stay(WrongState)),
+        (points, stay(WrongState)),
+        (Request::TableCommit(Commit { crc }), stay(WrongState)),
+        (Request::PathCommit(Commit { crc }), stay(WrongState)),
+        (
+            play,
+            [
+                (NoHello, Boot),
+                (WrongState, Idle),
+                (Done, Ramp),
+                (WrongState, Ramp),
+                (WrongState, Run),
+                (WrongState, Limp),
+                (WrongState, Fault),
+            ],
+        ),
+        (
+            record,
+            [
+                (NoHello, Boot),
+                (WrongState, Idle),
+                (Refusal::OtherTable, Loaded),
+                (WrongState, Ramp),
+                (WrongState, Run),
+                (WrongState, Limp),
+                (WrongState, Fault),
+            ],
+        ),
+        (
+            stop,
+            [
+                (NoHello, Boot),
+                (OtherPlayback, Idle),
+                (OtherPlayback, Loaded),
+                (Done, State::Stopping),
+                (Done, State::Stopping),
+                (OtherPlayback, Limp),
+                (OtherPlayback, Fault),
+            ],
+        ),
+        (
+            Request::Limp,
+            [Boot, Idle, Loaded, Ramp, Run, Limp, Fault]
+                .map(|s| (Done, if s == Fault { Fault } else { Limp })),
+        ),
+        (
+            Request::Rearm,
+            [
+                (NoHello, Boot),
+                (Done, Idle),
+                (Done, Loaded),
+                (Done, Ramp),
+                (Done, Run),
+                (Done, Idle),
+                (Done, Idle),
+            ],
+        ),
+        (
+            hello,
+            [Idle, Idle, Limp, Limp, Limp, Limp, Fault].map(|s| (Done, s)),
+        ),
+        (Request::State, states.map(|s| (Done, s))),
+        (
+            Request::Heartbeat(study::device::wire::Heartbeat {
+                count: 1_000_000,
+                deadline_ms: 0,
+            }),
+            states.map(|s| (Done, s)),
+        ),
+    ];
+    for (request, expected) in cases {
+        for (state, (refusal, after)) in states.into_iter().zip(expected) {
+            let mut host = in_state(state);
+            let context = format!("{} in {state:?}", request.kind());
+            match host.ask(request) {
+                Reply::Ack(ack) => {
+                    assert_eq!((ack.refusal, ack.state), (refusal, after), "{context}")
+                }
+                Reply::Identity(identity) => assert_eq!(identity.state, after, "{context}"),
+                Reply::Outcome(outcome) => assert_eq!(outcome.state, after, "{context}"),
+                Reply::Pulse(pulse) => assert_eq!(pulse.state, after, "{context}"),
+                other => panic!("{other:?}"),
+            }
+            if !after.forceful() {
+                assert_eq!(host.device.held_n(), 0.0, "{context}");
+            }
+        }
+    }
+    // PLAY for a host that has not been heard for as long as a watchdog lets it
+    let mut host = in_state(Loaded);
+    host.wait(ms(100));
+    let Reply::Ack(ack) = host.ask(play) else {
+        panic!();
+    };
+    assert_eq!((ack.refusal, ack.state), (WrongState, Limp));
+    let mut host = Host::opened(Options::default());
+    host.upload(begin, &nodes[..31]);
+    host.ask(Request::TableChunk(TableChunk {
+        first: 30,
+        nodes: Few::of(&nodes[30..]),
+    }));
+    host.wait(ms(50));
+    let ack = host.ack(Request::TableCommit(Commit { crc }));
+    assert_eq!((ack.refusal, ack.detail), (Refusal::Incomplete, 31));
+    host.ask(Request::TableChunk(TableChunk {
+        first: 31,
+        nodes: Few::of(&nodes[31..]),
+    }));
+    assert_eq!(
+        host.ack(Request::TableCommit(Commit { crc })).refusal,
+        NoHeartbeat
+    );
+    host.beat();
+    assert_eq!(host.ack(Request::TableCommit(Commit { crc })).refusal, Done);
 }
