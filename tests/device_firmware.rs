@@ -1074,3 +1074,53 @@ fn every_request_in_every_state_does_what_the_document_says() {
     host.beat();
     assert_eq!(host.ack(Request::TableCommit(Commit { crc })).refusal, Done);
 }
+
+/// Each state met by a reset, a processor that hangs, an end of the cable, noise.
+#[test]
+fn every_state_ends_without_force_when_something_breaks() {
+    for state in [
+        State::Boot,
+        State::Idle,
+        State::Loaded,
+        State::Ramp,
+        State::Run,
+        State::Limp,
+        State::Fault,
+    ] {
+        let mut host = in_state(state);
+        host.device.reset(host.at);
+        assert_eq!(host.device.held_n(), 0.0, "{state:?}");
+        assert_eq!(host.device.state(), State::Boot, "{state:?}");
+
+        let mut host = in_state(state);
+        host.device.stall(host.at, ms(60_000));
+        host.wait(ms(11));
+        assert_eq!(host.device.held_n(), 0.0, "{state:?}");
+        assert_eq!(host.device.state(), State::Boot, "{state:?}");
+
+        // unplugged: nothing comes any more
+        let mut host = in_state(state);
+        host.wait(ms(41));
+        assert_eq!(host.device.held_n(), 0.0, "{state:?}");
+        let expected = if state.armed() { State::Limp } else { state };
+        assert_eq!(host.device.state(), expected, "{state:?}");
+
+        // noise: nothing of it is done, and the next frame is understood
+        let mut host = in_state(state);
+        let noise: Vec<u8> = (0..2000u32).map(|i| (i * i >> 3) as u8).collect();
+        assert_eq!(host.send(&noise), None, "{state:?}");
+        assert_eq!(host.device.state(), state);
+        assert!(host.send(Request::State.frame(3).as_bytes()).is_some());
+    }
+
+    // in the middle of an upload
+    let mut host = Host::opened(Options::default());
+    let nodes = detents(0.05, 0.02);
+    host.ask(Request::TableBegin(begin(&nodes)));
+    host.device.reset(host.at);
+    let chunk = Request::TableChunk(TableChunk {
+        first: 0,
+        nodes: Few::of(&nodes[..3]),
+    });
+    assert_eq!(host.ack(chunk).refusal, Refusal::NoHello);
+}
