@@ -2,10 +2,15 @@
 
 use divan::{Bencher, black_box};
 use std::time::Duration;
+use study::device::core::{Core, Rendering, Settings, State};
+use study::device::firmware::{self, Firmware};
 use study::device::virtual_device::{Options, VirtualDevice};
+use study::device::wire::{
+    Commit, Few, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, TableCrc,
+};
 use study::device::{Device, Report, Stimulus};
 use study::limits::{Limit, Limits};
-use study::model::predict::{Direction, Lookup};
+use study::model::predict::{Direction, Lookup, Motion};
 use study::model::{Branch, Realization, Trained};
 use study::rater::Impression;
 
@@ -79,6 +84,129 @@ fn a_study_of_150_playbacks(bencher: Bencher) {
             .map(|n| play(&mut device, &realization, Duration::from_secs(20 * n)))
             .sum::<usize>()
     });
+}
+
+/// What a servo period of a playback costs: table of 32 nodes, hand in motion.
+/// The time is that of a thousand periods.
+#[divan::bench(sample_count = 100)]
+fn a_thousand_servo_steps(bencher: Bencher) {
+    let realization = realization();
+    let what = Rendering {
+        table: realization.table(),
+        rule: Direction::Play { delta_mm: 0.5 },
+        range_mm: realization.trained.x_mm,
+        trained_mm_s: realization.trained.v_mm_s,
+    };
+    let motions: Vec<Motion> = (0..1000)
+        .map(|i| {
+            let phase = f64::from(i) * 1e-3 * std::f64::consts::TAU;
+            Motion {
+                x_mm: 17.5 + 14.0 * phase.sin(),
+                v_mm_s: 88.0 * phase.cos(),
+                a_m_s2: -0.55 * phase.sin(),
+            }
+        })
+        .collect();
+    let mut core = Core::new(Settings::default());
+    core.start();
+    bencher.bench_local(|| {
+        let mut sum = 0.0;
+        for motion in &motions {
+            sum += core.step(black_box(&what), black_box(*motion));
+        }
+        sum
+    });
+    assert_eq!(core.state(), State::Playing);
+}
+
+/// The same with everything that a firmware does in it: watchdog, telemetry at
+/// 1 kHz with its frames, the simulated hand.
+#[divan::bench(sample_count = 100)]
+fn a_thousand_periods_of_the_simulated_device(bencher: Bencher) {
+    let mut host = Playing::new(&realization());
+    bencher.bench_local(|| host.quarter_second());
+    assert!(host.device.state().forceful());
+}
+
+/// A host in front of a device that plays.
+struct Playing {
+    device: Firmware,
+    at: Duration,
+    beats: u32,
+    sequence: u16,
+}
+
+impl Playing {
+    fn new(realization: &Realization) -> Self {
+        let mut playing = Self {
+            device: Firmware::new(firmware::Options::default()),
+            at: Duration::from_millis(100),
+            beats: 0,
+            sequence: 0,
+        };
+        let table = realization.table();
+        let begin = TableBegin {
+            nodes: table.x_mm.len() as u16,
+            lookup: realization.lookup,
+            direction: Direction::Play { delta_mm: 0.5 },
+            range_mm: realization.trained.x_mm,
+            trained_mm_s: realization.trained.v_mm_s,
+            force_n: 12.0,
+            velocity_mm_s: 1000.0,
+            uncertified_n: Some(12.0),
+        };
+        let branch =
+            |b: &Branch, i: usize| [b.m_kg[i], b.b_n_s_per_mm[i], b.k_n_per_mm[i], b.f0_n[i]];
+        let mut crc = TableCrc::of(&begin);
+        playing.say(Request::Hello(Hello { nonce: 1 }));
+        playing.say(Request::TableBegin(begin));
+        for i in 0..table.x_mm.len() {
+            let node = Node {
+                x_mm: table.x_mm[i],
+                positive: branch(&realization.positive, i),
+                negative: branch(&realization.negative, i),
+            };
+            crc.node(&node);
+            playing.say(Request::TableChunk(TableChunk {
+                first: i as u16,
+                nodes: Few::of(&[node]),
+            }));
+        }
+        let crc = crc.value();
+        playing.beat();
+        playing.say(Request::TableCommit(Commit { crc }));
+        playing.say(Request::Play(Play {
+            playback: 1,
+            crc,
+            longest_ms: 600_000,
+            every: 4,
+        }));
+        playing
+    }
+
+    fn say(&mut self, request: Request) {
+        self.sequence = self.sequence.wrapping_add(1);
+        self.device
+            .receive(request.frame(self.sequence).as_bytes(), self.at);
+    }
+
+    fn beat(&mut self) {
+        self.beats += 1;
+        self.say(Request::Heartbeat(Heartbeat {
+            count: self.beats,
+            deadline_ms: self.at.as_millis() as u32 + 40,
+        }));
+    }
+
+    /// A thousand servo periods of 250 µs.
+    fn quarter_second(&mut self) -> usize {
+        for _ in 0..25 {
+            self.beat();
+            self.at += Duration::from_millis(10);
+            self.device.advance(self.at);
+        }
+        self.device.take_output().len()
+    }
 }
 
 #[divan::bench(sample_count = 10)]

@@ -618,3 +618,53 @@ fn a_path_is_followed_and_recorded() {
     assert!((2_000_000..14_000_000).contains(&most), "{most}");
     assert_eq!(host.outcome().samples, 1000);
 }
+
+/// Switches a second of a hand that holds still for ten seconds against a table
+/// of two branches, `half_n` above and below zero.
+fn held(direction: Direction, servo_hz: f64, half_n: f64) -> f64 {
+    let mut options = Options {
+        servo_hz,
+        ..Options::default()
+    };
+    // one stroke, then a rest without end
+    options.hand.rest_s = [1e9, 1e9];
+    let mut host = Host::opened(options);
+    let mut nodes = detents(0.05, 0.0);
+    for node in &mut nodes {
+        node.positive[3] = half_n;
+        node.negative[3] = -half_n;
+    }
+    let begin = TableBegin {
+        direction,
+        ..begin(&nodes)
+    };
+    let (ack, crc) = host.upload(begin, &nodes);
+    assert_eq!(ack.refusal, Refusal::None, "{ack:?}");
+    host.play(1, crc);
+    host.live(ms(4000));
+    let before = host.outcome();
+    host.live(ms(10_000));
+    let after = host.outcome();
+    assert_eq!(after.state, State::Run);
+    f64::from(after.switches - before.switches) / 10.0
+}
+
+/// The sign of v chatters at rest whatever the servo rate; a direction state does
+/// not. How fast depends on the hand, on the filter of the speed and on the step
+/// between the branches; another simulation found 140 switches a second.
+#[test]
+fn held_still_the_sign_chatters_and_a_direction_state_does_not() {
+    for servo_hz in [4000.0, 10_000.0] {
+        for half_n in [0.5, 1.0, 4.0] {
+            let sign = held(Direction::Sign, servo_hz, half_n);
+            eprintln!("sign at {servo_hz} Hz, ±{half_n} N: {sign} switches/s");
+            assert!((100.0..300.0).contains(&sign), "{sign}");
+        }
+        for direction in [
+            Direction::Play { delta_mm: 0.5 },
+            Direction::Dahl { delta_mm: 0.5 },
+        ] {
+            assert_eq!(held(direction, servo_hz, 1.0), 0.0, "{direction:?}");
+        }
+    }
+}

@@ -23,7 +23,7 @@ mod table;
 mod talk;
 
 use super::core::{Core, Rendering, Settings, State as Servo, Trip};
-use super::frame::{Decoder, Frame};
+use super::frame::{Decoder, Frame, MAX_BODY};
 use super::wire::{Ack, Event, Fault, Flags, Happening, Loaded, Name, Refusal, Reply, State};
 use crate::model::predict::Motion;
 use path::Path;
@@ -205,14 +205,17 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     pub fn receive(&mut self, bytes: &[u8], now_ms: u32, out: Out<'_>) {
         self.supervise(now_ms, out);
         for byte in bytes {
-            // the decoder is lent out while a body of it is looked at
-            let mut decoder = core::mem::take(&mut self.decoder);
-            match decoder.push(*byte) {
+            match self.decoder.push(*byte) {
                 None => {}
-                Some(Ok(body)) => self.handle(body, now_ms, out),
+                Some(Ok(body)) => {
+                    // what is done with it may need all of the device
+                    let mut copy = [0; MAX_BODY];
+                    let len = body.len();
+                    copy[..len].copy_from_slice(body);
+                    self.handle(&copy[..len], now_ms, out);
+                }
                 Some(Err(_)) => self.bad_frames = self.bad_frames.wrapping_add(1),
             }
-            self.decoder = decoder;
         }
     }
 

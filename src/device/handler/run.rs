@@ -83,7 +83,7 @@ impl Run {
         let Waiting::Telemetry(waiting) = &mut self.waiting else {
             return false;
         };
-        if tick % self.every == 0 {
+        if tick.is_multiple_of(self.every) {
             waiting.push(TelemetrySample {
                 tick,
                 x_nm: fixed::nm(measured.motion.x_mm),
