@@ -7,13 +7,19 @@
 //! world in which "VAF predicts the rating" has to be rejected 5 % of the time. The
 //! seed is fixed: the same number of studies prints the same table, whatever the
 //! number of threads.
+//!
+//! An exact test can reach only some p. Its attainable level is the share of all
+//! equally likely arrangements of a study's own data (orders of the realizations,
+//! signs of the differences) with p ≤ .05, averaged over the studies.
 #![allow(clippy::print_stdout)]
 
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use study::analyze::{Rules, analyze};
+use study::analyze::{Rules, Values, analyze};
 use study::outcome::ratings::Ratings;
 use study::rng::Stream;
+use study::stats::correlation::{kendall, pearson, spearman};
+use study::stats::rank::doubled_ranks;
 
 const SUBJECTS: u32 = 10;
 const MODELS: u32 = 5;
@@ -36,39 +42,50 @@ const ALIKE: [&str; 21] = [
     "rmanova2/inter/p_gg",
     "friedman/p",
     "friedman/iman_davenport_p",
-    "friedman/exact_p",
     "posthoc/m0|m1/p_t",
     "posthoc/m0|m1/p_wilcoxon_exact",
     "posthoc/m0|m1/p_wilcoxon_normal",
     "order_trial/p",
     "order_previous_rating/p",
     "icc_subjects/p_3",
-    "lmm_model/p_satterthwaite",
     "lmm_model/satterthwaite_p",
-    "lmm_model/kr_p",
+    "lmm_model/kenward_roger_p",
     "lmm_model/lrt_p",
-    "clmm_model_laplace/lrt_p",
+    "clm_model/beta/m1",
+    "clmm_model_laplace/beta/m1",
+    "clmm_model_quad/beta/m1",
 ];
 
 /// Tests of VAF, null in both worlds.
-const VAF: [&str; 16] = [
+const VAF: [&str; 24] = [
     "corr/pearson/p_t",
     "corr/pearson/p_exact_two_sided",
     "corr/pearson/p_exact_greater",
     "corr/spearman/p_exact_two_sided",
+    "corr/spearman/p_exact_greater",
     "corr/kendall/p_exact_two_sided",
+    "corr/kendall/p_exact_greater",
     "covariate/lambda/p",
     "covariate/log10_memory/p",
     "covariate/log10_memory/quadratic/p",
     "lmm_vaf_crossed/slope_satterthwaite_p",
     "lmm_vaf/slope_satterthwaite_p",
+    "lmm_vaf/lrt_p",
     "lmm_vaf_slope/slope_satterthwaite_p",
+    "clm_vaf/beta/vaf",
+    "clmm_vaf_laplace/beta/vaf",
+    "clmm_vaf_quad/beta/vaf",
     "page/p_greater",
     "subject_corr/p",
     "subject_slope/p",
     "rmcorr_cells/p",
     "rmcorr_trials/p",
+    "bootstrap/percentile",
+    "bootstrap/bca",
 ];
+
+/// Families of pairs: any of the ten after Holm's correction.
+const FAMILIES: [&str; 2] = ["p_t_holm", "p_wilcoxon_exact_holm"];
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();
@@ -76,32 +93,40 @@ fn main() {
     let studies = at
         .and_then(|at| args.get(at + 1)?.parse().ok())
         .unwrap_or(10_000u32);
-    let sd = (0.05 * 0.95 / f64::from(studies)).sqrt();
-    println!("{studies} studies of {SUBJECTS} × {MODELS} × {REPETITIONS} in each world");
-    println!(
-        "5 % ± three binomial standard deviations: {:.4} to {:.4}",
-        0.05 - 3.0 * sd,
-        0.05 + 3.0 * sd
-    );
+    println!("{studies} studies of {SUBJECTS} × {MODELS} × {REPETITIONS} in each world.");
+    println!("`*`: further than three binomial standard deviations from the attainable level.");
     for (world, name) in [(World::Alike, "alike"), (World::Differ, "differ")] {
-        println!("\nworld `{name}`");
-        let counted = count(world, studies);
-        for (id, (rejected, defined)) in &counted {
-            let rate = f64::from(*rejected) / f64::from(studies);
-            let within = if (rate - 0.05).abs() <= 3.0 * sd {
+        println!("\n| world `{name}` | rejected | attainable | ± | | undefined in |");
+        println!("|---|---|---|---|---|---|");
+        for (id, found) in &count(world, studies) {
+            let n = f64::from(studies);
+            let rate = f64::from(found.rejected) / n;
+            let level = found.attainable as f64 / (n * UNIT);
+            let three = 3.0 * (level * (1.0 - level) / n).sqrt();
+            let mark = if (rate - level).abs() <= three {
                 ""
             } else {
-                "  *"
+                "*"
             };
-            let undefined = studies - defined;
-            println!("{id:45} {rate:.4}{within}  undefined in {undefined}");
+            let undefined = studies - found.defined;
+            let id = id.replace('|', "\\|");
+            println!("| `{id}` | {rate:.4} | {level:.4} | {three:.4} | {mark} | {undefined} |");
         }
     }
 }
 
-/// Rejections and definitions of each test. Sums of whole numbers: the order in
-/// which studies end changes nothing.
-fn count(world: World, studies: u32) -> BTreeMap<String, (u32, u32)> {
+/// What a level of 1 counts in [`Found::attainable`]. Whole numbers, so that the
+/// order in which studies end changes no sum.
+const UNIT: f64 = 1e9;
+
+#[derive(Default, Clone, Copy)]
+struct Found {
+    rejected: u32,
+    defined: u32,
+    attainable: u64,
+}
+
+fn count(world: World, studies: u32) -> BTreeMap<String, Found> {
     let tests: Vec<&str> = match world {
         World::Alike => ALIKE.iter().chain(&VAF).copied().collect(),
         World::Differ => VAF.to_vec(),
@@ -109,33 +134,129 @@ fn count(world: World, studies: u32) -> BTreeMap<String, (u32, u32)> {
     (0..studies)
         .into_par_iter()
         .map(|number| {
-            let a = analyze(&study(world, number), &Rules::default());
-            let mut counts = BTreeMap::new();
+            let ratings = study(world, number);
+            let v = analyze(&ratings, &Rules::default()).values;
+            let cells = Cells::of(&ratings);
+            let mut found = BTreeMap::new();
             for id in &tests {
-                if let Some(p) = a.values.number(id) {
-                    counts.insert((*id).to_owned(), (u32::from(p <= 0.05), 1));
-                }
+                let rejected = rejects(&v, id);
+                found.insert((*id).to_owned(), one(rejected, cells.attainable(id)));
             }
-            let pairs = || a.values.iter().filter(|(id, _)| id.starts_with("posthoc/"));
-            for name in ["p_t_holm", "p_wilcoxon_exact_holm"] {
-                let smallest = pairs()
-                    .filter(|(id, _)| id.ends_with(name))
-                    .filter_map(|(id, _)| a.values.number(id))
-                    .fold(f64::INFINITY, f64::min);
-                if world == World::Alike && smallest.is_finite() {
-                    let id = format!("posthoc, any of the ten, {name}");
-                    counts.insert(id, (u32::from(smallest <= 0.05), 1));
-                }
+            for name in FAMILIES.iter().filter(|_| world == World::Alike) {
+                let pairs = v.iter().map(|(id, _)| id);
+                let pairs = pairs.filter(|id| id.starts_with("posthoc/") && id.ends_with(name));
+                let rejected = pairs.filter_map(|id| rejects(&v, id)).reduce(|a, b| a | b);
+                found.insert(format!("posthoc, any, {name}"), one(rejected, 0.05));
             }
-            counts
+            found
         })
         .reduce(BTreeMap::new, |mut all, one| {
-            for (id, (rejected, defined)) in one {
-                let sum = all.entry(id).or_insert((0, 0));
-                *sum = (sum.0 + rejected, sum.1 + defined);
+            for (id, one) in one {
+                let sum: &mut Found = all.entry(id).or_default();
+                sum.rejected += one.rejected;
+                sum.defined += one.defined;
+                sum.attainable += one.attainable;
             }
             all
         })
+}
+
+/// A test that is not defined does not reject.
+fn one(rejected: Option<bool>, attainable: f64) -> Found {
+    Found {
+        rejected: u32::from(rejected == Some(true)),
+        defined: u32::from(rejected.is_some()),
+        attainable: (attainable * UNIT).round() as u64,
+    }
+}
+
+/// Whether a test rejects at 5 %: by its p, by Wald's z, by an interval without 0.
+fn rejects(v: &Values, id: &str) -> Option<bool> {
+    if let Some((group, name)) = id.split_once("/beta/") {
+        let se = v.number(&format!("{group}/se/{name}"))?;
+        return Some((v.number(id)? / se).abs() >= 1.959_963_984_540_054);
+    }
+    if let Some(kind) = id.strip_prefix("bootstrap/") {
+        let low = v.number(&format!("bootstrap/{kind}_lo"))?;
+        let high = v.number(&format!("bootstrap/{kind}_hi"))?;
+        return Some(low > 0.0 || high < 0.0);
+    }
+    Some(v.number(id)? <= 0.05)
+}
+
+const VAFS: [f64; MODELS as usize] = [0.701, 0.742, 0.778, 0.785, 0.793];
+
+/// Sums of the ratings by subject and realization: all cells hold three.
+struct Cells(Vec<[f64; MODELS as usize]>);
+
+impl Cells {
+    fn of(r: &Ratings) -> Self {
+        let mut sums = vec![[0.0; MODELS as usize]; SUBJECTS as usize];
+        for i in 0..r.len() {
+            sums[r.subject[i] as usize][r.model[i] as usize] += r.rating[i];
+        }
+        Self(sums)
+    }
+
+    /// Share of the equally likely arrangements with p ≤ .05; .05 of a test that
+    /// is not exact.
+    fn attainable(&self, id: &str) -> f64 {
+        let two_sided = id.ends_with("two_sided");
+        let statistic: fn(&[f64], &[f64]) -> Option<f64> = match id.rsplit_once("/p_exact") {
+            Some(("corr/pearson", _)) => pearson,
+            Some(("corr/spearman", _)) => spearman,
+            Some(("corr/kendall", _)) => kendall,
+            _ if id.ends_with("|m1/p_wilcoxon_exact") => return self.signed_ranks(),
+            _ => return 0.05,
+        };
+        let means = (0..MODELS as usize).map(|m| self.0.iter().map(|s| s[m]).sum());
+        let mut means: Vec<f64> = means.collect();
+        let mut all = Vec::with_capacity(120);
+        orders(&mut means, 0, &mut |y| {
+            let found = statistic(&VAFS, y).unwrap_or(0.0);
+            all.push(if two_sided { found.abs() } else { found });
+        });
+        let p = |at: f64| {
+            let as_far = all.iter().filter(|x| **x >= at - 1e-9).count();
+            as_far as f64 / all.len() as f64
+        };
+        let rejected = all.iter().filter(|x| p(**x) <= 0.05).count();
+        rejected as f64 / all.len() as f64
+    }
+
+    /// All signs of the differences of the first two realizations.
+    fn signed_ranks(&self) -> f64 {
+        let d = self.0.iter().map(|s| (s[0] - s[1]).abs());
+        let d: Vec<f64> = d.filter(|d| *d > 0.0).collect();
+        let ranks = doubled_ranks(&d);
+        // How many of the signs give each sum of positive ranks.
+        let mut ways = vec![0u64; ranks.iter().sum::<i64>() as usize + 1];
+        ways[0] = 1;
+        for &rank in &ranks {
+            for at in (rank as usize..ways.len()).rev() {
+                ways[at] += ways[at - rank as usize];
+            }
+        }
+        let total: u64 = ways.iter().sum();
+        let rejected = (0..ways.len()).filter(|&at| {
+            let below: u64 = ways[..=at].iter().sum();
+            let above: u64 = ways[at..].iter().sum();
+            2.0 * below.min(above) as f64 / total as f64 <= 0.05
+        });
+        rejected.map(|at| ways[at]).sum::<u64>() as f64 / total as f64
+    }
+}
+
+/// Every order of the values from `from` on.
+fn orders(x: &mut [f64], from: usize, visit: &mut impl FnMut(&[f64])) {
+    if from == x.len() {
+        return visit(x);
+    }
+    for i in from..x.len() {
+        x.swap(from, i);
+        orders(x, from + 1, visit);
+        x.swap(from, i);
+    }
 }
 
 /// One study without an effect. Subjects differ in level (0.7) and in taste (0.5).
@@ -152,7 +273,6 @@ fn study(world: World, number: u32) -> Ratings {
             World::Differ => 0.5 * noise.normal(),
         })
         .collect();
-    let vaf = [0.701, 0.742, 0.778, 0.785, 0.793];
     let lambda = [0.9991, 0.9993, 0.9995, 0.9997, 0.9999];
     let mut csv = String::from("subject,model,repetition,rating,vaf,trial_index,lambda\n");
     for s in 0..SUBJECTS {
@@ -169,7 +289,7 @@ fn study(world: World, number: u32) -> Ratings {
                 csv += &format!(
                     "S{s:02},m{m},{},{rating},{},{trial},{}\n",
                     r + 1,
-                    vaf[m],
+                    VAFS[m],
                     lambda[m]
                 );
             }

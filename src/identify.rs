@@ -344,7 +344,10 @@ impl<'r> Training<'r> {
 
     fn provenance(&self) -> Provenance {
         Provenance {
-            filter: Some("as recorded".into()),
+            filter: Some(match self.recording.filter() {
+                Some(words) => format!("as recorded: {words}"),
+                None => "as recorded".into(),
+            }),
             recordings: [(self.recording.name.clone(), self.recording.sha256.clone())].into(),
             // a probe's program writes there what was recorded, and whether it is real
             note: self.recording.header.first().cloned(),

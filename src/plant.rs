@@ -4,8 +4,9 @@
 //! the turn-signal switch: a spring-loaded follower on a cam with three detents,
 //! with friction, backlash and end stops; a probe imposes a motion on its handle
 //! and feels a force. [`Probe`] is that probe: it imposes a trajectory and measures
-//! with the noise of its sensors; [`file`](mod@file) holds the parameters of a target as TOML. [`Hand`] is a person's hand on the slider of the playback
-//! device, which it moves back and forth over the stroke.
+//! with the noise of its sensors; [`file`](mod@file) holds the parameters of a target
+//! as TOML. [`Hand`] is a person's hand on the slider of the playback device, which it
+//! moves back and forth over the stroke.
 //!
 //! Neither is measured on hardware: forces and ranks of methods that come out of
 //! them are those of the simulation. Equations and parameters are in
@@ -15,6 +16,12 @@
 //! parameters come from. Force is what the probe applies, positive with +x.
 //! Same parameters and same motion give the same force, bit for bit, on one
 //! platform.
+
+/// Counts what changes the simulated forces or measurements: recordings with the same
+/// number, parameters, trajectory and seed are the same. It stands in their headers in
+/// place of the program's version, so that a release that changes none of this leaves
+/// every recording, and the hash that model files know it by, as it is.
+pub const SIMULATION: u32 = 1;
 
 pub mod file;
 

@@ -62,6 +62,14 @@ impl Recording {
         motion::range(&self.x_mm)
     }
 
+    /// What its header says that its signals went through, if it does: the line
+    /// `filter: …` up to a semicolon.
+    pub fn filter(&self) -> Option<&str> {
+        let line = self.header.iter().find_map(|l| l.strip_prefix("filter:"))?;
+        let words = line.split(';').next().unwrap_or(line).trim();
+        (!words.is_empty()).then_some(words)
+    }
+
     /// Largest speed, mm/s.
     pub fn top_speed_mm_s(&self) -> f64 {
         self.v_mm_s.iter().fold(0.0, |top, v| v.abs().max(top))
@@ -249,6 +257,16 @@ mod tests {
         let r = read_text(swapped).unwrap();
         assert_eq!(r.f_n, [2.0, 3.0, 1.0]);
         assert_eq!(r.t_s, [0.0, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn the_filter_is_what_the_header_says() {
+        let with = |header: &str| read_text(&format!("{header}{GOOD}")).unwrap();
+        let r = with("# filter: low-pass at 30 Hz; v: differences\n");
+        assert_eq!(r.filter(), Some("low-pass at 30 Hz"));
+        for none in ["", "# filter: ; x\n", "# filtered at 30 Hz\n"] {
+            assert_eq!(with(none).filter(), None, "{none}");
+        }
     }
 
     #[test]

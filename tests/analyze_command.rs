@@ -70,19 +70,35 @@ fn tables_go_where_out_says() {
         .assert()
         .success();
     let expected = [
+        "agreement.csv",
         "comments.csv",
         "correlation.csv",
         "descriptives.csv",
         "excluded.csv",
+        "exclusions.csv",
         "figures",
+        "pairs.csv",
         "ratings_used.csv",
         "report.html",
+        "subjects.csv",
         "values.json",
+        "variance.csv",
+        "with_and_without.csv",
     ];
     assert_eq!(names(&target), expected);
     let used = fs::read_to_string(target.join("ratings_used.csv")).unwrap();
     assert_eq!(used.lines().count(), 151);
     assert!(used.starts_with("subject,model,repetition,rating,vaf,included,reason\r\n"));
+    let rows = |name: &str| {
+        let text = fs::read_to_string(target.join(name)).unwrap();
+        text.lines().count() - 1
+    };
+    // Ten pairs of five realizations, ten subjects, no rule.
+    let counted = ["pairs.csv", "subjects.csv", "exclusions.csv"].map(rows);
+    assert_eq!(counted, [10, 10, 0]);
+    let pairs = fs::read_to_string(target.join("pairs.csv")).unwrap();
+    assert!(pairs.starts_with("pair,mean_diff,t,p_t,p_t_holm,"));
+    assert!(!pairs.contains(",,"), "all of it is defined: {pairs}");
 }
 
 #[test]

@@ -160,16 +160,16 @@ fn a_vaf_that_differs_from_the_file_is_an_error_and_a_rounded_one_is_not() {
         dir.path(),
         "protocol.toml",
         id,
-        &format!("{id}vaf = 0.82\n"),
+        &format!("{id}vaf = 0.96\n"),
     );
     assert_eq!(report(dir.path()).0, 0);
-    edit(dir.path(), "protocol.toml", "vaf = 0.82\n", "vaf = 0.79\n");
+    edit(dir.path(), "protocol.toml", "vaf = 0.96\n", "vaf = 0.79\n");
     let (code, errors, _) = report(dir.path());
     assert_eq!(code, 1);
     assert_eq!(
         errors,
         [
-            "the VAF of `lambda-0.9995` is not 0.79: its file says 0.82177228603653 for `validation-1.5hz`"
+            "the VAF of `lambda-0.9995` is not 0.79: its file says 0.9623644884535236 for `validation-1.5hz`"
         ]
     );
 }

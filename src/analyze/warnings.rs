@@ -45,9 +45,10 @@ pub(super) fn warnings(
         warn(
             "interim",
             format!(
-                "interim: {} of {planned} planned participants have finished; looking early \
-                 and stopping when it pleases makes every p too small",
-                counts.finished
+                "interim: {} of {planned} planned participants {} finished; looking early and \
+                 stopping when it pleases makes every p too small",
+                counts.finished,
+                if counts.finished == 1 { "has" } else { "have" }
             ),
         );
     }
@@ -67,8 +68,8 @@ pub(super) fn warnings(
 fn who(counts: &Counts) -> String {
     match (counts.pilots, counts.simulated) {
         (0, s) => format!("{s} simulated"),
-        (p, 0) => format!("{p} pilots"),
-        (p, s) => format!("{p} pilots and {s} simulated"),
+        (p, 0) => counted(p, "pilot", "pilots"),
+        (p, s) => format!("{} and {s} simulated", counted(p, "pilot", "pilots")),
     }
 }
 
@@ -84,11 +85,7 @@ fn excluded(warn: &mut impl FnMut(&'static str, String), exclusions: &[Applied],
                 format!(
                     "the pre-stated exclusion `{}` left out {} of {}",
                     e.rule,
-                    if e.rows == 1 {
-                        "1 row".to_owned()
-                    } else {
-                        format!("{} rows", e.rows)
-                    },
+                    counted(e.rows, "row", "rows"),
                     people(e.participants)
                 ),
             );
@@ -174,7 +171,10 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
         warn(
             "incomplete",
             format!(
-                "{incomplete} participants did not rate every test realization and are left out of what needs complete tables"
+                "{} did not rate every test realization and {} left out of what needs complete \
+                 tables",
+                people(incomplete as usize),
+                if incomplete == 1.0 { "is" } else { "are" }
             ),
         );
     }
@@ -252,9 +252,10 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
 }
 
 fn people(n: usize) -> String {
-    if n == 1 {
-        "1 participant".to_owned()
-    } else {
-        format!("{n} participants")
-    }
+    counted(n, "participant", "participants")
+}
+
+/// `one` or so many `many`.
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
 }

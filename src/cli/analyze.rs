@@ -83,12 +83,19 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
         let mut input = of_study(study, args)?;
-        let damage = results::warn(study, console)?.into_iter();
-        let code = "damaged-results";
-        input
-            .analysis
-            .warnings
-            .extend(damage.map(|text| Warning { code, text }));
+        // On a terminal the page tells of it; who keeps or pipes the page, or asked
+        // for something else, is told on standard error as well.
+        let damage = if console.terminal && !args.json && !args.comments {
+            results::warnings(study)?
+        } else {
+            results::warn(study, console)?
+        };
+        let damage = damage.into_iter().map(|text| Warning {
+            code: "damaged-results",
+            text: format!("{text} (`study verify` tells everything)"),
+        });
+        // Before all else that a reader has to know.
+        input.analysis.warnings.splice(0..0, damage);
         let folder = study.path();
         let out = match &args.out {
             Some(out) if several => Some(out.join(folder.file_name().unwrap_or_default())),

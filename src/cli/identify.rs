@@ -13,6 +13,7 @@ use crate::identify::validation::{self, Ceiling, Validation};
 use crate::identify::{IdentifyError, Training};
 use crate::model::certificate::{Certificate, SERVO_RATES_HZ};
 use crate::recording::{self, Recording};
+use crate::text::Untrusted;
 use args::{AccelerationWord, Named};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
@@ -85,7 +86,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
 
     let mut cells = identify(args, &plan, &training, &recordings)
         .map_err(|e| Failure::input(format!("{}: {e}", args.training.path.display())))?;
-    let filter = signals_in_words(args);
+    warn_of_other_filters(&training, &recordings, console);
+    let filter = signals_in_words(args, &training);
     for cell in &mut cells {
         cell.realization.provenance.filter = Some(filter.clone());
     }
@@ -177,10 +179,12 @@ fn ceilings(
 }
 
 /// A VAF belongs to its filter: this stands beside it and in model files.
-fn signals_in_words(args: &Args) -> String {
-    let mut words = match args.filter {
-        Some(hz) => format!("{FILTER} at {hz} Hz"),
-        None => "as recorded".to_owned(),
+fn signals_in_words(args: &Args, training: &Recording) -> String {
+    let mut words = match (args.filter, training.filter()) {
+        (Some(hz), None) => format!("{FILTER} at {hz} Hz"),
+        (Some(hz), Some(before)) => format!("{FILTER} at {hz} Hz; before that {before}"),
+        (None, Some(recorded)) => format!("as recorded: {recorded}"),
+        (None, None) => "as recorded".to_owned(),
     };
     if let AccelerationWord::Encoder = args.acceleration {
         words += ", acceleration from the encoder";
@@ -189,6 +193,25 @@ fn signals_in_words(args: &Args) -> String {
         words += ", dwells thinned";
     }
     words
+}
+
+/// Between signals that went through different filters a VAF is worth little.
+fn warn_of_other_filters(
+    training: &Recording,
+    recordings: &[(&Named, &Recording)],
+    console: &mut Console,
+) {
+    let words = |r: &Recording| Untrusted(r.filter().unwrap_or("unknown")).to_string();
+    for (named, recording) in recordings {
+        if recording.filter() != training.filter() {
+            console.say(format!(
+                "warning: {}: its filter is not that of the training recording: {}, there {}",
+                named.path.display(),
+                words(recording),
+                words(training),
+            ));
+        }
+    }
 }
 
 fn read(named: &Named, args: &Args, console: &mut Console) -> Result<Recording, Failure> {

@@ -10,6 +10,7 @@ use super::{Console, Failure};
 use crate::identify::signal::{Excitation, LowPass, delay, difference, excitation};
 use crate::plant::{self, Measured, Parameters, Probe, ProbeError};
 use crate::recording::{self, Columns};
+use crate::text::Untrusted;
 use crate::trajectory::{self, Trajectory};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -97,11 +98,18 @@ fn header(
     target: &Parameters,
     probe: &Probe,
 ) -> String {
+    let trajectory_file = args.trajectory.file_name().unwrap_or_default();
+    let filter = match args.raw {
+        true => "--raw".to_owned(),
+        false => format!("--filter {}", args.filter),
+    };
+    // model files keep this line: it says what was recorded, and how
     let mut out = format!(
-        "simulated, not measured: probe and target (plant {name}) of study {}, {} Hz, seed {}\n",
-        env!("CARGO_PKG_VERSION"),
+        "simulated, not measured: study record {} --plant {name} --rate {} --seed {} {filter} (simulation {})\n",
+        Untrusted(&trajectory_file.to_string_lossy()),
         args.rate,
-        args.seed
+        args.seed,
+        plant::SIMULATION,
     );
     // writing to a String cannot fail
     let _ = match args.raw {
@@ -111,7 +119,7 @@ fn header(
         ),
         false => writeln!(
             out,
-            "filter: zero-phase 2nd-order Butterworth low-pass (forward and backward), {} Hz, the same on x, a and F; v: central difference of x",
+            "filter: zero-phase low-pass, Butterworth of 2nd order both ways, at {} Hz; the same on x, a and F; v: central difference of x",
             args.filter
         ),
     };
@@ -124,13 +132,7 @@ fn header(
     let _ = writeln!(out, "kept: {from_s} to {to_s} s, between the ramps");
     let _ = writeln!(
         out,
-        "again: study record TRAJECTORY --plant PLANT --rate {} --seed {} {}, with these two files:",
-        args.rate,
-        args.seed,
-        match args.raw {
-            true => "--raw".to_owned(),
-            false => format!("--filter {}", args.filter),
-        }
+        "again: the command of the first line, with these two files as the trajectory and --plant"
     );
     for (file, text) in [
         ("TRAJECTORY", trajectory::file::write(trajectory)),

@@ -12,7 +12,7 @@ use crate::plant::{DT_S, HandParameters, Parameters, Target};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-/// How a realization compares with the target A. Deterministic.
+/// How a realization compares with the target B, of which the shipped ones are. Deterministic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impression {
     /// Root mean square difference from the target's force, N.
@@ -50,7 +50,7 @@ struct Reference {
 
 impl Reference {
     fn new() -> Self {
-        let mut target = Target::new(Parameters::a(), CENTRE_MM)
+        let mut target = Target::new(Parameters::b(), CENTRE_MM)
             .expect("a unit test checks the built-in parameters");
         let steps = (SECONDS / DT_S) as usize;
         let mut sampled = Vec::with_capacity(steps / EVERY + 1);
@@ -205,7 +205,7 @@ mod tests {
         let nodes: Vec<f64> = (4..=66).map(|i| f64::from(i) * 0.5).collect();
         let branch = |direction: f64| {
             let start = if direction > 0.0 { 1.0 } else { 34.0 };
-            let mut target = Target::new(Parameters::a(), start).unwrap();
+            let mut target = Target::new(Parameters::b(), start).unwrap();
             let mut force = vec![0.0; nodes.len()];
             let speed = 20.0 * direction;
             let steps = (33.0 / 20.0 / DT_S) as usize;

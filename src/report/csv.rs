@@ -16,10 +16,19 @@ pub struct Table {
 pub fn tables(source: &Source, analysis: &Analysis) -> Vec<Table> {
     vec![
         table("descriptives.csv", descriptives(analysis)),
-        table("correlation.csv", correlation(analysis)),
+        table("correlation.csv", identified(analysis, &CORRELATION)),
+        table("pairs.csv", pairs(analysis)),
+        table("variance.csv", identified(analysis, &VARIANCE)),
+        table("agreement.csv", identified(analysis, &AGREEMENT)),
+        table("subjects.csv", subjects(analysis)),
+        table("exclusions.csv", exclusions(analysis)),
+        table("with_and_without.csv", with_and_without(analysis)),
         table("comments.csv", comments(analysis)),
         table("excluded.csv", excluded(analysis)),
-        table("ratings_used.csv", ratings_used(analysis)),
+        Table {
+            name: "ratings_used.csv",
+            content: ratings_used(analysis),
+        },
         Table {
             name: "values.json",
             content: super::json::document(source, analysis),
@@ -36,16 +45,33 @@ fn table(name: &'static str, rows: Vec<Vec<String>>) -> Table {
 
 /// Rows as CSV; all are equally long.
 pub(super) fn text(rows: &[Vec<String>]) -> String {
-    let mut writer = csv::WriterBuilder::new()
-        .terminator(csv::Terminator::CRLF)
-        .from_writer(Vec::new());
-    for row in rows {
-        writer
+    written(|to| {
+        for row in rows {
+            to.row(row);
+        }
+    })
+}
+
+/// A table that is written row by row, because it can have millions of them.
+fn written(write: impl FnOnce(&mut Rows)) -> String {
+    let mut rows = Rows(
+        csv::WriterBuilder::new()
+            .terminator(csv::Terminator::CRLF)
+            .from_writer(Vec::new()),
+    );
+    write(&mut rows);
+    let bytes = rows.0.into_inner().expect("memory takes them");
+    String::from_utf8(bytes).expect("only text was written")
+}
+
+struct Rows(csv::Writer<Vec<u8>>);
+
+impl Rows {
+    fn row<T: AsRef<[u8]>>(&mut self, row: impl IntoIterator<Item = T>) {
+        self.0
             .write_record(row)
             .expect("rows of a table are equally long and memory takes them");
     }
-    let bytes = writer.into_inner().expect("memory takes them");
-    String::from_utf8(bytes).expect("only text was written")
 }
 
 fn cells<const N: usize>(texts: [&str; N]) -> Vec<String> {
@@ -92,19 +118,30 @@ fn descriptives(a: &Analysis) -> Vec<Vec<String>> {
     rows
 }
 
-fn correlation(a: &Analysis) -> Vec<Vec<String>> {
-    const GROUPS: [&str; 7] = [
-        "corr",
-        "subject_corr",
-        "subject_slope",
-        "rmcorr_cells",
-        "rmcorr_trials",
-        "bootstrap",
-        "page",
-    ];
+const CORRELATION: [&str; 7] = [
+    "corr",
+    "subject_corr",
+    "subject_slope",
+    "rmcorr_cells",
+    "rmcorr_trials",
+    "bootstrap",
+    "page",
+];
+
+const VARIANCE: [&str; 2] = ["variance", "lmm_variance"];
+
+const AGREEMENT: [&str; 4] = [
+    "icc_subjects",
+    "icc_repetitions",
+    "krippendorff_subjects",
+    "krippendorff_repetitions",
+];
+
+/// The statistics of some groups, one in a row.
+fn identified(a: &Analysis, groups: &[&str]) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["identifier", "value", "undefined_because"])];
     for (id, value) in a.values.iter() {
-        if !GROUPS.iter().any(|g| id.split('/').next() == Some(g)) {
+        if !groups.iter().any(|g| id.split('/').next() == Some(g)) {
             continue;
         }
         rows.push(match value {
@@ -115,6 +152,93 @@ fn correlation(a: &Analysis) -> Vec<Vec<String>> {
             }
             Value::Undefined(why) => vec![id.to_owned(), String::new(), why.clone()],
         });
+    }
+    rows
+}
+
+/// Every pair of realizations, a minus b.
+fn pairs(a: &Analysis) -> Vec<Vec<String>> {
+    const STATISTICS: [&str; 12] = [
+        "mean_diff",
+        "t",
+        "p_t",
+        "p_t_holm",
+        "dz",
+        "d_av",
+        "wilcoxon_n",
+        "wilcoxon_Wplus",
+        "p_wilcoxon_exact",
+        "p_wilcoxon_exact_holm",
+        "p_wilcoxon_normal",
+        "rank_biserial",
+    ];
+    let mut rows = vec![cells(["pair"])];
+    rows[0].extend(STATISTICS.map(str::to_owned));
+    for (id, _) in a.values.iter() {
+        let pair = id.strip_prefix("posthoc/");
+        let Some(pair) = pair.and_then(|p| p.strip_suffix("/mean_diff")) else {
+            continue;
+        };
+        let mut row = vec![pair.to_owned()];
+        row.extend(STATISTICS.map(|s| number(a.values.number(&format!("posthoc/{pair}/{s}")))));
+        rows.push(row);
+    }
+    rows
+}
+
+/// Every participant that counts; empty where they are too many to be listed.
+fn subjects(a: &Analysis) -> Vec<Vec<String>> {
+    const STATISTICS: [&str; 10] = [
+        "n",
+        "mean",
+        "sd",
+        "distinct",
+        "longest_run",
+        "within_cell_sd",
+        "leave_one_out_r",
+        "hidden_reference_mean",
+        "low_anchor_mean",
+        "repeat_distance",
+    ];
+    let mut rows = vec![cells(["subject"])];
+    rows[0].extend(STATISTICS.map(str::to_owned));
+    rows[0].extend(cells(["r_with_vaf", "slope_on_vaf"]));
+    for (id, _) in a.values.iter() {
+        let subject = id.strip_prefix("subject/");
+        let Some(subject) = subject.and_then(|s| s.strip_suffix("/n")) else {
+            continue;
+        };
+        let get = |id: String| number(a.values.number(&id));
+        let mut row = vec![subject.to_owned()];
+        row.extend(STATISTICS.map(|s| get(format!("subject/{subject}/{s}"))));
+        row.extend(["r", "slope"].map(|s| get(format!("subject_corr/{subject}/{s}"))));
+        rows.push(row);
+    }
+    rows
+}
+
+/// What each pre-stated rule did.
+fn exclusions(a: &Analysis) -> Vec<Vec<String>> {
+    let mut rows = vec![cells(["rule", "rows", "participants", "problem"])];
+    rows.extend(a.exclusions.iter().map(|e| {
+        vec![
+            e.rule.to_string(),
+            e.rows.to_string(),
+            e.participants.to_string(),
+            e.problem.unwrap_or_default().to_owned(),
+        ]
+    }));
+    rows
+}
+
+/// The headline with the exclusions and without any.
+fn with_and_without(a: &Analysis) -> Vec<Vec<String>> {
+    let mut rows = vec![cells(["identifier", "with", "without"])];
+    for (id, value) in a.values.iter() {
+        if let (Some(own), Value::Number(x)) = (id.strip_prefix("before_exclusion/"), value) {
+            let with = number(a.values.number(own));
+            rows.push(vec![own.to_owned(), with, x.to_string()]);
+        }
     }
     rows
 }
@@ -161,32 +285,33 @@ fn excluded(a: &Analysis) -> Vec<Vec<String>> {
     rows
 }
 
-fn ratings_used(a: &Analysis) -> Vec<Vec<String>> {
-    let head = [
-        "subject",
-        "model",
-        "repetition",
-        "rating",
-        "vaf",
-        "included",
-        "reason",
-    ];
-    let mut rows = vec![cells(head)];
-    for row in &a.rows {
-        let reason = match (&row.excluded, row.rating) {
-            (Some(reason), _) => reason.to_string(),
-            (None, None) => "no rating".to_owned(),
-            (None, Some(_)) => String::new(),
-        };
-        rows.push(vec![
-            row.subject.to_string(),
-            row.model.to_string(),
-            row.repetition.to_string(),
-            number(row.rating),
-            number(row.vaf),
-            reason.is_empty().to_string(),
-            reason,
+fn ratings_used(a: &Analysis) -> String {
+    written(|to| {
+        to.row([
+            "subject",
+            "model",
+            "repetition",
+            "rating",
+            "vaf",
+            "included",
+            "reason",
         ]);
-    }
-    rows
+        for row in &a.rows {
+            let excluded = row.excluded.as_ref().map(|r| r.to_string());
+            let reason = match (&excluded, row.rating) {
+                (Some(reason), _) => reason,
+                (None, None) => "no rating",
+                (None, Some(_)) => "",
+            };
+            to.row([
+                &*row.subject,
+                &*row.model,
+                &row.repetition.to_string(),
+                &number(row.rating),
+                &number(row.vaf),
+                if reason.is_empty() { "true" } else { "false" },
+                reason,
+            ]);
+        }
+    })
 }

@@ -77,7 +77,7 @@ pub fn document(source: &Source, details: &Details, a: &Analysis, figures: &[Dra
                     (prose::section(details, a))
                     (answers::only_these(a))
                     (notes::comments(a, lang))
-                    (notes::exclusions(a))
+                    (notes::exclusions(a, source.study.is_some()))
                     (statistics::section(a))
                     (notes::provenance(source, details, a))
                 }

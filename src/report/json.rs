@@ -44,6 +44,14 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
                 "duplicate_of": m.duplicate_of,
                 "vaf": m.vaf,
             })).collect::<Vec<_>>(),
+        "exclusions": analysis.exclusions.iter()
+            .map(|e| json!({
+                "rule": e.rule.to_string(),
+                "rows": e.rows,
+                "participants": e.participants,
+                "problem": e.problem,
+            })).collect::<Vec<_>>(),
+        "deviations": analysis.deviations,
         "counts": {
             "rows": c.rows,
             "rated": c.rated,

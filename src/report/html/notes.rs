@@ -32,7 +32,49 @@ pub(super) fn banners(a: &Analysis) -> Markup {
     }
 }
 
-pub(super) fn exclusions(a: &Analysis) -> Markup {
+/// What was stated before the data of what to leave out, what each rule did, and
+/// what was changed afterwards.
+fn stated(a: &Analysis) -> Markup {
+    let text = |id: &str| a.values.number(id).map_or_else(|| "–".to_owned(), apa::r);
+    html! {
+        @if a.exclusions.is_empty() {
+            p { "No rule of exclusion was stated beforehand." }
+        } @else {
+            div.scroll tabindex="0" role="region" aria-label="Exclusions stated beforehand" {
+                table {
+                    caption { "Exclusions stated beforehand" }
+                    thead { tr {
+                        th scope="col" { "rule" } th scope="col" { "rows" } th scope="col" { "participants" }
+                        th.text scope="col" { "remark" }
+                    } }
+                    tbody {
+                        @for e in &a.exclusions {
+                            tr {
+                                td { code { (e.rule.to_string()) } } td { (e.rows) } td { (e.participants) }
+                                td.text { (e.problem.unwrap_or_default()) }
+                            }
+                        }
+                    }
+                }
+            }
+            @if a.values.get("before_exclusion/corr/pearson/r").is_some() {
+                p {
+                    "With them, mean rating and VAF correlate at r = " (text("corr/pearson/r"))
+                    "; without them, at r = " (text("before_exclusion/corr/pearson/r"))
+                    ". More of the headline with and without them is in a table above."
+                }
+            }
+        }
+        @if a.deviations.is_empty() {
+            p { "No rule of the analysis was changed after the study began." }
+        } @else {
+            h3 { "Deviations from what was stated beforehand" }
+            ul { @for d in &a.deviations { li { (safe(d)) } } }
+        }
+    }
+}
+
+pub(super) fn exclusions(a: &Analysis, of_study: bool) -> Markup {
     let c = &a.counts;
     let facts: Vec<(&str, usize)> = [
         ("rows, practice not counted", c.rows),
@@ -51,6 +93,7 @@ pub(super) fn exclusions(a: &Analysis) -> Markup {
         section {
             h2 { "What was counted and left out" }
             dl { @for (what, n) in facts { dt { (what) } dd { (n) } } }
+            @if of_study { (stated(a)) }
             @if c.excluded.is_empty() {
                 p { "No row was excluded." }
             } @else {

@@ -15,15 +15,20 @@ const MAX_NOTE: usize = 80;
 
 pub(super) fn panel(out: &mut Out, panel: &Panel, frame: &Frame) {
     grid(out, panel, frame);
-    let clip = out.fresh_id();
-    out.line(&format!(
-        "<clipPath id=\"{clip}\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/></clipPath>",
-        px(frame.left - 5.0),
-        px(frame.top - 5.0),
-        px(frame.right - frame.left + 10.0),
-        px(frame.bottom - frame.top + 10.0)
-    ));
-    out.line(&format!("<g clip-path=\"url(#{clip})\">"));
+    // A clip costs whoever draws the picture a layer of its own.
+    if panel.series.iter().all(|s| fits(panel, &s.mark)) {
+        out.line("<g>");
+    } else {
+        let clip = out.fresh_id();
+        out.line(&format!(
+            "<clipPath id=\"{clip}\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/></clipPath>",
+            px(frame.left - 5.0),
+            px(frame.top - 5.0),
+            px(frame.right - frame.left + 10.0),
+            px(frame.bottom - frame.top + 10.0)
+        ));
+        out.line(&format!("<g clip-path=\"url(#{clip})\">"));
+    }
     for series in &panel.series {
         mark(out, panel, frame, &series.mark, series.look);
     }
@@ -42,6 +47,30 @@ pub(super) fn panel(out: &mut Out, panel: &Panel, frame: &Frame) {
     }
     if let Some(bar) = &panel.colour_bar {
         colour_bar(out, bar, frame);
+    }
+}
+
+/// Whether a mark stays within the axes.
+fn fits(panel: &Panel, mark: &Mark) -> bool {
+    let within = |axis: &super::Axis, v: f64| {
+        let share = axis.share(v);
+        share.is_none_or(|s| (-1e-9..=1.0 + 1e-9).contains(&s))
+    };
+    let (x, y) = (&panel.x, &panel.y);
+    let spans =
+        |s: &Span| within(x, s.x.0) && within(x, s.x.1) && within(y, s.y.0) && within(y, s.y.1);
+    match mark {
+        Mark::Line(points) | Mark::Dots(points) | Mark::Points(points) => {
+            points.iter().all(|p| within(x, p.0) && within(y, p.1))
+        }
+        Mark::ErrorBars(bars) => {
+            (bars.iter()).all(|b| within(x, b.at) && within(y, b.low) && within(y, b.high))
+        }
+        Mark::ErrorBarsAcross(bars) => {
+            (bars.iter()).all(|b| within(y, b.at) && within(x, b.low) && within(x, b.high))
+        }
+        Mark::Bars(all) => all.iter().all(spans),
+        Mark::Heat { cells, .. } => cells.iter().all(|c| spans(&c.0)),
     }
 }
 
@@ -169,9 +198,11 @@ pub(super) fn share(value: f64, low: f64, high: f64) -> f64 {
     if share.is_finite() { share } else { 0.5 }
 }
 
+/// Of stroke and fill, not of the whole element, which would cost a layer.
 fn opacity(look: Look) -> String {
     if look.opacity < 1.0 {
-        format!(" opacity=\"{}\"", px(look.opacity))
+        let share = px(look.opacity);
+        format!(" stroke-opacity=\"{share}\" fill-opacity=\"{share}\"")
     } else {
         String::new()
     }

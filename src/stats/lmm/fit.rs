@@ -130,12 +130,17 @@ pub fn fit(table: &Table, random: Random, criterion: Criterion) -> Result<Fit<'_
         deviance(&p, criterion, weight)
     };
     let bounded = coordinates.bounded();
-    let found = coordinates
-        .starts(&value)
+    let starts = coordinates.starts(&value);
+    let mut ends = starts
         .iter()
-        .filter_map(|start| minimize(&value, start, &bounded))
-        .min_by(|a, b| a.value.total_cmp(&b.value))
-        .ok_or(LmmError::NotConverged)?;
+        .filter_map(|start| minimize(&value, start, &bounded));
+    let found = if bounded.len() == 1 {
+        // The criterion can have two minima.
+        ends.min_by(|a, b| a.value.total_cmp(&b.value))
+    } else {
+        ends.next()
+    }
+    .ok_or(LmmError::NotConverged)?;
     let ratios = coordinates.ratios(&found.at);
     let profile = profile(table, random, &ratios).ok_or(LmmError::NotConverged)?;
     let sigma2 = profile.rss / weight;

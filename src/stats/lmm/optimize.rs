@@ -3,8 +3,10 @@
 //! A step is −Σ q q'g/|λ| over the eigenpairs of the Hessian of the coordinates
 //! that are free: downhill also where the criterion is not convex. It is halved
 //! until the criterion falls. A bounded coordinate that is 0 and wants to go
-//! below is held at 0 exactly. The search has converged when the step promises
-//! less than 10⁻⁷ of deviance; three more steps then polish the digits.
+//! below is held at 0 exactly. A direction with next to no slope and no curvature
+//! is left alone: where the intercept has no variance, θ₂² and δ are one, and the
+//! criterion is flat along their sum. The search has converged when the step
+//! promises less than 10⁻⁷ of deviance; three more steps then polish the digits.
 
 use super::differences::second;
 use nalgebra::{DVector, SymmetricEigen};
@@ -26,6 +28,11 @@ const REACH: f64 = 3.0;
 const SMALL: f64 = 1e-7;
 /// γ = e⁴⁰ times the error: nothing is left to explain.
 const FAR: f64 = 40.0;
+
+/// Share of the largest curvature below which there is none, and the slope below
+/// which it is the noise of differences.
+const FLAT: f64 = 1e-6;
+const LEVEL: f64 = 1e-5;
 
 /// Searches from a point; `None` if it does not converge.
 pub(super) fn minimize(
@@ -118,6 +125,10 @@ fn direction(g: &DVector<f64>, h: nalgebra::DMatrix<f64>) -> Option<(DVector<f64
     let mut along = eigen.eigenvectors.tr_mul(g);
     let mut promise = 0.0;
     for (a, l) in along.iter_mut().zip(eigen.eigenvalues.iter()) {
+        if l.abs() < FLAT * largest && a.abs() < LEVEL {
+            *a = 0.0;
+            continue;
+        }
         let size = l.abs().max(floor);
         promise += 0.5 * *a * *a / size;
         *a /= -size;
@@ -148,6 +159,15 @@ mod tests {
         assert_eq!(m.at[0], 0.0);
         assert!((m.at[1] - 2.0).abs() < 1e-10);
         assert_eq!(m.free, [1]);
+    }
+
+    #[test]
+    fn a_flat_direction_is_no_reason_to_give_up() {
+        // Only the sum of the squares has a minimum; the digits are those of a
+        // criterion of 150.
+        let f = |x: &[f64]| Some(150.0 + (x[0] * x[0] + x[1] * x[1] - 2.0).powi(2));
+        let m = minimize(&f, &[0.3, 1.0], &[false, false]).unwrap();
+        assert!((m.value - 150.0).abs() < 1e-9, "{m:?}");
     }
 
     #[test]

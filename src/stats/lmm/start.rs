@@ -9,6 +9,9 @@ use super::Random;
 use super::data::Table;
 use super::profile::Ratios;
 
+/// Most points that are started from.
+const MAX_STARTS: usize = 4;
+
 /// Maps the coordinates to variance ratios.
 #[derive(Debug, Clone)]
 pub(super) struct Coordinates {
@@ -75,8 +78,9 @@ impl Coordinates {
         ratios
     }
 
-    /// Points of a coarse grid from which the search starts; of one coordinate
-    /// the whole line, of more the best of them.
+    /// Points of a coarse grid from which the search starts: of one coordinate
+    /// every dip of the line, of more the best of them, and the next best for when
+    /// the search does not come to an end from there.
     pub(super) fn starts(&self, f: &dyn Fn(&[f64]) -> Option<f64>) -> Vec<Vec<f64>> {
         let bounded = self.bounded();
         let axes: Vec<&[f64]> = match (bounded.len(), self.random.slope) {
@@ -104,21 +108,18 @@ impl Coordinates {
             .iter()
             .map(|p| f(p).unwrap_or(f64::INFINITY))
             .collect();
-        let best = |i: &usize| {
-            if axes.len() == 1 {
-                // Every dip of the line.
-                (*i == 0 || values[*i] <= values[i - 1])
-                    && (i + 1 == values.len() || values[*i] <= values[i + 1])
-            } else {
-                values.iter().all(|v| values[*i] <= *v)
-            }
-        };
-        let mut starts: Vec<Vec<f64>> = (0..points.len())
+        let mut order: Vec<usize> = (0..points.len())
             .filter(|i| values[*i].is_finite())
-            .filter(best)
-            .map(|i| points[i].clone())
             .collect();
-        starts.truncate(if axes.len() == 1 { 4 } else { 1 });
-        starts
+        if axes.len() == 1 {
+            order.retain(|&i| {
+                (i == 0 || values[i] <= values[i - 1])
+                    && (i + 1 == values.len() || values[i] <= values[i + 1])
+            });
+        } else {
+            order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+        }
+        order.truncate(MAX_STARTS);
+        order.iter().map(|&i| points[i].clone()).collect()
     }
 }
