@@ -4,7 +4,7 @@
 
 mod wire_support;
 
-use study::device::firmware::Options;
+use study::device::firmware::{Flaw, Options};
 use study::device::wire::probe::PathCrc;
 use study::device::wire::{
     Commit, Event, Fault, Few, Happening, Hello, Loaded, Node, PathBegin, PathChunk, Play, Record,
@@ -667,4 +667,97 @@ fn held_still_the_sign_chatters_and_a_direction_state_does_not() {
             assert_eq!(held(direction, servo_hz, 1.0), 0.0, "{direction:?}");
         }
     }
+}
+
+/// What each planted defect looks like from the other end of the wire.
+#[test]
+fn every_flaw_shows() {
+    let flawed = |flaw| Options {
+        flaw: Some(flaw),
+        ..Options::default()
+    };
+    let playing = |flaw| Host::playing(flawed(flaw), ms(1000));
+
+    let mut host = Host::opened(flawed(Flaw::TakesDamaged));
+    let mut damaged = Request::State.frame(9).as_bytes().to_vec();
+    damaged[6] ^= 0x10;
+    assert!(matches!(host.send(&damaged), Some(Reply::Outcome(_))));
+
+    let mut host = Host::new(flawed(Flaw::OtherVersion));
+    let ack = host.ack(Request::Hello(Hello { nonce: 1 }));
+    assert_eq!((ack.refusal, ack.detail), (Refusal::Version, 2));
+
+    let mut host = playing(Flaw::DeafToLimp);
+    assert_eq!(host.ack(Request::Limp).state, State::Limp);
+    assert_eq!(host.device.state(), State::Run);
+
+    let mut host = playing(Flaw::Repeats);
+    let first = host.ask_as(5000, Request::Rearm).unwrap();
+    host.live(ms(10));
+    assert_ne!(host.ask_as(5000, Request::Rearm), Some(first));
+
+    let mut host = playing(Flaw::Unlatched);
+    host.wait(ms(100));
+    assert_eq!(host.outcome().state, State::Idle);
+    assert_eq!(host.device.state(), State::Limp);
+
+    let mut host = playing(Flaw::TakesStale);
+    let clock = host.clock_ms();
+    assert!(host.beat_as(1_000_000, clock.wrapping_sub(500)).fresh);
+
+    let mut host = playing(Flaw::LateWatchdog);
+    host.beat();
+    host.wait(ms(250));
+    assert_eq!(host.device.state(), State::Run);
+    let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1 })) else {
+        panic!();
+    };
+    assert_eq!(identity.watchdog_ms, 30);
+
+    for (flaw, spoil) in [
+        (Flaw::TakesBadTables, f64::NAN),
+        (Flaw::TakesUncertified, -0.1),
+    ] {
+        let mut host = Host::opened(flawed(flaw));
+        let mut nodes = detents(0.05, 0.02);
+        nodes[3].positive[0] = spoil;
+        assert_eq!(host.upload(begin(&nodes), &nodes).0.refusal, Refusal::None);
+        assert_eq!(host.device.state(), State::Idle);
+    }
+
+    let most = |flaw| {
+        let mut host = Host::playing(flawed(flaw), ms(3000));
+        (host.outcome().most_force_n, host)
+    };
+    let (plain, _) = most(Flaw::SlowStop);
+    let (more, _) = most(Flaw::NoClamp);
+    assert_eq!(more, 1.5 * plain);
+
+    let (_, host) = most(Flaw::LosesTelemetry);
+    let mut expected = 0;
+    let gaps = host.heard.iter().filter(|reply| match reply {
+        Reply::Telemetry(telemetry) => {
+            let gap = telemetry.first != expected;
+            expected = telemetry.first + telemetry.samples.as_slice().len() as u32;
+            gap
+        }
+        _ => false,
+    });
+    assert!(gaps.count() > 20);
+
+    let mut host = Host::new(flawed(Flaw::SlowReplies));
+    let hello = Request::Hello(Hello { nonce: 1 });
+    assert!(host.send(hello.frame(1).as_bytes()).is_none());
+    host.wait(ms(49));
+    assert_eq!(host.heard, []);
+    host.wait(ms(2));
+    assert!(matches!(host.heard[..], [Reply::Identity(_)]));
+
+    let mut host = playing(Flaw::SlowStop);
+    let stop = Request::Stop(Stop { playback: 7 });
+    assert!(host.send(stop.frame(9000).as_bytes()).is_none());
+    host.live(ms(190));
+    assert_eq!(host.device.state(), State::Run);
+    host.live(ms(20));
+    assert_eq!(host.device.state(), State::Loaded);
 }
