@@ -1,5 +1,8 @@
 //! `study device`: what could play.
 
+mod check;
+mod port;
+mod rendered;
 mod simulate;
 
 use super::{Console, Failure, Kind, load};
@@ -23,6 +26,10 @@ enum What {
         #[arg(long)]
         json: bool,
     },
+    /// Ask a device who it is and what it can do
+    Info(check::InfoArgs),
+    /// Check a device against docs/wire.md, clause by clause
+    Check(check::CheckArgs),
     /// Be a simulated device on a pseudo-terminal, whose path is the first line
     Simulate(simulate::Args),
     /// Show what to write on the samples of a study: for who labels them, not for
@@ -37,6 +44,8 @@ enum What {
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     match &args.what {
         What::List { json } => list(*json, console),
+        What::Info(args) => check::info(args, console),
+        What::Check(args) => check::check(args, console),
         What::Simulate(args) => simulate::run(args, console),
         What::Codes { protocol } => codes(protocol, console),
     }

@@ -118,9 +118,9 @@ pub fn commission(
     let mut verdicts = Vec::new();
     for Clause { clause, what, look } in clauses::ALL {
         // each begins with a device that is limp, idle and heard
-        let ready = match *clause {
-            clauses::HANDSHAKE => Ok(()),
-            _ => talk.ready(),
+        let ready = match verdicts.is_empty() {
+            true => Ok(()),
+            false => talk.ready(),
         };
         let kept = ready.and_then(|()| look(&mut talk));
         let (pass, seen, gone) = match kept {
@@ -147,6 +147,18 @@ pub fn commission(
         device: talk.device,
         verdicts,
         latency_ms: talk.latency_ms,
+    }
+}
+
+/// Who is at the end of a wire: zero force, then HELLO.
+///
+/// # Errors
+/// In words: nobody, somebody else, another version.
+pub fn greet(wire: &mut dyn Wire, nonce: u32) -> Result<Identity, String> {
+    let mut talk = Talk::new(wire, nonce);
+    match clauses::introduce(&mut talk) {
+        Ok(device) => Ok(device),
+        Err(Broken::Seen(why) | Broken::Gone(why)) => Err(why),
     }
 }
 

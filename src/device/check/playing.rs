@@ -90,7 +90,11 @@ pub(super) fn telemetry(talk: &mut Talk<'_>) -> Kept {
     let late_ms = talk
         .telemetry
         .iter()
-        .filter_map(|(at, t)| Some(f64::from(talk.clock.at(*at)?.wrapping_sub(t.clock_ms) as i32)))
+        .filter_map(|(at, t)| {
+            Some(f64::from(
+                talk.clock.at(*at)?.wrapping_sub(t.clock_ms) as i32
+            ))
+        })
         .fold(0.0, f64::max);
     let Some((first, last)) = all.first().zip(all.last()) else {
         return Err(Broken::seen("nothing came"));
@@ -112,7 +116,9 @@ pub(super) fn telemetry(talk: &mut Talk<'_>) -> Kept {
     }
     let asked = device.telemetry_hz.min(1000.0);
     if !(0.9 * asked..=1.01 * asked).contains(&rate_hz) {
-        return Err(Broken::seen(format!("{seen}; {asked:.0} Hz were asked for")));
+        return Err(Broken::seen(format!(
+            "{seen}; {asked:.0} Hz were asked for"
+        )));
     }
     let events = &talk.events;
     if !events.iter().any(|e| e.what == Happening::Stopped) {
@@ -135,9 +141,8 @@ pub(super) fn clamp(talk: &mut Talk<'_>) -> Kept {
     let most_n = all.iter().map(force_n).fold(outcome.most_force_n, f64::max);
     let early = |s: &&TelemetrySample| f64::from(s.tick) < 0.05 * playback.servo_hz;
     let early_n = all.iter().filter(early).map(force_n).fold(0.0, f64::max);
-    let seen = format!(
-        "{most_n:.3} N at a limit of {limit_n} N; {early_n:.3} N in the first 50 ms"
-    );
+    let seen =
+        format!("{most_n:.3} N at a limit of {limit_n} N; {early_n:.3} N in the first 50 ms");
     if most_n > limit_n + 1e-6 {
         return Err(Broken::seen(seen));
     }
@@ -156,19 +161,36 @@ fn overhang_ms(playback: &Playback, ack: &Ack, ticks: u32) -> f64 {
     1e3 * f64::from(ticks) / playback.servo_hz - by_clock
 }
 
+/// A request that has to end the force at once: its acknowledgement, and how long it
+/// took by the device's clock, ms, with what the link may take.
+fn at_once(talk: &mut Talk<'_>, request: Request) -> Result<(Ack, f64, f64), Broken> {
+    let device = talk.identity()?;
+    let now = talk.now();
+    let sent_ms = talk.clock.at(now).unwrap_or(device.clock_ms);
+    let ack = talk.done(request)?;
+    let took_ms = f64::from(ack.clock_ms.wrapping_sub(sent_ms) as i32);
+    let [.., most_ms] = talk.latency_ms.unwrap_or([0.0; 3]);
+    let allowed_ms = 1.0 + 1e3 / device.servo_hz + most_ms + GRAIN_MS;
+    Ok((ack, took_ms, allowed_ms))
+}
+
 pub(super) fn stop(talk: &mut Talk<'_>) -> Kept {
     let playback = play(talk, 1.0, 60_000)?;
     talk.pass(SECOND)?;
     still_plays(talk)?;
-    let ack = talk.done(stop_request(&playback))?;
+    let (ack, took_ms, allowed_ms) = at_once(talk, stop_request(&playback))?;
     talk.pass(SECOND / 10)?;
     let outcome = talk.outcome()?;
     let over_ms = overhang_ms(&playback, &ack, outcome.ticks);
-    let seen = format!("{:.1} ms after its reply", over_ms.max(0.0));
+    let seen = format!(
+        "done {:.0} ms after it was sent, zero force {:.1} ms after its reply",
+        took_ms.max(0.0),
+        over_ms.max(0.0)
+    );
     if ack.state.forceful() {
         return Err(Broken::seen(format!("STOP: {}", ack.state.as_str())));
     }
-    if over_ms > 1.0 + 1e3 / playback.servo_hz + GRAIN_MS {
+    if took_ms > allowed_ms || over_ms > 1.0 + 1e3 / playback.servo_hz + GRAIN_MS {
         return Err(Broken::seen(seen));
     }
     if outcome.state != State::Loaded {
@@ -181,15 +203,19 @@ pub(super) fn limp(talk: &mut Talk<'_>) -> Kept {
     let playback = play(talk, 1.0, 60_000)?;
     talk.pass(SECOND / 2)?;
     still_plays(talk)?;
-    let ack = talk.done(Request::Limp)?;
+    let (ack, took_ms, allowed_ms) = at_once(talk, Request::Limp)?;
     talk.pass(SECOND / 10)?;
     let outcome = talk.outcome()?;
     let over_ms = overhang_ms(&playback, &ack, outcome.ticks);
-    let seen = format!("{:.1} ms after its reply", over_ms.max(0.0));
+    let seen = format!(
+        "done {:.0} ms after it was sent, zero force {:.1} ms after its reply",
+        took_ms.max(0.0),
+        over_ms.max(0.0)
+    );
     if ack.state != State::Limp || outcome.state != State::Limp {
         return Err(Broken::seen(format!("LIMP: {}", outcome.state.as_str())));
     }
-    if over_ms > 1.0 + 1e3 / playback.servo_hz + GRAIN_MS {
+    if took_ms > allowed_ms || over_ms > 1.0 + 1e3 / playback.servo_hz + GRAIN_MS {
         return Err(Broken::seen(seen));
     }
     Ok(seen)
@@ -201,7 +227,10 @@ pub(super) fn longest(talk: &mut Talk<'_>) -> Kept {
     talk.pass(SECOND)?;
     let outcome = talk.outcome()?;
     let lasted_ms = 1e3 * f64::from(outcome.ticks) / playback.servo_hz;
-    let seen = format!("{lasted_ms:.0} ms of {LONGEST_MS} ms, {}", outcome.fault.as_str());
+    let seen = format!(
+        "{lasted_ms:.0} ms of {LONGEST_MS} ms, {}",
+        outcome.fault.as_str()
+    );
     let ended = outcome.state == State::Loaded && outcome.fault == Fault::Longest;
     if ended && (lasted_ms - f64::from(LONGEST_MS)).abs() <= GRAIN_MS + 1.0 {
         Ok(seen)
@@ -249,7 +278,10 @@ pub(super) fn watchdog(talk: &mut Talk<'_>) -> Kept {
     talk.pass(SECOND / 5)?;
     let later = talk.outcome()?;
     if later.state != State::Limp || later.ticks != outcome.ticks {
-        return Err(Broken::seen(format!("{seen}, then {}", later.state.as_str())));
+        return Err(Broken::seen(format!(
+            "{seen}, then {}",
+            later.state.as_str()
+        )));
     }
     let (all, _) = samples(talk, &playback);
     let last_tick = all.last().map_or(0, |s| s.tick);

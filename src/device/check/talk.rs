@@ -5,7 +5,7 @@ use crate::device::frame::{Decoder, Frame};
 use crate::device::host::{BEAT, DeviceClock, RETRY, TRIES};
 use crate::device::wire::{
     Ack, Event, Heartbeat, Hello, Identity, Outcome, Pulse, Refusal, Reply, Request, State,
-    Telemetry,
+    Telemetry, VERSION,
 };
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -262,6 +262,14 @@ impl<'w> Talk<'w> {
         self.nonce = self.nonce.wrapping_add(1);
         let sent = self.now();
         let came = self.ask(Request::Hello(Hello { nonce: self.nonce }))?;
+        if let Reply::Ack(ack) = came.reply
+            && ack.refusal == Refusal::Version
+        {
+            return Err(Broken::Gone(format!(
+                "it speaks version {} of the wire format and not {VERSION}",
+                ack.detail
+            )));
+        }
         let Reply::Identity(identity) = came.reply else {
             return Err(Broken::seen(format!(
                 "HELLO is answered by type 0x{:02x}",
@@ -303,6 +311,15 @@ impl<'w> Talk<'w> {
         self.events.clear();
         self.pulses.clear();
         self.replies.clear();
+        // the new connection has not heard one yet
+        self.next_beat = self.now();
+        let until = self.now() + RETRY;
+        while !self.pulses.iter().any(|pulse| pulse.fresh) {
+            if self.now() > until {
+                return Err(Broken::seen("no heartbeat is fresh after HELLO"));
+            }
+            self.pass(SLICE)?;
+        }
         Ok(())
     }
 }
