@@ -1,8 +1,10 @@
 //! `study device`: what could play.
 
 mod check;
+mod hold;
 mod port;
 mod rendered;
+mod safety;
 mod simulate;
 
 use super::{Console, Failure, Kind, load};
@@ -32,6 +34,13 @@ enum What {
     Check(check::CheckArgs),
     /// Be a simulated device on a pseudo-terminal, whose path is the first line
     Simulate(simulate::Args),
+    /// Play one table for long, without a session
+    #[command(hide = true)]
+    Hold(hold::Args),
+    /// Measure the time to zero force when the host is killed, stopped, stalled or
+    /// unplugged, on a simulated device
+    #[command(hide = true)]
+    Safety(safety::Args),
     /// Show what to write on the samples of a study: for who labels them, not for
     /// the experimenter
     Codes {
@@ -46,6 +55,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         What::List { json } => list(*json, console),
         What::Info(args) => check::info(args, console),
         What::Check(args) => check::check(args, console),
+        What::Hold(args) => hold::run(args, console),
+        What::Safety(args) => safety::run(args, console),
         What::Simulate(args) => simulate::run(args, console),
         What::Codes { protocol } => codes(protocol, console),
     }
