@@ -453,7 +453,7 @@ pub fn sample_codes(protocol: &Protocol) -> BTreeMap<ModelId, String> {
 /// The limits for a table: the protocol's, and under its `uncertified` permission
 /// the lower force of that for a table that fails its certificate, which can put
 /// energy into the hand.
-fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limits {
+pub fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limits {
     let mut limits = protocol.device.limits;
     if let Some(uncertified) = &protocol.device.uncertified
         && table.is_some_and(|table| !table.certificate().passes())

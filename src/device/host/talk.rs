@@ -14,6 +14,11 @@ impl Host {
         self.unheard = None;
         match reply {
             Reply::Identity(identity) => self.greeted(sequence, identity, at),
+            Reply::Ack(ack) if self.stage == Stage::Greeting && ack.refusal == Refusal::Version => {
+                // all that a device of another time says to HELLO
+                let version = u8::try_from(ack.detail).unwrap_or(u8::MAX);
+                self.other_version(version, at);
+            }
             _ if !self.stage.known() => {}
             Reply::Ack(ack) => {
                 let Some(flight) = self.flight else { return };
