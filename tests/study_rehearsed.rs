@@ -28,7 +28,7 @@ fn a_study_with_a_failing_device_ends_and_is_whole() {
     let attempts = fs::read_to_string(folder.join("r/turn-signal-extended/attempts.csv")).unwrap();
     assert!(attempts.contains("failure"), "no fault was ever met");
     assert!(
-        attempts.contains("has sent nothing for"),
+        attempts.contains("it does not answer any more"),
         "no device ever went mute"
     );
     let ratings = folder.join("r/turn-signal-extended/ratings.csv");
