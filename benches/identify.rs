@@ -3,6 +3,9 @@
 //! `ns per sample and lambda` is the recursion alone, 10 λ and one table, on one
 //! thread; `naive` is the same with one estimate a sample. `fig4` is everything from
 //! the sorted samples to VAFs, 10 λ × 11 dx, on one thread.
+//!
+//! Above the table stand the same as processor time (Linux), the least of 20: what
+//! other programs on the machine take does not count.
 
 use std::fmt::Write as _;
 use study::identify::grid::{self, Plan};
@@ -18,7 +21,55 @@ const LAMBDAS: [f64; 10] = [
 const DX_MM: [f64; 11] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
 
 fn main() {
+    if std::env::args().any(|argument| argument == "--bench") {
+        processor_time();
+    }
     divan::main();
+}
+
+/// Seconds that this thread has run, without those it waited; `None` where nobody
+/// counts them.
+fn ran_s() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(text.split(' ').next()?.parse::<f64>().ok()? * 1e-9)
+}
+
+/// Prints the processor time of a whole Fig. 4 and of one sample and λ, sums of the
+/// table included.
+#[allow(clippy::print_stdout, reason = "a bench talks to whoever runs it")]
+fn processor_time() {
+    let twelve: Vec<f64> = (0..12).map(|i| 0.9988 + 1e-4 * f64::from(i)).collect();
+    for (rate, lambdas, dx_mm, validated) in [
+        (1000, &LAMBDAS[..], &DX_MM[..], true),
+        (10_000, &LAMBDAS, &DX_MM, true),
+        (10_000, &LAMBDAS, &[0.5], false),
+        (10_000, &twelve, &[0.5], false),
+    ] {
+        let (train, validation) = pair(rate);
+        let training = Training::new(&train).expect("both directions are there");
+        let plan = Plan::ewls(lambdas, dx_mm, Resample::Bin);
+        let validations: &[&Recording] = if validated { &[&validation] } else { &[] };
+        let least = (0..20)
+            .filter_map(|_| {
+                // inside of it there is one thread, and only that is asked
+                alone().install(|| {
+                    let before = ran_s()?;
+                    let cells = grid::run(&training, &plan, Lookup::Linear, validations, || ());
+                    divan::black_box(cells).expect("the plan suits the recording");
+                    Some(ran_s()? - before)
+                })
+            })
+            .fold(f64::INFINITY, f64::min);
+        println!(
+            "{} λ × {} dx of {} samples{}: {:.1} ms, {:.2} ns per sample and λ",
+            lambdas.len(),
+            dx_mm.len(),
+            train.len(),
+            if validated { " and their VAFs" } else { "" },
+            1e3 * least,
+            1e9 * least / (train.len() * lambdas.len()) as f64
+        );
+    }
 }
 
 /// The paper's training or validation motion on a made-up switch, at a rate in Hz.

@@ -60,6 +60,9 @@ pub struct Training<'r> {
     negative: Sorted,
     /// Where both directions have samples, mm.
     range_mm: [f64; 2],
+    // every table asks for these two, and a grid has a hundred tables
+    force_range_n: [f64; 2],
+    top_speed_mm_s: f64,
 }
 
 impl<'r> Training<'r> {
@@ -89,6 +92,13 @@ impl<'r> Training<'r> {
             positive,
             negative,
             range_mm: [low, high],
+            force_range_n: recording
+                .f_n
+                .iter()
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], f| {
+                    [f.min(low), f.max(high)]
+                }),
+            top_speed_mm_s: recording.top_speed_mm_s(),
         })
     }
 
@@ -371,7 +381,7 @@ impl<'r> Training<'r> {
             });
         }
         let both = [&positive.theta, &negative.theta];
-        warnings.extend(problem::unmeasured(&self.recording.f_n, &nodes, both));
+        warnings.extend(problem::unmeasured(self.force_range_n, &nodes, both));
         Identified {
             realization: Realization {
                 id: String::new(),
@@ -381,7 +391,7 @@ impl<'r> Training<'r> {
                 direction: Direction::Sign,
                 trained: Trained {
                     x_mm: self.range_mm,
-                    v_mm_s: self.recording.top_speed_mm_s(),
+                    v_mm_s: self.top_speed_mm_s,
                 },
                 x_mm: nodes,
                 positive: branch(&positive.theta),

@@ -11,8 +11,8 @@ use study::identify::lanes::Processor;
 use study::identify::method::{Ewls, Sort, Start};
 use study::identify::resample::Resample;
 use study::identify::{IdentifyError, Method, Training, vaf};
-use study::model::Branch;
 use study::model::predict::Lookup;
+use study::model::{Branch, Realization};
 use study::recording::{self, Recording};
 
 fn recording(name: &str) -> Recording {
@@ -116,6 +116,92 @@ fn the_grid_agrees_with_one_cell_at_a_time() {
             assert!((found.vaf - score.vaf).abs() <= 1e-7, "{found:?} {score:?}");
             assert!((found.bias_n - score.bias_n).abs() <= 1e-7);
             assert!((found.residual_n - score.residual_n).abs() <= 1e-7);
+        }
+    }
+}
+
+/// The plain recursion and the lanes round differently; on a whole recording and for
+/// the λ of the paper's grid that is less than 1e-9 of a table's scale and of a VAF.
+#[test]
+fn for_the_papers_lambda_the_grid_is_the_plain_recursion_to_1e9() {
+    let (train, validation) = (recording("training_a.csv"), recording("validation_a.csv"));
+    let training = Training::new(&train).unwrap();
+    let lambdas = [0.999, 0.9995, 0.9999];
+    for resample in [Resample::Bin, Resample::Point] {
+        let plan = Plan::ewls(&lambdas, &[0.5, 1.0], resample);
+        let cells = grid::run(&training, &plan, Lookup::Linear, &[&validation], || ()).unwrap();
+        for (lambda, cells) in lambdas.iter().zip(cells.chunks(2)) {
+            let estimates = training.estimates(*lambda).unwrap();
+            for (cell, dx) in cells.iter().zip([0.5, 1.0]) {
+                let plain = training
+                    .ewls(&estimates, dx, resample, Lookup::Linear)
+                    .unwrap()
+                    .realization;
+                let both = |r: &Realization| -> Vec<f64> {
+                    parameters(&r.positive)
+                        .chain(parameters(&r.negative))
+                        .collect()
+                };
+                let (found, expected) = (both(&cell.realization), both(&plain));
+                let scale = expected.iter().fold(1.0_f64, |top, p| top.max(p.abs()));
+                for (found, expected) in found.iter().zip(&expected) {
+                    assert!(
+                        (found - expected).abs() <= 1e-9 * scale,
+                        "λ {lambda} dx {dx}: {found} {expected}"
+                    );
+                }
+                let vaf = vaf::score(&plain, &validation).vaf;
+                assert!(
+                    (cell.scores[0].vaf - vaf).abs() <= 1e-9,
+                    "λ {lambda} dx {dx}"
+                );
+            }
+        }
+    }
+}
+
+/// With bounds the recursion is the same one sample at a time, so that only the order
+/// of addition differs.
+#[test]
+fn a_bounded_grid_agrees_with_one_cell_at_a_time() {
+    let train = thinned("training_a.csv", 50);
+    let validation = thinned("validation_a.csv", 50);
+    let training = Training::new(&train).unwrap();
+    for mut plan in all_plans() {
+        for method in &mut plan.methods {
+            if let Method::Ewls(options) = method {
+                options.bounded = true;
+            }
+        }
+        let cells = grid::run(&training, &plan, Lookup::Linear, &[&validation], || ()).unwrap();
+        for cell in &cells {
+            let dx = cell.realization.provenance.dx_mm.unwrap();
+            let alone = training.identify(cell.method, dx, Lookup::Linear).unwrap();
+            assert_eq!(cell.warnings, alone.warnings, "{} {dx}", cell.method);
+            assert_eq!(
+                cell.realization.provenance.method,
+                alone.realization.provenance.method
+            );
+            for (found, expected) in [
+                (&cell.realization.positive, &alone.realization.positive),
+                (&cell.realization.negative, &alone.realization.negative),
+            ] {
+                assert!(
+                    found
+                        .m_kg
+                        .iter()
+                        .chain(&found.b_n_s_per_mm)
+                        .all(|p| *p >= 0.0)
+                );
+                let scale = parameters(expected).fold(1.0_f64, |top, p| top.max(p.abs()));
+                for (found, expected) in parameters(found).zip(parameters(expected)) {
+                    assert!(
+                        (found - expected).abs() <= 1e-11 * scale,
+                        "{} dx {dx}: {found} {expected}",
+                        cell.method
+                    );
+                }
+            }
         }
     }
 }

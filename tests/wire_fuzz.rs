@@ -261,10 +261,10 @@ fn random_frames() {
     let mut fuzz = Fuzz::new(1);
     while fuzz.count.frames < frames() {
         let i = fuzz.count.frames;
-        if i % 1000 == 0 {
+        if i.is_multiple_of(1000) {
             fuzz.play();
         }
-        if i % 10 == 0 {
+        if i.is_multiple_of(10) {
             fuzz.beat();
         }
         let body = match fuzz.below(4) {
@@ -294,7 +294,7 @@ fn random_frames() {
         let frame = Frame::of(&body).unwrap();
         fuzz.send(frame.as_bytes());
         fuzz.count.frames += 1;
-        if i % 16 == 0 {
+        if i.is_multiple_of(16) {
             fuzz.in_step();
         }
     }
@@ -312,10 +312,10 @@ fn random_frames() {
 fn mutated_frames() {
     let mut fuzz = Fuzz::new(2);
     for i in 0..frames() {
-        if i % 1000 == 0 {
+        if i.is_multiple_of(1000) {
             fuzz.play();
         }
-        if i % 10 == 0 {
+        if i.is_multiple_of(10) {
             fuzz.beat();
         }
         let mut request = fuzz.request();
@@ -345,7 +345,7 @@ fn mutated_frames() {
         }
         fuzz.send(&bytes);
         fuzz.count.frames += 1;
-        if i % 16 == 0 {
+        if i.is_multiple_of(16) {
             fuzz.in_step();
         }
     }
@@ -357,4 +357,55 @@ fn mutated_frames() {
     );
     assert_eq!(fuzz.count.most_share, 1.0, "the limit was never reached");
     assert_ne!(fuzz.device.state(), State::Boot);
+}
+
+/// What a device may send a host: any bytes behind a header that is one. What is a
+/// message is the same message when it is sent on.
+#[test]
+fn random_replies() {
+    let mut fuzz = Fuzz::new(3);
+    let kinds = [
+        kind::ACK,
+        kind::IDENTITY,
+        kind::OUTCOME,
+        kind::PULSE,
+        kind::TELEMETRY,
+        kind::EVENT,
+        kind::RECORDED,
+    ];
+    // the length of each, as far as it is fixed, so that most are not refused for it
+    let lengths = [12, 153, 91, 11, 21, 15, 13];
+    let mut messages = 0u64;
+    for _ in 0..frames() {
+        let which = fuzz.below(7) as usize;
+        let samples = fuzz.below(4) as usize;
+        let mut body = vec![1, kinds[which], 0, 0];
+        let more = match kinds[which] {
+            kind::TELEMETRY => 20 * samples,
+            kind::RECORDED => 12 * samples,
+            _ => 0,
+        };
+        let small = fuzz.below(2) == 0;
+        for i in 0..lengths[which] + more {
+            // small bytes are codes more often than not
+            let byte = fuzz.below(if small && i < 12 { 9 } else { 256 });
+            body.push(byte as u8);
+        }
+        if more > 0 {
+            body[4 + lengths[which] - 1] = samples as u8;
+        }
+        let Ok((header, reply)) = Reply::decode(&body) else {
+            continue;
+        };
+        messages += 1;
+        let frame = reply.frame(header.sequence);
+        let mut decoder = Decoder::new();
+        let again = frame.as_bytes().iter().find_map(|byte| {
+            let body = decoder.push(*byte)?;
+            Some(Reply::decode(body.unwrap()).unwrap())
+        });
+        assert_eq!(again, Some((header, reply)));
+    }
+    eprintln!("random replies: {messages} were messages");
+    assert!(messages > frames() / 10, "{messages}");
 }

@@ -779,7 +779,9 @@ fn the_crc_over_a_whole_is_that_of_its_fields_in_a_row() {
         force_n: 20.0,
         velocity_mm_s: 500.0,
     });
-    [17_500_000, 17_500_250, -1].map(|point| crc.point(point));
+    for point in [17_500_000, 17_500_250, -1] {
+        crc.point(point);
+    }
     assert_eq!(crc.value(), PATH_CRC);
 }
 

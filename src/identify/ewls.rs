@@ -23,6 +23,7 @@
 //! Not here: the order of the samples and the choice of nodes.
 
 use super::constrained;
+use super::lanes::recursion::{Run, Sums};
 use super::method::{Ewls, Sort, Start};
 use super::resample::Resample;
 
@@ -100,16 +101,15 @@ pub fn estimate_with(samples: &Sorted, options: &Ewls, backward: bool) -> Vec<Th
         Sort::Travel | Sort::Ascending => (0..samples.len()).collect(),
     };
     let mut recursion = Recursion::cold(options.lambda);
-    let phi = |i: usize| [samples.a_m_s2[i], samples.v_mm_s[i], samples.x_mm[i], 1.0];
     if options.start == Start::Warm {
         let first = warm_samples(options.lambda).min(order.len());
         for i in order[..first].iter().rev() {
-            recursion.step(phi(*i), samples.f_n[*i]);
+            recursion.pass(samples, *i);
         }
     }
     let mut estimates = vec![[0.0; 4]; samples.len()];
     for i in order {
-        recursion.step(phi(i), samples.f_n[i]);
+        recursion.pass(samples, i);
         estimates[i] = if options.bounded {
             recursion.bounded()
         } else {
@@ -117,6 +117,46 @@ pub fn estimate_with(samples: &Sorted, options: &Ewls, backward: bool) -> Vec<Th
         };
     }
     estimates
+}
+
+/// The sums over `runs` of the estimates with m, b ≥ 0, as [`super::lanes::recursion::sums`] has
+/// them of the free ones: `samples` in the order of the recursion, which passes back
+/// over the first `warm` of them before it begins. No estimate is kept. `None` if
+/// they are no numbers.
+pub(super) fn bounded_sums(
+    samples: &Sorted,
+    lambda: f64,
+    warm: usize,
+    runs: &[Run],
+    moments: bool,
+) -> Option<Vec<Sums>> {
+    let mut recursion = Recursion::cold(lambda);
+    for i in (0..warm.min(samples.len())).rev() {
+        recursion.pass(samples, i);
+    }
+    let mut at = 0;
+    runs.iter()
+        .map(|run| {
+            (at..run.from).for_each(|i| recursion.pass(samples, i));
+            at = run.to;
+            let mut sums = Sums::default();
+            for i in run.from..run.to {
+                recursion.pass(samples, i);
+                let theta = recursion.bounded();
+                let arm = if moments {
+                    samples.x_mm[i] - run.origin_mm
+                } else {
+                    0.0
+                };
+                for (k, p) in theta.iter().enumerate() {
+                    sums.theta[k] += p;
+                    sums.moment[k] += arm * p;
+                }
+            }
+            let finite = sums.theta.iter().chain(&sums.moment).all(|p| p.is_finite());
+            finite.then_some(sums)
+        })
+        .collect()
 }
 
 /// Samples that a warm start goes back over, 3/(1 − λ); saturates at λ = 1.
@@ -150,6 +190,11 @@ impl Recursion {
             theta: [0.0; 4],
             p,
         }
+    }
+
+    fn pass(&mut self, samples: &Sorted, i: usize) {
+        let phi = [samples.a_m_s2[i], samples.v_mm_s[i], samples.x_mm[i], 1.0];
+        self.step(phi, samples.f_n[i]);
     }
 
     fn step(&mut self, phi: [f64; 4], force: f64) {

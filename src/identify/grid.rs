@@ -14,7 +14,7 @@
 mod runs;
 
 use super::lanes::errors::errors;
-use super::lanes::recursion::{self, Sums};
+use super::lanes::recursion::{self, Run, Sums};
 use super::lanes::{LAMBDAS_A_PASS, Processor};
 use super::method::{Ewls, Sort, Start};
 use super::resample::{Resample, Resampled};
@@ -194,14 +194,14 @@ fn each(
         .collect()
 }
 
-/// The unbounded EWLS methods that differ in λ only, by their indices.
+/// The EWLS methods that differ in λ only, by their indices.
 fn families(methods: &[Method]) -> Vec<(Ewls, Vec<usize>)> {
     let mut families: Vec<(Ewls, Vec<usize>)> = Vec::new();
     for (i, method) in methods.iter().enumerate() {
         let Method::Ewls(options) = method else {
             continue;
         };
-        if options.bounded || options.lambda < recursion::LEAST_LAMBDA {
+        if !options.bounded && options.lambda < recursion::LEAST_LAMBDA {
             continue;
         }
         let same = |family: &Ewls| {
@@ -230,9 +230,10 @@ fn ewls_tables(
     let runs = training
         .directions()
         .map(|samples| Runs::new(options.resample, &samples.x_mm, tables));
+    let together = if options.bounded { 1 } else { LAMBDAS_A_PASS };
     let passes: Vec<(usize, &[f64])> = [0, 1]
         .into_iter()
-        .flat_map(|direction| lambdas.chunks(LAMBDAS_A_PASS).map(move |l| (direction, l)))
+        .flat_map(|direction| lambdas.chunks(together).map(move |l| (direction, l)))
         .collect();
     let sums: Vec<Option<Vec<Sums>>> = passes
         .into_par_iter()
@@ -267,14 +268,23 @@ fn ewls_tables(
                     .zip(runs[1].table(i, nodes, minus))
                     .map(Into::into);
                 match found {
-                    Some([positive, negative]) => Ok(training.ewls_table(
-                        options,
-                        nodes.dx_mm,
-                        nodes.x_mm.clone(),
-                        positive,
-                        negative,
-                        lookup,
-                    )),
+                    Some([mut positive, mut negative]) => {
+                        if options.bounded {
+                            // what is left of taking moments off may be -1e-18
+                            let thetas = positive.theta.iter_mut().chain(&mut negative.theta);
+                            for p in thetas.flat_map(|theta| &mut theta[..2]) {
+                                *p = p.max(0.0);
+                            }
+                        }
+                        Ok(training.ewls_table(
+                            options,
+                            nodes.dx_mm,
+                            nodes.x_mm.clone(),
+                            positive,
+                            negative,
+                            lookup,
+                        ))
+                    }
                     // no node has a sample of its own: see `resample`
                     None => training.identify(Method::Ewls(options), nodes.dx_mm, lookup),
                 }
@@ -298,25 +308,26 @@ fn pass(
         Start::Cold => 0,
         Start::Warm => ewls::warm_samples(lambda),
     };
+    let moments = runs.moments;
+    let of = |samples: &ewls::Sorted, runs: &[Run]| -> Vec<Option<Vec<Sums>>> {
+        if options.bounded {
+            let alone = |l: &f64| ewls::bounded_sums(samples, *l, warm(*l), runs, moments);
+            lambdas.iter().map(alone).collect()
+        } else {
+            recursion::sums(processor, samples, lambdas, warm, runs, moments)
+        }
+    };
     if !(backward && options.sort == Sort::Travel) {
-        return recursion::sums(processor, samples, lambdas, warm, &runs.runs, runs.moments);
+        return of(samples, &runs.runs);
     }
-    let turned = samples.descending();
     let n = samples.len();
-    let turn = |run: &recursion::Run| recursion::Run {
+    let turn = |run: &Run| Run {
         from: n - run.to,
         to: n - run.from,
         ..*run
     };
-    let turned_runs: Vec<recursion::Run> = runs.runs.iter().rev().map(turn).collect();
-    let mut sums = recursion::sums(
-        processor,
-        &turned,
-        lambdas,
-        warm,
-        &turned_runs,
-        runs.moments,
-    );
+    let turned: Vec<Run> = runs.runs.iter().rev().map(turn).collect();
+    let mut sums = of(&samples.descending(), &turned);
     for sums in sums.iter_mut().flatten() {
         sums.reverse();
     }

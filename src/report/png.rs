@@ -87,9 +87,11 @@ fn encoded(picture: &Pixmap) -> Result<Vec<u8>, png::EncodingError> {
     let mut encoder = png::Encoder::new(&mut bytes, picture.width(), picture.height());
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_compression(png::Compression::Fast);
-    let rgb: Vec<u8> = (picture.data().chunks_exact(4))
-        .flat_map(|p| [p[0], p[1], p[2]])
-        .collect();
+    encoder.set_filter(png::Filter::Up);
+    let mut rgb = Vec::with_capacity(picture.data().len() / 4 * 3);
+    for pixel in picture.data().chunks_exact(4) {
+        rgb.extend_from_slice(&pixel[..3]);
+    }
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&rgb)?;
     writer.finish()?;

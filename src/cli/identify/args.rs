@@ -118,7 +118,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, requires = "out")]
     pub(super) force: bool,
 
-    /// Write the figures (SVG) and their numbers (CSV) into this folder
+    /// Write the figures (SVG, PNG) and their numbers (CSV) into this folder
     #[arg(long, value_name = "DIR")]
     pub(super) figures: Option<PathBuf>,
 }

@@ -179,7 +179,15 @@ fn plane(scene: &Scene<'_>, dots: &[Dot], title: &str, c: Canvas) -> Figure {
     c.figure("rating-against-vaf", title, height).with(panel)
 }
 
-/// Names beside the dots, where they cover no other name and no other bar.
+/// A box, px: left, top, right, bottom.
+type Box = (f64, f64, f64, f64);
+
+fn overlap(a: &Box, b: &Box) -> bool {
+    !(a.2 < b.0 || b.2 < a.0 || a.3 < b.1 || b.3 < a.1)
+}
+
+/// Names beside the dots, inside the picture, where they cover no other name or dot,
+/// and as few bars as can be.
 fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> Vec<Note> {
     let place = |x: f64, y: f64| {
         let share = |v: f64, axis: &Axis| (v - axis.low) / (axis.high - axis.low);
@@ -188,27 +196,24 @@ fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> V
             (1.0 - share(y, &panel.y)) * room.1,
         )
     };
-    type Box = (f64, f64, f64, f64);
-    let apart = |a: &Box, b: &Box| a.2 < b.0 || b.2 < a.0 || a.3 < b.1 || b.3 < a.1;
-    let mut taken: Vec<Box> = Vec::new();
+    let mut names: Vec<Box> = Vec::new();
+    let mut bars: Vec<Box> = Vec::new();
     for d in dots {
         let (x, y) = place(d.vaf, d.mean);
-        taken.push((x - 5.0, y - 5.0, x + 5.0, y + 5.0));
+        names.push((x - 5.0, y - 5.0, x + 5.0, y + 5.0));
         if let Some((low, high)) = d.ends {
             let (top, bottom) = (place(d.vaf, high).1, place(d.vaf, low).1);
-            taken.push((x - 3.0, top, x + 3.0, bottom));
+            bars.push((x - 3.0, top, x + 3.0, bottom));
         }
     }
+    // From below upwards, so that names that give way keep the order of their dots.
+    let mut upwards: Vec<&Dot> = dots.iter().collect();
+    upwards.sort_by(|a, b| a.mean.total_cmp(&b.mean));
     let mut notes = Vec::new();
-    for d in dots {
-        let text = shortened(&scene.models[d.nth].id, 20);
+    for d in upwards {
+        let text = shortened(&scene.models[d.nth].id, 22);
         let (x, y) = place(d.vaf, d.mean);
         let width = text_width(&text, SMALL);
-        let mut candidates = Vec::new();
-        for down in [0.0, -14.0, 14.0, -28.0, 28.0, -42.0, 42.0] {
-            candidates.push((Anchor::Start, 9.0, down));
-            candidates.push((Anchor::End, -9.0, down));
-        }
         let boxed = |c: &(Anchor, f64, f64)| -> Box {
             let left = if c.0 == Anchor::Start {
                 x + c.1
@@ -217,15 +222,28 @@ fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> V
             };
             (left, y + c.2 - 7.0, left + width, y + c.2 + 7.0)
         };
-        let free = |c: &&(Anchor, f64, f64)| {
+        let cost = |c: &(Anchor, f64, f64)| -> usize {
             let own = boxed(c);
-            own.0 >= 0.0 && own.2 <= room.0 && taken.iter().all(|t| apart(t, &own))
+            let outside = own.0 < 0.0 || own.2 > room.0 || own.1 < 0.0 || own.3 > room.1;
+            let covered = |all: &[Box]| all.iter().filter(|b| overlap(b, &own)).count();
+            100 * usize::from(outside) + 10 * covered(&names) + covered(&bars)
         };
-        let best = candidates.iter().find(free).unwrap_or(&candidates[0]);
-        taken.push(boxed(best));
+        let mut best = (Anchor::Start, 9.0, 0.0);
+        for step in 0..16 {
+            // 0, −14, 14, −28, 28 …; the further away, the further aside.
+            let down = 14.0 * f64::from((step + 1) / 2) * if step % 2 == 1 { -1.0 } else { 1.0 };
+            let aside = 9.0 + 0.3 * down.abs();
+            for c in [(Anchor::Start, aside, down), (Anchor::End, -aside, down)] {
+                if cost(&c) < cost(&best) {
+                    best = c;
+                }
+            }
+        }
+        names.push(boxed(&best));
         let mut note = Note::new((d.vaf, d.mean), &text)
             .moved(best.1, best.2)
             .anchored(best.0);
+        note.rim = true;
         note.colour = Colour::INK;
         notes.push(note);
     }

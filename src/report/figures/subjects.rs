@@ -179,8 +179,8 @@ pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
 pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     let mut by: BTreeMap<(&str, u32), Vec<f64>> = BTreeMap::new();
     for row in scene.a.rows.iter().filter(|r| r.excluded.is_none()) {
-        if let (Some(x), true) = (row.rating, row.repetition > 0) {
-            let key = (&*row.model, row.repetition);
+        if let (Some(x), true) = (row.rating(), row.repetition > 0) {
+            let key = (scene.a.model(row), row.repetition);
             by.entry(key).or_default().push(x);
         }
     }
@@ -235,7 +235,14 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
         let thick = Look::plain(Colour::INK).stroke(3.0);
         let line: Vec<(f64, f64)> = (1..=last).map(at).collect();
         panel = panel.named("all", thick, Mark::Line(line));
-        c.figure("order", &title, c.pick(320.0, 340.0)).with(panel)
+        // A long legend takes nothing from the axes.
+        let names = scene
+            .models
+            .iter()
+            .map(|m| text_width(&name(m), SMALL) + 40.0);
+        let lines = (names.sum::<f64>() / (c.width - 80.0)).ceil();
+        let height = c.pick(320.0, 340.0) + 18.0 * (lines - 1.0).max(0.0);
+        c.figure("order", &title, height).with(panel)
     }))
 }
 
