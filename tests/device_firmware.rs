@@ -799,12 +799,12 @@ fn whenever_the_host_dies_the_force_is_zero_within_50_ms() {
     assert!(worst > ms(30) && worst <= ms(41), "{worst:?}");
 }
 
-fn recording(x_mm: impl Fn(f64) -> f64) -> (Host, u32) {
+fn recording(x_mm: impl Fn(f64) -> f64, force_n: f64) -> (Host, u32) {
     let mut host = Host::opened(Options::default());
     let begin = PathBegin {
         points: 500,
         rate_hz: 1000.0,
-        force_n: 15.0,
+        force_n,
         velocity_mm_s: 150.0,
     };
     let x_nm: Vec<i32> = (0..500)
@@ -835,11 +835,11 @@ fn a_path_that_cannot_be_followed_is_refused_and_a_recording_can_be_stopped() {
         ),
     ];
     for (path, refusal, detail) in cases {
-        let (mut host, crc) = recording(path);
+        let (mut host, crc) = recording(path, 15.0);
         let ack = host.ack(Request::PathCommit(Commit { crc }));
         assert_eq!((ack.refusal, ack.detail), (refusal, detail));
     }
-    let (mut host, crc) = recording(|t| 17.5 + 20.0 * t);
+    let (mut host, crc) = recording(|t| 17.5 + 20.0 * t, 15.0);
     host.ack(Request::PathCommit(Commit { crc }));
     host.ack(Request::Record(Record { playback: 4, crc }));
     host.live(ms(700));
@@ -1123,4 +1123,18 @@ fn every_state_ends_without_force_when_something_breaks() {
         nodes: Few::of(&nodes[..3]),
     });
     assert_eq!(host.ack(chunk).refusal, Refusal::NoHello);
+}
+
+#[test]
+fn a_probe_that_is_not_strong_enough_loses_its_path_and_trips() {
+    // out of the middle detent: the crest takes more than 3 N
+    let (mut host, crc) = recording(|t| 17.5 + 20.0 * t, 3.0);
+    host.ack(Request::PathCommit(Commit { crc }));
+    host.ack(Request::Record(Record { playback: 4, crc }));
+    for _ in 0..200 {
+        host.live(ms(5));
+        assert!(host.device.held_n().abs() <= 3.0);
+    }
+    assert_eq!(host.device.fault(), Fault::Following);
+    assert_eq!(host.device.held_n(), 0.0);
 }

@@ -11,6 +11,7 @@ mod wire_support;
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
 use study::device::frame::{Decoder, Frame, MAX_BODY};
+use study::device::wire::probe::PathCrc;
 use study::device::wire::{
     Commit, Few, Heartbeat, Hello, PathBegin, PathChunk, Play, Record, Reply, Request, State, Stop,
     TableBegin, TableChunk, TableCrc, kind,
@@ -194,14 +195,27 @@ impl Fuzz {
         }));
     }
 
-    /// From whatever state to one that plays a table that pushes hard.
-    fn play(&mut self) {
+    /// From whatever state to idle, in a connection of its own.
+    fn open(&mut self) {
         self.say(Request::Limp);
         self.at += Duration::from_millis(500);
         self.nonce += 2;
         self.say(Request::Hello(Hello { nonce: self.nonce }));
         self.at += Duration::from_millis(100);
         self.say(Request::Rearm);
+    }
+
+    fn live(&mut self) {
+        for _ in 0..50 {
+            self.beat();
+            self.at += Duration::from_millis(10);
+        }
+        assert!(self.device.state().forceful(), "{:?}", self.device.fault());
+    }
+
+    /// To one that plays a table that pushes hard.
+    fn play(&mut self) {
+        self.open();
         let mut nodes = detents(0.05, 0.02);
         for node in &mut nodes {
             node.positive[3] *= 4.0;
@@ -215,9 +229,9 @@ impl Fuzz {
         nodes.iter().for_each(|node| crc.node(node));
         self.crc = crc.value();
         self.say(Request::TableBegin(begin));
-        for (i, some) in nodes.chunks(3).enumerate() {
+        for (i, some) in nodes.chunks(TableChunk::MOST).enumerate() {
             self.say(Request::TableChunk(TableChunk {
-                first: 3 * i as u16,
+                first: (i * TableChunk::MOST) as u16,
                 nodes: Few::of(some),
             }));
         }
@@ -229,11 +243,36 @@ impl Fuzz {
             longest_ms: 60_000,
             every: 1,
         }));
-        for _ in 0..50 {
-            self.beat();
-            self.at += Duration::from_millis(10);
+        self.live();
+    }
+
+    /// To one that moves the handle along a path.
+    fn record(&mut self) {
+        self.open();
+        let begin = PathBegin {
+            points: 2000,
+            rate_hz: 1000.0,
+            force_n: 15.0,
+            velocity_mm_s: 1000.0,
+        };
+        let x_nm: Vec<i32> = (0..2000).map(|i| 17_500_000 + 6_000 * i).collect();
+        let mut crc = PathCrc::of(&begin);
+        x_nm.iter().for_each(|x| crc.point(*x));
+        self.crc = crc.value();
+        self.say(Request::PathBegin(begin));
+        for (i, some) in x_nm.chunks(PathChunk::MOST).enumerate() {
+            self.say(Request::PathChunk(PathChunk {
+                first: (i * PathChunk::MOST) as u32,
+                x_nm: Few::of(some),
+            }));
         }
-        assert!(self.device.state().forceful(), "{:?}", self.device.fault());
+        self.beat();
+        self.say(Request::PathCommit(Commit { crc: self.crc }));
+        self.say(Request::Record(Record {
+            playback: 1,
+            crc: self.crc,
+        }));
+        self.live();
     }
 
     /// After whatever came before: the next frame is understood.
@@ -261,7 +300,9 @@ fn random_frames() {
     let mut fuzz = Fuzz::new(1);
     while fuzz.count.frames < frames() {
         let i = fuzz.count.frames;
-        if i.is_multiple_of(1000) {
+        if i.is_multiple_of(5000) {
+            fuzz.record();
+        } else if i.is_multiple_of(1000) {
             fuzz.play();
         }
         if i.is_multiple_of(10) {
@@ -312,7 +353,9 @@ fn random_frames() {
 fn mutated_frames() {
     let mut fuzz = Fuzz::new(2);
     for i in 0..frames() {
-        if i.is_multiple_of(1000) {
+        if i.is_multiple_of(5000) {
+            fuzz.record();
+        } else if i.is_multiple_of(1000) {
             fuzz.play();
         }
         if i.is_multiple_of(10) {
