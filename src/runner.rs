@@ -92,6 +92,8 @@ pub struct Setup {
     pub device_kind: DeviceKind,
     /// What plays.
     pub device: Box<dyn Device>,
+    /// What its last commissioning came to: stands in the session's first event.
+    pub device_check: Option<String>,
     /// Time.
     pub clock: Box<dyn Clock>,
     /// Whether telemetry is kept for the live strip.
@@ -295,6 +297,7 @@ impl Runner {
                     fingerprints: self.setup.fingerprints.clone(),
                     device_kind: self.setup.device_kind,
                     device_id: identity.id,
+                    device_check: self.setup.device_check.clone(),
                     device_telemetry: identity.telemetry,
                     notices: claimed.notices,
                 }))

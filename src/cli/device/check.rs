@@ -1,13 +1,13 @@
 //! `study device info` and `study device check`.
 
 use super::port::PortWire;
-use crate::cli::playback::Place;
+use crate::cli::playback::{COMMISSIONED, COMMISSIONED_FILE, Commissioned, Place};
 use crate::cli::{Console, Failure, Kind};
 use crate::device::check::{self, Commissioning, Verdict};
 use crate::device::host::name;
 use crate::device::wire::Identity;
 use crate::text::Untrusted;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `study device info`.
 #[derive(Debug, clap::Args)]
@@ -27,6 +27,10 @@ pub(in crate::cli) struct CheckArgs {
     /// Play each table of this study as well, and compare what was rendered with it
     #[arg(long, value_name = "PROTOCOL")]
     models: Option<PathBuf>,
+    /// Keep the verdict in device-check.json, so that it stands in every session that
+    /// is started in this folder on this device
+    #[arg(long)]
+    save: bool,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -151,6 +155,9 @@ pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(
         }
         _ => None,
     };
+    if args.save {
+        save(&found)?;
+    }
     let passes = found.passes();
     if json {
         let document = serde_json::json!({
@@ -170,6 +177,23 @@ pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(
         return Ok(());
     }
     Err(refused(&place, &found))
+}
+
+fn save(found: &Commissioning) -> Result<(), Failure> {
+    let Some(device) = &found.device else {
+        return Ok(());
+    };
+    let kept = Commissioned {
+        format: COMMISSIONED.to_owned(),
+        device: name(&device.serial),
+        at: chrono::Local::now()
+            .format("%Y-%m-%dT%H:%M:%S%:z")
+            .to_string(),
+        summary: found.summary(),
+    };
+    let path = Path::new(COMMISSIONED_FILE);
+    let text = serde_json::to_string_pretty(&kept).map_err(|e| Failure::new(Kind::Bug, e))?;
+    std::fs::write(path, text + "\n").map_err(|e| Failure::file(path, &e))
 }
 
 fn line(verdict: &Verdict) -> String {

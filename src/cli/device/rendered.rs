@@ -103,8 +103,7 @@ pub(super) fn look(
         all.push(rendered);
     }
     if !json && all.iter().all(|r| !r.measured) {
-        console
-            .say("no force sensor: this is what was commanded, not what the hand felt".to_owned());
+        console.say("no force sensor: this is what was commanded, not what the hand felt");
     }
     Ok(all)
 }

@@ -59,6 +59,8 @@ impl Accident {
 
 /// How long a host may take to play.
 const PLAYS_WITHIN: Duration = Duration::from_secs(20);
+/// How often one is tried.
+const TRIES: u32 = 5;
 /// Zero force has to stay for so long.
 const STAYS: Duration = Duration::from_millis(100);
 
@@ -68,13 +70,22 @@ fn failed(why: impl std::fmt::Display) -> Failure {
 
 /// Does it.
 pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let mut late = 0;
+    let (mut late, mut spoilt) = (0, 0);
     console.out("accident             n   median   99 %    most   allowed\n")?;
     for accident in Accident::ALL {
         let progress = crate::cli::console::progress(u64::from(args.times), accident.as_str());
         let mut times_ms = Vec::new();
         for n in 0..args.times {
-            times_ms.push(once(accident, n, args.rate)?);
+            // a busy machine may make the device limp before the accident does
+            let mut took = None;
+            for _ in 0..TRIES {
+                took = once(accident, n, args.rate)?;
+                if took.is_some() {
+                    break;
+                }
+                spoilt += 1;
+            }
+            times_ms.push(took.ok_or_else(|| failed("the host does not play"))?);
             progress.inc(1);
         }
         progress.finish_and_clear();
@@ -94,6 +105,11 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             at(1.0)
         ))?;
     }
+    if spoilt > 0 {
+        console.say(format!(
+            "{spoilt} tries were spoilt before the accident: the machine is busy"
+        ));
+    }
     if late == 0 {
         return Ok(());
     }
@@ -101,8 +117,9 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         .hint("is the machine busy? the simulated device needs a processor of its own"))
 }
 
-/// A host that plays, an accident, and the ms to zero force.
-fn once(accident: Accident, seed: u32, rate: u32) -> Result<f64, Failure> {
+/// A host that plays, an accident, and the ms to zero force; nothing if the host ends
+/// before.
+fn once(accident: Accident, seed: u32, rate: u32) -> Result<Option<f64>, Failure> {
     let firmware = Firmware::new(Options {
         seed: u64::from(seed),
         servo_hz: f64::from(rate),
@@ -114,8 +131,8 @@ fn once(accident: Accident, seed: u32, rate: u32) -> Result<f64, Failure> {
     let start = Instant::now();
     while device.firmware().state() != State::Run {
         device.turn();
-        if start.elapsed() > PLAYS_WITHIN {
-            return Err(failed("the host does not play"));
+        if host.ended() || start.elapsed() > PLAYS_WITHIN {
+            return Ok(None);
         }
     }
     // the accident comes at any moment between two heartbeats, and under force
@@ -123,8 +140,8 @@ fn once(accident: Accident, seed: u32, rate: u32) -> Result<f64, Failure> {
     let wait = Duration::from_micros(20_000 + 397 * u64::from(seed % 100));
     while from.elapsed() < wait || device.firmware().held_n().abs() < 0.5 {
         device.turn();
-        if start.elapsed() > PLAYS_WITHIN {
-            return Err(failed("there is no force"));
+        if host.ended() || start.elapsed() > PLAYS_WITHIN {
+            return Ok(None);
         }
     }
     host.befalls(accident, &mut device)?;
@@ -143,7 +160,7 @@ fn once(accident: Accident, seed: u32, rate: u32) -> Result<f64, Failure> {
             return Err(failed("it is not latched"));
         }
     }
-    Ok(took_ms)
+    Ok(Some(took_ms))
 }
 
 /// A child of this program that plays.
@@ -162,6 +179,10 @@ impl Host {
             .spawn()
             .map_err(failed)?;
         Ok(Self { child })
+    }
+
+    fn ended(&mut self) -> bool {
+        self.child.try_wait().is_ok_and(|ended| ended.is_some())
     }
 
     fn befalls(&mut self, accident: Accident, device: &mut Simulator) -> Result<(), Failure> {

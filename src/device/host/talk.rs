@@ -126,11 +126,11 @@ impl Host {
         let words = why.as_str();
         self.reports
             .push(Report::Fault(format!("it refuses {what}: {words}{detail}")));
-        self.to_rest(at);
+        self.settle(at);
     }
 
     /// Nothing plays any more, and nothing shall.
-    fn to_rest(&mut self, at: Duration) {
+    fn settle(&mut self, at: Duration) {
         self.todo.clear();
         self.rest = None;
         self.stage = Stage::Idle;
@@ -157,7 +157,7 @@ impl Host {
         );
         if playing {
             self.reports.push(Report::Fault(fault.as_str().to_owned()));
-            self.to_rest(at);
+            self.settle(at);
         }
     }
 
@@ -189,7 +189,7 @@ impl Host {
             samples: self.received,
             samples_lost,
         }));
-        self.to_rest(at);
+        self.settle(at);
     }
 
     fn pulse(&mut self, pulse: Pulse, at: Duration) {
