@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::time::Duration;
 use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::{Device, Report};
+use study::device::{Device, Report, Stimulus};
 use study::limits::{Limit, Limits};
 use study::model::{Realization, file};
 use study::outcome::Playback;
@@ -36,15 +36,16 @@ fn played(realization: &Realization, options: Options, force_n: f64) -> Result<P
         velocity_mm_s: Limit::new(1000.0).unwrap(),
     };
     let mut device = VirtualDevice::new(options);
-    device.load(realization, limits, ms(0)).unwrap();
-    device.poll(ms(20));
-    device.start(ms(20)).unwrap();
-    let mut reports = device.poll(ms(12_022));
+    let what = Stimulus::of_table(realization);
+    device.load(&what, limits, ms(0)).unwrap();
+    device.poll(ms(100));
+    device.start(ms(100)).unwrap();
+    let mut reports = device.poll(ms(12_102));
     if let Some(Report::Fault(said)) = reports.iter().find(|r| matches!(r, Report::Fault(_))) {
         return Err(said.clone());
     }
-    device.stop(ms(12_022)).unwrap();
-    reports.extend(device.poll(ms(12_100)));
+    device.stop(ms(12_102)).unwrap();
+    reports.extend(device.poll(ms(12_200)));
     let playback = reports.iter().find_map(|report| match report {
         Report::Stopped(playback) => Some(*playback),
         _ => None,

@@ -11,6 +11,7 @@ mod wire_support;
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
 use study::device::frame::{Decoder, Frame, MAX_BODY};
+use study::device::wire::probe::PathCrc;
 use study::device::wire::{
     Commit, Few, Heartbeat, Hello, PathBegin, PathChunk, Play, Record, Reply, Request, State, Stop,
     TableBegin, TableChunk, TableCrc, kind,
@@ -194,14 +195,27 @@ impl Fuzz {
         }));
     }
 
-    /// From whatever state to one that plays a table that pushes hard.
-    fn play(&mut self) {
+    /// From whatever state to idle, in a connection of its own.
+    fn open(&mut self) {
         self.say(Request::Limp);
         self.at += Duration::from_millis(500);
         self.nonce += 2;
         self.say(Request::Hello(Hello { nonce: self.nonce }));
         self.at += Duration::from_millis(100);
         self.say(Request::Rearm);
+    }
+
+    fn live(&mut self) {
+        for _ in 0..50 {
+            self.beat();
+            self.at += Duration::from_millis(10);
+        }
+        assert!(self.device.state().forceful(), "{:?}", self.device.fault());
+    }
+
+    /// To one that plays a table that pushes hard.
+    fn play(&mut self) {
+        self.open();
         let mut nodes = detents(0.05, 0.02);
         for node in &mut nodes {
             node.positive[3] *= 4.0;
@@ -215,9 +229,9 @@ impl Fuzz {
         nodes.iter().for_each(|node| crc.node(node));
         self.crc = crc.value();
         self.say(Request::TableBegin(begin));
-        for (i, some) in nodes.chunks(3).enumerate() {
+        for (i, some) in nodes.chunks(TableChunk::MOST).enumerate() {
             self.say(Request::TableChunk(TableChunk {
-                first: 3 * i as u16,
+                first: (i * TableChunk::MOST) as u16,
                 nodes: Few::of(some),
             }));
         }
@@ -229,11 +243,36 @@ impl Fuzz {
             longest_ms: 60_000,
             every: 1,
         }));
-        for _ in 0..50 {
-            self.beat();
-            self.at += Duration::from_millis(10);
+        self.live();
+    }
+
+    /// To one that moves the handle along a path.
+    fn record(&mut self) {
+        self.open();
+        let begin = PathBegin {
+            points: 2000,
+            rate_hz: 1000.0,
+            force_n: 15.0,
+            velocity_mm_s: 1000.0,
+        };
+        let x_nm: Vec<i32> = (0..2000).map(|i| 17_500_000 + 6_000 * i).collect();
+        let mut crc = PathCrc::of(&begin);
+        x_nm.iter().for_each(|x| crc.point(*x));
+        self.crc = crc.value();
+        self.say(Request::PathBegin(begin));
+        for (i, some) in x_nm.chunks(PathChunk::MOST).enumerate() {
+            self.say(Request::PathChunk(PathChunk {
+                first: (i * PathChunk::MOST) as u32,
+                x_nm: Few::of(some),
+            }));
         }
-        assert!(self.device.state().forceful(), "{:?}", self.device.fault());
+        self.beat();
+        self.say(Request::PathCommit(Commit { crc: self.crc }));
+        self.say(Request::Record(Record {
+            playback: 1,
+            crc: self.crc,
+        }));
+        self.live();
     }
 
     /// After whatever came before: the next frame is understood.
@@ -261,10 +300,12 @@ fn random_frames() {
     let mut fuzz = Fuzz::new(1);
     while fuzz.count.frames < frames() {
         let i = fuzz.count.frames;
-        if i % 1000 == 0 {
+        if i.is_multiple_of(5000) {
+            fuzz.record();
+        } else if i.is_multiple_of(1000) {
             fuzz.play();
         }
-        if i % 10 == 0 {
+        if i.is_multiple_of(10) {
             fuzz.beat();
         }
         let body = match fuzz.below(4) {
@@ -294,7 +335,7 @@ fn random_frames() {
         let frame = Frame::of(&body).unwrap();
         fuzz.send(frame.as_bytes());
         fuzz.count.frames += 1;
-        if i % 16 == 0 {
+        if i.is_multiple_of(16) {
             fuzz.in_step();
         }
     }
@@ -312,10 +353,12 @@ fn random_frames() {
 fn mutated_frames() {
     let mut fuzz = Fuzz::new(2);
     for i in 0..frames() {
-        if i % 1000 == 0 {
+        if i.is_multiple_of(5000) {
+            fuzz.record();
+        } else if i.is_multiple_of(1000) {
             fuzz.play();
         }
-        if i % 10 == 0 {
+        if i.is_multiple_of(10) {
             fuzz.beat();
         }
         let mut request = fuzz.request();
@@ -345,7 +388,7 @@ fn mutated_frames() {
         }
         fuzz.send(&bytes);
         fuzz.count.frames += 1;
-        if i % 16 == 0 {
+        if i.is_multiple_of(16) {
             fuzz.in_step();
         }
     }
@@ -357,4 +400,55 @@ fn mutated_frames() {
     );
     assert_eq!(fuzz.count.most_share, 1.0, "the limit was never reached");
     assert_ne!(fuzz.device.state(), State::Boot);
+}
+
+/// What a device may send a host: any bytes behind a header that is one. What is a
+/// message is the same message when it is sent on.
+#[test]
+fn random_replies() {
+    let mut fuzz = Fuzz::new(3);
+    let kinds = [
+        kind::ACK,
+        kind::IDENTITY,
+        kind::OUTCOME,
+        kind::PULSE,
+        kind::TELEMETRY,
+        kind::EVENT,
+        kind::RECORDED,
+    ];
+    // the length of each, as far as it is fixed, so that most are not refused for it
+    let lengths = [12, 153, 91, 11, 21, 15, 13];
+    let mut messages = 0u64;
+    for _ in 0..frames() {
+        let which = fuzz.below(7) as usize;
+        let samples = fuzz.below(4) as usize;
+        let mut body = vec![1, kinds[which], 0, 0];
+        let more = match kinds[which] {
+            kind::TELEMETRY => 20 * samples,
+            kind::RECORDED => 12 * samples,
+            _ => 0,
+        };
+        let small = fuzz.below(2) == 0;
+        for i in 0..lengths[which] + more {
+            // small bytes are codes more often than not
+            let byte = fuzz.below(if small && i < 12 { 9 } else { 256 });
+            body.push(byte as u8);
+        }
+        if more > 0 {
+            body[4 + lengths[which] - 1] = samples as u8;
+        }
+        let Ok((header, reply)) = Reply::decode(&body) else {
+            continue;
+        };
+        messages += 1;
+        let frame = reply.frame(header.sequence);
+        let mut decoder = Decoder::new();
+        let again = frame.as_bytes().iter().find_map(|byte| {
+            let body = decoder.push(*byte)?;
+            Some(Reply::decode(body.unwrap()).unwrap())
+        });
+        assert_eq!(again, Some((header, reply)));
+    }
+    eprintln!("random replies: {messages} were messages");
+    assert!(messages > frames() / 10, "{messages}");
 }

@@ -6,7 +6,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use study::device::core::Settings;
 use study::device::frame::{Decoder, crc32};
+use study::device::handler::{Bounds, Handler, Measured, Profile};
 use study::device::wire::probe::PathCrc;
 use study::device::wire::{
     Ack, Commit, Event, Fault, Few, Flags, Happening, Heartbeat, Hello, Identity, Loaded, Name,
@@ -14,7 +16,7 @@ use study::device::wire::{
     Reply, Request, State, Stop, TableBegin, TableChunk, TableCrc, Telemetry, TelemetrySample,
     WireError, fixed, kind,
 };
-use study::model::predict::{Direction, Lookup};
+use study::model::predict::{Direction, Lookup, Motion};
 
 /// Of the four nodes of [`chunk`] under [`begin`].
 const TABLE_CRC: u32 = 0xDDE60A90;
@@ -777,7 +779,9 @@ fn the_crc_over_a_whole_is_that_of_its_fields_in_a_row() {
         force_n: 20.0,
         velocity_mm_s: 500.0,
     });
-    [17_500_000, 17_500_250, -1].map(|point| crc.point(point));
+    for point in [17_500_000, 17_500_250, -1] {
+        crc.point(point);
+    }
     assert_eq!(crc.value(), PATH_CRC);
 }
 
@@ -846,4 +850,158 @@ fn a_name_is_cut_between_characters() {
     assert_eq!(Name::new("").as_bytes(), b"");
     let long = Name::new(&"x".repeat(99));
     assert_eq!(long.as_bytes().len(), Name::LEN);
+}
+
+/// The device of `docs/wire.md`, chapter 15.
+fn documented() -> Box<Handler<8, 0>> {
+    let identity = identity();
+    Box::new(Handler::new(Profile {
+        firmware: identity.firmware,
+        serial: identity.serial,
+        flags: identity.flags,
+        watchdog_ms: identity.watchdog_ms,
+        longest_ms: identity.longest_ms,
+        telemetry_hz: identity.telemetry_hz,
+        bounds: Bounds {
+            force_n: identity.force_n,
+            velocity_mm_s: identity.velocity_mm_s,
+            stiffness_n_per_mm: identity.stiffness_n_per_mm,
+            damping_n_s_per_mm: identity.damping_n_s_per_mm,
+            stroke_mm: identity.stroke_mm,
+        },
+        servo: Settings::default(),
+        rest_mm_s: 5.0,
+        rest_s: 0.05,
+    }))
+}
+
+/// What the host of the exchange sends, and at what time, ms.
+fn conversation() -> Vec<(u32, u16, Request)> {
+    let beat = |count, deadline_ms| Request::Heartbeat(Heartbeat { count, deadline_ms });
+    vec![
+        (100, 1, Request::Limp),
+        (102, 2, Request::Hello(Hello { nonce: 0xC0FF_EE01 })),
+        (104, 3, Request::Rearm),
+        (106, 4, Request::TableBegin(begin())),
+        (112, 5, chunk(0, 3)),
+        (118, 6, chunk(3, 1)),
+        (120, 0, beat(1, 160)),
+        (121, 7, Request::TableCommit(Commit { crc: TABLE_CRC })),
+        (130, 0, beat(2, 170)),
+        (
+            131,
+            8,
+            Request::Play(Play {
+                playback: 7,
+                crc: TABLE_CRC,
+                longest_ms: 60_000,
+                every: 40,
+            }),
+        ),
+        (140, 0, beat(3, 180)),
+        (150, 0, beat(4, 190)),
+        (160, 9, Request::Stop(Stop { playback: 7 })),
+        // the reply was lost: the same again
+        (162, 9, Request::Stop(Stop { playback: 7 })),
+        (164, 10, Request::State),
+        // and then nothing more is heard of the host
+        (185, 11, Request::State),
+    ]
+}
+
+fn word(message: &str) -> String {
+    let end = message.find(['(', ' ']).unwrap_or(message.len());
+    message[..end].to_owned()
+}
+
+/// What goes over the wire, a line each.
+fn exchange() -> Vec<String> {
+    let mut device = documented();
+    let at_rest = Measured {
+        motion: Motion {
+            x_mm: 10.0,
+            v_mm_s: 0.0,
+            a_m_s2: 0.0,
+        },
+        force_n: None,
+    };
+    let mut lines = Vec::new();
+    let mut requests = conversation();
+    requests.reverse();
+    for now_ms in 0..200 {
+        let mut out = |bytes: &[u8], request: Option<&str>| {
+            if let Some(request) = request {
+                lines.push(format!("{now_ms:3} > {}  {request}", hex(bytes)));
+                return;
+            }
+            let (_, reply) = Reply::decode(&body_of(bytes)).unwrap();
+            let mut what = word(&format!("{reply:?}"));
+            match reply {
+                Reply::Ack(ack) => {
+                    what = format!("Ack {:?} {:?}", ack.refusal, ack.state);
+                }
+                Reply::Event(event) => {
+                    what = format!("Event {:?} {:?} {:?}", event.what, event.state, event.fault);
+                }
+                _ => {}
+            }
+            lines.push(format!("{now_ms:3} < {}  {what}", hex(bytes)));
+        };
+        while requests.last().is_some_and(|(at, ..)| *at == now_ms) {
+            let (_, sequence, request) = requests.pop().unwrap();
+            let frame = request.frame(sequence);
+            let what = word(&format!("{request:?}"));
+            out(frame.as_bytes(), Some(&what));
+            device.receive(frame.as_bytes(), now_ms, &mut |bytes| out(bytes, None));
+        }
+        for _ in 0..4 {
+            device.servo(at_rest, now_ms, &mut |bytes| out(bytes, None));
+        }
+    }
+    lines
+}
+
+#[test]
+fn the_exchange_of_the_document_is_what_a_device_says() {
+    let document = include_str!("../docs/wire.md");
+    let (_, rest) = document.split_once("```exchange\n").unwrap();
+    let (written, _) = rest.split_once("```").unwrap();
+    let said = exchange();
+    assert_eq!(
+        written.lines().collect::<Vec<_>>(),
+        said,
+        "docs/wire.md, chapter 15, should be:\n{}",
+        said.join("\n")
+    );
+}
+
+/// Every code of the program stands in the document with its number.
+#[test]
+fn the_document_lists_every_code() {
+    let document = include_str!("../docs/wire.md");
+    let listed = |heading: &str| {
+        let (_, rest) = document.split_once(heading).unwrap();
+        let end = rest.find("\n#").unwrap_or(rest.len());
+        let rows = rest[..end].lines().filter_map(|line| {
+            let cell = line.strip_prefix("| ")?.split(" |").next()?;
+            cell.parse::<u8>().ok()
+        });
+        rows.collect::<Vec<_>>()
+    };
+    let refusals: Vec<u8> = Refusal::ALL.iter().map(|r| r.code()).collect();
+    assert_eq!(listed("### Refusals\n"), refusals);
+    let faults: Vec<u8> = Fault::ALL.iter().map(|f| f.code()).collect();
+    assert_eq!(listed("### Faults\n"), faults);
+    let states: Vec<u8> = State::ALL.iter().map(|s| s.code()).collect();
+    assert_eq!(listed("## 5. States\n"), states);
+    for golden in requests() {
+        let name = golden.name.split(' ').next().unwrap();
+        let entry = format!("**{name} 0x{:02X}**", golden.message.kind());
+        assert!(document.contains(&entry), "{entry}");
+    }
+    for golden in replies() {
+        let name = golden.name.split(' ').next().unwrap();
+        let entry = format!("**{name} 0x{:02X}**", golden.message.kind());
+        assert!(document.contains(&entry), "{entry}");
+    }
 }

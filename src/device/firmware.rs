@@ -11,6 +11,7 @@
 //! what they are made of. Nothing that it reports is measured.
 
 mod body;
+mod flaw;
 
 use super::core::Settings;
 use super::handler::{Bounds, Drive, Handler, Measured, Profile};
@@ -18,6 +19,8 @@ use super::wire::{Fault, Flags, Loaded, Name, State};
 use crate::limits::{Limit, Limits};
 use crate::plant::{HandParameters, Parameters};
 use body::Body;
+pub use flaw::Flaw;
+use flaw::Tamper;
 use std::time::Duration;
 
 /// Room for a table's nodes.
@@ -53,6 +56,8 @@ pub struct Options {
     pub clock_ms: u32,
     /// Names it.
     pub serial: String,
+    /// What is wrong with it.
+    pub flaw: Option<Flaw>,
 }
 
 impl Default for Options {
@@ -75,6 +80,7 @@ impl Default for Options {
             least_mass_kg: -hand.slider_kg,
             clock_ms: 0,
             serial: "simulated-1".to_owned(),
+            flaw: None,
         }
     }
 }
@@ -91,6 +97,9 @@ pub struct Firmware {
     started: Duration,
     clock_ms: u32,
     stalled_until: Option<Stall>,
+    tamper: Option<Tamper>,
+    /// Up to when time has passed.
+    now: Duration,
     /// What came while it stalled.
     unread: Vec<u8>,
     sent: Vec<u8>,
@@ -117,6 +126,10 @@ impl Firmware {
             started: Duration::ZERO,
             clock_ms: options.clock_ms,
             stalled_until: None,
+            tamper: options
+                .flaw
+                .map(|flaw| Tamper::new(flaw, options.watchdog_ms)),
+            now: Duration::ZERO,
             unread: Vec::new(),
             sent: Vec::new(),
             options,
@@ -156,6 +169,18 @@ impl Firmware {
             return;
         }
         let now_ms = self.clock(at);
+        match &mut self.tamper {
+            None => self.hear(bytes, at),
+            Some(tamper) => {
+                let [heard, answered] = tamper.inbound(bytes, at, now_ms);
+                self.hear(&heard, at);
+                self.sent.extend(answered);
+            }
+        }
+    }
+
+    fn hear(&mut self, bytes: &[u8], at: Duration) {
+        let now_ms = self.clock(at);
         let sent = &mut self.sent;
         self.handler
             .receive(bytes, now_ms, &mut |bytes| sent.extend_from_slice(bytes));
@@ -164,7 +189,11 @@ impl Firmware {
 
     /// What it has said since this was asked last.
     pub fn take_output(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.sent)
+        let said = std::mem::take(&mut self.sent);
+        match &mut self.tamper {
+            None => said,
+            Some(tamper) => tamper.outbound(&said, self.now),
+        }
     }
 
     /// Lets time pass: every servo period that begins before `until`.
@@ -180,12 +209,16 @@ impl Firmware {
         }
         while self.ticks < due {
             let at = Duration::from_secs_f64(self.ticks as f64 / self.options.servo_hz);
+            while let Some(late) = self.tamper.as_mut().and_then(|t| t.overdue(at)) {
+                self.hear(&late, at);
+            }
             if self.awake(at) {
                 self.servo(at);
             }
             self.body.pass();
             self.ticks += 1;
         }
+        self.now = self.now.max(until);
     }
 
     /// Hangs for a while: nothing is read or sent, and the motor goes on with the
@@ -244,13 +277,14 @@ impl Firmware {
         }
         self.stalled_until = None;
         if self.handler.state().forceful() {
-            self.trip(Fault::Overrun, at);
+            let now_ms = self.clock(at);
+            let sent = &mut self.sent;
+            self.handler.trip(Fault::Overrun, now_ms, &mut |bytes| {
+                sent.extend_from_slice(bytes);
+            });
         }
         let unread = std::mem::take(&mut self.unread);
-        let now_ms = self.clock(at);
-        let sent = &mut self.sent;
-        self.handler
-            .receive(&unread, now_ms, &mut |bytes| sent.extend_from_slice(bytes));
+        self.hear(&unread, at);
         true
     }
 
@@ -291,7 +325,10 @@ fn profile(options: &Options) -> Profile {
             telemetry: options.telemetry_hz > 0.0,
             probe: true,
         },
-        watchdog_ms: options.watchdog_ms,
+        watchdog_ms: match options.flaw {
+            Some(Flaw::LateWatchdog) => flaw::LATE_MS,
+            _ => options.watchdog_ms,
+        },
         longest_ms: 600_000,
         telemetry_hz: options.telemetry_hz.max(0.1),
         bounds: Bounds {

@@ -19,9 +19,9 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 /// encodes with one byte more.
 pub const MAX_BODY: usize = 250;
 /// Bytes of the CRC.
-const CRC_LEN: usize = 4;
+pub const FRAME_CRC_LEN: usize = 4;
 /// Longest encoded content, between the zeros.
-const MAX_ENCODED: usize = 1 + MAX_BODY + CRC_LEN;
+const MAX_ENCODED: usize = 1 + MAX_BODY + FRAME_CRC_LEN;
 /// Longest frame with both zeros.
 pub const MAX_FRAME: usize = MAX_ENCODED + 2;
 
@@ -218,7 +218,7 @@ fn body(encoded: &mut [u8]) -> Result<&[u8], FrameError> {
             written += 1;
         }
     }
-    let Some(len) = written.checked_sub(CRC_LEN) else {
+    let Some(len) = written.checked_sub(FRAME_CRC_LEN) else {
         return Err(FrameError::TooShort);
     };
     let (body, crc) = encoded[..written].split_at(len);

@@ -229,11 +229,11 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             self.end();
         }
         if self.state == State::Stopping {
-            self.flush(now_ms, out);
+            self.flush(out);
             self.state = State::Loaded;
             self.happened(Happening::Stopped, now_ms);
         }
-        self.tell(now_ms, out);
+        self.tell(out);
     }
 
     /// One servo period: what the motor does until the next.
@@ -260,7 +260,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     /// [`Fault::Overrun`] or [`Fault::External`].
     pub fn trip(&mut self, fault: Fault, now_ms: u32, out: Out<'_>) {
         self.latch(State::Fault, fault, now_ms);
-        self.tell(now_ms, out);
+        self.tell(out);
     }
 
     fn play(&mut self, measured: Measured, now_ms: u32, out: Out<'_>) -> Drive {
@@ -276,11 +276,11 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         let force_n = self.core.step(&what, measured.motion);
         if let Servo::Tripped(why) = self.core.state() {
             self.latch(State::Fault, fault_of(why), now_ms);
-            self.tell(now_ms, out);
+            self.tell(out);
             return Drive::Force(0.0);
         }
-        if self.run.sampled(measured, force_n) {
-            self.flush(now_ms, out);
+        if self.run.sampled(measured, force_n, now_ms) {
+            self.flush(out);
         }
         let full = self.profile.servo.ramp_s * self.profile.servo.servo_hz;
         if self.state == State::Ramp && f64::from(self.run.ticks) >= full {
@@ -336,17 +336,17 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 
     /// What is left of the stream, then the event.
-    fn tell(&mut self, now_ms: u32, out: Out<'_>) {
+    fn tell(&mut self, out: Out<'_>) {
         if let Some(event) = self.event.take() {
-            self.flush(now_ms, out);
+            self.flush(out);
             self.send(Reply::Event(event), out);
         }
     }
 
     /// The samples that wait.
-    fn flush(&mut self, now_ms: u32, out: Out<'_>) {
+    fn flush(&mut self, out: Out<'_>) {
         let tally = self.core.tally();
-        if let Some(stream) = self.run.take(&tally, now_ms) {
+        if let Some(stream) = self.run.take(&tally) {
             self.send(stream, out);
         }
     }

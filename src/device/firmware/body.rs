@@ -46,6 +46,8 @@ struct Moved {
     /// Where it is told to be next.
     next: Option<Motion>,
     force_n: f64,
+    /// The most that the motor may give, N.
+    most_n: f64,
     noise: [Stream; 2],
     /// Steps of the simulation that are due, with the fraction left over.
     due: f64,
@@ -105,6 +107,7 @@ impl Body {
                     motion: still(x_mm),
                     next: None,
                     force_n: 0.0,
+                    most_n: 0.0,
                     noise: ["force", "acceleration"].map(stream),
                     due: 0.0,
                 }))
@@ -157,9 +160,14 @@ impl Body {
     pub(super) fn drive(&mut self, drive: Drive) {
         match drive {
             Drive::Force(force_n) => self.force_n = force_n,
-            Drive::Position { x_mm, v_mm_s, .. } => {
+            Drive::Position {
+                x_mm,
+                v_mm_s,
+                force_n,
+            } => {
                 if let Holder::Probe(moved) = &mut self.holder {
                     self.force_n = moved.force_n;
+                    moved.most_n = force_n;
                     moved.next = Some(Motion {
                         x_mm,
                         v_mm_s,
@@ -192,7 +200,8 @@ impl Body {
 }
 
 impl Moved {
-    /// The probe is where it was told to be: it is ideal.
+    /// The probe is where it was told to be: it is ideal, up to its force limit.
+    /// There it stays where it is, and the handler will miss it on its path.
     fn pass(&mut self, period_s: f64) {
         let Some(next) = self.next.take() else {
             return;
@@ -213,7 +222,12 @@ impl Moved {
                 self.force_n = target.step(at);
             }
         }
-        self.motion = next;
+        if self.force_n.abs() <= self.most_n {
+            self.motion = next;
+        } else {
+            self.force_n = self.force_n.clamp(-self.most_n, self.most_n);
+            self.motion = still(from.x_mm);
+        }
     }
 }
 

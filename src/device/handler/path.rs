@@ -216,13 +216,13 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         self.path.ticks = self.path.ticks.saturating_add(1);
         self.run.ticks = self.path.ticks;
         if reached {
-            let full = self.run.recorded(RecordedPoint {
+            let point = RecordedPoint {
                 x_nm: fixed::nm(motion.x_mm),
                 force_un: fixed::maybe_un(measured.force_n),
                 a_um_s2: fixed::um_s2(motion.a_m_s2),
-            });
-            if full {
-                self.flush(now_ms, out);
+            };
+            if self.run.recorded(point, now_ms) {
+                self.flush(out);
             }
         }
         self.go(motion.x_mm, x_mm, v_mm_s, now_ms, out)

@@ -21,6 +21,8 @@ pub(super) struct Run {
     /// Servo periods that a sample may wait.
     patience: u32,
     waiting: Waiting,
+    /// When the last of them was taken.
+    newest_ms: u32,
 }
 
 /// Samples that wait for company.
@@ -71,7 +73,7 @@ impl Run {
     }
 
     /// Counts a servo period of a playback; true if samples should go.
-    pub(super) fn sampled(&mut self, measured: Measured, force_n: f64) -> bool {
+    pub(super) fn sampled(&mut self, measured: Measured, force_n: f64, now_ms: u32) -> bool {
         let tick = self.ticks;
         self.ticks = self.ticks.saturating_add(1);
         if self.every == 0 {
@@ -92,13 +94,14 @@ impl Run {
                 measured_un: fixed::maybe_un(measured.force_n),
             });
             self.samples = self.samples.saturating_add(1);
+            self.newest_ms = now_ms;
         }
         let oldest = waiting.as_slice().first();
         waiting.is_full() || oldest.is_some_and(|oldest| tick - oldest.tick >= self.patience)
     }
 
     /// Takes in a point of a recording; true if samples should go.
-    pub(super) fn recorded(&mut self, point: RecordedPoint) -> bool {
+    pub(super) fn recorded(&mut self, point: RecordedPoint, now_ms: u32) -> bool {
         if !matches!(self.waiting, Waiting::Recorded(_)) {
             self.waiting = Waiting::Recorded(Few::new());
         }
@@ -107,18 +110,19 @@ impl Run {
         };
         waiting.push(point);
         self.samples = self.samples.saturating_add(1);
+        self.newest_ms = now_ms;
         waiting.is_full()
     }
 
     /// What waits, as a message.
-    pub(super) fn take(&mut self, tally: &Tally, now_ms: u32) -> Option<Reply> {
+    pub(super) fn take(&mut self, tally: &Tally) -> Option<Reply> {
         let first = |waiting: usize| self.samples.saturating_sub(waiting as u32);
         let reply = match &self.waiting {
             Waiting::Telemetry(samples) if !samples.as_slice().is_empty() => {
                 Reply::Telemetry(Telemetry {
                     playback: self.playback,
                     first: first(samples.as_slice().len()),
-                    clock_ms: now_ms,
+                    clock_ms: self.newest_ms,
                     strokes: tally.strokes,
                     clamps: count(tally.clamps),
                     samples: *samples,
@@ -128,7 +132,7 @@ impl Run {
                 Reply::Recorded(Recorded {
                     playback: self.playback,
                     first: first(points.as_slice().len()),
-                    clock_ms: now_ms,
+                    clock_ms: self.newest_ms,
                     points: *points,
                 })
             }

@@ -25,7 +25,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         if header.kind == kind::LIMP {
             self.latch(State::Limp, Fault::Told, now_ms);
             self.answer(header, Ok(()), now_ms, out);
-            return self.tell(now_ms, out);
+            return self.tell(out);
         }
         match Request::decode(body) {
             Ok((header, request)) if request.sequenced() => {
@@ -44,7 +44,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
                 self.answer(header, Err(refusal), now_ms, out);
             }
         }
-        self.tell(now_ms, out);
+        self.tell(out);
     }
 
     fn answer(&self, header: Header, answer: Answer, now_ms: u32, out: Out<'_>) {
@@ -93,24 +93,27 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
                 self.table.begin(begin)
             }
             Request::TableChunk(chunk) => {
-                self.may_load()?;
+                self.loading()?;
                 self.table.chunk(chunk)
             }
             Request::TableCommit(commit) => {
-                self.may_load()?;
+                self.loading()?;
                 let judged = self.table.judge(commit.crc, &self.profile.bounds);
                 self.arm(judged, Loaded::Table, commit.crc, now_ms)
             }
             Request::PathBegin(begin) => {
                 self.may_probe()?;
+                self.may_load()?;
                 self.path.begin(begin)
             }
             Request::PathChunk(chunk) => {
                 self.may_probe()?;
+                self.loading()?;
                 self.path.chunk(chunk)
             }
             Request::PathCommit(commit) => {
                 self.may_probe()?;
+                self.loading()?;
                 let judged = self.path.judge(
                     commit.crc,
                     &self.profile.bounds,
@@ -142,11 +145,21 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         }
     }
 
-    fn may_probe(&mut self) -> Answer {
-        if POINTS == 0 || !self.profile.flags.probe {
-            return Err((Refusal::NoProbe, 0));
+    /// What follows a BEGIN: it replaces nothing.
+    fn loading(&self) -> Answer {
+        if self.state == State::Idle {
+            Ok(())
+        } else {
+            Err((Refusal::WrongState, 0))
         }
-        self.may_load()
+    }
+
+    fn may_probe(&self) -> Answer {
+        if POINTS == 0 || !self.profile.flags.probe {
+            Err((Refusal::NoProbe, 0))
+        } else {
+            Ok(())
+        }
     }
 
     fn arm(
