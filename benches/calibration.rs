@@ -1,12 +1,13 @@
 //! How often each test rejects at 5 % where there is nothing to find.
 //!
 //! `cargo bench --bench calibration -- --studies 10000`: so many simulated studies
-//! of 10 × 5 × 3 ratings of 1 to 7 through the analysis as it ships, in each of two
-//! worlds. In *alike* no realization differs from another. In *differ* realizations
-//! differ by chance, standard deviation 0.5, and VAF has nothing to do with it: the
-//! world in which "VAF predicts the rating" has to be rejected 5 % of the time. The
-//! seed is fixed: the same number of studies prints the same table, whatever the
-//! number of threads.
+//! of 10 × 5 × 3 ratings of 1 to 7 through the analysis as it ships, in each of three
+//! worlds. In *level* participants differ in nothing but their level. In *taste* each
+//! likes some realizations more than others, but all together like none more. In
+//! *differ* realizations differ as well, by chance, standard deviation 0.5, and VAF
+//! has nothing to do with it: the world in which "VAF predicts the rating" has to be
+//! rejected 5 % of the time. The seed is fixed: the same number of studies prints the
+//! same table, whatever the number of threads.
 //!
 //! An exact test can reach only some p. Its attainable level is the share of all
 //! equally likely arrangements of a study's own data (orders of the realizations,
@@ -27,11 +28,12 @@ const REPETITIONS: u32 = 3;
 
 #[derive(Clone, Copy, PartialEq)]
 enum World {
-    Alike,
+    Level,
+    Taste,
     Differ,
 }
 
-/// Tests of "do realizations differ" and of the order, null in *alike*.
+/// Tests of "do realizations differ" and of the order, null where they do not.
 const ALIKE: [&str; 21] = [
     "rmanova/p",
     "rmanova/p_gg",
@@ -56,7 +58,7 @@ const ALIKE: [&str; 21] = [
     "clmm_model_quad/beta/m1",
 ];
 
-/// Tests of VAF, null in both worlds.
+/// Tests of VAF, null everywhere.
 const VAF: [&str; 24] = [
     "corr/pearson/p_t",
     "corr/pearson/p_exact_two_sided",
@@ -95,7 +97,8 @@ fn main() {
         .unwrap_or(10_000u32);
     println!("{studies} studies of {SUBJECTS} × {MODELS} × {REPETITIONS} in each world.");
     println!("`*`: further than three binomial standard deviations from the attainable level.");
-    for (world, name) in [(World::Alike, "alike"), (World::Differ, "differ")] {
+    for world in [World::Level, World::Taste, World::Differ] {
+        let name = world.name();
         println!("\n| world `{name}` | rejected | attainable | ± | | undefined in |");
         println!("|---|---|---|---|---|---|");
         for (id, found) in &count(world, studies) {
@@ -128,7 +131,7 @@ struct Found {
 
 fn count(world: World, studies: u32) -> BTreeMap<String, Found> {
     let tests: Vec<&str> = match world {
-        World::Alike => ALIKE.iter().chain(&VAF).copied().collect(),
+        World::Level | World::Taste => ALIKE.iter().chain(&VAF).copied().collect(),
         World::Differ => VAF.to_vec(),
     };
     (0..studies)
@@ -142,7 +145,7 @@ fn count(world: World, studies: u32) -> BTreeMap<String, Found> {
                 let rejected = rejects(&v, id);
                 found.insert((*id).to_owned(), one(rejected, cells.attainable(id)));
             }
-            for name in FAMILIES.iter().filter(|_| world == World::Alike) {
+            for name in FAMILIES.iter().filter(|_| world != World::Differ) {
                 let pairs = v.iter().map(|(id, _)| id);
                 let pairs = pairs.filter(|id| id.starts_with("posthoc/") && id.ends_with(name));
                 let rejected = pairs.filter_map(|id| rejects(&v, id)).reduce(|a, b| a | b);
@@ -259,25 +262,35 @@ fn orders(x: &mut [f64], from: usize, visit: &mut impl FnMut(&[f64])) {
     }
 }
 
-/// One study without an effect. Subjects differ in level (0.7) and in taste (0.5).
+impl World {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Level => "level",
+            Self::Taste => "taste",
+            Self::Differ => "differ",
+        }
+    }
+
+    /// Standard deviations of the realizations and of the tastes.
+    fn spread(self) -> (f64, f64) {
+        match self {
+            Self::Level => (0.0, 0.0),
+            Self::Taste => (0.0, 0.5),
+            Self::Differ => (0.5, 0.5),
+        }
+    }
+}
+
+/// One study without an effect of VAF. Participants differ in level (0.7).
 fn study(world: World, number: u32) -> Ratings {
-    let name = if world == World::Alike {
-        "alike"
-    } else {
-        "differ"
-    };
-    let mut noise = Stream::new(2007, &["calibration", name, &number.to_string()]);
-    let of_model: Vec<f64> = (0..MODELS)
-        .map(|_| match world {
-            World::Alike => 0.0,
-            World::Differ => 0.5 * noise.normal(),
-        })
-        .collect();
+    let mut noise = Stream::new(2007, &["calibration", world.name(), &number.to_string()]);
+    let (of_models, of_tastes) = world.spread();
+    let of_model: Vec<f64> = (0..MODELS).map(|_| of_models * noise.normal()).collect();
     let lambda = [0.9991, 0.9993, 0.9995, 0.9997, 0.9999];
     let mut csv = String::from("subject,model,repetition,rating,vaf,trial_index,lambda\n");
     for s in 0..SUBJECTS {
         let level = 4.0 + 0.7 * noise.normal();
-        let taste: Vec<f64> = (0..MODELS).map(|_| 0.5 * noise.normal()).collect();
+        let taste: Vec<f64> = (0..MODELS).map(|_| of_tastes * noise.normal()).collect();
         let mut trial = 0;
         for r in 0..REPETITIONS {
             let mut order: Vec<usize> = (0..MODELS as usize).collect();

@@ -143,21 +143,31 @@ pub struct Listed {
     pub vaf: Option<f64>,
 }
 
-/// A row with the decision about it.
+/// A row with the decision about it; [`Analysis::subject`] and [`Analysis::model`]
+/// tell its names. There can be millions: no more is kept than has to be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// Subject. Untrusted.
-    pub subject: Arc<str>,
-    /// Realization, empty if there is none. Untrusted.
-    pub model: Arc<str>,
+    subject: u32,
+    model: u32,
     /// The how-maniest time; 0 unknown.
     pub repetition: u32,
-    /// The rating, if there is one.
-    pub rating: Option<f64>,
-    /// The VAF, if there is one.
-    pub vaf: Option<f64>,
+    /// NaN: none.
+    rating: f64,
+    vaf: f64,
     /// Why it does not count; `None`: it does.
     pub excluded: Option<Arc<Reason>>,
+}
+
+impl Judged {
+    /// The rating, if there is one.
+    pub fn rating(&self) -> Option<f64> {
+        Some(self.rating).filter(|v| v.is_finite())
+    }
+
+    /// The VAF, if there is one.
+    pub fn vaf(&self) -> Option<f64> {
+        Some(self.vaf).filter(|v| v.is_finite())
+    }
 }
 
 /// Everything that was computed.
@@ -175,6 +185,9 @@ pub struct Analysis {
     pub counts: Counts,
     /// Every row with the decision about it.
     pub rows: Vec<Judged>,
+    /// Names of the subjects and realizations of the rows.
+    subjects: Vec<String>,
+    models: Vec<String>,
     /// What each pre-stated rule of exclusion did, in the protocol's order.
     pub exclusions: Vec<Applied>,
     /// What was changed of the rules after the study began, in words.
@@ -187,11 +200,27 @@ pub struct Analysis {
     pub scale: Option<(f64, f64)>,
 }
 
+impl Analysis {
+    /// Whose row it is. Untrusted.
+    pub fn subject(&self, row: &Judged) -> &str {
+        self.subjects
+            .get(row.subject as usize)
+            .map_or("", String::as_str)
+    }
+
+    /// The row's realization, empty if there is none. Untrusted.
+    pub fn model(&self, row: &Judged) -> &str {
+        self.models
+            .get(row.model as usize)
+            .map_or("", String::as_str)
+    }
+}
+
 /// Analyses ratings under rules.
 pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     let (decisions, exclusions) = select::decide(ratings, rules);
     let used = rows(ratings, |i| decisions[i].is_none());
-    let cells = Cells::of(&used);
+    let (cells, rows_judged) = rayon::join(|| Cells::of(&used), || judged(ratings, &decisions));
     let mut values = statistics(&cells, rules);
     if exclusions.iter().any(|e| e.rows > 0) {
         let all = rows(ratings, |i| {
@@ -215,7 +244,9 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
                 vaf: *vaf,
             })
             .collect(),
-        rows: judged(ratings, decisions),
+        rows: rows_judged,
+        subjects: ratings.subjects.iter().map(|s| s.id.clone()).collect(),
+        models: ratings.models.iter().map(|m| m.id.clone()).collect(),
         exclusions,
         deviations: rules.deviations.clone(),
         comments: comments(&used),
@@ -274,21 +305,14 @@ fn statistics(cells: &Cells<'_>, rules: &Rules) -> Values {
     values
 }
 
-fn judged(ratings: &Ratings, decisions: Vec<select::Decision>) -> Vec<Judged> {
-    let subjects: Vec<Arc<str>> = (ratings.subjects.iter())
-        .map(|s| Arc::from(s.id.as_str()))
-        .collect();
-    let models: Vec<Arc<str>> = (ratings.models.iter())
-        .map(|m| Arc::from(m.id.as_str()))
-        .collect();
-    let none: Arc<str> = Arc::from("");
-    (decisions.into_iter().enumerate())
+fn judged(ratings: &Ratings, decisions: &[select::Decision]) -> Vec<Judged> {
+    (decisions.iter().cloned().enumerate())
         .map(|(i, excluded)| Judged {
-            subject: Arc::clone(&subjects[ratings.subject[i] as usize]),
-            model: Arc::clone(models.get(ratings.model[i] as usize).unwrap_or(&none)),
+            subject: ratings.subject[i],
+            model: ratings.model[i],
             repetition: ratings.repetition[i],
-            rating: Some(ratings.rating[i]).filter(|v| v.is_finite()),
-            vaf: Some(ratings.vaf[i]).filter(|v| v.is_finite()),
+            rating: ratings.rating[i],
+            vaf: ratings.vaf[i],
             excluded,
         })
         .collect()

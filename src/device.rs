@@ -10,6 +10,7 @@
 //! [`faults`] what it can be told to do wrong. [`process`] is a child program of
 //! the lab's, [`manual`] an experimenter who mounts samples.
 
+pub mod check;
 pub mod core;
 pub mod faults;
 pub mod firmware;

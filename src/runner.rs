@@ -92,6 +92,8 @@ pub struct Setup {
     pub device_kind: DeviceKind,
     /// What plays.
     pub device: Box<dyn Device>,
+    /// What its last commissioning came to: stands in the session's first event.
+    pub device_check: Option<String>,
     /// Time.
     pub clock: Box<dyn Clock>,
     /// Whether telemetry is kept for the live strip.
@@ -295,6 +297,7 @@ impl Runner {
                     fingerprints: self.setup.fingerprints.clone(),
                     device_kind: self.setup.device_kind,
                     device_id: identity.id,
+                    device_check: self.setup.device_check.clone(),
                     device_telemetry: identity.telemetry,
                     notices: claimed.notices,
                 }))
@@ -453,7 +456,7 @@ pub fn sample_codes(protocol: &Protocol) -> BTreeMap<ModelId, String> {
 /// The limits for a table: the protocol's, and under its `uncertified` permission
 /// the lower force of that for a table that fails its certificate, which can put
 /// energy into the hand.
-fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limits {
+pub fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limits {
     let mut limits = protocol.device.limits;
     if let Some(uncertified) = &protocol.device.uncertified
         && table.is_some_and(|table| !table.certificate().passes())

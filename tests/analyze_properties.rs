@@ -5,8 +5,9 @@
 use proptest::prelude::*;
 use study::analyze::{Analysis, Rules, Value, analyze};
 use study::outcome::ratings::Ratings;
+use study::report::html::Details;
 use study::report::text::{Page, comments, page};
-use study::report::{Source, csv, json};
+use study::report::{Source, csv, figures, html, json};
 
 fn source() -> Source {
     Source {
@@ -114,6 +115,13 @@ proptest! {
         for table in csv::tables(&source(), &a) {
             prop_assert!(has_no_number_that_is_none(&table.content), "{}", table.name);
         }
+        let figures = figures::all(&a, &[]);
+        for figure in &figures {
+            prop_assert!(has_no_number_that_is_none(&figure.wide.to_svg()), "{}", figure.name);
+            prop_assert!(has_no_number_that_is_none(&figure.data), "{}", figure.name);
+        }
+        let report = html::document(&source(), &Details::default(), &a, &figures);
+        prop_assert!(has_no_number_that_is_none(&report), "{report}");
     }
 
     #[test]

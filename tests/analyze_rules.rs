@@ -60,7 +60,7 @@ fn under(rule: Exclusion) -> Analysis {
 fn lost(a: &Analysis) -> (Vec<String>, usize) {
     let gone: Vec<&str> = (a.rows.iter())
         .filter(|r| r.excluded.is_some())
-        .map(|r| &*r.subject)
+        .map(|r| a.subject(r))
         .collect();
     let mut who: Vec<String> = gone.iter().map(|s| (*s).to_owned()).collect();
     who.dedup();

@@ -36,16 +36,16 @@ fn played(realization: &Realization, options: Options, force_n: f64) -> Result<P
         velocity_mm_s: Limit::new(1000.0).unwrap(),
     };
     let mut device = VirtualDevice::new(options);
-    let stimulus = Stimulus::of_table(realization);
-    device.load(&stimulus, limits, ms(0)).unwrap();
-    assert_eq!(device.poll(ms(1000)), [Report::Loaded]);
-    device.start(ms(1000)).unwrap();
-    let mut reports = device.poll(ms(13_002));
+    let what = Stimulus::of_table(realization);
+    device.load(&what, limits, ms(0)).unwrap();
+    device.poll(ms(100));
+    device.start(ms(100)).unwrap();
+    let mut reports = device.poll(ms(12_102));
     if let Some(Report::Fault(said)) = reports.iter().find(|r| matches!(r, Report::Fault(_))) {
         return Err(said.clone());
     }
-    device.stop(ms(13_002)).unwrap();
-    reports.extend(device.poll(ms(13_200)));
+    device.stop(ms(12_102)).unwrap();
+    reports.extend(device.poll(ms(12_200)));
     let playback = reports.iter().find_map(|report| match report {
         Report::Stopped(playback) => Some(*playback),
         _ => None,

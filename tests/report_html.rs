@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use study::analyze::{Analysis, Rules, Said, analyze};
+use study::analyze::{Analysis, Exclusion, Rules, Said, analyze};
 use study::outcome::ratings::Ratings;
 use study::report::Source;
 use study::report::figures::{self, Trace};
@@ -144,6 +144,28 @@ fn what_is_absent_is_left_out_politely() {
 }
 
 #[test]
+fn what_was_stated_beforehand_and_what_was_changed_is_told() {
+    let csv = "subject,model,repetition,rating,vaf\n\
+               S1,a,1,4,0.5\nS1,b,1,4,0.6\nS1,c,1,4,0.7\nS2,a,1,5,0.5\nS2,b,1,3,0.6\nS2,c,1,6,0.7\n\
+               S3,a,1,2,0.5\nS3,b,1,3,0.6\nS3,c,1,5,0.7\n";
+    let ratings = Ratings::read_csv("data.csv", csv.as_bytes(), None).unwrap();
+    let rules = Rules {
+        exclude: vec![Exclusion::ConstantRater, Exclusion::Inconsistent(1.0)],
+        deviations: vec!["protocol 2 of 2026-01-02, because \"typo\": vaf: a → b".to_owned()],
+        ..Rules::default()
+    };
+    let page = report(&analyze(&ratings, &rules), &[]);
+    let row = "<td><code>constant-rater</code></td><td>3</td><td>1</td>";
+    assert!(page.contains(row), "{page}");
+    assert!(page.contains("the design has no hidden repeat"));
+    assert!(page.contains("Deviations from what was stated beforehand"));
+    assert!(page.contains("because &quot;typo&quot;: vaf: a → b"));
+    let neither = report(&analyze(&ratings, &Rules::default()), &[]);
+    assert!(neither.contains("No rule of exclusion was stated beforehand."));
+    assert!(neither.contains("No rule of the analysis was changed"));
+}
+
+#[test]
 fn hostile_names_and_comments_stay_text() {
     let quoted = EVIL.replace('"', "\"\"");
     let mut csv = "subject,model,repetition,rating,vaf\n".to_owned();
@@ -179,6 +201,7 @@ fn hostile_names_and_comments_stay_text() {
         versions: vec![(1, EVIL.to_owned(), EVIL.to_owned())],
         ..Details::default()
     };
+    a.deviations.push(EVIL.to_owned());
     let figures = figures::all(&a, &[trace]);
     assert!(figures.iter().any(|f| f.name == "telemetry"));
     let page = document(&source(EVIL), &details, &a, &figures);

@@ -292,6 +292,63 @@ fn a_session_over_a_port_with_telemetry_that_is_whole() {
     assert_eq!((samples as usize, lost), (lines, 0));
 }
 
+/// Commissioned in the same folder: the verdict stands in the session.
+#[test]
+fn a_commissioning_is_told_in_the_session_and_a_broken_device_fails_it() {
+    let mut rig = Rig::start(&[]);
+    // the port has one owner
+    let port = rig.device.port.to_str().unwrap().to_owned();
+    let check = ["device", "check", "--save", "--port", &port];
+    let (code, _, err) = study(&check, rig.folder.path());
+    assert_eq!(code, 3);
+    assert!(err.contains("another program has it"), "{err}");
+    rig.to("Operate the real switch");
+    drop(rig.terminal);
+    // a busy machine may fail a time limit
+    let tries = (0..4).map(|_| study(&check, rig.folder.path()));
+    let (_, out, _) = tries.into_iter().find(|(code, ..)| *code == 0).unwrap();
+    assert!(out.contains("26 of 26 clauses kept"), "{out}");
+    let protocol = rig.folder.path().join("protocol");
+    let arguments = [
+        "run",
+        protocol.to_str().unwrap(),
+        "--operator",
+        "lw",
+        "--port",
+        &port,
+    ];
+    let mut terminal = Terminal::start(&arguments, rig.folder.path(), 24, 80);
+    terminal.wait_for("Who takes part?");
+    terminal.keys("\u{15}P02\r");
+    terminal.wait_for("Operate the real switch");
+    drop(terminal);
+    let journal = rig
+        .folder
+        .path()
+        .join("results/turn-signal/sessions/P02/1/journal.jsonl");
+    let journal = fs::read_to_string(journal).unwrap();
+    assert!(journal.contains("\"device_check\":\""), "{journal}");
+    assert!(
+        journal.contains("26 of 26 clauses kept; round trip"),
+        "{journal}"
+    );
+    drop(rig.device);
+
+    let folder = tempfile::tempdir().unwrap();
+    let device = Simulator::start(folder.path(), &["--flaw", "takes-bad-tables"]);
+    let port = device.port.to_str().unwrap();
+    let (code, out, err) = study(
+        &["device", "check", "--json", "--port", port],
+        folder.path(),
+    );
+    assert_eq!(code, 3, "{out}");
+    assert!(err.contains("clause 8.3 of docs/wire.md"), "{err}");
+    let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["format"], "study-device-check/1");
+    assert_eq!(document["pass"], false);
+    assert_eq!(document["device"]["serial"], "simulated-1");
+}
+
 /// The cable comes out while a table is waited for, while it plays, while the rating
 /// is typed and between two trials, and the device loses its power while it plays.
 #[test]

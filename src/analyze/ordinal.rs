@@ -7,16 +7,20 @@
 //! probability, and a threshold between them no estimate.
 
 use super::cells::Cells;
-use super::values::{Group, Values};
+use super::values::{self, Values};
 use crate::stats::clm::counts::{Count, Predictor, Table};
 use crate::stats::clm::{Cause, Fit, clm};
 use crate::stats::clmm::{Mixed, clmm};
+use rayon::prelude::*;
 
 /// More than these are no longer a rating scale: a slider.
 const MAX_CATEGORIES: usize = 20;
 
 /// Most realizations that get an effect of their own.
 const MAX_MODELS: usize = 50;
+
+/// Most different VAF.
+const MAX_LEVELS: usize = 10_000;
 
 /// Most subjects of a mixed model: its cost is proportional to them.
 const MAX_SUBJECTS: usize = 10_000;
@@ -31,8 +35,26 @@ pub(super) fn ordinal(cells: &Cells<'_>, values: &mut Values) {
     }
     let of_test = |i: &usize| test[cells.ratings.model[*i] as usize];
     let rows: Vec<usize> = cells.order.iter().copied().filter(of_test).collect();
-    by_model(cells, &rows, values);
-    by_vaf(cells, &rows, values);
+    let both: [Group; 2] = [by_model, by_vaf];
+    let parts = both.par_iter().map(|group| {
+        let mut values = Values::default();
+        group(cells, &rows, &mut values);
+        values
+    });
+    for part in parts.collect::<Vec<Values>>() {
+        values.take(part);
+    }
+}
+
+/// Writes the models of one predictor.
+type Group = fn(&Cells<'_>, &[usize], &mut Values);
+
+/// Whether there are more subjects than a mixed model is fitted to. Nobody needs
+/// to be told apart then: the counts are pooled.
+fn many(cells: &Cells<'_>, rows: &[usize]) -> bool {
+    let subject = |i: usize| cells.ratings.subject[i];
+    let same = rows.windows(2).filter(|w| subject(w[0]) != subject(w[1]));
+    same.count() >= MAX_SUBJECTS
 }
 
 fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
@@ -65,12 +87,13 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         Err(format!("more than {MAX_MODELS} realizations"))
     } else {
         categories(cells, rows).map(|ratings| {
-            let counts = counts(cells, rows, &ratings, |i| place[model(i) as usize]);
+            let n = predictors.len();
+            let counts = counts(cells, rows, &ratings, n, |i| place[model(i) as usize]);
             let table = Table::new(predictors, names.len(), ratings.len(), &counts);
             (table, ratings)
         })
     };
-    put_all("model", made, &scale, values);
+    put_all("model", made, many(cells, rows), &scale, values);
 }
 
 fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
@@ -80,12 +103,9 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         .copied()
         .filter(|&i| vaf(i).is_finite())
         .collect();
-    let mut levels: Vec<f64> = Vec::new();
-    for &i in &rows {
-        if let Err(at) = levels.binary_search_by(|v| v.total_cmp(&vaf(i))) {
-            levels.insert(at, vaf(i));
-        }
-    }
+    let mut levels: Vec<f64> = rows.iter().map(|&i| vaf(i)).collect();
+    levels.sort_unstable_by(f64::total_cmp);
+    levels.dedup_by(|a, b| a.total_cmp(b).is_eq());
     // From −1 to 1, so that the search sees no units.
     let (low, high) = match (levels.first(), levels.last()) {
         (Some(low), Some(high)) => (*low, *high),
@@ -101,6 +121,8 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         Err("no rating has a realization and a VAF".to_owned())
     } else if unit <= 0.0 {
         Err("all VAF are equal".to_owned())
+    } else if levels.len() > MAX_LEVELS {
+        Err(format!("more than {MAX_LEVELS} different VAF"))
     } else {
         categories(cells, &rows).map(|ratings| {
             let predictors = levels
@@ -114,11 +136,11 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
                 let found = levels.binary_search_by(|v| v.total_cmp(&vaf(i)));
                 found.unwrap_or(0) as u32
             };
-            let counts = counts(cells, &rows, &ratings, index);
+            let counts = counts(cells, &rows, &ratings, levels.len(), index);
             (Table::new(predictors, 1, ratings.len(), &counts), ratings)
         })
     };
-    put_all("vaf", made, &scale, values);
+    put_all("vaf", made, many(cells, &rows), &scale, values);
 }
 
 /// The ratings that occur, rising, or why they are no categories.
@@ -143,22 +165,38 @@ fn categories(cells: &Cells<'_>, rows: &[usize]) -> Result<Vec<f64>, String> {
     }
 }
 
-/// The rows, which come cell by cell, counted.
+/// The rows, which come cell by cell, counted; `predictors` is how many there are.
 fn counts(
     cells: &Cells<'_>,
     rows: &[usize],
     ratings: &[f64],
+    predictors: usize,
     predictor: impl Fn(usize) -> u32,
 ) -> Vec<Count> {
+    let category = |i: usize| {
+        let rating = cells.ratings.rating[i] + 0.0;
+        ratings.partition_point(|v| *v < rating) as u32
+    };
+    if many(cells, rows) {
+        let mut tally = vec![0u32; predictors * ratings.len()];
+        for &i in rows {
+            tally[predictor(i) as usize * ratings.len() + category(i) as usize] += 1;
+        }
+        let of = |(at, n): (usize, u32)| Count {
+            subject: 0,
+            predictor: (at / ratings.len()) as u32,
+            category: (at % ratings.len()) as u32,
+            n,
+        };
+        return tally.into_iter().enumerate().map(of).collect();
+    }
     let mut counts: Vec<Count> = Vec::new();
     let mut from = 0;
     for &i in rows {
-        let rating = cells.ratings.rating[i] + 0.0;
-        let category = ratings.partition_point(|v| *v < rating);
         let new = Count {
             subject: cells.ratings.subject[i],
             predictor: predictor(i),
-            category: category as u32,
+            category: category(i),
             n: 1,
         };
         if counts.get(from).is_some_and(|c| c.subject != new.subject) {
@@ -184,6 +222,7 @@ struct Scale<'a> {
 fn put_all(
     what: &str,
     made: Result<(Table, Vec<f64>), String>,
+    many: bool,
     scale: &Scale<'_>,
     values: &mut Values,
 ) {
@@ -210,7 +249,7 @@ fn put_all(
         Ok(fit) => put(fit, &labels, scale, &mut values.group(&ids[0], "")),
         Err(cause) => none(&mut values.group(&ids[0], cause.to_string()), what),
     }
-    let mixed: [Result<Mixed, String>; 2] = if table.subjects() > MAX_SUBJECTS {
+    let mixed: [Result<Mixed, String>; 2] = if many {
         let why = format!("more than {MAX_SUBJECTS} subjects");
         [Err(why.clone()), Err(why)]
     } else {
@@ -234,7 +273,7 @@ fn put_all(
     }
 }
 
-fn none(g: &mut Group<'_>, what: &str) {
+fn none(g: &mut values::Group<'_>, what: &str) {
     g.none(&["loglik"]);
     if what == "vaf" {
         g.none(&["beta/vaf", "se/vaf"]);
@@ -242,7 +281,7 @@ fn none(g: &mut Group<'_>, what: &str) {
 }
 
 /// On the scale of the data: θ + β·origin/unit, β/unit.
-fn put(fit: &Fit, labels: &[String], scale: &Scale<'_>, g: &mut Group<'_>) {
+fn put(fit: &Fit, labels: &[String], scale: &Scale<'_>, g: &mut values::Group<'_>) {
     g.put("loglik", fit.loglik);
     for ((name, beta), se) in scale.names.iter().zip(&fit.beta).zip(&fit.se) {
         g.put(&format!("beta/{name}"), beta / scale.unit);

@@ -19,7 +19,7 @@ use crate::store::StudyFolder;
 use crate::text::{ModelId, QuestionId};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{BufReader, Write as _};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `study analyze`.
@@ -335,8 +335,8 @@ fn deviations(study: &StudyFolder) -> Result<Vec<String>, Failure> {
     Ok(said)
 }
 
-/// Each file as a whole or not at all. Only tables and the report are synced:
-/// pictures can be made again at any time.
+/// Each file as a whole or not at all. None is synced: all of them can be made
+/// again at any time from what is on the disk.
 fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
     for item in [dir.to_owned(), dir.join("figures")] {
         fs::create_dir_all(&item).map_err(|e| Failure::file(&item, &e))?;
@@ -344,13 +344,7 @@ fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
     for output in files {
         let path = dir.join(&output.name);
         let part = path.with_extension(format!("{}.part", std::process::id()));
-        let written = File::create(&part).and_then(|mut file| {
-            file.write_all(&output.content)?;
-            if !output.name.starts_with("figures/") {
-                file.sync_data()?;
-            }
-            fs::rename(&part, &path)
-        });
+        let written = fs::write(&part, &output.content).and_then(|()| fs::rename(&part, &path));
         if let Err(e) = written {
             // What is left of it is of no use; the first error is the one to tell.
             let _ = fs::remove_file(&part);

@@ -1,5 +1,10 @@
 //! `study device`: what could play.
 
+mod check;
+mod hold;
+mod port;
+mod rendered;
+mod safety;
 mod simulate;
 
 use super::{Console, Failure, Kind, load};
@@ -23,8 +28,19 @@ enum What {
         #[arg(long)]
         json: bool,
     },
+    /// Ask a device who it is and what it can do
+    Info(check::InfoArgs),
+    /// Check a device against docs/wire.md, clause by clause
+    Check(check::CheckArgs),
     /// Be a simulated device on a pseudo-terminal, whose path is the first line
     Simulate(simulate::Args),
+    /// Play one table for long, without a session
+    #[command(hide = true)]
+    Hold(hold::Args),
+    /// Measure the time to zero force when the host is killed, stopped, stalled or
+    /// unplugged, on a simulated device
+    #[command(hide = true)]
+    Safety(safety::Args),
     /// Show what to write on the samples of a study: for who labels them, not for
     /// the experimenter
     Codes {
@@ -37,6 +53,10 @@ enum What {
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     match &args.what {
         What::List { json } => list(*json, console),
+        What::Info(args) => check::info(args, console),
+        What::Check(args) => check::check(args, console),
+        What::Hold(args) => hold::run(args, console),
+        What::Safety(args) => safety::run(args, console),
         What::Simulate(args) => simulate::run(args, console),
         What::Codes { protocol } => codes(protocol, console),
     }

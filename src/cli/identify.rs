@@ -38,8 +38,8 @@ struct Found<'a> {
     validations: Vec<Option<Validation>>,
     /// For each of `recordings` what a repetition of it says, if there is one.
     ceilings: Vec<Option<Ceiling>>,
-    /// Model files: path and text.
-    files: Vec<(PathBuf, String)>,
+    /// Models and figures: path and content.
+    files: Vec<(PathBuf, Vec<u8>)>,
 }
 
 impl Found<'_> {
@@ -115,7 +115,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files::write(dir, &found.files, args.force)?;
     }
     if let Some(dir) = &args.figures {
-        let (figures, missing) = files::figures(&found, dir);
+        let (figures, missing) = files::figures(&found, dir)?;
         // they follow from the recordings: making them again is no loss
         files::write(dir, &figures, true)?;
         for said in missing {

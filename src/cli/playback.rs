@@ -1,6 +1,6 @@
 //! Which device plays: from the protocol, the arguments and `device.toml`.
 
-use super::{Failure, Kind};
+use super::{Console, Failure, Kind};
 use crate::device::host::Settings;
 use crate::device::link::Threaded;
 use crate::device::manual::{Beside, Manual};
@@ -10,7 +10,7 @@ use crate::device::virtual_device::{Options, VirtualDevice};
 use crate::device::{Device, DeviceError};
 use crate::protocol::{DeviceKind, Protocol};
 use crate::text::Untrusted;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// What a rig has, in the folder that `study` is started in.
@@ -183,6 +183,44 @@ pub(super) fn open(
     } else {
         device
     })
+}
+
+/// What the last `study device check --save` said, as it is kept beside
+/// [`RIG_FILE`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Commissioned {
+    /// `study-device-commissioned/1`.
+    pub(super) format: String,
+    /// Serial number of the device.
+    pub(super) device: String,
+    /// When, RFC 3339.
+    pub(super) at: String,
+    /// In one line.
+    pub(super) summary: String,
+}
+
+/// Its `format`.
+pub(super) const COMMISSIONED: &str = "study-device-commissioned/1";
+/// Where it is kept.
+pub(super) const COMMISSIONED_FILE: &str = "device-check.json";
+
+/// What is known of the commissioning of a device; that of another one, and a file
+/// that cannot be read, are told and not used.
+pub(super) fn commissioned(device: &str, console: &mut Console) -> Option<String> {
+    let bytes = std::fs::read(COMMISSIONED_FILE).ok()?;
+    let kept: Commissioned = match serde_json::from_slice(&bytes) {
+        Ok(kept) => kept,
+        Err(e) => {
+            console.say(format!("warning: {COMMISSIONED_FILE} is not used: {e}"));
+            return None;
+        }
+    };
+    if kept.format != COMMISSIONED || kept.device != device {
+        return None;
+    }
+    let text = format!("{}: {}", kept.at, kept.summary);
+    // it goes into every session: short, whatever somebody wrote into the file
+    Some(text.chars().take(500).collect())
 }
 
 fn unopened(why: &DeviceError) -> Failure {

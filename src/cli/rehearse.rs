@@ -106,6 +106,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             rows: None,
             device_kind: DeviceKind::Simulated,
             device: Box::new(VirtualDevice::new(options)),
+            device_check: None,
             clock: Box::new(clock.clone()),
             live: false,
             threaded: false,

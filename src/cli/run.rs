@@ -91,6 +91,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         kind: seats,
         rows: args.rows.clone(),
         device_kind: kind,
+        device_check: playback::commissioned(&device.identity().id, console),
         device,
         clock: Box::new(clock),
         live: args.live,

@@ -177,6 +177,7 @@ pub struct Host {
     unheard: Option<Duration>,
     fed: Option<Duration>,
     settings: Settings,
+    trouble: Option<String>,
     health: Health,
 }
 
@@ -205,6 +206,7 @@ impl Host {
             unheard: None,
             fed: None,
             settings,
+            trouble: None,
             health: Health::default(),
         }
     }
@@ -539,6 +541,12 @@ impl Host {
         if self.stage.known() {
             self.reports.push(Report::Lost(why.to_owned()));
         }
+        self.trouble = Some(why.to_owned());
+    }
+
+    /// Why the device does not answer, if it does not.
+    pub fn trouble(&self) -> Option<&str> {
+        self.trouble.as_deref().filter(|_| !self.stage.known())
     }
 
     fn other_version(&mut self, version: u8, at: Duration) {

@@ -414,6 +414,11 @@ impl Keeper {
     fn note(&mut self) {
         let now = self.shared.now();
         let mut facts = self.shared.facts();
+        if let Some(why) = self.host.trouble()
+            && facts.trouble.is_none()
+        {
+            facts.trouble = Some(why.to_owned());
+        }
         let first = facts.identity.is_none() && self.host.identity().is_some();
         if first || now.saturating_sub(self.noted) > Duration::from_secs(1) {
             self.noted = now;

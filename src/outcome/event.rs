@@ -181,6 +181,9 @@ pub struct Start {
     pub device_kind: DeviceKind,
     /// Which one.
     pub device_id: String,
+    /// What its last commissioning came to, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device_check: Option<String>,
     /// Of this program.
     pub tool_version: String,
     /// Which frozen version of the protocol.

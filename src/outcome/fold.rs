@@ -289,6 +289,7 @@ mod tests {
             operator: "first".to_owned(),
             device_kind: DeviceKind::Simulated,
             device_id: "sim".to_owned(),
+            device_check: None,
             tool_version: "0".to_owned(),
             protocol_version: 1,
             fingerprints: Fingerprints {

@@ -33,7 +33,8 @@ pub struct Realization {
     pub role: Role,
     /// The realization that it repeats in secret.
     pub duplicate_of: Option<String>,
-    /// Numbers that may explain the ratings.
+    /// Numbers that may explain the ratings; `least_energy_j`, the mean over
+    /// playbacks, where telemetry tells it.
     pub covariates: BTreeMap<String, f64>,
 }
 
@@ -123,6 +124,14 @@ impl Ratings {
             for (question, text) in comments(r) {
                 builder.comment(question, text);
             }
+            let origin = match (r.simulated, r.pilot) {
+                (true, _) => Origin::Simulated,
+                (false, true) => Origin::Pilot,
+                (false, false) => Origin::Real,
+            };
+            if let (Some(energy), Status::Ok) = (r.least_energy_j, r.status) {
+                builder.least_energy(model, origin, energy);
+            }
             builder.push(Row {
                 subject,
                 model,
@@ -130,11 +139,7 @@ impl Ratings {
                 rating: rated(r, question),
                 vaf: r.vaf.filter(|v| v.is_finite()).unwrap_or(f64::NAN),
                 trial_index: r.position.unwrap_or(0),
-                origin: match (r.simulated, r.pilot) {
-                    (true, _) => Origin::Simulated,
-                    (false, true) => Origin::Pilot,
-                    (false, false) => Origin::Real,
-                },
+                origin,
                 status: r.status,
                 corrected: r.corrected,
                 attempt: r.attempt.unwrap_or(0),

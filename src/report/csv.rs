@@ -274,10 +274,10 @@ fn excluded(a: &Analysis) -> Vec<Vec<String>> {
     for row in &a.rows {
         if let Some(reason) = &row.excluded {
             rows.push(vec![
-                row.subject.to_string(),
-                row.model.to_string(),
+                a.subject(row).to_owned(),
+                a.model(row).to_owned(),
                 row.repetition.to_string(),
-                number(row.rating),
+                number(row.rating()),
                 reason.to_string(),
             ]);
         }
@@ -298,17 +298,17 @@ fn ratings_used(a: &Analysis) -> String {
         ]);
         for row in &a.rows {
             let excluded = row.excluded.as_ref().map(|r| r.to_string());
-            let reason = match (&excluded, row.rating) {
+            let reason = match (&excluded, row.rating()) {
                 (Some(reason), _) => reason,
                 (None, None) => "no rating",
                 (None, Some(_)) => "",
             };
             to.row([
-                &*row.subject,
-                &*row.model,
+                a.subject(row),
+                a.model(row),
                 &row.repetition.to_string(),
-                &number(row.rating),
-                &number(row.vaf),
+                &number(row.rating()),
+                &number(row.vaf()),
                 if reason.is_empty() { "true" } else { "false" },
                 reason,
             ]);

@@ -129,9 +129,13 @@ impl<'a> Scene<'a> {
             .partition(|m| m.role == Role::Test && m.duplicate_of.is_none());
         models.extend(others);
         let mut cells: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
-        for row in a.rows.iter().filter(|r| r.excluded.is_none()) {
-            if let (Some(rating), false) = (row.rating, row.model.is_empty()) {
-                let cell = (&*row.subject, &*row.model);
+        // Of more subjects none is drawn.
+        let few = a.counts.participants <= MAX_DRAWN;
+        let rows = a.rows.iter().filter(|r| few && r.excluded.is_none());
+        for row in rows {
+            let (subject, model) = (a.subject(row), a.model(row));
+            if let (Some(rating), false) = (row.rating(), model.is_empty()) {
+                let cell = (subject, model);
                 cells.entry(cell).or_default().push(rating);
             }
         }

@@ -82,6 +82,8 @@ pub fn surface(places: &[Place], best: Option<usize>, on: &str) -> Option<Drawin
             let share = (p.vaf - low) / (high - low);
             let mut note = Note::new(place(p), &short(p.vaf)).moved(0.0, 4.0);
             note.colour = ramp(share).text_on();
+            // a white rim would swallow white letters
+            note.rim = false;
             panel = panel.note(note);
         }
     }
@@ -309,7 +311,7 @@ pub fn map(by_lambda: &[(f64, &Realization)]) -> Option<Drawing> {
             .collect();
         let mut panel = Panel::new(
             Axis::new("position x (mm)", x[0], x[x.len() - 1]).without_grid(),
-            Axis::of_names("λ", &names),
+            Axis::of_names("forgetting factor λ", &names),
         )
         .titled(label)
         .with(Look::nth(0), Mark::Heat { cells, low, high });

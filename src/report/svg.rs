@@ -308,7 +308,7 @@ pub fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(em).sum::<f64>() * size
 }
 
-/// A text that is at most about so many px wide; what is cut off is marked.
+/// A text that is at most about so many px wide; what is left out is marked.
 pub fn fitted(text: &str, size: f64, room: f64) -> String {
     let mut most = text.chars().count();
     let mut shown = text.to_owned();
@@ -319,13 +319,18 @@ pub fn fitted(text: &str, size: f64, room: f64) -> String {
     shown
 }
 
-/// A text of at most so many characters; what is cut off is marked.
+/// A text of at most so many characters. What is left out is marked, in the middle:
+/// names of realizations often begin alike.
 pub fn shortened(text: &str, most: usize) -> String {
-    if text.chars().count() <= most {
+    let length = text.chars().count();
+    if length <= most {
         return text.to_owned();
     }
-    let kept: String = text.chars().take(most.saturating_sub(1)).collect();
-    format!("{kept}…")
+    let kept = most.saturating_sub(1);
+    let end = kept / 2;
+    let first: String = text.chars().take(kept - end).collect();
+    let last: String = text.chars().skip(length - end).collect();
+    format!("{first}…{last}")
 }
 
 #[cfg(test)]

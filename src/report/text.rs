@@ -170,7 +170,7 @@ fn table(
     if let Some(h) = &at_least {
         head.push(h);
     }
-    head.push("mean over subjects [95 %]");
+    head.push("subject mean [95 %]");
     let mut grid = Grid::new(&head, hist.map(|_| 5));
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));

@@ -128,6 +128,8 @@ pub struct Claim {
     pub device_kind: DeviceKind,
     /// Which one.
     pub device_id: String,
+    /// What its last commissioning came to, if it is known.
+    pub device_check: Option<String>,
     /// Whether it reports telemetry.
     pub device_telemetry: bool,
     /// Notices for the operator, such as a recovered tail.

@@ -78,6 +78,7 @@ impl Session {
                     operator: self.operator.clone(),
                     device_kind: claim.device_kind,
                     device_id: claim.device_id,
+                    device_check: claim.device_check,
                     tool_version: tool_version(),
                     protocol_version: claim.protocol_version,
                     fingerprints: claim.fingerprints,

@@ -1,6 +1,6 @@
 //! Agreement: intraclass correlations and Krippendorff's alpha.
 
-use super::describe::tidy;
+use super::describe::{Sum, sum, tidy};
 use super::distribution::{f_quantile, f_upper};
 use super::finite;
 
@@ -56,28 +56,29 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
     }
     let (nf, kf) = (n as f64, k as f64);
     let rows = || rows.iter().map(AsRef::as_ref);
-    let grand = rows().flatten().sum::<f64>() / (nf * kf);
-    let row_means: Vec<f64> = rows().map(|r| r.iter().sum::<f64>() / kf).collect();
-    let mut column_means = vec![0.0; k];
+    let row_means: Vec<f64> = rows().map(|r| sum(r) / kf).collect();
+    let grand = sum(&row_means) / nf;
+    let mut columns = vec![Sum::default(); k];
     for row in rows() {
-        for (sum, x) in column_means.iter_mut().zip(row) {
-            *sum += x;
+        for (sum, x) in columns.iter_mut().zip(row) {
+            sum.add(*x);
         }
     }
-    column_means.iter_mut().for_each(|sum| *sum /= nf);
-    let square = |x: f64| x * x;
-    let targets = kf * row_means.iter().map(|m| square(m - grand)).sum::<f64>() / (nf - 1.0);
-    let raters = nf * column_means.iter().map(|m| square(m - grand)).sum::<f64>() / (kf - 1.0);
-    let mut residual = 0.0;
+    let column_means: Vec<f64> = columns.iter().map(|sum| sum.get() / nf).collect();
+    let squares = |means: &[f64]| sum_by(means, |m| (m - grand).powi(2));
+    let targets = kf * squares(&row_means) / (nf - 1.0);
+    let raters = nf * squares(&column_means) / (kf - 1.0);
+    let (mut residual, mut size) = (Sum::default(), 0.0);
     for (row, rm) in rows().zip(&row_means) {
         for (x, cm) in row.iter().zip(&column_means) {
-            residual += square(x - rm - cm + grand);
+            residual.add((x - rm - cm + grand).powi(2));
+            size += (x - grand).powi(2);
         }
     }
+    let residual = residual.get();
     let (df_t, df_e, df_w) = (nf - 1.0, (nf - 1.0) * (kf - 1.0), nf * (kf - 1.0));
     let error = residual / df_e;
     let within = (residual + raters * (kf - 1.0)) / df_w;
-    let size: f64 = rows().flatten().map(|x| square(x - grand)).sum();
     let floor = 1e-24 * size;
     let f_1 = (within > floor).then(|| targets / within).and_then(finite);
     let f_3 = (error > floor).then(|| targets / error).and_then(finite);
@@ -121,6 +122,12 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         f_1,
         f_3,
     })
+}
+
+fn sum_by(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
+    let mut sum = Sum::default();
+    x.iter().for_each(|v| sum.add(f(*v)));
+    sum.get()
 }
 
 /// ICC2 with Satterthwaite's degrees of freedom for its interval.

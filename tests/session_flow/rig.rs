@@ -163,6 +163,7 @@ impl Rig {
             },
             device_kind: DeviceKind::Simulated,
             device_id: "simulated-1".to_owned(),
+            device_check: None,
             device_telemetry: self.telemetry,
             notices: Vec::new(),
         }

@@ -9,12 +9,11 @@ use crate::report::figures::{self, Drawn, Trace};
 use crate::report::html::{self, Details};
 use crate::report::png::{Painter, PngError};
 use crate::store::{StudyFolder, layout};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Samples of a playback that are read.
 const MAX_SAMPLES: usize = 200_000;
@@ -37,11 +36,15 @@ pub(super) fn files(
     traces: &[Trace],
 ) -> Result<Vec<Output>, Failure> {
     let drawn = figures::all(analysis, traces);
+    let (document, pictures) = rayon::join(
+        || html::document(source, details, analysis, &drawn),
+        || pictures(&drawn),
+    );
     let mut files = vec![Output {
         name: "report.html".to_owned(),
-        content: html::document(source, details, analysis, &drawn).into_bytes(),
+        content: document.into_bytes(),
     }];
-    let pictures = pictures(&drawn).map_err(|e| Failure::new(Kind::Bug, e))?;
+    let pictures = pictures.map_err(|e| Failure::new(Kind::Bug, e))?;
     for (figure, (svg, png)) in drawn.into_iter().zip(pictures) {
         let mut add = |ending: &str, content: Vec<u8>| {
             files.push(Output {
@@ -56,31 +59,15 @@ pub(super) fn files(
     Ok(files)
 }
 
-/// SVG and PNG of each figure. Threads take figures as they are free; each
-/// figure is drawn by one of them, so that their number changes no byte.
+/// SVG and PNG of each figure, each drawn by one thread, so that their number
+/// changes no byte.
 fn pictures(drawn: &[Drawn]) -> Result<Vec<(String, Vec<u8>)>, PngError> {
     let painter = Painter::default();
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(BTreeMap::new());
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(drawn.len()) {
-            scope.spawn(|| {
-                while let Some(figure) = drawn.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let svg = figure.wide.to_svg();
-                    let made = painter.png(&svg).map(|png| (svg, png));
-                    done.lock()
-                        .expect("no thread panics while it holds the lock")
-                        .insert(figure.name, made);
-                }
-            });
-        }
-    });
-    let mut done = done
-        .into_inner()
-        .expect("no thread panics while it holds the lock");
-    let own = drawn.iter().filter_map(|f| done.remove(f.name));
-    own.collect()
+    let one = |figure: &Drawn| {
+        let svg = figure.wide.to_svg();
+        painter.png(&svg).map(|png| (svg, png))
+    };
+    drawn.par_iter().with_max_len(1).map(one).collect()
 }
 
 /// What the study's folder says beyond its ratings.
@@ -171,7 +158,7 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
         .rows
         .iter()
         .filter(|r| r.excluded.is_none())
-        .map(|r| (&*r.subject, &*r.model, r.repetition))
+        .map(|r| (analysis.subject(r), analysis.model(r), r.repetition))
         .collect();
     let mut shown: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     let mut found = Vec::new();

@@ -1,7 +1,7 @@
 //! `study device simulate`: a device on a pseudo-terminal.
 
 use crate::cli::{Console, Failure, Kind};
-use crate::device::firmware::{Firmware, Options};
+use crate::device::firmware::{Firmware, Flaw, Options};
 use crate::device::link::memory::Noise;
 use crate::device::link::pty::{Control, Simulator};
 use std::io::BufRead as _;
@@ -34,6 +34,16 @@ pub(in crate::cli) struct Args {
     /// share of the frames (such as drop=0.01). May be given several times
     #[arg(long, value_name = "FAULT", value_parser = fault)]
     fault: Vec<FaultArg>,
+    /// A defect that it has all the time, to try `study device check` on it
+    #[arg(long, value_name = "DEFECT", value_parser = flaw)]
+    flaw: Option<Flaw>,
+}
+
+fn flaw(given: &str) -> Result<Flaw, String> {
+    Flaw::named(given).ok_or_else(|| {
+        let names: Vec<&str> = Flaw::ALL.iter().map(|(_, name, _)| *name).collect();
+        format!("it is one of {}", names.join(", "))
+    })
 }
 
 /// What stands on standard input, line by line.
@@ -120,6 +130,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         servo_hz: f64::from(args.rate),
         watchdog_ms: args.watchdog,
         serial: args.serial.clone(),
+        flaw: args.flaw,
         ..Options::default()
     });
     let failed = |e: crate::device::link::LinkError| Failure::new(Kind::Device, e);

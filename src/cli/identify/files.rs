@@ -1,20 +1,21 @@
 //! The files that `study identify` writes: models and figures.
 
 use super::args::{Args, MethodWord};
-use super::{Failure, Found};
+use super::{Failure, Found, Kind};
 use crate::identify::grid::Cell;
 use crate::model::file;
 use crate::report::identification::{self, Drawing, Place};
+use crate::report::png::Painter;
 use crate::text::{ModelId, Untrusted};
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Path and text.
-type Text = (PathBuf, String);
+/// Path and content.
+type Written = (PathBuf, Vec<u8>);
 
 /// Gives every cell its id and makes its file.
-pub(super) fn models(cells: &mut [Cell], args: &Args, dir: &Path) -> Result<Vec<Text>, Failure> {
+pub(super) fn models(cells: &mut [Cell], args: &Args, dir: &Path) -> Result<Vec<Written>, Failure> {
     let template = args.id.as_deref().unwrap_or(match args.method {
         MethodWord::Ewls => "lambda-{lambda}-dx-{dx}",
         MethodWord::Constrained => "constrained-lambda-{lambda}-dx-{dx}",
@@ -41,7 +42,7 @@ pub(super) fn models(cells: &mut [Cell], args: &Args, dir: &Path) -> Result<Vec<
         cell.realization.id = id.to_string();
         files.push((
             dir.join(format!("{id}.toml")),
-            file::write(&cell.realization),
+            file::write(&cell.realization).into_bytes(),
         ));
         ids.push(id);
     }
@@ -49,7 +50,7 @@ pub(super) fn models(cells: &mut [Cell], args: &Args, dir: &Path) -> Result<Vec<
 }
 
 /// Writes the files; without `force` none if one of them is there.
-pub(super) fn write(dir: &Path, files: &[Text], force: bool) -> Result<(), Failure> {
+pub(super) fn write(dir: &Path, files: &[Written], force: bool) -> Result<(), Failure> {
     fs::create_dir_all(dir).map_err(|e| Failure::file(dir, &e))?;
     if !force && let Some((path, _)) = files.iter().find(|(path, _)| path.exists()) {
         return Err(
@@ -57,7 +58,7 @@ pub(super) fn write(dir: &Path, files: &[Text], force: bool) -> Result<(), Failu
                 .hint("--force overwrites it; nothing was written"),
         );
     }
-    for (path, text) in files {
+    for (path, content) in files {
         // A reader never sees half a file: the whole one takes the name at once.
         let mut part = path.clone().into_os_string();
         part.push(".part");
@@ -67,10 +68,7 @@ pub(super) fn write(dir: &Path, files: &[Text], force: bool) -> Result<(), Failu
             .create(true)
             .truncate(true)
             .open(&part)
-            .and_then(|mut file| {
-                file.write_all(text.as_bytes())
-                    .and_then(|()| file.sync_all())
-            })
+            .and_then(|mut file| file.write_all(content).and_then(|()| file.sync_all()))
             .and_then(|()| fs::rename(&part, path));
         if let Err(e) = written {
             // what is left of it is of no use
@@ -81,9 +79,12 @@ pub(super) fn write(dir: &Path, files: &[Text], force: bool) -> Result<(), Failu
     Ok(())
 }
 
-/// The figures that the cells are enough for, as SVG and CSV, and in words those
-/// that they are not.
-pub(super) fn figures(found: &Found<'_>, dir: &Path) -> (Vec<Text>, Vec<&'static str>) {
+/// The figures that the cells are enough for, as SVG, PNG and CSV, and in words
+/// those that they are not.
+pub(super) fn figures(
+    found: &Found<'_>,
+    dir: &Path,
+) -> Result<(Vec<Written>, Vec<&'static str>), Failure> {
     let mut missing = Vec::new();
     let mut drawings: Vec<Drawing> = Vec::new();
     // chosen on this one, and drawn for the one that nothing was chosen on
@@ -125,15 +126,17 @@ pub(super) fn figures(found: &Found<'_>, dir: &Path) -> (Vec<Text>, Vec<&'static
             None => missing.push("no Fig. 8: it takes two or more lambda"),
         }
     }
-    let files = drawings
-        .into_iter()
-        .flat_map(|drawing| {
-            let path = |ending: &str| dir.join(format!("{}.{ending}", drawing.name));
-            [
-                (path("svg"), drawing.figure.to_svg()),
-                (path("csv"), drawing.csv),
-            ]
-        })
-        .collect();
-    (files, missing)
+    let painter = Painter::default();
+    let mut files = Vec::new();
+    for drawing in drawings {
+        let path = |ending: &str| dir.join(format!("{}.{ending}", drawing.name));
+        let svg = drawing.figure.to_svg();
+        let png = painter
+            .png(&svg)
+            .map_err(|e| Failure::new(Kind::Bug, e.to_string()))?;
+        files.push((path("svg"), svg.into_bytes()));
+        files.push((path("png"), png));
+        files.push((path("csv"), drawing.csv.into_bytes()));
+    }
+    Ok((files, missing))
 }

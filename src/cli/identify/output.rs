@@ -7,6 +7,7 @@ use crate::identify::grid::Cell;
 use crate::identify::validation::{JUST_NOTICEABLE_N, Part};
 use crate::model::certificate::Certificate;
 use crate::model::file::lookup_word;
+use crate::recording::Recording;
 use crate::text::Untrusted;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
@@ -53,12 +54,14 @@ pub(super) fn json(found: &Found<'_>) -> String {
             })
         })
         .collect();
-    let recording = |named: &Named, sha256: &str, role: &str| {
+    let recording = |named: &Named, recording: &Recording, role: &str| {
+        let warnings: Vec<String> = recording.warnings.iter().map(ToString::to_string).collect();
         json!({
             "file": key(found, named),
             "name": named.name,
-            "sha256": sha256,
+            "sha256": recording.sha256,
             "role": role,
+            "warnings": warnings,
         })
     };
     let recordings: Vec<Value> = found
@@ -67,11 +70,7 @@ pub(super) fn json(found: &Found<'_>) -> String {
         .enumerate()
         .map(|(i, (named, r))| {
             let validates = i < found.args.validate.len();
-            recording(
-                named,
-                &r.sha256,
-                if validates { "validate" } else { "test" },
-            )
+            recording(named, r, if validates { "validate" } else { "test" })
         })
         .collect();
     let validation: Map<String, Value> = found
@@ -100,7 +99,7 @@ pub(super) fn json(found: &Found<'_>) -> String {
     let document = json!({
         "format": "study-identify/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
-        "training": recording(&found.args.training, &found.training.sha256, "training"),
+        "training": recording(&found.args.training, found.training, "training"),
         "recordings": recordings,
         "best": found.best,
         "validation": validation,

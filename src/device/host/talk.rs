@@ -14,6 +14,11 @@ impl Host {
         self.unheard = None;
         match reply {
             Reply::Identity(identity) => self.greeted(sequence, identity, at),
+            Reply::Ack(ack) if self.stage == Stage::Greeting && ack.refusal == Refusal::Version => {
+                // all that a device of another time says to HELLO
+                let version = u8::try_from(ack.detail).unwrap_or(u8::MAX);
+                self.other_version(version, at);
+            }
             _ if !self.stage.known() => {}
             Reply::Ack(ack) => {
                 let Some(flight) = self.flight else { return };
@@ -121,11 +126,11 @@ impl Host {
         let words = why.as_str();
         self.reports
             .push(Report::Fault(format!("it refuses {what}: {words}{detail}")));
-        self.to_rest(at);
+        self.settle(at);
     }
 
     /// Nothing plays any more, and nothing shall.
-    fn to_rest(&mut self, at: Duration) {
+    fn settle(&mut self, at: Duration) {
         self.todo.clear();
         self.rest = None;
         self.stage = Stage::Idle;
@@ -152,7 +157,7 @@ impl Host {
         );
         if playing {
             self.reports.push(Report::Fault(fault.as_str().to_owned()));
-            self.to_rest(at);
+            self.settle(at);
         }
     }
 
@@ -184,7 +189,7 @@ impl Host {
             samples: self.received,
             samples_lost,
         }));
-        self.to_rest(at);
+        self.settle(at);
     }
 
     fn pulse(&mut self, pulse: Pulse, at: Duration) {

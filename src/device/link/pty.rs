@@ -273,8 +273,10 @@ impl Simulator {
 
 impl Drop for Simulator {
     fn drop(&mut self) {
-        if let Some(name) = &self.name {
-            // it may never have been made
+        // a file of somebody else's stays, and it may never have been made
+        if let Some(name) = &self.name
+            && std::fs::symlink_metadata(name).is_ok_and(|found| found.is_symlink())
+        {
             let _ = std::fs::remove_file(name);
         }
     }

@@ -53,12 +53,18 @@ impl Names {
     }
 }
 
+/// The covariate that telemetry gives: how active a realization was.
+const LEAST_ENERGY: &str = "least_energy_j";
+
 /// Ratings in the making.
 #[derive(Debug)]
 pub(super) struct Builder {
     ratings: Ratings,
     subjects: Names,
     models: Names,
+    /// Sum and number of the least energies, J, by realization: those of
+    /// participants, and of pilots and simulated participants.
+    energies: BTreeMap<u32, [(f64, f64); 2]>,
 }
 
 impl Builder {
@@ -70,6 +76,16 @@ impl Builder {
             },
             subjects: Names::default(),
             models: Names::default(),
+            energies: BTreeMap::new(),
+        }
+    }
+
+    /// The least energy that the hand had put in during a playback, J.
+    pub(super) fn least_energy(&mut self, model: u32, origin: Origin, energy: f64) {
+        if energy.is_finite() {
+            let both = self.energies.entry(model).or_default();
+            let (sum, n) = &mut both[usize::from(origin != Origin::Real)];
+            (*sum, *n) = (*sum + energy, *n + 1.0);
         }
     }
 
@@ -141,9 +157,17 @@ impl Builder {
         r.source_row.push(row.source_row);
     }
 
-    /// Sorts the names.
+    /// Tells the realizations their mean least energy and sorts the names.
     pub(super) fn finish(self) -> Ratings {
         let mut r = self.ratings;
+        // As in the analysis: the others where there is no participant.
+        let others = usize::from(!r.origin.contains(&Origin::Real));
+        for (model, both) in self.energies {
+            let (sum, n) = both[others];
+            if let Some(m) = r.models.get_mut(model as usize).filter(|_| n > 0.0) {
+                m.covariates.insert(LEAST_ENERGY.to_owned(), sum / n);
+            }
+        }
         let subjects = sort(&mut r.subjects, |s| &s.id);
         let models = sort(&mut r.models, |m| &m.id);
         for s in &mut r.subject {

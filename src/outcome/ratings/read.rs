@@ -185,6 +185,7 @@ struct Columns {
     vaf: Option<usize>,
     trial_index: Option<usize>,
     strokes: Option<usize>,
+    least_energy: Option<usize>,
     /// Those after `vaf` in our own table; of somebody else's, what tells the
     /// memory of a realization.
     covariates: Vec<usize>,
@@ -233,6 +234,7 @@ impl Columns {
                 vaf: find("vaf"),
                 trial_index: find("trial_index"),
                 strokes: None,
+                least_energy: None,
                 covariates: MEMORY.iter().filter_map(|c| find(c)).collect(),
                 ours: None,
             });
@@ -254,6 +256,7 @@ impl Columns {
             vaf: find("vaf"),
             trial_index: find("position"),
             strokes: find("strokes"),
+            least_energy: find("least_energy_j"),
             covariates: find("vaf").map_or(Vec::new(), |v| (v + 1..header.len()).collect()),
             ours: Some(Ours {
                 role: find("role"),
@@ -294,6 +297,7 @@ impl Columns {
             source_row: number,
         };
         let mut role = Role::Test;
+        let mut energy = None;
         if let Some(ours) = &self.ours {
             let flag = |at: Option<usize>| at.map_or(Ok(false), |i| line.flag(i));
             if flag(ours.practice)? {
@@ -315,6 +319,10 @@ impl Columns {
             if let Some(i) = self.strokes.filter(|&i| !line.text(i).is_empty()) {
                 row.strokes = line.whole(i)?;
             }
+            let telling = row.status == Status::Ok;
+            if let Some(i) = self.least_energy.filter(|_| telling) {
+                energy = Some(line.number(i)?);
+            }
             if row.status == Status::Failed {
                 row.rating = f64::NAN;
             }
@@ -333,6 +341,9 @@ impl Columns {
         let model = line.text(self.model);
         if !model.is_empty() {
             row.model = builder.model(model, role, || self.covariates(line));
+            if let Some(energy) = energy {
+                builder.least_energy(row.model, row.origin, energy);
+            }
         }
         Ok(Some(row))
     }

@@ -159,28 +159,53 @@ fn plane(scene: &Scene<'_>, dots: &[Dot], title: &str, c: Canvas) -> Figure {
         })
         .collect();
     let label = format!("{}, mean [95 %]", scene.asked);
-    let height = c.pick(360.0, 320.0);
-    let mut panel = Panel::new(
+    let mut height = c.pick(360.0, 320.0);
+    let axes = Panel::new(
         Axis::around("VAF", dots.iter().map(|d| d.vaf)),
         scene.ratings(&label, &beyond),
     );
-    for d in dots {
+    // About what is left of the figure for the axes.
+    let room = (c.width - 70.0, height - 60.0);
+    let names: Vec<String> = (dots.iter())
+        .map(|d| shortened(&scene.models[d.nth].id, 22))
+        .collect();
+    let (mut notes, crowded) = labels(&names, dots, &axes, room);
+    if crowded {
+        // Numbers have room; the legend tells what they stand for.
+        let numbers: Vec<String> = (1..=dots.len()).map(|n| n.to_string()).collect();
+        notes = labels(&numbers, dots, &axes, room).0;
+        let widths = names.iter().map(|n| text_width(n, SMALL) + 52.0);
+        height += 18.0 * (widths.sum::<f64>() / (c.width - 80.0)).ceil();
+    }
+    let mut panel = axes;
+    for (i, d) in dots.iter().enumerate() {
         let look = scene.look(d.nth);
         if let Some((low, high)) = d.ends {
             let at = d.vaf;
             let bar = Mark::ErrorBars(vec![Whisker { at, low, high }]);
             panel = panel.with(look, bar);
         }
-        panel = panel.with(look.size(10.0), Mark::Points(vec![(d.vaf, d.mean)]));
+        let point = Mark::Points(vec![(d.vaf, d.mean)]);
+        panel = if crowded {
+            panel.named(&format!("{} {}", i + 1, names[i]), look.size(10.0), point)
+        } else {
+            panel.with(look.size(10.0), point)
+        };
     }
-    // About what is left of the figure for the axes.
-    let room = (c.width - 70.0, height - 60.0);
-    panel.notes = labels(scene, dots, &panel, room);
+    panel.notes = notes;
     c.figure("rating-against-vaf", title, height).with(panel)
 }
 
-/// Names beside the dots, where they cover no other name and no other bar.
-fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> Vec<Note> {
+/// A box, px: left, top, right, bottom.
+type Box = (f64, f64, f64, f64);
+
+fn overlap(a: &Box, b: &Box) -> bool {
+    !(a.2 < b.0 || b.2 < a.0 || a.3 < b.1 || b.3 < a.1)
+}
+
+/// Texts beside the dots, inside the picture, where they cover no other text or dot,
+/// and as few bars as can be; whether there was no such place for one.
+fn labels(texts: &[String], dots: &[Dot], panel: &Panel, room: (f64, f64)) -> (Vec<Note>, bool) {
     let place = |x: f64, y: f64| {
         let share = |v: f64, axis: &Axis| (v - axis.low) / (axis.high - axis.low);
         (
@@ -188,27 +213,23 @@ fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> V
             (1.0 - share(y, &panel.y)) * room.1,
         )
     };
-    type Box = (f64, f64, f64, f64);
-    let apart = |a: &Box, b: &Box| a.2 < b.0 || b.2 < a.0 || a.3 < b.1 || b.3 < a.1;
-    let mut taken: Vec<Box> = Vec::new();
+    let mut names: Vec<Box> = Vec::new();
+    let mut bars: Vec<Box> = Vec::new();
     for d in dots {
         let (x, y) = place(d.vaf, d.mean);
-        taken.push((x - 5.0, y - 5.0, x + 5.0, y + 5.0));
+        names.push((x - 5.0, y - 5.0, x + 5.0, y + 5.0));
         if let Some((low, high)) = d.ends {
             let (top, bottom) = (place(d.vaf, high).1, place(d.vaf, low).1);
-            taken.push((x - 3.0, top, x + 3.0, bottom));
+            bars.push((x - 3.0, top, x + 3.0, bottom));
         }
     }
-    let mut notes = Vec::new();
-    for d in dots {
-        let text = shortened(&scene.models[d.nth].id, 20);
+    // From below upwards, so that texts that give way keep the order of their dots.
+    let mut upwards: Vec<(&Dot, &String)> = dots.iter().zip(texts).collect();
+    upwards.sort_by(|a, b| a.0.mean.total_cmp(&b.0.mean));
+    let (mut notes, mut crowded) = (Vec::new(), false);
+    for (d, text) in upwards {
         let (x, y) = place(d.vaf, d.mean);
-        let width = text_width(&text, SMALL);
-        let mut candidates = Vec::new();
-        for down in [0.0, -14.0, 14.0, -28.0, 28.0, -42.0, 42.0] {
-            candidates.push((Anchor::Start, 9.0, down));
-            candidates.push((Anchor::End, -9.0, down));
-        }
+        let width = text_width(text, SMALL);
         let boxed = |c: &(Anchor, f64, f64)| -> Box {
             let left = if c.0 == Anchor::Start {
                 x + c.1
@@ -217,17 +238,31 @@ fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> V
             };
             (left, y + c.2 - 7.0, left + width, y + c.2 + 7.0)
         };
-        let free = |c: &&(Anchor, f64, f64)| {
+        let cost = |c: &(Anchor, f64, f64)| -> usize {
             let own = boxed(c);
-            own.0 >= 0.0 && own.2 <= room.0 && taken.iter().all(|t| apart(t, &own))
+            let outside = own.0 < 0.0 || own.2 > room.0 || own.1 < 0.0 || own.3 > room.1;
+            let covered = |all: &[Box]| all.iter().filter(|b| overlap(b, &own)).count();
+            100 * usize::from(outside) + 10 * covered(&names) + covered(&bars)
         };
-        let best = candidates.iter().find(free).unwrap_or(&candidates[0]);
-        taken.push(boxed(best));
-        let mut note = Note::new((d.vaf, d.mean), &text)
+        let mut best = (Anchor::Start, 9.0, 0.0);
+        for step in 0..9 {
+            // 0, −14, 14, −28, 28 …; the further away, the further aside.
+            let down = 14.0 * f64::from((step + 1) / 2) * if step % 2 == 1 { -1.0 } else { 1.0 };
+            let aside = 9.0 + 0.3 * down.abs();
+            for c in [(Anchor::Start, aside, down), (Anchor::End, -aside, down)] {
+                if cost(&c) < cost(&best) {
+                    best = c;
+                }
+            }
+        }
+        crowded |= cost(&best) >= 10;
+        names.push(boxed(&best));
+        let mut note = Note::new((d.vaf, d.mean), text)
             .moved(best.1, best.2)
             .anchored(best.0);
+        note.rim = true;
         note.colour = Colour::INK;
         notes.push(note);
     }
-    notes
+    (notes, crowded)
 }

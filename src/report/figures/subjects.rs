@@ -81,7 +81,8 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
                 .map(|s| text_width(&shortened(s, 24), SMALL))
                 .fold(0.0, f64::max);
             // Beside labels and key; below 26 px a number does not fit into its cell.
-            let wide = (c.width - widest - 110.0) / scene.models.len() as f64 >= 26.0;
+            let room = c.width - widest - 110.0;
+            let wide = room / scene.models.len() as f64 >= 26.0;
             if wide && high.abs() < 1000.0 && low.abs() < 1000.0 {
                 panel.notes = found
                     .iter()
@@ -91,7 +92,17 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
                     })
                     .collect();
             }
-            let height = 70.0 + c.pick(22.0, 20.0) * rows.max(4) as f64 + c.pick(0.0, 40.0);
+            // Names that have no room side by side are set at a slant, below the cells.
+            let longest = (scene.names().iter())
+                .map(|n| text_width(&shortened(n, 24), SMALL))
+                .fold(0.0, f64::max);
+            let slanted = (longest + 8.0) * scene.models.len() as f64 > room;
+            let below = if slanted {
+                0.6 * longest.min(118.0)
+            } else {
+                0.0
+            };
+            let height = 70.0 + c.pick(22.0, 20.0) * rows.max(4) as f64 + below;
             c.figure("subjects-and-realizations", &title, height)
                 .with(panel)
         },
@@ -179,8 +190,8 @@ pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
 pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     let mut by: BTreeMap<(&str, u32), Vec<f64>> = BTreeMap::new();
     for row in scene.a.rows.iter().filter(|r| r.excluded.is_none()) {
-        if let (Some(x), true) = (row.rating, row.repetition > 0) {
-            let key = (&*row.model, row.repetition);
+        if let (Some(x), true) = (row.rating(), row.repetition > 0) {
+            let key = (scene.a.model(row), row.repetition);
             by.entry(key).or_default().push(x);
         }
     }
@@ -235,7 +246,14 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
         let thick = Look::plain(Colour::INK).stroke(3.0);
         let line: Vec<(f64, f64)> = (1..=last).map(at).collect();
         panel = panel.named("all", thick, Mark::Line(line));
-        c.figure("order", &title, c.pick(320.0, 340.0)).with(panel)
+        // A long legend takes nothing from the axes.
+        let names = scene
+            .models
+            .iter()
+            .map(|m| text_width(&name(m), SMALL) + 40.0);
+        let lines = (names.sum::<f64>() / (c.width - 80.0)).ceil();
+        let height = c.pick(320.0, 340.0) + 18.0 * (lines - 1.0).max(0.0);
+        c.figure("order", &title, height).with(panel)
     }))
 }
 

@@ -2,7 +2,7 @@
 
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
-use crate::analyze::{Analysis, Said};
+use crate::analyze::{Analysis, Said, Warning};
 use crate::report::{Source, apa};
 use maud::{Markup, html};
 
@@ -20,15 +20,28 @@ pub(super) fn banners(a: &Analysis) -> Markup {
     };
     html! {
         @for w in a.warnings.iter().filter(|w| AT_THE_TOP.contains(&w.code)) {
-            div.banner role="note" { b { (title(w.code)) } (safe(&w.text)) "." }
+            div.banner role="note" { b { (title(w.code)) } (sentence(w)) }
         }
         @let others: Vec<_> = a.warnings.iter().filter(|w| !AT_THE_TOP.contains(&w.code)).collect();
         @if !others.is_empty() {
             details open {
                 summary { (apa::counted(others.len(), "thing", "things")) " to know before believing a number" }
-                ul { @for w in others { li { (safe(&w.text)) "." } } }
+                ul { @for w in others { li { (sentence(w)) } } }
             }
         }
+    }
+}
+
+/// With a capital letter, unless a path stands first, and a full stop.
+fn sentence(w: &Warning) -> String {
+    let text = safe(&w.text);
+    let mut letters = text.chars();
+    let first = letters.next();
+    match first {
+        Some(c) if w.code != "damaged-results" => {
+            format!("{}{}.", c.to_uppercase(), letters.as_str())
+        }
+        _ => format!("{text}."),
     }
 }
 
@@ -113,10 +126,10 @@ pub(super) fn exclusions(a: &Analysis, of_study: bool) -> Markup {
                             tbody {
                                 @for r in left_out.iter().take(MAX_ROWS) {
                                     tr {
-                                        td { (safe(&r.subject)) }
-                                        td { (safe(&r.model)) }
+                                        td { (safe(a.subject(r))) }
+                                        td { (safe(a.model(r))) }
                                         td { (r.repetition) }
-                                        td { (r.rating.map_or_else(|| "–".to_owned(), apa::plain)) }
+                                        td { (r.rating().map_or_else(|| "–".to_owned(), apa::plain)) }
                                         td.text { (safe(&r.excluded.as_ref().map(ToString::to_string).unwrap_or_default())) }
                                     }
                                 }

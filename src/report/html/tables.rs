@@ -247,14 +247,8 @@ fn subjects(a: &Analysis) -> Table {
     ];
     let mut table = Table::new("Subjects: flagged, never dropped", &head);
     let v = &a.values;
-    let mut names: Vec<&str> = a
-        .rows
-        .iter()
-        .filter(|r| r.excluded.is_none())
-        .map(|r| &*r.subject)
-        .collect();
-    names.sort_unstable();
-    names.dedup();
+    let ids = v.iter().map(|(id, _)| id);
+    let names = ids.filter_map(|id| id.strip_prefix("subject/")?.strip_suffix("/n"));
     for s in names {
         let get = |what: &str| v.number(&format!("subject/{s}/{what}"));
         let r = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| apa::share(x, 2));

@@ -10,6 +10,9 @@ use super::{
 /// Half the width of an error bar's cap, px.
 const CAP: f64 = 4.0;
 
+/// A note that stands further above or below its place than this has a line to it, px.
+const LEADER: f64 = 10.0;
+
 /// Characters of a note that are shown.
 const MAX_NOTE: usize = 80;
 
@@ -342,6 +345,13 @@ fn note(out: &mut Out, panel: &Panel, f: &Frame, n: &Note) {
         Setting::Plain
     };
     let at = (x + n.by.0, y + n.by.1 + 4.0);
+    if n.by.1.abs() > LEADER {
+        // From the middle of the letters' height to the edge of what it names.
+        let (dx, dy) = (n.by.0, n.by.1);
+        let length = dx.hypot(dy);
+        let edge = (x + dx * 6.0 / length, y + dy * 6.0 / length);
+        out.segment(edge, (x + dx, y + dy), Colour::GREY, 1.0);
+    }
     let text = shortened(&n.text, MAX_NOTE);
     out.text(at, &text, SMALL, (n.anchor, n.colour), how);
 }

@@ -6,8 +6,11 @@ use super::{Figure, NORMAL, Panel, SMALL, fitted, text_width};
 /// Least distance of two tick labels, px.
 const APART: f64 = 8.0;
 
-/// Width of a slanted label, px: what leaves the first one inside the picture.
-const MAX_SLANTED: f64 = 92.0;
+/// Width of a slanted label, px.
+const MAX_SLANTED: f64 = 118.0;
+
+/// cos 35°.
+const SLANT: f64 = 0.819;
 
 /// Characters of a tick label that are shown.
 pub(super) const MAX_LABEL: usize = 24;
@@ -98,7 +101,7 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool
     let mut top = outer_top + if panel.title.is_empty() { 8.0 } else { 26.0 };
     let legend = legend(panel, left, right, &mut top);
     let room = right - left;
-    let (x_ticks, slanted) = x_ticks(&panel.x, room);
+    let (x_ticks, slanted) = x_ticks(&panel.x, room, left - outer_left);
     let below = match (x_ticks.is_empty(), slanted) {
         (true, _) => 6.0,
         (false, false) => 22.0,
@@ -132,8 +135,9 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool
 }
 
 /// As many ticks as have room beside each other; names that have none are set
-/// at a slant, and if even that is too tight every n-th is shown.
-fn x_ticks(axis: &Axis, room: f64) -> (Vec<(f64, String)>, bool) {
+/// at a slant, and if even that is too tight every n-th is shown. A slanted one
+/// reaches to the left, `margin` px beyond the axis at most.
+fn x_ticks(axis: &Axis, room: f64, margin: f64) -> (Vec<(f64, String)>, bool) {
     let widest = |ticks: &[(f64, String)]| {
         let all = ticks.iter().map(|(_, l)| text_width(l, SMALL));
         all.fold(0.0, f64::max)
@@ -148,7 +152,11 @@ fn x_ticks(axis: &Axis, room: f64) -> (Vec<(f64, String)>, bool) {
             // At least 16 px, most of a line, from one to the next.
             let fit = (room / 16.0).floor().max(1.0) as usize;
             let every = ticks.len().div_ceil(fit);
-            let short = |t: (f64, String)| (t.0, fitted(&t.1, SMALL, MAX_SLANTED));
+            let short = |(at, label): (f64, String)| {
+                let before = margin + axis.share(at).unwrap_or(0.0) * room;
+                let most = MAX_SLANTED.min(before / SLANT);
+                (at, fitted(&label, SMALL, most))
+            };
             ticks = ticks.into_iter().step_by(every).map(short).collect();
         }
         return (ticks, slanted);

@@ -66,11 +66,11 @@ fn best(a: &Analysis) -> Vec<String> {
             Untrusted(second)
         )];
     }
-    let mut said = format!(
-        "{}: mean {mean:.3}; next {} with {next_mean:.3}",
+    let mut said = vec![format!(
+        "{}: mean {mean:.3}; next {} with {next_mean:.3}.",
         Untrusted(first),
         Untrusted(second)
-    );
+    )];
     let (low, high) = if first < second {
         (first, second)
     } else {
@@ -78,15 +78,28 @@ fn best(a: &Analysis) -> Vec<String> {
     };
     let pair = format!("posthoc/{low}|{high}");
     if let Some(holm) = v.number(&format!("{pair}/p_wilcoxon_exact_holm")) {
-        said += &format!(" (Wilcoxon, exact, Holm over all pairs: p {})", p(holm));
+        let verdict = if holm < 0.05 {
+            "These two differ"
+        } else {
+            "These data do not tell the two apart"
+        };
+        said.push(format!(
+            "{verdict} (Wilcoxon, exact, Holm over all pairs: p {}).",
+            p(holm)
+        ));
     }
-    said.push('.');
-    vec![said]
+    said
 }
 
 fn differ(a: &Analysis) -> Vec<String> {
     let v = &a.values;
     let mut parts = Vec::new();
+    let decides = v.number("rmanova/p_gg").or_else(|| v.number("friedman/p"));
+    let verdict = match decides {
+        Some(p) if p < 0.05 => "Yes: ",
+        Some(_) => "Not shown: ",
+        None => "",
+    };
     if let (Some(f), Some(pg), Some(e)) = (
         v.number("rmanova/F"),
         v.number("rmanova/p_gg"),
@@ -116,7 +129,7 @@ fn differ(a: &Analysis) -> Vec<String> {
     if parts.is_empty() {
         return Vec::new();
     }
-    vec![format!("{}.", parts.join("; "))]
+    vec![format!("{verdict}{}.", parts.join("; "))]
 }
 
 fn predicts(a: &Analysis) -> Vec<String> {
@@ -130,8 +143,17 @@ fn predicts(a: &Analysis) -> Vec<String> {
         };
     };
     let n = v.number("corr/n_models").unwrap_or(0.0);
+    let decides = v
+        .number("corr/pearson/p_exact_two_sided")
+        .or_else(|| v.number("corr/pearson/p_monte_carlo_two_sided"));
+    let verdict = match decides {
+        Some(p) if p < 0.05 && pearson > 0.0 => "Those with a higher VAF are rated higher: ",
+        Some(p) if p < 0.05 => "Those with a higher VAF are rated lower: ",
+        Some(_) => "Not shown: ",
+        None => "",
+    };
     let mut said = vec![format!(
-        "r = {} over {n} realizations{}{}.",
+        "{verdict}r = {} over {n} realizations{}{}.",
         r(pearson),
         interval(a, "corr/pearson/ci95"),
         permuted(a, "pearson")
@@ -156,7 +178,29 @@ fn predicts(a: &Analysis) -> Vec<String> {
     } else if n < 8.0 {
         said.push(format!("{} points: read with care.", count(n)));
     }
+    said.extend(beside(a));
     said
+}
+
+/// What VAF goes along with over the realizations.
+fn beside(a: &Analysis) -> Option<String> {
+    let with = |id: &str, what: &str| {
+        let found = a.values.number(&format!("covariate/{id}/r_with_vaf"))?;
+        Some(format!("{what} at r = {}", r(found)))
+    };
+    let all: Vec<String> = [
+        with("log10_memory", "log10 of the memory"),
+        with("least_energy_j", "the least energy put in (activeness)"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "VAF goes along with {}: what is said of one may be the other's.",
+            all.join(" and with ")
+        )
+    })
 }
 
 fn count(n: f64) -> String {
@@ -190,7 +234,7 @@ fn permuted(a: &Analysis, name: &str) -> String {
             format!(
                 ", exact p {} (the smallest possible with {n} is {})",
                 p(exact),
-                small(least)
+                of_orders(least, n)
             )
         }
         (None, Some(drawn), _) => format!(", permutation p {}", p(drawn)),
@@ -198,9 +242,10 @@ fn permuted(a: &Analysis, name: &str) -> String {
     }
 }
 
-/// A probability without its sign.
-fn small(x: f64) -> String {
-    p(x).trim_start_matches("= ").to_owned()
+/// A share of all n! orders as what it is.
+fn of_orders(share: f64, n: f64) -> String {
+    let all: f64 = (1..=n as u32).map(f64::from).product();
+    format!("{}/{all}", (share * all).round())
 }
 
 fn only_these(a: &Analysis) -> Vec<String> {
@@ -252,6 +297,6 @@ mod tests {
         assert_eq!(r(-0.0001), ".000");
         assert_eq!(p(1.0 / 120.0), "= .0083");
         assert_eq!(p(1e-9), "< .0001");
-        assert_eq!(small(1.0 / 120.0), ".0083");
+        assert_eq!(of_orders(2.0 / 120.0, 5.0), "2/120");
     }
 }

@@ -113,9 +113,6 @@ fn memory(a: &Analysis) -> Vec<String> {
     if let (Some(value), Some(df)) = (get("quadratic/p"), get("quadratic/df")) {
         said += &format!("; curvature p {} with {df} df", p(value));
     }
-    if let Some(with) = get("r_with_vaf") {
-        said += &format!("; its correlation with VAF is {}", r(with));
-    }
     vec![format!("{said}.")]
 }
 

@@ -47,7 +47,7 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
             "VAF differs between realizations only, so there are {n} points however many \
              participants rated. The smallest p that any ratings of {n} realizations could have \
              given is {}{}.",
-            apa::p(least),
+            of_orders(least, n),
             v.number("corr/pearson/critical_r")
                 .map_or_else(String::new, |r| {
                     format!(", and |r| has to exceed {} for p < .05 by t", apa::r(r))
@@ -98,6 +98,12 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
         short,
         more,
     })
+}
+
+/// A share of all n! orders as what it is.
+fn of_orders(share: f64, n: f64) -> String {
+    let all: f64 = (1..=n as u32).map(f64::from).product();
+    format!("{}/{all}", (share * all).round())
 }
 
 /// The mixed model with subjects and realizations crossed.
@@ -164,7 +170,7 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
     if let Some(r) = get("r_with_vaf") {
         more.push(format!(
             "The memory goes along with VAF at r = {} over these realizations: what is said of one \
-             cannot be kept apart from the other.",
+             may be the other's.",
             apa::r(r)
         ));
     }
@@ -179,8 +185,18 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
             Value::Number(r) => {
                 let p = v.number(&format!("covariate/{name}/p"));
                 let p = p.map_or_else(String::new, |p| format!(", p {}", apa::equals_p(p)));
+                let with = v.number(&format!("covariate/{name}/r_with_vaf"));
+                let with = with.map_or_else(String::new, |r| {
+                    format!("; {name} against VAF: r = {}", apa::r(r))
+                });
+                let remark = if name == "least_energy_j" {
+                    " It is the least energy that the hand had put in, over playbacks; below 0 the \
+                     device was active."
+                } else {
+                    ""
+                };
                 more.push(format!(
-                    "Mean rating against {name}: r = {}{p}.",
+                    "Mean rating against {name}: r = {}{p}{with}.{remark}",
                     apa::r(*r)
                 ));
             }

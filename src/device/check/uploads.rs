@@ -1,0 +1,112 @@
+//! Tables for a commissioning: sound ones, and ones that a device has to refuse.
+
+use super::talk::Talk;
+use super::{Broken, FORCE_N};
+use crate::device::wire::{
+    Ack, Commit, Few, Identity, Node, Play, Request, TableBegin, TableChunk, TableCrc,
+};
+use crate::model::predict::{Direction, Lookup};
+
+/// Damping of the tables, N·s/mm.
+const DAMPING: f64 = 0.005;
+
+/// A table as it is uploaded.
+#[derive(Debug, Clone)]
+pub(super) struct Upload {
+    pub(super) begin: TableBegin,
+    pub(super) nodes: Vec<Node>,
+}
+
+impl Upload {
+    /// Damping and a constant force, within what the device reaches.
+    pub(super) fn sound(device: &Identity, force_n: f64) -> Self {
+        Self::with_nodes(device, force_n, 4)
+    }
+
+    pub(super) fn with_nodes(device: &Identity, force_n: f64, count: u16) -> Self {
+        let [low, high] = device.stroke_mm;
+        let margin = 0.1 * (high - low);
+        let range_mm = [low + margin, high - margin];
+        let parameters = [0.0, DAMPING, 0.0, force_n];
+        let step = (range_mm[1] - range_mm[0]) / f64::from(count - 1);
+        let nodes = (0..count)
+            .map(|i| Node {
+                x_mm: range_mm[0] + step * f64::from(i),
+                positive: parameters,
+                negative: parameters,
+            })
+            .collect();
+        Self {
+            begin: TableBegin {
+                nodes: count,
+                lookup: Lookup::Linear,
+                direction: Direction::Play { delta_mm: 0.5 },
+                range_mm,
+                trained_mm_s: 100.0,
+                force_n: FORCE_N.min(device.force_n),
+                velocity_mm_s: device.velocity_mm_s,
+                uncertified_n: None,
+            },
+            nodes,
+        }
+    }
+
+    /// The same with a negative mass, which fails the certificate.
+    pub(super) fn unsound(device: &Identity) -> Self {
+        let mut upload = Self::sound(device, 0.0);
+        for node in &mut upload.nodes {
+            node.positive[0] = -0.2;
+            node.negative[0] = -0.2;
+        }
+        upload
+    }
+
+    pub(super) fn crc(&self) -> u32 {
+        let mut crc = TableCrc::of(&self.begin);
+        for node in &self.nodes {
+            crc.node(node);
+        }
+        crc.value()
+    }
+
+    pub(super) fn commit(&self) -> Request {
+        Request::TableCommit(Commit { crc: self.crc() })
+    }
+
+    pub(super) fn chunks(&self) -> Vec<Request> {
+        let chunks = self.nodes.chunks(TableChunk::MOST).enumerate();
+        chunks
+            .map(|(i, nodes)| {
+                Request::TableChunk(TableChunk {
+                    // a table has fewer than 65,536 nodes
+                    first: (i * TableChunk::MOST) as u16,
+                    nodes: Few::of(nodes),
+                })
+            })
+            .collect()
+    }
+
+    /// Up to COMMIT, which is left to the caller.
+    pub(super) fn send(&self, talk: &mut Talk<'_>) -> Result<(), Broken> {
+        talk.done(Request::TableBegin(self.begin))?;
+        for chunk in self.chunks() {
+            talk.done(chunk)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn load(&self, talk: &mut Talk<'_>) -> Result<Ack, Broken> {
+        self.send(talk)?;
+        talk.done(self.commit())
+    }
+
+    /// PLAY of it, for at most so long.
+    pub(super) fn play(&self, talk: &mut Talk<'_>, longest_ms: u32, every: u16) -> Request {
+        Request::Play(Play {
+            playback: talk.next_playback(),
+            crc: self.crc(),
+            longest_ms,
+            every,
+        })
+    }
+}
