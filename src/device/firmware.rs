@@ -93,6 +93,7 @@ pub struct Firmware {
     body: Body,
     /// Servo periods since the beginning.
     ticks: u64,
+    period_ns: f64,
     /// When its clock began to count.
     started: Duration,
     clock_ms: u32,
@@ -123,6 +124,7 @@ impl Firmware {
             handler: Box::new(Handler::new(profile(&options))),
             body: Body::new(&options),
             ticks: 0,
+            period_ns: 1e9 / options.servo_hz,
             started: Duration::ZERO,
             clock_ms: options.clock_ms,
             stalled_until: None,
@@ -208,7 +210,7 @@ impl Firmware {
             self.ticks = due - idle;
         }
         while self.ticks < due {
-            let at = Duration::from_secs_f64(self.ticks as f64 / self.options.servo_hz);
+            let at = Duration::from_nanos((self.ticks as f64 * self.period_ns).round() as u64);
             while let Some(late) = self.tamper.as_mut().and_then(|t| t.overdue(at)) {
                 self.hear(&late, at);
             }
@@ -248,6 +250,9 @@ impl Firmware {
         self.notice();
     }
 
+    // inlined, it would give its half a megabyte of stack to every step
+    #[cold]
+    #[inline(never)]
     fn reboot(&mut self, at: Duration) {
         *self.handler = Handler::new(profile(&self.options));
         self.started = at;
