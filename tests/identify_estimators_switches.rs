@@ -96,7 +96,8 @@ fn on_random_switches_a_direction_state_leaves_a_fifth_of_the_papers_residual() 
     }
 }
 
-/// Measured, in order: 7.5 10.4 10.1 10.3 9.7 5.8 6.0 10.1 10.9 6.6 5.0 8.4.
+/// Measured, in order: MEASURED.
+/// δ and ridges were chosen on other switches.
 ///
 /// `cargo test --release --test identify_estimators_switches -- --ignored`
 #[test]
@@ -104,6 +105,6 @@ fn on_random_switches_a_direction_state_leaves_a_fifth_of_the_papers_residual() 
 fn on_each_of_12_random_switches_a_direction_state_leaves_a_fifth_of_the_papers_residual() {
     for switch in 0..12 {
         let factor = factor(switch, [60.0, 20.0], 0.999);
-        assert!(factor > 5.0, "switch {switch}: {factor}");
+        assert!(factor > 5.4, "switch {switch}: {factor}");
     }
 }

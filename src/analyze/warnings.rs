@@ -133,7 +133,8 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
         warn(
             "one-realization",
             format!(
-                "one realization carries the correlation: without it r goes from {low:.3} to {high:.3}"
+                "the correlation hangs on single realizations: with one left out, r lies between \
+                 {low:.3} and {high:.3}"
             ),
         );
     }
@@ -152,14 +153,16 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
     if f && flat {
         warn(
             "differ-without-trend",
-            "the realizations differ, but not along VAF: look at their means, not at the slope"
+            "the realizations differ, but that they do so along VAF is not shown: look at their \
+             means, not at the slope alone"
                 .to_owned(),
         );
     }
     warn(
         "assumptions",
         "the permutation takes the realizations as exchangeable, which neighbours on one ladder \
-         of lambda are not; VAF goes along with lambda and with activeness"
+         of lambda are not; what goes along with VAF, such as lambda or activeness, cannot be \
+         told from it"
             .to_owned(),
     );
 }

@@ -235,7 +235,7 @@ impl Default for Hat {
         Self {
             state: State::Play(Delta::Scan),
             ridge_force: 3e-3,
-            ridge_dynamics: 1e-1,
+            ridge_dynamics: 5e-2,
             bounded: true,
         }
     }
@@ -277,7 +277,8 @@ impl State {
 pub enum Delta {
     /// mm.
     Mm(f64),
-    /// The one in 0.3 to 1 mm that leaves least of the training recording.
+    /// The shortest in 0.3 to 1 mm that leaves at most a tenth more (rms) of the
+    /// training recording than the one that leaves least.
     Scan,
 }
 
@@ -360,7 +361,7 @@ mod tests {
         );
         assert_eq!(
             Method::Hat(Hat::default()).to_string(),
-            "hat ridge=0.003,0.1 delta=scan m,b>=0"
+            "hat ridge=0.003,0.05 delta=scan m,b>=0"
         );
     }
 

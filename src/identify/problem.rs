@@ -176,7 +176,7 @@ impl fmt::Display for Warning {
             ),
             Self::DeltaAtEnd { delta_mm } => write!(
                 f,
-                "delta = {delta_mm} mm is the end of what was tried: a better one may lie beyond"
+                "of the training recording delta = {delta_mm} mm leaves least, the end of what was tried: a better one may lie beyond"
             ),
             Self::NegativeSpring { k_n_per_mm } => {
                 write!(f, "the spring pushes away, {k_n_per_mm:.4} N/mm")

@@ -7,6 +7,7 @@
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
+use std::io::Write as _;
 use std::sync::Arc;
 
 const FONT: &[u8] = include_bytes!("../../assets/LiberationSans-Regular.ttf");
@@ -88,13 +89,18 @@ fn encoded(picture: &Pixmap) -> Result<Vec<u8>, png::EncodingError> {
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Up);
-    let mut rgb = Vec::with_capacity(picture.data().len() / 4 * 3);
-    for pixel in picture.data().chunks_exact(4) {
-        rgb.extend_from_slice(&pixel[..3]);
-    }
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&rgb)?;
-    writer.finish()?;
+    let mut stream = writer.stream_writer()?;
+    let mut rgb = Vec::new();
+    for row in picture.data().chunks_exact(4 * picture.width() as usize) {
+        rgb.clear();
+        for pixel in row.chunks_exact(4) {
+            rgb.extend_from_slice(&pixel[..3]);
+        }
+        stream.write_all(&rgb)?;
+    }
+    stream.finish()?;
+    drop(writer);
     Ok(bytes)
 }
 

@@ -131,6 +131,15 @@ fn page(q: &Question, found: &[Found]) -> String {
     if all.is_empty() {
         return out;
     }
+    let _ = writeln!(
+        out,
+        "Of {} definitions of the SD {} can have given it.",
+        found.len(),
+        match found.iter().filter(|f| f.count > 0).count() {
+            0 => "none".to_owned(),
+            n => n.to_string(),
+        }
+    );
     out.push('\n');
     for f in found {
         let verdict = if f.count > 0 {
@@ -146,7 +155,7 @@ fn page(q: &Question, found: &[Found]) -> String {
         for s in &f.sums {
             let _ = writeln!(
                 out,
-                "            sum {}, {squares} {}: deviations {}/{}",
+                "            sum {}, {squares} {}; squared deviations sum to {}/{}",
                 s.sum, s.squares, s.deviations, f.n
             );
         }

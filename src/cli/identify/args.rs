@@ -86,11 +86,11 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_enum)]
     pub(super) direction: Option<DirectionWord>,
 
-    /// Distance over which a hat table changes direction in mm [default: the best on the training recording]
+    /// Distance over which a hat table changes direction in mm [default: the shortest that the training recording allows]
     #[arg(long, value_name = "MM", value_parser = length)]
     pub(super) delta: Option<f64>,
 
-    /// Ridges of a hat table: on the curvature of F, on the slopes of m and b [default: 0.003,0.03]
+    /// Ridges of a hat table: on the curvature of F, on the slopes of m and b [default: 0.003,0.05]
     #[arg(long, value_name = "F,DYNAMICS", value_delimiter = ',', value_parser = weight, num_args = 2)]
     pub(super) ridge: Vec<f64>,
 

@@ -159,23 +159,40 @@ fn plane(scene: &Scene<'_>, dots: &[Dot], title: &str, c: Canvas) -> Figure {
         })
         .collect();
     let label = format!("{}, mean [95 %]", scene.asked);
-    let height = c.pick(360.0, 320.0);
-    let mut panel = Panel::new(
+    let mut height = c.pick(360.0, 320.0);
+    let axes = Panel::new(
         Axis::around("VAF", dots.iter().map(|d| d.vaf)),
         scene.ratings(&label, &beyond),
     );
-    for d in dots {
+    // About what is left of the figure for the axes.
+    let room = (c.width - 70.0, height - 60.0);
+    let names: Vec<String> = (dots.iter())
+        .map(|d| shortened(&scene.models[d.nth].id, 22))
+        .collect();
+    let (mut notes, crowded) = labels(&names, dots, &axes, room);
+    if crowded {
+        // Numbers have room; the legend tells what they stand for.
+        let numbers: Vec<String> = (1..=dots.len()).map(|n| n.to_string()).collect();
+        notes = labels(&numbers, dots, &axes, room).0;
+        let widths = names.iter().map(|n| text_width(n, SMALL) + 52.0);
+        height += 18.0 * (widths.sum::<f64>() / (c.width - 80.0)).ceil();
+    }
+    let mut panel = axes;
+    for (i, d) in dots.iter().enumerate() {
         let look = scene.look(d.nth);
         if let Some((low, high)) = d.ends {
             let at = d.vaf;
             let bar = Mark::ErrorBars(vec![Whisker { at, low, high }]);
             panel = panel.with(look, bar);
         }
-        panel = panel.with(look.size(10.0), Mark::Points(vec![(d.vaf, d.mean)]));
+        let point = Mark::Points(vec![(d.vaf, d.mean)]);
+        panel = if crowded {
+            panel.named(&format!("{} {}", i + 1, names[i]), look.size(10.0), point)
+        } else {
+            panel.with(look.size(10.0), point)
+        };
     }
-    // About what is left of the figure for the axes.
-    let room = (c.width - 70.0, height - 60.0);
-    panel.notes = labels(scene, dots, &panel, room);
+    panel.notes = notes;
     c.figure("rating-against-vaf", title, height).with(panel)
 }
 
@@ -186,9 +203,9 @@ fn overlap(a: &Box, b: &Box) -> bool {
     !(a.2 < b.0 || b.2 < a.0 || a.3 < b.1 || b.3 < a.1)
 }
 
-/// Names beside the dots, inside the picture, where they cover no other name or dot,
-/// and as few bars as can be.
-fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> Vec<Note> {
+/// Texts beside the dots, inside the picture, where they cover no other text or dot,
+/// and as few bars as can be; whether there was no such place for one.
+fn labels(texts: &[String], dots: &[Dot], panel: &Panel, room: (f64, f64)) -> (Vec<Note>, bool) {
     let place = |x: f64, y: f64| {
         let share = |v: f64, axis: &Axis| (v - axis.low) / (axis.high - axis.low);
         (
@@ -206,14 +223,13 @@ fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> V
             bars.push((x - 3.0, top, x + 3.0, bottom));
         }
     }
-    // From below upwards, so that names that give way keep the order of their dots.
-    let mut upwards: Vec<&Dot> = dots.iter().collect();
-    upwards.sort_by(|a, b| a.mean.total_cmp(&b.mean));
-    let mut notes = Vec::new();
-    for d in upwards {
-        let text = shortened(&scene.models[d.nth].id, 22);
+    // From below upwards, so that texts that give way keep the order of their dots.
+    let mut upwards: Vec<(&Dot, &String)> = dots.iter().zip(texts).collect();
+    upwards.sort_by(|a, b| a.0.mean.total_cmp(&b.0.mean));
+    let (mut notes, mut crowded) = (Vec::new(), false);
+    for (d, text) in upwards {
         let (x, y) = place(d.vaf, d.mean);
-        let width = text_width(&text, SMALL);
+        let width = text_width(text, SMALL);
         let boxed = |c: &(Anchor, f64, f64)| -> Box {
             let left = if c.0 == Anchor::Start {
                 x + c.1
@@ -229,7 +245,7 @@ fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> V
             100 * usize::from(outside) + 10 * covered(&names) + covered(&bars)
         };
         let mut best = (Anchor::Start, 9.0, 0.0);
-        for step in 0..16 {
+        for step in 0..9 {
             // 0, −14, 14, −28, 28 …; the further away, the further aside.
             let down = 14.0 * f64::from((step + 1) / 2) * if step % 2 == 1 { -1.0 } else { 1.0 };
             let aside = 9.0 + 0.3 * down.abs();
@@ -239,13 +255,14 @@ fn labels(scene: &Scene<'_>, dots: &[Dot], panel: &Panel, room: (f64, f64)) -> V
                 }
             }
         }
+        crowded |= cost(&best) >= 10;
         names.push(boxed(&best));
-        let mut note = Note::new((d.vaf, d.mean), &text)
+        let mut note = Note::new((d.vaf, d.mean), text)
             .moved(best.1, best.2)
             .anchored(best.0);
         note.rim = true;
         note.colour = Colour::INK;
         notes.push(note);
     }
-    notes
+    (notes, crowded)
 }

@@ -81,7 +81,8 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
                 .map(|s| text_width(&shortened(s, 24), SMALL))
                 .fold(0.0, f64::max);
             // Beside labels and key; below 26 px a number does not fit into its cell.
-            let wide = (c.width - widest - 110.0) / scene.models.len() as f64 >= 26.0;
+            let room = c.width - widest - 110.0;
+            let wide = room / scene.models.len() as f64 >= 26.0;
             if wide && high.abs() < 1000.0 && low.abs() < 1000.0 {
                 panel.notes = found
                     .iter()
@@ -91,7 +92,17 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
                     })
                     .collect();
             }
-            let height = 70.0 + c.pick(22.0, 20.0) * rows.max(4) as f64 + c.pick(0.0, 40.0);
+            // Names that have no room side by side are set at a slant, below the cells.
+            let longest = (scene.names().iter())
+                .map(|n| text_width(&shortened(n, 24), SMALL))
+                .fold(0.0, f64::max);
+            let slanted = (longest + 8.0) * scene.models.len() as f64 > room;
+            let below = if slanted {
+                0.6 * longest.min(118.0)
+            } else {
+                0.0
+            };
+            let height = 70.0 + c.pick(22.0, 20.0) * rows.max(4) as f64 + below;
             c.figure("subjects-and-realizations", &title, height)
                 .with(panel)
         },

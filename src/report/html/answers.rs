@@ -331,7 +331,8 @@ fn order(a: &Analysis) -> Option<Answer> {
     )];
     if let Some(previous) = effect("order_previous_rating") {
         more.push(format!(
-            "Change per point of the rating just before: {}.",
+            "Change per point of the rating just before: {} (biased a little below 0, so that its p \
+             is too small).",
             say(previous)
         ));
     }
