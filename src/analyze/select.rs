@@ -123,6 +123,8 @@ pub struct Counts {
     pub pilots: usize,
     /// Participants that count and are simulated.
     pub simulated: usize,
+    /// Rows of real participants, whether they count or not.
+    pub real_rows: usize,
 }
 
 impl Counts {
@@ -173,6 +175,7 @@ impl Counts {
             planned: rules.planned,
             pilots: origin.iter().filter(|o| **o == Origin::Pilot).count(),
             simulated: origin.iter().filter(|o| **o == Origin::Simulated).count(),
+            real_rows: all.origin.iter().filter(|o| **o == Origin::Real).count(),
         }
     }
 

@@ -37,6 +37,10 @@ pub(super) fn warnings(
             "no-participants",
             format!("{}; this is no evidence", who(counts)),
         );
+    } else if counts.rows > 0 && counts.real_rows == 0 {
+        // whoever took part was left out, and was nobody real
+        let text = "only pilots or simulated participants; this is no evidence";
+        warn("no-participants", text.to_owned());
     } else if others > 0 {
         warn("mixed", format!("among the participants: {}", who(counts)));
     }

@@ -27,6 +27,15 @@ pub(super) fn share(x: f64, decimals: usize) -> String {
     }
 }
 
+/// `a, b and c`.
+pub(super) fn listing(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
 /// A correlation.
 pub(super) fn r(x: f64) -> String {
     share(x, 3)
@@ -88,6 +97,13 @@ pub(super) fn counted(n: usize, one: &str, many: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_listed_as_one_says_them() {
+        let names = ["a", "b", "c"].map(str::to_owned);
+        let said = [0, 1, 2, 3].map(|n| listing(&names[..n]));
+        assert_eq!(said, ["", "a", "a and b", "a, b and c"]);
+    }
 
     #[test]
     fn numbers_read_as_in_print() {

@@ -179,7 +179,15 @@ fn separable(a: &Analysis) -> Option<Answer> {
     if mean == next {
         return Some(Answer {
             question,
-            short: format!("{first} and {second} have the same mean, {}.", two(mean)),
+            short: {
+                let best = ranked.iter().take_while(|(m, _)| *m == mean);
+                let best: Vec<String> = best.map(|(_, id)| (*id).to_owned()).collect();
+                format!(
+                    "{} share the highest mean, {}.",
+                    apa::listing(&best),
+                    two(mean)
+                )
+            },
             more: Vec::new(),
         });
     }

@@ -1,5 +1,6 @@
 //! The study's questions and their answers, in words with numbers.
 
+use super::super::apa;
 use super::layout::{Paint, wrap};
 use super::{asked, listed};
 use crate::analyze::{Analysis, Value};
@@ -60,10 +61,11 @@ fn best(a: &Analysis) -> Vec<String> {
         return Vec::new();
     };
     if mean == next_mean {
+        let best = ranked.iter().take_while(|(m, _)| *m == mean);
+        let best: Vec<String> = best.map(|(_, id)| Untrusted(id).to_string()).collect();
         return vec![format!(
-            "{} and {} have the same mean, {mean:.3}.",
-            Untrusted(first),
-            Untrusted(second)
+            "{} share the highest mean, {mean:.3}.",
+            apa::listing(&best)
         )];
     }
     let mut said = vec![format!(
