@@ -337,6 +337,13 @@ fn a_bad_line_is_safe_and_usable() {
     assert!(ended >= 8, "{ended} of 12");
 }
 
+/// A deadline may not be further ahead than a second, whatever the watchdog time.
+#[test]
+fn a_device_with_a_watchdog_of_a_second_can_be_armed() {
+    let mut bench = Bench::new(Noise::default(), 8, 1000);
+    bench.play();
+}
+
 /// The clock of the device is known to a millisecond, and its telemetry is whole.
 #[test]
 fn clock_and_telemetry_are_accounted_for() {
