@@ -35,6 +35,8 @@ const PING: Duration = Duration::from_millis(100);
 pub const STALL: Duration = Duration::from_millis(100);
 /// How long beyond the watchdog time a heartbeat says something, ms.
 const DEADLINE_SLACK_MS: u32 = 10;
+/// A deadline a second ahead is none (wire.md 6.1), and the clock is an estimate, ms.
+const DEADLINE_MOST_MS: u32 = 900;
 /// How long heartbeats may stay without an answer.
 const MUTE: Duration = Duration::from_millis(500);
 /// How long a handle may take to come to rest before a table goes up.
@@ -506,9 +508,9 @@ impl Host {
         self.beat_count = self.beat_count.wrapping_add(1);
         let beat = Heartbeat {
             count: self.beat_count,
-            deadline_ms: now_ms
-                .wrapping_add(u32::from(device.watchdog_ms))
-                .wrapping_add(DEADLINE_SLACK_MS),
+            deadline_ms: now_ms.wrapping_add(
+                (u32::from(device.watchdog_ms) + DEADLINE_SLACK_MS).min(DEADLINE_MOST_MS),
+            ),
         };
         // heartbeats carry no sequence number that counts
         let frame = Request::Heartbeat(beat).frame(0);

@@ -147,7 +147,7 @@ impl<'w> Talk<'w> {
         self.beats.push_back((self.beat_count, now));
         Request::Heartbeat(Heartbeat {
             count: self.beat_count,
-            deadline_ms: now_ms.wrapping_add(watchdog).wrapping_add(10),
+            deadline_ms: now_ms.wrapping_add((watchdog + 10).min(900)),
         })
         .frame(0)
     }
