@@ -19,6 +19,7 @@ pub mod handler;
 pub mod host;
 pub mod link;
 pub mod manual;
+pub mod probe;
 pub mod process;
 pub mod serial;
 pub mod table;

@@ -108,7 +108,6 @@ fn each_planted_defect_is_named_by_its_clause() {
         };
         assert!(broken.contains(&expected), "{name} ({clause}): {broken:?}");
         assert!(!found.passes());
-        eprintln!("{name}: {broken:?}");
     }
 }
 
@@ -128,4 +127,52 @@ fn nobody_there_is_one_verdict() {
     assert_eq!(found.verdicts.len(), 1);
     assert!(!found.passes());
     assert!(found.verdicts[0].seen.contains("no answer"), "{found:?}");
+}
+
+/// The probe of the simulated device follows a path and measures the target: what
+/// comes back is the path, a period late, and a force of the target's size.
+#[test]
+fn a_path_is_followed_and_recorded_whole() {
+    use study::device::probe::{Path, record};
+    let rate_hz = 1000.0;
+    let x_mm: Vec<f64> = (0..3000)
+        .map(|i| 17.5 - 12.0 * (std::f64::consts::TAU * 0.5 * f64::from(i) / rate_hz).cos())
+        .collect();
+    let path = Path {
+        x_mm: x_mm.clone(),
+        rate_hz,
+        force_n: 12.0,
+    };
+    let mut bench = Bench::new(Options::default());
+    let mut told = 0.0;
+    let (device, recording) = record(&mut bench, 3, &path, &mut |share| told = share).unwrap();
+    assert!(device.flags.simulated);
+    assert!((told - 1.0f64).abs() < 0.05, "{told}");
+    assert_eq!(recording.x_mm.len(), 3000);
+    assert_eq!((recording.f_n.len(), recording.a_m_s2.len()), (3000, 3000));
+    for (asked, is) in x_mm.iter().zip(&recording.x_mm) {
+        assert!((asked - is).abs() < 0.1, "{asked} {is}");
+    }
+    let most_n = recording.f_n.iter().fold(0.0f64, |m, f| m.max(f.abs()));
+    assert!((3.0..12.0).contains(&most_n), "{most_n}");
+    assert_eq!(bench.firmware.held_n(), 0.0);
+    // beyond its stroke, and faster than it may
+    let refusal = |path: &Path| {
+        let mut bench = Bench::new(Options::default());
+        record(&mut bench, 4, path, &mut |_| {}).unwrap_err()
+    };
+    let mut far = path.clone();
+    far.x_mm[1500] = 70.0;
+    assert!(
+        refusal(&far).contains("a limit is none"),
+        "{}",
+        refusal(&far)
+    );
+    let mut fast = path;
+    fast.x_mm[1500] += 5.0;
+    assert!(
+        refusal(&fast).contains("cannot be evaluated"),
+        "{}",
+        refusal(&fast)
+    );
 }

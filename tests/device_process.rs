@@ -2,6 +2,7 @@
 //! that do what they should not.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(clippy::print_stderr, reason = "what is skipped is told")]
 
 mod support;
 

@@ -215,3 +215,28 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
         "ragged.csv: line 3: 2 fields where the columns are 3",
     );
 }
+
+/// Every figure as SVG, as PNG and as numbers.
+#[test]
+fn each_figure_comes_in_three_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("figures");
+    identify(&[TRAINING, "--validate", VALIDATION])
+        .args(["--lambda", "0.999,0.9999", "--dx", "1,2", "--figures"])
+        .arg(&out)
+        .assert()
+        .success();
+    for figure in [
+        "fig4-vaf",
+        "fig5-parameters",
+        "fig6-force",
+        "fig7-spectra",
+        "fig8-map",
+    ] {
+        let read = |ending: &str| fs::read(out.join(format!("{figure}.{ending}"))).unwrap();
+        assert!(read("svg").starts_with(b"<svg"), "{figure}");
+        assert!(read("png").starts_with(b"\x89PNG\r\n\x1a\n"), "{figure}");
+        assert!(read("csv").iter().filter(|b| **b == b'\n').count() > 4);
+    }
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 15);
+}

@@ -1,6 +1,7 @@
 //! Whole sessions by keys on each way to a device.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(clippy::print_stderr, reason = "what is skipped is told")]
 
 mod support;
 
@@ -404,6 +405,46 @@ fn a_bad_line_costs_telemetry_and_no_answer() {
     let rig = Rig::start(&faults);
     let (rows, _) = rig.finish();
     assert_eq!(rows.len(), 5);
+}
+
+/// `study record` with a probe at a port: a recording that can be identified.
+#[test]
+fn a_recording_over_a_port_can_be_identified() {
+    let folder = tempfile::tempdir().unwrap();
+    let device = Simulator::start(folder.path(), &[]);
+    let port = device.port.to_str().unwrap();
+    let trajectory = folder.path().join("short.toml");
+    let text = "format = \"study-trajectory/1\"\noffset_mm = 17.5\nduration_s = 4.0\nramp_s = 1.0\n[[parts]]\nkind = \"sine\"\namplitude_mm = 14.0\nfrequency_hz = 0.7\n";
+    fs::write(&trajectory, text).unwrap();
+    for name in ["training.csv", "probe.csv"] {
+        let arguments = [
+            "record",
+            "short.toml",
+            "--device",
+            "serial",
+            "--port",
+            port,
+            "--out",
+            name,
+        ];
+        let (code, out, err) = study(&arguments, folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        assert!(err.contains(&format!("wrote {name}")), "{err}");
+        let file = fs::read_to_string(folder.path().join(name)).unwrap();
+        assert!(file.contains("simulated, not measured"), "{file}");
+    }
+    let (code, _, err) = study(&["record", "short.toml", "--port", port], folder.path());
+    assert_eq!(code, 2, "{err}");
+    let identify = [
+        "identify",
+        "training.csv",
+        "--validate",
+        "probe.csv",
+        "--method",
+        "ewls",
+    ];
+    let (code, out, err) = study(&identify, folder.path());
+    assert_eq!(code, 0, "{out}{err}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 mod check;
 mod hold;
-mod port;
+pub(super) mod port;
 mod rendered;
 mod safety;
 mod simulate;
@@ -47,6 +47,12 @@ enum What {
         /// A protocol.toml or the folder that holds one
         protocol: PathBuf,
     },
+}
+
+/// Different for each run of the program.
+pub(super) fn nonce() -> u32 {
+    use std::hash::{BuildHasher as _, RandomState};
+    RandomState::new().hash_one(std::process::id()) as u32
 }
 
 /// Does it.

@@ -1,12 +1,16 @@
 //! `study record`: the probe imposes a trajectory, a recording comes out.
 //!
-//! The probe and the target are the simulated ones. The header of the recording
-//! holds everything that it takes to make it again, to the byte.
+//! The probe and the target are the simulated ones, and the header of the recording
+//! then holds everything that it takes to make it again, to the byte; or a probe at the
+//! end of a [`wire`].
 
+mod wire;
+
+use super::playback::Place;
 use super::trajectory::{
     picture, rate, read_plant, read_trajectory, refuse_to_overwrite, write_file,
 };
-use super::{Console, Failure};
+use super::{Console, Failure, Kind};
 use crate::identify::signal::{Excitation, LowPass, delay, difference, excitation};
 use crate::plant::{self, Measured, Parameters, Probe, ProbeError};
 use crate::recording::{self, Columns};
@@ -35,6 +39,15 @@ pub(super) struct Args {
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
     rate: f64,
 
+    /// What moves: the simulated probe and target, or a probe on a serial port
+    #[arg(long, value_name = "KIND", value_parser = ["simulated", "serial"], default_value = "simulated")]
+    device: String,
+    #[command(flatten)]
+    place: Place,
+    /// Largest force of a probe on a serial port, N
+    #[arg(long, value_name = "N", default_value_t = 12.0)]
+    max_force: f64,
+
     /// The noise of the sensors
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -58,6 +71,16 @@ pub(super) struct Args {
 
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    if args.device == "serial" {
+        return wire::run(args, console);
+    }
+    if args.place.port.is_some() {
+        return Err(Failure::new(
+            Kind::Usage,
+            "--port makes no sense with the simulated probe",
+        )
+        .hint("--device serial records with the probe at that port"));
+    }
     let trajectory = read_trajectory(&args.trajectory, console)?;
     let (name, target) = read_plant(&args.plant, console)?;
     refuse_to_overwrite(args.out.as_deref(), args.force)?;
@@ -71,14 +94,19 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         .map_err(|e| refused(args, &e))?;
     let header = header(args, &trajectory, &name, &target, &probe);
     let bytes = recording_bytes(&trajectory, &measured, filter, args.rate, &header);
-    summary(&bytes, console);
+    finish(args, &bytes, console)
+}
+
+/// Tells what was recorded, and writes it.
+fn finish(args: &Args, bytes: &[u8], console: &mut Console) -> Result<(), Failure> {
+    summary(bytes, console);
     match &args.out {
         Some(path) => {
-            write_file(path, |sink| sink.write_all(&bytes))?;
+            write_file(path, |sink| sink.write_all(bytes))?;
             console.say(format!("wrote {}", path.display()));
             Ok(())
         }
-        None => console.out(String::from_utf8_lossy(&bytes)),
+        None => console.out(String::from_utf8_lossy(bytes)),
     }
 }
 
@@ -111,18 +139,8 @@ fn header(
         args.seed,
         plant::SIMULATION,
     );
+    out.push_str(&filter_line(args));
     // writing to a String cannot fail
-    let _ = match args.raw {
-        true => writeln!(
-            out,
-            "filter: none; x as the encoder counts, a and F with their noise"
-        ),
-        false => writeln!(
-            out,
-            "filter: zero-phase low-pass, Butterworth of 2nd order both ways, at {} Hz; the same on x, a and F; v: central difference of x",
-            args.filter
-        ),
-    };
     let _ = writeln!(
         out,
         "probe: encoder {} mm, force noise {} N rms, acceleration noise {} m/s² rms; F is what it applies to the target, positive with +x",
@@ -145,6 +163,16 @@ fn header(
         }
     }
     out
+}
+
+fn filter_line(args: &Args) -> String {
+    match args.raw {
+        true => "filter: none; x as the encoder counts, a and F with their noise\n".to_owned(),
+        false => format!(
+            "filter: zero-phase low-pass, Butterworth of 2nd order both ways, at {} Hz; the same on x, a and F; v: central difference of x\n",
+            args.filter
+        ),
+    }
 }
 
 /// The recording between the ramps. The filter sees the ramps too, so its ends are

@@ -7,7 +7,7 @@
 
 mod clauses;
 mod playing;
-mod talk;
+pub(super) mod talk;
 mod uploads;
 
 use super::frame::crc32;
@@ -85,7 +85,7 @@ impl Commissioning {
 
 /// Why a clause is broken.
 #[derive(Debug)]
-enum Broken {
+pub(super) enum Broken {
     /// In words.
     Seen(String),
     /// Nothing more can be asked.
@@ -93,7 +93,7 @@ enum Broken {
 }
 
 impl Broken {
-    fn seen(what: impl Into<String>) -> Self {
+    pub(super) fn seen(what: impl Into<String>) -> Self {
         Self::Seen(what.into())
     }
 }

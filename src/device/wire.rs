@@ -21,7 +21,7 @@ use bytes::{Reader, Writer};
 use core::fmt;
 
 pub use code::{Fault, Happening, Loaded, Refusal, State};
-pub use probe::{PathBegin, PathChunk};
+pub use probe::{PathBegin, PathChunk, PathCrc};
 pub use reply::{Ack, Flags, Identity, Name, Outcome, Pulse};
 pub use stream::{Event, Recorded, RecordedPoint, Telemetry, TelemetrySample};
 pub use table::{Node, TableBegin, TableChunk, TableCrc};

@@ -91,11 +91,11 @@ fn encoded(picture: &Pixmap) -> Result<Vec<u8>, png::EncodingError> {
     encoder.set_filter(png::Filter::Up);
     let mut writer = encoder.write_header()?;
     let mut stream = writer.stream_writer()?;
-    let mut rgb = Vec::new();
-    for row in picture.data().chunks_exact(4 * picture.width() as usize) {
-        rgb.clear();
-        for pixel in row.chunks_exact(4) {
-            rgb.extend_from_slice(&pixel[..3]);
+    let width = picture.width() as usize;
+    let mut rgb = vec![0; 3 * width];
+    for row in picture.data().chunks_exact(4 * width) {
+        for (out, pixel) in rgb.chunks_exact_mut(3).zip(row.chunks_exact(4)) {
+            out.copy_from_slice(&pixel[..3]);
         }
         stream.write_all(&rgb)?;
     }

@@ -1,5 +1,6 @@
 //! `study device info` and `study device check`.
 
+use super::nonce;
 use super::port::PortWire;
 use crate::cli::playback::{COMMISSIONED, COMMISSIONED_FILE, Commissioned, Place};
 use crate::cli::{Console, Failure, Kind};
@@ -34,12 +35,6 @@ pub(in crate::cli) struct CheckArgs {
     /// Print one JSON document
     #[arg(long)]
     json: bool,
-}
-
-/// Different for each run.
-pub(super) fn nonce() -> u32 {
-    use std::hash::{BuildHasher as _, RandomState};
-    RandomState::new().hash_one(std::process::id()) as u32
 }
 
 /// Says who is there.

@@ -8,16 +8,16 @@ use crate::text::Untrusted;
 use std::time::{Duration, Instant};
 
 /// An open port, and since when.
-pub(super) struct PortWire {
+pub(in crate::cli) struct PortWire {
     link: Box<dyn Link>,
     start: Instant,
     /// Where it leads to.
-    pub(super) place: String,
+    pub(in crate::cli) place: String,
 }
 
 impl PortWire {
     /// Opens the port that the arguments or `device.toml` name.
-    pub(super) fn open(place: &Place) -> Result<Self, Failure> {
+    pub(in crate::cli) fn open(place: &Place) -> Result<Self, Failure> {
         let mut opener = place.serial()?;
         let link = opener.open().map_err(|e| {
             let place = opener.place();

@@ -1,11 +1,12 @@
 //! A conversation with a device that may say anything.
 
-use super::{Broken, Wire};
+pub(in crate::device) use super::Broken;
+use super::Wire;
 use crate::device::frame::{Decoder, Frame};
 use crate::device::host::{BEAT, DeviceClock, RETRY, TRIES};
 use crate::device::wire::{
-    Ack, Event, Heartbeat, Hello, Identity, Outcome, Pulse, Refusal, Reply, Request, State,
-    Telemetry, VERSION,
+    Ack, Event, Heartbeat, Hello, Identity, Outcome, Pulse, Recorded, Refusal, Reply, Request,
+    State, Telemetry, VERSION,
 };
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -17,37 +18,38 @@ const REST_WITHIN: Duration = Duration::from_secs(5);
 
 /// A reply as it came.
 #[derive(Debug, Clone)]
-pub(super) struct Came {
-    pub(super) sequence: u16,
-    pub(super) reply: Reply,
-    pub(super) body: Vec<u8>,
-    pub(super) at: Duration,
+pub(in crate::device) struct Came {
+    pub(in crate::device) sequence: u16,
+    pub(in crate::device) reply: Reply,
+    pub(in crate::device) body: Vec<u8>,
+    pub(in crate::device) at: Duration,
 }
 
 /// What goes on between the check and the device.
-pub(super) struct Talk<'w> {
+pub(in crate::device) struct Talk<'w> {
     wire: &'w mut dyn Wire,
     nonce: u32,
     decoder: Decoder,
     sequence: u16,
     /// Whether heartbeats go out by themselves.
-    pub(super) beating: bool,
+    pub(in crate::device) beating: bool,
     beat_count: u32,
     next_beat: Duration,
     beats: VecDeque<(u32, Duration)>,
-    pub(super) clock: DeviceClock,
-    pub(super) device: Option<Identity>,
+    pub(in crate::device) clock: DeviceClock,
+    pub(in crate::device) device: Option<Identity>,
     /// Replies that nobody has looked at.
     replies: Vec<Came>,
-    pub(super) telemetry: Vec<(Duration, Telemetry)>,
-    pub(super) events: Vec<Event>,
-    pub(super) pulses: Vec<Pulse>,
-    pub(super) latency_ms: Option<[f64; 3]>,
+    pub(in crate::device) telemetry: Vec<(Duration, Telemetry)>,
+    pub(in crate::device) events: Vec<Event>,
+    pub(in crate::device) recorded: Vec<Recorded>,
+    pub(in crate::device) pulses: Vec<Pulse>,
+    pub(in crate::device) latency_ms: Option<[f64; 3]>,
     playback: u32,
 }
 
 impl<'w> Talk<'w> {
-    pub(super) fn new(wire: &'w mut dyn Wire, nonce: u32) -> Self {
+    pub(in crate::device) fn new(wire: &'w mut dyn Wire, nonce: u32) -> Self {
         Self {
             wire,
             nonce,
@@ -62,28 +64,29 @@ impl<'w> Talk<'w> {
             replies: Vec::new(),
             telemetry: Vec::new(),
             events: Vec::new(),
+            recorded: Vec::new(),
             pulses: Vec::new(),
             latency_ms: None,
             playback: 0,
         }
     }
 
-    pub(super) fn now(&mut self) -> Duration {
+    pub(in crate::device) fn now(&mut self) -> Duration {
         self.wire.now()
     }
 
-    pub(super) fn identity(&self) -> Result<Identity, Broken> {
+    pub(in crate::device) fn identity(&self) -> Result<Identity, Broken> {
         self.device
             .ok_or_else(|| Broken::Gone("it has not said who it is".to_owned()))
     }
 
-    pub(super) fn next_sequence(&mut self) -> u16 {
+    pub(in crate::device) fn next_sequence(&mut self) -> u16 {
         // 0 is that of the heartbeats
         self.sequence = self.sequence.wrapping_add(1).max(1);
         self.sequence
     }
 
-    pub(super) fn next_playback(&mut self) -> u32 {
+    pub(in crate::device) fn next_playback(&mut self) -> u32 {
         self.playback += 1;
         self.playback
     }
@@ -116,7 +119,7 @@ impl<'w> Talk<'w> {
         match reply {
             Reply::Telemetry(telemetry) => self.telemetry.push((at, telemetry)),
             Reply::Event(event) => self.events.push(event),
-            Reply::Recorded(_) => {}
+            Reply::Recorded(recorded) => self.recorded.push(recorded),
             Reply::Pulse(pulse) if sequence == 0 => {
                 let sent = self.beats.iter().find(|(count, _)| *count == pulse.count);
                 if let Some((_, sent)) = sent {
@@ -149,12 +152,12 @@ impl<'w> Talk<'w> {
         .frame(0)
     }
 
-    pub(super) fn beat_count(&self) -> u32 {
+    pub(in crate::device) fn beat_count(&self) -> u32 {
         self.beat_count
     }
 
     /// Lets time pass.
-    pub(super) fn pass(&mut self, time: Duration) -> Result<(), Broken> {
+    pub(in crate::device) fn pass(&mut self, time: Duration) -> Result<(), Broken> {
         let until = self.now() + time;
         loop {
             let left = until.saturating_sub(self.now());
@@ -167,7 +170,7 @@ impl<'w> Talk<'w> {
 
     /// Bytes that may or may not be answered: the reply with this number, if it
     /// comes in time.
-    pub(super) fn send(
+    pub(in crate::device) fn send(
         &mut self,
         bytes: &[u8],
         sequence: u16,
@@ -189,7 +192,7 @@ impl<'w> Talk<'w> {
     }
 
     /// A request until it is answered.
-    pub(super) fn ask(&mut self, request: Request) -> Result<Came, Broken> {
+    pub(in crate::device) fn ask(&mut self, request: Request) -> Result<Came, Broken> {
         let sequence = self.next_sequence();
         let frame = request.frame(sequence);
         for _ in 0..TRIES {
@@ -203,7 +206,7 @@ impl<'w> Talk<'w> {
         )))
     }
 
-    pub(super) fn ack(&mut self, request: Request) -> Result<Ack, Broken> {
+    pub(in crate::device) fn ack(&mut self, request: Request) -> Result<Ack, Broken> {
         match self.ask(request)?.reply {
             Reply::Ack(ack) if ack.request == request.kind() => Ok(ack),
             other => Err(Broken::seen(format!(
@@ -215,7 +218,7 @@ impl<'w> Talk<'w> {
     }
 
     /// A request that has to be done.
-    pub(super) fn done(&mut self, request: Request) -> Result<Ack, Broken> {
+    pub(in crate::device) fn done(&mut self, request: Request) -> Result<Ack, Broken> {
         let ack = self.ack(request)?;
         match ack.refusal {
             Refusal::None => Ok(ack),
@@ -229,7 +232,11 @@ impl<'w> Talk<'w> {
     }
 
     /// A request that has to be refused, and why.
-    pub(super) fn refused(&mut self, request: Request, why: Refusal) -> Result<Ack, Broken> {
+    pub(in crate::device) fn refused(
+        &mut self,
+        request: Request,
+        why: Refusal,
+    ) -> Result<Ack, Broken> {
         let ack = self.ack(request)?;
         if ack.refusal == why {
             Ok(ack)
@@ -243,7 +250,7 @@ impl<'w> Talk<'w> {
         }
     }
 
-    pub(super) fn outcome(&mut self) -> Result<Outcome, Broken> {
+    pub(in crate::device) fn outcome(&mut self) -> Result<Outcome, Broken> {
         match self.ask(Request::State)?.reply {
             Reply::Outcome(outcome) => Ok(outcome),
             other => Err(Broken::seen(format!(
@@ -253,12 +260,12 @@ impl<'w> Talk<'w> {
         }
     }
 
-    pub(super) fn limp(&mut self) -> Result<(), Broken> {
+    pub(in crate::device) fn limp(&mut self) -> Result<(), Broken> {
         self.done(Request::Limp).map(drop)
     }
 
     /// Opens a new connection.
-    pub(super) fn hello(&mut self) -> Result<Identity, Broken> {
+    pub(in crate::device) fn hello(&mut self) -> Result<Identity, Broken> {
         self.nonce = self.nonce.wrapping_add(1);
         let sent = self.now();
         let came = self.ask(Request::Hello(Hello { nonce: self.nonce }))?;
@@ -286,7 +293,7 @@ impl<'w> Talk<'w> {
     }
 
     /// Limp, at rest, idle, with heartbeats, and nothing left of before.
-    pub(super) fn ready(&mut self) -> Result<(), Broken> {
+    pub(in crate::device) fn ready(&mut self) -> Result<(), Broken> {
         self.beating = true;
         self.limp()?;
         self.hello()?;

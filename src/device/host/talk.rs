@@ -162,7 +162,6 @@ impl Host {
     }
 
     fn ended(&mut self, outcome: Outcome, at: Duration) {
-        self.health.clock.note(at, at, outcome.clock_ms);
         self.health.outcome = Some(outcome);
         if self.stage != Stage::Asking {
             return;

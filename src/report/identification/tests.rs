@@ -50,6 +50,8 @@ fn the_surface_has_a_box_and_a_row_for_every_cell() {
     let svg = drawing.figure.to_svg();
     assert!(svg.contains("a &lt; b"), "the name of a recording is text");
     assert!(svg.contains("-11"));
+    // a white rim around the white letters of dark cells would hide them
+    assert!(drawing.figure.panels[0].notes.iter().all(|note| !note.rim));
 }
 
 #[test]

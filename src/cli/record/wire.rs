@@ -1,0 +1,80 @@
+//! A recording by a probe at the end of a wire: the trajectory is sampled, followed
+//! by the device, and comes back as it was measured.
+
+use super::{Args, filter_line, finish, recording_bytes};
+use crate::cli::device::port::PortWire;
+use crate::cli::trajectory::{read_trajectory, refuse_to_overwrite};
+use crate::cli::{Console, Failure, Kind};
+use crate::device::host::name;
+use crate::device::probe::{self, Path};
+use crate::identify::signal::LowPass;
+use crate::limits::Limit;
+use crate::plant::Measured;
+use crate::text::Untrusted;
+use crate::trajectory;
+
+/// Does it.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let trajectory = read_trajectory(&args.trajectory, console)?;
+    refuse_to_overwrite(args.out.as_deref(), args.force)?;
+    let force_n = Limit::new(args.max_force).map_err(Failure::input)?.get();
+    let filter = match args.raw {
+        true => None,
+        false => Some(LowPass::new(args.filter, args.rate).map_err(Failure::input)?),
+    };
+    // bounded by the longest trajectory and the highest rate
+    let samples = (trajectory.total_s() * args.rate + 1e-6).floor() as usize + 1;
+    let t_s: Vec<f64> = (0..samples).map(|i| i as f64 / args.rate).collect();
+    let path = Path {
+        x_mm: t_s.iter().map(|t| trajectory.at(*t).x_mm).collect(),
+        rate_hz: args.rate,
+        force_n,
+    };
+    let mut port = PortWire::open(&args.place)?;
+    let place = port.place.clone();
+    let progress = crate::cli::console::progress(100, "% of the path");
+    let recorded = probe::record(
+        &mut port,
+        crate::cli::device::nonce(),
+        &path,
+        &mut |share| {
+            progress.set_position((100.0 * share) as u64);
+        },
+    );
+    progress.finish_and_clear();
+    let (device, recorded) = recorded.map_err(|why| {
+        let (place, why) = (Untrusted(&place), Untrusted(&why));
+        Failure::new(Kind::Device, format!("{place}: {why}")).hint(
+            "nothing was recorded; `study device info` shows what the probe reaches, `study trajectory` what the path asks for",
+        )
+    })?;
+    let measured = Measured {
+        t_s,
+        x_mm: recorded.x_mm,
+        a_m_s2: recorded.a_m_s2,
+        f_n: recorded.f_n,
+    };
+    let what = match device.flags.simulated {
+        true => "simulated, not measured: the simulated probe at the end of a wire",
+        false => "measured by a probe",
+    };
+    // model files keep the first line: it says what was recorded, and how
+    let mut header = format!(
+        "{what}, {} ({}); study record {} --rate {}, study {}\n",
+        name(&device.serial),
+        name(&device.firmware),
+        Untrusted(&args.trajectory.to_string_lossy()),
+        args.rate,
+        env!("CARGO_PKG_VERSION"),
+    );
+    header.push_str(&filter_line(args));
+    header.push_str("TRAJECTORY:\n");
+    // a reader may drop blanks at the end of a line, and then a blank line is lost
+    for line in trajectory::file::write(&trajectory).lines() {
+        if !line.is_empty() {
+            header.push_str(&format!("  {line}\n"));
+        }
+    }
+    let bytes = recording_bytes(&trajectory, &measured, filter, args.rate, &header);
+    finish(args, &bytes, console)
+}
