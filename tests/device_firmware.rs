@@ -1107,7 +1107,7 @@ fn every_state_ends_without_force_when_something_breaks() {
 
         // noise: nothing of it is done, and the next frame is understood
         let mut host = in_state(state);
-        let noise: Vec<u8> = (0..2000u32).map(|i| (i * i >> 3) as u8).collect();
+        let noise: Vec<u8> = (0..2000u32).map(|i| ((i * i) >> 3) as u8).collect();
         assert_eq!(host.send(&noise), None, "{state:?}");
         assert_eq!(host.device.state(), state);
         assert!(host.send(Request::State.frame(3).as_bytes()).is_some());
