@@ -68,7 +68,7 @@ enum Command {
     New(new::Args),
     /// Print the JSON Schema of the protocol file, for editors
     Schema(schema::Args),
-    /// Find playback devices
+    /// Find, check and simulate playback devices
     Device(device::Args),
     /// Print completions for a shell
     Completions(completions::Args),

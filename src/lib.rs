@@ -20,7 +20,8 @@
 //! | 5 | [`tui`] |
 //! | 6 | [`cli`] |
 //!
-//! Input and output happen only in `store`, `tui`, `runner` (the clock) and
+//! Input and output happen only in `store`, `tui`, `runner` (the clock),
+//! `device::{link, serial, process}` and
 //! `cli`. Everywhere else time, randomness and identity are arguments.
 //!
 //! # Glossary
