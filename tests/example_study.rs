@@ -1,6 +1,8 @@
 //! The example study of the repository: whole, marked as simulated, and what the
 //! program of today rehearses.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod support;
 
 use std::collections::BTreeMap;
