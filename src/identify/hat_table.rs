@@ -13,7 +13,7 @@ use crate::model::predict::{Direction, Lookup};
 const SCAN: [u32; 2] = [6, 20];
 
 /// How much more than the least a shorter δ may leave, in rms. Chosen, with the ridge
-/// on m and b, on simulated switches that no number in the documentation is of.
+/// on m and b, on simulated switches: `docs/estimators.md` says on which.
 const HARDLY_MORE: f64 = 1.1;
 
 impl Training<'_> {
