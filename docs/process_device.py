@@ -13,7 +13,7 @@ def force_n(table, x, v):  # nearest node; a real controller interpolates, at 4 
     branch = table["positive" if v >= 0 else "negative"]
     return branch["b_n_s_per_mm"][node] * v + branch["k_n_per_mm"][node] * x + branch["f0_n"][node]
 
-say("hello", format="study-process/1", id="example-1", telemetry=True,
+say("hello", format="study-process/1", id="example-1", telemetry=True, simulated=True,
     limits={"force_n": 12.0, "velocity_mm_s": 500.0})
 task, playing, alive, told, pending = None, None, time.monotonic(), 0.0, b""
 while True:

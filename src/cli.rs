@@ -60,7 +60,7 @@ enum Command {
     Verify(verify::Args),
     /// Draw an excitation and check it against the limits of probe and target
     Trajectory(trajectory::Args),
-    /// Impose an excitation on the simulated target: a recording
+    /// Impose an excitation on a target, simulated or real: a recording
     Record(record::Args),
     /// From a recording to model files and their VAF
     Identify(Box<identify::Args>),

@@ -116,6 +116,7 @@ impl Tui {
             }
         });
         drawn.map_err(OperatorError)?;
+        self.terminal.allow_paste(!view.armed);
         self.drawn = Some(now);
         Ok(())
     }

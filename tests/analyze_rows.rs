@@ -155,6 +155,28 @@ fn a_folder_without_participants_is_analysed_under_a_banner() {
 }
 
 #[test]
+fn pilots_are_not_mixed_with_rehearsals() {
+    let mut rows = two();
+    for row in &mut rows {
+        row.pilot = row.participant.as_str() == "P01";
+        row.simulated = !row.pilot;
+    }
+    let counts = |simulated| {
+        let rules = Rules {
+            include: Include {
+                pilot: false,
+                simulated,
+            },
+            ..Rules::default()
+        };
+        let a = analyze(&ratings(&rows, &[]), &rules);
+        (a.counts.pilots, a.counts.simulated)
+    };
+    assert_eq!(counts(false), (1, 0));
+    assert_eq!(counts(true), (1, 1));
+}
+
+#[test]
 fn states_decide_and_are_named() {
     let people = [
         participant("P01", State::Excluded, "fell asleep"),

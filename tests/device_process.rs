@@ -100,6 +100,7 @@ fn the_documented_example_plays() {
     let Some(command) = example() else { return };
     let mut bench = Bench::new(command);
     assert_eq!(bench.device.identity().id, "example-1");
+    assert!(bench.device.identity().simulated);
     for _ in 0..2 {
         bench.heard.clear();
         bench.load().unwrap();

@@ -53,10 +53,13 @@ pub(super) type Decision = Option<Arc<Reason>>;
 /// Decides about every row, and tells what each pre-stated rule did.
 ///
 /// Real rows are analysed alone, unless others are asked for. Where there are
-/// none at all, the others are analysed, under a banner. The rules judge what is
+/// none at all, those of pilots are, and where there are none of these the simulated
+/// ones, under a banner. The rules judge what is
 /// left then.
 pub(super) fn decide(ratings: &Ratings, rules: &Rules) -> (Vec<Decision>, Vec<Applied>) {
     let real = ratings.origin.contains(&Origin::Real);
+    // somebody who sat at the screen, real or pilot
+    let people = real || ratings.origin.contains(&Origin::Pilot);
     let pilot = Arc::new(Reason::Pilot);
     let simulated = Arc::new(Reason::Simulated);
     let states: Vec<Decision> = (ratings.subjects.iter())
@@ -77,7 +80,7 @@ pub(super) fn decide(ratings: &Ratings, rules: &Rules) -> (Vec<Decision>, Vec<Ap
     let mut decisions: Vec<Decision> = (0..ratings.len())
         .map(|i| match ratings.origin[i] {
             Origin::Pilot if real && !rules.include.pilot => Some(Arc::clone(&pilot)),
-            Origin::Simulated if real && !rules.include.simulated => Some(Arc::clone(&simulated)),
+            Origin::Simulated if people && !rules.include.simulated => Some(Arc::clone(&simulated)),
             Origin::Real | Origin::Pilot | Origin::Simulated => {
                 states[ratings.subject[i] as usize].clone()
             }

@@ -225,8 +225,9 @@ pub(super) fn commissioned(device: &str, console: &mut Console) -> Option<String
 
 fn unopened(why: &DeviceError) -> Failure {
     let text = why.to_string();
-    Failure::new(Kind::Device, Untrusted(&text))
-        .hint("`study device list` shows the ports, docs/devices.md how a device is set up")
+    Failure::new(Kind::Device, Untrusted(&text)).hint(
+        "`study device list` shows serial ports; docs/devices.md says how each kind is set up",
+    )
 }
 
 #[cfg(test)]

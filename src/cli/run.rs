@@ -137,28 +137,57 @@ fn refuse_tableless(kind: DeviceKind, loaded: &load::Loaded) -> Result<(), Failu
     }
 }
 
-/// The command that goes on with a session.
+/// The command that goes on with a session, to be typed as it is.
 fn again(args: &Args, participant: &str) -> String {
-    let mut command = format!("study run {}", args.protocol.display());
-    if args.results.as_os_str() != "results" {
-        command.push_str(&format!(" --results {}", args.results.display()));
+    let mut command = vec!["study".to_owned(), "run".to_owned()];
+    let path = |path: &std::path::Path| path.display().to_string();
+    command.push(path(&args.protocol));
+    let mut option = |name: &str, value: Option<String>| {
+        if let Some(value) = value {
+            command.extend([format!("--{name}"), value]);
+        }
+    };
+    let results = Some(path(&args.results)).filter(|p| p != "results");
+    option("results", results);
+    option(
+        "device",
+        args.playback.device.map(|k| k.as_str().to_owned()),
+    );
+    option("port", args.playback.place.port.clone());
+    option("baud", args.playback.place.baud.map(|b| b.to_string()));
+    option("command", args.playback.place.command.clone());
+    option(
+        "rows",
+        args.rows
+            .as_ref()
+            .map(|r| format!("{}-{}", r.start(), r.end())),
+    );
+    option("operator", args.operator.clone());
+    option(
+        "participant",
+        Some(participant.to_owned()).filter(|p| !p.is_empty()),
+    );
+    for (flag, given) in [
+        ("--pilot", args.pilot),
+        ("--live", args.live),
+        ("--no-mouse", args.no_mouse),
+    ] {
+        if given {
+            command.push(flag.to_owned());
+        }
     }
-    if let Some(kind) = args.playback.device {
-        command.push_str(&format!(" --device {}", kind.as_str()));
+    let quoted: Vec<String> = command.iter().map(|word| quoted(word)).collect();
+    quoted.join(" ")
+}
+
+/// A word as a shell takes it for one.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./:=@%+,".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
     }
-    if let Some(port) = &args.playback.place.port {
-        command.push_str(&format!(" --port {port}"));
-    }
-    if let Some(program) = &args.playback.place.command {
-        command.push_str(&format!(" --command '{program}'"));
-    }
-    if args.pilot {
-        command.push_str(" --pilot");
-    }
-    if !participant.is_empty() {
-        command.push_str(&format!(" --participant {participant}"));
-    }
-    command
 }
 
 /// Writes the derived tables and says what comes next, also where they cannot be
@@ -260,6 +289,12 @@ mod tests {
         assert!(failure.hint.unwrap().contains("--rebuild"));
         let said = String::from_utf8(out.0.borrow().clone()).unwrap();
         assert!(said.contains("It goes on with: study run X"), "{said}");
+    }
+
+    #[test]
+    fn a_command_is_one_that_a_shell_understands() {
+        let said = ["results/P-01", "my study", "it's", ""].map(quoted);
+        assert_eq!(said, ["results/P-01", "'my study'", r"'it'\''s'", "''"]);
     }
 
     #[test]

@@ -71,9 +71,11 @@ fn follow(
     }
     if path.x_mm.len() as u64 > u64::from(device.most_points) {
         return Err(Broken::seen(format!(
-            "the path has {} points, and it has room for {}",
+            "the path has {} points, and it has room for {}: record it at {} samples a second \
+             or fewer (--rate)",
             path.x_mm.len(),
-            device.most_points
+            device.most_points,
+            (path.rate_hz * f64::from(device.most_points) / path.x_mm.len() as f64).floor()
         )));
     }
     let x_nm: Vec<i32> = path.x_mm.iter().map(|x| fixed::nm(*x)).collect();

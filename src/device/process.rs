@@ -261,7 +261,7 @@ impl ProcessDevice {
 fn identity(hello: Hello) -> Identity {
     Identity {
         id: hello.id,
-        simulated: false,
+        simulated: hello.simulated,
         telemetry: hello.telemetry,
         limits: hello.limits,
     }

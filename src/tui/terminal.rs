@@ -32,6 +32,8 @@ use std::time::Duration;
 static TAKEN: AtomicBool = AtomicBool::new(false);
 /// Whether the mouse was asked for.
 static MOUSE: AtomicBool = AtomicBool::new(false);
+/// Whether the terminal was asked to mark what is pasted.
+static PASTE: AtomicBool = AtomicBool::new(false);
 /// Whether some thread has panicked: the terminal is given back for good.
 static PANICKED: AtomicBool = AtomicBool::new(false);
 static HOOK: Once = Once::new();
@@ -141,6 +143,21 @@ impl Terminal {
         }
     }
 
+    /// Whether what is pasted comes as one event. A paste whose end is lost on the way
+    /// swallows every key after it, so there is none while a key has to stop the device.
+    pub(super) fn allow_paste(&self, allowed: bool) {
+        let _one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
+        if !TAKEN.load(Ordering::SeqCst) || PASTE.swap(allowed, Ordering::SeqCst) == allowed {
+            return;
+        }
+        // a terminal that cannot be written shows at the next page
+        let _ = if allowed {
+            execute!(io::stdout(), EnableBracketedPaste)
+        } else {
+            execute!(io::stdout(), DisableBracketedPaste)
+        };
+    }
+
     /// The name of a signal that asked the program to end, once.
     pub(super) fn take_signal(&self) -> Option<&'static str> {
         match i32::try_from(self.signal.swap(0, Ordering::SeqCst)) {
@@ -219,6 +236,7 @@ fn take() -> io::Result<()> {
     enable_raw_mode()?;
     TAKEN.store(true, Ordering::SeqCst);
     let entered = execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste);
+    PASTE.store(true, Ordering::SeqCst);
     let entered = entered.and_then(|()| {
         if MOUSE.load(Ordering::SeqCst) {
             execute!(io::stdout(), EnableMouseCapture)

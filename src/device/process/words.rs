@@ -58,6 +58,9 @@ pub(super) struct Hello {
     pub(super) format: String,
     pub(super) id: String,
     pub(super) telemetry: bool,
+    /// Whether no motor and no hand is behind it.
+    #[serde(default)]
+    pub(super) simulated: bool,
     pub(super) limits: Limits,
 }
 

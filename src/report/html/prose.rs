@@ -153,8 +153,13 @@ fn results(a: &Analysis) -> String {
         get("slope_satterthwaite_df"),
         get("slope_satterthwaite_p"),
     ) {
+        let singular = if get("singular") == Some(1.0) {
+            " (singular fit: no variance of the realizations is left beside VAF, and p is too small)"
+        } else {
+            ""
+        };
         said.push(format!(
-            "Crossed mixed model: b = {} per unit of VAF, SE = {}, t({}) = {}, p {}.",
+            "Crossed mixed model: b = {} per unit of VAF, SE = {}, t({}) = {}, p {}{singular}.",
             two(b),
             two(se),
             apa::number(df, 1),

@@ -147,14 +147,19 @@ fn pairs(a: &Analysis) -> Table {
     });
     for pair in ids {
         let get = |what: &str| v.number(&format!("posthoc/{pair}/{what}"));
+        // thirds that cancel leave the digits that rounding left
+        let shown = |what: &str, decimals: usize| {
+            let x = get(what).map(|x| if x.abs() < 1e-9 { 0.0 } else { x });
+            show(x, decimals)
+        };
         let p = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), apa::p);
         table.row(
             false,
             vec![
                 pair.replace('|', " − "),
-                show(get("mean_diff"), 3),
-                show(get("dz"), 2),
-                show(get("t"), 2),
+                shown("mean_diff", 3),
+                shown("dz", 2),
+                shown("t", 2),
                 p(get("p_t_holm")),
                 p(get("p_wilcoxon_exact_holm")),
             ],

@@ -132,9 +132,15 @@ fn crossed(a: &Analysis) -> Option<String> {
                 apa::number(with, 3)
             )
         });
+    let singular = if get("singular") == Some(1.0) {
+        " The fit is singular: no variance of the realizations is left beside VAF, so that its p \
+         is too small and says nothing about other realizations."
+    } else {
+        ""
+    };
     Some(format!(
         "The mixed model with subjects and realizations crossed gives a slope of {} per unit of \
-         VAF (SE {}{test}).{between}",
+         VAF (SE {}{test}).{between}{singular}",
         two(slope),
         two(se)
     ))
