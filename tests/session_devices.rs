@@ -91,7 +91,13 @@ fn a_session_on_a_child_program_is_real_data_with_telemetry() {
     }
     let folder = tempfile::tempdir().unwrap();
     let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
-    let command = format!("python3 {}", repository("docs/process_device.py"));
+    // the documented example, as if a motor were behind it
+    let example = fs::read_to_string(repository("docs/process_device.py")).unwrap();
+    let real = example.replace(" simulated=True,", "");
+    assert_ne!(real, example);
+    let script = folder.path().join("controller.py");
+    fs::write(&script, real).unwrap();
+    let command = format!("python3 {}", script.display());
     let (_, rows) = session(folder.path(), &protocol, &["--command", &command]);
     assert_eq!(rows.len(), 5);
     for row in &rows {
@@ -177,7 +183,15 @@ impl Rig {
     fn start(faults: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let device = Simulator::start(folder.path(), faults);
-        let protocol = protocol(folder.path(), &[("\"simulated\"", "\"serial\"")]);
+        let changes = [
+            ("\"simulated\"", "\"serial\""),
+            // a busy machine loses playbacks of its own
+            (
+                "order = \"blocked\"\n",
+                "order = \"blocked\"\nmax_attempts = 50\n",
+            ),
+        ];
+        let protocol = protocol(folder.path(), &changes);
         let port = device.port.to_str().unwrap().to_owned();
         let arguments = [
             "run",
