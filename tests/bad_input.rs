@@ -8,20 +8,12 @@ mod support;
 use std::fs;
 use std::path::{Path, PathBuf};
 use support::player::{Did, play};
-use support::{Terminal, repository, study};
+use support::{Terminal, changed_protocol, repository, study};
 
 /// A copy of the paper's protocol in which one text is replaced by another.
 fn protocol(folder: &Path, old: &str, new: &str) -> PathBuf {
-    let from = PathBuf::from(repository("protocols/turn-signal"));
     let to = folder.join("protocol");
-    fs::create_dir_all(to.join("models")).unwrap();
-    for file in fs::read_dir(from.join("models")).unwrap() {
-        let file = file.unwrap();
-        fs::copy(file.path(), to.join("models").join(file.file_name())).unwrap();
-    }
-    let text = fs::read_to_string(from.join("protocol.toml")).unwrap();
-    assert!(text.contains(old), "the protocol has no `{old}`");
-    fs::write(to.join("protocol.toml"), text.replace(old, new)).unwrap();
+    changed_protocol("turn-signal", &to, &[(old, new)]);
     to
 }
 

@@ -8,29 +8,16 @@ mod support;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use support::{repository, study};
+use support::{copy_folder, repository, study};
 
 /// A copy, because an analysis writes into the folder.
 fn copied(to: &Path) -> PathBuf {
     let folder = to.join("results/turn-signal-example");
-    copy(
+    copy_folder(
         Path::new(&repository("results/turn-signal-example")),
         &folder,
     );
     folder
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        let target = to.join(entry.file_name());
-        if entry.file_type().unwrap().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            fs::copy(entry.path(), target).unwrap();
-        }
-    }
 }
 
 /// Every row of a table as a map from column to field.

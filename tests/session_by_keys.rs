@@ -7,7 +7,7 @@ mod support;
 use std::fs;
 use std::path::{Path, PathBuf};
 use support::player::{Did, play};
-use support::{Terminal, repository, study};
+use support::{Terminal, changed_protocol, repository, study};
 
 fn start(folder: &Path, protocol: &Path) -> Terminal {
     let path = protocol.to_str().unwrap();
@@ -142,15 +142,8 @@ fn the_papers_study_with_a_correction_a_remark_a_bad_trial_a_quit_and_a_resume()
 
 /// The extended protocol with one repetition and short waits: nobody is tired here.
 fn shortened(folder: &Path) -> PathBuf {
-    let from = PathBuf::from(repository("protocols/turn-signal-extended"));
     let to = folder.join("extended");
-    fs::create_dir_all(to.join("models")).unwrap();
-    for file in fs::read_dir(from.join("models")).unwrap() {
-        let file = file.unwrap();
-        fs::copy(file.path(), to.join("models").join(file.file_name())).unwrap();
-    }
-    let mut text = fs::read_to_string(from.join("protocol.toml")).unwrap();
-    for (long, short) in [
+    let changes = [
         ("repetitions = 3", "repetitions = 1"),
         (
             "breaks = { every = 10, at_least_s = 60 }",
@@ -158,11 +151,8 @@ fn shortened(folder: &Path) -> PathBuf {
         ),
         ("reference_min_s = 3", "reference_min_s = 0"),
         ("minimum_strokes = 2", "minimum_strokes = 1"),
-    ] {
-        assert!(text.contains(long), "the protocol has no `{long}` any more");
-        text = text.replace(long, short);
-    }
-    fs::write(to.join("protocol.toml"), text).unwrap();
+    ];
+    changed_protocol("turn-signal-extended", &to, &changes);
     to
 }
 

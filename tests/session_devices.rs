@@ -9,26 +9,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use support::player::{Did, play};
 use support::simulator::Simulator;
-use support::{Terminal, repository, study};
+use support::{Terminal, changed_protocol, repository, study};
 
 /// The paper's protocol with one repetition, changed.
 fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
-    let from = PathBuf::from(repository("protocols/turn-signal"));
     let to = folder.join("protocol");
-    fs::create_dir_all(to.join("models")).unwrap();
-    for file in fs::read_dir(from.join("models")).unwrap() {
-        let file = file.unwrap();
-        fs::copy(file.path(), to.join("models").join(file.file_name())).unwrap();
-    }
-    let mut text = fs::read_to_string(from.join("protocol.toml")).unwrap();
-    for (old, new) in [("repetitions = 3", "repetitions = 1")]
-        .iter()
-        .chain(changes)
-    {
-        assert!(text.contains(old), "the protocol has no `{old}` any more");
-        text = text.replacen(old, new, 1);
-    }
-    fs::write(to.join("protocol.toml"), text).unwrap();
+    let changes = [&[("repetitions = 3", "repetitions = 1")], changes].concat();
+    changed_protocol("turn-signal", &to, &changes);
     to
 }
 

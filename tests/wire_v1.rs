@@ -185,20 +185,21 @@ fn joined<M>(golden: &Golden<M>) -> Vec<u8> {
     )
 }
 
+/// Frame, body and CRC of a message are those that are written down; the body.
+fn bytes_agree<M>(golden: &Golden<M>, frame: &[u8]) -> Vec<u8> {
+    assert_eq!(hex(frame), golden.frame, "{}", golden.name);
+    let body = body_of(frame);
+    assert_eq!(body, joined(golden), "{}", golden.name);
+    let crc = hex(&crc32(&body).to_le_bytes());
+    assert_eq!(crc, golden.crc, "{}", golden.name);
+    body
+}
+
 #[test]
 fn every_request_is_the_bytes_of_the_document() {
     let mut kinds = Vec::new();
     for golden in requests() {
-        let frame = golden.message.frame(golden.sequence);
-        assert_eq!(hex(frame.as_bytes()), golden.frame, "{}", golden.name);
-        let body = body_of(frame.as_bytes());
-        assert_eq!(body, joined(&golden), "{}", golden.name);
-        assert_eq!(
-            hex(&crc32(&body).to_le_bytes()),
-            golden.crc,
-            "{}",
-            golden.name
-        );
+        let body = bytes_agree(&golden, golden.message.frame(golden.sequence).as_bytes());
         let (header, message) = Request::decode(&body).unwrap();
         assert_eq!(message, golden.message, "{}", golden.name);
         assert_eq!(header.sequence, golden.sequence);
@@ -214,16 +215,7 @@ fn every_request_is_the_bytes_of_the_document() {
 fn every_reply_is_the_bytes_of_the_document() {
     let mut kinds = Vec::new();
     for golden in replies() {
-        let frame = golden.message.frame(golden.sequence);
-        assert_eq!(hex(frame.as_bytes()), golden.frame, "{}", golden.name);
-        let body = body_of(frame.as_bytes());
-        assert_eq!(body, joined(&golden), "{}", golden.name);
-        assert_eq!(
-            hex(&crc32(&body).to_le_bytes()),
-            golden.crc,
-            "{}",
-            golden.name
-        );
+        let body = bytes_agree(&golden, golden.message.frame(golden.sequence).as_bytes());
         let (header, message) = Reply::decode(&body).unwrap();
         assert_eq!(message, golden.message, "{}", golden.name);
         assert_eq!(header.sequence, golden.sequence);

@@ -199,3 +199,29 @@ pub fn repository(path: &str) -> String {
         .unwrap()
         .to_owned()
 }
+
+/// Copies a folder with all that is in it.
+pub fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy_folder(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+/// A copy of a protocol of the repository in `to`, each text replaced once.
+pub fn changed_protocol(name: &str, to: &Path, changes: &[(&str, &str)]) {
+    copy_folder(Path::new(&repository(&format!("protocols/{name}"))), to);
+    let file = to.join("protocol.toml");
+    let mut text = std::fs::read_to_string(&file).unwrap();
+    for (old, new) in changes {
+        assert!(text.contains(old), "the protocol has no `{old}` any more");
+        text = text.replacen(old, new, 1);
+    }
+    std::fs::write(file, text).unwrap();
+}
