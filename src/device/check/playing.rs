@@ -4,7 +4,7 @@ use super::talk::Talk;
 use super::uploads::Upload;
 use super::{Broken, Kept, tag};
 use crate::device::wire::{
-    Ack, Fault, Happening, Heartbeat, Request, State, Stop, TelemetrySample, fixed,
+    Ack, Fault, Happening, Heartbeat, Outcome, Request, State, Stop, TelemetrySample, fixed,
 };
 use std::time::Duration;
 
@@ -174,23 +174,35 @@ fn at_once(talk: &mut Talk<'_>, request: Request) -> Result<(Ack, f64, f64), Bro
     Ok((ack, took_ms, allowed_ms))
 }
 
-pub(super) fn stop(talk: &mut Talk<'_>) -> Kept {
-    let playback = play(talk, 1.0, 60_000)?;
-    talk.pass(SECOND)?;
-    still_plays(talk)?;
-    let (ack, took_ms, allowed_ms) = at_once(talk, stop_request(&playback))?;
+/// Ends a playback by `request`: its acknowledgement, the outcome, what was seen of
+/// the time that it took, and whether that was too long.
+fn ended(
+    talk: &mut Talk<'_>,
+    playback: &Playback,
+    request: Request,
+) -> Result<(Ack, Outcome, String, bool), Broken> {
+    let (ack, took_ms, allowed_ms) = at_once(talk, request)?;
     talk.pass(SECOND / 10)?;
     let outcome = talk.outcome()?;
-    let over_ms = overhang_ms(&playback, &ack, outcome.ticks);
+    let over_ms = overhang_ms(playback, &ack, outcome.ticks);
     let seen = format!(
         "done {:.0} ms after it was sent, zero force {:.1} ms after its reply",
         took_ms.max(0.0),
         over_ms.max(0.0)
     );
+    let late = took_ms > allowed_ms || over_ms > 1.0 + 1e3 / playback.servo_hz + GRAIN_MS;
+    Ok((ack, outcome, seen, late))
+}
+
+pub(super) fn stop(talk: &mut Talk<'_>) -> Kept {
+    let playback = play(talk, 1.0, 60_000)?;
+    talk.pass(SECOND)?;
+    still_plays(talk)?;
+    let (ack, outcome, seen, late) = ended(talk, &playback, stop_request(&playback))?;
     if ack.state.forceful() {
         return Err(Broken::seen(format!("STOP: {}", ack.state.as_str())));
     }
-    if took_ms > allowed_ms || over_ms > 1.0 + 1e3 / playback.servo_hz + GRAIN_MS {
+    if late {
         return Err(Broken::seen(seen));
     }
     if outcome.state != State::Loaded {
@@ -203,19 +215,11 @@ pub(super) fn limp(talk: &mut Talk<'_>) -> Kept {
     let playback = play(talk, 1.0, 60_000)?;
     talk.pass(SECOND / 2)?;
     still_plays(talk)?;
-    let (ack, took_ms, allowed_ms) = at_once(talk, Request::Limp)?;
-    talk.pass(SECOND / 10)?;
-    let outcome = talk.outcome()?;
-    let over_ms = overhang_ms(&playback, &ack, outcome.ticks);
-    let seen = format!(
-        "done {:.0} ms after it was sent, zero force {:.1} ms after its reply",
-        took_ms.max(0.0),
-        over_ms.max(0.0)
-    );
+    let (ack, outcome, seen, late) = ended(talk, &playback, Request::Limp)?;
     if ack.state != State::Limp || outcome.state != State::Limp {
         return Err(Broken::seen(format!("LIMP: {}", outcome.state.as_str())));
     }
-    if took_ms > allowed_ms || over_ms > 1.0 + 1e3 / playback.servo_hz + GRAIN_MS {
+    if late {
         return Err(Broken::seen(seen));
     }
     Ok(seen)
