@@ -99,6 +99,116 @@ fn a_session_on_a_child_program_is_real_data_with_telemetry() {
     assert_eq!(fs::read_dir(telemetry).unwrap().count(), 5);
 }
 
+/// A program that is slow to say hello: what is waited for is on the screen, and a key
+/// leaves. Nothing has been made.
+#[test]
+fn a_program_that_is_slow_to_say_hello_is_waited_for_in_sight() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
+    let path = protocol.to_str().unwrap();
+    let arguments = ["run", path, "--command", "sleep 60"];
+    for key in ["\u{1b}", "q"] {
+        let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
+        terminal.wait_for("Waiting for the device.");
+        terminal.wait_for("`sleep 60` has not said hello yet: 1 of at most 10 s.");
+        terminal.keys(key);
+        assert_eq!(terminal.exit_code(), 0);
+        assert!(!terminal.alternate());
+        assert!(
+            terminal.screen().contains("Nothing was recorded."),
+            "{}",
+            terminal.screen()
+        );
+    }
+    // one that ends is told with its own words
+    let script = folder.path().join("broken.sh");
+    fs::write(&script, "sleep 1; echo no encoder >&2; exit 7").unwrap();
+    let command = format!("sh {}", script.display());
+    let arguments = ["run", path, "--command", &command];
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 3, "{err}");
+    assert!(
+        err.contains("` has ended with exit status 7; its last words: no encoder"),
+        "{err}"
+    );
+    assert!(!folder.path().join("results").exists());
+}
+
+/// A controller that ends in the middle of a trial: it is no cable that was pulled.
+#[test]
+fn a_program_that_ends_is_told_with_its_status_and_its_last_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
+    let script = folder.path().join("c.sh");
+    let hello = r#"{"say":"hello","format":"study-process/1","id":"c","telemetry":false,"limits":{"force_n":9,"velocity_mm_s":500}}"#;
+    let text = format!(
+        "test -e gone && sleep 60\necho '{hello}'\nwhile read line; do case $line in *load*lambda*) touch gone; echo 'no encoder for lambda-0.9995' >&2; exit 7;; esac; done\n"
+    );
+    fs::write(&script, text).unwrap();
+    let arguments = [
+        "run",
+        protocol.to_str().unwrap(),
+        "--operator",
+        "lw",
+        "--command",
+        "sh c.sh",
+    ];
+    let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
+    terminal.wait_for("Who takes part?");
+    play_until(&mut terminal, "DEVICE TROUBLE");
+    let screen = terminal.screen().replace('┃', "");
+    let words: Vec<&str> = screen.split_whitespace().collect();
+    let screen = words.join(" ");
+    for words in [
+        "`sh c.sh` has ended",
+        "exit status 7",
+        "no encoder",
+        "by hand",
+    ] {
+        assert!(screen.contains(words), "{words}:\n{screen}");
+    }
+    for words in ["cable", "lambda"] {
+        assert!(!screen.contains(words), "{words}:\n{screen}");
+    }
+}
+
+#[test]
+fn info_asks_a_program_who_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = folder.path().join("c.sh");
+    let hello = r#"{"say":"hello","format":"study-process/1","id":"rig-2","telemetry":true,"limits":{"force_n":9,"velocity_mm_s":500}}"#;
+    fs::write(
+        &script,
+        format!("echo '{hello}'\nwhile read line; do :; done\n"),
+    )
+    .unwrap();
+    let ask = ["device", "info", "--command", "sh c.sh"];
+    let (code, out, err) = study(&ask, folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("rig-2") && out.contains("at most 9 N"),
+        "{out}"
+    );
+    let (_, out, _) = study(&[&ask[..], &["--json"]].concat(), folder.path());
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["device"]["id"], "rig-2");
+    // device.toml names it as well as an argument does
+    fs::write(
+        folder.path().join("device.toml"),
+        "[process]\ncommand = [\"sh\", \"c.sh\"]\n",
+    )
+    .unwrap();
+    let (code, out, _) = study(&["device", "info"], folder.path());
+    assert!(code == 0 && out.contains("rig-2"), "{out}");
+    // what a program has no use for is not offered
+    for command in [&["device", "check"][..], &["record", "x.toml"]] {
+        let arguments = [command, &["--command", "sh c.sh"]].concat();
+        let (code, _, err) = study(&arguments, folder.path());
+        assert_eq!(code, 2, "{err}");
+        assert!(err.contains("unexpected argument '--command'"), "{err}");
+    }
+}
+
 /// Samples have a code that names nothing; the codes are for who labels them.
 #[test]
 fn a_session_on_samples_mounted_by_hand_shows_their_codes_and_nothing_else() {
@@ -436,6 +546,20 @@ fn a_recording_over_a_port_can_be_identified() {
     }
     let (code, _, err) = study(&["record", "short.toml", "--port", port], folder.path());
     assert_eq!(code, 2, "{err}");
+    // the command of the header can be run as it is written
+    let file = fs::read_to_string(folder.path().join("probe.csv")).unwrap();
+    let (_, command) = file.lines().next().unwrap().split_once("; ").unwrap();
+    let (command, _) = command.split_once(" (study ").unwrap();
+    assert_eq!(
+        command,
+        format!(
+            "study record short.toml --device serial --port {port} --rate 1000 --max-force 12 --filter 30"
+        )
+    );
+    let words: Vec<&str> = command.split(' ').skip(1).collect();
+    let (code, again, err) = study(&words, folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(again.lines().next(), file.lines().next());
     let identify = [
         "identify",
         "training.csv",
