@@ -142,6 +142,23 @@ fn the_documented_example_plays() {
     assert_eq!(loads.count(), 1, "{:?}", bench.heard);
 }
 
+/// A host that has stopped is not a host that has gone: its child goes limp by itself.
+#[test]
+fn the_documented_example_ends_when_it_is_not_told_that_somebody_is_there() {
+    let Some(command) = example() else { return };
+    let mut bench = Bench::new(command);
+    bench.load().unwrap();
+    bench.until("table", |r| *r == Report::Loaded);
+    // what does not play needs nobody
+    std::thread::sleep(Duration::from_millis(700));
+    let at = bench.at();
+    bench.device.start(at).unwrap();
+    bench.until("start", |r| *r == Report::Started);
+    std::thread::sleep(Duration::from_millis(900));
+    let lost = bench.lost();
+    assert!(lost.contains("has ended by signal: 14"), "{lost}");
+}
+
 #[test]
 fn the_example_can_be_loaded_without_a_table_and_says_no() {
     let Some(command) = example() else { return };
