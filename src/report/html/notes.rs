@@ -16,7 +16,7 @@ pub(super) fn banners(a: &Analysis) -> Markup {
         }
         "no-participants" => "NO PARTICIPANTS",
         "mixed" => "PILOTS OR SIMULATED PARTICIPANTS AMONG THE DATA",
-        _ => "INTERIM",
+        _ => "AN EARLY LOOK",
     };
     html! {
         @for w in a.warnings.iter().filter(|w| AT_THE_TOP.contains(&w.code)) {
@@ -118,10 +118,11 @@ pub(super) fn exclusions(a: &Analysis, of_study: bool) -> Markup {
                 }
                 details {
                     summary { "The rows that do not count" }
-                    div.scroll {
+                    div.scroll tabindex="0" role="region" aria-label="The rows that do not count" {
                         table {
                             thead { tr {
-                                th { "subject" } th { "realization" } th { "repetition" } th { "rating" } th.text { "reason" }
+                                th scope="col" { "subject" } th scope="col" { "realization" } th scope="col" { "repetition" }
+                                th scope="col" { "rating" } th.text scope="col" { "reason" }
                             } }
                             tbody {
                                 @for r in left_out.iter().take(MAX_ROWS) {
