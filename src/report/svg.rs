@@ -321,8 +321,8 @@ pub fn fitted(text: &str, size: f64, room: f64) -> String {
     shown
 }
 
-/// A text of at most so many characters. What is left out is marked, in the middle:
-/// names of realizations often begin alike.
+/// A text of at most so many characters. What is left out is marked, after the first
+/// third: names of realizations often begin alike.
 /// Characters that are shown as their code count as that.
 pub fn shortened(text: &str, most: usize) -> String {
     let text = &crate::text::Untrusted(text).to_string();
@@ -331,7 +331,7 @@ pub fn shortened(text: &str, most: usize) -> String {
         return text.to_owned();
     }
     let kept = most.saturating_sub(1);
-    let end = kept / 2;
+    let end = kept - kept / 3;
     let first: String = text.chars().take(kept - end).collect();
     let last: String = text.chars().skip(length - end).collect();
     format!("{first}…{last}")

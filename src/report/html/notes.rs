@@ -1,5 +1,6 @@
 //! What a reader has to know: banners, warnings, exclusions, comments, versions.
 
+use super::prose::in_words;
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
 use crate::analyze::{Analysis, Said, Warning};
@@ -57,13 +58,13 @@ fn stated(a: &Analysis) -> Markup {
                 table {
                     caption { "Exclusions stated beforehand" }
                     thead { tr {
-                        th scope="col" { "rule" } th scope="col" { "rows" } th scope="col" { "participants" }
-                        th.text scope="col" { "remark" }
+                        th scope="col" { "rule" } th.text scope="col" { "leaves out" } th scope="col" { "rows" }
+                        th scope="col" { "participants" } th.text scope="col" { "remark" }
                     } }
                     tbody {
                         @for e in &a.exclusions {
                             tr {
-                                td { code { (e.rule.to_string()) } } td { (e.rows) } td { (e.participants) }
+                                td { code { (e.rule.to_string()) } } td.text { (in_words(e.rule)) } td { (e.rows) } td { (e.participants) }
                                 td.text { (e.problem.unwrap_or_default()) }
                             }
                         }

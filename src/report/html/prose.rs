@@ -2,7 +2,7 @@
 
 use super::answers::ci;
 use super::{Details, safe};
-use crate::analyze::{Analysis, Listed, Value};
+use crate::analyze::{Analysis, Exclusion, Listed, Value};
 use crate::report::apa;
 use crate::stats::permutation::DRAWS;
 use maud::{Markup, html};
@@ -92,9 +92,8 @@ fn conduct(d: &Details, a: &Analysis) -> Vec<String> {
         })
         .collect();
     if !beside.is_empty() {
-        let were = if beside.len() == 1 { "was" } else { "were" };
         said.push(format!(
-            "{} {were} presented among them and had no part in the tests.",
+            "Rated among them, without a part in the tests: {}.",
             apa::listing(&beside)
         ));
     }
@@ -132,6 +131,23 @@ fn conduct(d: &Details, a: &Analysis) -> Vec<String> {
     said
 }
 
+/// A rule of exclusion, as a sentence goes on with it.
+pub(super) fn in_words(rule: Exclusion) -> String {
+    match rule {
+        Exclusion::ConstantRater => "participants whose ratings never change".to_owned(),
+        Exclusion::HiddenReferenceBelow(rating) => {
+            format!("participants whose mean rating of the hidden references is below {rating}")
+        }
+        Exclusion::StrokesBelow(strokes) => {
+            format!("trials with fewer than {strokes} full strokes")
+        }
+        Exclusion::Inconsistent(difference) => format!(
+            "participants whose means of a realization and of its hidden repeat are more than \
+             {difference} apart, on average"
+        ),
+    }
+}
+
 /// What was stated beforehand of leaving out, and what was left out.
 fn left_out(a: &Analysis) -> Vec<String> {
     let c = &a.counts;
@@ -140,10 +156,13 @@ fn left_out(a: &Analysis) -> Vec<String> {
         let rules: Vec<String> = a
             .exclusions
             .iter()
-            .map(|e| format!("{} ({})", e.rule, apa::counted(e.rows, "row", "rows")))
+            .map(|e| {
+                let rows = apa::counted(e.rows, "row", "rows");
+                format!("{} ({rows})", in_words(e.rule))
+            })
             .collect();
         said.push(format!(
-            "The rules of exclusion stated beforehand, and what each left out: {}.",
+            "It was stated beforehand to leave out {}.",
             apa::listing(&rules)
         ));
     }
@@ -151,9 +170,9 @@ fn left_out(a: &Analysis) -> Vec<String> {
     let rows: usize = c.excluded.values().sum();
     if rows > rules {
         said.push(format!(
-            "Of {}, {} left out in all, for reasons that are listed.",
-            apa::counted(c.excluded_participants, "participant", "participants"),
-            apa::counted(rows, "row was", "rows were")
+            "In all, {} of {} left out; the reasons are listed under “What was counted and left out”.",
+            apa::counted(rows, "row", "rows"),
+            apa::counted(c.excluded_participants, "participant is", "participants are")
         ));
     }
     if c.without_rating > 0 {

@@ -8,6 +8,9 @@ use maud::{Markup, html};
 /// Most rows of a table; the rest is in the CSV.
 pub(super) const MAX_ROWS: usize = 200;
 
+/// Rows of a table that is not cut at the end of a page.
+const MAX_WHOLE: usize = 15;
+
 /// A table: head, rows, and which of them stand beside the others.
 struct Table {
     caption: String,
@@ -38,7 +41,7 @@ impl Table {
     fn render(&self) -> Markup {
         html! {
             @if !self.rows.is_empty() {
-                div.scroll tabindex="0" role="region" aria-label=(self.caption) {
+                div.scroll.whole[self.rows.len() <= MAX_WHOLE] tabindex="0" role="region" aria-label=(self.caption) {
                     table {
                         caption { (self.caption) }
                         thead { tr { @for h in &self.head { th scope="col" { (safe(h)) } } } }

@@ -9,17 +9,20 @@ const APART: f64 = 8.0;
 /// Width of a slanted label, px.
 const MAX_SLANTED: f64 = 140.0;
 
-/// Angles at which labels are set, degrees, with cosine and sine: the flatter one
+/// An angle: degrees, cosine, sine.
+type Angle = (u8, f64, f64);
+
+/// Angles at which labels are set: the flatter one
 /// where there is room for it.
-const FLAT: (u8, f64, f64) = (35, 0.819, 0.574);
-const STEEP: (u8, f64, f64) = (60, 0.5, 0.866);
+const FLAT: Angle = (35, 0.819, 0.574);
+const STEEP: Angle = (60, 0.5, 0.866);
 
 /// Least distance of the base lines of slanted labels, px.
 const LINE: f64 = 12.0;
 
-/// The angle of so many labels of the axis of x, and how many px of it each has;
+/// The angle of so many labels on an axis of x of `room` px;
 /// `None` if they have room side by side.
-fn slant(widest: f64, labels: usize, room: f64) -> Option<(u8, f64, f64)> {
+fn slant(widest: f64, labels: usize, room: f64) -> Option<Angle> {
     if (widest + APART) * labels as f64 <= room {
         None
     } else if room / labels as f64 * FLAT.2 >= LINE {
@@ -167,7 +170,7 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool
 /// As many ticks as have room beside each other; names that have none are set
 /// at a slant, and if even that is too tight every n-th is shown. A slanted one
 /// reaches to the left, `margin` px beyond the axis at most.
-fn x_ticks(axis: &Axis, room: f64, margin: f64) -> (Vec<(f64, String)>, Option<(u8, f64, f64)>) {
+fn x_ticks(axis: &Axis, room: f64, margin: f64) -> (Vec<(f64, String)>, Option<Angle>) {
     let widest = |ticks: &[(f64, String)]| {
         let all = ticks.iter().map(|(_, l)| text_width(l, SMALL));
         all.fold(0.0, f64::max)

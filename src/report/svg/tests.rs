@@ -154,3 +154,16 @@ fn slanted_names_do_not_run_into_each_other() {
         assert!(sine == 0.0 || apart * sine >= 11.9, "{n} names: {apart}");
     }
 }
+
+#[test]
+fn names_that_begin_alike_stay_apart_when_cut() {
+    let names = [
+        "lambda-0.9995-dx-1",
+        "lambda-0.99995-dx-1",
+        "lambda-0.99998-dx-1",
+    ];
+    let cut = names.map(|n| shortened(n, 15));
+    let distinct: std::collections::BTreeSet<_> = cut.iter().collect();
+    assert_eq!(distinct.len(), 3, "{cut:?}");
+    assert!(cut.iter().all(|c| c.chars().count() <= 15), "{cut:?}");
+}
