@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `study analyze`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A results folder, one study in it, or a CSV: subject,model,repetition,rating,vaf[,trial_index]
+    /// A results folder, one study in it, or a CSV: subject,model,rating[,repetition][,vaf][,trial_index]
     #[arg(required_unless_present = "possible")]
     results: Option<PathBuf>,
     /// Say which data can give a printed mean and SD: mean=4.800 sd=0.997 n=30 scale=1..7 [each=3]
