@@ -38,6 +38,8 @@ pub(super) struct Cells<'a> {
     pub(super) cells: Vec<Cell>,
     /// VAF of each model, if its rows agree on one.
     pub(super) vaf: Vec<Option<f64>>,
+    /// Whether anyone rated the model.
+    pub(super) rated: Vec<bool>,
 }
 
 /// A complete table: the subjects that rated all of some realizations.
@@ -70,6 +72,7 @@ impl<'a> Cells<'a> {
         let mut order = ratings.by_cell();
         order.retain(|&i| centred[i].is_finite() && ratings.model[i] != NO_MODEL);
         let mut cells = Vec::new();
+        let mut rated = vec![false; ratings.models.len()];
         let mut sorted = Vec::with_capacity(order.len());
         for group in order.chunk_by_mut(|&a, &b| {
             (ratings.subject[a], ratings.model[a]) == (ratings.subject[b], ratings.model[b])
@@ -81,6 +84,7 @@ impl<'a> Cells<'a> {
             sorted.extend(group.iter().map(|&i| centred[i]));
             let numbers = &sorted[start..];
             if let Some(mean) = mean(numbers) {
+                rated[ratings.model[group[0]] as usize] = true;
                 cells.push(Cell {
                     subject: ratings.subject[group[0]] as usize,
                     model: ratings.model[group[0]] as usize,
@@ -95,6 +99,7 @@ impl<'a> Cells<'a> {
         }
         Self {
             vaf: vafs(ratings),
+            rated,
             ratings,
             offset,
             centred,
@@ -109,12 +114,13 @@ impl<'a> Cells<'a> {
         &self.sorted[cell.rows.clone()]
     }
 
-    /// Realizations that the study asks about: role test and no hidden repeat.
+    /// Realizations that the study asks about and somebody rated: role test and
+    /// no hidden repeat.
     pub(super) fn test_models(&self) -> Vec<usize> {
         (0..self.ratings.models.len())
             .filter(|&m| {
                 let model = &self.ratings.models[m];
-                model.role == Role::Test && model.duplicate_of.is_none()
+                self.rated[m] && model.role == Role::Test && model.duplicate_of.is_none()
             })
             .collect()
     }
