@@ -272,32 +272,32 @@ type Group = fn(&Cells<'_>, &Rules, &mut Values);
 
 /// Groups that need nothing of each other, the longest first.
 const GROUPS: [Group; 10] = [
+    vaf::against_vaf,
+    effects::ranks_and_anova,
     |cells, _, values| ordinal::ordinal(cells, values),
     |cells, _, values| mixed::mixed(cells, values),
-    order::order,
-    effects::ranks_and_anova,
-    effects::pairs,
     effects::agree,
-    vaf::against_vaf,
+    effects::pairs,
     describe::describe,
+    order::order,
     subjects::subjects,
     reference::reference,
 ];
 
-/// Every statistic. Groups are computed side by side; each by itself, so that
-/// the number of threads changes no bit.
+/// Every statistic. Groups are computed side by side, in the order of the list;
+/// each by itself, so that the number of threads changes no bit.
 fn statistics(cells: &Cells<'_>, rules: &Rules) -> Values {
-    let parts: Vec<Values> = GROUPS
-        .par_iter()
-        .with_max_len(1)
-        .map(|group| {
+    let mut parts: Vec<(usize, Values)> = (GROUPS.iter().enumerate())
+        .par_bridge()
+        .map(|(place, group)| {
             let mut values = Values::default();
             group(cells, rules, &mut values);
-            values
+            (place, values)
         })
         .collect();
+    parts.sort_by_key(|(place, _)| *place);
     let mut values = Values::default();
-    for part in parts {
+    for (_, part) in parts {
         values.take(part);
     }
     memory::memory(cells, rules, &mut values);
