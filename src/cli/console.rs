@@ -70,8 +70,10 @@ impl Console {
         let plain = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty())
             || std::env::var_os("TERM").is_some_and(|t| t == "dumb");
         let terminal = io::stdout().is_terminal();
-        let width = match crossterm::terminal::size() {
-            Ok((columns, _)) if terminal && columns > 0 => usize::from(columns),
+        // Asked only where there is one: without it, crossterm asks `tput`.
+        let columns = terminal.then(crossterm::terminal::size);
+        let width = match columns {
+            Some(Ok((columns, _))) if columns > 0 => usize::from(columns),
             _ => 100,
         };
         Self {

@@ -9,6 +9,7 @@ mod headline;
 mod layout;
 
 use super::Source;
+use super::apa;
 use super::plot::{Axis, bars};
 use crate::analyze::{Analysis, Listed};
 use crate::outcome::Role;
@@ -100,9 +101,9 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
     }
     facts.push(match c.planned {
         Some(planned) => format!("{} of {planned} participants", c.finished),
-        None => format!("{} subjects", c.participants),
+        None => apa::counted(c.participants, "subject", "subjects"),
     });
-    facts.push(format!("{} ratings", c.rated));
+    facts.push(apa::counted(c.rated, "rating", "ratings"));
     let facts = facts.join(" · ");
     let title = Untrusted(&source.title).to_string();
     let mut out = String::new();
@@ -170,7 +171,7 @@ fn table(
     if let Some(h) = &at_least {
         head.push(h);
     }
-    head.push("subject mean [95 %]");
+    head.push("by subject [95 %]");
     let mut grid = Grid::new(&head, hist.map(|_| 5));
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
@@ -313,7 +314,7 @@ fn counts(a: &Analysis, width: usize) -> String {
     }
     for (reason, n) in &c.excluded {
         let rows = if *n == 1 { "row" } else { "rows" };
-        parts.push(format!("{n} {rows} excluded ({})", Untrusted(reason)));
+        parts.push(format!("{n} {rows} left out ({})", Untrusted(reason)));
     }
     if !a.comments.is_empty() {
         parts.push(format!("comments: {} (--comments)", a.comments.len()));

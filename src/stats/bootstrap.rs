@@ -99,7 +99,6 @@ fn resample(rows: &[Vec<f64>], x: &[f64], seed: u64, normal_limit: bool) -> Opti
             count(&weighted(rows, &draws), 1);
         }
     }
-    resamples.sort_by(|a, b| a.0.total_cmp(&b.0));
     let summed = summary(rows, &score, observed, &resamples, undefined, total)?;
     Some(Bootstrap {
         exact,
@@ -194,7 +193,8 @@ fn summary(
     let ties = share(&|r| (r - observed).abs() <= TIE);
     let z0 = normal_quantile(below + 0.5 * ties);
     let acceleration = acceleration(rows, score);
-    let at = |p: f64| quantile(resamples, p * defined);
+    let quantiles = Quantiles::of(resamples);
+    let at = |p: f64| quantiles.at(p * defined);
     let bca = z0.zip(acceleration).and_then(|(z0, a)| {
         let level = |p: f64| {
             let z = z0 + normal_quantile(p)?;
@@ -209,23 +209,59 @@ fn summary(
         bca,
         z0,
         acceleration,
-        p_le_zero: share(&|r| r <= 0.0),
+        // A correlation that is 0 on paper may be 10⁻¹⁷ here.
+        p_le_zero: share(&|r| r <= TIE),
         undefined_probability: undefined as f64 / total as f64,
         exact: false,
         normal_limit: false,
     })
 }
 
-/// The smallest value whose cumulated weight reaches `weight`.
-fn quantile(resamples: &[(f64, u64)], weight: f64) -> Option<f64> {
-    let mut sum = 0u64;
-    for (r, w) in resamples {
-        sum += w;
-        if sum as f64 >= weight {
-            return Some(*r);
-        }
+/// Quantiles of weighted correlations without sorting all of them: the weights
+/// are cumulated by class, and only the class that holds a quantile is sorted.
+struct Quantiles<'a> {
+    resamples: &'a [(f64, u64)],
+    /// Weight of each class of equal width over [−1, 1].
+    classes: Vec<u64>,
+}
+
+impl<'a> Quantiles<'a> {
+    const CLASSES: usize = 4096;
+
+    /// Never falls with r.
+    fn class(r: f64) -> usize {
+        // From 0 to CLASSES: r is a correlation.
+        (((r + 1.0) * 0.5 * Self::CLASSES as f64) as usize).min(Self::CLASSES - 1)
     }
-    resamples.last().map(|(r, _)| *r)
+
+    fn of(resamples: &'a [(f64, u64)]) -> Self {
+        let mut classes = vec![0; Self::CLASSES];
+        for (r, weight) in resamples {
+            classes[Self::class(*r)] += weight;
+        }
+        Self { resamples, classes }
+    }
+
+    /// The smallest value whose cumulated weight reaches `weight`; the largest if
+    /// rounding lets none reach it.
+    fn at(&self, weight: f64) -> Option<f64> {
+        let mut sum = 0u64;
+        for (class, own) in self.classes.iter().enumerate() {
+            if ((sum + own) as f64) < weight || *own == 0 {
+                sum += own;
+                continue;
+            }
+            let inside = |item: &&(f64, u64)| Self::class(item.0) == class;
+            let mut members: Vec<_> = self.resamples.iter().filter(inside).collect();
+            members.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            return members.into_iter().find_map(|(r, w)| {
+                sum += w;
+                (sum as f64 >= weight).then_some(*r)
+            });
+        }
+        let all = self.resamples.iter().map(|(r, _)| *r);
+        all.max_by(f64::total_cmp)
+    }
 }
 
 /// Σ(m − mᵢ)³/(6(Σ(m − mᵢ)²)^1.5) over the correlations mᵢ without subject i.
@@ -349,6 +385,57 @@ mod tests {
             weights += w;
         });
         assert_eq!((visited, weights), (35, 256));
+    }
+
+    /// VAF on even steps: whether r > 0 is told by whole numbers, Σ (2j − 3)·yⱼ.
+    #[test]
+    fn a_correlation_that_is_zero_on_paper_is_not_above_zero() {
+        let rows: [[f64; 4]; 5] = [
+            [1.0, 2.0, 2.0, 1.0],
+            [3.0, 1.0, 2.0, 4.0],
+            [5.0, 4.0, 4.0, 4.0],
+            [2.0, 3.0, 1.0, 2.0],
+            [1.0, 4.0, 2.0, 3.0],
+        ];
+        let trend = |y: &[f64]| -3.0 * y[0] - y[1] + y[2] + 3.0 * y[3];
+        let (mut not_above, mut zero, mut all) = (0, 0, 0);
+        let mut sums = vec![vec![0.0; 4]; 6];
+        let rows: Vec<Vec<f64>> = rows.iter().map(|r| r.to_vec()).collect();
+        compose(&rows, 0, 5, 1, &mut sums, &mut |s, w| {
+            not_above += if trend(s) <= 0.0 { w } else { 0 };
+            zero += if trend(s) == 0.0 { w } else { 0 };
+            all += w;
+        });
+        let found = correlation(&rows, &[0.7, 0.75, 0.8, 0.85], 1).unwrap();
+        assert!(found.exact && zero > 0 && found.undefined_probability == 0.0);
+        let expected = not_above as f64 / all as f64;
+        assert!((found.p_le_zero - expected).abs() < 1e-15);
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_sorted_resamples() {
+        let mut stream = Stream::new(5, &["quantiles"]);
+        let resamples: Vec<(f64, u64)> = (0..3000)
+            // Many ties, and a class with hundreds of members.
+            .map(|_| {
+                let r = (stream.normal().sin() * 300.0).round() / 300.0;
+                (r * r * r, 1 + stream.below(50))
+            })
+            .collect();
+        let mut sorted = resamples.clone();
+        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let total: u64 = sorted.iter().map(|(_, w)| w).sum();
+        let quantiles = Quantiles::of(&resamples);
+        for step in 0..=1000 {
+            let weight = total as f64 * f64::from(step) / 1000.0;
+            let mut sum = 0;
+            let slow = sorted.iter().find(|(_, w)| {
+                sum += w;
+                sum as f64 >= weight
+            });
+            assert_eq!(quantiles.at(weight), slow.map(|(r, _)| *r), "{weight}");
+        }
+        assert_eq!(quantiles.at(2.0 * total as f64), Some(sorted[2999].0));
     }
 
     #[test]

@@ -181,15 +181,6 @@ impl StudyFolder {
         })
     }
 
-    /// The lowest row that the next participant would get.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the sessions cannot be read.
-    pub fn next_row(&self) -> Result<u32, StoreError> {
-        let all = self.sessions()?;
-        Ok(free_row(1..=u32::MAX, &all).unwrap_or(u32::MAX))
-    }
-
     /// Refuses an id that a file system could take for another one.
     ///
     /// # Errors
@@ -349,6 +340,11 @@ fn next_seat(request: &ClaimRequest, all: &[SessionData]) -> Result<Seat, StoreE
                 })
         }
     }
+}
+
+/// The lowest row that the next participant would get, by all sessions of a study.
+pub fn next_row(sessions: &[SessionData]) -> u32 {
+    free_row(1..=u32::MAX, sessions).unwrap_or(u32::MAX)
 }
 
 /// The lowest row of a range that nobody keeps.
