@@ -38,6 +38,8 @@ pub struct Details {
     pub repetitions: Option<u32>,
     /// How orders were made, as the protocol calls it.
     pub order: Option<String>,
+    /// How many participants are in which state.
+    pub states: Vec<(String, usize)>,
     /// Sentences on how the sessions were run, for the methods.
     pub conduct: Vec<String>,
     /// What the participants did before each trial.

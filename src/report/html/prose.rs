@@ -127,6 +127,12 @@ fn conduct(d: &Details, a: &Analysis) -> Vec<String> {
             "A rating of {from} or higher was said beforehand to count as realistic."
         ));
     }
+    if d.states.iter().any(|(state, _)| state != "done") {
+        let all: Vec<String> = (d.states.iter())
+            .map(|(state, n)| format!("{n} {state}"))
+            .collect();
+        said.push(format!("States of all sessions: {}.", apa::listing(&all)));
+    }
     said.extend(left_out(a));
     said
 }
