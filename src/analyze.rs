@@ -221,7 +221,10 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     let (decisions, exclusions) = select::decide(ratings, rules);
     let used = rows(ratings, |i| decisions[i].is_none());
     let (cells, rows_judged) = rayon::join(|| Cells::of(&used), || judged(ratings, &decisions));
-    let mut values = statistics(&cells, rules);
+    let (mut values, counts) = rayon::join(
+        || statistics(&cells, rules),
+        || Counts::of(ratings, &used, &decisions, rules),
+    );
     if exclusions.iter().any(|e| e.rows > 0) {
         let all = rows(ratings, |i| {
             let reason = decisions[i].as_deref();
@@ -229,7 +232,6 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
         });
         headline::without_exclusions(&statistics(&Cells::of(&all), rules), &mut values);
     }
-    let counts = Counts::of(ratings, &used, &decisions, rules);
     let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &values);
     Analysis {
         question: ratings.question.clone(),
@@ -272,32 +274,32 @@ type Group = fn(&Cells<'_>, &Rules, &mut Values);
 
 /// Groups that need nothing of each other, the longest first.
 const GROUPS: [Group; 10] = [
-    |cells, _, values| ordinal::ordinal(cells, values),
-    |cells, _, values| mixed::mixed(cells, values),
     order::order,
-    effects::ranks_and_anova,
-    effects::pairs,
-    effects::agree,
     vaf::against_vaf,
+    |cells, _, values| ordinal::ordinal(cells, values),
+    effects::ranks_and_anova,
+    effects::agree,
+    |cells, _, values| mixed::mixed(cells, values),
     describe::describe,
     subjects::subjects,
+    effects::pairs,
     reference::reference,
 ];
 
-/// Every statistic. Groups are computed side by side; each by itself, so that
-/// the number of threads changes no bit.
+/// Every statistic. Groups are computed side by side, in the order of the list;
+/// each by itself, so that the number of threads changes no bit.
 fn statistics(cells: &Cells<'_>, rules: &Rules) -> Values {
-    let parts: Vec<Values> = GROUPS
-        .par_iter()
-        .with_max_len(1)
-        .map(|group| {
+    let mut parts: Vec<(usize, Values)> = (GROUPS.iter().enumerate())
+        .par_bridge()
+        .map(|(place, group)| {
             let mut values = Values::default();
             group(cells, rules, &mut values);
-            values
+            (place, values)
         })
         .collect();
+    parts.sort_by_key(|(place, _)| *place);
     let mut values = Values::default();
-    for part in parts {
+    for (_, part) in parts {
         values.take(part);
     }
     memory::memory(cells, rules, &mut values);

@@ -32,10 +32,10 @@ mod telemetry;
 mod vanished;
 mod verify;
 
-pub use derive::{Columns, Derived};
+pub use derive::{Columns, Derived, participants};
 pub use error::{StoreError, plain};
 pub use journal::Journal;
-pub use ledger::{ClaimRequest, Claimed, SeatKind};
+pub use ledger::{ClaimRequest, Claimed, SeatKind, next_row};
 pub use manifest::Manifest;
 pub use participant::{StateChange, StateRequest, Tombstone};
 pub use replay::{Damage, DamageKind};

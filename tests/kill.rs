@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use study::outcome::{Event, State};
 use study::rng::Stream;
-use study::store::StudyFolder;
+use study::store::{StudyFolder, participants};
 use support::player::{Did, play, play_before};
 use support::{Terminal, repository, study};
 
@@ -103,7 +103,7 @@ fn is_done(folder: &Path, participant: &str) -> bool {
     let Ok(study) = StudyFolder::open(&folder.join("results/turn-signal")) else {
         return false;
     };
-    let rows = study.participants().unwrap();
+    let rows = participants(&study.sessions().unwrap());
     rows.iter()
         .any(|p| p.participant.as_str() == participant && p.state == State::Done)
 }

@@ -15,8 +15,9 @@ use crate::report::figures::Trace;
 use crate::report::html::Details;
 use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
-use crate::store::StudyFolder;
+use crate::store::{Derived, SessionData, StudyFolder};
 use crate::text::{ModelId, QuestionId};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -82,14 +83,17 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         if i > 0 {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
-        let mut input = of_study(study, args)?;
+        let sessions = study.sessions()?;
+        let (input, damage) = rayon::join(
+            || of_study(study, &sessions, args),
+            || results::warnings(study, &sessions),
+        );
+        let (mut input, damage) = (input?, damage?);
         // On a terminal the page tells of it; who keeps or pipes the page, or asked
         // for something else, is told on standard error as well.
-        let damage = if console.terminal && !args.json && !args.comments {
-            results::warnings(study)?
-        } else {
-            results::warn(study, console)?
-        };
+        if !console.terminal || args.json || args.comments {
+            results::warn(study, &damage, console);
+        }
         let damage = damage.into_iter().map(|text| Warning {
             code: "damaged-results",
             text: format!("{text} (`study verify` tells everything)"),
@@ -222,8 +226,12 @@ struct StudyInput {
     participants: Vec<ParticipantRow>,
 }
 
-fn of_study(study: &StudyFolder, args: &Args) -> Result<Analysed, Failure> {
-    let input = study_input(study)?;
+fn of_study(
+    study: &StudyFolder,
+    sessions: &[SessionData],
+    args: &Args,
+) -> Result<Analysed, Failure> {
+    let input = study_input(study, sessions)?;
     let question = question(&input.protocol, args.question.as_deref())?;
     let mut ratings = Ratings::from_rows(&input.rows, &question);
     ratings.set_states(&input.participants);
@@ -302,11 +310,11 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
 
 /// The rows of a study, by the newest version of its protocol. The VAF may stand
 /// in the model files only: they are opened too.
-fn study_input(study: &StudyFolder) -> Result<StudyInput, Failure> {
+fn study_input(study: &StudyFolder, sessions: &[SessionData]) -> Result<StudyInput, Failure> {
     let Loaded {
         protocol, models, ..
     } = results::frozen(study)?;
-    let derived = study.derive(&protocol)?;
+    let derived = Derived::of(sessions, &protocol);
     Ok(StudyInput {
         deviations: deviations(study)?,
         models,
@@ -340,21 +348,24 @@ fn deviations(study: &StudyFolder) -> Result<Vec<String>, Failure> {
     Ok(said)
 }
 
-/// Each file as a whole or not at all. None is synced: all of them can be made
-/// again at any time from what is on the disk.
+/// Each file as a whole or not at all, and not again if it has these bytes. None is
+/// synced: all of them can be made again at any time from what is on the disk.
 fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
     for item in [dir.to_owned(), dir.join("figures")] {
         fs::create_dir_all(&item).map_err(|e| Failure::file(&item, &e))?;
     }
-    for output in files {
+    files.par_iter().try_for_each(|output| {
         let path = dir.join(&output.name);
-        let part = path.with_extension(format!("{}.part", std::process::id()));
+        if fs::read(&path).is_ok_and(|old| old == output.content) {
+            return Ok(());
+        }
+        // Its own for each file and process: SVG, PNG and CSV of a figure share a stem.
+        let part = dir.join(format!("{}.{}.part", output.name, std::process::id()));
         let written = fs::write(&part, &output.content).and_then(|()| fs::rename(&part, &path));
-        if let Err(e) = written {
+        written.map_err(|e| {
             // What is left of it is of no use; the first error is the one to tell.
             let _ = fs::remove_file(&part);
-            return Err(Failure::file(&path, &e));
-        }
-    }
-    Ok(())
+            Failure::file(&path, &e)
+        })
+    })
 }

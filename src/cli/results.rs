@@ -5,7 +5,7 @@ use super::load::{self, Loaded};
 use super::{Console, Failure};
 use crate::outcome::Moment;
 use crate::protocol::question::MAX_TEXT_BYTES;
-use crate::store::{StoreError, StudyFolder, layout, plain};
+use crate::store::{SessionData, StoreError, StudyFolder, layout, plain};
 use std::path::Path;
 
 impl From<StoreError> for Failure {
@@ -76,8 +76,11 @@ pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded
 
 /// What is wrong with the journals and the frozen protocol of a study, as
 /// `study verify` has it; one sentence each, with the place.
-pub(super) fn warnings(study: &StudyFolder) -> Result<Vec<String>, Failure> {
-    let mut found = study.faults()?;
+pub(super) fn warnings(
+    study: &StudyFolder,
+    sessions: &[SessionData],
+) -> Result<Vec<String>, Failure> {
+    let mut found = study.faults(sessions)?;
     found.extend(super::verify::frozen_versions(study));
     let path = study.path().display();
     Ok(found
@@ -86,17 +89,15 @@ pub(super) fn warnings(study: &StudyFolder) -> Result<Vec<String>, Failure> {
         .collect())
 }
 
-/// Tells of [`warnings`] on standard error and returns them.
-pub(super) fn warn(study: &StudyFolder, console: &mut Console) -> Result<Vec<String>, Failure> {
-    let warnings = warnings(study)?;
-    for warning in &warnings {
+/// Tells of [`warnings`] on standard error.
+pub(super) fn warn(study: &StudyFolder, warnings: &[String], console: &mut Console) {
+    for warning in warnings {
         console.say(format!("warning: {warning}"));
     }
     if !warnings.is_empty() {
         let path = study.path().display();
         console.say(format!("  hint: `study verify {path}` tells everything"));
     }
-    Ok(warnings)
 }
 
 /// An analysis that was printed is no failure although its tables have no place.

@@ -2,7 +2,7 @@
 
 use super::{Console, Failure, results};
 use crate::outcome::{ParticipantRow, State};
-use crate::store::StudyFolder;
+use crate::store::{SessionData, StudyFolder, next_row, participants};
 use crate::text::Untrusted;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -20,13 +20,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         if n > 0 {
             console.out("\n")?;
         }
-        results::warn(study, console)?;
-        console.out(of_study(study)?)?;
+        let sessions = study.sessions()?;
+        results::warn(study, &results::warnings(study, &sessions)?, console);
+        console.out(of_study(study, &sessions))?;
     }
     Ok(())
 }
 
-fn of_study(study: &StudyFolder) -> Result<String, Failure> {
+fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {
     let manifest = study.manifest();
     let mut out = format!(
         "{} · {} · protocol version {}\n",
@@ -34,7 +35,7 @@ fn of_study(study: &StudyFolder) -> Result<String, Failure> {
         Untrusted(&study.path().display().to_string()),
         study.version()
     );
-    let all = study.participants()?;
+    let all = participants(sessions);
     let real: Vec<_> = all.iter().filter(|p| !p.pilot && !p.simulated).collect();
     let pilots: Vec<_> = all.iter().filter(|p| p.pilot).collect();
     let simulated: Vec<_> = all.iter().filter(|p| p.simulated).collect();
@@ -52,8 +53,8 @@ fn of_study(study: &StudyFolder) -> Result<String, Failure> {
         out.push_str(&table(rows));
     }
     let _ = writeln!(out, "\n{}", summary(study, &real));
-    let _ = writeln!(out, "Next free row: {}", study.next_row()?);
-    Ok(out)
+    let _ = writeln!(out, "Next free row: {}", next_row(sessions));
+    out
 }
 
 fn table(rows: &[&ParticipantRow]) -> String {

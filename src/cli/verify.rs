@@ -2,7 +2,7 @@
 
 use super::{Console, Failure, results};
 use crate::cli::load;
-use crate::store::{Finding, StudyFolder, layout};
+use crate::store::{Finding, SessionData, StudyFolder, layout};
 use crate::text::{Untrusted, counted};
 use std::path::PathBuf;
 
@@ -29,7 +29,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         }
         let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
         found.extend(frozen_versions(&study));
-        console.out(of_study(&study, &found)?)?;
+        console.out(of_study(&study, &study.sessions()?, &found))?;
         wrong += found.iter().filter(|f| f.wrong).count();
     }
     match wrong {
@@ -39,7 +39,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
 }
 
-fn of_study(study: &StudyFolder, found: &[Finding]) -> Result<String, Failure> {
+fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) -> String {
     let path = study.path().display().to_string();
     let mut out = String::new();
     for finding in found {
@@ -51,7 +51,6 @@ fn of_study(study: &StudyFolder, found: &[Finding]) -> Result<String, Failure> {
             Untrusted(&finding.what)
         ));
     }
-    let sessions = study.sessions()?;
     let events: usize = sessions.iter().map(|s| s.entries.len()).sum();
     let verdict = match found.iter().filter(|f| f.wrong).count() {
         0 => "all is as it was written",
@@ -72,7 +71,7 @@ fn of_study(study: &StudyFolder, found: &[Finding]) -> Result<String, Failure> {
     {
         out.push_str("the tables are made again with --rebuild\n");
     }
-    Ok(out)
+    out
 }
 
 /// Reads each frozen protocol and compares its fingerprints with study.json.

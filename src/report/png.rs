@@ -5,10 +5,10 @@
 //! Greek and Cyrillic. Letters of other scripts are missing in the PNG; they are
 //! in the SVG and in the report, which use the reader's fonts.
 
-use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::tiny_skia::{PixmapMut, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
 use std::io::Write as _;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 const FONT: &[u8] = include_bytes!("../../assets/LiberationSans-Regular.ttf");
 
@@ -40,10 +40,13 @@ pub enum PngError {
     Encoding(String),
 }
 
-/// Draws SVG; made once, used for all figures.
+/// Draws SVG; made once, used for all figures, by several threads.
 #[derive(Debug)]
 pub struct Painter {
     options: Options<'static>,
+    /// Memory of pictures that are done, for the next ones: a figure takes
+    /// megabytes, and fresh ones cost as much time as drawing.
+    canvases: Mutex<Vec<Vec<u8>>>,
 }
 
 impl Default for Painter {
@@ -56,7 +59,10 @@ impl Default for Painter {
             fontdb: Arc::new(fonts),
             ..Options::default()
         };
-        Self { options }
+        Self {
+            options,
+            canvases: Mutex::default(),
+        }
     }
 }
 
@@ -71,29 +77,36 @@ impl Painter {
         // A size is finite and positive; what is too large saturates.
         let pixels = |side: f32| (side * SCALE).ceil() as u32;
         let (width, height) = (pixels(size.width()), pixels(size.height()));
-        let mut picture = Some((width, height))
-            .filter(|(w, h)| *w.max(h) <= MAX_SIDE)
-            .and_then(|(w, h)| Pixmap::new(w, h))
+        if width.max(height) > MAX_SIDE {
+            return Err(PngError::Size { width, height });
+        }
+        let canvases = || self.canvases.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut canvas = canvases().pop().unwrap_or_default();
+        canvas.clear();
+        canvas.resize(4 * width as usize * height as usize, 0);
+        let mut picture = PixmapMut::from_bytes(&mut canvas, width, height)
             .ok_or(PngError::Size { width, height })?;
         let scale = Transform::from_scale(SCALE, SCALE);
-        resvg::render(&tree, scale, &mut picture.as_mut());
-        encoded(&picture).map_err(|e| PngError::Encoding(e.to_string()))
+        resvg::render(&tree, scale, &mut picture);
+        let png = encoded(&canvas, width, height).map_err(|e| PngError::Encoding(e.to_string()));
+        canvases().push(canvas);
+        png
     }
 }
 
 /// Three bytes a pixel: every figure has a white ground, so nothing shows through.
 /// Fast compression takes a third of the time of the usual one.
-fn encoded(picture: &Pixmap) -> Result<Vec<u8>, png::EncodingError> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, picture.width(), picture.height());
+fn encoded(rgba: &[u8], width: u32, height: u32) -> Result<Vec<u8>, png::EncodingError> {
+    // A figure is mostly white: a sixteenth of its pixels' bytes is enough for most.
+    let mut bytes = Vec::with_capacity(rgba.len() / 16);
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Up);
     let mut writer = encoder.write_header()?;
     let mut stream = writer.stream_writer()?;
-    let width = picture.width() as usize;
-    let mut rgb = vec![0; 3 * width];
-    for row in picture.data().chunks_exact(4 * width) {
+    let mut rgb = vec![0; 3 * width as usize];
+    for row in rgba.chunks_exact(4 * width as usize) {
         for (out, pixel) in rgb.chunks_exact_mut(3).zip(row.chunks_exact(4)) {
             out.copy_from_slice(&pixel[..3]);
         }
@@ -108,6 +121,7 @@ fn encoded(picture: &Pixmap) -> Result<Vec<u8>, png::EncodingError> {
 mod tests {
     use super::*;
     use crate::report::svg::{Axis, Figure, Panel};
+    use resvg::tiny_skia::Pixmap;
 
     /// Dark pixels of a figure whose x axis has this label.
     fn ink(label: &str) -> usize {
@@ -131,11 +145,13 @@ mod tests {
     #[test]
     fn equal_figures_give_equal_pictures() {
         let svg = Figure::new("f", "t", 40.0, 30.0).to_svg();
+        let other = Figure::new("g", "another", 33.0, 50.0).to_svg();
         let painter = Painter::default();
-        assert_eq!(
-            painter.png(&svg).unwrap(),
-            Painter::default().png(&svg).unwrap()
-        );
+        let first = painter.png(&svg).unwrap();
+        // On a canvas that was used before, by a larger one, too.
+        let another = painter.png(&other).unwrap();
+        assert_eq!(painter.png(&svg).unwrap(), first);
+        assert_eq!(Painter::default().png(&other).unwrap(), another);
     }
 
     #[test]

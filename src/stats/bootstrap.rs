@@ -99,7 +99,6 @@ fn resample(rows: &[Vec<f64>], x: &[f64], seed: u64, normal_limit: bool) -> Opti
             count(&weighted(rows, &draws), 1);
         }
     }
-    resamples.sort_by(|a, b| a.0.total_cmp(&b.0));
     let summed = summary(rows, &score, observed, &resamples, undefined, total)?;
     Some(Bootstrap {
         exact,
@@ -194,7 +193,8 @@ fn summary(
     let ties = share(&|r| (r - observed).abs() <= TIE);
     let z0 = normal_quantile(below + 0.5 * ties);
     let acceleration = acceleration(rows, score);
-    let at = |p: f64| quantile(resamples, p * defined);
+    let quantiles = Quantiles::of(resamples);
+    let at = |p: f64| quantiles.at(p * defined);
     let bca = z0.zip(acceleration).and_then(|(z0, a)| {
         let level = |p: f64| {
             let z = z0 + normal_quantile(p)?;
@@ -216,16 +216,51 @@ fn summary(
     })
 }
 
-/// The smallest value whose cumulated weight reaches `weight`.
-fn quantile(resamples: &[(f64, u64)], weight: f64) -> Option<f64> {
-    let mut sum = 0u64;
-    for (r, w) in resamples {
-        sum += w;
-        if sum as f64 >= weight {
-            return Some(*r);
-        }
+/// Quantiles of weighted correlations without sorting all of them: the weights
+/// are cumulated by class, and only the class that holds a quantile is sorted.
+struct Quantiles<'a> {
+    resamples: &'a [(f64, u64)],
+    /// Weight of each class of equal width over [−1, 1].
+    classes: Vec<u64>,
+}
+
+impl<'a> Quantiles<'a> {
+    const CLASSES: usize = 4096;
+
+    /// Never falls with r.
+    fn class(r: f64) -> usize {
+        // From 0 to CLASSES: r is a correlation.
+        (((r + 1.0) * 0.5 * Self::CLASSES as f64) as usize).min(Self::CLASSES - 1)
     }
-    resamples.last().map(|(r, _)| *r)
+
+    fn of(resamples: &'a [(f64, u64)]) -> Self {
+        let mut classes = vec![0; Self::CLASSES];
+        for (r, weight) in resamples {
+            classes[Self::class(*r)] += weight;
+        }
+        Self { resamples, classes }
+    }
+
+    /// The smallest value whose cumulated weight reaches `weight`; the largest if
+    /// rounding lets none reach it.
+    fn at(&self, weight: f64) -> Option<f64> {
+        let mut sum = 0u64;
+        for (class, own) in self.classes.iter().enumerate() {
+            if ((sum + own) as f64) < weight || *own == 0 {
+                sum += own;
+                continue;
+            }
+            let inside = |item: &&(f64, u64)| Self::class(item.0) == class;
+            let mut members: Vec<_> = self.resamples.iter().filter(inside).collect();
+            members.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            return members.into_iter().find_map(|(r, w)| {
+                sum += w;
+                (sum as f64 >= weight).then_some(*r)
+            });
+        }
+        let all = self.resamples.iter().map(|(r, _)| *r);
+        all.max_by(f64::total_cmp)
+    }
 }
 
 /// Σ(m − mᵢ)³/(6(Σ(m − mᵢ)²)^1.5) over the correlations mᵢ without subject i.
@@ -349,6 +384,32 @@ mod tests {
             weights += w;
         });
         assert_eq!((visited, weights), (35, 256));
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_sorted_resamples() {
+        let mut stream = Stream::new(5, &["quantiles"]);
+        let resamples: Vec<(f64, u64)> = (0..3000)
+            // Many ties, and a class with hundreds of members.
+            .map(|_| {
+                let r = (stream.normal().sin() * 300.0).round() / 300.0;
+                (r * r * r, 1 + stream.below(50))
+            })
+            .collect();
+        let mut sorted = resamples.clone();
+        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let total: u64 = sorted.iter().map(|(_, w)| w).sum();
+        let quantiles = Quantiles::of(&resamples);
+        for step in 0..=1000 {
+            let weight = total as f64 * f64::from(step) / 1000.0;
+            let mut sum = 0;
+            let slow = sorted.iter().find(|(_, w)| {
+                sum += w;
+                sum as f64 >= weight
+            });
+            assert_eq!(quantiles.at(weight), slow.map(|(r, _)| *r), "{weight}");
+        }
+        assert_eq!(quantiles.at(2.0 * total as f64), Some(sorted[2999].0));
     }
 
     #[test]

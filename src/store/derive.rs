@@ -55,23 +55,6 @@ impl Columns {
 }
 
 impl StudyFolder {
-    /// The rows that the journals give, with a protocol whose models have their VAF.
-    ///
-    /// # Errors
-    /// [`StoreError`] if a journal cannot be read. Damaged lines are passed over;
-    /// [`StudyFolder::sessions`] and [`StudyFolder::verify`] tell of them.
-    pub fn derive(&self, protocol: &Protocol) -> Result<Derived, StoreError> {
-        Ok(derive(&self.sessions()?, protocol))
-    }
-
-    /// One row for each participant; needs no protocol.
-    ///
-    /// # Errors
-    /// [`StoreError`] if a journal cannot be read.
-    pub fn participants(&self) -> Result<Vec<ParticipantRow>, StoreError> {
-        Ok(participants(&self.sessions()?))
-    }
-
     /// Replaces the derived tables, each as a whole, unless they are the same.
     ///
     /// # Errors
@@ -85,7 +68,7 @@ impl StudyFolder {
     /// has the last word.
     ///
     /// # Errors
-    /// As [`StudyFolder::derive`] and [`StudyFolder::write_derived`], and if the
+    /// As [`StudyFolder::sessions`] and [`StudyFolder::write_derived`], and if the
     /// tables name a session that is not there: nobody is dropped unasked.
     pub fn refresh(&self, protocol: &Protocol) -> Result<Derived, StoreError> {
         self.refresh_with(protocol, false)
@@ -110,7 +93,7 @@ impl StudyFolder {
                 who: who.join(", "),
             });
         }
-        let derived = derive(&sessions, protocol);
+        let derived = Derived::of(&sessions, protocol);
         self.replace_tables(&derived)?;
         Ok(derived)
     }
@@ -123,26 +106,30 @@ impl StudyFolder {
     }
 }
 
-/// The rows of these sessions.
-pub(super) fn derive(sessions: &[SessionData], protocol: &Protocol) -> Derived {
-    let mut derived = Derived {
-        participants: participants(sessions),
-        columns: Columns::of(protocol),
-        ..Derived::default()
-    };
-    for session in sessions {
-        let (id, number, entries) = (&session.participant, session.session, &session.entries);
-        if !matches!(session.standing().state, State::Void | State::Withdrawn) {
-            derived.rows.extend(fold::ratings(entries, protocol));
+impl Derived {
+    /// The rows of all sessions of a study, with a protocol whose models have their
+    /// VAF. Damaged lines are passed over; [`StudyFolder::verify`] tells of them.
+    pub fn of(sessions: &[SessionData], protocol: &Protocol) -> Self {
+        let mut derived = Self {
+            participants: participants(sessions),
+            columns: Columns::of(protocol),
+            ..Self::default()
+        };
+        for session in sessions {
+            let (id, number, entries) = (&session.participant, session.session, &session.entries);
+            if !matches!(session.standing().state, State::Void | State::Withdrawn) {
+                derived.rows.extend(fold::ratings(entries, protocol));
+            }
+            if session.standing().state != State::Withdrawn {
+                derived.attempts.extend(fold::attempts(id, number, entries));
+            }
         }
-        if session.standing().state != State::Withdrawn {
-            derived.attempts.extend(fold::attempts(id, number, entries));
-        }
+        derived
     }
-    derived
 }
 
-fn participants(sessions: &[SessionData]) -> Vec<ParticipantRow> {
+/// One row for each participant; needs no protocol.
+pub fn participants(sessions: &[SessionData]) -> Vec<ParticipantRow> {
     let mut rows: Vec<ParticipantRow> = Vec::new();
     for session in sessions.iter().filter(|s| s.claimed) {
         let mut row = fold::participant(&session.participant, session.session, &session.entries);

@@ -181,17 +181,11 @@ impl StudyFolder {
         })
     }
 
-    /// The lowest row that the next participant would get.
+    /// Refuses an id that a file system could take for another one.
     ///
     /// # Errors
-    /// [`StoreError`] if the sessions cannot be read.
-    pub fn next_row(&self) -> Result<u32, StoreError> {
-        let all = self.sessions()?;
-        Ok(free_row(1..=u32::MAX, &all).unwrap_or(u32::MAX))
-    }
-
-    /// Refuses an id that a file system could take for another one.
-    pub(super) fn check_id(&self, id: &ParticipantId) -> Result<(), StoreError> {
+    /// [`StoreError::Collides`], or the sessions cannot be read.
+    pub fn check_id(&self, id: &ParticipantId) -> Result<(), StoreError> {
         let ids = self.participant_ids()?;
         match ids.into_iter().find(|i| i != id && i.collides_with(id)) {
             None => Ok(()),
@@ -346,6 +340,11 @@ fn next_seat(request: &ClaimRequest, all: &[SessionData]) -> Result<Seat, StoreE
                 })
         }
     }
+}
+
+/// The lowest row that the next participant would get, by all sessions of a study.
+pub fn next_row(sessions: &[SessionData]) -> u32 {
+    free_row(1..=u32::MAX, sessions).unwrap_or(u32::MAX)
 }
 
 /// The lowest row of a range that nobody keeps.

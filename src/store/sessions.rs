@@ -1,6 +1,7 @@
 //! Every session of a study, read and not changed.
 
 use super::error::{At as _, StoreError};
+use super::line::Claim;
 use super::participant::Tombstone;
 use super::replay::{Damage, replay};
 use super::{StudyFolder, journal, layout};
@@ -8,6 +9,7 @@ use crate::outcome::fold::{Standing, standing};
 use crate::outcome::{Entry, State};
 use crate::protocol::Seat;
 use crate::text::ParticipantId;
+use rayon::prelude::*;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -31,6 +33,10 @@ pub struct SessionData {
     pub tombstone: Option<Tombstone>,
     /// Whether the claim of the folder was completed.
     pub claimed: bool,
+    /// The claim, if it could be read.
+    pub(super) claim: Option<Claim>,
+    /// The file that the journal was last written to.
+    pub(super) last_file: String,
 }
 
 impl SessionData {
@@ -65,9 +71,12 @@ impl StudyFolder {
     /// # Errors
     /// [`StoreError`] if a folder or file cannot be read. Damage is no error.
     pub fn sessions(&self) -> Result<Vec<SessionData>, StoreError> {
+        let ids = self.participant_ids()?;
+        let read: Vec<_> = ids.par_iter().map(|id| self.sessions_of(id)).collect();
         let mut all = Vec::new();
-        for participant in self.participant_ids()? {
-            all.extend(self.sessions_of(&participant)?);
+        // Of several errors always the same one is told.
+        for sessions in read {
+            all.extend(sessions?);
         }
         Ok(all)
     }
@@ -101,6 +110,8 @@ impl StudyFolder {
                 damage: Vec::new(),
                 tombstone: Some(tombstone),
                 claimed: true,
+                claim: None,
+                last_file: String::new(),
             }]);
         }
         self.session_numbers(&folder)?
@@ -130,7 +141,8 @@ impl StudyFolder {
         number: u32,
     ) -> Result<SessionData, StoreError> {
         let path = layout::session(&self.path, id, number);
-        let replay = replay(&journal::segments(self.disk.as_ref(), &path)?);
+        let segments = journal::segments(self.disk.as_ref(), &path)?;
+        let replay = replay(&segments);
         Ok(SessionData {
             participant: id.clone(),
             session: number,
@@ -140,6 +152,8 @@ impl StudyFolder {
             entries: replay.entries,
             damage: replay.damage,
             tombstone: None,
+            claim: replay.claim,
+            last_file: segments.last().map(|s| s.name.clone()).unwrap_or_default(),
         })
     }
 }

@@ -2,19 +2,18 @@
 
 mod telemetry;
 
-use super::derive::{derive, tables};
+use super::derive::{Derived, tables};
 use super::error::{At as _, StoreError, plain};
 use super::ledger::SeatKind;
 use super::line::sha256;
 use super::manifest::Manifest;
-use super::replay::{DamageKind, replay};
+use super::replay::DamageKind;
 use super::sessions::SessionData;
-use super::{StudyFolder, journal, layout};
+use super::{StudyFolder, layout};
 use crate::outcome::{Event, State, fold};
 use crate::protocol::{Protocol, Seat};
 use crate::text::{ParticipantId, Untrusted};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 /// Something that a check of a results folder found.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,7 +45,8 @@ impl Finding {
 
 impl StudyFolder {
     /// Re-reads every journal and compares it with itself, the frozen protocol with
-    /// its hashes, the telemetry with the number of its samples, and, given a protocol, the tables with what the journals give.
+    /// its hashes, the telemetry with the number of its samples, and, given a
+    /// protocol, the tables with what the journals give.
     ///
     /// # Errors
     /// [`StoreError`] if a folder or journal cannot be read at all.
@@ -68,8 +68,8 @@ impl StudyFolder {
     ///
     /// # Errors
     /// As [`StudyFolder::verify`].
-    pub fn faults(&self) -> Result<Vec<Finding>, StoreError> {
-        let mut found = self.verify_journals(&self.sessions()?)?;
+    pub fn faults(&self, sessions: &[SessionData]) -> Result<Vec<Finding>, StoreError> {
+        let mut found = self.verify_journals(sessions)?;
         found.retain(|f| f.wrong);
         Ok(found)
     }
@@ -77,7 +77,7 @@ impl StudyFolder {
     fn verify_journals(&self, sessions: &[SessionData]) -> Result<Vec<Finding>, StoreError> {
         let mut found = Vec::new();
         self.verify_frozen(&mut found)?;
-        self.verify_names(&mut found)?;
+        self.verify_names(sessions, &mut found)?;
         for session in sessions {
             self.verify_session(session, &mut found)?;
         }
@@ -109,7 +109,11 @@ impl StudyFolder {
     }
 
     /// What stands among the sessions that this program did not put there.
-    fn verify_names(&self, found: &mut Vec<Finding>) -> Result<(), StoreError> {
+    fn verify_names(
+        &self,
+        sessions: &[SessionData],
+        found: &mut Vec<Finding>,
+    ) -> Result<(), StoreError> {
         let folder = self.path.join(layout::SESSIONS);
         let Ok(items) = self.disk.list(&folder) else {
             return Ok(());
@@ -125,7 +129,9 @@ impl StudyFolder {
                             format!("differs from {other} only in upper and lower case"),
                         ));
                     }
-                    self.verify_participant(&id, &place, found)?;
+                    let erased = |s: &SessionData| s.participant == id && s.tombstone.is_some();
+                    let erased = sessions.iter().any(erased);
+                    self.verify_participant(&id, erased, &place, found)?;
                     ids.push(id);
                 }
                 _ => found.push(Finding::note(place, "no participant's folder; passed over")),
@@ -137,11 +143,11 @@ impl StudyFolder {
     fn verify_participant(
         &self,
         id: &ParticipantId,
+        erased: bool,
         place: &str,
         found: &mut Vec<Finding>,
     ) -> Result<(), StoreError> {
         let folder = layout::participant(&self.path, id);
-        let erased = self.sessions_of(id)?.iter().any(|s| s.tombstone.is_some());
         for item in self.disk.list(&folder).at(&folder)? {
             let is_session = item.is_folder && layout::number(&item.name).is_some();
             let place = format!("{place}/{}", Untrusted(&item.name));
@@ -175,23 +181,21 @@ impl StudyFolder {
             found.push(Finding::note(place, format!("erased at {when}")));
             return Ok(());
         }
-        let replay = replay(&journal::segments(self.disk.as_ref(), &session.path)?);
-        if replay.records == 0 && replay.damage.iter().all(is_torn) {
+        if !session.claimed && session.damage.iter().all(is_torn) {
             found.push(Finding::note(place, "made, but never claimed to the end"));
             return Ok(());
         }
         // A line that a dying process did not finish was never acknowledged.
         let under_way = session.is_unfinished();
-        let last = journal_name(&session.path, self)?;
-        for damage in &replay.damage {
-            let expected = is_torn(damage) && (under_way || damage.file != last);
+        for damage in &session.damage {
+            let expected = is_torn(damage) && (under_way || damage.file != session.last_file);
             found.push(Finding {
                 wrong: !expected,
                 place: place.clone(),
                 what: damage.to_string(),
             });
         }
-        if let Some(claim) = &replay.claim
+        if let Some(claim) = &session.claim
             && (claim.participant != session.participant || claim.session != session.session)
         {
             let whose = format!(
@@ -255,7 +259,7 @@ impl StudyFolder {
         protocol: &Protocol,
         found: &mut Vec<Finding>,
     ) -> Result<(), StoreError> {
-        let derived = derive(sessions, protocol);
+        let derived = Derived::of(sessions, protocol);
         for (name, bytes) in tables(&derived).at(&self.path)? {
             match self.disk.read(&self.path.join(name)) {
                 Ok(old) if old == bytes => {}
@@ -277,12 +281,6 @@ fn place_of(session: &SessionData) -> String {
 
 fn is_torn(damage: &super::Damage) -> bool {
     matches!(damage.kind, DamageKind::Torn(_))
-}
-
-/// The file that a journal was last written to.
-fn journal_name(folder: &Path, study: &StudyFolder) -> Result<String, StoreError> {
-    let segments = journal::segments(study.disk.as_ref(), folder)?;
-    Ok(segments.last().map(|s| s.name.clone()).unwrap_or_default())
 }
 
 /// Two participants who both keep one row, or have one number.

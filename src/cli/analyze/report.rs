@@ -11,6 +11,7 @@ use crate::report::png::{Painter, PngError};
 use crate::store::{StudyFolder, layout};
 use crate::text::counted;
 use rayon::prelude::*;
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -64,11 +65,19 @@ pub(super) fn files(
 /// changes no byte.
 fn pictures(drawn: &[Drawn]) -> Result<Vec<(String, Vec<u8>)>, PngError> {
     let painter = Painter::default();
-    let one = |figure: &Drawn| {
-        let svg = figure.wide.to_svg();
-        painter.png(&svg).map(|png| (svg, png))
-    };
-    drawn.par_iter().with_max_len(1).map(one).collect()
+    let figures = drawn.par_iter().with_max_len(1);
+    let svgs: Vec<String> = figures.map(|figure| figure.wide.to_svg()).collect();
+    // What takes longest first, so that no thread has it alone at the end.
+    let mut order: Vec<usize> = (0..svgs.len()).collect();
+    order.sort_by_key(|&i| Reverse(svgs[i].len()));
+    let mut pngs: Vec<(usize, Vec<u8>)> = (order.into_iter().par_bridge())
+        .map(|i| painter.png(&svgs[i]).map(|png| (i, png)))
+        .collect::<Result<_, _>>()?;
+    pngs.sort_by_key(|(i, _)| *i);
+    Ok(svgs
+        .into_iter()
+        .zip(pngs.into_iter().map(|p| p.1))
+        .collect())
 }
 
 /// What the study's folder says beyond its ratings.
