@@ -9,6 +9,7 @@
 //! left out, what is undefined is listed with its reason.
 
 mod answers;
+mod methods;
 mod notes;
 mod prose;
 mod statistics;
@@ -131,7 +132,10 @@ fn head(source: &Source, details: &Details, a: &Analysis, lang: Option<&str>) ->
                     span { "protocol version " (version) } " "
                 }
                 @match c.planned {
-                    Some(planned) => span { (c.finished) " of " (planned) " planned participants finished" },
+                    Some(planned) => {
+                        span { (c.finished) " of " (planned) " planned participants finished" }
+                        @if c.participants != c.finished { " " span { (c.participants) " analysed" } }
+                    },
                     None => span { (super::apa::counted(c.participants, "subject", "subjects")) },
                 }
                 " "

@@ -103,6 +103,10 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
         facts.push(format!("protocol {version}"));
     }
     facts.push(match c.planned {
+        Some(planned) if c.participants != c.finished => format!(
+            "{} of {planned} participants, {} analysed",
+            c.finished, c.participants
+        ),
         Some(planned) => format!("{} of {planned} participants", c.finished),
         None => apa::counted(c.participants, "subject", "subjects"),
     });

@@ -1,6 +1,6 @@
 //! What a reader has to know: banners, warnings, exclusions, comments, versions.
 
-use super::prose::in_words;
+use super::methods::in_words;
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
 use crate::analyze::{Analysis, Said, Warning};
