@@ -207,7 +207,7 @@ fn position_and_force_in_each_others_columns_are_doubted_and_no_right_recording_
         "recordings/validation_a.csv",
         "plant/switch_a_1.5hz.csv",
     ] {
-        let file = std::fs::File::open(format!("tests/data/{name}")).unwrap();
+        let file = fs::File::open(format!("tests/data/{name}")).unwrap();
         let whole = recording::read(name, std::io::BufReader::new(file)).unwrap();
         let doubts = |x_mm: &[f64], f_n: &[f64]| {
             let mut bytes = Vec::from("t_s,x_mm,f_n\n");

@@ -42,6 +42,8 @@ pub(super) struct Cells<'a> {
     pub(super) cells: Vec<Cell>,
     /// VAF of each model, if its rows agree on one.
     pub(super) vaf: Vec<Option<f64>>,
+    /// Whether anyone rated the model.
+    pub(super) rated: Vec<bool>,
     /// The complete table of the realizations that the study asks about.
     complete: Table,
 }
@@ -104,8 +106,13 @@ impl<'a> Cells<'a> {
         let cells: Vec<Cell> = (groups.into_par_iter().with_min_len(1000))
             .filter_map(cell)
             .collect();
+        let mut rated = vec![false; ratings.models.len()];
+        for cell in &cells {
+            rated[cell.model] = true;
+        }
         let mut made = Self {
             vaf,
+            rated,
             ratings,
             offset,
             centred,
@@ -124,12 +131,13 @@ impl<'a> Cells<'a> {
         &self.sorted[cell.rows.clone()]
     }
 
-    /// Realizations that the study asks about: role test and no hidden repeat.
+    /// Realizations that the study asks about and somebody rated: role test and
+    /// no hidden repeat.
     pub(super) fn test_models(&self) -> Vec<usize> {
         (0..self.ratings.models.len())
             .filter(|&m| {
                 let model = &self.ratings.models[m];
-                model.role == Role::Test && model.duplicate_of.is_none()
+                self.rated[m] && model.role == Role::Test && model.duplicate_of.is_none()
             })
             .collect()
     }

@@ -20,6 +20,7 @@ const MAX_PAIRED: usize = 8;
 const MAX_LABELS: usize = 10_000;
 
 const FEW: &str = "fewer than two complete subjects or realizations";
+const NO_END: &str = "the interval of ICC2 ends where Spearman–Brown's formula has its pole";
 const NO_ERROR: &str = "the ratings leave no variance of error";
 
 pub(super) fn ranks_and_anova(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
@@ -58,7 +59,7 @@ fn ranks(table: &Table, values: &mut Values) {
     let why = "all subjects rank alike, or rate all alike";
     g.put_or("iman_davenport_F", f.iman_davenport, why);
     g.put_or("iman_davenport_p", f.iman_davenport_p, why);
-    let why = "too many arrangements to visit all, or no statistic";
+    let why = "too many orders of the ranks for the exact distribution, or no statistic";
     g.put_or("exact_p", f.exact_p, why);
 }
 
@@ -298,8 +299,12 @@ fn put_icc(found: Option<&Icc>, prefix: &str, few: &str, values: &mut Values) {
     for (name, c) in coefficients {
         g.maybe(name, c.map(|c| c.value));
         let ends = c.and_then(|c| c.ci95);
-        g.maybe(&format!("{name}/lo"), ends.map(|e| e.0));
-        g.maybe(&format!("{name}/hi"), ends.map(|e| e.1));
+        for (end, value) in [("lo", ends.map(|e| e.0)), ("hi", ends.map(|e| e.1))] {
+            match value.filter(|v| !v.is_finite()) {
+                Some(_) => g.put_or(&format!("{name}/{end}"), None, NO_END),
+                None => g.maybe(&format!("{name}/{end}"), value),
+            }
+        }
     }
 }
 

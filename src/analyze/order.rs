@@ -27,9 +27,12 @@ pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
         places.sort_by_key(|p| p.0);
         for &i in own {
             let before = r.trial_index[i] - 1;
-            // Of rows that claim the same place, the last.
-            let end = places.partition_point(|p| p.0 <= before);
-            if let Some((_, j)) = places[..end].last().filter(|p| p.0 == before) {
+            let first = places.partition_point(|p| p.0 < before);
+            // Where several claim the place, which one was before is not known.
+            if let [(place, j), after, ..] = &places[first..]
+                && *place == before
+                && after.0 != before
+            {
                 rows.push(i);
                 previous.push(cells.centred[*j]);
             }

@@ -202,6 +202,13 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
         }
     }
     for (m, model) in r.models.iter().enumerate() {
+        if !cells.rated[m] {
+            let text = format!(
+                "nobody rated realization {}: it is left out of all comparisons",
+                model.id
+            );
+            warn("not-rated", text);
+        }
         if cells.vaf[m].is_none() && has_vaf[m] {
             warn(
                 "vaf-differs",
@@ -252,7 +259,7 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     warn(
         "constant-rater",
         format!(
-            "{} gave one rating only: {shown}{more} (kept)",
+            "{} gave the same rating every time: {shown}{more} (kept)",
             people(constant)
         ),
     );

@@ -1,6 +1,6 @@
 //! Agreement: intraclass correlations and Krippendorff's alpha.
 
-use super::describe::{Sum, sum, tidy};
+use super::describe::{Sum, sum};
 use super::distribution::{f_quantile, f_upper};
 use super::finite;
 
@@ -9,7 +9,7 @@ use super::finite;
 pub struct Coefficient {
     /// The estimate.
     pub value: f64,
-    /// Its interval.
+    /// Its interval; an end of ICC2k's can be infinite.
     pub ci95: Option<(f64, f64)>,
 }
 
@@ -90,7 +90,8 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         ))
     };
     let icc2 = icc2(targets, raters, error, nf, kf);
-    let brown = |c: f64| finite(kf * c / (1.0 + (kf - 1.0) * c));
+    // Has a pole at −1/(k − 1): an end there is infinite, the other is not.
+    let brown = |c: f64| kf * c / (1.0 + (kf - 1.0) * c);
     Some(Icc {
         ms_targets: targets,
         ms_raters: raters,
@@ -105,7 +106,7 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         icc2k: icc2.and_then(|c| {
             Some(Coefficient {
                 value: finite((targets - error) / (targets + (raters - error) / nf))?,
-                ci95: c.ci95.and_then(|(l, h)| Some((brown(l)?, brown(h)?))),
+                ci95: c.ci95.map(|(l, h)| (brown(l), brown(h))),
             })
         }),
         icc2,
@@ -185,7 +186,7 @@ pub fn krippendorff<U: AsRef<[f64]>>(units: &[U]) -> Alpha {
     // Ascending; there are few, so each rating is looked up among them.
     let mut distinct: Vec<f64> = Vec::new();
     for x in units().flatten() {
-        let x = tidy(*x);
+        let x = *x;
         let at = distinct.partition_point(|d| *d < x);
         if distinct.get(at) != Some(&x) {
             if distinct.len() == MAX_DISTINCT {
@@ -204,8 +205,7 @@ pub fn krippendorff<U: AsRef<[f64]>>(units: &[U]) -> Alpha {
     let mut seen: Vec<usize> = Vec::new();
     for unit in units() {
         for x in unit {
-            let x = tidy(*x);
-            let place = distinct.partition_point(|d| *d < x);
+            let place = distinct.partition_point(|d| d < x);
             if counts[place] == 0.0 {
                 seen.push(place);
             }
@@ -280,6 +280,29 @@ mod tests {
         assert_eq!(two(i.icc1k.unwrap()), "0.44");
         assert_eq!(two(i.icc2k.unwrap().value), "0.62");
         assert_eq!(two(i.icc3k.unwrap().value), "0.91");
+    }
+
+    /// krippendorff 0.9.0 (Python): nominal 0, ordinal 6/7, interval .9973371205.
+    /// Ratings are apart however small their unit is.
+    #[test]
+    fn alpha_does_not_round_small_ratings() {
+        let units = [vec![1e-12, 2e-12], vec![7e-12, 8e-12], vec![3e-11, 3.1e-11]];
+        let a = krippendorff(&units);
+        assert!(
+            (a.interval.unwrap() - 0.997_337_120_539_676_9).abs() < 1e-12,
+            "{a:?}"
+        );
+        assert!(a.nominal.unwrap().abs() < 1e-12, "{a:?}");
+        assert!((a.ordinal.unwrap() - 6.0 / 7.0).abs() < 1e-12, "{a:?}");
+    }
+
+    /// Spearman–Brown's formula has its pole at an ICC2 of −1/(k − 1); only the
+    /// end that lies there is lost.
+    #[test]
+    fn an_end_of_icc2k_at_the_pole_leaves_the_other() {
+        let i = icc(&[vec![5.0, 3.5], vec![4.5, 4.5]]).unwrap();
+        let (lo, hi) = i.icc2k.unwrap().ci95.unwrap();
+        assert!(!lo.is_finite() && hi.is_finite(), "{lo} {hi}");
     }
 
     #[test]

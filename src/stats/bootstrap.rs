@@ -209,7 +209,8 @@ fn summary(
         bca,
         z0,
         acceleration,
-        p_le_zero: share(&|r| r <= 0.0),
+        // A correlation that is 0 on paper may be 10⁻¹⁷ here.
+        p_le_zero: share(&|r| r <= TIE),
         undefined_probability: undefined as f64 / total as f64,
         exact: false,
         normal_limit: false,
@@ -384,6 +385,31 @@ mod tests {
             weights += w;
         });
         assert_eq!((visited, weights), (35, 256));
+    }
+
+    /// VAF on even steps: whether r > 0 is told by whole numbers, Σ (2j − 3)·yⱼ.
+    #[test]
+    fn a_correlation_that_is_zero_on_paper_is_not_above_zero() {
+        let rows: [[f64; 4]; 5] = [
+            [1.0, 2.0, 2.0, 1.0],
+            [3.0, 1.0, 2.0, 4.0],
+            [5.0, 4.0, 4.0, 4.0],
+            [2.0, 3.0, 1.0, 2.0],
+            [1.0, 4.0, 2.0, 3.0],
+        ];
+        let trend = |y: &[f64]| -3.0 * y[0] - y[1] + y[2] + 3.0 * y[3];
+        let (mut not_above, mut zero, mut all) = (0, 0, 0);
+        let mut sums = vec![vec![0.0; 4]; 6];
+        let rows: Vec<Vec<f64>> = rows.iter().map(|r| r.to_vec()).collect();
+        compose(&rows, 0, 5, 1, &mut sums, &mut |s, w| {
+            not_above += if trend(s) <= 0.0 { w } else { 0 };
+            zero += if trend(s) == 0.0 { w } else { 0 };
+            all += w;
+        });
+        let found = correlation(&rows, &[0.7, 0.75, 0.8, 0.85], 1).unwrap();
+        assert!(found.exact && zero > 0 && found.undefined_probability == 0.0);
+        let expected = not_above as f64 / all as f64;
+        assert!((found.p_le_zero - expected).abs() < 1e-15);
     }
 
     #[test]

@@ -91,16 +91,21 @@ pub fn clmm(table: &Table) -> Both {
     let slope = slope_at_zero(table, &fixed);
     let found = start.and_then(|at| maximise(at, &mut by_laplace));
     let laplace = judge(table, &fixed, slope, found.as_ref());
-    let start = match (&found, &laplace) {
-        (Some(found), Ok(mixed)) if !mixed.boundary => Some(found.at.clone()),
-        _ => best(&starts, &mut |at| {
-            quadrature::point(table, at, &FEW, &mut modes)
-        }),
+    // Laplace's maximum is near; where it is not, the integral is searched anew.
+    let near = match (found, &laplace) {
+        (Some(found), Ok(mixed)) if !mixed.boundary => integrate(table, found.at, &mut modes),
+        _ => None,
     };
-    let found = start.and_then(|at| integrate(table, at, &mut modes));
+    let near = judge(table, &fixed, slope, near.as_ref());
+    let quadrature = near.or_else(|_| {
+        let few = &mut |at: &[f64]| quadrature::point(table, at, &FEW, &mut modes);
+        let start = best(&starts, few);
+        let found = start.and_then(|at| integrate(table, at, &mut modes));
+        judge(table, &fixed, slope, found.as_ref())
+    });
     Both {
-        quadrature: judge(table, &fixed, slope, found.as_ref()),
         laplace,
+        quadrature,
     }
 }
 

@@ -1,5 +1,7 @@
 //! Friedman's and Page's rank tests over a subjects × realizations table.
 
+mod exact;
+
 use super::distribution::{chi2_upper, f_upper, normal_upper};
 use super::finite;
 use super::rank::{doubled_ranks, mid_ranks};
@@ -21,12 +23,9 @@ pub struct Friedman {
     pub iman_davenport: Option<f64>,
     /// By F.
     pub iman_davenport_p: Option<f64>,
-    /// P(statistic ≥ observed) over all orders within rows, where it is cheap.
+    /// P(statistic ≥ observed) over all orders within rows, where they are few enough.
     pub exact_p: Option<f64>,
 }
-
-/// Most work, in visited states, that the exact distribution may cost.
-const EXACT_WORK: usize = 200_000;
 
 /// χ² = (k−1) Σⱼ(Rⱼ − n(k+1)/2)² / (Σᵢⱼ rᵢⱼ² − nk(k+1)²/4), which is Friedman's
 /// with the correction for ties (Conover 1999, §5.8). `None` below two rows or
@@ -60,86 +59,8 @@ pub fn friedman(rows: &[Vec<f64>]) -> Option<Friedman> {
         kendall_w: chi2.map(|c| c / (nf * (kf - 1.0))),
         iman_davenport,
         iman_davenport_p: iman_davenport.and_then(|f| f_upper(f, df1, df2)),
-        exact_p: chi2.and_then(|_| exact_p(&ranks, above, centre)),
+        exact_p: chi2.and_then(|_| exact::upper_tail(&ranks, above)),
     })
-}
-
-/// The distribution of Σ(Rⱼ − centre)² over all orders within rows, row by row.
-/// Columns are exchangeable under H₀, so a state is the sorted rank sums; they
-/// are packed into one number, 12 bits each.
-fn exact_p(ranks: &[Vec<i64>], observed: i64, centre: i64) -> Option<f64> {
-    const BITS: usize = 12;
-    let k = ranks.first()?.len();
-    if k > 5 || 2 * k * ranks.len() >= 1 << BITS {
-        return None;
-    }
-    let mut states: Vec<(u64, f64)> = vec![(0, 1.0)];
-    let mut work = 0;
-    for row in ranks {
-        let arrangements = arrangements(row);
-        let share = 1.0 / arrangements.len() as f64;
-        work += states.len() * arrangements.len();
-        if work > EXACT_WORK {
-            return None;
-        }
-        let mut next = Vec::with_capacity(states.len() * arrangements.len());
-        for (state, p) in &states {
-            for arrangement in &arrangements {
-                let mut sums = [0u64; 5];
-                for (j, rank) in arrangement.iter().enumerate() {
-                    // Doubled ranks are positive.
-                    sums[j] = (state >> (BITS * j) & ((1 << BITS) - 1)) + rank.unsigned_abs();
-                }
-                sums[..k].sort_unstable();
-                let packed = (0..k).fold(0, |all, j| all | sums[j] << (BITS * j));
-                next.push((packed, p * share));
-            }
-        }
-        next.sort_unstable_by_key(|s| s.0);
-        next.dedup_by(|later, kept| {
-            let same = later.0 == kept.0;
-            if same {
-                kept.1 += later.1;
-            }
-            same
-        });
-        states = next;
-    }
-    let size = |state: u64| -> i64 {
-        (0..k)
-            .map(|j| {
-                let sum = (state >> (BITS * j) & ((1 << BITS) - 1)) as i64;
-                (sum - centre) * (sum - centre)
-            })
-            .sum()
-    };
-    let p: f64 = states
-        .iter()
-        .filter(|(s, _)| size(*s) >= observed)
-        .map(|(_, p)| p)
-        .sum();
-    Some(p.min(1.0))
-}
-
-/// The distinct orders of a row; each stands for equally many permutations.
-fn arrangements(row: &[i64]) -> Vec<Vec<i64>> {
-    let mut current = row.to_vec();
-    current.sort_unstable();
-    let mut all = vec![current.clone()];
-    // Next permutation in lexicographic order (Narayana).
-    while let Some(i) = (1..current.len())
-        .rev()
-        .find(|&i| current[i - 1] < current[i])
-    {
-        let j = (i..current.len())
-            .rev()
-            .find(|&j| current[j] > current[i - 1])
-            .unwrap_or(i);
-        current.swap(i - 1, j);
-        current[i..].reverse();
-        all.push(current.clone());
-    }
-    all
 }
 
 /// Page's trend test.

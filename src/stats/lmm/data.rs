@@ -238,6 +238,17 @@ impl Table {
         &self.models
     }
 
+    /// Number of ratings of each realization, in that order.
+    pub(super) fn ratings_by_model(&self) -> Vec<f64> {
+        let mut ratings = vec![0.0; self.models.len()];
+        for pattern in &self.patterns {
+            for unit in &pattern.units {
+                ratings[unit.model] += pattern.subjects * unit.n;
+            }
+        }
+        ratings
+    }
+
     /// Number of ratings.
     pub fn ratings(&self) -> f64 {
         self.n

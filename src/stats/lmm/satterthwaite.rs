@@ -4,9 +4,10 @@
 //! effects, φ the coordinates off the boundary and log σ², g = ∂f/∂φ, H the
 //! Hessian of the REML deviance: var φ = 2H⁻¹, and ν = 2f²/(g'2H⁻¹g). A variance
 //! on the boundary is taken as known. F over several contrasts: lmerTest's
-//! rotation to independent ones (Kuznetsova et al. 2017, §2.3): tₘ² = (l̃ₘ'β)²/dₘ,
+//! contrasts, rotated to independent ones (Kuznetsova et al. 2017, §2.3): tₘ² = (l̃ₘ'β)²/dₘ,
 //! F = mean tₘ², E = Σ νₘ/(νₘ − 2), ν = 2E/(E − q).
 
+use super::data::Fixed;
 use super::differences::{first, second};
 use super::fit::{Fit, weight};
 use super::profile::profile;
@@ -111,10 +112,9 @@ impl Fit<'_> {
     /// [`super::Fixed::Models`] with two or more.
     pub fn f_test(&self) -> Option<ContrastF> {
         let p = self.table.columns();
-        let q = p.checked_sub(1).filter(|q| *q > 0)?;
-        let l = DMatrix::from_fn(q, p, |i, j| {
-            f64::from(i8::from(j == i + 1) - i8::from(j == 0))
-        });
+        let of_models = matches!(self.table.fixed, Fixed::Models);
+        let q = p.checked_sub(1).filter(|q| of_models && *q > 0)?;
+        let l = sequential(&self.table.ratings_by_model());
         let covariance = self.profile.inverse() * self.sigma2;
         let eigen = SymmetricEigen::new(&l * covariance * l.transpose());
         let rotated = eigen.eigenvectors.transpose() * l;
@@ -195,6 +195,20 @@ impl Fit<'_> {
             inverse,
         })
     }
+}
+
+/// The contrasts of a sequential decomposition (lmerTest's for one factor): each
+/// level but the first against the ratings of the first and of all later ones.
+/// F is the same for every basis, its degrees of freedom are not where the
+/// levels have unequal numbers.
+fn sequential(ratings: &[f64]) -> DMatrix<f64> {
+    let p = ratings.len();
+    let others = |i: usize| ratings[0] + ratings[i + 2..].iter().sum::<f64>();
+    DMatrix::from_fn(p - 1, p, |i, j| match j {
+        j if j == i + 1 => 1.0,
+        j if j == 0 || j > i + 1 => -ratings[j] / others(i),
+        _ => 0.0,
+    })
 }
 
 /// Denominator degrees of freedom of F from those of its parts.

@@ -116,6 +116,44 @@ fn a_balanced_random_intercept_has_its_closed_form() {
     close(adjusted.f, fit.f_test().unwrap().f, 1e-8);
 }
 
+/// Unequal numbers of ratings, cells missing: the degrees of freedom of F hang on
+/// the contrasts that are taken. R 4.2.2, lmerTest 3.1.3,
+/// `anova(lmer(y ~ m + (1 | s)))`: F 4.5316903505 on 2 and 11.5614721934,
+/// p .0352250596.
+#[test]
+fn f_over_unequal_numbers_takes_the_contrasts_of_lmertest() {
+    let ratings: [&[(usize, f64)]; 6] = [
+        &[(0, 3.0), (0, 4.0), (1, 5.0), (2, 4.0)],
+        &[(0, 2.0), (1, 4.0), (1, 3.0)],
+        &[(0, 5.0), (1, 6.0), (2, 6.0), (2, 7.0)],
+        &[(1, 5.0), (2, 5.0), (2, 7.0)],
+        &[(0, 2.0), (2, 4.0), (2, 3.0)],
+        &[(0, 6.0), (1, 6.0)],
+    ];
+    let mut cells = Vec::new();
+    for (subject, own) in ratings.iter().enumerate() {
+        for cell in own.chunk_by(|a, b| a.0 == b.0) {
+            let mean = cell.iter().map(|c| c.1).sum::<f64>() / cell.len() as f64;
+            cells.push(Cell {
+                subject,
+                model: cell[0].0,
+                x: 0.0,
+                n: cell.len(),
+                mean,
+                within: cell.iter().map(|c| (c.1 - mean).powi(2)).sum(),
+            });
+        }
+    }
+    let table = Table::new(&cells, Fixed::Models).unwrap();
+    let found = fit(&table, Random::default(), Criterion::Reml)
+        .unwrap()
+        .f_test()
+        .unwrap();
+    close(found.f, 4.531_690_350_5, 1e-6);
+    close(found.df2.unwrap(), 11.561_472_193_4, 1e-5);
+    close(found.p.unwrap(), 0.035_225_059_6, 1e-5);
+}
+
 #[test]
 fn a_variance_on_the_boundary_is_zero_exactly() {
     // Each subject has the same mean.

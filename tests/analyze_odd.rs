@@ -1,0 +1,72 @@
+//! Tables that are odd in one way each: nothing else may suffer from it.
+#![allow(clippy::unwrap_used)]
+
+use study::analyze::{Analysis, Rules, analyze};
+use study::outcome::ratings::Ratings;
+
+fn of(csv: &str) -> Analysis {
+    let ratings = Ratings::read_csv("a.csv", csv.as_bytes(), None).unwrap();
+    analyze(&ratings, &Rules::default())
+}
+
+/// Five subjects, four realizations, two repetitions; ratings 1 to 7.
+fn table(rating: impl Fn(usize, usize, usize) -> String) -> String {
+    let mut csv = String::from("subject,model,repetition,rating,vaf,trial_index\n");
+    for s in 0..5 {
+        for r in 0..2 {
+            for m in 0..4 {
+                let (vaf, trial) = (0.7 + 0.05 * m as f64, 4 * r + m + 1);
+                csv += &format!("S{s},m{m},{},{},{vaf:.2},{trial}\n", r + 1, rating(s, m, r));
+            }
+        }
+    }
+    csv
+}
+
+fn some(s: usize, m: usize, r: usize) -> String {
+    ((3 * s + 5 * m + 2 * r + s * m) % 7 + 1).to_string()
+}
+
+#[test]
+fn a_realization_that_nobody_rated_takes_nothing_from_the_others() {
+    let empty = of(&table(
+        |s, m, r| if m == 1 { String::new() } else { some(s, m, r) },
+    ));
+    let csv = table(some);
+    let rows = csv.lines().filter(|l| !l.contains(",m1,"));
+    let without = of(&rows.map(|l| format!("{l}\n")).collect::<String>());
+    for id in [
+        "design/n_subjects_complete",
+        "friedman/chi2",
+        "rmanova/F",
+        "corr/pearson/r",
+        "subject_slope/mean",
+        "page/L",
+        "bootstrap/se",
+        "icc_subjects/ICC2",
+        "lmm_model/reml_deviance",
+    ] {
+        assert!(without.values.number(id).is_some(), "{id}");
+        assert_eq!(empty.values.number(id), without.values.number(id), "{id}");
+    }
+    let said = empty
+        .warnings
+        .iter()
+        .find(|w| w.code == "not-rated")
+        .unwrap();
+    assert!(said.text.contains("m1"), "{}", said.text);
+}
+
+/// Trials numbered from 1 in each of two sessions: what came before a trial is
+/// not known, and no rating of the other session stands in for it.
+#[test]
+fn a_place_that_two_rows_claim_is_before_no_other() {
+    let twice = of(&table(some)
+        .replace(",5\n", ",1\n")
+        .replace(",6\n", ",2\n")
+        .replace(",7\n", ",3\n")
+        .replace(",8\n", ",4\n"));
+    assert!(twice.values.reason("order_previous_rating/slope").is_some());
+    let once = of(&table(some));
+    assert!(once.values.number("order_previous_rating/slope").is_some());
+}
