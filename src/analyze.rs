@@ -20,6 +20,7 @@ mod memory;
 mod mixed;
 mod order;
 mod ordinal;
+mod overflow;
 mod reference;
 mod select;
 mod subjects;
@@ -222,6 +223,9 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     let used = rows(ratings, |i| decisions[i].is_none());
     let (cells, rows_judged) = rayon::join(|| Cells::of(&used), || judged(ratings, &decisions));
     let mut values = statistics(&cells, rules);
+    if let Some(smaller) = overflow::smaller(&used) {
+        overflow::explain(&mut values, &statistics(&Cells::of(&smaller), rules));
+    }
     if exclusions.iter().any(|e| e.rows > 0) {
         let all = rows(ratings, |i| {
             let reason = decisions[i].as_deref();

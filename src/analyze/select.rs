@@ -116,7 +116,8 @@ pub struct Counts {
     pub excluded: BTreeMap<String, usize>,
     /// Participants that count.
     pub participants: usize,
-    /// Of these, those whose session is finished (or whose state is not known).
+    /// Of these, real ones whose session is finished (or whose state is not known):
+    /// pilots and simulated ones are not among those that were planned.
     pub finished: usize,
     /// Participants with at least one row that does not count.
     pub excluded_participants: usize,
@@ -173,7 +174,9 @@ impl Counts {
             practice: all.practice,
             excluded,
             participants: used.subjects.len(),
-            finished: used.subjects.iter().filter(|s| finished(s.state)).count(),
+            finished: (used.subjects.iter().zip(&origin))
+                .filter(|(s, o)| **o == Origin::Real && finished(s.state))
+                .count(),
             excluded_participants: gone.iter().filter(|g| **g).count(),
             planned: rules.planned,
             pilots: origin.iter().filter(|o| **o == Origin::Pilot).count(),
@@ -182,8 +185,14 @@ impl Counts {
         }
     }
 
-    /// Whether fewer have finished than were planned.
+    /// Participants that count and are real.
+    pub fn real(&self) -> usize {
+        self.participants - self.pilots - self.simulated
+    }
+
+    /// Whether fewer have finished than were planned. Without any real participant
+    /// there is nothing to be interim of.
     pub fn interim(&self) -> bool {
-        self.planned.is_some_and(|p| self.finished < p as usize)
+        self.real() > 0 && self.planned.is_some_and(|p| self.finished < p as usize)
     }
 }

@@ -127,7 +127,11 @@ fn head(source: &Source, details: &Details, a: &Analysis, lang: Option<&str>) ->
                     span { "protocol version " (version) } " "
                 }
                 @match c.planned {
-                    Some(planned) => span { (c.finished) " of " (planned) " planned participants finished" },
+                    Some(planned) => span {
+                        (c.finished) " of "
+                        (super::apa::counted(planned as usize, "planned participant", "planned participants"))
+                        " finished"
+                    },
                     None => span { (super::apa::counted(c.participants, "subject", "subjects")) },
                 }
                 " "

@@ -8,12 +8,12 @@ mod answers;
 mod headline;
 mod layout;
 
-use super::Source;
 use super::plot::{Axis, bars};
+use super::{Source, apa};
 use crate::analyze::{Analysis, Listed};
 use crate::outcome::Role;
 use crate::text::Untrusted;
-use layout::{Grid, Paint, cut, pad, wrap};
+use layout::{Grid, Paint, cut, number, pad, wrap};
 use unicode_width::UnicodeWidthStr as _;
 
 /// How the page is set.
@@ -65,7 +65,7 @@ pub fn comments(a: &Analysis, page: Page) -> String {
     for group in a.comments.chunk_by(|x, y| x.model == y.model) {
         let id = Untrusted(&group[0].model).to_string();
         let mean = a.values.number(&format!("desc/{}/mean", group[0].model));
-        let mean = mean.map_or_else(String::new, |m| format!("  mean {m:.3}"));
+        let mean = mean.map_or_else(String::new, |m| format!("  mean {}", number(m, 3)));
         out += &paint.strong(&format!("{id}{mean}"));
         out.push('\n');
         for c in group {
@@ -99,10 +99,13 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
         facts.push(format!("protocol {version}"));
     }
     facts.push(match c.planned {
-        Some(planned) => format!("{} of {planned} participants", c.finished),
-        None => format!("{} subjects", c.participants),
+        Some(planned) => {
+            let planned = apa::counted(planned as usize, "participant", "participants");
+            format!("{} of {planned}", c.finished)
+        }
+        None => apa::counted(c.participants, "subject", "subjects"),
     });
-    facts.push(format!("{} ratings", c.rated));
+    facts.push(apa::counted(c.rated, "rating", "ratings"));
     let facts = facts.join(" · ");
     let title = Untrusted(&source.title).to_string();
     let mut out = String::new();
@@ -174,9 +177,8 @@ fn table(
     let mut grid = Grid::new(&head, hist.map(|_| 5));
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
-        let show = |x: Option<f64>, digits: usize| {
-            x.map_or_else(|| "–".to_owned(), |x| layout::number(x, digits))
-        };
+        let show =
+            |x: Option<f64>, digits: usize| x.map_or_else(|| "–".to_owned(), |x| number(x, digits));
         let mut row = vec![
             name(m),
             show(get("n"), 0),
@@ -199,8 +201,8 @@ fn table(
             Some((low, high)) => format!(
                 "{} [{}, {}]",
                 show(over, 2),
-                layout::number(low, 2),
-                layout::number(high, 2)
+                number(low, 2),
+                number(high, 2)
             ),
             None => show(over, 2),
         });

@@ -27,10 +27,13 @@ fn methods(d: &Details, a: &Analysis) -> String {
     let tests = super::answers::tests(a).len();
     let mut said = Vec::new();
     let who = match (c.simulated == c.participants, c.pilots == c.participants) {
-        _ if c.participants == 0 => "subjects",
-        (true, _) => "simulated participants, no people,",
-        (_, true) => "pilot participants",
-        _ => "participants",
+        _ if c.participants == 0 => ("subject", "subjects"),
+        (true, _) => (
+            "simulated participant, no person,",
+            "simulated participants, no people,",
+        ),
+        (_, true) => ("pilot participant", "pilot participants"),
+        _ => ("participant", "participants"),
     };
     let times = d.repetitions.map_or_else(String::new, |n| match n {
         1 => " once".to_owned(),
@@ -38,8 +41,8 @@ fn methods(d: &Details, a: &Analysis) -> String {
         n => format!(" {n} times"),
     });
     said.push(format!(
-        "{} {who} rated {}{times}.",
-        c.participants,
+        "{} rated {}{times}.",
+        apa::counted(c.participants, who.0, who.1),
         apa::counted(tests, "realization", "realizations")
     ));
     if let Some(order) = &d.order {
