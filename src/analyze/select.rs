@@ -116,7 +116,8 @@ pub struct Counts {
     pub excluded: BTreeMap<String, usize>,
     /// Participants that count.
     pub participants: usize,
-    /// Of these, those whose session is finished (or whose state is not known).
+    /// Those whose session is finished (or whose state is not known): of these and
+    /// of those whom a pre-stated rule leaves out.
     pub finished: usize,
     /// Participants with at least one row that does not count.
     pub excluded_participants: usize,
@@ -142,7 +143,11 @@ impl Counts {
         // Rows share their reasons: each is put into words once.
         let mut by_reason: Vec<(&Arc<Reason>, usize)> = Vec::new();
         let mut places: HashMap<*const Reason, usize> = HashMap::new();
+        let mut took_part = vec![false; all.subjects.len()];
         for (i, decision) in decisions.iter().enumerate() {
+            if matches!(decision.as_deref(), None | Some(Reason::Rule(_))) {
+                took_part[all.subject[i] as usize] = true;
+            }
             if let Some(reason) = decision {
                 let at = *places.entry(Arc::as_ptr(reason)).or_insert_with(|| {
                     by_reason.push((reason, 0));
@@ -173,7 +178,9 @@ impl Counts {
             practice: all.practice,
             excluded,
             participants: used.subjects.len(),
-            finished: used.subjects.iter().filter(|s| finished(s.state)).count(),
+            finished: (all.subjects.iter().zip(&took_part))
+                .filter(|(s, part)| **part && finished(s.state))
+                .count(),
             excluded_participants: gone.iter().filter(|g| **g).count(),
             planned: rules.planned,
             pilots: origin.iter().filter(|o| **o == Origin::Pilot).count(),

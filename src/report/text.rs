@@ -14,7 +14,7 @@ use super::plot::{Axis, bars};
 use crate::analyze::{Analysis, Listed};
 use crate::outcome::Role;
 use crate::text::Untrusted;
-use layout::{Grid, Paint, cut, pad, wrap};
+use layout::{Grid, Paint, pad, squeezed, wrap};
 use unicode_width::UnicodeWidthStr as _;
 
 /// How the page is set.
@@ -25,6 +25,9 @@ pub struct Page {
     /// Whether it shows colours.
     pub colour: bool,
 }
+
+/// Columns that are spent on saying of what a repeat is one.
+const MAX_NAME: usize = 30;
 
 /// Most bins that a table shows as a histogram.
 const MAX_BINS: usize = 11;
@@ -100,6 +103,10 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
         facts.push(format!("protocol {version}"));
     }
     facts.push(match c.planned {
+        Some(planned) if c.participants != c.finished => format!(
+            "{} of {planned} participants, {} analysed",
+            c.finished, c.participants
+        ),
         Some(planned) => format!("{} of {planned} participants", c.finished),
         None => apa::counted(c.participants, "subject", "subjects"),
     });
@@ -125,7 +132,14 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
 fn name(m: &Listed) -> String {
     let id = Untrusted(&m.id);
     match (&m.duplicate_of, m.role) {
-        (Some(of), _) => format!("{id} (repeats {})", Untrusted(of)),
+        (Some(of), _) => {
+            let whole = format!("{id} (repeats {})", Untrusted(of));
+            if whole.width() <= MAX_NAME {
+                whole
+            } else {
+                format!("{id} (repeat)")
+            }
+        }
         (None, Role::Test) => id.to_string(),
         (None, role) => format!("{id} ({})", role.as_str()),
     }
@@ -172,7 +186,14 @@ fn table(
         head.push(h);
     }
     head.push("by subject [95 %]");
-    let mut grid = Grid::new(&head, hist.map(|_| 5));
+    // The median, the histogram, the share, the count.
+    let counts_at = hist.map(|_| 5);
+    let share_at = at_least.as_ref().map(|_| head.len() - 2);
+    let dropped: Vec<usize> = [Some(4), counts_at, share_at, Some(1)]
+        .into_iter()
+        .flatten()
+        .collect();
+    let mut grid = Grid::new(&head, counts_at, &dropped);
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
         let show = |x: Option<f64>, digits: usize| {
@@ -270,7 +291,7 @@ fn section(title: &str, axis: &Axis, margin: usize, paint: Paint) -> String {
 }
 
 fn line(m: &Listed, drawn: &str, margin: usize) -> String {
-    format!("{}   {drawn}\n", pad(&cut(&name(m), margin), margin))
+    format!("{}   {drawn}\n", pad(&squeezed(&name(m), margin), margin))
 }
 
 /// The question as a noun.
