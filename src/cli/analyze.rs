@@ -7,18 +7,15 @@ mod report;
 use super::load::Loaded;
 use super::{Console, Failure, results};
 use crate::analyze::{self, Analysis, Include, Rules, Warning, analyze};
-use crate::model::Realization;
 use crate::outcome::ratings::Ratings;
-use crate::outcome::{ParticipantRow, RatingRow};
 use crate::protocol::Protocol;
 use crate::report::figures::Trace;
 use crate::report::html::Details;
 use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
 use crate::store::{Derived, SessionData, StudyFolder};
-use crate::text::{ModelId, QuestionId};
+use crate::text::QuestionId;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -84,9 +81,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
         let sessions = study.sessions()?;
+        let loaded = results::frozen(study)?;
         let (input, damage) = rayon::join(
-            || of_study(study, &sessions, args),
-            || results::warnings(study, &sessions),
+            || of_study(study, &sessions, &loaded, args),
+            || results::warnings(study, &sessions, Some(&loaded)),
         );
         let (mut input, damage) = (input?, damage?);
         // On a terminal the page tells of it; who keeps or pipes the page, or asked
@@ -215,31 +213,26 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
     })
 }
 
-/// What a study's folder gives to the analysis.
-struct StudyInput {
-    protocol: Protocol,
-    protocol_version: u32,
-    /// How the realizations came about: λ and memory.
-    models: BTreeMap<ModelId, Realization>,
-    deviations: Vec<String>,
-    rows: Vec<RatingRow>,
-    participants: Vec<ParticipantRow>,
-}
-
+/// A study, by the newest version of its protocol. The VAF may stand in the model
+/// files only: they are opened too.
 fn of_study(
     study: &StudyFolder,
     sessions: &[SessionData],
+    loaded: &Loaded,
     args: &Args,
 ) -> Result<Analysed, Failure> {
-    let input = study_input(study, sessions)?;
-    let question = question(&input.protocol, args.question.as_deref())?;
-    let mut ratings = Ratings::from_rows(&input.rows, &question);
-    ratings.set_states(&input.participants);
-    ratings.set_duplicates(input.protocol.models.iter().filter_map(|m| {
+    let Loaded {
+        protocol, models, ..
+    } = loaded;
+    let derived = Derived::of(sessions, protocol);
+    let question = question(protocol, args.question.as_deref())?;
+    let mut ratings = Ratings::from_rows(&derived.rows, &question);
+    ratings.set_states(&derived.participants);
+    ratings.set_duplicates(protocol.models.iter().filter_map(|m| {
         let original = m.duplicate_of.as_ref()?;
         Some((m.id.as_str(), original.as_str()))
     }));
-    for (id, model) in &input.models {
+    for (id, model) in models {
         let told = [
             ("memory_mm", model.provenance.memory_mm),
             ("lambda", model.provenance.lambda),
@@ -251,13 +244,13 @@ fn of_study(
         }
     }
     let rules = Rules {
-        deviations: input.deviations,
-        ..Rules::of(&input.protocol, question.as_str(), include(args))
+        deviations: deviations(study)?,
+        ..Rules::of(protocol, question.as_str(), include(args))
     };
     let source = Source {
-        title: input.protocol.study.title.clone(),
-        study: Some(input.protocol.study.id.clone()),
-        protocol_version: Some(input.protocol_version),
+        title: protocol.study.title.clone(),
+        study: Some(protocol.study.id.clone()),
+        protocol_version: Some(study.version()),
         path: study.path().display().to_string(),
     };
     let analysis = analyze(&ratings, &rules);
@@ -265,14 +258,14 @@ fn of_study(
     Ok(Analysed {
         source,
         details: report::details(
-            &input.protocol,
+            protocol,
             study,
-            (&input.rows, &input.participants),
+            (&derived.rows, &derived.participants),
             question.as_str(),
         ),
         // Telemetry is large: only for who looks at it.
         traces: if written {
-            report::traces(study, &input.rows, &analysis)
+            report::traces(study, &derived.rows, &analysis)
         } else {
             Vec::new()
         },
@@ -306,23 +299,6 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
                 .hint(format!("there is: {}", numeric.join(", "))),
         )
     }
-}
-
-/// The rows of a study, by the newest version of its protocol. The VAF may stand
-/// in the model files only: they are opened too.
-fn study_input(study: &StudyFolder, sessions: &[SessionData]) -> Result<StudyInput, Failure> {
-    let Loaded {
-        protocol, models, ..
-    } = results::frozen(study)?;
-    let derived = Derived::of(sessions, &protocol);
-    Ok(StudyInput {
-        deviations: deviations(study)?,
-        models,
-        protocol,
-        protocol_version: study.version(),
-        rows: derived.rows,
-        participants: derived.participants,
-    })
 }
 
 /// What each later version of the protocol changed of the analysis.

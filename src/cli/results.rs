@@ -79,9 +79,10 @@ pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded
 pub(super) fn warnings(
     study: &StudyFolder,
     sessions: &[SessionData],
+    newest: Option<&Loaded>,
 ) -> Result<Vec<String>, Failure> {
     let mut found = study.faults(sessions)?;
-    found.extend(super::verify::frozen_versions(study));
+    found.extend(super::verify::frozen_versions(study, newest));
     let path = study.path().display();
     Ok(found
         .iter()

@@ -21,7 +21,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             console.out("\n")?;
         }
         let sessions = study.sessions()?;
-        results::warn(study, &results::warnings(study, &sessions)?, console);
+        results::warn(study, &results::warnings(study, &sessions, None)?, console);
         console.out(of_study(study, &sessions))?;
     }
     Ok(())

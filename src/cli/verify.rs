@@ -1,7 +1,7 @@
 //! `study verify`
 
 use super::{Console, Failure, results};
-use crate::cli::load;
+use crate::cli::load::{self, Loaded};
 use crate::store::{Finding, SessionData, StudyFolder, layout};
 use crate::text::{Untrusted, counted};
 use std::path::PathBuf;
@@ -28,7 +28,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             study.refresh_with(&loaded.protocol, args.drop_missing)?;
         }
         let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
-        found.extend(frozen_versions(&study));
+        found.extend(frozen_versions(&study, None));
         console.out(of_study(&study, &study.sessions()?, &found))?;
         wrong += found.iter().filter(|f| f.wrong).count();
     }
@@ -74,14 +74,19 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) ->
     out
 }
 
-/// Reads each frozen protocol and compares its fingerprints with study.json.
-pub(super) fn frozen_versions(study: &StudyFolder) -> Vec<Finding> {
+/// Reads each frozen protocol, but the newest if it is there already, and compares
+/// its fingerprints with study.json.
+pub(super) fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> Vec<Finding> {
     let mut found = Vec::new();
     for version in &study.manifest().versions {
         let number = version.version;
         let path = layout::protocol(study.path(), number).join(layout::PROTOCOL);
-        let what = match load::load_frozen(&path) {
-            Ok(loaded) if loaded.fingerprints == version.fingerprints => continue,
+        let prints = match newest {
+            Some(loaded) if number == study.version() => Ok(loaded.fingerprints.clone()),
+            _ => load::load_frozen(&path).map(|loaded| loaded.fingerprints),
+        };
+        let what = match prints {
+            Ok(prints) if prints == version.fingerprints => continue,
             Ok(_) => "its fingerprints are not those in study.json".to_owned(),
             Err(_) => format!("it cannot be read; see `study check {}`", path.display()),
         };

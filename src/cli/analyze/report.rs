@@ -227,7 +227,7 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
         .map(|r| (analysis.subject(r), analysis.model(r), r.repetition))
         .collect();
     let mut shown: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-    let mut found = Vec::new();
+    let mut wanted = Vec::new();
     for row in rows
         .iter()
         .filter(|r| !r.practice && r.status == Status::Ok)
@@ -242,17 +242,21 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
         let path = layout::session(study.path(), &row.participant, row.session)
             .join(layout::TELEMETRY)
             .join(layout::telemetry(row.trial, attempt, 1));
-        if let Some((points, measured)) = trace(&path) {
+        if path.is_file() {
             own.insert(who);
-            found.push(Trace {
-                model: model.to_owned(),
-                label: format!("{who} trial {}", row.trial),
-                measured,
-                points,
-            });
+            wanted.push((row, path));
         }
     }
-    found
+    let read = wanted.par_iter().with_max_len(1).map(|(row, path)| {
+        let (points, measured) = trace(path)?;
+        Some(Trace {
+            model: row.model.to_string(),
+            label: format!("{} trial {}", row.participant, row.trial),
+            measured,
+            points,
+        })
+    });
+    read.collect::<Vec<_>>().into_iter().flatten().collect()
 }
 
 /// Position and force of a telemetry file, and whether the force was measured.
