@@ -71,6 +71,7 @@ fn words(page: &str) -> String {
     }
     text.push_str(rest);
     let text = text.replace("&lt;", "<").replace("&gt;", ">");
+    let text = text.replace('\u{a0}', " ");
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 

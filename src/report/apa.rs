@@ -114,6 +114,23 @@ pub(super) fn percent(x: f64) -> String {
     format!("{} %", number(100.0 * x, 0))
 }
 
+/// Decimals, three to six, at which numbers that differ look different; three for
+/// more numbers than anybody compares.
+pub(super) fn telling(all: &[f64]) -> usize {
+    let apart = |decimals: usize| {
+        all.iter().enumerate().all(|(i, x)| {
+            let shown = number(*x, decimals);
+            all[..i]
+                .iter()
+                .all(|y| x == y || number(*y, decimals) != shown)
+        })
+    };
+    if all.len() > 200 {
+        return 3;
+    }
+    (3..6).find(|d| apart(*d)).unwrap_or(6)
+}
+
 /// As many digits as a reader of a table wants.
 pub(super) fn plain(x: f64) -> String {
     if x.fract() == 0.0 && x.abs() < 1e7 {
@@ -179,6 +196,8 @@ mod tests {
             [0.44, 0.015, 1.1e-5, 0.0].map(|se| decimals(se, 2)),
             [2, 3, 6, 2]
         );
+        assert_eq!(telling(&[0.9, 0.9005, 0.9]), 4);
+        assert_eq!(telling(&[0.9, 0.95]), 3);
         assert_eq!(plain(30.0), "30");
         assert_eq!(plain(0.12345), "0.1235");
     }

@@ -194,6 +194,8 @@ fn table(
         .flatten()
         .collect();
     let mut grid = Grid::new(&head, counts_at, &dropped);
+    let vaf: Vec<f64> = a.realizations.iter().filter_map(|m| m.vaf).collect();
+    let digits = apa::telling(&vaf);
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
         let show = |x: Option<f64>, digits: usize| {
@@ -210,7 +212,7 @@ fn table(
             let counts = v.list(&format!("desc/{}/hist", m.id)).unwrap_or(&[]);
             row.push(bars(counts, most, gap));
         }
-        row.push(show(m.vaf, 3));
+        row.push(show(m.vaf, digits));
         if at_least.is_some() {
             let share = v.number(&format!("realistic/{}/share", m.id));
             row.push(share.map_or_else(|| "–".to_owned(), |s| format!("{:.0} %", 100.0 * s)));

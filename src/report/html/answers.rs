@@ -2,7 +2,7 @@
 
 mod between;
 
-use super::safe;
+use super::{safe, typeset};
 use crate::analyze::{Analysis, Listed};
 use crate::outcome::Role;
 use crate::report::apa;
@@ -38,8 +38,8 @@ pub(super) fn section(a: &Analysis) -> Markup {
             }
             @for answer in &all {
                 h3 { (safe(&answer.question)) }
-                p.short { (safe(&answer.short)) }
-                @for line in &answer.more { p { (safe(line)) } }
+                p.short { (typeset(&answer.short)) }
+                @for line in &answer.more { p { (typeset(line)) } }
             }
         }
     }
@@ -217,7 +217,11 @@ fn separable(a: &Analysis) -> Option<Answer> {
         1 => String::new(),
         n => format!(", Holm's correction over {n} pairs"),
     };
-    let difference = format!("{first} {} and {second} {}", two(mean), two(next));
+    let difference = format!(
+        "{first} (mean {}) and {second} (mean {})",
+        two(mean),
+        two(next)
+    );
     let short = match found {
         Some((test, p)) => {
             let verdict = if p < 0.05 { "Yes" } else { "Not by these data" };
@@ -417,7 +421,7 @@ pub(super) fn only_these(a: &Analysis) -> Markup {
                      of this kind found a VAF effect that was not there in up to half of simulated studies. \
                      None of them answers whether VAF predicts realism."
                 }
-                ul { @for row in &rows { li { (safe(row)) } } }
+                ul { @for row in &rows { li { (typeset(row)) } } }
             }
         }
     }
