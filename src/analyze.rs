@@ -20,6 +20,7 @@ mod memory;
 mod mixed;
 mod order;
 mod ordinal;
+mod overflow;
 mod reference;
 mod select;
 mod subjects;
@@ -225,6 +226,9 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
         || statistics(&cells, rules),
         || Counts::of(ratings, &used, &decisions, rules),
     );
+    if let Some(smaller) = overflow::smaller(&used) {
+        overflow::explain(&mut values, &statistics(&Cells::of(&smaller), rules));
+    }
     if exclusions.iter().any(|e| e.rows > 0) {
         let all = rows(ratings, |i| {
             let reason = decisions[i].as_deref();

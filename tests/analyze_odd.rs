@@ -1,12 +1,29 @@
 //! Tables that are odd in one way each: nothing else may suffer from it.
 #![allow(clippy::unwrap_used)]
 
-use study::analyze::{Analysis, Rules, analyze};
+use study::analyze::{Analysis, Rules, Value, analyze};
 use study::outcome::ratings::Ratings;
+use study::report::Source;
+use study::report::text::{Page, page};
 
 fn of(csv: &str) -> Analysis {
     let ratings = Ratings::read_csv("a.csv", csv.as_bytes(), None).unwrap();
     analyze(&ratings, &Rules::default())
+}
+
+/// What the terminal shows.
+fn shown(a: &Analysis) -> String {
+    let source = Source {
+        title: "a.csv".to_owned(),
+        study: None,
+        protocol_version: None,
+        path: "a.csv".to_owned(),
+    };
+    let form = Page {
+        width: 100,
+        colour: false,
+    };
+    page(&source, a, form)
 }
 
 /// Five subjects, four realizations, two repetitions; ratings 1 to 7.
@@ -69,4 +86,51 @@ fn a_place_that_two_rows_claim_is_before_no_other() {
     assert!(twice.values.reason("order_previous_rating/slope").is_some());
     let once = of(&table(some));
     assert!(once.values.number("order_previous_rating/slope").is_some());
+}
+
+/// Squares of 10³⁰⁸ are no doubles. What is lost by that says so; what is not
+/// defined for another reason keeps it; no reason speaks of no ratings.
+#[test]
+fn what_overflows_says_that_it_does() {
+    let csv = table(|s, m, r| format!("{}e307", some(s, m, r)));
+    let a = of(&csv);
+    let why = |id: &str| a.values.reason(id).unwrap_or_else(|| panic!("{id}"));
+    for id in [
+        "desc/m0/sd",
+        "rmanova/F",
+        "icc_subjects/ICC1",
+        "lmm_model/reml_deviance",
+        "subject_slope/t",
+    ] {
+        assert!(
+            why(id).contains("beyond what a double holds"),
+            "{id}: {}",
+            why(id)
+        );
+    }
+    let plain = of(&table(|s, m, r| format!("{}.5", some(s, m, r))));
+    for id in ["clm_model/loglik", "realistic/m0/share"] {
+        assert_eq!(a.values.reason(id), plain.values.reason(id), "{id}");
+    }
+    for (id, value) in a.values.iter() {
+        if let Value::Undefined(why) = value {
+            assert!(
+                !why.contains("no ratings") && !why.contains("fewer than two"),
+                "{id}: {why}"
+            );
+        }
+    }
+    let page = shown(&a);
+    let digits = page
+        .split(|c: char| !c.is_ascii_digit())
+        .map(str::len)
+        .max();
+    assert!(digits.is_some_and(|n| n < 20), "{page}");
+}
+
+#[test]
+fn one_is_not_many() {
+    let one = of("subject,model,repetition,rating,vaf\nS,m,1,4,0.7\n");
+    let page = shown(&one);
+    assert!(page.contains("1 subject · 1 rating\n"), "{page}");
 }

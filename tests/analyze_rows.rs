@@ -223,6 +223,45 @@ fn before_the_planned_number_it_is_interim() {
     assert!(!code(2));
 }
 
+/// Those who were planned are no pilots: neither beside others nor alone.
+#[test]
+fn pilots_are_none_of_the_planned_participants() {
+    let mut rows = two();
+    for row in &mut rows {
+        row.pilot = row.participant.as_str() == "P01";
+    }
+    let people = [
+        participant("P01", State::Done, ""),
+        participant("P02", State::Done, ""),
+    ];
+    let rules = Rules {
+        planned: Some(2),
+        include: Include {
+            pilot: true,
+            simulated: false,
+        },
+        ..Rules::default()
+    };
+    let a = analyze(&ratings(&rows, &people), &rules);
+    assert_eq!((a.counts.participants, a.counts.finished), (2, 1));
+    let said = a.warnings.iter().find(|w| w.code == "interim").unwrap();
+    assert!(
+        said.text
+            .contains("1 of 2 planned participants has finished"),
+        "{}",
+        said.text
+    );
+    for row in &mut rows {
+        row.pilot = true;
+    }
+    let a = analyze(&ratings(&rows, &people), &rules);
+    let codes: Vec<&str> = a.warnings.iter().map(|w| w.code).collect();
+    assert!(
+        codes.contains(&"no-participants") && !codes.contains(&"interim"),
+        "{codes:?}"
+    );
+}
+
 #[test]
 fn failed_declined_missing_corrected_and_repeated_trials_are_counted() {
     let mut rows = two();

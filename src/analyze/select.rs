@@ -116,8 +116,9 @@ pub struct Counts {
     pub excluded: BTreeMap<String, usize>,
     /// Participants that count.
     pub participants: usize,
-    /// Those whose session is finished (or whose state is not known): of these and
-    /// of those whom a pre-stated rule leaves out.
+    /// Real ones whose session is finished (or whose state is not known): of these
+    /// and of those whom a pre-stated rule leaves out. Pilots and simulated ones are
+    /// not among those that were planned.
     pub finished: usize,
     /// Participants with at least one row that does not count.
     pub excluded_participants: usize,
@@ -145,7 +146,8 @@ impl Counts {
         let mut places: HashMap<*const Reason, usize> = HashMap::new();
         let mut took_part = vec![false; all.subjects.len()];
         for (i, decision) in decisions.iter().enumerate() {
-            if matches!(decision.as_deref(), None | Some(Reason::Rule(_))) {
+            let counts = matches!(decision.as_deref(), None | Some(Reason::Rule(_)));
+            if counts && all.origin[i] == Origin::Real {
                 took_part[all.subject[i] as usize] = true;
             }
             if let Some(reason) = decision {
@@ -189,8 +191,14 @@ impl Counts {
         }
     }
 
-    /// Whether fewer have finished than were planned.
+    /// Participants that count and are real.
+    pub fn real(&self) -> usize {
+        self.participants - self.pilots - self.simulated
+    }
+
+    /// Whether fewer have finished than were planned. Without any real participant
+    /// there is nothing to be interim of.
     pub fn interim(&self) -> bool {
-        self.planned.is_some_and(|p| self.finished < p as usize)
+        self.real() > 0 && self.planned.is_some_and(|p| self.finished < p as usize)
     }
 }

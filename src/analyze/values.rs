@@ -57,6 +57,15 @@ impl Values {
         self.0.append(&mut other.0);
     }
 
+    /// Says why anew of each that is not defined.
+    pub(super) fn explain(&mut self, why: impl Fn(&str) -> Option<String>) {
+        for (id, value) in &mut self.0 {
+            if let (Value::Undefined(old), Some(new)) = (&mut *value, why(id)) {
+                *old = new;
+            }
+        }
+    }
+
     /// Copies one to another identifier.
     pub(super) fn copy(&mut self, from: &Self, id: &str, to: String) {
         if let Some(value) = from.0.get(id) {

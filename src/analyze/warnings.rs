@@ -30,7 +30,7 @@ pub(super) fn warnings(
 ) -> Vec<Warning> {
     let mut found = Vec::new();
     let mut warn = |code, text: String| found.push(Warning { code, text });
-    let real = counts.participants - counts.pilots - counts.simulated;
+    let real = counts.real();
     let others = counts.pilots + counts.simulated;
     if others > 0 && real == 0 {
         warn(

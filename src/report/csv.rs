@@ -79,7 +79,16 @@ fn cells<const N: usize>(texts: [&str; N]) -> Vec<String> {
 }
 
 fn number(x: Option<f64>) -> String {
-    x.map_or_else(String::new, |x| x.to_string())
+    x.map_or_else(String::new, digits)
+}
+
+/// All digits of a number, and no zeros that only say how large or small it is.
+pub(super) fn digits(x: f64) -> String {
+    if x == 0.0 || (1e-5..1e16).contains(&x.abs()) {
+        x.to_string()
+    } else {
+        format!("{x:e}")
+    }
 }
 
 fn descriptives(a: &Analysis) -> Vec<Vec<String>> {
@@ -92,7 +101,7 @@ fn descriptives(a: &Analysis) -> Vec<Vec<String>> {
     head.extend(STATISTICS.iter().map(|s| (*s).to_owned()));
     head.extend(OVER_SUBJECTS.iter().map(|s| format!("subject_mean_{s}")));
     head.extend(cells(["cousineau_morey_ci95_half", "share_realistic"]));
-    head.extend((0..bins).map(|b| format!("count_{}", from.unwrap_or(0.0) + b as f64)));
+    head.extend((0..bins).map(|b| format!("count_{}", digits(from.unwrap_or(0.0) + b as f64))));
     let mut rows = vec![head];
     for m in &a.realizations {
         let id = &m.id;
@@ -145,9 +154,9 @@ fn identified(a: &Analysis, groups: &[&str]) -> Vec<Vec<String>> {
             continue;
         }
         rows.push(match value {
-            Value::Number(x) => vec![id.to_owned(), x.to_string(), String::new()],
+            Value::Number(x) => vec![id.to_owned(), digits(*x), String::new()],
             Value::List(x) => {
-                let all: Vec<String> = x.iter().map(f64::to_string).collect();
+                let all: Vec<String> = x.iter().map(|x| digits(*x)).collect();
                 vec![id.to_owned(), all.join(" "), String::new()]
             }
             Value::Undefined(why) => vec![id.to_owned(), String::new(), why.clone()],
@@ -237,7 +246,7 @@ fn with_and_without(a: &Analysis) -> Vec<Vec<String>> {
     for (id, value) in a.values.iter() {
         if let (Some(own), Value::Number(x)) = (id.strip_prefix("before_exclusion/"), value) {
             let with = number(a.values.number(own));
-            rows.push(vec![own.to_owned(), with, x.to_string()]);
+            rows.push(vec![own.to_owned(), with, digits(*x)]);
         }
     }
     rows
@@ -314,4 +323,25 @@ fn ratings_used(a: &Analysis) -> String {
             ]);
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::digits;
+
+    #[test]
+    fn digits_read_back_as_the_same_number() {
+        for (x, shown) in [
+            (0.0, "0"),
+            (-4.25, "-4.25"),
+            (1e15, "1000000000000000"),
+            (0.00001, "0.00001"),
+            (1.5e308, "1.5e308"),
+            (5e-324, "5e-324"),
+            (-1.2e-6, "-1.2e-6"),
+        ] {
+            assert_eq!(digits(x), shown);
+            assert_eq!(digits(x).parse(), Ok(x));
+        }
+    }
 }

@@ -213,7 +213,7 @@ fn drawn(
 }
 
 fn cell(x: Option<f64>) -> String {
-    x.map_or_else(String::new, |x| x.to_string())
+    x.map_or_else(String::new, super::csv::digits)
 }
 
 fn head<const N: usize>(names: [&str; N]) -> Vec<String> {

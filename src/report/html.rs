@@ -143,7 +143,11 @@ fn head(source: &Source, details: &Details, a: &Analysis, lang: Option<&str>) ->
                 }
                 @match c.planned {
                     Some(planned) => {
-                        span { (c.finished) " of " (planned) " planned participants finished" }
+                        span {
+                            (c.finished) " of "
+                            (super::apa::counted(planned as usize, "planned participant", "planned participants"))
+                            " finished"
+                        }
                         @if c.participants != c.finished { " " span { (c.participants) " analysed" } }
                     },
                     None => span { (super::apa::counted(c.participants, "subject", "subjects")) },

@@ -81,9 +81,15 @@ impl Axis {
         let mut free = 0;
         let mut k = (self.low / step - 1e-9).ceil();
         while k * step <= self.high + 1e-9 * step {
-            let label: Vec<char> = format!("{:.decimals$}", k * step + 0.0).chars().collect();
-            let at = self.column(k * step)?;
-            let start = at.saturating_sub(label.len() / 2);
+            let at = k * step + 0.0;
+            let label = if at.abs().max(step) >= 1e12 {
+                format!("{at:.2e}")
+            } else {
+                format!("{at:.decimals$}")
+            };
+            let label: Vec<char> = label.chars().collect();
+            let column = self.column(k * step)?;
+            let start = column.saturating_sub(label.len() / 2);
             let start = start.min(self.columns.checked_sub(label.len())?);
             if start < free {
                 return None;

@@ -8,13 +8,12 @@ mod answers;
 mod headline;
 mod layout;
 
-use super::Source;
-use super::apa;
 use super::plot::{Axis, bars};
+use super::{Source, apa};
 use crate::analyze::{Analysis, Listed};
 use crate::outcome::Role;
 use crate::text::Untrusted;
-use layout::{Grid, Paint, pad, squeezed, wrap};
+use layout::{Grid, Paint, number, pad, squeezed, wrap};
 use unicode_width::UnicodeWidthStr as _;
 
 /// How the page is set.
@@ -69,7 +68,7 @@ pub fn comments(a: &Analysis, page: Page) -> String {
     for group in a.comments.chunk_by(|x, y| x.model == y.model) {
         let id = Untrusted(&group[0].model).to_string();
         let mean = a.values.number(&format!("desc/{}/mean", group[0].model));
-        let mean = mean.map_or_else(String::new, |m| format!("  mean {m:.3}"));
+        let mean = mean.map_or_else(String::new, |m| format!("  mean {}", number(m, 3)));
         out += &paint.strong(&format!("{id}{mean}"));
         out.push('\n');
         for c in group {
@@ -103,11 +102,15 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
         facts.push(format!("protocol {version}"));
     }
     facts.push(match c.planned {
-        Some(planned) if c.participants != c.finished => format!(
-            "{} of {planned} participants, {} analysed",
-            c.finished, c.participants
-        ),
-        Some(planned) => format!("{} of {planned} participants", c.finished),
+        Some(planned) => {
+            let planned = apa::counted(planned as usize, "participant", "participants");
+            let finished = format!("{} of {planned}", c.finished);
+            if c.participants == c.finished {
+                finished
+            } else {
+                format!("{finished}, {} analysed", c.participants)
+            }
+        }
         None => apa::counted(c.participants, "subject", "subjects"),
     });
     facts.push(apa::counted(c.rated, "rating", "ratings"));
@@ -198,9 +201,8 @@ fn table(
     let digits = apa::telling(&vaf);
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
-        let show = |x: Option<f64>, digits: usize| {
-            x.map_or_else(|| "–".to_owned(), |x| layout::number(x, digits))
-        };
+        let show =
+            |x: Option<f64>, digits: usize| x.map_or_else(|| "–".to_owned(), |x| number(x, digits));
         let mut row = vec![
             name(m),
             show(get("n"), 0),
@@ -223,8 +225,8 @@ fn table(
             Some((low, high)) => format!(
                 "{} [{}, {}]",
                 show(over, 2),
-                layout::number(low, 2),
-                layout::number(high, 2)
+                number(low, 2),
+                number(high, 2)
             ),
             None => show(over, 2),
         });

@@ -1,6 +1,7 @@
 //! How often each rating was given, by realization.
 
 use super::{Canvas, Drawn, Scene, drawn, head, name};
+use crate::report::csv::digits;
 use crate::report::svg::{Axis, Look, Mark, PALETTE, Panel, Span};
 
 /// Most bins of a histogram that can be told apart.
@@ -39,7 +40,7 @@ pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
     for (m, counts) in scene.models.iter().zip(&counts) {
         for (b, n) in counts.iter().enumerate() {
             let rating = first + b as f64;
-            data.push(vec![m.id.clone(), rating.to_string(), n.to_string()]);
+            data.push(vec![m.id.clone(), digits(rating), n.to_string()]);
         }
     }
     let of = match scene.asked.as_str() {

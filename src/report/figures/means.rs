@@ -2,6 +2,7 @@
 
 use super::{Canvas, Drawn, Scene, cell, drawn, head};
 use crate::report::apa;
+use crate::report::csv::digits;
 use crate::report::svg::{Anchor, Axis, Colour, Figure, Look, Mark, Note, Panel, Whisker};
 use crate::report::svg::{PALETTE, SMALL, for_names, shortened, text_width};
 
@@ -125,8 +126,8 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
     for d in &dots {
         data.push(vec![
             scene.models[d.nth].id.clone(),
-            d.vaf.to_string(),
-            d.mean.to_string(),
+            digits(d.vaf),
+            digits(d.mean),
             cell(d.ends.map(|e| e.0)),
             cell(d.ends.map(|e| e.1)),
         ]);

@@ -1,7 +1,7 @@
 //! The study's questions and their answers, in words with numbers.
 
 use super::super::{apa, pairs, permuted, tied};
-use super::layout::{Paint, wrap};
+use super::layout::{Paint, number, wrap};
 use super::{asked, listed};
 use crate::analyze::{Analysis, Value};
 use crate::stats::permutation::DRAWS;
@@ -65,14 +65,17 @@ fn best(a: &Analysis) -> Vec<String> {
         let best = ranked.iter().take_while(|(m, _)| *m == mean);
         let best: Vec<String> = best.map(|(_, id)| Untrusted(id).to_string()).collect();
         return vec![format!(
-            "{} share the highest mean, {mean:.3}.",
-            apa::listing(&best)
+            "{} share the highest mean, {}.",
+            apa::listing(&best),
+            number(mean, 3)
         )];
     }
     let mut said = vec![format!(
-        "{}: mean {mean:.3}; next {} with {next_mean:.3}.",
+        "{}: mean {}; next {} with {}.",
         Untrusted(first),
-        Untrusted(second)
+        number(mean, 3),
+        Untrusted(second),
+        number(next_mean, 3)
     )];
     let (low, high) = if first < second {
         (first, second)
@@ -120,9 +123,10 @@ fn differ(a: &Analysis) -> Vec<String> {
     ) && let (Some(df1), Some(df2)) = (v.number("rmanova/df1"), v.number("rmanova/df2"))
     {
         parts.push(format!(
-            "F({:.1}, {:.1}) = {f:.2}, p {} (Greenhouse–Geisser)",
+            "F({:.1}, {:.1}) = {}, p {} (Greenhouse–Geisser)",
             df1 * e,
             df2 * e,
+            number(f, 2),
             p(pg)
         ));
     }
@@ -134,7 +138,8 @@ fn differ(a: &Analysis) -> Vec<String> {
                 .number("friedman/kendall_W")
                 .map_or_else(String::new, |w| format!(", Kendall's W = {}", r(w)));
             parts.push(format!(
-                "Friedman χ²({df}) = {chi2:.2}, {kind} {}{w}",
+                "Friedman χ²({df}) = {}, {kind} {}{w}",
+                number(chi2, 2),
                 p(value)
             ));
         }

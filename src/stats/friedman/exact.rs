@@ -13,7 +13,7 @@ const MAX_COLUMNS: usize = 8;
 const MAX_ADDED: f64 = 2e6;
 
 /// After so many of them, and at each doubling, it is asked how many will follow.
-const ENOUGH_SEEN: f64 = 1e5;
+const ENOUGH_SEEN: f64 = 1e4;
 
 /// Most sums of the last row that are compared: about ten milliseconds.
 const MAX_COMPARED: usize = 4_000_000;
