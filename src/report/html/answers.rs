@@ -5,7 +5,7 @@ mod between;
 use super::{safe, typeset};
 use crate::analyze::{Analysis, Listed};
 use crate::outcome::Role;
-use crate::report::apa;
+use crate::report::{MAX_PAIRED, apa};
 use maud::{Markup, html};
 
 /// One question.
@@ -256,9 +256,6 @@ fn separable(a: &Analysis) -> Option<Answer> {
         more,
     })
 }
-
-/// More realizations are not compared pair by pair.
-const MAX_PAIRED: usize = 8;
 
 /// Why no pair can be significant.
 pub(super) fn too_few_for_pairs(pairs: usize, least: f64) -> String {
