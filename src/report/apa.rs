@@ -27,14 +27,21 @@ pub(super) fn share(x: f64, decimals: usize) -> String {
     }
 }
 
-/// `a, b and c`.
+/// `a, b and c`; of very many the first ones.
 pub(super) fn listing(names: &[String]) -> String {
+    if names.len() > MAX_LISTED {
+        let more = names.len() - MAX_LISTED;
+        return format!("{} and {more} more", names[..MAX_LISTED].join(", "));
+    }
     match names {
         [] => String::new(),
         [one] => one.clone(),
         [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
 }
+
+/// Names that a sentence can hold.
+const MAX_LISTED: usize = 12;
 
 /// A correlation.
 pub(super) fn r(x: f64) -> String {
@@ -176,6 +183,8 @@ mod tests {
         let names = ["a", "b", "c"].map(str::to_owned);
         let said = [0, 1, 2, 3].map(|n| listing(&names[..n]));
         assert_eq!(said, ["", "a", "a and b", "a, b and c"]);
+        let many = vec!["m".to_owned(); 20_000];
+        assert!(listing(&many).ends_with("m, m and 19988 more"));
     }
 
     #[test]
