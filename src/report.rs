@@ -45,16 +45,27 @@ fn tied(a: &crate::analyze::Analysis) -> usize {
         let id = format!("desc/{}/subject_mean/mean", m.id);
         m.vaf.filter(|_| own).and(a.values.number(&id))
     };
-    let means: Vec<f64> = a.realizations.iter().filter_map(|m| of(&m)).collect();
-    let same = |x: f64, y: f64| (x - y).abs() <= 1e-9 * x.abs().max(1.0);
-    let twins = |x: &&f64| means.iter().filter(|y| same(**x, **y)).count() > 1;
-    means.iter().filter(twins).count()
+    let mut means: Vec<f64> = a.realizations.iter().filter_map(|m| of(&m)).collect();
+    means.sort_by(f64::total_cmp);
+    let same = |x: &f64, y: &f64| (x - y).abs() <= 1e-9 * x.abs().max(1.0);
+    let groups = means.chunk_by(same).map(<[f64]>::len);
+    groups.filter(|n| *n > 1).sum()
 }
+
+/// More realizations are not compared pair by pair.
+const MAX_PAIRED: usize = 8;
 
 /// Pairs that were compared, by name, and the least p that Wilcoxon's test and
 /// Holm's correction could have given the clearest of them.
 fn pairs(a: &crate::analyze::Analysis) -> (Vec<(String, String)>, Option<f64>) {
-    let ids: Vec<&str> = a.realizations.iter().map(|m| m.id.as_str()).collect();
+    let own = |m: &&crate::analyze::Listed| {
+        m.role == crate::outcome::Role::Test && m.duplicate_of.is_none()
+    };
+    let tests = a.realizations.iter().filter(own);
+    let ids: Vec<&str> = tests.map(|m| m.id.as_str()).collect();
+    if ids.len() > MAX_PAIRED {
+        return (Vec::new(), None);
+    }
     let mut found = Vec::new();
     for first in &ids {
         for second in ids.iter().filter(|s| first < *s) {

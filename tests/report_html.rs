@@ -46,6 +46,7 @@ fn golden() -> Vec<PathBuf> {
     sets
 }
 
+/// The report, with plain spaces.
 fn report(a: &Analysis, traces: &[Trace]) -> String {
     document(
         &source("A study"),
@@ -53,6 +54,7 @@ fn report(a: &Analysis, traces: &[Trace]) -> String {
         a,
         &figures::all(a, traces),
     )
+    .replace('\u{a0}', " ")
 }
 
 /// Nothing that a browser would fetch or run.

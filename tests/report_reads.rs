@@ -71,6 +71,7 @@ fn words(page: &str) -> String {
     }
     text.push_str(rest);
     let text = text.replace("&lt;", "<").replace("&gt;", ">");
+    let text = text.replace('\u{a0}', " ");
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -383,4 +384,25 @@ fn headings_are_in_order_and_tables_have_heads() {
             );
         }
     }
+}
+
+#[test]
+fn the_terminal_page_stays_a_page() {
+    let names: Vec<String> = (0..300).map(|m| format!("m{m:03}")).collect();
+    let models: Vec<(&str, f64)> = names.iter().map(|n| (n.as_str(), 0.5)).collect();
+    let a = analysis_of(&ratings(2, &models, |_, m, k| 1.0 + ((m + k) % 3) as f64));
+    let told = page(
+        &source(),
+        &a,
+        Page {
+            width: 80,
+            colour: false,
+        },
+    );
+    assert!(told.lines().count() < 150, "{}", told.lines().count());
+    assert!(
+        told.contains("260 realizations are not shown here"),
+        "{told}"
+    );
+    assert!(told.lines().all(|l| l.chars().count() <= 80), "{told}");
 }

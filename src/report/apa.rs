@@ -27,14 +27,21 @@ pub(super) fn share(x: f64, decimals: usize) -> String {
     }
 }
 
-/// `a, b and c`.
+/// `a, b and c`; of very many the first ones.
 pub(super) fn listing(names: &[String]) -> String {
+    if names.len() > MAX_LISTED {
+        let more = names.len() - MAX_LISTED;
+        return format!("{} and {more} more", names[..MAX_LISTED].join(", "));
+    }
     match names {
         [] => String::new(),
         [one] => one.clone(),
         [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
 }
+
+/// Names that a sentence can hold.
+const MAX_LISTED: usize = 12;
 
 /// A correlation.
 pub(super) fn r(x: f64) -> String {
@@ -114,6 +121,23 @@ pub(super) fn percent(x: f64) -> String {
     format!("{} %", number(100.0 * x, 0))
 }
 
+/// Decimals, three to six, at which numbers that differ look different; three for
+/// more numbers than anybody compares.
+pub(super) fn telling(all: &[f64]) -> usize {
+    let apart = |decimals: usize| {
+        all.iter().enumerate().all(|(i, x)| {
+            let shown = number(*x, decimals);
+            all[..i]
+                .iter()
+                .all(|y| x == y || number(*y, decimals) != shown)
+        })
+    };
+    if all.len() > 200 {
+        return 3;
+    }
+    (3..6).find(|d| apart(*d)).unwrap_or(6)
+}
+
 /// As many digits as a reader of a table wants.
 pub(super) fn plain(x: f64) -> String {
     if x.fract() == 0.0 && x.abs() < 1e7 {
@@ -159,6 +183,8 @@ mod tests {
         let names = ["a", "b", "c"].map(str::to_owned);
         let said = [0, 1, 2, 3].map(|n| listing(&names[..n]));
         assert_eq!(said, ["", "a", "a and b", "a, b and c"]);
+        let many = vec!["m".to_owned(); 20_000];
+        assert!(listing(&many).ends_with("m, m and 19988 more"));
     }
 
     #[test]
@@ -179,6 +205,8 @@ mod tests {
             [0.44, 0.015, 1.1e-5, 0.0].map(|se| decimals(se, 2)),
             [2, 3, 6, 2]
         );
+        assert_eq!(telling(&[0.9, 0.9005, 0.9]), 4);
+        assert_eq!(telling(&[0.9, 0.95]), 3);
         assert_eq!(plain(30.0), "30");
         assert_eq!(plain(0.12345), "0.1235");
     }

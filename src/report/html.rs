@@ -103,6 +103,16 @@ fn safe(text: &str) -> String {
     Untrusted(text).to_string()
 }
 
+/// A sentence, whose lines break neither around a sign of equality or comparison nor
+/// before a per cent sign.
+fn typeset(text: &str) -> String {
+    safe(text)
+        .replace(" = ", "\u{a0}=\u{a0}")
+        .replace(" < ", "\u{a0}<\u{a0}")
+        .replace(" %", "\u{a0}%")
+        .replace("% CI [", "%\u{a0}CI\u{a0}[")
+}
+
 /// Text from the data that may have lines.
 fn lines(text: &str) -> Markup {
     html! {
@@ -163,7 +173,7 @@ fn figures_section(figures: &[Drawn]) -> Markup {
                         div.wide { (PreEscaped(f.wide.to_svg())) }
                         div.narrow { (PreEscaped(f.narrow.to_svg())) }
                         figcaption {
-                            b { "Figure " (i + 1) ". " } (safe(&f.caption))
+                            b { "Figure " (i + 1) ". " } (typeset(&f.caption))
                             span.file { " figures/" (f.name) ".svg, .png, .csv" }
                         }
                     }

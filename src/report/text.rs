@@ -25,6 +25,9 @@ pub struct Page {
     pub colour: bool,
 }
 
+/// Most realizations on the page, of those that are asked about and of the others.
+const MAX_SHOWN: usize = 40;
+
 /// Columns that are spent on saying of what a repeat is one.
 const MAX_NAME: usize = 30;
 
@@ -38,8 +41,17 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
     let mut out = head(source, a, width, paint);
     let (tests, others) = listed(a);
     if !a.realizations.is_empty() {
-        out += &table(a, &tests, &others, width, paint);
-        out += &chart(a, &tests, &others, width, paint);
+        let tests = &tests[..tests.len().min(MAX_SHOWN)];
+        let others = &others[..others.len().min(MAX_SHOWN)];
+        out += &table(a, tests, others, width, paint);
+        out += &chart(a, tests, others, width, paint);
+        let more = a.realizations.len() - tests.len() - others.len();
+        if more > 0 {
+            let what = apa::counted(more, "realization is", "realizations are");
+            let text = format!("{what} not shown here: --out writes descriptives.csv, with all.");
+            out += &wrap(&text, width, "", "");
+            out.push('\n');
+        }
     }
     out += &answers::answers(a, width, paint);
     out += &headline::headline(a, width, paint);
@@ -197,6 +209,8 @@ fn table(
         .flatten()
         .collect();
     let mut grid = Grid::new(&head, counts_at, &dropped);
+    let vaf: Vec<f64> = a.realizations.iter().filter_map(|m| m.vaf).collect();
+    let digits = apa::telling(&vaf);
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
         let show =
@@ -212,7 +226,7 @@ fn table(
             let counts = v.list(&format!("desc/{}/hist", m.id)).unwrap_or(&[]);
             row.push(bars(counts, most, gap));
         }
-        row.push(show(m.vaf, 3));
+        row.push(show(m.vaf, digits));
         if at_least.is_some() {
             let share = v.number(&format!("realistic/{}/share", m.id));
             row.push(share.map_or_else(|| "–".to_owned(), |s| format!("{:.0} %", 100.0 * s)));

@@ -143,9 +143,14 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
             apa::r(r)
         )
     });
+    let bars = if dots.iter().any(|d| d.ends.is_some()) {
+        " Error bars: 95 % t intervals over subjects; they hold for these realizations and say \
+         nothing about others."
+    } else {
+        ""
+    };
     let caption = format!(
-        "Mean {} over subjects against VAF (variance accounted for). Error bars: 95 % t intervals \
-         over subjects; they hold for these realizations and say nothing about others.{found}",
+        "Mean {} over subjects against VAF (variance accounted for).{bars}{found}",
         scene.asked
     );
     let title = format!("Mean {} against VAF", scene.asked);
@@ -162,7 +167,8 @@ fn plane(scene: &Scene<'_>, dots: &[Dot], title: &str, c: Canvas) -> Figure {
             [low, high, d.mean]
         })
         .collect();
-    let label = format!("{}, mean [95 %]", scene.asked);
+    let with = dots.iter().any(|d| d.ends.is_some());
+    let label = format!("{}, mean{}", scene.asked, if with { " [95 %]" } else { "" });
     let mut height = c.pick(360.0, 320.0);
     let axes = Panel::new(
         Axis::around("VAF", dots.iter().map(|d| d.vaf)),

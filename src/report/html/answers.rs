@@ -2,10 +2,10 @@
 
 mod between;
 
-use super::safe;
+use super::{safe, typeset};
 use crate::analyze::{Analysis, Listed};
 use crate::outcome::Role;
-use crate::report::apa;
+use crate::report::{MAX_PAIRED, apa};
 use maud::{Markup, html};
 
 /// One question.
@@ -38,8 +38,8 @@ pub(super) fn section(a: &Analysis) -> Markup {
             }
             @for answer in &all {
                 h3 { (safe(&answer.question)) }
-                p.short { (safe(&answer.short)) }
-                @for line in &answer.more { p { (safe(line)) } }
+                p.short { (typeset(&answer.short)) }
+                @for line in &answer.more { p { (typeset(line)) } }
             }
         }
     }
@@ -217,7 +217,11 @@ fn separable(a: &Analysis) -> Option<Answer> {
         1 => String::new(),
         n => format!(", Holm's correction over {n} pairs"),
     };
-    let difference = format!("{first} {} and {second} {}", two(mean), two(next));
+    let difference = format!(
+        "{first} (mean {}) and {second} (mean {})",
+        two(mean),
+        two(next)
+    );
     let short = match found {
         Some((test, p)) => {
             let verdict = if p < 0.05 { "Yes" } else { "Not by these data" };
@@ -252,9 +256,6 @@ fn separable(a: &Analysis) -> Option<Answer> {
         more,
     })
 }
-
-/// More realizations are not compared pair by pair.
-const MAX_PAIRED: usize = 8;
 
 /// Why no pair can be significant.
 pub(super) fn too_few_for_pairs(pairs: usize, least: f64) -> String {
@@ -417,7 +418,7 @@ pub(super) fn only_these(a: &Analysis) -> Markup {
                      of this kind found a VAF effect that was not there in up to half of simulated studies. \
                      None of them answers whether VAF predicts realism."
                 }
-                ul { @for row in &rows { li { (safe(row)) } } }
+                ul { @for row in &rows { li { (typeset(row)) } } }
             }
         }
     }

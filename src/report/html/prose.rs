@@ -2,7 +2,7 @@
 //! these realizations only.
 
 use super::answers::ci;
-use super::{Details, safe};
+use super::{Details, typeset};
 use crate::analyze::Analysis;
 use crate::report::apa;
 use maud::{Markup, html};
@@ -14,10 +14,10 @@ pub(super) fn section(details: &Details, a: &Analysis) -> Markup {
             h2 { "For the paper" }
             p.note { "Written from the numbers of this analysis. Check every sentence before you print it." }
             h3 { "Methods" }
-            p { (safe(&super::methods::paragraph(details, a))) }
+            p { (typeset(&super::methods::paragraph(details, a))) }
             @if !results.is_empty() {
                 h3 { "Results" }
-                p { (safe(&results)) }
+                p { (typeset(&results)) }
             }
         }
     }

@@ -113,13 +113,16 @@ fn realizations(a: &Analysis) -> Table {
     let beside = |m: &Listed| !tests.iter().any(|t| t.id == m.id);
     let mut listed: Vec<&Listed> = a.realizations.iter().collect();
     listed.sort_by_key(|m| beside(m));
+    let vaf: Vec<f64> = listed.iter().filter_map(|m| m.vaf).collect();
+    let digits = apa::telling(&vaf);
     for m in listed {
         let get = |what: &str| v.number(&format!("desc/{}/{what}", m.id));
         let ends = get("subject_mean/ci95_lo").zip(get("subject_mean/ci95_hi"));
         let mut row = vec![
             apa::name(&m.id),
             role(m),
-            m.vaf.map_or_else(|| "–".to_owned(), |v| apa::share(v, 3)),
+            m.vaf
+                .map_or_else(|| "–".to_owned(), |v| apa::share(v, digits)),
             show(get("n"), 0),
             show(get("mean"), 3),
             show(get("sd"), 3),

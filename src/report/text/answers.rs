@@ -1,6 +1,6 @@
 //! The study's questions and their answers, in words with numbers.
 
-use super::super::{apa, pairs, permuted, tied};
+use super::super::{MAX_PAIRED, apa, pairs, permuted, tied};
 use super::layout::{Paint, number, wrap};
 use super::{asked, listed};
 use crate::analyze::{Analysis, Value};
@@ -101,7 +101,7 @@ fn best(a: &Analysis) -> Vec<String> {
                 p(least).trim_start_matches("= ")
             ));
         }
-    } else if pairs.is_empty() && ranked.len() > 8 {
+    } else if pairs.is_empty() && ranked.len() > MAX_PAIRED {
         said.push("Pairs are tested of eight realizations at most.".to_owned());
     }
     said

@@ -29,7 +29,7 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
         Some(p) if p < 0.05 => {
             format!("Over these {n} realizations, those with a higher VAF are rated {direction}")
         }
-        Some(_) => format!("{n} realizations do not show that it does"),
+        Some(_) => format!("These {n} realizations do not show that it does"),
         None => format!("Over {n} realizations"),
     };
     let shown = found.map_or_else(String::new, |(kind, p)| {
