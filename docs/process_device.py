@@ -1,54 +1,39 @@
-"""A controller for `study run --device process --command "python3 docs/process_device.py"`.
-
-It moves a simulated handle back and forth; put your motor there. docs/devices.md
-has the language. Standard library only.
-"""
-import json, math, os, select, sys, time
+"""A controller for `study run --device process --command "python3 docs/process_device.py"`: it moves a
+simulated handle to and fro. Put your motor there, in a loop of its own; docs/devices.md has the language."""
+import json, math, signal, sys, time
 
 def say(word, **more):
     print(json.dumps({"say": word, **more}), flush=True)
 
-def force_n(table, x, v):  # nearest node; a real controller interpolates, at 4 kHz
+def force_n(table, x, v):  # of the nearest node; a real controller interpolates, at 4 kHz
     node = min(range(len(table["x_mm"])), key=lambda i: abs(table["x_mm"][i] - x))
     branch = table["positive" if v >= 0 else "negative"]
     return branch["b_n_s_per_mm"][node] * v + branch["k_n_per_mm"][node] * x + branch["f0_n"][node]
 
 say("hello", format="study-process/1", id="example-1", telemetry=True, simulated=True,
     limits={"force_n": 12.0, "velocity_mm_s": 500.0})
-task, playing, alive, told, pending = None, None, time.monotonic(), 0.0, b""
-while True:
-    if select.select([0], [], [], 0.002)[0]:
-        read = os.read(0, 65536)
-        if not read:
-            sys.exit()  # the host has gone: zero force, and out
-        *lines, pending = (pending + read).split(b"\n")
-        for words in map(json.loads, lines):
-            alive = time.monotonic()
-            if words["do"] == "load" and words["table"] is None:
-                say("refused", load=words["load"], why="no table")
-            elif words["do"] == "load":
-                task = words
-                say("loaded", load=words["load"])
-            elif words["do"] == "start":
-                playing, told = time.monotonic(), 0.0
-                say("started", load=words["load"])
-            elif words["do"] == "stop" and playing:
-                lasted = time.monotonic() - playing
-                playing = None
-                say("stopped", load=words["load"], duration_s=lasted, strokes=int(2 * lasted),
-                    least_energy_j=0.0, switches_per_s=0.0, clamps=0)
-            elif words["do"] == "limp":
-                playing = None
-    if playing and time.monotonic() - alive > 0.5:
-        playing = None
-        say("fault", what="nothing heard of the host for 0.5 s")
-    if playing and time.monotonic() - playing - told > 0.01:
-        told = time.monotonic() - playing
-        low, high = task["table"]["trained"]["x_mm"]
-        middle, half = (low + high) / 2, 0.45 * (high - low)
-        turn = 2 * math.pi  # one hertz
-        x, v = middle - half * math.cos(turn * told), turn * half * math.sin(turn * told)
-        limit = task["limits"]["force_n"]
-        force = max(-limit, min(limit, force_n(task["table"], x, v)))
-        say("samples", load=task["load"], samples=[[told, x, v, force, None]])
-        say("progress", load=task["load"], strokes=int(2 * told), clamps=0)
+table, limit_n, since = None, 0.0, None  # what is loaded, and since when it plays
+for line in sys.stdin:  # ends when the host does, and the force with it
+    words, now = json.loads(line), time.monotonic()
+    do, load = words["do"], words["load"]
+    if do == "load" and words["table"] is None:
+        say("refused", load=load, why="no table")
+    elif do == "load":
+        table, limit_n = words["table"], words["limits"]["force_n"]
+        say("loaded", load=load)
+    elif do == "start":
+        since = now
+        say("started", load=load)
+    elif do == "stop" and since:
+        say("stopped", load=load, duration_s=now - since, strokes=int(2 * (now - since)),
+            least_energy_j=0.0, switches_per_s=0.0, clamps=0)
+    elif do == "alive" and since:  # once a second between the ends of what was trained
+        (low, high), t = table["trained"]["x_mm"], now - since
+        half, w = 0.45 * (high - low), 2 * math.pi
+        x, v = (low + high) / 2 - half * math.cos(w * t), w * half * math.sin(w * t)
+        force = max(-limit_n, min(limit_n, force_n(table, x, v)))
+        say("samples", load=load, samples=[[t, x, v, force, None]])
+        say("progress", load=load, strokes=int(2 * t), clamps=0)
+    if do in ("stop", "limp"):
+        since = None  # zero force
+    signal.setitimer(signal.ITIMER_REAL, 0.5 if since else 0)  # no `alive` for so long: SIGALRM ends it

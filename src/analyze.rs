@@ -222,7 +222,10 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     let (decisions, exclusions) = select::decide(ratings, rules);
     let used = rows(ratings, |i| decisions[i].is_none());
     let (cells, rows_judged) = rayon::join(|| Cells::of(&used), || judged(ratings, &decisions));
-    let mut values = statistics(&cells, rules);
+    let (mut values, counts) = rayon::join(
+        || statistics(&cells, rules),
+        || Counts::of(ratings, &used, &decisions, rules),
+    );
     if let Some(smaller) = overflow::smaller(&used) {
         overflow::explain(&mut values, &statistics(&Cells::of(&smaller), rules));
     }
@@ -233,7 +236,6 @@ pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
         });
         headline::without_exclusions(&statistics(&Cells::of(&all), rules), &mut values);
     }
-    let counts = Counts::of(ratings, &used, &decisions, rules);
     let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &values);
     Analysis {
         question: ratings.question.clone(),
@@ -276,15 +278,15 @@ type Group = fn(&Cells<'_>, &Rules, &mut Values);
 
 /// Groups that need nothing of each other, the longest first.
 const GROUPS: [Group; 10] = [
-    vaf::against_vaf,
-    effects::ranks_and_anova,
-    |cells, _, values| ordinal::ordinal(cells, values),
-    |cells, _, values| mixed::mixed(cells, values),
-    effects::agree,
-    effects::pairs,
-    describe::describe,
     order::order,
+    vaf::against_vaf,
+    |cells, _, values| ordinal::ordinal(cells, values),
+    effects::ranks_and_anova,
+    effects::agree,
+    |cells, _, values| mixed::mixed(cells, values),
+    describe::describe,
     subjects::subjects,
+    effects::pairs,
     reference::reference,
 ];
 

@@ -114,6 +114,17 @@ impl Findings {
             .count()
     }
 
+    /// Those of one severity.
+    #[must_use]
+    pub fn only(&self, severity: Severity) -> Self {
+        let faults = self.faults.iter().filter(|f| f.severity == severity);
+        Self {
+            path: self.path.clone(),
+            text: self.text.clone(),
+            faults: faults.cloned().collect(),
+        }
+    }
+
     /// Sorts the faults by their place, those about the whole file first.
     pub fn sort(&mut self) {
         self.faults

@@ -11,6 +11,7 @@
 
 mod motion;
 mod rows;
+mod swapped;
 mod write;
 
 pub use write::{Columns, write};
@@ -109,6 +110,15 @@ pub enum Warning {
         /// The column.
         column: &'static str,
     },
+    /// Position and force look as if each stood in the other's column.
+    Swapped {
+        /// How many times smoother the force is.
+        smoother: f64,
+        /// Share of the force's variance that the position leaves open.
+        of_force: f64,
+        /// Share of the position's variance that the force leaves open.
+        of_position: f64,
+    },
 }
 
 impl fmt::Display for Warning {
@@ -129,6 +139,16 @@ impl fmt::Display for Warning {
                 "x_mm changes {ratio:.3e} times as fast as {column} says: look at the units and the sign"
             ),
             Self::Constant { column } => write!(f, "{column} is the same in every row"),
+            Self::Swapped {
+                smoother,
+                of_force,
+                of_position,
+            } => write!(
+                f,
+                "x_mm and f_n look swapped: f_n is {smoother:.0} times smoother than x_mm, lies to one side of zero, and explains {:.0} % of the variance of x_mm, which explains {:.0} % of that of f_n: look at the column names",
+                100.0 * (1.0 - of_position),
+                100.0 * (1.0 - of_force)
+            ),
         }
     }
 }

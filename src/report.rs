@@ -29,6 +29,50 @@ pub struct Source {
     pub path: String,
 }
 
+/// The permutation p of a correlation over realizations (`pearson`, `spearman`,
+/// `kendall`), with how it was found: from all orders, or from random ones.
+fn permuted(a: &crate::analyze::Analysis, name: &str) -> Option<(&'static str, f64)> {
+    let get = |id: &str| a.values.number(&format!("corr/{name}/{id}"));
+    let exact = get("p_exact_two_sided").map(|p| ("exact p", p));
+    exact.or_else(|| get("p_monte_carlo_two_sided").map(|p| ("permutation p", p)))
+}
+
+/// How many of the realizations behind the correlation have a mean that another
+/// one has, too.
+fn tied(a: &crate::analyze::Analysis) -> usize {
+    let of = |m: &&crate::analyze::Listed| {
+        let own = m.role == crate::outcome::Role::Test && m.duplicate_of.is_none();
+        let id = format!("desc/{}/subject_mean/mean", m.id);
+        m.vaf.filter(|_| own).and(a.values.number(&id))
+    };
+    let means: Vec<f64> = a.realizations.iter().filter_map(|m| of(&m)).collect();
+    let same = |x: f64, y: f64| (x - y).abs() <= 1e-9 * x.abs().max(1.0);
+    let twins = |x: &&f64| means.iter().filter(|y| same(**x, **y)).count() > 1;
+    means.iter().filter(twins).count()
+}
+
+/// Pairs that were compared, by name, and the least p that Wilcoxon's test and
+/// Holm's correction could have given the clearest of them.
+fn pairs(a: &crate::analyze::Analysis) -> (Vec<(String, String)>, Option<f64>) {
+    let ids: Vec<&str> = a.realizations.iter().map(|m| m.id.as_str()).collect();
+    let mut found = Vec::new();
+    for first in &ids {
+        for second in ids.iter().filter(|s| first < *s) {
+            let id = format!("posthoc/{first}|{second}/mean_diff");
+            if a.values.get(&id).is_some() {
+                found.push(((*first).to_owned(), (*second).to_owned()));
+            }
+        }
+    }
+    found.sort();
+    let subjects = a.values.number("design/n_subjects_complete");
+    let least = subjects.filter(|_| !found.is_empty()).map(|n| {
+        let one = 2.0 * 0.5f64.powi(n as i32);
+        (one * found.len() as f64).min(1.0)
+    });
+    (found, least)
+}
+
 /// The question as a noun. Untrusted.
 fn asked(a: &crate::analyze::Analysis) -> String {
     match a.question.as_str() {

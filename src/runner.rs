@@ -280,7 +280,10 @@ impl Runner {
             Ok((claimed, journal))
         });
         match opened {
-            Err(error) => Input::ClaimRefused(error.to_string()),
+            Err(error) => Input::ClaimRefused(match error.hint() {
+                Some(hint) => format!("{error}: {hint}"),
+                None => error.to_string(),
+            }),
             Ok((claimed, journal)) => {
                 let mut saver = Saver::new(claimed.folder, journal, self.setup.threaded);
                 for (at, event) in self.early.drain(..) {

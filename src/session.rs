@@ -32,6 +32,7 @@ mod trial;
 pub mod view;
 
 pub use input::{Claim, Effect, Ending, Input};
+pub use opening::MAX_OPERATOR;
 pub use view::{Screen, View};
 
 use crate::outcome::{Event, Moment};

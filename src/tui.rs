@@ -18,6 +18,7 @@ pub mod surface;
 mod terminal;
 pub mod theme;
 pub mod views;
+pub mod waiting;
 pub mod widgets;
 pub mod wrap;
 

@@ -102,6 +102,46 @@ fn tables_go_where_out_says() {
 }
 
 #[test]
+fn a_second_analysis_leaves_what_is_right_and_repairs_what_is_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join("out").join(name);
+    let analyze = || {
+        let sub = set("sim_paper");
+        let args = ["analyze", &sub, "--out", "out"];
+        out(study().current_dir(dir.path()).args(args))
+    };
+    analyze();
+    // Of every file: its bytes, and a time that only another write changes.
+    let long_ago = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000);
+    let all: Vec<String> = (names(&path("")).into_iter())
+        .filter(|n| n != "figures")
+        .chain(
+            names(&path("figures"))
+                .iter()
+                .map(|n| format!("figures/{n}")),
+        )
+        .collect();
+    assert!(all.len() > 30, "{all:?}");
+    let before: Vec<Vec<u8>> = all.iter().map(|n| fs::read(path(n)).unwrap()).collect();
+    for name in &all {
+        let file = fs::File::options().write(true).open(path(name)).unwrap();
+        file.set_modified(long_ago).unwrap();
+    }
+    let damaged = "figures/order.png";
+    fs::write(path(damaged), "half a picture").unwrap();
+    analyze();
+    for (name, bytes) in all.iter().zip(before) {
+        assert!(fs::read(path(name)).unwrap() == bytes, "{name}");
+        let untouched = fs::metadata(path(name)).unwrap().modified().unwrap() == long_ago;
+        assert_eq!(untouched, name != damaged, "{name}");
+    }
+    assert_eq!(
+        names(&path("figures")).len() + names(&path("")).len() - 1,
+        all.len()
+    );
+}
+
+#[test]
 fn bad_input_is_one_clear_error() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("r.csv");

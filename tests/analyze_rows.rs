@@ -140,8 +140,8 @@ fn real_rows_are_analysed_alone_unless_others_are_asked_for() {
     assert_eq!(n(with(true, true)), (4.0, 0));
     let a = analyze(&all, &Rules::default());
     let text = shown(&a);
-    assert!(text.contains("1 row excluded (pilot)"), "{text}");
-    assert!(text.contains("1 row excluded (simulated)"), "{text}");
+    assert!(text.contains("1 row left out (pilot)"), "{text}");
+    assert!(text.contains("1 row left out (simulated)"), "{text}");
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn states_decide_and_are_named() {
     let all = ratings(&two(), &people);
     let a = analyze(&all, &Rules::default());
     assert_eq!(a.counts.rated, 3);
-    assert!(shown(&a).contains("3 rows excluded (excluded: fell asleep)"));
+    assert!(shown(&a).contains("3 rows left out (excluded: fell asleep)"));
     let files = csv::tables(&source(), &a);
     let excluded = files.iter().find(|f| f.name == "excluded.csv").unwrap();
     assert!(

@@ -96,6 +96,60 @@ fn a_results_folder_of_a_newer_format_is_not_touched() {
     assert_eq!(fs::read_to_string(&manifest).unwrap(), newer);
 }
 
+/// What is wrong with the arguments is said before anything is said of a terminal.
+#[test]
+fn arguments_are_looked_at_before_the_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = repository("protocols/turn-signal");
+    let run = |more: &[&str]| {
+        let (code, _, err) = study(&[&["run", &path][..], more].concat(), folder.path());
+        let terminal = err.contains("needs a terminal");
+        assert_eq!(code, if terminal { 2 } else { 1 }, "{err}");
+        (terminal, err)
+    };
+    let (terminal, err) = run(&["--participant", "../../x"]);
+    assert!(
+        !terminal && err.contains("`../../x` is no participant id"),
+        "{err}"
+    );
+    let long = "o".repeat(65);
+    let (terminal, err) = run(&["--operator", &long]);
+    assert!(!terminal && err.contains("at most 64 characters"), "{err}");
+    assert!(run(&["--participant", "P01", "--operator", "lw"]).0);
+    assert!(!folder.path().join("results").exists());
+}
+
+#[test]
+fn an_id_that_differs_only_in_case_has_one_hint() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = repository("protocols/turn-signal");
+    let state = ["--state", "no-show", "--reason", "x"];
+    let mut terminal = Terminal::start(&["run", &path], folder.path(), 24, 80);
+    terminal.wait_for("Enter begin");
+    terminal.keys("P01\tlw\r");
+    terminal.wait_for("Operate the real switch");
+    drop(terminal);
+    let told = "`p01` and the existing `P01` differ only in upper and lower case";
+    let hint = "write `P01` if it is the same person";
+    for arguments in [
+        vec!["run", &path, "--participant", "p01"],
+        [&["participant", "results", "p01"][..], &state].concat(),
+    ] {
+        let (code, _, err) = study(&arguments, folder.path());
+        assert_eq!(code, 1, "{err}");
+        let lines: Vec<&str> = err
+            .lines()
+            .filter(|l| !l.starts_with("1 warning"))
+            .collect();
+        assert_eq!(lines, [format!("error: {told}"), format!("  hint: {hint}")]);
+    }
+    let mut terminal = Terminal::start(&["run", &path], folder.path(), 24, 80);
+    terminal.wait_for("Enter begin");
+    terminal.keys("p01\tlw\r");
+    terminal.wait_for("differ only in upper and lower case");
+    terminal.wait_for("if it is the same person");
+}
+
 #[test]
 fn an_id_that_leaves_the_folder_is_refused_on_the_screen_and_on_the_command_line() {
     let folder = tempfile::tempdir().unwrap();

@@ -7,7 +7,7 @@
 mod support;
 
 use std::time::{Duration, Instant};
-use study::device::process::ProcessDevice;
+use study::device::process::{Opened, Opening, ProcessDevice};
 use study::device::{Device, DeviceError, Report, Stimulus};
 use study::limits::Limits;
 use study::model::Realization;
@@ -142,6 +142,23 @@ fn the_documented_example_plays() {
     assert_eq!(loads.count(), 1, "{:?}", bench.heard);
 }
 
+/// A host that has stopped is not a host that has gone: its child goes limp by itself.
+#[test]
+fn the_documented_example_ends_when_it_is_not_told_that_somebody_is_there() {
+    let Some(command) = example() else { return };
+    let mut bench = Bench::new(command);
+    bench.load().unwrap();
+    bench.until("table", |r| *r == Report::Loaded);
+    // what does not play needs nobody
+    std::thread::sleep(Duration::from_millis(700));
+    let at = bench.at();
+    bench.device.start(at).unwrap();
+    bench.until("start", |r| *r == Report::Started);
+    std::thread::sleep(Duration::from_millis(900));
+    let lost = bench.lost();
+    assert!(lost.contains("has ended by signal: 14"), "{lost}");
+}
+
 #[test]
 fn the_example_can_be_loaded_without_a_table_and_says_no() {
     let Some(command) = example() else { return };
@@ -176,7 +193,12 @@ fn a_child_that_cannot_be_understood_is_lost_and_started_again() {
             "echo '{\"say\":\"loaded\",\"load\":1'; sleep 60",
             "its line 2 is wrong: EOF",
         ),
-        ("echo motor on fire >&2; sleep 0.2; exit 3", "motor on fire"),
+        (
+            "echo ready >&2; printf 'motor on \\033[31mfire\n\n' >&2; exit 3",
+            " has ended with exit status 3; its last words: motor on \\u{1b}[31mfire",
+        ),
+        ("kill -9 $$", " has ended by signal: 9 (SIGKILL)"),
+        ("exec >&-; sleep 60", " has closed its standard streams"),
         ("head -c 400000 /dev/zero; sleep 60", "longer than 262144"),
     ] {
         // only after the load has come: the child shall not be faster than the test
@@ -210,7 +232,11 @@ fn a_child_that_is_no_controller_is_refused_before_the_session() {
         let command = ["sh", "-c", script].map(str::to_owned).to_vec();
         ProcessDevice::open(command).unwrap_err().to_string()
     };
-    assert!(refusal("exit 4").contains("it has ended"));
+    let ended = refusal("echo no encoder >&2; exit 4");
+    assert!(
+        ended.ends_with("` has ended with exit status 4; its last words: no encoder"),
+        "{ended}"
+    );
     assert!(refusal("echo '{\"say\":\"loaded\",\"load\":1}'; sleep 60").contains("before `hello`"));
     let other = HELLO.replace("process/1", "process/7");
     assert!(refusal(&format!("{other} sleep 60")).contains("speaks `study-process/7`"));
@@ -219,8 +245,58 @@ fn a_child_that_is_no_controller_is_refused_before_the_session() {
         missing
             .unwrap_err()
             .to_string()
-            .contains("cannot be started"),
+            .contains("`/no/such/program` cannot be started: there is no such program"),
     );
+}
+
+/// A child that does not come back, and why not, which may be another reason than
+/// that of the first loss.
+#[test]
+fn what_keeps_a_child_from_coming_back_is_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let flag = folder.path().join("flag");
+    let script = format!(
+        "test -e {flag} && echo no port >&2 && exit 2; touch {flag}; {HELLO} read load; exit 1",
+        flag = flag.display()
+    );
+    let mut bench = Bench::shell(&script);
+    bench.load().unwrap();
+    assert!(bench.lost().contains("exit status 1"));
+    let again = bench.lost();
+    assert!(
+        again.contains("exit status 2; its last words: no port"),
+        "{again}"
+    );
+    let until = bench.at() + Duration::from_millis(2500);
+    while bench.at() < until {
+        let at = bench.at();
+        assert_eq!(bench.device.poll(at), []);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::fs::remove_file(flag).unwrap();
+    bench.until("return", |r| *r == Report::Ready);
+}
+
+#[test]
+fn a_hello_can_be_waited_for_in_turns() {
+    let command = ["sh", "-c", &format!("read go; {HELLO} sleep 60")].map(str::to_owned);
+    let mut command = command.to_vec();
+    // it waits for a line that never comes
+    let opening = Opening::begin(command.clone()).unwrap();
+    let waited = opening.hello(Duration::from_millis(50)).unwrap();
+    assert!(matches!(waited, Opened::NotYet(_)), "{waited:?}");
+    command[2] = command[2].replace("read go", "sleep 0.2");
+    let mut opening = Opening::begin(command).unwrap();
+    let mut turns = 0;
+    let device = loop {
+        turns += 1;
+        opening = match opening.hello(Duration::from_millis(10)).unwrap() {
+            Opened::Device(device) => break device,
+            Opened::NotYet(opening) => opening,
+        };
+    };
+    assert!(turns > 1, "it was waited for in one go");
+    assert_eq!(device.identity().id, "sh");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use assert_cmd::Command;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
+use study::recording;
 
 const NAMES: &str = "t_s,x_mm,v_mm_s,a_m_s2,f_n";
 
@@ -195,6 +196,37 @@ fn swapped_columns_do_not_fit_together() {
         &text("x_mm,t_s,v_mm_s,a_m_s2,f_n", &training()),
         "time has to increase",
     );
+}
+
+/// Without v and a nothing has a scale; what is left to tell is how position and force
+/// move, in every recording that is here.
+#[test]
+fn position_and_force_in_each_others_columns_are_doubted_and_no_right_recording_is() {
+    for name in [
+        "recordings/training_a.csv",
+        "recordings/validation_a.csv",
+        "plant/switch_a_1.5hz.csv",
+    ] {
+        let file = fs::File::open(format!("tests/data/{name}")).unwrap();
+        let whole = recording::read(name, std::io::BufReader::new(file)).unwrap();
+        let doubts = |x_mm: &[f64], f_n: &[f64]| {
+            let mut bytes = Vec::from("t_s,x_mm,f_n\n");
+            for ((t, x), f) in whole.t_s.iter().zip(x_mm).zip(f_n) {
+                bytes.extend(format!("{t},{x},{f}\n").bytes());
+            }
+            let read = recording::read(name, &bytes[..]).unwrap();
+            let said = read.warnings.iter().map(ToString::to_string);
+            said.filter(|w| w.contains("look swapped")).count()
+        };
+        assert_eq!(doubts(&whole.x_mm, &whole.f_n), 0, "{name}");
+        assert_eq!(doubts(&whole.f_n, &whole.x_mm), 1, "{name}");
+    }
+    let rows: Vec<[f64; 5]> = training();
+    let names = "t_s,x_mm,ignored,unused,f_n";
+    let swapped = "t_s,f_n,ignored,unused,x_mm";
+    let (_, _, err) = identify(&text(names, &rows), &[]);
+    assert!(!err.contains("look swapped"), "{err}");
+    warned(&text(swapped, &rows), "x_mm and f_n look swapped: f_n is ");
 }
 
 #[test]

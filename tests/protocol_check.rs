@@ -120,6 +120,82 @@ fn a_table_that_fails_its_certificate_is_refused_without_permission() {
     assert_eq!(run(dir.path(), &["check", "."]).0, 1);
 }
 
+/// What is mounted by hand has no force, so nothing is said of one, and no permission
+/// is needed; a device that is to play it after all needs it.
+#[test]
+fn of_samples_mounted_by_hand_only_what_is_true_is_told() {
+    let dir = turn_signal();
+    edit(dir.path(), "protocol.toml", "\"simulated\"", "\"manual\"");
+    let path = dir.path().join("protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let without: Vec<&str> = text
+        .lines()
+        .filter(|line| !line.starts_with("uncertified"))
+        .collect();
+    fs::write(&path, without.join("\n")).unwrap();
+    let (code, out, err) = run(dir.path(), &["check", "."]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(
+        out.lines().collect::<Vec<_>>(),
+        [
+            "turn-signal: ok, 5 models, 15 trials, about 23 minutes, 1 warning",
+            "note: 5 samples are mounted by hand; `study device codes ./protocol.toml` lists what to write on them",
+        ]
+    );
+    let (_, out, _) = run(dir.path(), &["check", ".", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["certificates"], serde_json::json!([]));
+    let (code, _, err) = run(dir.path(), &["run", ".", "--device", "simulated"]);
+    assert_eq!(code, 1, "{err}");
+    assert!(err.contains("the table of `lambda-0.9991` can put energy into a hand"));
+
+    // one sample among tables
+    let dir = turn_signal();
+    let id = "id = \"lambda-0.9991\"";
+    edit(
+        dir.path(),
+        "protocol.toml",
+        id,
+        &format!("{id}\ndevice = \"manual\""),
+    );
+    let (code, out, _) = run(dir.path(), &["check", "."]);
+    assert_eq!(code, 0);
+    assert!(!out.contains("lambda-0.9991"), "{out}");
+    assert!(out.contains("4 of 4 tables fail"), "{out}");
+    assert!(out.contains("note: 1 sample is mounted by hand"), "{out}");
+}
+
+/// Errors first, then what can be doubted, and nothing that follows from an error.
+#[test]
+fn errors_come_before_warnings_and_nothing_twice() {
+    let dir = turn_signal();
+    fs::remove_file(dir.path().join("models/lambda-0.9995.toml")).unwrap();
+    edit(dir.path(), "models/lambda-0.9999.toml", "lookup", "look_up");
+    edit(
+        dir.path(),
+        "protocol.toml",
+        "repetitions = 3",
+        "repetitions = 5",
+    );
+    let (code, _, err) = run(dir.path(), &["check", "."]);
+    assert_eq!(code, 1);
+    let told: Vec<&str> = err
+        .lines()
+        .filter(|l| l.starts_with("error: ") || l.starts_with("warning: "))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            "error: the model file cannot be read: there is no such file",
+            "error: unknown key `look_up` at the top level",
+            "warning: 25 trials without a break",
+            "warning: 5 test realizations: |r| with VAF has to exceed 0.878 for p < .05",
+            "error: 2 faults, 2 warnings",
+        ],
+        "{err}"
+    );
+}
+
 #[test]
 fn ten_faults_of_three_files_are_told_at_once() {
     let dir = turn_signal();

@@ -155,7 +155,8 @@ fn what_was_stated_beforehand_and_what_was_changed_is_told() {
         ..Rules::default()
     };
     let page = report(&analyze(&ratings, &rules), &[]);
-    let row = "<td><code>constant-rater</code></td><td>3</td><td>1</td>";
+    let row = "<td><code>constant-rater</code></td>\
+               <td class=\"text\">participants whose ratings never change</td><td>3</td><td>1</td>";
     assert!(page.contains(row), "{page}");
     assert!(page.contains("the design has no hidden repeat"));
     assert!(page.contains("Deviations from what was stated beforehand"));

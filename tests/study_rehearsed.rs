@@ -19,6 +19,39 @@ fn rehearse(folder: &Path, protocol: &str, more: &[&str]) -> String {
     out
 }
 
+/// Samples are mounted by simulated hands; what needs a table and has none is refused
+/// before anything is made.
+#[test]
+fn a_study_of_samples_can_be_rehearsed() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = folder.path().join("protocol.toml");
+    let text = "format = \"study-protocol/1\"\n[study]\nid = \"samples\"\ntitle = \"t\"\nseed = 4\n\
+        [design]\nparticipants = 4\nrepetitions = 2\norder = \"shuffled\"\n[device]\nkind = \"manual\"\n\
+        [[models]]\nid = \"soft\"\n[[models]]\nid = \"hard\"\n[[questions]]\nid = \"realism\"\n\
+        kind = \"rating\"\nprompt = \"How?\"\nfrom = 1\nto = 7\n[analysis]\nprimary = \"realism\"\n";
+    fs::write(&protocol, text).unwrap();
+    let arguments = ["rehearse", "protocol.toml", "--participants", "2"];
+    let (code, out, err) = study(&arguments, folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.starts_with("2 simulated participants, 8 rated trials"),
+        "{out}"
+    );
+    let process = text.replace(
+        "kind = \"manual\"",
+        "kind = \"process\"\nlimits = { force_n = 9.0, velocity_mm_s = 500.0 }",
+    );
+    fs::write(&protocol, process).unwrap();
+    let arguments = [&arguments[..], &["--out", "other"]].concat();
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 1, "{err}");
+    assert!(
+        err.contains("model `soft` has no table for a simulated device"),
+        "{err}"
+    );
+    assert!(!folder.path().join("other").exists());
+}
+
 #[test]
 fn a_study_with_a_failing_device_ends_and_is_whole() {
     let folder = tempfile::tempdir().unwrap();

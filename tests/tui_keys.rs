@@ -12,7 +12,7 @@ use crossterm::event::{
 use study::outcome::{Author, Choice, Place};
 use study::protocol::question::MAX_TEXT_BYTES;
 use study::protocol::{Answer, Entry, QuestionKind};
-use study::session::view::{DeviceState, View};
+use study::session::view::{Counts, DeviceState, View};
 use study::session::{Input, Screen};
 use study::tui::{Colour, Surface};
 use support::*;
@@ -527,10 +527,10 @@ fn several_questions_are_answered_page_by_page() {
 fn nothing_beyond_the_view_is_on_the_screen_while_it_plays() {
     // Every word of the picture is one of the page's own or of the view.
     let mut desk = Desk::with(playing());
-    desk.view.line.device = DeviceState::Running {
+    desk.view.line.device = DeviceState::Running(Some(Counts {
         strokes: 4,
         clamps: 1,
-    };
+    }));
     let known = "trial 7 of 15 Feel the device. ● playing 0:03 Enter to rate · Esc stops \
                  S03 · lw running · 4 strokes · 1 clamp · 12:41 · saved ✓ 6 of 6 ? help";
     let known: Vec<&str> = known.split_whitespace().collect();

@@ -5,7 +5,9 @@
 
 use crate::outcome::ratings::{NO_MODEL, Ratings};
 use crate::protocol::Role;
-use crate::stats::describe::{mean, mean_of, sum_of_squares};
+use crate::stats::describe::{mean, mean_of, squares_about};
+use rayon::prelude::*;
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// One subject's ratings of one realization, with what suffices of them for
@@ -18,7 +20,7 @@ pub(super) struct Cell {
     pub(super) rows: Range<usize>,
     /// Mean of the centred ratings.
     pub(super) mean: f64,
-    /// Sum of squares about the mean; 0 for one rating.
+    /// Sum of squares about the mean; 0 for one rating, NaN if it overflows.
     pub(super) squares: f64,
 }
 
@@ -30,6 +32,8 @@ pub(super) struct Cells<'a> {
     pub(super) offset: f64,
     /// Ratings less the offset, by row; NaN missing.
     pub(super) centred: Vec<f64>,
+    /// Every row, by subject and model (none comes last), otherwise as they stand.
+    pub(super) all: Vec<usize>,
     /// Rows with a rating and a realization, by subject, model, repetition.
     pub(super) order: Vec<usize>,
     /// The centred ratings in that order: those of a cell stand together.
@@ -40,10 +44,12 @@ pub(super) struct Cells<'a> {
     pub(super) vaf: Vec<Option<f64>>,
     /// Whether anyone rated the model.
     pub(super) rated: Vec<bool>,
+    /// The complete table of the realizations that the study asks about.
+    complete: Table,
 }
 
 /// A complete table: the subjects that rated all of some realizations.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Table {
     /// Indices of the subjects.
     pub(super) subjects: Vec<usize>,
@@ -69,44 +75,55 @@ impl<'a> Cells<'a> {
             None => 0.0,
         };
         let centred: Vec<f64> = ratings.rating.iter().map(|v| v - offset).collect();
-        let mut order = ratings.by_cell();
-        order.retain(|&i| centred[i].is_finite() && ratings.model[i] != NO_MODEL);
-        let mut cells = Vec::new();
-        let mut rated = vec![false; ratings.models.len()];
-        let mut sorted = Vec::with_capacity(order.len());
-        for group in order.chunk_by_mut(|&a, &b| {
-            (ratings.subject[a], ratings.model[a]) == (ratings.subject[b], ratings.model[b])
-        }) {
+        let (all, vaf) = rayon::join(|| ratings.by_cell(), || vafs(ratings));
+        let counts = |i: &usize| centred[*i].is_finite() && ratings.model[*i] != NO_MODEL;
+        let mut order: Vec<usize> = all.iter().copied().filter(counts).collect();
+        let place = |i: usize| (ratings.subject[i], ratings.model[i]);
+        let mut groups: Vec<Range<usize>> = Vec::new();
+        for group in order.chunk_by_mut(|&a, &b| place(a) == place(b)) {
             if !group.is_sorted_by_key(|&i| ratings.repetition[i]) {
                 group.sort_by_key(|&i| ratings.repetition[i]);
             }
-            let start = sorted.len();
-            sorted.extend(group.iter().map(|&i| centred[i]));
-            let numbers = &sorted[start..];
-            if let Some(mean) = mean(numbers) {
-                rated[ratings.model[group[0]] as usize] = true;
-                cells.push(Cell {
-                    subject: ratings.subject[group[0]] as usize,
-                    model: ratings.model[group[0]] as usize,
-                    rows: start..sorted.len(),
-                    mean,
-                    squares: match numbers {
-                        [_] => 0.0,
-                        _ => sum_of_squares(numbers).unwrap_or(f64::NAN).max(0.0),
-                    },
-                });
-            }
+            let start = groups.last().map_or(0, |g| g.end);
+            groups.push(start..start + group.len());
         }
-        Self {
-            vaf: vafs(ratings),
+        let sorted: Vec<f64> = order.par_iter().map(|&i| centred[i]).collect();
+        let cell = |rows: Range<usize>| {
+            let numbers = &sorted[rows.clone()];
+            let (subject, model) = place(order[rows.start]);
+            let mean = mean(numbers)?;
+            Some(Cell {
+                subject: subject as usize,
+                model: model as usize,
+                rows,
+                mean,
+                squares: match numbers {
+                    [_] => 0.0,
+                    _ => squares_about(numbers, mean).unwrap_or(f64::NAN).max(0.0),
+                },
+            })
+        };
+        let cells: Vec<Cell> = (groups.into_par_iter().with_min_len(1000))
+            .filter_map(cell)
+            .collect();
+        let mut rated = vec![false; ratings.models.len()];
+        for cell in &cells {
+            rated[cell.model] = true;
+        }
+        let mut made = Self {
+            vaf,
             rated,
             ratings,
             offset,
             centred,
+            all,
             order,
             sorted,
             cells,
-        }
+            complete: Table::default(),
+        };
+        made.complete = made.complete_table(&made.test_models());
+        made
     }
 
     /// Centred ratings of a cell, by repetition.
@@ -126,7 +143,15 @@ impl<'a> Cells<'a> {
     }
 
     /// The subjects that rated all of these realizations.
-    pub(super) fn table(&self, models: &[usize]) -> Table {
+    pub(super) fn table(&self, models: &[usize]) -> Cow<'_, Table> {
+        if models == self.complete.models {
+            Cow::Borrowed(&self.complete)
+        } else {
+            Cow::Owned(self.complete_table(models))
+        }
+    }
+
+    fn complete_table(&self, models: &[usize]) -> Table {
         let mut table = Table {
             subjects: Vec::new(),
             models: models.to_vec(),
@@ -175,7 +200,7 @@ impl<'a> Cells<'a> {
 }
 
 /// Sum of squares and degrees of freedom within some cells.
-pub(super) fn within(cells: &[Cell]) -> (f64, usize) {
+pub(super) fn within<'c>(cells: impl IntoIterator<Item = &'c Cell>) -> (f64, usize) {
     let (mut squares, mut df) = (0.0, 0);
     for cell in cells {
         squares += cell.squares;

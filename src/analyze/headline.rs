@@ -87,9 +87,8 @@ fn components(cells: &Cells<'_>, values: &mut Values) {
     let own: Vec<_> = (cells.cells.iter())
         .filter(|c| table.subjects.binary_search(&c.subject).is_ok())
         .filter(|c| table.models.binary_search(&c.model).is_ok())
-        .cloned()
         .collect();
-    let (squares, df) = within(&own);
+    let (squares, df) = within(own.iter().copied());
     let h = own.iter().map(|c| 1.0 / c.rows.len() as f64).sum::<f64>() / own.len() as f64;
     let noise = (df > 0).then(|| squares / df as f64);
     let why = "fewer than two complete subjects or realizations";

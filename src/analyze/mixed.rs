@@ -60,7 +60,15 @@ impl Data {
         };
         let all: Vec<Cell> = own
             .iter()
-            .filter_map(|c| of_rows(c.subject, c.model, 0.0, cells.of_cell(c)))
+            .filter(|c| c.squares.is_finite())
+            .map(|c| Cell {
+                subject: c.subject,
+                model: c.model,
+                x: 0.0,
+                n: c.rows.len(),
+                mean: c.mean,
+                within: c.squares,
+            })
             .collect();
         let vafs: Vec<f64> = models.iter().filter_map(|&m| cells.vaf[m]).collect();
         let by_row = vafs.is_empty();

@@ -4,7 +4,7 @@
 use super::Rules;
 use super::cells::Cells;
 use super::values::Values;
-use crate::stats::beside::beside_factors;
+use crate::stats::beside::{Beside, beside_factors};
 use crate::stats::describe::Sum;
 use std::collections::BTreeMap;
 
@@ -18,7 +18,6 @@ pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
         .filter(|&i| r.trial_index[i] > 0)
         .collect();
     let trial: Vec<f64> = known.iter().map(|&i| f64::from(r.trial_index[i])).collect();
-    put(cells, "order_trial", &known, &trial, values);
     // The rating of the trial just before, and of no other.
     let (mut rows, mut previous) = (Vec::new(), Vec::new());
     let mut places: Vec<(u32, usize)> = Vec::new();
@@ -39,7 +38,12 @@ pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
             }
         }
     }
-    put(cells, "order_previous_rating", &rows, &previous, values);
+    let (by_trial, by_previous) = rayon::join(
+        || slope(cells, &known, &trial),
+        || slope(cells, &rows, &previous),
+    );
+    put("order_trial", by_trial, values);
+    put("order_previous_rating", by_previous, values);
     let mut by_repetition: BTreeMap<u32, (Sum, f64)> = BTreeMap::new();
     for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
         let (sum, n) = by_repetition.entry(r.repetition[i]).or_default();
@@ -60,12 +64,15 @@ pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
 const MAX_REPETITIONS: usize = 10_000;
 
 /// The slope of the rating on x beside fixed subjects and realizations.
-fn put(cells: &Cells<'_>, id: &str, rows: &[usize], x: &[f64], values: &mut Values) {
+fn slope(cells: &Cells<'_>, rows: &[usize], x: &[f64]) -> Option<Beside> {
     let r = cells.ratings;
     let y: Vec<f64> = rows.iter().map(|&i| cells.centred[i]).collect();
     let subjects: Vec<u32> = rows.iter().map(|&i| r.subject[i]).collect();
     let models: Vec<u32> = rows.iter().map(|&i| r.model[i]).collect();
-    let found = beside_factors(x, &y, &subjects, &models);
+    beside_factors(x, &y, &subjects, &models)
+}
+
+fn put(id: &str, found: Option<Beside>, values: &mut Values) {
     let why = "the order is not known, or is one with subjects and realizations";
     let mut g = values.group(id, why);
     g.maybe("slope", found.map(|f| f.slope));

@@ -24,9 +24,8 @@ pub(super) fn subjects(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
         .cells
         .chunk_by(|a, b| a.subject == b.subject)
         .peekable();
-    let order = r.by_cell();
     let mut x = Vec::new();
-    for rows in order.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
+    for rows in cells.all.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
         let s = r.subject[rows[0]] as usize;
         let own = own_cells.next_if(|own| own[0].subject == s).unwrap_or(&[]);
         let mut rows = rows.to_vec();

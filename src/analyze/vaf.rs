@@ -275,8 +275,7 @@ fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
         counts[m] = true;
     }
     let mut by_trial = Flat::default();
-    let order = r.by_cell();
-    for own in order.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
+    for own in cells.all.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
         by_trial.next();
         for &i in own {
             let known = cells.centred[i].is_finite() && r.vaf[i].is_finite();

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `study analyze`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A results folder, one study in it, or a CSV: subject,model,repetition,rating,vaf[,trial_index]
+    /// A results folder, one study in it, or a CSV: subject,model,rating[,repetition][,vaf][,trial_index]
     #[arg(required_unless_present = "possible")]
     results: Option<PathBuf>,
     /// Say which data can give a printed mean and SD: mean=4.800 sd=0.997 n=30 scale=1..7 [each=3]
@@ -343,14 +343,17 @@ fn deviations(study: &StudyFolder) -> Result<Vec<String>, Failure> {
     Ok(said)
 }
 
-/// Each file as a whole or not at all. None is synced: all of them can be made
-/// again at any time from what is on the disk.
+/// Each file as a whole or not at all, and not again if it has these bytes. None is
+/// synced: all of them can be made again at any time from what is on the disk.
 fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
     for item in [dir.to_owned(), dir.join("figures")] {
         fs::create_dir_all(&item).map_err(|e| Failure::file(&item, &e))?;
     }
     files.par_iter().try_for_each(|output| {
         let path = dir.join(&output.name);
+        if fs::read(&path).is_ok_and(|old| old == output.content) {
+            return Ok(());
+        }
         // Its own for each file and process: SVG, PNG and CSV of a figure share a stem.
         let part = dir.join(format!("{}.{}.part", output.name, std::process::id()));
         let written = fs::write(&part, &output.content).and_then(|()| fs::rename(&part, &path));

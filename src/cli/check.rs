@@ -2,8 +2,9 @@
 
 use super::{Console, Failure, load};
 use crate::diagnostic::{Findings, Severity};
-use crate::protocol::check;
-use crate::text::Untrusted;
+use crate::model::Realization;
+use crate::protocol::{DeviceKind, ModelEntry, check};
+use crate::text::{ModelId, Untrusted};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -112,13 +113,21 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         plural(trials, "trial"),
         plural(warnings, "warning"),
     ))?;
-    console.out(certificates(&loaded))
+    console.out(what_is_felt(&loaded))
+}
+
+/// The tables that a device plays: what is mounted by hand has none, whatever file
+/// the protocol names.
+fn played(loaded: &load::Loaded) -> impl Iterator<Item = (&ModelId, &Realization)> {
+    let protocol = &loaded.protocol;
+    loaded.models.iter().filter(|(id, _)| {
+        let own = protocol.model(id).and_then(|m| m.device);
+        own.unwrap_or(protocol.device.kind) != DeviceKind::Manual
+    })
 }
 
 fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
-    loaded
-        .models
-        .iter()
+    played(loaded)
         .map(|(id, realization)| {
             let certificate = realization.certificate();
             Certified {
@@ -143,11 +152,13 @@ fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
         .collect()
 }
 
-/// A line for each model's certificate, and what those that fail mean.
-fn certificates(loaded: &load::Loaded) -> String {
+/// A line for each certificate of a table that is played, what those that fail mean,
+/// and what is not played but mounted.
+fn what_is_felt(loaded: &load::Loaded) -> String {
     let mut out = String::new();
-    let mut failing = 0;
-    for (id, realization) in &loaded.models {
+    let (mut failing, mut tables) = (0, 0);
+    for (id, realization) in played(loaded) {
+        tables += 1;
         let certificate = realization.certificate();
         failing += usize::from(!certificate.passes());
         out += &format!("{id}: {certificate}\n");
@@ -156,9 +167,22 @@ fn certificates(loaded: &load::Loaded) -> String {
     if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {
         out += &format!(
             "note: {failing} of {} fail their certificate; `uncertified` has them played up to {} N: {}\n",
-            plural(loaded.models.len(), "table"),
+            plural(tables, "table"),
             permission.force_n.get(),
             Untrusted(&permission.reason),
+        );
+    }
+    let kind = loaded.protocol.device.kind;
+    let by_hand = |m: &&ModelEntry| m.device.unwrap_or(kind) == DeviceKind::Manual;
+    let samples = loaded.protocol.models.iter().filter(by_hand).count();
+    if samples > 0 {
+        let (sample, verb) = match samples {
+            1 => ("1 sample".to_owned(), "is"),
+            n => (format!("{n} samples"), "are"),
+        };
+        out += &format!(
+            "note: {sample} {verb} mounted by hand; `study device codes {}` lists what to write on them\n",
+            loaded.path.display()
         );
     }
     out

@@ -1,6 +1,7 @@
 //! Standard output and standard error, and what they can show.
 
 use super::failure::Failure;
+use crate::diagnostic::{Findings, Severity};
 use crate::text::Untrusted;
 use std::io::{self, IsTerminal as _, Write};
 
@@ -45,6 +46,22 @@ pub(super) fn progress(length: u64, unit: &'static str) -> indicatif::ProgressBa
     }
     bar.set_message(unit);
     bar
+}
+
+/// Words as a line that a shell takes for them.
+pub(super) fn shell_command(words: &[String]) -> String {
+    let quoted: Vec<String> = words.iter().map(|word| quoted(word)).collect();
+    quoted.join(" ")
+}
+
+/// A word as a shell takes it for one.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./:=@%+,".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
 }
 
 impl Console {
@@ -105,19 +122,18 @@ impl Console {
         let _ = writeln!(self.err, "{}", Untrusted(text.as_ref()));
     }
 
-    /// Prints findings to standard error.
-    pub fn findings(&mut self, findings: &[crate::diagnostic::Findings]) {
-        for f in findings {
-            let _ = write!(self.err, "{}", f.render(self.err_colour));
+    /// Prints findings to standard error: the errors of all files, then the warnings.
+    pub fn findings(&mut self, findings: &[Findings]) {
+        for severity in [Severity::Error, Severity::Warning] {
+            for f in findings {
+                let shown = f.only(severity).render(self.err_colour);
+                let _ = write!(self.err, "{shown}");
+            }
         }
     }
 
     /// Says how many warnings there are and where they are shown; nothing if none.
-    pub fn warnings_in_short(
-        &mut self,
-        findings: &[crate::diagnostic::Findings],
-        protocol: &std::path::Path,
-    ) {
+    pub fn warnings_in_short(&mut self, findings: &[Findings], protocol: &std::path::Path) {
         let count: usize = findings.iter().map(|f| f.faults.len()).sum();
         let path = protocol.display();
         match count {
@@ -136,5 +152,16 @@ impl Console {
         if let Some(hint) = &failure.hint {
             self.say(format!("  hint: {hint}"));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_one_that_a_shell_understands() {
+        let said = ["results/P-01", "my study", "it's", ""].map(quoted);
+        assert_eq!(said, ["results/P-01", "'my study'", r"'it'\''s'", "''"]);
     }
 }

@@ -23,6 +23,9 @@ mod join;
 const MAX_MODEL_BYTES: usize = 16 * 1024 * 1024;
 const MAX_ORDERS_BYTES: usize = 64 * 1024 * 1024;
 
+/// What to do about a table that fails its certificate.
+pub(super) const PERMIT: &str = "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
+
 /// The name of a protocol in its folder.
 pub const FILE_NAME: &str = "protocol.toml";
 
@@ -138,7 +141,10 @@ fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
     if orders.is_some() || !matches!(protocol.design.order, Order::File(_)) {
         join::orders(&protocol, orders.as_ref(), &spans, &mut findings);
     }
-    findings.faults.extend(check::warnings(&protocol, &spans));
+    let unread = others.unread(&protocol);
+    findings
+        .faults
+        .extend(check::warnings(&protocol, &spans, &unread));
     findings.sort();
 
     let mut files = vec![(FILE_NAME.to_owned(), bytes)];
@@ -245,6 +251,13 @@ impl<'f> Others<'f> {
                 self.models.insert(model.id.clone(), index);
             }
         }
+    }
+
+    /// Those whose file is missing or wrong.
+    fn unread<'p>(&self, protocol: &'p Protocol) -> Vec<&'p ModelId> {
+        let models = protocol.models.iter().filter(|m| m.file.is_some());
+        let unread = models.filter(|m| self.realization(&m.id).is_none());
+        unread.map(|m| &m.id).collect()
     }
 
     fn realization(&self, id: &ModelId) -> Option<&Realization> {

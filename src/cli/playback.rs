@@ -4,17 +4,23 @@ use super::{Console, Failure, Kind};
 use crate::device::host::Settings;
 use crate::device::link::Threaded;
 use crate::device::manual::{Beside, Manual};
-use crate::device::process::ProcessDevice;
+use crate::device::process::{HELLO_WITHIN, Opened, Opening, ProcessDevice};
 use crate::device::serial::{BAUD, SerialOpener};
 use crate::device::virtual_device::{Options, VirtualDevice};
 use crate::device::{Device, DeviceError};
 use crate::protocol::{DeviceKind, Protocol};
 use crate::text::Untrusted;
+use crate::tui;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// What a rig has, in the folder that `study` is started in.
 const RIG_FILE: &str = "device.toml";
+/// Between two looks whether a program has said hello.
+const SLICE: Duration = Duration::from_millis(20);
+/// A program that says hello within this time is not told to be waited for.
+const QUIET: Duration = Duration::from_millis(400);
 
 /// Arguments that say where a device is.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -26,18 +32,25 @@ pub(super) struct PlaybackArgs {
     pub(super) place: Place,
 }
 
-/// Where a device is.
+/// Where a device is, of either kind.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct Place {
+    #[command(flatten)]
+    pub(super) serial: Port,
+    /// Program and arguments of a process device, split at spaces
+    #[arg(long, value_name = "COMMAND")]
+    pub(super) command: Option<String>,
+}
+
+/// Where a serial device is.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(super) struct Port {
     /// Serial port of the device
     #[arg(long, value_name = "PATH")]
     pub(super) port: Option<String>,
     /// Bits per second of a serial port that is not USB [default: 460800]
     #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(9600..=4_000_000))]
     pub(super) baud: Option<u32>,
-    /// Program and arguments of a process device, split at spaces
-    #[arg(long, value_name = "COMMAND")]
-    pub(super) command: Option<String>,
 }
 
 /// The kinds of device, as words.
@@ -92,16 +105,41 @@ impl Rig {
 }
 
 impl Place {
+    /// Whether one device alone is named, and whether it is a program: by the
+    /// arguments, or else by `device.toml`.
+    pub(super) fn is_program(&self) -> Result<bool, Failure> {
+        let port = self.serial.port.is_some() || self.serial.baud.is_some();
+        let (program, port) = match (self.command.is_some(), port) {
+            (false, false) => {
+                let rig = Rig::read(Path::new(RIG_FILE))?;
+                let port = rig.serial.port.is_some() || rig.serial.usb_serial.is_some();
+                (rig.process.command.is_some(), port)
+            }
+            given => given,
+        };
+        match (program, port) {
+            (true, true) => Err(Failure::new(
+                Kind::Usage,
+                "a port and a program are two devices",
+            )
+            .hint("say which one is meant: --port PATH or --command COMMAND")),
+            (false, false) => Err(Failure::new(Kind::Usage, "which device? none is named").hint(
+                format!(
+                    "--port PATH or --command \"PROGRAM ARGUMENTS\", or [serial] or [process] in {RIG_FILE}; `study device list` shows the ports"
+                ),
+            )),
+            (program, _) => Ok(program),
+        }
+    }
+
     /// Arguments that the kind of device has no use for are refused.
     fn suits(&self, kind: DeviceKind) -> Result<(), Failure> {
+        let (port, baud) = (self.serial.port.is_some(), self.serial.baud.is_some());
         let useless = match kind {
             DeviceKind::Serial => [("--command", self.command.is_some()), ("", false)],
-            DeviceKind::Process => [
-                ("--port", self.port.is_some()),
-                ("--baud", self.baud.is_some()),
-            ],
+            DeviceKind::Process => [("--port", port), ("--baud", baud)],
             DeviceKind::Simulated | DeviceKind::Manual => [
-                ("--port", self.port.is_some() || self.baud.is_some()),
+                ("--port", port || baud),
                 ("--command", self.command.is_some()),
             ],
         };
@@ -114,6 +152,42 @@ impl Place {
         }
     }
 
+    fn process(&self) -> Result<Vec<String>, Failure> {
+        let given = self.command.as_deref();
+        let given = given.map(|c| c.split_whitespace().map(str::to_owned).collect());
+        let command: Option<Vec<String>> = match given {
+            Some(command) => Some(command),
+            None => Rig::read(Path::new(RIG_FILE))?.process.command,
+        };
+        command.filter(|c| !c.is_empty()).ok_or_else(|| {
+            Failure::new(Kind::Usage, "a process device needs a program").hint(format!(
+                "--command \"PROGRAM ARGUMENTS\", or [process] command = [\"PROGRAM\", \"ARGUMENT\"] in {RIG_FILE}"
+            ))
+        })
+    }
+
+    /// Starts the program and waits for its hello. `None` if somebody left.
+    pub(super) fn open_program(
+        &self,
+        waiting: &mut Waiting<'_>,
+    ) -> Result<Option<ProcessDevice>, Failure> {
+        let command = self.process()?;
+        let name = command.join(" ");
+        let mut opening = Opening::begin(command).map_err(|e| unstarted(&e))?;
+        let since = Instant::now();
+        loop {
+            opening = match opening.hello(SLICE).map_err(|e| unstarted(&e))? {
+                Opened::Device(device) => return Ok(Some(*device)),
+                Opened::NotYet(opening) => opening,
+            };
+            if since.elapsed() > QUIET && waiting.leaves(&name, since.elapsed()) {
+                return Ok(None);
+            }
+        }
+    }
+}
+
+impl Port {
     /// The serial port, from the arguments or `device.toml`.
     pub(super) fn serial(&self) -> Result<SerialOpener, Failure> {
         let rig = Rig::read(Path::new(RIG_FILE))?.serial;
@@ -133,20 +207,6 @@ impl Place {
         Ok(SerialOpener::new(&port, baud, usb_serial))
     }
 
-    fn process(&self) -> Result<Vec<String>, Failure> {
-        let given = self.command.as_deref();
-        let given = given.map(|c| c.split_whitespace().map(str::to_owned).collect());
-        let command: Option<Vec<String>> = match given {
-            Some(command) => Some(command),
-            None => Rig::read(Path::new(RIG_FILE))?.process.command,
-        };
-        command.filter(|c| !c.is_empty()).ok_or_else(|| {
-            Failure::new(Kind::Usage, "a process device needs a program").hint(format!(
-                "--command \"PROGRAM ARGUMENTS\", or [process] command = [\"PROGRAM\", \"ARGUMENT\"] in {RIG_FILE}"
-            ))
-        })
-    }
-
     /// Opens the device behind a serial port.
     pub(super) fn open_serial(&self, settings: Settings) -> Result<Threaded, Failure> {
         let opener = self.serial()?;
@@ -154,35 +214,81 @@ impl Place {
     }
 }
 
+/// How somebody is told that a program is waited for.
+pub(super) enum Waiting<'a> {
+    /// On a screen of its own, which can be left by a key.
+    Screen(tui::Options, Option<tui::waiting::Waiting>),
+    /// By a line on standard error; Ctrl-C leaves, as in any program.
+    Line(&'a mut Console, bool),
+}
+
+impl<'a> Waiting<'a> {
+    pub(super) fn on_screen(options: tui::Options) -> Self {
+        Self::Screen(options, None)
+    }
+
+    pub(super) fn in_a_line(console: &'a mut Console) -> Self {
+        Self::Line(console, false)
+    }
+
+    /// Shows what is waited for; whether somebody wants to leave.
+    fn leaves(&mut self, program: &str, since: Duration) -> bool {
+        match self {
+            Self::Line(_, true) => {}
+            Self::Line(console, told) => {
+                *told = true;
+                console.say(format!(
+                    "waiting for `{program}` to say hello, at most {} s; Ctrl-C leaves",
+                    HELLO_WITHIN.as_secs()
+                ));
+            }
+            Self::Screen(options, None) => {
+                // without a terminal it is waited for all the same; the session says
+                // what is wrong with it
+                if let Ok(screen) = tui::waiting::Waiting::open(*options) {
+                    *self = Self::Screen(*options, Some(screen));
+                }
+            }
+            Self::Screen(_, Some(screen)) => {
+                return screen.leaves(program, since, HELLO_WITHIN);
+            }
+        }
+        false
+    }
+}
+
 /// Opens what plays `kind`, together with a person if some samples are mounted by
-/// hand.
+/// hand. `None` if somebody left while it was waited for.
 pub(super) fn open(
     place: &Place,
     kind: DeviceKind,
     protocol: &Protocol,
-) -> Result<Box<dyn Device>, Failure> {
+    waiting: &mut Waiting<'_>,
+) -> Result<Option<Box<dyn Device>>, Failure> {
     place.suits(kind)?;
     let device: Box<dyn Device> = match kind {
         DeviceKind::Simulated => Box::new(VirtualDevice::new(Options {
             seed: protocol.study.seed,
             ..Options::default()
         })),
-        DeviceKind::Serial => Box::new(place.open_serial(Settings::default())?),
-        DeviceKind::Process => {
-            let command = place.process()?;
-            Box::new(ProcessDevice::open(command).map_err(|e| unopened(&e))?)
-        }
-        DeviceKind::Manual => return Ok(Box::new(Manual::default())),
+        DeviceKind::Serial => Box::new(place.serial.open_serial(Settings::default())?),
+        DeviceKind::Process => match place.open_program(waiting)? {
+            Some(device) => Box::new(device),
+            None => return Ok(None),
+        },
+        DeviceKind::Manual => return Ok(Some(Box::new(Manual::default()))),
     };
-    let by_hand = protocol
-        .models
-        .iter()
-        .any(|m| m.device == Some(DeviceKind::Manual));
-    Ok(if by_hand {
+    Ok(Some(with_person(device, protocol)))
+}
+
+/// The device, together with a person if some samples are mounted by hand.
+pub(super) fn with_person(device: Box<dyn Device>, protocol: &Protocol) -> Box<dyn Device> {
+    let mut models = protocol.models.iter();
+    if models.any(|m| m.device == Some(DeviceKind::Manual)) {
         Box::new(Beside::new(device))
     } else {
         device
-    })
+    }
 }
 
 /// What the last `study device check --save` said, as it is kept beside
@@ -223,10 +329,21 @@ pub(super) fn commissioned(device: &str, console: &mut Console) -> Option<String
     Some(text.chars().take(500).collect())
 }
 
+/// A program that is no device: its own words come first.
+fn unstarted(why: &DeviceError) -> Failure {
+    let text = match why {
+        DeviceError::Lost(why) => why.clone(),
+        why => why.to_string(),
+    };
+    Failure::new(Kind::Device, Untrusted(&text)).hint(
+        "start it by hand: it has to print its hello as the first line (docs/devices.md, section 3)",
+    )
+}
+
 fn unopened(why: &DeviceError) -> Failure {
     let text = why.to_string();
     Failure::new(Kind::Device, Untrusted(&text)).hint(
-        "`study device list` shows serial ports; docs/devices.md says how each kind is set up",
+        "`study device list` shows the ports; `study device info --port PATH` asks who is there",
     )
 }
 
@@ -255,9 +372,11 @@ mod tests {
     #[test]
     fn an_argument_that_does_not_suit_the_kind_is_refused() {
         let place = |port: bool, command: bool| Place {
-            port: port.then(|| "/dev/ttyUSB0".to_owned()),
+            serial: Port {
+                port: port.then(|| "/dev/ttyUSB0".to_owned()),
+                baud: None,
+            },
             command: command.then(|| "a b".to_owned()),
-            ..Place::default()
         };
         assert!(place(true, false).suits(DeviceKind::Serial).is_ok());
         assert!(place(false, true).suits(DeviceKind::Serial).is_err());

@@ -6,7 +6,7 @@
 
 mod wire;
 
-use super::playback::Place;
+use super::playback::Port;
 use super::trajectory::{
     picture, rate, read_plant, read_trajectory, refuse_to_overwrite, write_file,
 };
@@ -43,7 +43,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "KIND", value_parser = ["simulated", "serial"], default_value = "simulated")]
     device: String,
     #[command(flatten)]
-    place: Place,
+    place: Port,
     /// Largest force of a probe on a serial port, N
     #[arg(long, value_name = "N", default_value_t = 12.0)]
     max_force: f64,
@@ -74,7 +74,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if args.device == "serial" {
         return wire::run(args, console);
     }
-    if args.place.port.is_some() {
+    if args.place.port.is_some() || args.place.baud.is_some() {
         return Err(Failure::new(
             Kind::Usage,
             "--port makes no sense with the simulated probe",

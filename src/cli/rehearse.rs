@@ -1,7 +1,9 @@
 //! `study rehearse`: a whole study with simulated participants.
 
+use super::playback::with_person;
 use super::{Console, Failure, Kind, load};
 use crate::device::faults::FaultPlan;
+use crate::device::manual::Manual;
 use crate::device::virtual_device::{Options, VirtualDevice};
 use crate::outcome::{State, Status};
 use crate::protocol::{DeviceKind, Seat};
@@ -60,6 +62,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
+    // Samples are mounted by simulated hands; all else is played by the simulated
+    // device.
+    let kind = match loaded.protocol.device.kind {
+        DeviceKind::Manual => DeviceKind::Manual,
+        _ => DeviceKind::Simulated,
+    };
+    super::run::refuse_unplayable(kind, &loaded)?;
     let study = StudyFolder::open_or_create(&args.out, &frozen, clock.now())?;
     let folder = study.path().to_owned();
     refuse_occupied(&study, &folder)?;
@@ -104,8 +113,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             study: here,
             kind: SeatKind::Simulated,
             rows: None,
-            device_kind: DeviceKind::Simulated,
-            device: Box::new(VirtualDevice::new(options)),
+            device_kind: kind,
+            device: match kind {
+                DeviceKind::Manual => Box::new(Manual::default()),
+                _ => with_person(Box::new(VirtualDevice::new(options)), &protocol),
+            },
             device_check: None,
             clock: Box::new(clock.clone()),
             live: false,

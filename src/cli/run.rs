@@ -1,12 +1,14 @@
 //! `study run`: the session, in the terminal.
 
-use super::playback::{self, PlaybackArgs};
+use super::console::shell_command;
+use super::playback::{self, PlaybackArgs, Waiting};
 use super::{Console, Failure, Kind, load};
 use crate::protocol::DeviceKind;
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Runner, Setup};
-use crate::session::{Config, Ending};
-use crate::store::{Frozen, SeatKind, StoreError, StudyFolder};
+use crate::session::{Config, Ending, MAX_OPERATOR};
+use crate::store::{Frozen, SeatKind, StoreError, StudyFolder, layout};
+use crate::text::ParticipantId;
 use crate::tui::{self, Tui};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -47,22 +49,43 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = load::load(&args.protocol)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
     let kind = args.playback.device.unwrap_or(loaded.protocol.device.kind);
-    // The device before the terminal: what is wrong with it is read in peace.
-    refuse_tableless(kind, &loaded)?;
-    let device = playback::open(&args.playback.place, kind, &loaded.protocol)?;
-    // A person on the simulated device feels nothing: that is never real data.
-    let overridden = kind != loaded.protocol.device.kind;
-    let seats = if args.pilot || overridden || device.identity().simulated {
-        SeatKind::Pilot
-    } else {
-        SeatKind::Real
-    };
+    // Everything that can be checked before the device, and the device before the
+    // terminal: what is wrong is read in peace.
+    let participant = refuse_ids(args)?;
+    refuse_unplayable(kind, &loaded)?;
     let clock = RealClock::default();
     let at = clock.now();
     let frozen = Frozen {
         protocol: &loaded.protocol,
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
+    };
+    let begun = args.results.join(loaded.protocol.study.id.as_str());
+    let begun = match begun.join(layout::MANIFEST).exists() {
+        true => Some(StudyFolder::open_or_create(&args.results, &frozen, at)?),
+        false => None,
+    };
+    if let (Some(study), Some(participant)) = (&begun, &participant) {
+        study.check_id(participant)?;
+    }
+    let options = tui::Options {
+        mouse: !args.no_mouse,
+        live: args.live,
+        colour: tui::Colour::detect(|name| std::env::var(name).ok()),
+    };
+    let place = &args.playback.place;
+    let mut waiting = Waiting::on_screen(options);
+    let opened = playback::open(place, kind, &loaded.protocol, &mut waiting);
+    drop(waiting);
+    let Some(device) = opened? else {
+        return console.out("Nothing was recorded.\n");
+    };
+    // A person on the simulated device feels nothing: that is never real data.
+    let overridden = kind != loaded.protocol.device.kind;
+    let seats = if args.pilot || overridden || device.identity().simulated {
+        SeatKind::Pilot
+    } else {
+        SeatKind::Real
     };
     // Past a file size limit a write shall fail, which is told, instead of ending
     // the program. Where the handler cannot be set it ends as it always did.
@@ -71,13 +94,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         Arc::new(AtomicBool::new(false)),
     );
     // The terminal before the folder: without one, nothing is created.
-    let mut tui = Tui::open(tui::Options {
-        mouse: !args.no_mouse,
-        live: args.live,
-        colour: tui::Colour::detect(|name| std::env::var(name).ok()),
-    })
-    .map_err(|e| Failure::new(Kind::Usage, &e).hint(e.hint()))?;
-    let study = StudyFolder::open_or_create(&args.results, &frozen, at)?;
+    let mut tui = Tui::open(options).map_err(|e| Failure::new(Kind::Usage, &e).hint(e.hint()))?;
+    let study = match begun {
+        Some(study) => study,
+        None => StudyFolder::open_or_create(&args.results, &frozen, at)?,
+    };
     let folder = study.path().to_owned();
     // After a kill the tables are behind the journals: bring them up first.
     study.refresh(&loaded.protocol)?;
@@ -116,25 +137,52 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     )
 }
 
-/// A device that plays tables cannot stand in for one that needs none.
-fn refuse_tableless(kind: DeviceKind, loaded: &load::Loaded) -> Result<(), Failure> {
-    if !matches!(kind, DeviceKind::Simulated | DeviceKind::Serial) {
+/// What is typed on the first screen, if it stands in the arguments.
+fn refuse_ids(args: &Args) -> Result<Option<ParticipantId>, Failure> {
+    if let Some(operator) = &args.operator
+        && operator.chars().count() > MAX_OPERATOR
+    {
+        return Err(Failure::input(format!(
+            "--operator: at most {MAX_OPERATOR} characters"
+        )));
+    }
+    let id = args.participant.as_deref().map(str::trim);
+    let id = id.map(ParticipantId::new).transpose();
+    id.map_err(|why| Failure::input(why).hint("a pseudonym, such as P01"))
+}
+
+/// Tables that the device cannot do without, or may not play. What is mounted by hand
+/// needs none.
+pub(super) fn refuse_unplayable(kind: DeviceKind, loaded: &load::Loaded) -> Result<(), Failure> {
+    if kind == DeviceKind::Manual {
         return Ok(());
     }
-    let missing = loaded
-        .protocol
-        .models
-        .iter()
-        .find(|m| m.device != Some(DeviceKind::Manual) && !loaded.models.contains_key(&m.id));
-    match missing {
-        None => Ok(()),
-        Some(model) => Err(Failure::input(format!(
-            "model `{}` has no table for a {} device",
-            model.id,
-            kind.as_str()
-        ))
-        .hint("add its `file`, or play it on the protocol's own kind of device")),
+    let protocol = &loaded.protocol;
+    let permitted = protocol.device.uncertified.as_ref().is_some_and(|u| u.play);
+    for model in &protocol.models {
+        if model.device == Some(DeviceKind::Manual) {
+            continue;
+        }
+        match loaded.models.get(&model.id) {
+            None if kind != DeviceKind::Process => {
+                return Err(Failure::input(format!(
+                    "model `{}` has no table for a {} device",
+                    model.id,
+                    kind.as_str()
+                ))
+                .hint("add its `file`; without one only a program or a hand can present it"));
+            }
+            Some(table) if !permitted && !table.certificate().passes() => {
+                return Err(Failure::input(format!(
+                    "the table of `{}` can put energy into a hand, and the protocol, which mounts it by hand, does not permit that",
+                    model.id,
+                ))
+                .hint(load::PERMIT));
+            }
+            _ => {}
+        }
     }
+    Ok(())
 }
 
 /// The command that goes on with a session, to be typed as it is.
@@ -153,8 +201,11 @@ fn again(args: &Args, participant: &str) -> String {
         "device",
         args.playback.device.map(|k| k.as_str().to_owned()),
     );
-    option("port", args.playback.place.port.clone());
-    option("baud", args.playback.place.baud.map(|b| b.to_string()));
+    option("port", args.playback.place.serial.port.clone());
+    option(
+        "baud",
+        args.playback.place.serial.baud.map(|b| b.to_string()),
+    );
     option("command", args.playback.place.command.clone());
     option(
         "rows",
@@ -176,18 +227,7 @@ fn again(args: &Args, participant: &str) -> String {
             command.push(flag.to_owned());
         }
     }
-    let quoted: Vec<String> = command.iter().map(|word| quoted(word)).collect();
-    quoted.join(" ")
-}
-
-/// A word as a shell takes it for one.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_./:=@%+,".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
+    shell_command(&command)
 }
 
 /// Writes the derived tables and says what comes next, also where they cannot be
@@ -289,12 +329,6 @@ mod tests {
         assert!(failure.hint.unwrap().contains("--rebuild"));
         let said = String::from_utf8(out.0.borrow().clone()).unwrap();
         assert!(said.contains("It goes on with: study run X"), "{said}");
-    }
-
-    #[test]
-    fn a_command_is_one_that_a_shell_understands() {
-        let said = ["results/P-01", "my study", "it's", ""].map(quoted);
-        assert_eq!(said, ["results/P-01", "'my study'", r"'it'\''s'", "''"]);
     }
 
     #[test]

@@ -7,6 +7,7 @@
 
 use super::{Design, DeviceKind, Protocol, Question, QuestionKind, Role};
 use crate::diagnostic::Fault;
+use crate::text::ModelId;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -30,11 +31,12 @@ const FORCE_SD_N: f64 = 5.0;
 /// Where each value of the file stood, as `file::Parsed` has it.
 pub type Spans = BTreeMap<String, Range<usize>>;
 
-/// Every doubt, as warnings. VAFs should have been filled in from the model files.
-pub fn warnings(protocol: &Protocol, spans: &Spans) -> Vec<Fault> {
+/// Every doubt, as warnings. VAFs should have been filled in from the model files;
+/// those of `unread` could not be, which is an error of its own.
+pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<Fault> {
     let mut faults = Vec::new();
     realizations(protocol, spans, &mut faults);
-    vaf(protocol, spans, &mut faults);
+    vaf(protocol, spans, unread, &mut faults);
     practice(protocol, spans, &mut faults);
     duration(protocol, spans, &mut faults);
     roles(protocol, spans, &mut faults);
@@ -171,17 +173,16 @@ fn critical_r(n: usize) -> f64 {
     t / (t * t + df).sqrt()
 }
 
-fn vaf(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+fn vaf(protocol: &Protocol, spans: &Spans, unread: &[&ModelId], faults: &mut Vec<Fault>) {
     let known: Vec<f64> = tests(protocol).filter_map(|m| m.vaf).collect();
-    let all = tests(protocol).count();
     if known.is_empty() {
         return;
     }
-    if known.len() < all {
-        let without: Vec<&str> = tests(protocol)
-            .filter(|m| m.vaf.is_none())
-            .map(|m| m.id.as_str())
-            .collect();
+    let without: Vec<&str> = tests(protocol)
+        .filter(|m| m.vaf.is_none() && !unread.contains(&&m.id))
+        .map(|m| m.id.as_str())
+        .collect();
+    if !without.is_empty() {
         faults.push(
             Fault::warning(format!(
                 "no VAF is known of {}: the correlation leaves them out",
@@ -190,7 +191,8 @@ fn vaf(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
             .at(spans.get("analysis.vaf").cloned()),
         );
     }
-    if known.len() < 2 {
+    // what could not be read may differ enough
+    if known.len() < 2 || !unread.is_empty() {
         return;
     }
     let low = known.iter().copied().fold(f64::INFINITY, f64::min);
@@ -320,7 +322,7 @@ mod tests {
     use crate::protocol::{Breaks, example};
 
     fn messages(protocol: &Protocol) -> Vec<String> {
-        warnings(protocol, &Spans::new())
+        warnings(protocol, &Spans::new(), &[])
             .into_iter()
             .map(|f| f.message)
             .collect()

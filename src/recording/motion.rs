@@ -1,6 +1,7 @@
 //! Velocity and acceleration where they are absent, and doubts about the rest.
 
 use super::rows::{COLUMNS, Rows};
+use super::swapped::swapped;
 use super::{Recording, RecordingError, RecordingFault, Warning};
 
 /// A stroke below this, in mm, was surely written in metres.
@@ -29,6 +30,9 @@ pub(super) fn complete(name: String, rows: Rows) -> Result<Recording, RecordingE
         return refuse(RecordingFault::Metres { stroke_mm });
     }
     let mut warnings: Vec<Warning> = gaps(&t_s).into_iter().collect();
+    if v_mm_s.is_empty() && a_m_s2.is_empty() {
+        warnings.extend(swapped(&t_s, &x_mm, &f_n));
+    }
     if v_mm_s.is_empty() {
         v_mm_s = (0..t_s.len()).map(|i| velocity(&t_s, &x_mm, i)).collect();
         warnings.push(Warning::Derived {

@@ -5,7 +5,7 @@
 /// as powers of ten.
 pub(super) fn number(x: f64, decimals: usize) -> String {
     let size = x.abs();
-    let shown = if size >= 1e7 || (size > 0.0 && size < 1e-5) {
+    let shown = if size >= 1e12 || (size > 0.0 && size < 1e-5) {
         format!("{x:.2e}")
     } else {
         format!("{x:.decimals$}")
@@ -61,6 +61,49 @@ pub(super) fn p(x: f64) -> String {
     }
 }
 
+/// A p with its sign as text: `p = .023`, `exact p < .001`.
+pub(super) fn named_p(kind: &str, p: f64) -> String {
+    format!("{kind} {}", equals_p(p))
+}
+
+/// A share of all n! orders as what it is.
+pub(super) fn of_orders(share: f64, n: f64) -> String {
+    let all: f64 = (1..=n as u32).map(f64::from).product();
+    format!("{}/{all}", (share * all).round())
+}
+
+/// A word for a small number, else its digits.
+pub(super) fn count(n: usize) -> String {
+    let words = ["two", "three", "four", "five", "six", "seven"];
+    let word = n.checked_sub(2).and_then(|at| words.get(at));
+    word.map_or_else(|| n.to_string(), |w| (*w).to_owned())
+}
+
+/// With a capital letter at its beginning.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next();
+    first.map_or_else(String::new, |c| {
+        c.to_uppercase().to_string() + letters.as_str()
+    })
+}
+
+/// A name of at most 60 characters, shortened in the middle.
+pub(super) fn name(text: &str) -> String {
+    super::svg::shortened(&crate::text::Untrusted(text).to_string(), 60)
+}
+
+/// Decimals at which a standard error has two digits, at least so many.
+pub(super) fn decimals(se: f64, least: usize) -> usize {
+    let digits = 1.0 - se.abs().log10().floor();
+    if digits.is_finite() {
+        // Between 0 and 8, so the cast is exact.
+        (digits.clamp(0.0, 8.0) as usize).max(least)
+    } else {
+        least
+    }
+}
+
 /// `[low, high]`.
 pub(super) fn interval(low: f64, high: f64, one: impl Fn(f64) -> String) -> String {
     format!("[{}, {}]", one(low), one(high))
@@ -94,6 +137,19 @@ pub(super) fn counted(n: usize, one: &str, many: &str) -> String {
     }
 }
 
+/// What is said of the memory by the correlation and the two p. Line and curve are two tests of one question: each is judged at half of .05.
+pub(super) fn memory_verdict(r: f64, line: Option<f64>, curve: Option<f64>) -> &'static str {
+    let shown = |p: Option<f64>| p.is_some_and(|p| p < if curve.is_some() { 0.025 } else { 0.05 });
+    match (shown(line), shown(curve)) {
+        (true, _) if r > 0.0 => {
+            "Over these realizations, those with a longer memory are rated higher"
+        }
+        (true, _) => "Over these realizations, those with a shorter memory are rated higher",
+        (false, true) => "Over these realizations the rating follows the memory along a curve",
+        (false, false) => "These realizations do not show that it does",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -118,6 +174,11 @@ mod tests {
         assert_eq!(number(-2.3456, 2), "−2.35");
         assert_eq!(number(1.5e300, 2), "1.50e300");
         assert_eq!(percent(0.565), "56 %");
+        assert_eq!(number(1e9 + 4.5, 2), "1000000004.50");
+        assert_eq!(
+            [0.44, 0.015, 1.1e-5, 0.0].map(|se| decimals(se, 2)),
+            [2, 3, 6, 2]
+        );
         assert_eq!(plain(30.0), "30");
         assert_eq!(plain(0.12345), "0.1235");
     }

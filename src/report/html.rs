@@ -38,6 +38,8 @@ pub struct Details {
     pub repetitions: Option<u32>,
     /// How orders were made, as the protocol calls it.
     pub order: Option<String>,
+    /// Sentences on how the sessions were run, for the methods.
+    pub conduct: Vec<String>,
     /// What the participants did before each trial.
     pub reference: Option<String>,
     /// Kind of the device.
@@ -136,7 +138,9 @@ fn head(source: &Source, details: &Details, a: &Analysis, lang: Option<&str>) ->
                 }
                 " "
                 span { (super::apa::counted(c.rated, "rating", "ratings")) } " "
-                span { (super::apa::counted(a.realizations.len(), "realization", "realizations")) }
+                @if !a.realizations.is_empty() {
+                    span { (super::apa::counted(a.realizations.len(), "realization", "realizations")) }
+                }
             }
             (notes::banners(a))
         }

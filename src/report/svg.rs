@@ -18,6 +18,7 @@ mod look;
 mod out;
 
 pub use axis::{Axis, Ticks};
+pub(in crate::report) use frame::for_names;
 pub use look::{Colour, Dash, Fill, Look, PALETTE, Shape, ramp};
 
 use out::Out;
@@ -305,7 +306,8 @@ pub fn text_width(text: &str, size: f64) -> f64 {
             _ => 1.02,
         },
     };
-    text.chars().map(em).sum::<f64>() * size
+    let shown = crate::text::Untrusted(text).to_string();
+    shown.chars().map(em).sum::<f64>() * size
 }
 
 /// A text that is at most about so many px wide; what is left out is marked.
@@ -319,15 +321,17 @@ pub fn fitted(text: &str, size: f64, room: f64) -> String {
     shown
 }
 
-/// A text of at most so many characters. What is left out is marked, in the middle:
-/// names of realizations often begin alike.
+/// A text of at most so many characters. What is left out is marked, after the first
+/// third: names of realizations often begin alike.
+/// Characters that are shown as their code count as that.
 pub fn shortened(text: &str, most: usize) -> String {
+    let text = &crate::text::Untrusted(text).to_string();
     let length = text.chars().count();
     if length <= most {
         return text.to_owned();
     }
     let kept = most.saturating_sub(1);
-    let end = kept / 2;
+    let end = kept - kept / 3;
     let first: String = text.chars().take(kept - end).collect();
     let last: String = text.chars().skip(length - end).collect();
     format!("{first}…{last}")

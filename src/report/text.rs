@@ -173,7 +173,7 @@ fn table(
     if let Some(h) = &at_least {
         head.push(h);
     }
-    head.push("subject mean [95 %]");
+    head.push("by subject [95 %]");
     let mut grid = Grid::new(&head, hist.map(|_| 5));
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
@@ -315,7 +315,7 @@ fn counts(a: &Analysis, width: usize) -> String {
     }
     for (reason, n) in &c.excluded {
         let rows = if *n == 1 { "row" } else { "rows" };
-        parts.push(format!("{n} {rows} excluded ({})", Untrusted(reason)));
+        parts.push(format!("{n} {rows} left out ({})", Untrusted(reason)));
     }
     if !a.comments.is_empty() {
         parts.push(format!("comments: {} (--comments)", a.comments.len()));

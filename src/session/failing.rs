@@ -40,7 +40,6 @@ impl Session {
         if self.phase.armed() {
             return self.lose_attempt(failure, what, at);
         }
-        self.say(format!("device: {}", self.safe(what)));
         self.set_trouble(what, failure);
     }
 

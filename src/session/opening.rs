@@ -7,7 +7,7 @@ use crate::schedule;
 use crate::text::ParticipantId;
 
 /// Longest operator code, characters.
-const MAX_OPERATOR: usize = 64;
+pub const MAX_OPERATOR: usize = 64;
 
 impl Session {
     pub(super) fn identify(&mut self, participant: &str, operator: &str) {

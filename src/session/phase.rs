@@ -1,7 +1,7 @@
 //! Where a session is, beyond what its events tell.
 
 use super::Ending;
-use super::view::MessageKind;
+use super::view::{Counts, MessageKind};
 use crate::outcome::{Moment, Place};
 use crate::protocol::Question;
 
@@ -46,8 +46,8 @@ pub(super) enum Phase {
     },
     Playing {
         since: Moment,
-        strokes: u32,
-        clamps: u64,
+        /// What the device has counted, if it counts.
+        counts: Option<Counts>,
     },
     /// The stop was asked for then.
     Stopping {

@@ -6,7 +6,7 @@ use super::phase::{Form, Phase};
 use super::view::{Banner, Correctable, DeviceState, Progress, Screen, StatusLine, View};
 use super::{Ending, Session};
 use crate::outcome::{Moment, Place};
-use crate::protocol::Seat;
+use crate::protocol::{DeviceKind, Seat};
 use crate::text::Untrusted;
 
 /// Where the protocol has no words of its own.
@@ -22,8 +22,9 @@ impl Session {
         View {
             progress: self.progress(),
             line: self.line(at),
+            device: self.plays_now(),
             banner: self.claim.as_ref().and_then(|c| banner(c.seat)),
-            notice: self.notice.clone(),
+            notice: self.notice.clone().or_else(|| self.trouble_in_form()),
             entry: self.protocol.session.entry,
             correctable: self.correctable(),
             can_mark_bad: self
@@ -92,9 +93,11 @@ impl Session {
             },
             Phase::Loading { .. } | Phase::Ready { .. } => Screen::Loading,
             Phase::Mounting { code } => Screen::Mount { code: code.clone() },
-            Phase::Playing { since, strokes, .. } => Screen::Playing {
+            Phase::Playing { since, counts } => Screen::Playing {
                 since_s: at.seconds_since(since),
-                strokes_missing: self.strokes_needed().saturating_sub(*strokes),
+                strokes_missing: self
+                    .strokes_needed()
+                    .saturating_sub(counts.unwrap_or_default().strokes),
             },
             Phase::Stopping { .. } => Screen::Stopping,
             Phase::Stopped => Screen::Stopped {
@@ -164,15 +167,36 @@ impl Session {
         if self.trouble.as_ref().is_some_and(|t| t.fault) {
             return DeviceState::Fault;
         }
+        let none = self.claim.as_ref().map(|c| c.device_kind) == Some(DeviceKind::Manual);
         match self.phase {
+            Phase::Playing { .. } if self.plays_now() == DeviceKind::Manual => DeviceState::Felt,
+            _ if none => DeviceState::ByHand,
+            _ if self.plays_now() == DeviceKind::Manual => DeviceState::Limp,
             Phase::Loading { .. } => DeviceState::Loading,
             Phase::Ready { .. } => DeviceState::Ready,
-            Phase::Playing {
-                strokes, clamps, ..
-            } => DeviceState::Running { strokes, clamps },
+            Phase::Playing { counts, .. } => DeviceState::Running(counts),
             Phase::Stopping { .. } => DeviceState::Stopping,
             _ => DeviceState::Limp,
         }
+    }
+
+    /// What gives the force in the trial under way; between trials, in the study.
+    fn plays_now(&self) -> DeviceKind {
+        let under_way = self
+            .history
+            .open
+            .as_ref()
+            .filter(|_| self.phase.armed() || matches!(self.phase, Phase::Stopped));
+        let own = under_way.and_then(|open| self.protocol.model(&open.trial.model)?.device);
+        let claimed = self.claim.as_ref().map(|c| c.device_kind);
+        own.or(claimed).unwrap_or(self.protocol.device.kind)
+    }
+
+    /// A form is not covered by the device's trouble: it is told below it, as long
+    /// as it lasts.
+    fn trouble_in_form(&self) -> Option<String> {
+        let trouble = self.trouble.as_ref().filter(|_| self.in_form())?;
+        Some(format!("device: {}", trouble.what))
     }
 
     fn correctable(&self) -> Vec<Correctable> {

@@ -1,6 +1,7 @@
 //! One attempt at a trial: load, play, stop, and the way to its rating.
 
 use super::phase::Phase;
+use super::view::Counts;
 use super::{Effect, Session};
 use crate::outcome::{Event, Failure, Moment, Playback};
 use crate::protocol::{DeviceKind, Trial};
@@ -53,16 +54,13 @@ impl Session {
     pub(super) fn device_started(&mut self, at: Moment) {
         match (&mut self.phase, &self.history.open) {
             (Phase::Ready { .. }, Some(open)) => {
+                let counts = self.counted(&open.trial).then(Counts::default);
                 let started = Event::PlaybackStarted {
                     trial: open.trial.trial,
                     attempt: open.attempt,
                 };
                 self.record(started, at);
-                self.phase = Phase::Playing {
-                    since: at,
-                    strokes: 0,
-                    clamps: 0,
-                };
+                self.phase = Phase::Playing { since: at, counts };
             }
             (Phase::Playing { .. }, _) => {}
             (Phase::Loading { .. } | Phase::Mounting { .. }, _) => {
@@ -77,13 +75,9 @@ impl Session {
         }
     }
 
-    pub(super) fn device_progress(&mut self, now_strokes: u32, now_clamps: u64) {
-        if let Phase::Playing {
-            strokes, clamps, ..
-        } = &mut self.phase
-        {
-            *strokes = now_strokes;
-            *clamps = now_clamps;
+    pub(super) fn device_progress(&mut self, strokes: u32, clamps: u64) {
+        if let Phase::Playing { counts, .. } = &mut self.phase {
+            *counts = Some(Counts { strokes, clamps });
         }
     }
 
@@ -145,12 +139,16 @@ impl Session {
 
     /// Strokes that a rating needs; none where nobody counts them.
     pub(super) fn minimum_strokes(&self, trial: &Trial) -> u32 {
-        let counted = self.claim.as_ref().is_some_and(|c| c.device_telemetry);
-        if counted && !self.by_hand(trial) {
+        if self.counted(trial) {
             self.protocol.trial.minimum_strokes
         } else {
             0
         }
+    }
+
+    /// Whether strokes and clamps of this trial are known.
+    fn counted(&self, trial: &Trial) -> bool {
+        self.claim.as_ref().is_some_and(|c| c.device_telemetry) && !self.by_hand(trial)
     }
 
     /// Whether the realization is mounted by a person, who may take their time.

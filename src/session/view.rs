@@ -1,7 +1,7 @@
 //! What may be seen of a session. Nothing here identifies a realization.
 
 use crate::outcome::Place;
-use crate::protocol::{Answer, Entry, Question};
+use crate::protocol::{Answer, DeviceKind, Entry, Question};
 use crate::text::QuestionId;
 
 /// Everything that a screen shows.
@@ -13,6 +13,9 @@ pub struct View {
     pub progress: Option<Progress>,
     /// The experimenter's line.
     pub line: StatusLine,
+    /// What gives the force: of the trial under way, or else of the study. Where it
+    /// is [`DeviceKind::Manual`] nothing can be stopped, limp or counted.
+    pub device: DeviceKind,
     /// Shown above everything: pilot, simulated.
     pub banner: Option<Banner>,
     /// One sentence for the operator, until the next input.
@@ -79,19 +82,27 @@ pub enum DeviceState {
     Loading,
     /// Loaded, about to start.
     Ready,
-    /// Playing: strokes and clamps so far.
-    Running {
-        /// Full strokes.
-        strokes: u32,
-        /// Clamps.
-        clamps: u64,
-    },
+    /// Playing: strokes and clamps so far, where somebody counts them.
+    Running(Option<Counts>),
     /// Stop is asked and not confirmed.
     Stopping,
     /// It reported a fault.
     Fault,
     /// It does not answer.
     Lost,
+    /// There is none: samples are mounted by hand.
+    ByHand,
+    /// A sample that was mounted by hand is felt.
+    Felt,
+}
+
+/// What a device has counted in a playback.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Full strokes.
+    pub strokes: u32,
+    /// Clamps.
+    pub clamps: u64,
 }
 
 /// The one thing to do.

@@ -26,30 +26,32 @@ const MAX_LEVELS: usize = 300;
 /// first factor is swept out by centring within it, which leaves normal equations
 /// of the second factor's indicators and x. Their sums go over the levels of the
 /// first factor, whose rows have to stand together, so that no column is ever
-/// stored. What rounding costs, one step of iterative refinement gives back: the
+/// stored. The levels of the second, `b`, are small numbers: a table is as long
+/// as the largest. What rounding costs, one step of iterative refinement gives back: the
 /// residuals are taken row by row and fitted again. `None` if the factors leave
 /// nothing of x, or no degree of freedom.
 pub fn beside_factors(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<Beside> {
     let n = x.len();
-    let levels = distinct(b);
-    if n < 3 || levels.len() > MAX_LEVELS {
+    let (level_of, levels) = numbered(b);
+    if n < 3 || levels > MAX_LEVELS {
         return None;
     }
     let (mx, my) = (mean(x)?, mean(y)?);
-    let groups = Groups {
+    let mut groups = Groups {
         rows: (x.iter().zip(y))
             .zip(b)
             .map(|((x, y), b)| Row {
                 x: x - mx,
                 y: y - my,
-                level: levels.partition_point(|l| l < b),
+                level: level_of[*b as usize],
             })
             .collect(),
         ends: ends(a),
-        levels: levels.len(),
+        levels,
     };
-    let (normal, mut right, yy) = groups.normal_equations();
     let size: f64 = groups.rows.iter().map(|r| r.x * r.x).sum();
+    groups.centre();
+    let (normal, mut right, yy) = groups.normal_equations();
     let factor = Factor::new(normal);
     let spread = factor.pivots[0];
     let df = n as f64 - groups.ends.len() as f64 - (factor.rank() as f64 - 1.0) - 1.0;
@@ -94,7 +96,13 @@ fn ends(a: &[u32]) -> Vec<usize> {
 struct Row {
     x: f64,
     y: f64,
-    level: usize,
+    level: u32,
+}
+
+impl Row {
+    fn level(&self) -> usize {
+        self.level as usize
+    }
 }
 
 /// Rows, the levels of the first factor one after another. Unknowns are the slope
@@ -112,6 +120,22 @@ impl Groups {
         starts.zip(&self.ends).map(|(s, e)| &self.rows[s..*e])
     }
 
+    /// Takes the mean of its group off every x and y.
+    fn centre(&mut self) {
+        let mut start = 0;
+        for &end in &self.ends {
+            let rows = &mut self.rows[start..end];
+            start = end;
+            let n = rows.len() as f64;
+            let mx = rows.iter().map(|r| r.x).sum::<f64>() / n;
+            let my = rows.iter().map(|r| r.y).sum::<f64>() / n;
+            for r in rows {
+                r.x -= mx;
+                r.y -= my;
+            }
+        }
+    }
+
     /// Matrix, right side, and the sum of squares of y within the groups.
     fn normal_equations(&self) -> (Vec<Vec<f64>>, Vec<f64>, f64) {
         let p = self.levels;
@@ -123,18 +147,15 @@ impl Groups {
         let mut seen: Vec<usize> = Vec::new();
         for rows in self.each() {
             let n = rows.len() as f64;
-            let mx = rows.iter().map(|r| r.x).sum::<f64>() / n;
-            let my = rows.iter().map(|r| r.y).sum::<f64>() / n;
             for r in rows {
-                let s = &mut sums[r.level];
+                let s = &mut sums[r.level()];
                 if s.0 == 0.0 {
-                    seen.push(r.level);
+                    seen.push(r.level());
                 }
-                let (dx, dy) = (r.x - mx, r.y - my);
-                *s = (s.0 + 1.0, s.1 + dx, s.2 + dy);
-                normal[0][0] += dx * dx;
-                right[0] += dx * dy;
-                yy += dy * dy;
+                *s = (s.0 + 1.0, s.1 + r.x, s.2 + r.y);
+                normal[0][0] += r.x * r.x;
+                right[0] += r.x * r.y;
+                yy += r.y * r.y;
             }
             for &j in seen.iter().filter(|j| **j > 0) {
                 normal[j][0] += sums[j].1;
@@ -162,18 +183,17 @@ impl Groups {
         let mut own: Vec<f64> = Vec::new();
         for rows in self.each() {
             let n = rows.len() as f64;
-            let mx = rows.iter().map(|r| r.x).sum::<f64>() / n;
             own.clear();
             own.extend(
                 rows.iter()
-                    .map(|r| r.y - effect(r.level) - found[0] * (r.x - mx)),
+                    .map(|r| r.y - effect(r.level()) - found[0] * r.x),
             );
             let m = own.iter().sum::<f64>() / n;
             for (r, e) in rows.iter().zip(&own) {
                 let e = e - m;
                 squares += e * e;
-                right[0] += (r.x - mx) * e;
-                right[r.level] += if r.level == 0 { 0.0 } else { e };
+                right[0] += r.x * e;
+                right[r.level()] += if r.level == 0 { 0.0 } else { e };
             }
         }
         (squares, right)
@@ -242,11 +262,21 @@ impl Factor {
     }
 }
 
-fn distinct(v: &[u32]) -> Vec<u32> {
-    let mut levels = v.to_vec();
-    levels.sort_unstable();
-    levels.dedup();
-    levels
+/// Numbers the levels that occur, in ascending order: the number of each, and how
+/// many there are.
+fn numbered(b: &[u32]) -> (Vec<u32>, usize) {
+    let largest = b.iter().max().map_or(0, |m| *m as usize);
+    let mut numbers = vec![0; largest + 1];
+    for level in b {
+        numbers[*level as usize] = 1;
+    }
+    let mut next = 0;
+    for number in &mut numbers {
+        let used = *number;
+        *number = next;
+        next += used;
+    }
+    (numbers, next as usize)
 }
 
 #[cfg(test)]

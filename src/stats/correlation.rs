@@ -1,6 +1,6 @@
 //! Correlation of two columns: Pearson, Spearman, Kendall, within subjects.
 
-use super::describe::{constant, mean, sum_of_products, sum_of_squares};
+use super::describe::{constant, mean, products_about, squares_about};
 use super::distribution::{normal_quantile, t_two_sided};
 use super::finite;
 use super::rank::{doubled_ranks, mid_ranks};
@@ -11,11 +11,12 @@ pub fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() < 2 || constant(x) || constant(y) {
         return None;
     }
-    let (xx, yy) = (sum_of_squares(x)?, sum_of_squares(y)?);
+    let (mx, my) = (mean(x)?, mean(y)?);
+    let (xx, yy) = (squares_about(x, mx)?, squares_about(y, my)?);
     if !(xx > 0.0 && yy > 0.0) {
         return None;
     }
-    finite(sum_of_products(x, y)? / (xx.sqrt() * yy.sqrt())).map(|r| r.clamp(-1.0, 1.0))
+    finite(products_about(x, mx, y, my)? / (xx.sqrt() * yy.sqrt())).map(|r| r.clamp(-1.0, 1.0))
 }
 
 /// Spearman's rho: Pearson's r of the mid-ranks.

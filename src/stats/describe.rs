@@ -70,12 +70,27 @@ pub fn mean_of(x: impl Iterator<Item = f64> + Clone) -> Option<f64> {
 /// rounded mean: the second term takes back what the rounding of the mean put
 /// in (Chan, Golub & LeVeque 1983).
 pub fn sum_of_squares(x: &[f64]) -> Option<f64> {
-    sum_of_products(x, x)
+    squares_about(x, mean(x)?)
+}
+
+/// The same where the rounded mean is known already.
+pub fn squares_about(x: &[f64], mean: f64) -> Option<f64> {
+    let (mut squares, mut rest) = (Sum::default(), Sum::default());
+    for v in x {
+        let d = v - mean;
+        squares.add(d * d);
+        rest.add(d);
+    }
+    finite(squares.get() - rest.get() * rest.get() / x.len() as f64)
 }
 
 /// Σ(x − x̄)(y − ȳ), by the same correction.
 pub fn sum_of_products(x: &[f64], y: &[f64]) -> Option<f64> {
-    let (mx, my) = (mean(x)?, mean(y)?);
+    products_about(x, mean(x)?, y, mean(y)?)
+}
+
+/// The same where the rounded means are known already.
+pub fn products_about(x: &[f64], mx: f64, y: &[f64], my: f64) -> Option<f64> {
     let (mut xy, mut dx, mut dy) = (Sum::default(), Sum::default(), Sum::default());
     for (a, b) in x.iter().zip(y) {
         xy.add((a - mx) * (b - my));

@@ -227,7 +227,9 @@ impl StoreError {
             }
             Self::Open { .. } => "go on there, or end that process".to_owned(),
             Self::Busy { .. } => "wait for it, or end it".to_owned(),
-            Self::Collides { existing, .. } => format!("use `{existing}`, or another id"),
+            Self::Collides { existing, .. } => {
+                format!("write `{existing}` if it is the same person")
+            }
             Self::NoRow { .. } => "give this rig a larger range with --rows".to_owned(),
             Self::OtherKind { .. } => "use another id".to_owned(),
             Self::Vanished { path, .. } => format!(

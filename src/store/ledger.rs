@@ -182,7 +182,10 @@ impl StudyFolder {
     }
 
     /// Refuses an id that a file system could take for another one.
-    pub(super) fn check_id(&self, id: &ParticipantId) -> Result<(), StoreError> {
+    ///
+    /// # Errors
+    /// [`StoreError::Collides`], or the sessions cannot be read.
+    pub fn check_id(&self, id: &ParticipantId) -> Result<(), StoreError> {
         let ids = self.participant_ids()?;
         match ids.into_iter().find(|i| i != id && i.collides_with(id)) {
             None => Ok(()),

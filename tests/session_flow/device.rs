@@ -4,7 +4,7 @@ use crate::rig::{DeviceMood, Rig, name};
 use crate::studies::{plain, rich};
 use study::outcome::{Event, Failure, Playback};
 use study::protocol::DeviceKind;
-use study::session::view::DeviceState;
+use study::session::view::{Counts, DeviceState};
 use study::session::{Effect, Input, Screen};
 
 /// A session whose device waits in the phase of this screen, in the first trial.
@@ -115,6 +115,85 @@ fn trouble_while_nothing_plays_costs_no_attempt_and_no_rating() {
     assert_eq!(failures(&rig), []);
     rig.finish();
     rig.assert_whole();
+}
+
+#[test]
+fn a_form_tells_of_a_lost_device_as_long_as_it_is_lost() {
+    let mut rig = Rig::new(plain());
+    rig.until("Form")
+        .send(Input::DeviceLost("unplugged".to_owned()));
+    assert_eq!(rig.view().notice.unwrap(), "device: unplugged");
+    rig.send(Input::Stop).wait(60.0);
+    assert_eq!(rig.view().notice.unwrap(), "device: unplugged");
+    rig.send(Input::DeviceReady);
+    assert_eq!(rig.view().notice, None);
+    assert_eq!(rig.view().line.device, DeviceState::Limp);
+    // nothing was lost, so nothing is left to be confirmed
+    rig.answer_page();
+    assert_eq!(screen(&rig), "Reference");
+}
+
+#[test]
+fn between_trials_the_trouble_is_told_once() {
+    let mut rig = Rig::new(plain());
+    rig.until("Reference")
+        .send(Input::DeviceLost("unplugged".to_owned()));
+    assert_eq!(screen(&rig), "DeviceTrouble");
+    assert_eq!(rig.view().notice, None);
+}
+
+/// Nothing is said of a device where there is none, and nothing of counts that
+/// nobody makes.
+#[test]
+fn a_sample_is_neither_limp_nor_counted() {
+    let mut protocol = plain();
+    protocol.device.kind = DeviceKind::Manual;
+    let mut rig = Rig::new(protocol);
+    rig.telemetry = false;
+    rig.until("Reference");
+    let states = |rig: &Rig| (rig.view().line.device, rig.view().device);
+    assert_eq!(states(&rig), (DeviceState::ByHand, DeviceKind::Manual));
+    rig.device = DeviceMood::Silent;
+    rig.send(Input::Advance)
+        .send(Input::DeviceMount("417".to_owned()));
+    assert_eq!(states(&rig), (DeviceState::ByHand, DeviceKind::Manual));
+    rig.send(Input::Advance);
+    rig.session.handle(Input::DeviceStarted, rig.now);
+    assert_eq!(states(&rig), (DeviceState::Felt, DeviceKind::Manual));
+
+    // among tables: the device is limp while somebody has their hands in it
+    let mut protocol = plain();
+    for model in &mut protocol.models {
+        model.device = Some(DeviceKind::Manual);
+    }
+    let mut rig = Rig::new(protocol);
+    rig.until("Reference");
+    assert_eq!(states(&rig), (DeviceState::Limp, DeviceKind::Simulated));
+    rig.device = DeviceMood::Silent;
+    rig.send(Input::Advance)
+        .send(Input::DeviceMount("417".to_owned()));
+    assert_eq!(states(&rig), (DeviceState::Limp, DeviceKind::Manual));
+    rig.send(Input::Advance);
+    rig.session.handle(Input::DeviceStarted, rig.now);
+    assert_eq!(states(&rig), (DeviceState::Felt, DeviceKind::Manual));
+
+    // a controller without telemetry counts only if it says so
+    let mut rig = Rig::new(plain());
+    rig.telemetry = false;
+    rig.until("Reference");
+    rig.device = DeviceMood::Silent;
+    rig.send(Input::Advance).send(Input::DeviceLoaded);
+    rig.send(Input::DeviceStarted);
+    assert_eq!(rig.view().line.device, DeviceState::Running(None));
+    rig.send(Input::DeviceProgress {
+        strokes: 2,
+        clamps: 0,
+    });
+    let counts = Counts {
+        strokes: 2,
+        clamps: 0,
+    };
+    assert_eq!(rig.view().line.device, DeviceState::Running(Some(counts)));
 }
 
 #[test]

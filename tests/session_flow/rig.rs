@@ -131,7 +131,7 @@ impl Rig {
         let mut inbox = VecDeque::from([input]);
         while let Some(input) = inbox.pop_front() {
             match &input {
-                Input::DeviceLoaded => self.loaded = self.loads > 0,
+                Input::DeviceLoaded | Input::DeviceMount(_) => self.loaded = self.loads > 0,
                 Input::Saved { count } => self.on_disk = *count,
                 _ => {}
             }
@@ -161,7 +161,7 @@ impl Rig {
                 wording: "w".to_owned(),
                 analysis: "a".to_owned(),
             },
-            device_kind: DeviceKind::Simulated,
+            device_kind: self.protocol.device.kind,
             device_id: "simulated-1".to_owned(),
             device_check: None,
             device_telemetry: self.telemetry,

@@ -4,7 +4,7 @@ use crate::rig::{Rig, start};
 use crate::studies::{MODELS, plain, rating, rich};
 use study::outcome::{Author, Event, Place, State};
 use study::protocol::{Breaks, Entry, Seat};
-use study::session::view::{Banner, DeviceState, MessageKind};
+use study::session::view::{Banner, Counts, DeviceState, MessageKind};
 use study::session::{Config, Effect, Ending, Input, Screen};
 
 #[test]
@@ -343,10 +343,10 @@ fn the_status_line_follows_the_device_and_the_clock() {
     rig.step();
     assert_eq!(
         rig.view().line.device,
-        DeviceState::Running {
+        DeviceState::Running(Some(Counts {
             strokes: 5,
             clamps: 0
-        }
+        }))
     );
     assert!(rig.view().armed);
     let before = rig.view().line.elapsed_s;

@@ -5,10 +5,10 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use std::collections::BTreeMap;
 use study::outcome::Place;
-use study::protocol::{Answer, Entry, Question, QuestionKind};
+use study::protocol::{Answer, DeviceKind, Entry, Question, QuestionKind};
 use study::runner::Strip;
 use study::session::view::{
-    Banner, Correctable, DeviceState, MessageKind, Progress, Screen, StatusLine, View,
+    Banner, Correctable, Counts, DeviceState, MessageKind, Progress, Screen, StatusLine, View,
 };
 use study::text::QuestionId;
 use study::tui::{Colour, Surface};
@@ -102,16 +102,24 @@ pub(crate) fn form(questions: Vec<Question>) -> Screen {
     }
 }
 
+/// A study of samples that are mounted by hand.
+fn by_hand(screen: Screen, state: DeviceState) -> View {
+    let mut view = view(screen);
+    view.device = DeviceKind::Manual;
+    view.line.device = state;
+    view
+}
+
 pub(crate) fn view(screen: Screen) -> View {
     let armed = matches!(
         screen,
         Screen::Playing { .. } | Screen::Loading | Screen::Mount { .. }
     );
     let device = match screen {
-        Screen::Playing { .. } => DeviceState::Running {
+        Screen::Playing { .. } => DeviceState::Running(Some(Counts {
             strokes: 4,
             clamps: 0,
-        },
+        })),
         Screen::Loading => DeviceState::Loading,
         Screen::Stopping => DeviceState::Stopping,
         Screen::DeviceTrouble { .. } => DeviceState::Fault,
@@ -157,6 +165,7 @@ pub(crate) fn view(screen: Screen) -> View {
         banner: None,
         notice: None,
         entry: Entry::Participant,
+        device: DeviceKind::Simulated,
         correctable: vec![
             Correctable {
                 place: Place::Trial {
@@ -298,6 +307,20 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
                 strokes_missing: 2,
             }),
         ),
+        (
+            "playing_by_hand",
+            by_hand(
+                Screen::Playing {
+                    since_s: 14.3,
+                    strokes_missing: 0,
+                },
+                DeviceState::Felt,
+            ),
+        ),
+        (
+            "stopped_by_hand",
+            by_hand(Screen::Stopped { can_rate: true }, DeviceState::ByHand),
+        ),
         ("stopping", view(Screen::Stopping)),
         ("stopped", view(Screen::Stopped { can_rate: true })),
         (
@@ -313,6 +336,19 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
                 what: text("no answer for 200 ms"),
                 can_go_on: false,
             }),
+        ),
+        (
+            "program_lost",
+            View {
+                device: DeviceKind::Process,
+                ..view(Screen::DeviceTrouble {
+                    what: text(
+                        "the program `python3 controller.py` has ended with exit status 1; \
+                         its last words: OSError: [Errno 5] encoder",
+                    ),
+                    can_go_on: false,
+                })
+            },
         ),
         ("saving", view(Screen::Saving)),
         (

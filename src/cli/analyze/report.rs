@@ -9,7 +9,9 @@ use crate::report::figures::{self, Drawn, Trace};
 use crate::report::html::{self, Details};
 use crate::report::png::{Painter, PngError};
 use crate::store::{StudyFolder, layout};
+use crate::text::counted;
 use rayon::prelude::*;
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -63,11 +65,19 @@ pub(super) fn files(
 /// changes no byte.
 fn pictures(drawn: &[Drawn]) -> Result<Vec<(String, Vec<u8>)>, PngError> {
     let painter = Painter::default();
-    let one = |figure: &Drawn| {
-        let svg = figure.wide.to_svg();
-        painter.png(&svg).map(|png| (svg, png))
-    };
-    drawn.par_iter().with_max_len(1).map(one).collect()
+    let figures = drawn.par_iter().with_max_len(1);
+    let svgs: Vec<String> = figures.map(|figure| figure.wide.to_svg()).collect();
+    // What takes longest first, so that no thread has it alone at the end.
+    let mut order: Vec<usize> = (0..svgs.len()).collect();
+    order.sort_by_key(|&i| Reverse(svgs[i].len()));
+    let mut pngs: Vec<(usize, Vec<u8>)> = (order.into_iter().par_bridge())
+        .map(|i| painter.png(&svgs[i]).map(|png| (i, png)))
+        .collect::<Result<_, _>>()?;
+    pngs.sort_by_key(|(i, _)| *i);
+    Ok(svgs
+        .into_iter()
+        .zip(pngs.into_iter().map(|p| p.1))
+        .collect())
 }
 
 /// What the study's folder says beyond its ratings.
@@ -107,6 +117,10 @@ pub(super) fn details(
     if let Some(u) = &protocol.device.uncertified {
         facts.push(("uncertified tables played".to_owned(), u.reason.clone()));
     }
+    // What was felt, which for pilots can be another device than the protocol's.
+    let felt = rows.iter().filter(|r| r.attempt.is_some());
+    let devices: BTreeSet<&str> = felt.map(|r| r.device_kind.as_str()).collect();
+    let devices: Vec<&str> = devices.into_iter().collect();
     let tools: BTreeSet<&str> = rows.iter().map(|r| r.tool_version.as_str()).collect();
     let manifest = study.manifest();
     let prints = &manifest.newest().fingerprints;
@@ -118,8 +132,9 @@ pub(super) fn details(
         facts,
         repetitions: Some(protocol.design.repetitions),
         order: Some(order(&protocol.design.order).to_owned()),
+        conduct: conduct(protocol, &devices),
         reference: protocol.trial.reference.clone(),
-        device: Some(protocol.device.kind.as_str().to_owned()),
+        device: Some(devices.join(", ")).filter(|d| !d.is_empty()),
         seed: Some(s.seed),
         tools: tools
             .into_iter()
@@ -137,6 +152,44 @@ pub(super) fn details(
             .map(|v| (v.version, v.at.to_rfc3339(), v.reason.clone()))
             .collect(),
     }
+}
+
+/// How the sessions were run, in sentences for the methods.
+fn conduct(protocol: &Protocol, devices: &[&str]) -> Vec<String> {
+    let design = &protocol.design;
+    let mut said = Vec::new();
+    match design.max_run {
+        Some(1) => said.push("No realization came twice in a row.".to_owned()),
+        Some(n) => said.push(format!("No realization came more than {n} times in a row.")),
+        None => {}
+    }
+    match design.practice.len() {
+        0 => {}
+        n => said.push(format!(
+            "Before these, {} felt that {} not analysed.",
+            counted(n, "practice trial was", "practice trials were"),
+            if n == 1 { "is" } else { "are" }
+        )),
+    }
+    if let Some(breaks) = &design.breaks {
+        said.push(format!(
+            "After every {} there was a break of at least {} s.",
+            counted(breaks.every as usize, "trial", "trials"),
+            breaks.at_least_s
+        ));
+    }
+    said.push(match devices {
+        [] => return said,
+        ["simulated"] => "The device was simulated: nobody felt a force.".to_owned(),
+        kinds => format!("Kinds of device that were played on: {}.", kinds.join(", ")),
+    });
+    if let Some(u) = protocol.device.uncertified.as_ref().filter(|u| u.play) {
+        said.push(format!(
+            "Realizations without a certificate of passivity were played with at most {} N.",
+            u.force_n.get()
+        ));
+    }
+    said
 }
 
 fn order(order: &Order) -> &'static str {

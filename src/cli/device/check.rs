@@ -2,11 +2,12 @@
 
 use super::nonce;
 use super::port::PortWire;
-use crate::cli::playback::{COMMISSIONED, COMMISSIONED_FILE, Commissioned, Place};
+use crate::cli::playback::{COMMISSIONED, COMMISSIONED_FILE, Commissioned, Place, Port, Waiting};
 use crate::cli::{Console, Failure, Kind};
 use crate::device::check::{self, Commissioning, Verdict};
 use crate::device::host::name;
 use crate::device::wire::Identity;
+use crate::device::{Device as _, process};
 use crate::text::Untrusted;
 use std::path::{Path, PathBuf};
 
@@ -24,7 +25,7 @@ pub(in crate::cli) struct InfoArgs {
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct CheckArgs {
     #[command(flatten)]
-    place: Place,
+    place: Port,
     /// Play each table of this study as well, and compare what was rendered with it
     #[arg(long, value_name = "PROTOCOL")]
     models: Option<PathBuf>,
@@ -39,7 +40,10 @@ pub(in crate::cli) struct CheckArgs {
 
 /// Says who is there.
 pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
-    let mut wire = PortWire::open(&args.place)?;
+    if args.place.is_program()? {
+        return program(args, console);
+    }
+    let mut wire = PortWire::open(&args.place.serial)?;
     let place = wire.place.clone();
     let found = check::greet(&mut wire, nonce());
     let device = found.map_err(|why| {
@@ -95,11 +99,49 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
     if device.fault.code() != 0 {
         lines.push(("because", device.fault.as_str().to_owned()));
     }
-    let mut out = String::new();
-    for (what, value) in lines {
-        out.push_str(&format!("{what:<14} {value}\n"));
+    console.out(aligned(&lines))
+}
+
+/// What a program says of itself.
+fn program(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
+    let opened = args.place.open_program(&mut Waiting::in_a_line(console))?;
+    let Some(device) = opened else { return Ok(()) };
+    let (command, device) = (device.command().join(" "), device.identity());
+    let [force_n, velocity_mm_s] = [device.limits.force_n, device.limits.velocity_mm_s];
+    if args.json {
+        let document = serde_json::json!({
+            "format": "study-device-info/1",
+            "command": command,
+            "device": {
+                "id": device.id,
+                "language": process::FORMAT,
+                "simulated": device.simulated,
+                "telemetry": device.telemetry,
+                "force_n": force_n.get(),
+                "velocity_mm_s": velocity_mm_s.get(),
+            },
+        });
+        return console.out(format!("{document:#}\n"));
     }
-    console.out(out)
+    let flags = [
+        (device.simulated, "simulated: every session is a pilot"),
+        (device.telemetry, "telemetry"),
+    ];
+    let flags: Vec<&str> = flags.iter().filter(|f| f.0).map(|f| f.1).collect();
+    let lines = [
+        ("program", Untrusted(&command).to_string()),
+        ("id", Untrusted(&device.id).to_string()),
+        ("language", process::FORMAT.to_owned()),
+        ("has", flags.join(", ")),
+        ("force", format!("at most {} N", force_n.get())),
+        ("velocity", format!("at most {} mm/s", velocity_mm_s.get())),
+    ];
+    console.out(aligned(&lines))
+}
+
+fn aligned(lines: &[(&str, String)]) -> String {
+    let line = |(what, value): &(&str, String)| format!("{what:<14} {value}\n");
+    lines.iter().map(line).collect()
 }
 
 fn described(device: &Identity) -> serde_json::Value {

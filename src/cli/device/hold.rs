@@ -3,9 +3,11 @@
 //! For measurements of the link: telemetry over minutes, memory, what becomes of the
 //! force when this program is killed.
 
-use crate::cli::playback::Place;
+use crate::cli::playback::{Place, Waiting};
 use crate::cli::{Console, Failure, Kind, load};
 use crate::device::host::Settings;
+use crate::device::link::Threaded;
+use crate::device::process::ProcessDevice;
 use crate::device::{Device, Report, Stimulus};
 use crate::limits::{Limit, Limits};
 use crate::model::predict::{Direction, Lookup};
@@ -50,7 +52,13 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         force_n: limit(9.0)?,
         velocity_mm_s: limit(1000.0)?,
     };
-    let mut device = args.place.open_serial(Settings::default())?;
+    let mut device = match args.place.is_program()? {
+        false => Held::Wire(args.place.serial.open_serial(Settings::default())?),
+        true => match args.place.open_program(&mut Waiting::in_a_line(console))? {
+            Some(device) => Held::Program(device),
+            None => return Ok(()),
+        },
+    };
     let failed = |why: String| Failure::new(Kind::Device, why);
     let (say, lines) = channel();
     std::thread::spawn(move || {
@@ -64,6 +72,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
     let at = || start.elapsed();
     let told = |e: crate::device::DeviceError| failed(e.to_string());
     device
+        .any()
         .load(&Stimulus::of_table(&table), limits, at())
         .map_err(told)?;
     let mut until = ANSWER_WITHIN;
@@ -72,17 +81,13 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         if lines.try_recv().is_ok_and(|line| line.trim() == STALL) {
             std::thread::sleep(Duration::from_secs(1));
         }
-        for report in device.poll(at()) {
+        for report in device.any().poll(at()) {
             match report {
-                Report::Loaded => device.start(at()).map_err(told)?,
+                Report::Loaded => device.any().start(at()).map_err(told)?,
                 Report::Started => until = at() + Duration::from_secs(args.seconds),
                 Report::Stopped(playback) => {
-                    let facts = device.facts();
-                    let number = |value: Option<f64>| {
-                        value.map_or("unknown".to_owned(), |value| format!("{value:.1}"))
-                    };
                     return console.out(format!(
-                        "{:.1} s, {} samples, {} lost, {} strokes, least energy {:.4} J, {:.1} switches/s, {} clamps\nclock: {} ms ahead, {} ppm fast; {} bad frames, {} repeats\n",
+                        "{:.1} s, {} samples, {} lost, {} strokes, least energy {:.4} J, {:.1} switches/s, {} clamps\n{}",
                         playback.exploration_s,
                         playback.samples,
                         playback.samples_lost,
@@ -90,10 +95,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
                         playback.least_energy_j,
                         playback.switches_per_s,
                         playback.clamp_count,
-                        number(facts.health.clock.offset_ms()),
-                        number(facts.health.clock.drift_ppm()),
-                        facts.health.bad_frames,
-                        facts.health.repeats,
+                        device.health(),
                     ));
                 }
                 Report::Fault(why) | Report::Lost(why) => return Err(failed(why)),
@@ -106,9 +108,43 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             }
             stopping = true;
             until = at() + ANSWER_WITHIN;
-            device.stop(at()).map_err(told)?;
+            device.any().stop(at()).map_err(told)?;
         }
         std::thread::sleep(TURN);
+    }
+}
+
+/// What is held.
+enum Held {
+    Wire(Threaded),
+    Program(ProcessDevice),
+}
+
+impl Held {
+    fn any(&mut self) -> &mut dyn Device {
+        match self {
+            Self::Wire(device) => device,
+            Self::Program(device) => device,
+        }
+    }
+
+    /// A line about the link, where there is one.
+    fn health(&self) -> String {
+        let Self::Wire(device) = self else {
+            return String::new();
+        };
+        let health = device.facts().health;
+        let number = |value: Option<f64>| match value {
+            Some(value) => format!("{value:.1}"),
+            None => "unknown".to_owned(),
+        };
+        format!(
+            "clock: {} ms ahead, {} ppm fast; {} bad frames, {} repeats\n",
+            number(health.clock.offset_ms()),
+            number(health.clock.drift_ppm()),
+            health.bad_frames,
+            health.repeats,
+        )
     }
 }
 

@@ -1,6 +1,6 @@
 //! A port as a wire with a clock.
 
-use crate::cli::playback::Place;
+use crate::cli::playback::Port;
 use crate::cli::{Failure, Kind};
 use crate::device::check::Wire;
 use crate::device::link::{Link, LinkError, Opener as _};
@@ -17,8 +17,8 @@ pub(in crate::cli) struct PortWire {
 
 impl PortWire {
     /// Opens the port that the arguments or `device.toml` name.
-    pub(in crate::cli) fn open(place: &Place) -> Result<Self, Failure> {
-        let mut opener = place.serial()?;
+    pub(in crate::cli) fn open(port: &Port) -> Result<Self, Failure> {
+        let mut opener = port.serial()?;
         let link = opener.open().map_err(|e| {
             let place = opener.place();
             Failure::new(Kind::Device, format!("{}: {e}", Untrusted(&place)))

@@ -5,7 +5,7 @@
 //! the position: so a playback is compared as a recording is, and the VAF of what
 //! was rendered can stand beside the one that the table was identified with.
 
-use crate::cli::playback::Place;
+use crate::cli::playback::Port;
 use crate::cli::{Console, Failure, Kind, load};
 use crate::device::host::Settings;
 use crate::device::link::Threaded;
@@ -15,6 +15,7 @@ use crate::identify::vaf::{self, Score};
 use crate::limits::Limits;
 use crate::model::Realization;
 use crate::outcome::Sample;
+use crate::protocol::DeviceKind;
 use crate::recording::{self, Columns};
 use crate::runner::playback_limits;
 use serde::Serialize;
@@ -48,12 +49,12 @@ pub(super) struct Rendered {
 /// Plays each table of a study.
 pub(super) fn look(
     protocol: &Path,
-    place: &Place,
+    port: &Port,
     console: &mut Console,
     json: bool,
 ) -> Result<Vec<Rendered>, Failure> {
     let loaded = load::load(protocol)?;
-    let mut device = place.open_serial(Settings::default())?;
+    let mut device = port.open_serial(Settings::default())?;
     let mut all = Vec::new();
     if !json {
         console.say(format!(
@@ -66,7 +67,7 @@ pub(super) fn look(
         let Some(table) = loaded.models.get(&entry.id) else {
             continue;
         };
-        if entry.duplicate_of.is_some() {
+        if entry.duplicate_of.is_some() || entry.device == Some(DeviceKind::Manual) {
             continue;
         }
         let limits = playback_limits(&loaded.protocol, Some(table));

@@ -4,7 +4,7 @@
 use super::Others;
 use crate::diagnostic::{Fault, Findings, did_you_mean};
 use crate::protocol::check::Spans;
-use crate::protocol::{FileOrders, Order, Protocol, Role, Seat};
+use crate::protocol::{DeviceKind, FileOrders, Order, Protocol, Role, Seat};
 use crate::schedule::balance::balances;
 use crate::schedule::{Planner, ScheduleError};
 use crate::text::Untrusted;
@@ -119,6 +119,10 @@ pub(super) fn certificates(
         let Some(realization) = others.realization(&entry.id) else {
             continue;
         };
+        // what is mounted by hand has no force
+        if entry.device.unwrap_or(protocol.device.kind) == DeviceKind::Manual {
+            continue;
+        }
         let certificate = realization.certificate();
         if certificate.passes() || seen.contains(&entry.file.as_ref()) {
             continue;
@@ -131,9 +135,7 @@ pub(super) fn certificates(
             ))
             .at(spans.get(&format!("models[{i}].file")).cloned())
             .label(certificate.to_string())
-            .hint(
-                "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }",
-            ),
+            .hint(super::PERMIT),
         );
     }
 }

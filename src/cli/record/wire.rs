@@ -2,6 +2,7 @@
 //! by the device, and comes back as it was measured.
 
 use super::{Args, filter_line, finish, recording_bytes};
+use crate::cli::console::shell_command;
 use crate::cli::device::port::PortWire;
 use crate::cli::trajectory::{read_trajectory, refuse_to_overwrite};
 use crate::cli::{Console, Failure, Kind};
@@ -12,6 +13,28 @@ use crate::limits::Limit;
 use crate::plant::Measured;
 use crate::text::Untrusted;
 use crate::trajectory;
+
+/// The command that records the same way, to be typed as it is. A port that stands in
+/// `device.toml` is found there again.
+fn again(args: &Args) -> String {
+    let mut words: Vec<String> = ["study", "record"].map(str::to_owned).to_vec();
+    words.push(args.trajectory.to_string_lossy().into_owned());
+    let mut option = |name: &str, value: Option<String>| {
+        if let Some(value) = value {
+            words.extend([format!("--{name}"), value]);
+        }
+    };
+    option("device", Some(args.device.clone()));
+    option("port", args.place.port.clone());
+    option("baud", args.place.baud.map(|b| b.to_string()));
+    option("rate", Some(args.rate.to_string()));
+    option("max-force", Some(args.max_force.to_string()));
+    option("filter", (!args.raw).then(|| args.filter.to_string()));
+    if args.raw {
+        words.push("--raw".to_owned());
+    }
+    shell_command(&words)
+}
 
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
@@ -60,11 +83,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     // model files keep the first line: it says what was recorded, and how
     let mut header = format!(
-        "{what}, {} ({}); study record {} --rate {}, study {}\n",
+        "{what}, {} ({}); {} (study {})\n",
         name(&device.serial),
         name(&device.firmware),
-        Untrusted(&args.trajectory.to_string_lossy()),
-        args.rate,
+        Untrusted(&again(args)),
         env!("CARGO_PKG_VERSION"),
     );
     header.push_str(&filter_line(args));

@@ -163,7 +163,12 @@ pub(super) fn read(line: &[u8]) -> Result<Say, String> {
 
 /// The beginning of somebody's text.
 pub(super) fn short_text(text: &str) -> String {
-    let mut short: String = text.chars().take(MAX_TEXT).collect();
+    beginning(text, MAX_TEXT)
+}
+
+/// At most so many characters of it.
+pub(super) fn beginning(text: &str, most: usize) -> String {
+    let mut short: String = text.chars().take(most).collect();
     if short.len() < text.len() {
         short.push('…');
     }

@@ -7,17 +7,17 @@ use crate::protocol::Role;
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
-const FOREIGN: &str = "subject,model,repetition,rating,vaf[,trial_index]";
+const FOREIGN: &str = "subject,model,rating[,repetition][,vaf][,trial_index]";
 
 /// Columns of our own table that stand before the questions.
 const BEFORE_QUESTIONS: &str = "protocol_version";
 
 impl Ratings {
-    /// Reads a CSV with the columns `subject,model,repetition,rating,vaf` and
-    /// optionally `trial_index`, in any order, or one with the columns of our own
-    /// `ratings.csv`. Empty fields of model, rating and vaf are missing, and so
-    /// are `NA` and `NaN`; an empty repetition is counted up. A byte order mark
-    /// is skipped. In our own table `question` names the column (default: the
+    /// Reads a CSV with the columns `subject,model,rating` and optionally
+    /// `repetition`, `vaf` and `trial_index`, in any order, or one with the columns of
+    /// our own `ratings.csv`. Empty fields of model, rating and vaf are missing, and so
+    /// are `NA` and `NaN`; a repetition that is empty or has no column is counted up.
+    /// A byte order mark is skipped. In our own table `question` names the column (default: the
     /// first after `protocol_version`).
     ///
     /// # Errors
@@ -180,7 +180,7 @@ struct Columns {
     question: String,
     subject: usize,
     model: usize,
-    repetition: usize,
+    repetition: Option<usize>,
     rating: usize,
     vaf: Option<usize>,
     trial_index: Option<usize>,
@@ -229,7 +229,7 @@ impl Columns {
                 question: question.unwrap_or("rating").to_owned(),
                 subject: need("subject")?,
                 model: need("model")?,
-                repetition: need("repetition")?,
+                repetition: find("repetition"),
                 rating: need(question.unwrap_or("rating"))?,
                 vaf: find("vaf"),
                 trial_index: find("trial_index"),
@@ -251,7 +251,7 @@ impl Columns {
             question: header[rating].clone(),
             subject,
             model: need("model")?,
-            repetition: need("repetition")?,
+            repetition: Some(need("repetition")?),
             rating,
             vaf: find("vaf"),
             trial_index: find("position"),
@@ -285,7 +285,7 @@ impl Columns {
         let mut row = Row {
             subject: 0,
             model: NO_MODEL,
-            repetition: line.whole(self.repetition)?,
+            repetition: self.repetition.map_or(Ok(0), |i| line.whole(i))?,
             rating: line.number(self.rating)?,
             vaf: self.vaf.map_or(Ok(f64::NAN), |i| line.number(i))?,
             trial_index: self.trial_index.map_or(Ok(0), |i| line.whole(i))?,
@@ -463,6 +463,13 @@ mod tests {
     }
 
     #[test]
+    fn three_columns_are_a_table() {
+        let r = read("subject,model,rating\nS1,A,4\nS1,B,2\nS1,A,5\n").unwrap();
+        assert_eq!(r.repetition, [1, 1, 2]);
+        assert!(r.vaf.iter().all(|v| v.is_nan()));
+    }
+
+    #[test]
     fn each_fault_names_its_line() {
         assert_eq!(
             says(&format!("{HEAD}S1,A,1,4,0.5\nS1,B,1,4\n")),
@@ -481,7 +488,7 @@ mod tests {
             "r.csv, line 3: subject `S1`, model `A`, repetition 1 came already on line 2"
         );
         assert_eq!(says(HEAD), "r.csv: no ratings, only a header");
-        assert!(says("subject,model,rating\n").contains("no column `repetition`"));
+        assert!(says("subject,model,vaf\n").contains("no column `rating`"));
         assert!(says("subject,subject\n").contains("two columns are named `subject`"));
         assert_eq!(
             says("subject;model;repetition;rating;vaf\nS1;A;1;4,5;0,5\n"),

@@ -4,7 +4,7 @@ use super::{Canvas, Drawn, Scene, cell, drawn, head};
 use crate::report::apa;
 use crate::report::csv::digits;
 use crate::report::svg::{Anchor, Axis, Colour, Figure, Look, Mark, Note, Panel, Whisker};
-use crate::report::svg::{PALETTE, SMALL, shortened, text_width};
+use crate::report::svg::{PALETTE, SMALL, for_names, shortened, text_width};
 
 /// Mean and its deviation, by realization: (place, mean, half).
 fn deviations(scene: &Scene<'_>) -> Vec<(f64, f64, f64)> {
@@ -54,7 +54,8 @@ pub(super) fn fig10(scene: &Scene<'_>) -> Option<Drawn> {
     );
     let title = format!("Mean {} by realization", scene.asked);
     Some(drawn("fig10-means", caption, data, |c: Canvas| {
-        c.figure("fig10-means", &title, c.pick(300.0, 280.0))
+        let height = c.pick(280.0, 250.0) + for_names(&scene.names(), c.width - 60.0);
+        c.figure("fig10-means", &title, height)
             .with(rating_panel(scene, "realization"))
     }))
 }
@@ -90,7 +91,8 @@ pub(super) fn fig11(scene: &Scene<'_>) -> Option<Drawn> {
         let names = Axis::of_names("realization", &scene.names());
         let look = Look::nth(1).size(9.0);
         let below = Panel::new(names, axis).with(look, Mark::Points(vaf.clone()));
-        c.figure("fig11-rating-and-vaf", &title, c.pick(440.0, 420.0))
+        let height = c.pick(420.0, 390.0) + for_names(&scene.names(), c.width - 60.0);
+        c.figure("fig11-rating-and-vaf", &title, height)
             .with(above)
             .with(below)
     }))
@@ -132,17 +134,18 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
     }
     let v = &scene.a.values;
     let found = v.number("corr/pearson/r").map_or_else(String::new, |r| {
-        let p = v
-            .number("corr/pearson/p_exact_two_sided")
-            .or_else(|| v.number("corr/pearson/p_monte_carlo_two_sided"));
-        let p = p.map_or_else(String::new, |p| {
-            format!(", permutation p {}", apa::equals_p(p))
+        let p = crate::report::permuted(scene.a, "pearson");
+        let p = p.map_or_else(String::new, |(kind, p)| {
+            format!(", {}", apa::named_p(kind, p))
         });
-        format!(" Over the test realizations r = {}{p}.", apa::r(r))
+        format!(
+            " Over the realizations that are tested r = {}{p}.",
+            apa::r(r)
+        )
     });
     let caption = format!(
-        "Mean {} over subjects against VAF. Error bars: 95 % t intervals over subjects; they hold \
-         for these realizations and say nothing about others.{found}",
+        "Mean {} over subjects against VAF (variance accounted for). Error bars: 95 % t intervals \
+         over subjects; they hold for these realizations and say nothing about others.{found}",
         scene.asked
     );
     let title = format!("Mean {} against VAF", scene.asked);

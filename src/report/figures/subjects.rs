@@ -3,8 +3,8 @@
 use super::{Canvas, Drawn, Scene, cell, drawn, head, name};
 use crate::report::apa;
 use crate::report::svg::{
-    Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, SMALL, Span, ramp, shortened,
-    text_width,
+    Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, SMALL, Span, for_names, ramp,
+    shortened, text_width,
 };
 use crate::stats::describe::mean;
 use std::collections::BTreeMap;
@@ -93,15 +93,7 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
                     .collect();
             }
             // Names that have no room side by side are set at a slant, below the cells.
-            let longest = (scene.names().iter())
-                .map(|n| text_width(&shortened(n, 24), SMALL))
-                .fold(0.0, f64::max);
-            let slanted = (longest + 8.0) * scene.models.len() as f64 > room;
-            let below = if slanted {
-                0.6 * longest.min(118.0)
-            } else {
-                0.0
-            };
+            let below = for_names(&scene.names(), room);
             let height = 70.0 + c.pick(22.0, 20.0) * rows.max(4) as f64 + below;
             c.figure("subjects-and-realizations", &title, height)
                 .with(panel)
@@ -180,8 +172,8 @@ pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
             panel = panel
                 .named("mean over subjects", thick, Mark::Line(over.clone()))
                 .with(thick, Mark::Points(over));
-            c.figure("subject-lines", &title, c.pick(340.0, 320.0))
-                .with(panel)
+            let height = c.pick(320.0, 290.0) + for_names(&names, c.width - 60.0);
+            c.figure("subject-lines", &title, height).with(panel)
         },
     ))
 }
@@ -196,7 +188,8 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
         }
     }
     let last = by.keys().map(|k| k.1).max().unwrap_or(0);
-    if !(2..=MAX_REPETITIONS).contains(&last) || scene.models.len() > MAX_LINES {
+    let lines = (1..=MAX_LINES).contains(&scene.models.len());
+    if !(2..=MAX_REPETITIONS).contains(&last) || !lines {
         return None;
     }
     let of = |model: &str, repetition: u32| by.get(&(model, repetition)).and_then(|x| mean(x));
@@ -212,10 +205,11 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     }
     let v = &scene.a.values;
     let slope = v.number("order_trial/slope").zip(v.number("order_trial/p"));
+    let digits = apa::decimals(v.number("order_trial/se").unwrap_or(0.0), 3);
     let slope = slope.map_or_else(String::new, |(b, p)| {
         format!(
-            " Beside subjects and realizations the rating changes by {} per trial, p {}.",
-            apa::number(b, 3),
+            " With a mean for each subject and each realization taken out, the rating changes by {} per trial, t test p {}.",
+            apa::number(b, digits),
             apa::equals_p(p)
         )
     });

@@ -81,19 +81,28 @@ fn real(a: &Analysis) -> Option<Answer> {
     let ranked = ranked(a);
     let (mean, best) = *ranked.first()?;
     let v = &a.values;
+    let equals = ranked.iter().filter(|r| r.0 == mean).count();
+    let who = match (ranked.len(), equals) {
+        (1, _) => format!("The only realization is {best}"),
+        (_, 1) => format!("The best-rated realization is {best}"),
+        _ => format!(
+            "{} realizations share the highest mean; one of them is {best}",
+            apa::capital(&apa::count(equals))
+        ),
+    };
     let scale = a.scale.map_or_else(String::new, |(from, to)| {
         format!(" on a scale from {from} to {to}")
     });
     let share = |id: &str| v.number(&format!("realistic/{id}/share"));
     let short = match a.realistic_from.zip(share(best)) {
         Some((from, s)) => format!(
-            "The best-rated realization is {best}, mean {}{scale}; {} of its ratings are {from} or higher.",
+            "{who}, mean {}{scale}; {} of its ratings are {from} or higher.",
             two(mean),
             apa::percent(s)
         ),
         None => format!(
-            "The best-rated realization is {best}, mean {}{scale}; no rating was stated beforehand \
-             from which one counts as realistic.",
+            "{who}, mean {}{scale}; no rating was stated beforehand from which one counts as \
+             realistic.",
             two(mean)
         ),
     };
@@ -101,7 +110,10 @@ fn real(a: &Analysis) -> Option<Answer> {
     let over = format!("desc/{best}/subject_mean");
     let interval = ci(a, &format!("{over}/ci95"), two);
     if let (Some(m), false) = (v.number(&format!("{over}/mean")), interval.is_empty()) {
-        more.push(format!("Its mean over subjects is {}{interval}.", two(m)));
+        more.push(format!(
+            "The mean of {best} over subjects is {}{interval}.",
+            two(m)
+        ));
     }
     if let Some(from) = a.realistic_from {
         let most: Vec<String> = ranked
@@ -144,8 +156,9 @@ fn against_references(a: &Analysis, best: &str) -> Vec<String> {
             let get = |what: &str| v.number(&format!("{id}/{what}"));
             let difference = get("mean_diff")?;
             let interval = ci(a, &format!("{id}/ci95"), two);
-            let p = get("p_t_holm")
-                .map_or_else(String::new, |p| format!(", p {} (Holm)", apa::equals_p(p)));
+            let p = get("p_t_holm").map_or_else(String::new, |p| {
+                format!(", paired t test p {} (Holm)", apa::equals_p(p))
+            });
             let equivalent = get("margin").zip(get("p_tost")).map_or_else(
                 || " No margin of equivalence was stated beforehand.".to_owned(),
                 |(margin, p)| {
@@ -183,7 +196,7 @@ fn separable(a: &Analysis) -> Option<Answer> {
                 let best = ranked.iter().take_while(|(m, _)| *m == mean);
                 let best: Vec<String> = best.map(|(_, id)| (*id).to_owned()).collect();
                 format!(
-                    "{} share the highest mean, {}.",
+                    "No: {} share the highest mean, {}.",
                     apa::listing(&best),
                     two(mean)
                 )
@@ -197,29 +210,41 @@ fn separable(a: &Analysis) -> Option<Answer> {
         (second, first)
     };
     let get = |id: &str| v.number(&format!("posthoc/{low}|{high}/{id}"));
-    let p = get("p_wilcoxon_exact_holm").or_else(|| get("p_t_holm"));
+    let exact = get("p_wilcoxon_exact_holm").map(|p| ("Wilcoxon's signed-rank test, exact", p));
+    let found = exact.or_else(|| get("p_t_holm").map(|p| ("paired t test", p)));
+    let (pairs, least) = crate::report::pairs(a);
+    let holm = match pairs.len() {
+        1 => String::new(),
+        n => format!(", Holm's correction over {n} pairs"),
+    };
     let difference = format!("{first} {} and {second} {}", two(mean), two(next));
-    let short = match p {
-        Some(p) if p < 0.05 => format!("Yes: {difference}, p {} (Holm).", apa::equals_p(p)),
-        Some(p) => format!(
-            "Not by these data: {difference}, p {} (Holm).",
-            apa::equals_p(p)
+    let short = match found {
+        Some((test, p)) => {
+            let verdict = if p < 0.05 { "Yes" } else { "Not by these data" };
+            let p = apa::equals_p(p);
+            format!("{verdict}: {difference}, p {p} ({test}{holm}).")
+        }
+        None if ranked.len() > MAX_PAIRED => format!(
+            "{difference}; pairs are tested of {MAX_PAIRED} realizations at most, and there are {}.",
+            ranked.len()
         ),
-        None => format!("{difference}; the pair was not tested."),
+        None => format!("{difference}; too few subjects rated both to test it."),
     };
     let mut more = Vec::new();
     if let (Some(d), Some(dz)) = (get("mean_diff"), get("dz")) {
-        let wilcoxon = get("p_wilcoxon_exact").map_or_else(String::new, |p| {
-            format!(
-                ", Wilcoxon exact p {} before Holm's correction over all pairs",
-                apa::equals_p(p)
-            )
+        let sign = if low == first { 1.0 } else { -1.0 };
+        let alone = get("p_wilcoxon_exact").filter(|_| pairs.len() > 1);
+        let alone = alone.map_or_else(String::new, |p| {
+            format!("; without the correction p {}", apa::equals_p(p))
         });
         more.push(format!(
-            "{low} minus {high} over subjects: {} (dz = {}){wilcoxon}.",
-            two(d),
-            two(dz)
+            "{first} minus {second} over subjects: {} (Cohen's dz = {}){alone}.",
+            two(sign * d),
+            two(sign * dz)
         ));
+    }
+    if let Some(least) = least.filter(|l| exact.is_some() && *l >= 0.05) {
+        more.push(too_few_for_pairs(pairs.len(), least));
     }
     Some(Answer {
         question,
@@ -228,19 +253,42 @@ fn separable(a: &Analysis) -> Option<Answer> {
     })
 }
 
+/// More realizations are not compared pair by pair.
+const MAX_PAIRED: usize = 8;
+
+/// Why no pair can be significant.
+pub(super) fn too_few_for_pairs(pairs: usize, least: f64) -> String {
+    format!(
+        "With so few subjects Wilcoxon's test, corrected over {}, cannot give a p below {}: it could \
+         not have shown a difference.",
+        apa::counted(pairs, "pair", "pairs"),
+        apa::p(least)
+    )
+}
+
+/// Whether the crossed model with VAF has no variance of the realizations left;
+/// `None` if its fit is not singular.
+pub(super) fn none_left(a: &Analysis) -> Option<bool> {
+    let get = |id: &str| a.values.number(&format!("lmm_vaf_crossed/{id}"));
+    get("singular").filter(|s| *s == 1.0)?;
+    Some(get("var_model").is_none_or(|v| v <= 0.0))
+}
+
 fn differ(a: &Analysis) -> Option<Answer> {
     let v = &a.values;
     let mut more = Vec::new();
     more.extend(super::prose::anova(a).map(|s| format!("{s}.")));
     more.extend(super::prose::friedman(a).map(|s| format!("{s}.")));
-    let p = v
-        .number("rmanova/p_gg")
-        .or_else(|| v.number("friedman/p"))?;
-    let short = if p < 0.05 {
-        format!("Yes, p {}.", apa::equals_p(p))
+    let of = |id: &str, test: &'static str| v.number(id).map(|p| (p, test));
+    let (p, test) = of("rmanova/p_gg", "repeated-measures analysis of variance")
+        .or_else(|| of("friedman/exact_p", "Friedman's test, exact"))
+        .or_else(|| of("friedman/p", "Friedman's test"))?;
+    let verdict = if p < 0.05 {
+        "Yes"
     } else {
-        format!("These data do not show it, p {}.", apa::equals_p(p))
+        "These data do not show it"
     };
+    let short = format!("{verdict}, p {} ({test}).", apa::equals_p(p));
     Some(Answer {
         question: "Do the realizations differ at all?".to_owned(),
         short,
@@ -263,7 +311,11 @@ fn variance(a: &Analysis) -> Option<Answer> {
     Some(Answer {
         question: "Where does the variance of the ratings come from?".to_owned(),
         short: format!("{}{}.", first.unwrap_or_default(), letters.as_str()),
-        more: vec!["Few realizations estimate their own share poorly.".to_owned()],
+        more: vec![
+            "The share of the realizations is the least certain: it rests on as many values as there \
+             are realizations."
+                .to_owned(),
+        ],
     })
 }
 
@@ -311,10 +363,11 @@ fn order(a: &Analysis) -> Option<Answer> {
         Some((get("slope")?, get("se")?, get("df")?, get("t")?, get("p")?))
     };
     let say = |(b, se, df, t, p): (f64, f64, f64, f64, f64)| {
+        let digits = apa::decimals(se, 3);
         format!(
             "{} (SE {}), t({}) = {}, p {}",
-            apa::number(b, 3),
-            apa::number(se, 3),
+            apa::number(b, digits),
+            apa::number(se, digits),
             apa::number(df, 0),
             two(t),
             apa::equals_p(p)
@@ -323,24 +376,24 @@ fn order(a: &Analysis) -> Option<Answer> {
     let trial = effect("order_trial")?;
     let short = if trial.4 < 0.05 {
         format!(
-            "Ratings drift by {} per trial, p {}.",
-            apa::number(trial.0, 3),
+            "Ratings drift by {} points per trial, p {} (t test).",
+            apa::number(trial.0, apa::decimals(trial.1, 3)),
             apa::equals_p(trial.4)
         )
     } else {
         format!(
-            "No drift over the session is shown, p {}.",
+            "No drift over the session is shown, p {} (t test).",
             apa::equals_p(trial.4)
         )
     };
     let mut more = vec![format!(
-        "Change per trial, beside subjects and realizations: {}.",
+        "Change per trial, with a mean for each subject and each realization taken out: {}.",
         say(trial)
     )];
     if let Some(previous) = effect("order_previous_rating") {
         more.push(format!(
-            "Change per point of the rating just before: {} (biased a little below 0, so that its p \
-             is too small).",
+            "Change per point of the rating just before: {}. Taking out the subjects' means biases \
+             this a little below 0, so that a small negative change is no finding.",
             say(previous)
         ));
     }

@@ -1,5 +1,6 @@
 //! What a reader has to know: banners, warnings, exclusions, comments, versions.
 
+use super::prose::in_words;
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
 use crate::analyze::{Analysis, Said, Warning};
@@ -16,7 +17,7 @@ pub(super) fn banners(a: &Analysis) -> Markup {
         }
         "no-participants" => "NO PARTICIPANTS",
         "mixed" => "PILOTS OR SIMULATED PARTICIPANTS AMONG THE DATA",
-        _ => "INTERIM",
+        _ => "AN EARLY LOOK",
     };
     html! {
         @for w in a.warnings.iter().filter(|w| AT_THE_TOP.contains(&w.code)) {
@@ -57,13 +58,13 @@ fn stated(a: &Analysis) -> Markup {
                 table {
                     caption { "Exclusions stated beforehand" }
                     thead { tr {
-                        th scope="col" { "rule" } th scope="col" { "rows" } th scope="col" { "participants" }
-                        th.text scope="col" { "remark" }
+                        th scope="col" { "rule" } th.text scope="col" { "leaves out" } th scope="col" { "rows" }
+                        th scope="col" { "participants" } th.text scope="col" { "remark" }
                     } }
                     tbody {
                         @for e in &a.exclusions {
                             tr {
-                                td { code { (e.rule.to_string()) } } td { (e.rows) } td { (e.participants) }
+                                td { code { (e.rule.to_string()) } } td.text { (in_words(e.rule)) } td { (e.rows) } td { (e.participants) }
                                 td.text { (e.problem.unwrap_or_default()) }
                             }
                         }
@@ -118,10 +119,11 @@ pub(super) fn exclusions(a: &Analysis, of_study: bool) -> Markup {
                 }
                 details {
                     summary { "The rows that do not count" }
-                    div.scroll {
+                    div.scroll tabindex="0" role="region" aria-label="The rows that do not count" {
                         table {
                             thead { tr {
-                                th { "subject" } th { "realization" } th { "repetition" } th { "rating" } th.text { "reason" }
+                                th scope="col" { "subject" } th scope="col" { "realization" } th scope="col" { "repetition" }
+                                th scope="col" { "rating" } th.text scope="col" { "reason" }
                             } }
                             tbody {
                                 @for r in left_out.iter().take(MAX_ROWS) {

@@ -2,8 +2,9 @@
 
 use super::answers::ci;
 use super::{Details, safe};
-use crate::analyze::Analysis;
+use crate::analyze::{Analysis, Exclusion, Listed, Value};
 use crate::report::apa;
+use crate::stats::permutation::DRAWS;
 use maud::{Markup, html};
 
 pub(super) fn section(details: &Details, a: &Analysis) -> Markup {
@@ -23,33 +24,85 @@ pub(super) fn section(details: &Details, a: &Analysis) -> Markup {
 }
 
 fn methods(d: &Details, a: &Analysis) -> String {
+    let mut said = conduct(d, a);
+    said.extend(tests_done(a));
+    if super::answers::tests(a).iter().any(|m| has_sd(a, m)) {
+        said.push(
+            "Standard deviations are over all ratings of a realization (n − 1); intervals of means are \
+             t intervals over subjects."
+                .to_owned(),
+        );
+    }
+    said.push(format!(
+        "The level of significance is .05, two-sided. The analysis was done with study {}.",
+        env!("CARGO_PKG_VERSION")
+    ));
+    said.join(" ")
+}
+
+fn has_sd(a: &Analysis, m: &Listed) -> bool {
+    let sd = format!("desc/{}/sd", m.id);
+    a.values.number(&sd).is_some()
+}
+
+/// Who rated what, how often and how, and what was left out.
+fn conduct(d: &Details, a: &Analysis) -> Vec<String> {
     let c = &a.counts;
-    let tests = super::answers::tests(a).len();
+    let tests = super::answers::tests(a);
     let mut said = Vec::new();
     let who = match (c.simulated == c.participants, c.pilots == c.participants) {
-        _ if c.participants == 0 => ("subject", "subjects"),
-        (true, _) => (
+        _ if c.participants == 0 => apa::counted(0, "subject", "subjects"),
+        (true, _) => apa::counted(
+            c.participants,
             "simulated participant, no person,",
             "simulated participants, no people,",
         ),
-        (_, true) => ("pilot participant", "pilot participants"),
-        _ => ("participant", "participants"),
+        (_, true) => apa::counted(c.participants, "pilot participant", "pilot participants"),
+        _ => apa::counted(c.participants, "participant", "participants"),
+    };
+    let others = match (c.pilots, c.simulated) {
+        (0, 0) => String::new(),
+        (p, s) if p == c.participants || s == c.participants => String::new(),
+        (p, 0) => format!(" ({})", apa::counted(p, "pilot", "pilots")),
+        (0, s) => format!(" ({s} simulated)"),
+        (p, s) => format!(
+            " ({} and {s} simulated)",
+            apa::counted(p, "pilot", "pilots")
+        ),
     };
     let times = d.repetitions.map_or_else(String::new, |n| match n {
-        1 => " once".to_owned(),
-        2 => " twice".to_owned(),
-        n => format!(" {n} times"),
+        1 => " once each".to_owned(),
+        2 => " twice each".to_owned(),
+        n => format!(" {n} times each"),
     });
-    said.push(format!(
-        "{} rated {}{times}.",
-        apa::counted(c.participants, who.0, who.1),
-        apa::counted(tests, "realization", "realizations")
-    ));
+    said.push(if tests.is_empty() {
+        let ratings = apa::counted(c.rated, "rating", "ratings");
+        format!("{who}{others} gave {ratings}.")
+    } else {
+        let what = apa::counted(tests.len(), "realization", "realizations");
+        format!("{who}{others} rated {what}{times}.")
+    });
+    let beside: Vec<String> = a
+        .realizations
+        .iter()
+        .filter(|m| !tests.iter().any(|t| t.id == m.id))
+        .map(|m| match &m.duplicate_of {
+            Some(of) => format!("{} (a hidden repeat of {of})", m.id),
+            None => format!("{} ({})", m.id, m.role.as_str().replace('-', " ")),
+        })
+        .collect();
+    if !beside.is_empty() {
+        said.push(format!(
+            "Rated among them, without a part in the tests: {}.",
+            apa::listing(&beside)
+        ));
+    }
     if let Some(order) = &d.order {
         said.push(format!(
             "The order of trials was {order}, fixed before each session."
         ));
     }
+    said.extend(d.conduct.iter().cloned());
     if let Some(reference) = &d.reference {
         said.push(format!("Before each trial the screen said: “{reference}”"));
     }
@@ -69,43 +122,150 @@ fn methods(d: &Details, a: &Analysis) -> String {
             "After each trial the question was “{prompt}”, answered{scale}."
         ));
     }
-    let beside = a.realizations.len() - tests;
-    if beside > 0 {
+    if let Some(from) = a.realistic_from {
         said.push(format!(
-            "{} beside them (references, anchors, hidden repeats) had no part in the tests.",
-            apa::counted(beside, "realization", "realizations")
+            "A rating of {from} or higher was said beforehand to count as realistic."
         ));
     }
-    if a.values.number("corr/pearson/r").is_some() {
+    said.extend(left_out(a));
+    said
+}
+
+/// A rule of exclusion, as a sentence goes on with it.
+pub(super) fn in_words(rule: Exclusion) -> String {
+    match rule {
+        Exclusion::ConstantRater => "participants whose ratings never change".to_owned(),
+        Exclusion::HiddenReferenceBelow(rating) => {
+            format!("participants whose mean rating of the hidden references is below {rating}")
+        }
+        Exclusion::StrokesBelow(strokes) => {
+            format!("trials with fewer than {strokes} full strokes")
+        }
+        Exclusion::Inconsistent(difference) => format!(
+            "participants whose means of a realization and of its hidden repeat are more than \
+             {difference} apart, on average"
+        ),
+    }
+}
+
+/// What was stated beforehand of leaving out, and what was left out.
+fn left_out(a: &Analysis) -> Vec<String> {
+    let c = &a.counts;
+    let mut said = Vec::new();
+    if !a.exclusions.is_empty() {
+        let rules: Vec<String> = a
+            .exclusions
+            .iter()
+            .map(|e| {
+                let rows = apa::counted(e.rows, "row", "rows");
+                format!("{} ({rows})", in_words(e.rule))
+            })
+            .collect();
+        said.push(format!(
+            "It was stated beforehand to leave out {}.",
+            apa::listing(&rules)
+        ));
+    }
+    let rules: usize = a.exclusions.iter().map(|e| e.rows).sum();
+    let rows: usize = c.excluded.values().sum();
+    if rows > rules {
+        said.push(format!(
+            "In all, {} of {} left out; the reasons are listed under “What was counted and left out”.",
+            apa::counted(rows, "row", "rows"),
+            apa::counted(c.excluded_participants, "participant is", "participants are")
+        ));
+    }
+    if c.without_rating > 0 {
+        said.push(format!(
+            "{} without a rating.",
+            apa::counted(
+                c.without_rating,
+                "trial that counts is",
+                "trials that count are"
+            )
+        ));
+    }
+    said
+}
+
+/// The tests that there are numbers of.
+fn tests_done(a: &Analysis) -> Vec<String> {
+    let v = &a.values;
+    let mut said = Vec::new();
+    if v.number("corr/pearson/r").is_some() {
+        let p = match crate::report::permuted(a, "pearson") {
+            Some(("exact p", _)) => ", the p from all permutations of the realizations".to_owned(),
+            Some(_) => format!(", the p from {DRAWS} random permutations of the realizations"),
+            None => String::new(),
+        };
+        said.push(format!(
+            "Whether the variance accounted for (VAF) predicts the rating was tested over the means \
+             of the realizations (subjects' cell means averaged), with Pearson's r{p}."
+        ));
+    }
+    let (f, chi2) = (
+        v.number("rmanova/F").is_some(),
+        v.number("friedman/chi2").is_some(),
+    );
+    let anova = "a repeated-measures analysis of variance on the cell means with the \
+                 Greenhouse–Geisser correction";
+    let friedman = "Friedman's test with mid-ranks";
+    let differences = match (f, chi2) {
+        (true, true) => Some(format!("{anova} and by {friedman}")),
+        (true, false) => Some(anova.to_owned()),
+        (false, true) => Some(friedman.to_owned()),
+        (false, false) => None,
+    };
+    said.extend(
+        differences.map(|d| format!("Differences between realizations were tested by {d}.")),
+    );
+    let (pairs, _) = crate::report::pairs(a);
+    let wilcoxon = v
+        .iter()
+        .any(|(id, value)| id.ends_with("/p_wilcoxon_exact") && matches!(value, Value::Number(_)));
+    let pair_test = if wilcoxon {
+        "by Wilcoxon's signed-rank test, exact and conditional on ties, and by paired t tests"
+    } else {
+        "by paired t tests"
+    };
+    match pairs.len() {
+        0 => {}
+        1 => said.push(format!("The pair was compared {pair_test}.")),
+        n => said.push(format!(
+            "The {n} pairs were compared {pair_test}, each with Holm's correction over all pairs."
+        )),
+    }
+    if v.number("lmm_vaf_crossed/slope").is_some() {
+        let cells = match v.number("lmm_vaf_crossed/var_subject_model") {
+            Some(_) => ", realizations and their combinations",
+            None => " and realizations",
+        };
+        said.push(format!(
+            "A linear mixed model of the ratings on VAF with random intercepts of subjects{cells} was \
+             fitted by restricted maximum likelihood, with Satterthwaite's degrees of freedom."
+        ));
+    }
+    let one = v.number("icc_subjects/ICC2").is_some();
+    let other = v.number("icc_repetitions/ICC1").is_some();
+    let iccs = match (one, other) {
+        (true, true) => Some(
+            "Agreement of subjects is ICC(2,1) over cell means, consistency over repetitions ICC(1,1)",
+        ),
+        (true, false) => Some("Agreement of subjects is ICC(2,1) over cell means"),
+        (false, true) => Some("Consistency over repetitions is ICC(1,1)"),
+        (false, false) => None,
+    };
+    said.extend(iccs.map(|i| format!("{i} (Shrout and Fleiss), with F intervals.")));
+    if v.iter().any(|(id, value)| {
+        id.starts_with("reference/") && id.ends_with("/p_tost") && matches!(value, Value::Number(_))
+    }) {
         said.push(
-            "Whether VAF predicts the rating was tested over the means of the realizations \
-             (subjects' cell means averaged), with Pearson's r and the p of all permutations of the \
-             realizations where there were nine or fewer, of random ones above."
+            "Equivalence with the reference was tested by two one-sided t tests at the margin stated \
+             beforehand."
                 .to_owned(),
         );
     }
-    if a.values.number("rmanova/F").is_some() {
-        said.push(
-            "Differences between realizations were tested by a repeated-measures analysis of \
-             variance on the cell means with the Greenhouse–Geisser correction and by Friedman's \
-             test with mid-ranks; pairs by Wilcoxon's signed-rank test, exact and conditional on \
-             ties, with Holm's correction."
-                .to_owned(),
-        );
-    }
-    if a.values.number("lmm_vaf_crossed/slope").is_some() {
-        said.push(
-            "A linear mixed model with crossed random intercepts of subjects and realizations was \
-             fitted by REML, with Satterthwaite's degrees of freedom."
-                .to_owned(),
-        );
-    }
-    said.push(format!(
-        "Standard deviations are over all ratings of a realization (n − 1). The analysis was done \
-         with study {}.",
-        env!("CARGO_PKG_VERSION")
-    ));
-    said.join(" ")
+    said
 }
 
 fn results(a: &Analysis) -> String {
@@ -127,17 +287,16 @@ fn results(a: &Analysis) -> String {
     }
     let both: Vec<String> = [anova(a), friedman(a)].into_iter().flatten().collect();
     if !both.is_empty() {
-        said.push(format!("{}.", both.join("; ")));
+        said.push(format!(
+            "Differences between realizations: {}.",
+            both.join("; ")
+        ));
     }
     if let Some(r) = v.number("corr/pearson/r") {
         let n = v.number("corr/n_models").unwrap_or(0.0);
-        let exact = v
-            .number("corr/pearson/p_exact_two_sided")
-            .map(|p| ("exact ", p));
-        let drawn = v.number("corr/pearson/p_monte_carlo_two_sided");
-        let p = exact.or_else(|| drawn.map(|p| ("Monte Carlo permutation ", p)));
+        let p = crate::report::permuted(a, "pearson");
         let p = p.map_or_else(String::new, |(kind, p)| {
-            format!(", {kind}p {}", apa::equals_p(p))
+            format!(", {}", apa::named_p(kind, p))
         });
         let rho = v.number("corr/spearman/rho");
         let rho = rho.map_or_else(String::new, |x| format!("; Spearman’s ρ = {}", apa::r(x)));
@@ -156,15 +315,17 @@ fn results(a: &Analysis) -> String {
         get("slope_satterthwaite_df"),
         get("slope_satterthwaite_p"),
     ) {
-        let singular = if get("singular") == Some(1.0) {
-            " (singular fit: no variance of the realizations is left beside VAF, and p is too small)"
-        } else {
-            ""
+        let singular = match super::answers::none_left(a) {
+            Some(true) => {
+                " (singular fit: no variance of the realizations is left beside VAF, and p is too small)"
+            }
+            Some(false) => " (singular fit in another variance than that of the realizations)",
+            None => "",
         };
         said.push(format!(
             "Crossed mixed model: b = {} per unit of VAF, SE = {}, t({}) = {}, p {}{singular}.",
-            two(b),
-            two(se),
+            apa::number(b, apa::decimals(se, 2)),
+            apa::number(se, apa::decimals(se, 2)),
             apa::number(df, 1),
             two(t),
             apa::equals_p(p)
@@ -184,6 +345,14 @@ fn results(a: &Analysis) -> String {
     }
     if let Some(x) = icc("icc_repetitions", "ICC1") {
         said.push(format!("Consistency over repetitions: ICC(1,1) = {x}."));
+    }
+    let before = v.number("before_exclusion/corr/pearson/r");
+    if let Some((before, r)) = before.zip(v.number("corr/pearson/r")) {
+        said.push(format!(
+            "Without the exclusions the correlation would be r = {} instead of {}.",
+            apa::r(before),
+            apa::r(r)
+        ));
     }
     said.join(" ")
 }
@@ -227,11 +396,17 @@ pub(super) fn only_these(a: &Analysis) -> Vec<String> {
     let v = &a.values;
     let two = |x: f64| apa::number(x, 2);
     let mut rows = Vec::new();
+    if a.realizations.is_empty() {
+        return rows;
+    }
     for (id, what) in [
-        ("rmcorr_cells", "Repeated-measures correlation of the cells"),
+        (
+            "rmcorr_cells",
+            "Repeated-measures correlation of rating and VAF, by cells",
+        ),
         (
             "rmcorr_trials",
-            "Repeated-measures correlation of the trials",
+            "Repeated-measures correlation of rating and VAF, by trials",
         ),
     ] {
         let get = |name: &str| v.number(&format!("{id}/{name}"));
@@ -252,7 +427,9 @@ pub(super) fn only_these(a: &Analysis) -> Vec<String> {
     if let Some(b) = v.number("subject_slope/mean") {
         let get = |name: &str| v.number(&format!("subject_slope/{name}"));
         let test = get("t").zip(get("p")).map_or_else(String::new, |(t, p)| {
-            format!(", t = {}, p {}", two(t), apa::equals_p(p))
+            let df = v.number("subject_slope/df");
+            let df = df.map_or_else(String::new, |df| format!("({df})"));
+            format!(", t{df} = {}, p {}", two(t), apa::equals_p(p))
         });
         rows.push(format!(
             "Mean slope of a subject’s ratings on VAF: {}{}{test}.",
@@ -269,7 +446,7 @@ pub(super) fn only_these(a: &Analysis) -> Vec<String> {
             _ => "bootstrap",
         };
         rows.push(format!(
-            "With other subjects and the same realizations, r would be {} in 95 of 100 studies ({kind} over subjects, percentiles).",
+            "Correlation of the means with VAF, subjects drawn anew from these subjects: 95 % of r lie in {} ({kind}, percentiles).",
             apa::interval(low, high, apa::r)
         ));
     }
@@ -289,9 +466,18 @@ pub(super) fn only_these(a: &Analysis) -> Vec<String> {
     ] {
         let get = |name: &str| v.number(&format!("{id}/{name}"));
         if let (Some(b), Some(se)) = (get("slope"), get("slope_se")) {
-            let p = get("slope_satterthwaite_p");
-            let p = p.map_or_else(String::new, |p| format!(", p {}", apa::equals_p(p)));
-            rows.push(format!("{what}: slope {} (SE {}){p}.", two(b), two(se)));
+            let p = get("slope_satterthwaite_p").zip(get("slope_satterthwaite_df"));
+            let p = p
+                .zip(get("slope_t"))
+                .map_or_else(String::new, |((p, df), t)| {
+                    let df = apa::number(df, 1);
+                    format!(", t({df}) = {}, p {}", two(t), apa::equals_p(p))
+                });
+            rows.push(format!(
+                "{what}: slope {} points per unit of VAF (SE {}){p}.",
+                apa::number(b, apa::decimals(se, 2)),
+                apa::number(se, apa::decimals(se, 2))
+            ));
         }
     }
     let ordinal = v
@@ -299,7 +485,7 @@ pub(super) fn only_these(a: &Analysis) -> Vec<String> {
         .zip(v.number("clmm_vaf_quad/se/vaf"));
     if let Some((b, se)) = ordinal {
         rows.push(format!(
-            "Ordinal model with an intercept for each subject: log odds {} per unit of VAF (SE {}).",
+            "Ordinal model (cumulative logits) with an intercept for each subject: log odds {} per unit of VAF (SE {}).",
             two(b),
             two(se)
         ));

@@ -27,9 +27,11 @@ pub(super) fn section(a: &Analysis) -> Markup {
             @if !undefined.is_empty() {
                 details {
                     summary { (undefined.len()) " not defined, with reasons" }
-                    div.scroll {
+                    div.scroll tabindex="0" role="region" aria-label="Statistics that are not defined" {
                         table {
-                            thead { tr { th { "statistic" } th.text { "why it is not defined" } } }
+                            thead { tr {
+                                th scope="col" { "statistic" } th.text scope="col" { "why it is not defined" }
+                            } }
                             tbody {
                                 @for (id, why) in undefined.iter().take(MAX_LISTED) {
                                     tr { td { code { (safe(id)) } } td.text { (safe(why)) } }
@@ -42,9 +44,9 @@ pub(super) fn section(a: &Analysis) -> Markup {
             }
             details {
                 summary { (defined.len()) " values" }
-                div.scroll {
+                div.scroll tabindex="0" role="region" aria-label="Statistics" {
                     table {
-                        thead { tr { th { "statistic" } th { "value" } } }
+                        thead { tr { th scope="col" { "statistic" } th scope="col" { "value" } } }
                         tbody {
                             @for (id, value) in defined.iter().take(MAX_LISTED) {
                                 tr { td { code { (safe(id)) } } td { (value) } }

@@ -29,7 +29,7 @@ th, td { padding: .22rem .6rem .22rem 0; text-align: right; vertical-align: top;
 th { border-bottom: 1px solid #1a1a1a; }
 td { border-bottom: 1px solid #ddd; }
 th:first-child, td:first-child, .text { text-align: left; }
-td:first-child { white-space: normal; min-width: 7.5rem; max-width: 18rem; overflow-wrap: anywhere; }
+td:first-child { white-space: normal; min-width: 7.5rem; max-width: 23rem; overflow-wrap: anywhere; }
 .text { white-space: normal; min-width: 12rem; }
 tr.beside td { font-style: italic; }
 code { font-family: 'Liberation Mono', Consolas, Menlo, monospace; font-size: .88em; }
@@ -58,6 +58,6 @@ footer { margin-top: 3rem; font-size: .85rem; border-top: 1px solid #bbb; paddin
   .scroll { overflow: visible; }
   .apart { background: #fff; }
   h2, h3, caption, summary { break-after: avoid; }
-  figure, .banner, .warning, blockquote, tr { break-inside: avoid; }
+  figure, .banner, .warning, blockquote, tr, .whole { break-inside: avoid; }
 }
 ";

@@ -1,12 +1,15 @@
 //! Tables that a reader looks for first.
 
 use super::{answers, safe};
-use crate::analyze::{Analysis, Listed, Value};
+use crate::analyze::{Analysis, Listed};
 use crate::report::apa;
 use maud::{Markup, html};
 
 /// Most rows of a table; the rest is in the CSV.
 pub(super) const MAX_ROWS: usize = 200;
+
+/// Rows of a table that is not cut at the end of a page.
+const MAX_WHOLE: usize = 15;
 
 /// A table: head, rows, and which of them stand beside the others.
 struct Table {
@@ -38,7 +41,7 @@ impl Table {
     fn render(&self) -> Markup {
         html! {
             @if !self.rows.is_empty() {
-                div.scroll tabindex="0" role="region" aria-label=(self.caption) {
+                div.scroll.whole[self.rows.len() <= MAX_WHOLE] tabindex="0" role="region" aria-label=(self.caption) {
                     table {
                         caption { (self.caption) }
                         thead { tr { @for h in &self.head { th scope="col" { (safe(h)) } } } }
@@ -61,16 +64,21 @@ pub(super) fn section(a: &Analysis) -> Markup {
     html! {
         section {
             h2 { "Tables" }
-            (realizations(a).render())
-            p.note {
-                "mean, SD and median are over all ratings of a realization, SD with n − 1; the interval is \
-                 a 95 % t interval over subjects. Realizations in italics stand beside the tested ones."
+            @if !a.realizations.is_empty() {
+                (realizations(a).render())
+                p.note {
+                    "n: ratings. Mean, SD (standard deviation, n − 1) and median are over all ratings of a \
+                     realization; the interval is a 95 % t interval of the mean over subjects."
+                    @if a.realizations.len() > answers::tests(a).len() {
+                        " Realizations in italics stand beside the tested ones."
+                    }
+                }
             }
-            (pairs(a).render())
+            (pairs(a))
             (shares(a).render())
             (agreement(a).render())
             (with_and_without(a).render())
-            (subjects(a).render())
+            (subjects(a))
         }
     }
 }
@@ -81,7 +89,7 @@ fn show(x: Option<f64>, decimals: usize) -> String {
 
 fn role(m: &Listed) -> String {
     match &m.duplicate_of {
-        Some(of) => format!("repeats {of}"),
+        Some(of) => format!("repeats {}", apa::name(of)),
         None => m.role.as_str().to_owned(),
     }
 }
@@ -109,7 +117,7 @@ fn realizations(a: &Analysis) -> Table {
         let get = |what: &str| v.number(&format!("desc/{}/{what}", m.id));
         let ends = get("subject_mean/ci95_lo").zip(get("subject_mean/ci95_hi"));
         let mut row = vec![
-            m.id.clone(),
+            apa::name(&m.id),
             role(m),
             m.vaf.map_or_else(|| "–".to_owned(), |v| apa::share(v, 3)),
             show(get("n"), 0),
@@ -130,7 +138,7 @@ fn realizations(a: &Analysis) -> Table {
     table
 }
 
-fn pairs(a: &Analysis) -> Table {
+fn pairs(a: &Analysis) -> Markup {
     let head = [
         "pair (a minus b)",
         "difference",
@@ -141,12 +149,9 @@ fn pairs(a: &Analysis) -> Table {
     ];
     let mut table = Table::new("Pairs of realizations", &head);
     let v = &a.values;
-    let ids = v.iter().filter_map(|(id, _)| {
-        let pair = id.strip_prefix("posthoc/")?.strip_suffix("/mean_diff")?;
-        Some(pair.to_owned())
-    });
-    for pair in ids {
-        let get = |what: &str| v.number(&format!("posthoc/{pair}/{what}"));
+    let (compared, least) = crate::report::pairs(a);
+    for (first, second) in &compared {
+        let get = |what: &str| v.number(&format!("posthoc/{first}|{second}/{what}"));
         // thirds that cancel leave the digits that rounding left
         let shown = |what: &str, decimals: usize| {
             let x = get(what).map(|x| if x.abs() < 1e-9 { 0.0 } else { x });
@@ -156,7 +161,7 @@ fn pairs(a: &Analysis) -> Table {
         table.row(
             false,
             vec![
-                pair.replace('|', " − "),
+                format!("{} − {}", apa::name(first), apa::name(second)),
                 shown("mean_diff", 3),
                 shown("dz", 2),
                 shown("t", 2),
@@ -165,7 +170,19 @@ fn pairs(a: &Analysis) -> Table {
             ],
         );
     }
-    table
+    html! {
+        (table.render())
+        @if !compared.is_empty() {
+            p.note {
+                "Differences of cell means over subjects; dz: mean difference by its standard deviation; \
+                 p of the paired t test and of Wilcoxon’s signed-rank test (exact), with Holm’s \
+                 correction over all pairs."
+                @if let Some(least) = least.filter(|l| *l >= 0.05) {
+                    " " (answers::too_few_for_pairs(compared.len(), least))
+                }
+            }
+        }
+    }
 }
 
 fn shares(a: &Analysis) -> Table {
@@ -219,26 +236,56 @@ fn agreement(a: &Analysis) -> Table {
     table
 }
 
+fn three(x: f64) -> String {
+    apa::number(x, 3)
+}
+
+fn whole(x: f64) -> String {
+    apa::number(x, 0)
+}
+
+/// A row of the comparison: what, its identifier, how it is printed.
+type Row = (&'static str, &'static str, fn(f64) -> String);
+
+/// What is compared with and without the exclusions, beside the means.
+const HEADLINE: [Row; 8] = [
+    ("participants", "design/n_subjects", whole),
+    ("r of mean rating and VAF", "corr/pearson/r", apa::r),
+    ("its p, exact", "corr/pearson/p_exact_two_sided", apa::p),
+    (
+        "its p, random permutations",
+        "corr/pearson/p_monte_carlo_two_sided",
+        apa::p,
+    ),
+    ("Spearman’s ρ", "corr/spearman/rho", apa::r),
+    ("F of the realizations", "rmanova/F", three),
+    ("its p, Greenhouse–Geisser", "rmanova/p_gg", apa::p),
+    ("p of Friedman’s test", "friedman/p", apa::p),
+];
+
 /// The headline with the exclusions and without them.
 fn with_and_without(a: &Analysis) -> Table {
     let head = ["statistic", "with the exclusions", "without them"];
     let mut table = Table::new("The headline with and without the exclusions", &head);
     let v = &a.values;
-    for (id, value) in v.iter() {
-        let Some(own) = id.strip_prefix("before_exclusion/") else {
-            continue;
-        };
-        let shown =
-            own.starts_with("corr/") || own.starts_with("rmanova/") || own.ends_with("/mean");
-        if let (true, Value::Number(before)) = (shown, value) {
-            let with = v.number(own).map_or_else(|| "–".to_owned(), apa::plain);
-            table.row(false, vec![own.to_owned(), with, apa::plain(*before)]);
+    let mut both = |what: String, id: &str, shown: fn(f64) -> String| {
+        let pair = (v.number(id), v.number(&format!("before_exclusion/{id}")));
+        if let (with, Some(before)) = pair {
+            let with = with.map_or_else(|| "–".to_owned(), shown);
+            table.row(false, vec![what, with, shown(before)]);
         }
+    };
+    for (what, id, shown) in HEADLINE {
+        both(what.to_owned(), id, shown);
+    }
+    for m in &a.realizations {
+        let id = format!("desc/{}/mean", m.id);
+        both(format!("mean of {}", apa::name(&m.id)), &id, three);
     }
     table
 }
 
-fn subjects(a: &Analysis) -> Table {
+fn subjects(a: &Analysis) -> Markup {
     let head = [
         "subject",
         "n",
@@ -254,13 +301,18 @@ fn subjects(a: &Analysis) -> Table {
     let v = &a.values;
     let ids = v.iter().map(|(id, _)| id);
     let names = ids.filter_map(|id| id.strip_prefix("subject/")?.strip_suffix("/n"));
+    // Two points always lie on a line.
+    let enough = answers::tests(a).len() > 2;
     for s in names {
         let get = |what: &str| v.number(&format!("subject/{s}/{what}"));
-        let r = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| apa::share(x, 2));
+        let r = |x: Option<f64>| {
+            let x = x.filter(|_| enough);
+            x.map_or_else(|| "–".to_owned(), |x| apa::share(x, 2))
+        };
         table.row(
             false,
             vec![
-                s.to_owned(),
+                apa::name(s),
                 show(get("n"), 0),
                 show(get("mean"), 2),
                 show(get("sd"), 2),
@@ -272,5 +324,14 @@ fn subjects(a: &Analysis) -> Table {
             ],
         );
     }
-    table
+    html! {
+        (table.render())
+        @if !table.rows.is_empty() {
+            p.note {
+                "Over all ratings of a subject. Distinct: how many different ratings were given; longest \
+                 run: trials in a row with the same one; SD within cells: of the repetitions; r with the \
+                 others: of the subject’s means with those of all other subjects, over realizations."
+            }
+        }
+    }
 }

@@ -103,14 +103,14 @@ fn axes(out: &mut Out, panel: &Panel, f: &Frame) {
             continue;
         };
         out.segment((x, f.bottom), (x, f.bottom + 4.0), ink, 1.0);
-        if f.slanted {
+        if f.slant > 0 {
             let style = (Anchor::End, ink);
             out.text(
                 (x + 4.0, f.bottom + 15.0),
                 label,
                 SMALL,
                 style,
-                Setting::Slanted,
+                Setting::Slanted(f.slant),
             );
         } else {
             let style = (Anchor::Middle, ink);

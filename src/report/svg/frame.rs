@@ -7,10 +7,40 @@ use super::{Figure, NORMAL, Panel, SMALL, fitted, text_width};
 const APART: f64 = 8.0;
 
 /// Width of a slanted label, px.
-const MAX_SLANTED: f64 = 118.0;
+const MAX_SLANTED: f64 = 140.0;
 
-/// cos 35°.
-const SLANT: f64 = 0.819;
+/// An angle: degrees, cosine, sine.
+type Angle = (u8, f64, f64);
+
+/// Angles at which labels are set: the flatter one
+/// where there is room for it.
+const FLAT: Angle = (35, 0.819, 0.574);
+const STEEP: Angle = (60, 0.5, 0.866);
+
+/// Least distance of the base lines of slanted labels, px.
+const LINE: f64 = 12.0;
+
+/// The angle of so many labels on an axis of x of `room` px;
+/// `None` if they have room side by side.
+fn slant(widest: f64, labels: usize, room: f64) -> Option<Angle> {
+    if (widest + APART) * labels as f64 <= room {
+        None
+    } else if room / labels as f64 * FLAT.2 >= LINE {
+        Some(FLAT)
+    } else {
+        Some(STEEP)
+    }
+}
+
+/// How much higher a figure has to be whose names of x stand at a slant, px, when its
+/// axis is about `room` px wide.
+pub(in crate::report) fn for_names(names: &[String], room: f64) -> f64 {
+    let widths = names
+        .iter()
+        .map(|n| text_width(&super::shortened(n, MAX_LABEL), SMALL));
+    let widest = widths.fold(0.0, f64::max);
+    slant(widest, names.len(), room).map_or(0.0, |(_, _, sine)| sine * widest.min(MAX_SLANTED))
+}
 
 /// Characters of a tick label that are shown.
 pub(super) const MAX_LABEL: usize = 24;
@@ -32,8 +62,8 @@ pub(super) struct Frame {
     /// Ticks of x and y: place, label.
     pub(super) x_ticks: Vec<(f64, String)>,
     pub(super) y_ticks: Vec<(f64, String)>,
-    /// Whether the labels of x are set at a slant.
-    pub(super) slanted: bool,
+    /// Degrees by which the labels of x are set at a slant.
+    pub(super) slant: u8,
     /// Legend: series, place of its sample.
     pub(super) legend: Vec<(usize, (f64, f64))>,
 }
@@ -61,13 +91,16 @@ pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
     let share = |row: &[Panel]| row.iter().map(|p| p.share).fold(0.1, f64::max);
     let whole: f64 = rows.iter().map(|r| share(r)).sum();
     let margin = figure.panels.iter().map(left_margin).fold(0.0, f64::max);
+    // Panels that are compared side by side are equally high.
+    let labelled = |row: &[Panel]| row.iter().any(|p| !p.x.label.is_empty());
+    let anywhere = columns > 1 && labelled(&figure.panels);
     let mut frames = Vec::new();
     let mut top = 0.0;
     for row in rows {
         let height = figure.height * share(row) / whole;
         for (j, panel) in row.iter().enumerate() {
             let left = cell_width * j as f64;
-            let label = row.iter().any(|p| !p.x.label.is_empty());
+            let label = anywhere || labelled(row);
             frames.push(frame(
                 panel,
                 (left, top, left + cell_width, top + height),
@@ -101,17 +134,17 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool
     let mut top = outer_top + if panel.title.is_empty() { 8.0 } else { 26.0 };
     let legend = legend(panel, left, right, &mut top);
     let room = right - left;
-    let (x_ticks, slanted) = x_ticks(&panel.x, room, left - outer_left);
-    let below = match (x_ticks.is_empty(), slanted) {
+    let (x_ticks, angle) = x_ticks(&panel.x, room, left - outer_left);
+    let below = match (x_ticks.is_empty(), angle) {
         (true, _) => 6.0,
-        (false, false) => 22.0,
-        (false, true) => {
+        (false, None) => 22.0,
+        (false, Some((_, _, sine))) => {
             let widest = x_ticks
                 .iter()
                 .map(|(_, l)| text_width(l, SMALL))
                 .fold(0.0, f64::max);
-            // sin 35° and the height of the letters.
-            widest * 0.574 + 18.0
+            // and the height of the letters
+            widest * sine + 18.0
         }
     };
     let label = if label { 22.0 } else { 4.0 };
@@ -129,7 +162,7 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool
         outer_bottom,
         x_ticks,
         y_ticks: panel.y.marks(most).into_iter().map(shorten).collect(),
-        slanted,
+        slant: angle.map_or(0, |a| a.0),
         legend,
     }
 }
@@ -137,7 +170,7 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool
 /// As many ticks as have room beside each other; names that have none are set
 /// at a slant, and if even that is too tight every n-th is shown. A slanted one
 /// reaches to the left, `margin` px beyond the axis at most.
-fn x_ticks(axis: &Axis, room: f64, margin: f64) -> (Vec<(f64, String)>, bool) {
+fn x_ticks(axis: &Axis, room: f64, margin: f64) -> (Vec<(f64, String)>, Option<Angle>) {
     let widest = |ticks: &[(f64, String)]| {
         let all = ticks.iter().map(|(_, l)| text_width(l, SMALL));
         all.fold(0.0, f64::max)
@@ -147,25 +180,24 @@ fn x_ticks(axis: &Axis, room: f64, margin: f64) -> (Vec<(f64, String)>, bool) {
             .iter()
             .map(|(at, l)| (*at, super::shortened(l, MAX_LABEL)))
             .collect();
-        let slanted = (widest(&ticks) + APART) * ticks.len() as f64 > room;
-        if slanted {
-            // At least 16 px, most of a line, from one to the next.
-            let fit = (room / 16.0).floor().max(1.0) as usize;
+        let angle = slant(widest(&ticks), ticks.len(), room);
+        if let Some((_, cosine, sine)) = angle {
+            let fit = (room * sine / LINE).floor().max(1.0) as usize;
             let every = ticks.len().div_ceil(fit);
             let short = |(at, label): (f64, String)| {
                 let before = margin + axis.share(at).unwrap_or(0.0) * room;
-                let most = MAX_SLANTED.min(before / SLANT);
+                let most = MAX_SLANTED.min(before / cosine);
                 (at, fitted(&label, SMALL, most))
             };
             ticks = ticks.into_iter().step_by(every).map(short).collect();
         }
-        return (ticks, slanted);
+        return (ticks, angle);
     }
     let ticks = (2..=10)
         .rev()
         .map(|most| axis.marks(most))
         .find(|ticks| (widest(ticks) + APART) * ticks.len() as f64 <= room);
-    (ticks.unwrap_or_default(), false)
+    (ticks.unwrap_or_default(), None)
 }
 
 fn legend(panel: &Panel, left: f64, right: f64, top: &mut f64) -> Vec<(usize, (f64, f64))> {

@@ -32,10 +32,10 @@ impl Colour {
         0.2126 * linear(self.0) + 0.7152 * linear(self.1) + 0.0722 * linear(self.2)
     }
 
-    /// Black or white, whichever is read better on this.
+    /// Black or white, whichever is read better on this: at least 4.5 to 1.
     pub fn text_on(self) -> Self {
         if self.luminance() > 0.18 {
-            Self::INK
+            Self(0, 0, 0)
         } else {
             Self::WHITE
         }
@@ -162,7 +162,8 @@ impl Look {
     pub fn nth(n: usize) -> Self {
         Self {
             colour: PALETTE[n % PALETTE.len()],
-            shape: SHAPES[n % SHAPES.len()],
+            // after a round of colours each comes with the next shape
+            shape: SHAPES[(n + n / PALETTE.len()) % SHAPES.len()],
             dash: DASHES[n % DASHES.len()],
             fill: FILLS[n % FILLS.len()],
             stroke: 1.5,

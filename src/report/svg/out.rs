@@ -122,7 +122,7 @@ impl Out {
             Setting::Plain => String::new(),
             Setting::Bold => " font-weight=\"bold\"".to_owned(),
             Setting::Turned => format!(" transform=\"rotate(-90 {x} {y})\""),
-            Setting::Slanted => format!(" transform=\"rotate(-35 {x} {y})\""),
+            Setting::Slanted(by) => format!(" transform=\"rotate(-{by} {x} {y})\""),
             // A white rim keeps it readable over lines.
             Setting::Rimmed => {
                 " stroke=\"#ffffff\" stroke-width=\"3\" paint-order=\"stroke\"".to_owned()
@@ -143,6 +143,7 @@ pub(super) enum Setting {
     Plain,
     Bold,
     Turned,
-    Slanted,
+    /// By so many degrees, upwards.
+    Slanted(u8),
     Rimmed,
 }

@@ -1,9 +1,10 @@
 //! The study's questions and their answers, in words with numbers.
 
-use super::super::apa;
+use super::super::{apa, pairs, permuted, tied};
 use super::layout::{Paint, number, wrap};
 use super::{asked, listed};
 use crate::analyze::{Analysis, Value};
+use crate::stats::permutation::DRAWS;
 use crate::text::Untrusted;
 
 pub(super) fn answers(a: &Analysis, width: usize, paint: Paint) -> String {
@@ -82,16 +83,26 @@ fn best(a: &Analysis) -> Vec<String> {
         (second, first)
     };
     let pair = format!("posthoc/{low}|{high}");
+    let (pairs, least) = pairs(a);
+    let over = match pairs.len() {
+        1 => String::new(),
+        n => format!(", Holm over {n} pairs"),
+    };
     if let Some(holm) = v.number(&format!("{pair}/p_wilcoxon_exact_holm")) {
         let verdict = if holm < 0.05 {
             "These two differ"
         } else {
             "These data do not tell the two apart"
         };
-        said.push(format!(
-            "{verdict} (Wilcoxon, exact, Holm over all pairs: p {}).",
-            p(holm)
-        ));
+        said.push(format!("{verdict} (Wilcoxon, exact{over}: p {}).", p(holm)));
+        if let Some(least) = least.filter(|l| *l >= 0.05) {
+            said.push(format!(
+                "With so few participants that p cannot be below {}.",
+                p(least).trim_start_matches("= ")
+            ));
+        }
+    } else if pairs.is_empty() && ranked.len() > 8 {
+        said.push("Pairs are tested of eight realizations at most.".to_owned());
     }
     said
 }
@@ -150,9 +161,7 @@ fn predicts(a: &Analysis) -> Vec<String> {
         };
     };
     let n = v.number("corr/n_models").unwrap_or(0.0);
-    let decides = v
-        .number("corr/pearson/p_exact_two_sided")
-        .or_else(|| v.number("corr/pearson/p_monte_carlo_two_sided"));
+    let decides = permuted(a, "pearson").map(|found| found.1);
     let verdict = match decides {
         Some(p) if p < 0.05 && pearson > 0.0 => "Those with a higher VAF are rated higher: ",
         Some(p) if p < 0.05 => "Those with a higher VAF are rated lower: ",
@@ -163,17 +172,31 @@ fn predicts(a: &Analysis) -> Vec<String> {
         "{verdict}r = {} over {n} realizations{}{}.",
         r(pearson),
         interval(a, "corr/pearson/ci95"),
-        permuted(a, "pearson")
+        with_p(a, "pearson")
     )];
+    let tied = tied(a);
+    if tied > 1 {
+        said.push(format!(
+            "{} of the {n} means have an equal among them: p cannot become so small then.",
+            apa::capital(&apa::count(tied))
+        ));
+    }
     if let Some(rho) = v.number("corr/spearman/rho") {
-        said.push(format!("rho = {}{}.", r(rho), permuted(a, "spearman")));
+        said.push(format!(
+            "By ranks: Spearman's rho = {}{}.",
+            r(rho),
+            with_p(a, "spearman")
+        ));
     }
     let ends = v
         .number("corr/leave_one_out/pearson_min")
         .zip(v.number("corr/leave_one_out/pearson_max"));
     if let Some((low, high)) = ends {
         let care = if n < 8.0 {
-            format!(" {} points: read with care.", count(n))
+            format!(
+                " {} points: read with care.",
+                apa::capital(&apa::count(n as usize))
+            )
         } else {
             String::new()
         };
@@ -183,7 +206,10 @@ fn predicts(a: &Analysis) -> Vec<String> {
             r(high)
         ));
     } else if n < 8.0 {
-        said.push(format!("{} points: read with care.", count(n)));
+        said.push(format!(
+            "{} points: read with care.",
+            apa::capital(&apa::count(n as usize))
+        ));
     }
     said.extend(beside(a));
     said
@@ -210,16 +236,6 @@ fn beside(a: &Analysis) -> Option<String> {
     })
 }
 
-fn count(n: f64) -> String {
-    let words = ["Three", "Four", "Five", "Six", "Seven"];
-    let at = n - 3.0;
-    if (0.0..5.0).contains(&at) && at.fract() == 0.0 {
-        words[at as usize].to_owned()
-    } else {
-        n.to_string()
-    }
-}
-
 fn interval(a: &Analysis, id: &str) -> String {
     let low = a.values.number(&format!("{id}_lo"));
     let high = a.values.number(&format!("{id}_hi"));
@@ -228,31 +244,26 @@ fn interval(a: &Analysis, id: &str) -> String {
     })
 }
 
-fn permuted(a: &Analysis, name: &str) -> String {
-    let get = |id: &str| a.values.number(&format!("corr/{name}/{id}"));
-    let least = get("smallest_p_two_sided");
+fn with_p(a: &Analysis, name: &str) -> String {
+    let least = format!("corr/{name}/smallest_p_two_sided");
+    let least = a.values.number(&least);
     let n = a.values.number("corr/n_models").unwrap_or(0.0);
-    match (
-        get("p_exact_two_sided"),
-        get("p_monte_carlo_two_sided"),
-        least,
-    ) {
-        (Some(exact), _, Some(least)) => {
+    match (permuted(a, name), least) {
+        (Some(("exact p", exact)), Some(least)) => format!(
+            ", exact p {} (the smallest possible with {n} is {})",
+            p(exact),
+            apa::of_orders(least, n)
+        ),
+        (Some((kind, found)), _) if kind != "exact p" => {
+            let smallest = DRAWS + 1;
             format!(
-                ", exact p {} (the smallest possible with {n} is {})",
-                p(exact),
-                of_orders(least, n)
+                ", {kind} {} (the smallest possible is 1/{smallest})",
+                p(found)
             )
         }
-        (None, Some(drawn), _) => format!(", permutation p {}", p(drawn)),
-        _ => String::new(),
+        (Some((kind, found)), _) => format!(", {kind} {}", p(found)),
+        (None, _) => String::new(),
     }
-}
-
-/// A share of all n! orders as what it is.
-fn of_orders(share: f64, n: f64) -> String {
-    let all: f64 = (1..=n as u32).map(f64::from).product();
-    format!("{}/{all}", (share * all).round())
 }
 
 fn only_these(a: &Analysis) -> Vec<String> {
@@ -260,17 +271,20 @@ fn only_these(a: &Analysis) -> Vec<String> {
     let mut parts = Vec::new();
     if let Some(x) = v.number("rmcorr_cells/r") {
         let ends = interval(a, "rmcorr_cells/ci95");
-        parts.push(format!("within participants r = {}{ends}", r(x)));
+        parts.push(format!(
+            "rating and VAF within participants correlate at r = {}{ends}",
+            r(x)
+        ));
     }
     if let Some(x) = v.number("subject_corr/r_back") {
-        parts.push(format!("mean correlation of a participant {}", r(x)));
+        parts.push(format!("on average over participants at r = {}", r(x)));
     }
     let ends = v
         .number("bootstrap/percentile_lo")
         .zip(v.number("bootstrap/percentile_hi"));
     if let Some((low, high)) = ends {
         parts.push(format!(
-            "with other participants r would be {} to {} (bootstrap, 95 %)",
+            "with participants drawn anew from these, 95 % of r are from {} to {} (bootstrap)",
             r(low),
             r(high)
         ));
@@ -278,17 +292,10 @@ fn only_these(a: &Analysis) -> Vec<String> {
     if parts.is_empty() {
         return Vec::new();
     }
-    let said = format!(
-        "{}. It says nothing about other realizations.",
+    vec![apa::capital(&format!(
+        "{}. This says nothing about other realizations.",
         parts.join("; ")
-    );
-    let mut letters = said.chars();
-    let capital = letters.next().map(|c| c.to_uppercase().to_string());
-    vec![format!(
-        "{}{}",
-        capital.unwrap_or_default(),
-        letters.as_str()
-    )]
+    ))]
 }
 
 #[cfg(test)]
@@ -304,6 +311,6 @@ mod tests {
         assert_eq!(r(-0.0001), ".000");
         assert_eq!(p(1.0 / 120.0), "= .0083");
         assert_eq!(p(1e-9), "< .0001");
-        assert_eq!(of_orders(2.0 / 120.0, 5.0), "2/120");
+        assert_eq!(apa::of_orders(2.0 / 120.0, 5.0), "2/120");
     }
 }

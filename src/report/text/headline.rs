@@ -1,6 +1,7 @@
 //! The answers that stand beside the three: the target, the forgetting factor, the
 //! variance; and what `VAF predicts` leaves unsaid.
 
+use super::super::apa;
 use super::answers::{p, r};
 use super::layout::{Paint, number, wrap};
 use super::listed;
@@ -104,14 +105,15 @@ fn memory(a: &Analysis) -> Vec<String> {
         "samples"
     };
     let mut said = format!(
-        "log10 of the memory ({unit}): r = {} over {n} realizations",
+        "{}: mean rating against log10 of the memory ({unit}), r = {} over {n} realizations",
+        apa::memory_verdict(found, get("p"), get("quadratic/p")),
         r(found)
     );
     if let Some(value) = get("p") {
-        said += &format!(", p {} with {df} df", p(value));
+        said += &format!(", t test with {df} df: p {}", p(value));
     }
     if let (Some(value), Some(df)) = (get("quadratic/p"), get("quadratic/df")) {
-        said += &format!("; curvature p {} with {df} df", p(value));
+        said += &format!("; a curve beside the line, {df} df: p {}", p(value));
     }
     vec![format!("{said}.")]
 }

@@ -85,7 +85,8 @@ pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String 
         out.push('\n');
         rest.clone_into(line);
     };
-    for word in text.split(' ').filter(|w| !w.is_empty()) {
+    for word in glued(text) {
+        let word = word.as_str();
         let space = usize::from(!empty);
         if !empty && line.width() + space + word.width() > width {
             feed(&mut line, &mut out);
@@ -104,6 +105,25 @@ pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String 
     }
     feed(&mut line, &mut out);
     out
+}
+
+/// The words of a text. What stands around an equals or a less-than sign stays
+/// together: `p = .023` is one word.
+fn glued(text: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut open = false;
+    for word in text.split(' ').filter(|w| !w.is_empty()) {
+        let sign = matches!(word, "=" | "<");
+        match words.last_mut().filter(|_| sign || open) {
+            Some(last) => {
+                last.push(' ');
+                last.push_str(word);
+            }
+            None => words.push(word.to_owned()),
+        }
+        open = sign;
+    }
+    words
 }
 
 /// A table that gives way when the page is narrow: first the names, then whole
@@ -190,6 +210,7 @@ mod tests {
     fn words_wrap_and_long_ones_break() {
         assert_eq!(wrap("aa bb cc", 5, "", ""), "aa bb\ncc\n");
         assert_eq!(wrap("aaaaaaa", 4, "! ", "  "), "! aa\n  aa\n  aa\n  a\n");
+        assert_eq!(wrap("so p = .02, yes", 9, "", ""), "so\np = .02,\nyes\n");
     }
 
     #[test]

@@ -159,7 +159,7 @@ impl<'a> Page<'a> {
             form.render(area, buf);
         } else if let Some(who) = self.who() {
             who.render(area, buf);
-        } else if let Some(trouble) = Trouble::new(&self.view.screen, self.theme) {
+        } else if let Some(trouble) = Trouble::new(self.view, self.theme) {
             trouble.render(area, buf);
         } else if let Screen::Playing {
             since_s,

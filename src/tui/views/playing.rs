@@ -1,5 +1,6 @@
 //! The device plays: what to do, for how long already, and the strip if asked.
 
+use crate::protocol::DeviceKind;
 use crate::runner::Strip;
 use crate::session::View;
 use crate::tui::theme::Theme;
@@ -15,7 +16,7 @@ use ratatui::widgets::canvas::{Canvas, Line as Stroke};
 /// The screen while the device plays.
 #[derive(Debug)]
 pub struct Playing<'a> {
-    /// For the mode of entry.
+    /// For what gives the force.
     pub view: &'a View,
     /// Since the confirmed start, s.
     pub since_s: f64,
@@ -35,10 +36,16 @@ impl Widget for &Playing<'_> {
         };
         let words = rows(area, 0, area.height - strip_rows);
         let y = words.height.saturating_sub(5) / 2;
-        let title = Span::styled("Feel the device.", self.theme.strong());
+        let by_hand = self.view.device == DeviceKind::Manual;
+        let (what, now) = if by_hand {
+            ("Feel the sample.", "●  exploring")
+        } else {
+            ("Feel the device.", "●  playing")
+        };
+        let title = Span::styled(what, self.theme.strong());
         centre(buf, row(words, y), &Line::from(title));
         let playing = Line::from(vec![
-            Span::styled("●  playing", self.theme.playing()),
+            Span::styled(now, self.theme.playing()),
             Span::styled(format!("   {}", clock(self.since_s)), self.theme.text()),
         ]);
         centre(buf, row(words, y + 2), &playing);

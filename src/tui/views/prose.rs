@@ -1,7 +1,7 @@
 //! Screens that are mainly words: texts to read, prompts, pauses, choices by a
 //! letter.
 
-use crate::protocol::Entry;
+use crate::protocol::{DeviceKind, Entry};
 use crate::session::view::MessageKind;
 use crate::session::{Screen, View};
 use crate::tui::draft::Reading;
@@ -42,6 +42,12 @@ pub fn prose(view: &View) -> Option<Prose> {
         } else {
             String::new()
         }
+    };
+    let by_hand = view.device == DeviceKind::Manual;
+    let again = if by_hand {
+        "feel it again"
+    } else {
+        "play it again"
     };
     let ready: &[_] = if view.can_advance {
         &[("Enter", "when ready")]
@@ -127,15 +133,22 @@ pub fn prose(view: &View) -> Option<Prose> {
             ..Prose::default()
         },
         Screen::Stopped { can_rate } => Prose {
-            title: "■  The device is stopped.".to_owned(),
-            body: "It gives no force. This trial is not lost.".to_owned(),
-            choices: if *can_rate {
-                vec![
-                    ("Enter", "play it again", ""),
-                    ("r", "rate what was felt", ""),
-                ]
+            title: if by_hand {
+                "■  Stopped."
             } else {
-                vec![("Enter", "play it again", "")]
+                "■  The device is stopped."
+            }
+            .to_owned(),
+            body: if by_hand {
+                "Let go of the sample. This trial is not lost."
+            } else {
+                "It gives no force. This trial is not lost."
+            }
+            .to_owned(),
+            choices: if *can_rate {
+                vec![("Enter", again, ""), ("r", "rate what was felt", "")]
+            } else {
+                vec![("Enter", again, "")]
             },
             ..Prose::default()
         },
@@ -161,7 +174,11 @@ pub fn prose(view: &View) -> Option<Prose> {
         },
         Screen::Paused { since_s } => Prose {
             title: "Paused".to_owned(),
-            body: format!("for {}. The device gives no force.", clock(*since_s)),
+            body: if by_hand {
+                format!("for {}.", clock(*since_s))
+            } else {
+                format!("for {}. The device gives no force.", clock(*since_s))
+            },
             keys: vec![("Enter", "goes on"), ("F10", "leaves")],
             ..Prose::default()
         },

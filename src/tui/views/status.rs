@@ -1,6 +1,6 @@
 //! The experimenter's line, the banner and the progress.
 
-use crate::session::view::{Banner, DeviceState, StatusLine};
+use crate::session::view::{Banner, Counts, DeviceState, StatusLine};
 use crate::session::{Screen, View};
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, clock, left, right};
@@ -29,7 +29,8 @@ fn device(state: DeviceState) -> String {
         DeviceState::Limp => "device limp".to_owned(),
         DeviceState::Loading => "device loading".to_owned(),
         DeviceState::Ready => "device ready".to_owned(),
-        DeviceState::Running { strokes, clamps } => {
+        DeviceState::Running(None) => "running".to_owned(),
+        DeviceState::Running(Some(Counts { strokes, clamps })) => {
             let stroke = if strokes == 1 { "stroke" } else { "strokes" };
             let clamp = if clamps == 1 { "clamp" } else { "clamps" };
             format!("running · {strokes} {stroke} · {clamps} {clamp}")
@@ -37,6 +38,8 @@ fn device(state: DeviceState) -> String {
         DeviceState::Stopping => "device stopping".to_owned(),
         DeviceState::Fault => "DEVICE FAULT".to_owned(),
         DeviceState::Lost => "DEVICE LOST".to_owned(),
+        DeviceState::ByHand => "samples by hand".to_owned(),
+        DeviceState::Felt => "sample felt".to_owned(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Troubles: what happened, what it means, what to do.
 
-use crate::session::Screen;
+use crate::protocol::DeviceKind;
+use crate::session::{Screen, View};
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, frame, left_all, middle, row, rows};
 use crate::tui::wrap;
@@ -19,15 +20,22 @@ pub struct Trouble<'a> {
 }
 
 impl<'a> Trouble<'a> {
-    /// For a screen; `None` if it is none of these.
-    pub fn new(screen: &'a Screen, theme: Theme) -> Option<Self> {
-        let (title, what, then) = match screen {
+    /// For a view; `None` if its screen is none of these.
+    pub fn new(view: &'a View, theme: Theme) -> Option<Self> {
+        let (title, what, then) = match &view.screen {
             Screen::DeviceTrouble { what, can_go_on } => (
                 "DEVICE TROUBLE",
                 what,
                 if *can_go_on {
                     "The device gives no force. Look after the device, then press Enter: \
-                     the trial comes back later. Nothing that was answered is lost."
+                     a trial that was under way comes back later. Nothing that was \
+                     answered is lost."
+                } else if view.device == DeviceKind::Process {
+                    "Let go of the device: nothing says what its motor does without its \
+                     program. A new one is started every second, and this page goes on by \
+                     itself when it has said hello. If it never does, start it by hand to \
+                     see why. F10 leaves: the session can be picked up later, and nothing \
+                     that was answered is lost."
                 } else {
                     "The device gives no force. Check its power and its cable; this page \
                      goes on by itself when it answers again. F10 leaves: the session can \

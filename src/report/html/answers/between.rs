@@ -3,7 +3,8 @@
 
 use super::{Answer, ci, two};
 use crate::analyze::{Analysis, Value};
-use crate::report::apa;
+use crate::report::{apa, permuted, tied};
+use crate::stats::permutation::DRAWS;
 
 pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     let v = &a.values;
@@ -21,13 +22,8 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
         };
     };
     let n = v.number("corr/n_models").unwrap_or(0.0);
-    let (kind, p) = match v.number("corr/pearson/p_exact_two_sided") {
-        Some(p) => ("exact", Some(p)),
-        None => (
-            "permutation",
-            v.number("corr/pearson/p_monte_carlo_two_sided"),
-        ),
-    };
+    let found = permuted(a, "pearson");
+    let p = found.map(|f| f.1);
     let direction = if r > 0.0 { "higher" } else { "lower" };
     let said = match p {
         Some(p) if p < 0.05 => {
@@ -36,30 +32,37 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
         Some(_) => format!("{n} realizations do not show that it does"),
         None => format!("Over {n} realizations"),
     };
-    let p = p.map_or_else(String::new, |p| {
-        format!(", {kind} p {} (two-sided)", apa::equals_p(p))
+    let shown = found.map_or_else(String::new, |(kind, p)| {
+        format!(", {} (two-sided)", apa::named_p(kind, p))
     });
     let interval = ci(a, "corr/pearson/ci95", apa::r);
-    let short = format!("{said}: r = {}{interval}{p}.", apa::r(r));
-    let mut more = Vec::new();
-    if let Some(least) = v.number("corr/pearson/smallest_p_two_sided") {
-        more.push(format!(
-            "VAF differs between realizations only, so there are {n} points however many \
-             participants rated. The smallest p that any ratings of {n} realizations could have \
-             given is {}{}.",
-            of_orders(least, n),
-            v.number("corr/pearson/critical_r")
-                .map_or_else(String::new, |r| {
-                    format!(", and |r| has to exceed {} for p < .05 by t", apa::r(r))
-                })
-        ));
+    let short = format!("{said}: r = {}{interval}{shown}.", apa::r(r));
+    let mut more = points(a, n);
+    let ends = (v.number("corr/pearson/ci95_lo")).zip(v.number("corr/pearson/ci95_hi"));
+    if let (Some((low, high)), Some(p)) = (ends, p)
+        && (low * high > 0.0) != (p < 0.05)
+    {
+        more.push(
+            "The interval and the p disagree: the interval (Fisher's z) takes VAF and mean rating \
+             as normally distributed, the p does not. Go by the p."
+                .to_owned(),
+        );
     }
     if let Some(rho) = v.number("corr/spearman/rho") {
-        let p = v.number("corr/spearman/p_exact_two_sided");
-        let p = p.map_or_else(String::new, |p| format!(", exact p {}", apa::equals_p(p)));
+        let with = |name: &str| {
+            permuted(a, name).map_or_else(String::new, |(kind, p)| {
+                format!(", {}", apa::named_p(kind, p))
+            })
+        };
         let tau = v.number("corr/kendall/tau_b");
-        let tau = tau.map_or_else(String::new, |t| format!("; Kendall's τb = {}", apa::r(t)));
-        more.push(format!("By ranks: Spearman's ρ = {}{p}{tau}.", apa::r(rho)));
+        let tau = tau.map_or_else(String::new, |t| {
+            format!("; Kendall's τb = {}{}", apa::r(t), with("kendall"))
+        });
+        more.push(format!(
+            "By ranks: Spearman's ρ = {}{}{tau}.",
+            apa::r(rho),
+            with("spearman")
+        ));
     }
     let ends = v
         .number("corr/leave_one_out/pearson_min")
@@ -85,9 +88,9 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
         ));
     }
     more.extend(crossed(a));
-    if v.number("corr/pearson/p_exact_two_sided").is_some() {
+    if p.is_some() {
         more.push(
-            "It assumes that the realizations are exchangeable, which neighbours on one ladder of \
+            "The p by permutation assumes that the realizations are exchangeable, which neighbours on one ladder of \
              λ are not, and it cannot tell VAF from what goes along with it: λ, and how active a \
              realization is."
                 .to_owned(),
@@ -100,10 +103,43 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     })
 }
 
-/// A share of all n! orders as what it is.
-fn of_orders(share: f64, n: f64) -> String {
-    let all: f64 = (1..=n as u32).map(f64::from).product();
-    format!("{}/{all}", (share * all).round())
+/// How many points there are, and what p they can give.
+fn points(a: &Analysis, n: f64) -> Vec<String> {
+    let v = &a.values;
+    let Some(least) = v.number("corr/pearson/smallest_p_two_sided") else {
+        return Vec::new();
+    };
+    let exact = v.number("corr/pearson/p_exact_two_sided").is_some();
+    let smallest = if exact {
+        format!(
+            "The smallest p that {n} realizations can give is {}",
+            apa::of_orders(least, n)
+        )
+    } else {
+        format!(
+            "The p is from {DRAWS} random orders of the realizations, and cannot be smaller than \
+             1/{}",
+            DRAWS + 1
+        )
+    };
+    let critical = v
+        .number("corr/pearson/critical_r")
+        .map_or_else(String::new, |r| {
+            format!("; by a t test, p < .05 needs |r| above {}", apa::r(r))
+        });
+    let mut said = vec![format!(
+        "VAF differs between realizations only, so there are {n} points however many \
+         participants rated. {smallest}{critical}."
+    )];
+    let tied = tied(a);
+    if tied > 1 {
+        said.push(format!(
+            "{} of the {n} means have an equal among them. Exchanging equal means changes nothing, so \
+             that p cannot become as small as that.",
+            apa::capital(&apa::count(tied))
+        ));
+    }
+    said
 }
 
 /// The mixed model with subjects and realizations crossed.
@@ -132,17 +168,22 @@ fn crossed(a: &Analysis) -> Option<String> {
                 apa::number(with, 3)
             )
         });
-    let singular = if get("singular") == Some(1.0) {
-        " The fit is singular: no variance of the realizations is left beside VAF, so that its p \
-         is too small and says nothing about other realizations."
-    } else {
-        ""
+    let singular = match super::none_left(a) {
+        Some(true) => {
+            " The fit is singular: no variance of the realizations is left beside VAF, so that its \
+             p is too small and says nothing about other realizations."
+        }
+        Some(false) => {
+            " Another variance of the model is estimated as 0 (a singular fit); that of the \
+             realizations, which the p rests on, is not."
+        }
+        None => "",
     };
     Some(format!(
         "The mixed model with subjects and realizations crossed gives a slope of {} per unit of \
          VAF (SE {}{test}).{between}{singular}",
-        two(slope),
-        two(se)
+        apa::number(slope, apa::decimals(se, 2)),
+        apa::number(se, apa::decimals(se, 2))
     ))
 }
 
@@ -151,27 +192,8 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
     let v = &a.values;
     let get = |id: &str| v.number(&format!("covariate/log10_memory/{id}"));
     let mut more = Vec::new();
-    let linear = get("r").map(|r| {
-        let test = get("t").zip(get("df")).zip(get("p"));
-        let test = test.map_or_else(String::new, |((t, df), p)| {
-            format!(
-                ", t({}) = {}, p {}",
-                apa::number(df, 0),
-                two(t),
-                apa::equals_p(p)
-            )
-        });
-        format!("r = {}{test}", apa::r(r))
-    });
-    let (b, p) = (get("quadratic/square"), get("quadratic/p"));
-    if let Some((b, p)) = b.zip(p) {
-        let df = get("quadratic/df").unwrap_or(0.0);
-        more.push(format!(
-            "With a square term: {} (p {}, {} residual degrees of freedom).",
-            two(b),
-            apa::equals_p(p),
-            apa::number(df, 0)
-        ));
+    if let Some(line) = curvature(a) {
+        more.push(line);
     }
     if let Some(r) = get("r_with_vaf") {
         more.push(format!(
@@ -180,54 +202,48 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
             apa::r(r)
         ));
     }
-    for (id, value) in v.iter().filter(|(id, _)| id.starts_with("covariate/")) {
-        let name = id
-            .strip_prefix("covariate/")
-            .and_then(|n| n.strip_suffix("/r"));
-        let Some(name) = name.filter(|n| *n != "log10_memory") else {
-            continue;
-        };
-        match value {
-            Value::Number(r) => {
-                let p = v.number(&format!("covariate/{name}/p"));
-                let p = p.map_or_else(String::new, |p| format!(", p {}", apa::equals_p(p)));
-                let with = v.number(&format!("covariate/{name}/r_with_vaf"));
-                let with = with.map_or_else(String::new, |r| {
-                    format!("; {name} against VAF: r = {}", apa::r(r))
-                });
-                let remark = if name == "least_energy_j" {
-                    " It is the least energy that the hand had put in, over playbacks; below 0 the \
-                     device was active."
-                } else {
-                    ""
-                };
-                more.push(format!(
-                    "Mean rating against {name}: r = {}{p}{with}.{remark}",
-                    apa::r(*r)
-                ));
-            }
-            Value::Undefined(why) => more.push(format!("{name}: not defined, {why}.")),
-            Value::List(_) => {}
-        }
-        if more.len() >= 8 {
-            break;
-        }
+    let listed = others(a);
+    if listed.len() > 1 {
+        more.push(
+            "Each covariate is tested alone, by a t test over the realizations; no p is corrected \
+             for their number."
+                .to_owned(),
+        );
     }
-    let short = match (linear, v.reason("covariate/log10_memory/r")) {
-        (Some(linear), _) => {
-            let significant = |id: &str| get(id).is_some_and(|p| p < 0.05);
-            let verdict = if significant("p") || significant("quadratic/p") {
-                "Over these realizations it goes along with the mean rating"
-            } else {
-                "These realizations do not show that it does"
-            };
-            format!("{verdict}: log10 of the memory, {linear}.")
+    more.extend(listed);
+    let unit = match get("in_mm") {
+        Some(1.0) => "in mm",
+        _ => "in samples",
+    };
+    let short = match (get("r"), v.reason("covariate/log10_memory/r")) {
+        (Some(r), _) => {
+            let test = get("t").zip(get("df")).zip(get("p"));
+            let test = test.map_or_else(String::new, |((t, df), p)| {
+                format!(
+                    ", t({}) = {}, p {}",
+                    apa::number(df, 0),
+                    two(t),
+                    apa::equals_p(p)
+                )
+            });
+            format!(
+                "{}: mean rating against log10 of the memory ({unit}), r = {}{test}.",
+                apa::memory_verdict(r, get("p"), get("quadratic/p")),
+                apa::r(r)
+            )
         }
         (None, Some(why)) => format!("It cannot be said: {why}."),
         (None, None) if more.is_empty() => return None,
-        (None, None) => "Covariates of the realizations, over their mean ratings:".to_owned(),
+        (None, None) => "What is known of the realizations, against their mean ratings:".to_owned(),
     };
     let lambda = get("r").is_some() || v.reason("covariate/log10_memory/r").is_some();
+    if get("r").is_some() {
+        more.push(
+            "The memory is how far back the identification looks: the nearer the forgetting factor λ \
+             is to 1, the longer."
+                .to_owned(),
+        );
+    }
     let question = if lambda {
         "Does the forgetting factor matter?"
     } else {
@@ -238,4 +254,76 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
         short,
         more,
     })
+}
+
+fn curvature(a: &Analysis) -> Option<String> {
+    let get = |id: &str| {
+        a.values
+            .number(&format!("covariate/log10_memory/quadratic/{id}"))
+    };
+    let ((b, p), df) = get("square").zip(get("p")).zip(get("df"))?;
+    let bent = if b < 0.0 { "downwards" } else { "upwards" };
+    Some(format!(
+        "With a square term beside the line, {} (a curve bent {bent}), t({}) = {}, \
+         p {}. Line and curve are two tests: each is held against .025.",
+        two(b),
+        apa::number(df, 0),
+        get("t").map_or_else(|| "–".to_owned(), two),
+        apa::equals_p(p)
+    ))
+}
+
+/// A sentence for each covariate other than the logarithm of the memory.
+fn others(a: &Analysis) -> Vec<String> {
+    let v = &a.values;
+    let mut said = Vec::new();
+    for (id, value) in v.iter() {
+        let name = id
+            .strip_prefix("covariate/")
+            .and_then(|n| n.strip_suffix("/r"));
+        let Some(name) = name.filter(|n| *n != "log10_memory") else {
+            continue;
+        };
+        // The logarithm has been told of.
+        if name == "memory_mm" && v.number("covariate/log10_memory/r").is_some() {
+            continue;
+        }
+        let shown = called(name);
+        match value {
+            Value::Number(r) => {
+                let get = |what: &str| v.number(&format!("covariate/{name}/{what}"));
+                let p = get("p").map_or_else(String::new, |p| format!(", p {}", apa::equals_p(p)));
+                let with = get("r_with_vaf").map_or_else(String::new, |r| {
+                    format!(" (and VAF against it, r = {})", apa::r(r))
+                });
+                said.push(format!(
+                    "Mean rating against {shown}: r = {}{p}{with}.",
+                    apa::r(*r)
+                ));
+            }
+            Value::Undefined(why) => {
+                said.push(format!("Mean rating against {shown}: not defined, {why}."));
+            }
+            Value::List(_) => {}
+        }
+        if said.len() >= 8 {
+            break;
+        }
+    }
+    said
+}
+
+/// What the program's own covariates are; others by their names.
+fn called(name: &str) -> String {
+    match name {
+        "least_energy_j" => {
+            "the least energy that the hand had put in (J, over playbacks; below 0 the device was \
+             active)"
+                .to_owned()
+        }
+        "lambda" => "the forgetting factor λ".to_owned(),
+        "memory_mm" => "the memory (mm)".to_owned(),
+        "dx_mm" => "the grid's step (dx, mm)".to_owned(),
+        other => apa::name(other),
+    }
 }
