@@ -244,3 +244,33 @@ fn the_shares_of_the_variance_are_those_of_the_analysis_of_variance() {
         .sum();
     assert!((whole - 1.0).abs() < 1e-12);
 }
+
+#[test]
+fn whom_a_rule_leaves_out_has_finished_and_makes_it_no_early_look() {
+    let rules = Rules {
+        exclude: vec![Exclusion::ConstantRater],
+        planned: Some(5),
+        ..Rules::default()
+    };
+    let a = analyze(&people(), &rules);
+    assert_eq!((a.counts.finished, a.counts.participants), (5, 4));
+    assert!(a.warnings.iter().all(|w| w.code != "interim"));
+    let source = Source {
+        title: "A study".to_owned(),
+        study: None,
+        protocol_version: None,
+        path: "r.csv".to_owned(),
+    };
+    let width = study::report::text::Page {
+        width: 100,
+        colour: false,
+    };
+    let page = study::report::text::page(&source, &a, width);
+    assert!(page.contains("5 of 5 participants, 4 analysed"), "{page}");
+    let rules = Rules {
+        planned: Some(6),
+        ..rules
+    };
+    let a = analyze(&people(), &rules);
+    assert!(a.warnings.iter().any(|w| w.code == "interim"));
+}

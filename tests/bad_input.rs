@@ -115,6 +115,12 @@ fn arguments_are_looked_at_before_the_terminal() {
     let long = "o".repeat(65);
     let (terminal, err) = run(&["--operator", &long]);
     assert!(!terminal && err.contains("at most 64 characters"), "{err}");
+    fs::write(folder.path().join("file"), "x").unwrap();
+    let (terminal, err) = run(&["--results", "file"]);
+    assert!(
+        !terminal && err.contains("file: it is a file, not a folder"),
+        "{err}"
+    );
     assert!(run(&["--participant", "P01", "--operator", "lw"]).0);
     assert!(!folder.path().join("results").exists());
 }

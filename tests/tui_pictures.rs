@@ -117,6 +117,11 @@ fn the_strip_is_drawn_when_it_is_asked_for() {
     let strip = strip();
     let buf = drawn(&mut surface, &playing, Some(&strip), 80, 24);
     insta::assert_snapshot!("playing_strip_80x24", picture(&buf));
+    // a sample that was mounted by hand has no force
+    let mut felt = playing;
+    felt.device = study::protocol::DeviceKind::Manual;
+    let buf = drawn(&mut surface, &felt, Some(&strip), 80, 24);
+    assert!(!picture(&buf).contains('┤'), "{}", picture(&buf));
 }
 
 #[test]

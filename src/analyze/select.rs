@@ -116,8 +116,9 @@ pub struct Counts {
     pub excluded: BTreeMap<String, usize>,
     /// Participants that count.
     pub participants: usize,
-    /// Of these, real ones whose session is finished (or whose state is not known):
-    /// pilots and simulated ones are not among those that were planned.
+    /// Real ones whose session is finished (or whose state is not known): of these
+    /// and of those whom a pre-stated rule leaves out. Pilots and simulated ones are
+    /// not among those that were planned.
     pub finished: usize,
     /// Participants with at least one row that does not count.
     pub excluded_participants: usize,
@@ -143,7 +144,12 @@ impl Counts {
         // Rows share their reasons: each is put into words once.
         let mut by_reason: Vec<(&Arc<Reason>, usize)> = Vec::new();
         let mut places: HashMap<*const Reason, usize> = HashMap::new();
+        let mut took_part = vec![false; all.subjects.len()];
         for (i, decision) in decisions.iter().enumerate() {
+            let counts = matches!(decision.as_deref(), None | Some(Reason::Rule(_)));
+            if counts && all.origin[i] == Origin::Real {
+                took_part[all.subject[i] as usize] = true;
+            }
             if let Some(reason) = decision {
                 let at = *places.entry(Arc::as_ptr(reason)).or_insert_with(|| {
                     by_reason.push((reason, 0));
@@ -174,8 +180,8 @@ impl Counts {
             practice: all.practice,
             excluded,
             participants: used.subjects.len(),
-            finished: (used.subjects.iter().zip(&origin))
-                .filter(|(s, o)| **o == Origin::Real && finished(s.state))
+            finished: (all.subjects.iter().zip(&took_part))
+                .filter(|(s, part)| **part && finished(s.state))
                 .count(),
             excluded_participants: gone.iter().filter(|g| **g).count(),
             planned: rules.planned,

@@ -264,7 +264,12 @@ fn of_study(
     let written = !args.json || args.out.is_some();
     Ok(Analysed {
         source,
-        details: report::details(&input.protocol, study, &input.rows, question.as_str()),
+        details: report::details(
+            &input.protocol,
+            study,
+            (&input.rows, &input.participants),
+            question.as_str(),
+        ),
         // Telemetry is large: only for who looks at it.
         traces: if written {
             report::traces(study, &input.rows, &analysis)

@@ -30,7 +30,7 @@ enum What {
     },
     /// Ask a device who it is and what it can do
     Info(check::InfoArgs),
-    /// Check a device against docs/wire.md, clause by clause
+    /// Check a device on a serial port against docs/wire.md, clause by clause
     Check(check::CheckArgs),
     /// Be a simulated device on a pseudo-terminal, whose path is the first line
     Simulate(simulate::Args),

@@ -98,7 +98,9 @@ impl Rig {
             Err(e) => return Err(Failure::file(path, &e)),
         };
         toml::from_str(&text).map_err(|e| {
-            Failure::input(format!("{}: {}", path.display(), e.message()))
+            let before = e.span().and_then(|span| text.get(..span.start));
+            let line = before.map_or(1, |before| before.matches('\n').count() + 1);
+            Failure::input(format!("{}:{line}: {}", path.display(), e.message()))
                 .hint("it has [serial] with port, baud, usb_serial and [process] with command")
         })
     }
@@ -145,10 +147,19 @@ impl Place {
         };
         match useless.iter().find(|(_, given)| *given) {
             None => Ok(()),
-            Some((argument, _)) => Err(Failure::new(
-                Kind::Usage,
-                format!("{argument} makes no sense with a {} device", kind.as_str()),
-            )),
+            Some((argument, _)) => {
+                let other = match *argument {
+                    "--command" => "process",
+                    _ => "serial",
+                };
+                Err(Failure::new(
+                    Kind::Usage,
+                    format!("{argument} makes no sense with a {} device", kind.as_str()),
+                )
+                .hint(format!(
+                    "say kind = \"{other}\" in the protocol, or --device {other}, which makes it a pilot"
+                )))
+            }
         }
     }
 
@@ -366,7 +377,8 @@ mod tests {
         assert_eq!(rig.process.command.unwrap(), ["a", "b c"]);
         std::fs::write(&path, "[serial]\nprot = \"/dev/ttyUSB0\"\n").unwrap();
         let failure = Rig::read(&path).unwrap_err();
-        assert!(failure.message.contains("prot"), "{}", failure.message);
+        let told = "device.toml:2: unknown field `prot`";
+        assert!(failure.message.contains(told), "{}", failure.message);
     }
 
     #[test]

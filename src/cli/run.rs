@@ -60,6 +60,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
+    if args.results.exists() && !args.results.is_dir() {
+        let shown = args.results.display();
+        return Err(
+            Failure::input(format!("{shown}: it is a file, not a folder"))
+                .hint("--results names the folder that holds the results of all studies"),
+        );
+    }
     let begun = args.results.join(loaded.protocol.study.id.as_str());
     let begun = match begun.join(layout::MANIFEST).exists() {
         true => Some(StudyFolder::open_or_create(&args.results, &frozen, at)?),

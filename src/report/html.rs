@@ -9,6 +9,7 @@
 //! left out, what is undefined is listed with its reason.
 
 mod answers;
+mod methods;
 mod notes;
 mod prose;
 mod statistics;
@@ -38,6 +39,8 @@ pub struct Details {
     pub repetitions: Option<u32>,
     /// How orders were made, as the protocol calls it.
     pub order: Option<String>,
+    /// How many participants are in which state.
+    pub states: Vec<(String, usize)>,
     /// Sentences on how the sessions were run, for the methods.
     pub conduct: Vec<String>,
     /// What the participants did before each trial.
@@ -129,10 +132,13 @@ fn head(source: &Source, details: &Details, a: &Analysis, lang: Option<&str>) ->
                     span { "protocol version " (version) } " "
                 }
                 @match c.planned {
-                    Some(planned) => span {
-                        (c.finished) " of "
-                        (super::apa::counted(planned as usize, "planned participant", "planned participants"))
-                        " finished"
+                    Some(planned) => {
+                        span {
+                            (c.finished) " of "
+                            (super::apa::counted(planned as usize, "planned participant", "planned participants"))
+                            " finished"
+                        }
+                        @if c.participants != c.finished { " " span { (c.participants) " analysed" } }
                     },
                     None => span { (super::apa::counted(c.participants, "subject", "subjects")) },
                 }

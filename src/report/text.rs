@@ -13,7 +13,7 @@ use super::{Source, apa};
 use crate::analyze::{Analysis, Listed};
 use crate::outcome::Role;
 use crate::text::Untrusted;
-use layout::{Grid, Paint, cut, number, pad, wrap};
+use layout::{Grid, Paint, number, pad, squeezed, wrap};
 use unicode_width::UnicodeWidthStr as _;
 
 /// How the page is set.
@@ -24,6 +24,9 @@ pub struct Page {
     /// Whether it shows colours.
     pub colour: bool,
 }
+
+/// Columns that are spent on saying of what a repeat is one.
+const MAX_NAME: usize = 30;
 
 /// Most bins that a table shows as a histogram.
 const MAX_BINS: usize = 11;
@@ -101,7 +104,12 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
     facts.push(match c.planned {
         Some(planned) => {
             let planned = apa::counted(planned as usize, "participant", "participants");
-            format!("{} of {planned}", c.finished)
+            let finished = format!("{} of {planned}", c.finished);
+            if c.participants == c.finished {
+                finished
+            } else {
+                format!("{finished}, {} analysed", c.participants)
+            }
         }
         None => apa::counted(c.participants, "subject", "subjects"),
     });
@@ -127,7 +135,14 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
 fn name(m: &Listed) -> String {
     let id = Untrusted(&m.id);
     match (&m.duplicate_of, m.role) {
-        (Some(of), _) => format!("{id} (repeats {})", Untrusted(of)),
+        (Some(of), _) => {
+            let whole = format!("{id} (repeats {})", Untrusted(of));
+            if whole.width() <= MAX_NAME {
+                whole
+            } else {
+                format!("{id} (repeat)")
+            }
+        }
         (None, Role::Test) => id.to_string(),
         (None, role) => format!("{id} ({})", role.as_str()),
     }
@@ -174,7 +189,14 @@ fn table(
         head.push(h);
     }
     head.push("by subject [95 %]");
-    let mut grid = Grid::new(&head, hist.map(|_| 5));
+    // The median, the histogram, the share, the count.
+    let counts_at = hist.map(|_| 5);
+    let share_at = at_least.as_ref().map(|_| head.len() - 2);
+    let dropped: Vec<usize> = [Some(4), counts_at, share_at, Some(1)]
+        .into_iter()
+        .flatten()
+        .collect();
+    let mut grid = Grid::new(&head, counts_at, &dropped);
     for m in tests.iter().chain(others) {
         let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
         let show =
@@ -271,7 +293,7 @@ fn section(title: &str, axis: &Axis, margin: usize, paint: Paint) -> String {
 }
 
 fn line(m: &Listed, drawn: &str, margin: usize) -> String {
-    format!("{}   {drawn}\n", pad(&cut(&name(m), margin), margin))
+    format!("{}   {drawn}\n", pad(&squeezed(&name(m), margin), margin))
 }
 
 /// The question as a noun.

@@ -313,6 +313,8 @@ fn read(send: &Sender<io::Result<Event>>, stop: &AtomicBool) {
     while !stop.load(Ordering::SeqCst) && !hung_up() {
         let event = match crossterm::event::poll(READ_SLICE) {
             Ok(false) => continue,
+            // it is there for whoever takes the terminal next
+            Ok(true) if stop.load(Ordering::SeqCst) => return,
             Ok(true) => crossterm::event::read(),
             Err(error) => Err(error),
         };

@@ -2,7 +2,7 @@
 
 use super::super::{Failure, Kind};
 use crate::analyze::Analysis;
-use crate::outcome::{RatingRow, Status};
+use crate::outcome::{ParticipantRow, RatingRow, Status};
 use crate::protocol::{Order, Protocol, QuestionKind};
 use crate::report::Source;
 use crate::report::figures::{self, Drawn, Trace};
@@ -84,7 +84,7 @@ fn pictures(drawn: &[Drawn]) -> Result<Vec<(String, Vec<u8>)>, PngError> {
 pub(super) fn details(
     protocol: &Protocol,
     study: &StudyFolder,
-    rows: &[RatingRow],
+    (rows, participants): (&[RatingRow], &[ParticipantRow]),
     question: &str,
 ) -> Details {
     let asked = protocol
@@ -133,6 +133,7 @@ pub(super) fn details(
         repetitions: Some(protocol.design.repetitions),
         order: Some(order(&protocol.design.order).to_owned()),
         conduct: conduct(protocol, &devices),
+        states: states(participants),
         reference: protocol.trial.reference.clone(),
         device: Some(devices.join(", ")).filter(|d| !d.is_empty()),
         seed: Some(s.seed),
@@ -152,6 +153,18 @@ pub(super) fn details(
             .map(|v| (v.version, v.at.to_rfc3339(), v.reason.clone()))
             .collect(),
     }
+}
+
+/// How many participants are in which state; pilots and simulated ones only where
+/// nobody else is.
+fn states(participants: &[ParticipantRow]) -> Vec<(String, usize)> {
+    let real = |p: &&ParticipantRow| !p.pilot && !p.simulated;
+    let any = participants.iter().any(|p| real(&p));
+    let mut by: BTreeMap<&str, usize> = BTreeMap::new();
+    for p in participants.iter().filter(|p| real(p) || !any) {
+        *by.entry(p.state.as_str()).or_default() += 1;
+    }
+    by.into_iter().map(|(s, n)| (s.to_owned(), n)).collect()
 }
 
 /// How the sessions were run, in sentences for the methods.

@@ -2,7 +2,7 @@
 //! at: first what costs nothing, then uploads, then playbacks.
 
 use super::playing;
-use super::talk::Talk;
+use super::talk::{Talk, name};
 use super::uploads::Upload;
 use super::{Broken, Clause, FORCE_N, Kept, percentile};
 use crate::device::frame::Frame;
@@ -323,8 +323,8 @@ fn beat(talk: &mut Talk<'_>, count: u32, deadline_ms: u32) -> Result<bool, Broke
     match talk.ask(Request::Heartbeat(beat))?.reply {
         Reply::Pulse(pulse) => Ok(pulse.fresh),
         other => Err(Broken::seen(format!(
-            "HEARTBEAT is answered by type 0x{:02x}",
-            other.kind()
+            "HEARTBEAT is answered by {}",
+            name(other.kind())
         ))),
     }
 }

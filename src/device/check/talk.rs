@@ -6,7 +6,7 @@ use crate::device::frame::{Decoder, Frame};
 use crate::device::host::{BEAT, DeviceClock, RETRY, TRIES};
 use crate::device::wire::{
     Ack, Event, Heartbeat, Hello, Identity, Outcome, Pulse, Recorded, Refusal, Reply, Request,
-    State, Telemetry, VERSION,
+    State, Telemetry, VERSION, kind,
 };
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -201,8 +201,8 @@ impl<'w> Talk<'w> {
             }
         }
         Err(Broken::Gone(format!(
-            "no answer to type 0x{:02x} after {TRIES} tries",
-            request.kind()
+            "no answer to {} after {TRIES} tries",
+            name(request.kind())
         )))
     }
 
@@ -210,9 +210,9 @@ impl<'w> Talk<'w> {
         match self.ask(request)?.reply {
             Reply::Ack(ack) if ack.request == request.kind() => Ok(ack),
             other => Err(Broken::seen(format!(
-                "type 0x{:02x} is answered by type 0x{:02x}",
-                request.kind(),
-                other.kind()
+                "{} is answered by {}",
+                name(request.kind()),
+                name(other.kind())
             ))),
         }
     }
@@ -223,8 +223,8 @@ impl<'w> Talk<'w> {
         match ack.refusal {
             Refusal::None => Ok(ack),
             refusal => Err(Broken::seen(format!(
-                "type 0x{:02x} is refused: {} ({})",
-                request.kind(),
+                "{} is refused: {} ({})",
+                name(request.kind()),
                 refusal.as_str(),
                 ack.detail
             ))),
@@ -242,8 +242,8 @@ impl<'w> Talk<'w> {
             Ok(ack)
         } else {
             Err(Broken::seen(format!(
-                "type 0x{:02x}: {}, and not: {}",
-                request.kind(),
+                "{}: {}, and not: {}",
+                name(request.kind()),
                 ack.refusal.as_str(),
                 why.as_str()
             )))
@@ -254,8 +254,8 @@ impl<'w> Talk<'w> {
         match self.ask(Request::State)?.reply {
             Reply::Outcome(outcome) => Ok(outcome),
             other => Err(Broken::seen(format!(
-                "STATE is answered by type 0x{:02x}",
-                other.kind()
+                "STATE is answered by {}",
+                name(other.kind())
             ))),
         }
     }
@@ -279,8 +279,8 @@ impl<'w> Talk<'w> {
         }
         let Reply::Identity(identity) = came.reply else {
             return Err(Broken::seen(format!(
-                "HELLO is answered by type 0x{:02x}",
-                came.reply.kind()
+                "HELLO is answered by {}",
+                name(came.reply.kind())
             )));
         };
         if identity.nonce != self.nonce {
@@ -328,5 +328,33 @@ impl<'w> Talk<'w> {
             self.pass(SLICE)?;
         }
         Ok(())
+    }
+}
+
+/// What docs/wire.md calls a message.
+pub(super) fn name(kind: u8) -> &'static str {
+    match kind {
+        kind::HELLO => "HELLO",
+        kind::TABLE_BEGIN => "TABLE_BEGIN",
+        kind::TABLE_CHUNK => "TABLE_CHUNK",
+        kind::TABLE_COMMIT => "TABLE_COMMIT",
+        kind::PLAY => "PLAY",
+        kind::STOP => "STOP",
+        kind::LIMP => "LIMP",
+        kind::HEARTBEAT => "HEARTBEAT",
+        kind::REARM => "REARM",
+        kind::STATE => "STATE",
+        kind::PATH_BEGIN => "PATH_BEGIN",
+        kind::PATH_CHUNK => "PATH_CHUNK",
+        kind::PATH_COMMIT => "PATH_COMMIT",
+        kind::RECORD => "RECORD",
+        kind::ACK => "ACK",
+        kind::IDENTITY => "IDENTITY",
+        kind::OUTCOME => "OUTCOME",
+        kind::PULSE => "PULSE",
+        kind::TELEMETRY => "TELEMETRY",
+        kind::EVENT => "EVENT",
+        kind::RECORDED => "RECORDED",
+        _ => "a message of an unknown type",
     }
 }

@@ -163,8 +163,7 @@ impl State {
     #[inline(always)]
     fn step(&mut self, phi: [Lane; 3], force: Lane) {
         let [a, v, x] = phi;
-        let q = self.q;
-        let theta = self.theta;
+        let (q, theta) = (&self.q, &self.theta);
         let mut g = [Lane::ZERO; 4];
         for i in 0..4 {
             let row = UPPER[i];
@@ -175,12 +174,15 @@ impl State {
         let d = Lane::all(1.0) / (self.scale + spread);
         let e = force - theta[3];
         let e = a.take_from(theta[0], v.take_from(theta[1], x.take_from(theta[2], e)));
-        let k = [g[0] * d, g[1] * d, g[2] * d, g[3] * d];
-        for i in 0..4 {
-            self.theta[i] = k[i].mul_add(e, theta[i]);
-            for (j, k) in k.iter().enumerate().skip(i) {
+        // Q is read again: it does not fit into the registers, and to keep a copy of it
+        // would cost more stores than the recursion itself has
+        let q = std::hint::black_box(&mut self.q);
+        for j in 0..4 {
+            let k = g[j] * d;
+            self.theta[j] = k.mul_add(e, self.theta[j]);
+            for i in 0..=j {
                 let at = UPPER[i][j];
-                self.q[at] = g[i].take_from(*k, q[at]);
+                q[at] = g[i].take_from(k, q[at]);
             }
         }
         self.scale = self.scale * self.lambda;

@@ -1,6 +1,6 @@
 //! What a reader has to know: banners, warnings, exclusions, comments, versions.
 
-use super::prose::in_words;
+use super::methods::in_words;
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
 use crate::analyze::{Analysis, Said, Warning};
@@ -198,6 +198,10 @@ pub(super) fn provenance(source: &Source, d: &Details, a: &Analysis) -> Markup {
                 dt { "question" } dd { (safe(&a.question)) }
                 @if let Some(seed) = d.seed { dt { "seed" } dd { (seed) } }
                 @if !d.tools.is_empty() { dt { "sessions run with" } dd { "study " (safe(&d.tools.join(", "))) } }
+                @if !d.states.is_empty() {
+                    dt { "states of sessions" }
+                    dd { @for (i, (state, n)) in d.states.iter().enumerate() { @if i > 0 { ", " } (n) " " (safe(state)) } }
+                }
                 @if let Some(kind) = &d.device { dt { "device" } dd { (safe(kind)) } }
                 @for (name, value) in &d.facts { dt { (safe(name)) } dd { (safe(value)) } }
                 @for (name, value) in &d.fingerprints {

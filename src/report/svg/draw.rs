@@ -6,6 +6,7 @@ use super::out::{Out, Setting, escape, px};
 use super::{
     Anchor, ColourBar, Mark, NORMAL, Note, Panel, SMALL, Span, Whisker, fitted, shortened,
 };
+use std::collections::BTreeSet;
 
 /// Half the width of an error bar's cap, px.
 const CAP: f64 = 4.0;
@@ -233,9 +234,12 @@ fn line(out: &mut Out, places: &[(f64, f64)], look: Look) {
 }
 
 fn dots(out: &mut Out, places: &[(f64, f64)], look: Look) {
+    // Of dots that nobody could tell apart, the first.
+    let quarter = |v: f64| (v * 4.0).round() as i64;
+    let mut taken = BTreeSet::new();
+    let places = (places.iter()).filter(|(x, y)| taken.insert((quarter(*x), quarter(*y))));
     // A line of no length with round ends is a dot, in a seventh of the bytes.
     let all: Vec<String> = places
-        .iter()
         .map(|(x, y)| format!("M{} {}h0", px(*x), px(*y)))
         .collect();
     out.line(&format!(

@@ -167,3 +167,14 @@ fn names_that_begin_alike_stay_apart_when_cut() {
     assert_eq!(distinct.len(), 3, "{cut:?}");
     assert!(cut.iter().all(|c| c.chars().count() <= 15), "{cut:?}");
 }
+
+#[test]
+fn dots_in_one_place_are_drawn_once() {
+    // A probe that rests: 500 samples within a hundredth of the axis, and one apart.
+    let mut points: Vec<(f64, f64)> = (0..500).map(|i| (0.5, 0.5 + 1e-6 * f64::from(i))).collect();
+    points.push((0.9, 0.9));
+    let panel = Panel::new(Axis::new("", 0.0, 1.0), Axis::new("", 0.0, 1.0));
+    let panel = panel.with(Look::nth(0), Mark::Dots(points));
+    let svg = Figure::new("f", "", 400.0, 200.0).with(panel).to_svg();
+    assert_eq!(svg.matches("h0").count(), 2);
+}

@@ -1,5 +1,6 @@
 //! Columns, wrapping and colour of the terminal page, by display width.
 
+use std::collections::BTreeSet;
 use unicode_segmentation::UnicodeSegmentation as _;
 use unicode_width::UnicodeWidthStr as _;
 
@@ -69,6 +70,27 @@ pub(super) fn cut(text: &str, width: usize) -> String {
     out
 }
 
+/// A name of at most so many columns, with `…` after its first third where it was
+/// cut: names of realizations often begin alike.
+pub(super) fn squeezed(name: &str, width: usize) -> String {
+    if name.width() <= width {
+        return name.to_owned();
+    }
+    let room = width.saturating_sub(1);
+    let within = |parts: &mut dyn Iterator<Item = &str>, most: usize| -> Vec<String> {
+        let mut used = 0;
+        let fits = |g: &&str| {
+            used += g.width();
+            used <= most
+        };
+        parts.take_while(fits).map(str::to_owned).collect()
+    };
+    let first = within(&mut name.graphemes(true), room / 3);
+    let mut last = within(&mut name.graphemes(true).rev(), room - room / 3);
+    last.reverse();
+    format!("{}…{}", first.concat(), last.concat())
+}
+
 /// Text filled up to so many columns.
 pub(super) fn pad(text: &str, width: usize) -> String {
     format!("{text}{}", " ".repeat(width.saturating_sub(text.width())))
@@ -108,13 +130,14 @@ pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String 
 }
 
 /// The words of a text. What stands around an equals or a less-than sign stays
-/// together: `p = .023` is one word.
+/// together, and a number with its per cent: `p = .023` is one word.
 fn glued(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut open = false;
     for word in text.split(' ').filter(|w| !w.is_empty()) {
         let sign = matches!(word, "=" | "<");
-        match words.last_mut().filter(|_| sign || open) {
+        let unit = word.starts_with('%');
+        match words.last_mut().filter(|_| sign || unit || open) {
             Some(last) => {
                 last.push(' ');
                 last.push_str(word);
@@ -126,27 +149,38 @@ fn glued(text: &str) -> Vec<String> {
     words
 }
 
-/// A table that gives way when the page is narrow: first the names, then whole
-/// columns, last the ends of the lines.
+/// A table that gives way when the page is narrow: first the names, as long as they
+/// differ, then whole columns, last the ends of the lines.
 pub(super) struct Grid {
     rows: Vec<Vec<String>>,
-    /// A column that is set to the left, like the first and the last; the first
-    /// to be left out.
+    /// A column that is set to the left, like the first and the last.
     left: Option<usize>,
+    /// Columns that are left out, one after the other.
+    dropped: Vec<usize>,
 }
 
 /// Narrowest first column.
 const MIN_NAME: usize = 8;
 
-/// The median: the second to be left out.
-const MEDIAN: usize = 4;
-
 impl Grid {
-    pub(super) fn new(head: &[&str], left: Option<usize>) -> Self {
+    pub(super) fn new(head: &[&str], left: Option<usize>, dropped: &[usize]) -> Self {
         Self {
             rows: vec![head.iter().map(|h| (*h).to_owned()).collect()],
             left,
+            dropped: dropped.to_vec(),
         }
+    }
+
+    /// The narrowest first column in which the names differ that do so in full.
+    fn narrowest(&self, widest: usize) -> usize {
+        let differ = |width: usize| {
+            let shown = self.rows.iter().map(|r| squeezed(&r[0], width));
+            shown.collect::<BTreeSet<_>>().len()
+        };
+        let all = differ(widest);
+        (MIN_NAME.min(widest)..widest)
+            .find(|w| differ(*w) == all)
+            .unwrap_or(widest)
     }
 
     pub(super) fn row(&mut self, row: Vec<String>) {
@@ -164,9 +198,10 @@ impl Grid {
         };
         let mut widths: Vec<usize> = (0..columns).map(column).collect();
         let mut shown: Vec<usize> = (0..columns).collect();
-        for drop in [self.left, Some(MEDIAN)].into_iter().flatten() {
+        let narrowest = self.narrowest(widths[0]);
+        for &drop in &self.dropped {
             let least: usize = shown[1..].iter().map(|&j| widths[j] + 2).sum();
-            if MIN_NAME.min(widths[0]) + least > width {
+            if narrowest + least > width {
                 shown.retain(|&j| j != drop);
             }
         }
@@ -179,7 +214,11 @@ impl Grid {
             let mut line = String::new();
             for &j in &shown {
                 let w = widths[j];
-                let cell = cut(&row[j], w);
+                let cell = if j == 0 {
+                    squeezed(&row[j], w)
+                } else {
+                    cut(&row[j], w)
+                };
                 if j > 0 {
                     line.push_str("  ");
                 }
@@ -214,7 +253,26 @@ mod tests {
     }
 
     #[test]
+    fn names_that_begin_alike_stay_apart() {
+        assert_eq!(squeezed("lambda-0.99995-dx-1", 13), "lamb…995-dx-1");
+        let mut grid = Grid::new(&["realization", "n", "VAF"], None, &[1]);
+        for name in ["lambda-0.9995-dx-1", "lambda-0.99995-dx-1"] {
+            grid.row(vec![name.to_owned(), "30".to_owned(), "0.9".to_owned()]);
+        }
+        let page = grid.render(20, 2, Paint(false));
+        let names: BTreeSet<&str> = page
+            .lines()
+            .skip(1)
+            .filter_map(|l| l.split(' ').next())
+            .filter(|n| !n.is_empty())
+            .collect();
+        assert_eq!(names.len(), 2, "{page}");
+        assert!(page.lines().all(|l| l.width() <= 20), "{page}");
+    }
+
+    #[test]
     fn wide_characters_count_twice() {
+        assert_eq!(squeezed("よかったね", 6), "…たね");
         assert_eq!(cut("よかった", 5), "よか…");
         assert_eq!(pad("よ", 4), "よ  ");
     }

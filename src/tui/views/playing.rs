@@ -30,13 +30,14 @@ pub struct Playing<'a> {
 
 impl Widget for &Playing<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let strip_rows = match self.strip {
+        let by_hand = self.view.device == DeviceKind::Manual;
+        // a sample has no force that could be drawn
+        let strip_rows = match self.strip.filter(|_| !by_hand) {
             Some(_) if area.height >= 14 => (area.height / 2).min(14),
             _ => 0,
         };
         let words = rows(area, 0, area.height - strip_rows);
         let y = words.height.saturating_sub(5) / 2;
-        let by_hand = self.view.device == DeviceKind::Manual;
         let (what, now) = if by_hand {
             ("Feel the sample.", "●  exploring")
         } else {
