@@ -108,13 +108,14 @@ pub enum RatingsError {
 }
 
 impl RatingsError {
-    /// What the reader of CSV says of the file `name`.
-    pub(super) fn csv(name: &str, source: csv::Error) -> Self {
+    /// What the reader of CSV says of the file `name`; it has `pending` lines yet
+    /// to count.
+    pub(super) fn csv(name: &str, source: csv::Error, pending: u64) -> Self {
         let name = name.to_owned();
         match source.kind() {
             csv::ErrorKind::Utf8 { pos, .. } => Self::Encoding {
                 name,
-                line: pos.as_ref().map_or(1, csv::Position::line),
+                line: pos.as_ref().map_or(1, |pos| pos.line() + pending),
             },
             _ => Self::Csv { name, source },
         }

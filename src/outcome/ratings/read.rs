@@ -33,7 +33,7 @@ impl Ratings {
             .from_reader(input);
         let header: Vec<String> = reader
             .headers()
-            .map_err(|source| RatingsError::csv(name, source))?
+            .map_err(|source| RatingsError::csv(name, source, 0))?
             .iter()
             .map(|h| h.trim_start_matches('\u{feff}').trim().to_owned())
             .collect();
@@ -95,14 +95,25 @@ impl Reading {
     ) -> Result<(), RatingsError> {
         let mut record = csv::StringRecord::new();
         let mut number = 0u32;
+        // The reader counts a line at its `\n`, but stops at the `\r` before it.
+        let inner = header.iter().filter(|h| h.contains('\n')).count();
+        let pending = u64::from(inner == 0 && reader.position().line() == 1);
         loop {
             let more = reader
                 .read_record(&mut record)
-                .map_err(|source| RatingsError::csv(name, source))?;
+                .map_err(|source| RatingsError::csv(name, source, pending))?;
             if !more {
                 return Ok(());
             }
-            let line = record.position().map_or(0, csv::Position::line);
+            let start = record.position().map_or(0, csv::Position::line);
+            let line = match reader.position().line() - start {
+                0 | 1 => start + pending,
+                // Lines within a name, or empty ones before the row.
+                passed => {
+                    let within = record.as_slice().matches('\n').count() as u64;
+                    start + pending + (passed - 1).saturating_sub(within)
+                }
+            };
             if record.len() != header.len() {
                 return Err(RatingsError::Ragged {
                     name: name.to_owned(),
@@ -487,6 +498,25 @@ mod tests {
             says(&format!("{HEAD}S1,A,1,4,0.5\nS1,A,1,5,0.5\n")),
             "r.csv, line 3: subject `S1`, model `A`, repetition 1 came already on line 2"
         );
+        // Lines are those of an editor: also where they end in \r\n, where one is
+        // empty and where a name goes on in the next.
+        let wrong = "S1,A,1,four,0.5\n";
+        for (before, line) in [
+            ("", 2),
+            ("S0,A,1,4,0.5\n", 3),
+            ("S0,A,1,4,0.5\n\n\n", 5),
+            ("S0,\"A\nB\",1,4,0.5\n", 4),
+            ("S0,\"A\nB\",1,4,0.5\n\nS0,A,1,4,0.5\n", 6),
+        ] {
+            for end in ["\n", "\r\n"] {
+                let text = format!("{HEAD}{before}{wrong}").replace('\n', end);
+                let said = says(&text);
+                assert!(
+                    said.starts_with(&format!("r.csv, line {line}:")),
+                    "{said} {text:?}"
+                );
+            }
+        }
         assert_eq!(says(HEAD), "r.csv: no ratings, only a header");
         assert!(says("subject,model,vaf\n").contains("no column `rating`"));
         assert!(says("subject,subject\n").contains("two columns are named `subject`"));
