@@ -44,7 +44,7 @@ enum Command {
     Run(run::Args),
     /// Run a whole study with simulated participants, on a virtual clock
     Rehearse(rehearse::Args),
-    /// Means, standard deviations and the correlation with VAF
+    /// What came of a study: statistics, figures and a report
     Analyze(analyze::Args),
     /// Show every fault of a protocol and its models
     Check(check::Args),

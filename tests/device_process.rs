@@ -95,6 +95,11 @@ impl Bench {
 
 const HELLO: &str = r#"echo '{"say":"hello","format":"study-process/1","id":"sh","telemetry":true,"limits":{"force_n":5,"velocity_mm_s":100}}'; "#;
 
+/// Only after the load has come: the child shall not be faster than the test, and what
+/// comes first may be `alive`.
+const UNTIL_LOAD: &str =
+    r#"while read line; do case "$line" in *'"do":"load"'*) break;; esac; done; "#;
+
 #[test]
 fn the_documented_example_plays() {
     let Some(command) = example() else { return };
@@ -201,8 +206,7 @@ fn a_child_that_cannot_be_understood_is_lost_and_started_again() {
         ("exec >&-; sleep 60", " has closed its standard streams"),
         ("head -c 400000 /dev/zero; sleep 60", "longer than 262144"),
     ] {
-        // only after the load has come: the child shall not be faster than the test
-        let mut bench = Bench::shell(&format!("{HELLO} read load; {script}"));
+        let mut bench = Bench::shell(&format!("{HELLO} {UNTIL_LOAD} {script}"));
         bench.load().unwrap();
         let lost = bench.lost();
         assert!(lost.contains(why), "{script}: {lost}");
@@ -256,7 +260,7 @@ fn what_keeps_a_child_from_coming_back_is_told_once() {
     let folder = tempfile::tempdir().unwrap();
     let flag = folder.path().join("flag");
     let script = format!(
-        "test -e {flag} && echo no port >&2 && exit 2; touch {flag}; {HELLO} read load; exit 1",
+        "test -e {flag} && echo no port >&2 && exit 2; touch {flag}; {HELLO} {UNTIL_LOAD} exit 1",
         flag = flag.display()
     );
     let mut bench = Bench::shell(&script);
