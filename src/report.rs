@@ -84,6 +84,71 @@ fn pairs(a: &crate::analyze::Analysis) -> (Vec<(String, String)>, Option<f64>) {
     (found, least)
 }
 
+/// `one of 8 participants`: those who rated every realization.
+fn complete(a: &crate::analyze::Analysis) -> String {
+    let get = |id: &str| a.values.number(&format!("design/{id}")).unwrap_or(0.0);
+    let who = match get("n_subjects_complete") {
+        0.0 => "none".to_owned(),
+        n => n.to_string(),
+    };
+    format!(
+        "{who} of {}",
+        apa::counted(get("n_subjects") as usize, "participant", "participants")
+    )
+}
+
+/// Why there is no p of a pair of realizations, `first` before `second` by name.
+fn no_pairs(a: &crate::analyze::Analysis, first: &str, second: &str) -> String {
+    let why = a.values.reason(&format!("posthoc/{first}|{second}/p_t"));
+    match (a.values.number("design/n_subjects_complete"), why) {
+        (Some(n), Some(why)) if n >= 2.0 => format!("not tested: {why}"),
+        _ => format!(
+            "not tested: pairs are compared among those who rated every realization, and that is {}",
+            complete(a)
+        ),
+    }
+}
+
+/// Why equivalence with a reference was not tested, by the identifier of the
+/// contrast; `None` if it was.
+fn no_equivalence(a: &crate::analyze::Analysis, contrast: &str) -> Option<String> {
+    let why = a.values.reason(&format!("{contrast}/p_tost"))?;
+    let margin = a.values.number(&format!("{contrast}/margin"));
+    let changed = a.changed(crate::analyze::Stated::Margin);
+    Some(match margin {
+        None if changed => {
+            "the margin of equivalence was taken back after the study began: see Deviations"
+                .to_owned()
+        }
+        None => "no margin of equivalence was stated beforehand".to_owned(),
+        Some(margin) => format!("equivalence within ± {margin} was not tested: {why}"),
+    })
+}
+
+/// The F test of a mixed model.
+struct MixedF {
+    f: f64,
+    df1: f64,
+    df2: f64,
+    p: f64,
+}
+
+/// That of the realizations over all ratings, where too few subjects are complete for
+/// the tests that need complete tables.
+fn mixed_f(a: &crate::analyze::Analysis) -> Option<MixedF> {
+    let get = |id: &str| a.values.number(&format!("lmm_model/satterthwaite_{id}"));
+    let complete = ["rmanova/p_gg", "friedman/p"];
+    if complete.iter().any(|id| a.values.number(id).is_some()) {
+        return None;
+    }
+    Some(MixedF {
+        f: get("F")?,
+        df1: a.values.number("lmm_model/lrt_df")?,
+        df2: get("df2")?,
+        p: get("p")?,
+    })
+}
+
 /// The question as a noun. Untrusted.
 fn asked(a: &crate::analyze::Analysis) -> String {
     match a.question.as_str() {

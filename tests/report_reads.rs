@@ -406,3 +406,113 @@ fn the_terminal_page_stays_a_page() {
     );
     assert!(told.lines().all(|l| l.chars().count() <= 80), "{told}");
 }
+
+const WIDE: Page = Page {
+    width: 100,
+    colour: false,
+};
+
+/// The terminal page on one line.
+fn told(a: &Analysis) -> String {
+    let text = page(&source(), a, WIDE);
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Nobody rates everything: each leaves out another realization.
+fn incomplete() -> Analysis {
+    let all = ratings(6, &FIVE, |s, m, k| 1.0 + ((m + s * k) % 4 + m) as f64);
+    let kept = all.lines().filter(|l| {
+        let mut cells = l.split(',');
+        let (who, what) = (cells.next().unwrap(), cells.next().unwrap());
+        let left_out = who.strip_prefix('S').and_then(|n| n.parse::<usize>().ok());
+        left_out.is_none_or(|s| FIVE[s % 5].0 != what)
+    });
+    analysis_of(&kept.fold(String::new(), |csv, l| csv + l + "\n"))
+}
+
+#[test]
+fn incomplete_tables_are_told_with_numbers_and_answered_by_the_mixed_model() {
+    let a = incomplete();
+    assert!(a.values.number("rmanova/F").is_none());
+    let f = a.values.number("lmm_model/satterthwaite_F").unwrap();
+    let text = words(&html(&a));
+    for text in [text.clone(), told(&a)] {
+        assert!(!text.contains("too few subjects rated both"), "{text}");
+        assert!(text.contains("one of 6 participants"), "{text}");
+        assert!(
+            text.contains("pairs are compared among those who rated every realization"),
+            "{text}"
+        );
+        assert!(text.contains("inear mixed model of all ratings"), "{text}");
+        assert!(text.contains(&format!(") = {f:.2}, p")), "{text}");
+    }
+    assert!(text.contains("Do the realizations differ at all?"));
+}
+
+#[test]
+fn an_undefined_test_of_equivalence_names_its_own_reason() {
+    use study::protocol::Role;
+    // Everybody rates a one above the reference: no variance, no test.
+    let text = "study,participant,session,row,trial,block,position,planned_position,model,role,\
+         repetition,practice,pilot,simulated,protocol_version,realism,corrected,strokes,attempt,\
+         status,vaf\n";
+    let mut csv = text.to_owned();
+    for s in 0..4 {
+        for (i, (model, role, up)) in [
+            ("a", "test", 1),
+            ("b", "test", 0),
+            ("R", "hidden-reference", 0),
+        ]
+        .iter()
+        .enumerate()
+        {
+            let n = i + 1;
+            let _ = writeln!(
+                csv,
+                "s,P{s},1,1,{n},1,{n},{n},{model},{role},1,false,false,false,1,{},false,9,1,ok,0.{n}",
+                s + up + 1
+            );
+        }
+    }
+    let ratings = Ratings::read_csv("r.csv", csv.as_bytes(), None).unwrap();
+    let rules = Rules {
+        equivalence_margin: Some(0.5),
+        ..Rules::default()
+    };
+    let a = analyze(&ratings, &rules);
+    assert!(
+        a.realizations
+            .iter()
+            .any(|m| m.role == Role::HiddenReference)
+    );
+    assert!(a.values.reason("reference/R/a/p_tost").is_some());
+    for text in [words(&html(&a)), told(&a)] {
+        assert!(!text.contains("margin of equivalence was stated"), "{text}");
+        assert!(
+            text.contains("quivalence within ± 0.5 was not tested: "),
+            "{text}"
+        );
+    }
+    let without = analyze(&ratings, &Rules::default());
+    assert!(told(&without).contains("no margin of equivalence was stated beforehand"));
+}
+
+#[test]
+fn line_and_curve_are_held_against_half_the_level_and_tested_together() {
+    let mut csv = String::from("subject,model,rating,vaf,lambda\n");
+    for s in 0..3 {
+        for (m, lambda) in [0.9, 0.99, 0.999, 0.9999, 0.99999].iter().enumerate() {
+            let rating = [2, 5, 6, 5, 3][m] + s % 2;
+            let _ = writeln!(csv, "S{s},m{m},{rating},0.{},{lambda}", [3, 5, 9, 7, 4][m]);
+        }
+    }
+    let a = analysis_of(&csv);
+    let f = a
+        .values
+        .number("covariate/log10_memory/quadratic/F")
+        .unwrap();
+    for text in [words(&html(&a)), told(&a)] {
+        assert!(text.contains("held against .025"), "{text}");
+        assert!(text.contains(&format!("F(2, 2) = {f:.2}, p")), "{text}");
+    }
+}

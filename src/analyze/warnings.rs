@@ -2,6 +2,7 @@
 
 use super::Rules;
 use super::cells::Cells;
+use super::deviation::{Stated, touches};
 use super::exclude::Applied;
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
@@ -62,7 +63,8 @@ pub(super) fn warnings(
             format!("deviation from what was stated beforehand: {change}"),
         );
     }
-    excluded(&mut warn, exclusions, values);
+    let changed = touches(&rules.deviations, Stated::Exclusions);
+    excluded(&mut warn, exclusions, changed, values);
     headline(&mut warn, values);
     design(&mut warn, cells, values);
     raters(&mut warn, cells, values);
@@ -77,17 +79,27 @@ fn who(counts: &Counts) -> String {
     }
 }
 
-fn excluded(warn: &mut impl FnMut(&'static str, String), exclusions: &[Applied], values: &Values) {
+fn excluded(
+    warn: &mut impl FnMut(&'static str, String),
+    exclusions: &[Applied],
+    changed: bool,
+    values: &Values,
+) {
+    let (first, later) = if changed {
+        ("the", " (the rules were changed after the study began)")
+    } else {
+        ("the pre-stated", "")
+    };
     for e in exclusions {
         if let Some(problem) = e.problem {
-            let text = format!("the pre-stated exclusion `{}`: {problem}", e.rule);
+            let text = format!("{first} exclusion `{}`{later}: {problem}", e.rule);
             warn("rule-not-judged", text);
         }
         if e.rows > 0 {
             warn(
                 "excluded",
                 format!(
-                    "the pre-stated exclusion `{}` left out {} of {}",
+                    "{first} exclusion `{}`{later} left out {} of {}",
                     e.rule,
                     counted(e.rows, "row", "rows"),
                     people(e.participants)
@@ -100,9 +112,19 @@ fn excluded(warn: &mut impl FnMut(&'static str, String), exclusions: &[Applied],
         before.zip(values.number(id))
     };
     if let Some((before, after)) = both("corr/pearson/r") {
-        let text = format!(
-            "without the exclusions r would be {before:.3}, not {after:.3}: both are in the tables"
-        );
+        let shown = |x: f64| format!("{x:.3}");
+        let text = if shown(before) == shown(after) {
+            format!(
+                "without the exclusions r would be the same to three digits, {}",
+                shown(after)
+            )
+        } else {
+            format!(
+                "without the exclusions r would be {}, not {}: both are in the tables",
+                shown(before),
+                shown(after)
+            )
+        };
         warn("with-and-without", text);
     }
 }

@@ -2,7 +2,7 @@
 //! tests that there are numbers of; no others.
 
 use super::Details;
-use crate::analyze::{Analysis, Exclusion, Listed, Value};
+use crate::analyze::{Analysis, Exclusion, Listed, Stated, Value};
 use crate::report::apa;
 use crate::stats::permutation::DRAWS;
 
@@ -107,9 +107,14 @@ fn conduct(d: &Details, a: &Analysis) -> Vec<String> {
         ));
     }
     if let Some(from) = a.realistic_from {
-        said.push(format!(
-            "A rating of {from} or higher was said beforehand to count as realistic."
-        ));
+        said.push(if a.changed(Stated::RealisticFrom) {
+            format!(
+                "A rating of {from} or higher counts as realistic; this was changed after the study \
+                 began (see Deviations)."
+            )
+        } else {
+            format!("A rating of {from} or higher was said beforehand to count as realistic.")
+        });
     }
     if d.states.iter().any(|(state, _)| state != "done") {
         let all: Vec<String> = (d.states.iter())
@@ -138,7 +143,7 @@ pub(super) fn in_words(rule: Exclusion) -> String {
     }
 }
 
-/// What was stated beforehand of leaving out, and what was left out.
+/// What was to be left out, since when, and what was left out.
 fn left_out(a: &Analysis) -> Vec<String> {
     let c = &a.counts;
     let mut said = Vec::new();
@@ -152,10 +157,15 @@ fn left_out(a: &Analysis) -> Vec<String> {
                 format!("{} ({rows} of {who})", in_words(e.rule))
             })
             .collect();
-        said.push(format!(
-            "It was stated beforehand to leave out {}.",
-            apa::listing(&rules)
-        ));
+        let rules = apa::listing(&rules);
+        said.push(if a.changed(Stated::Exclusions) {
+            format!(
+                "The rules of exclusion were changed after the study began (see Deviations); now \
+                 they leave out {rules}."
+            )
+        } else {
+            format!("It was stated beforehand to leave out {rules}.")
+        });
     }
     let rules: usize = a.exclusions.iter().map(|e| e.rows).sum();
     let rows: usize = c.excluded.values().sum();
@@ -250,11 +260,14 @@ fn tests_done(a: &Analysis) -> Vec<String> {
     if v.iter().any(|(id, value)| {
         id.starts_with("reference/") && id.ends_with("/p_tost") && matches!(value, Value::Number(_))
     }) {
-        said.push(
-            "Equivalence with the reference was tested by two one-sided t tests at the margin stated \
-             beforehand."
-                .to_owned(),
-        );
+        let margin = if a.changed(Stated::Margin) {
+            "a margin that was changed after the study began (see Deviations)"
+        } else {
+            "the margin stated beforehand"
+        };
+        said.push(format!(
+            "Equivalence with the reference was tested by two one-sided t tests at {margin}."
+        ));
     }
     said
 }

@@ -3,7 +3,7 @@
 use super::methods::in_words;
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
-use crate::analyze::{Analysis, Said, Warning};
+use crate::analyze::{Analysis, Said, Stated, Warning};
 use crate::report::{Source, apa};
 use maud::{Markup, html};
 
@@ -50,13 +50,21 @@ fn sentence(w: &Warning) -> String {
 /// what was changed afterwards.
 fn stated(a: &Analysis) -> Markup {
     let text = |id: &str| a.values.number(id).map_or_else(|| "–".to_owned(), apa::r);
+    let changed = a.changed(Stated::Exclusions);
+    let caption = if changed {
+        "Exclusions, changed after the study began: see Deviations"
+    } else {
+        "Exclusions stated beforehand"
+    };
     html! {
-        @if a.exclusions.is_empty() {
+        @if a.exclusions.is_empty() && changed {
+            p { "The rules of exclusion were changed after the study began; none is left: see Deviations." }
+        } @else if a.exclusions.is_empty() {
             p { "No rule of exclusion was stated beforehand." }
         } @else {
-            div.scroll tabindex="0" role="region" aria-label="Exclusions stated beforehand" {
+            div.scroll tabindex="0" role="region" aria-label=(caption) {
                 table {
-                    caption { "Exclusions stated beforehand" }
+                    caption { (caption) }
                     thead { tr {
                         th scope="col" { "rule" } th.text scope="col" { "leaves out" } th scope="col" { "rows" }
                         th scope="col" { "participants" } th.text scope="col" { "remark" }

@@ -103,6 +103,9 @@ fn best(a: &Analysis) -> Vec<String> {
         }
     } else if pairs.is_empty() && ranked.len() > MAX_PAIRED {
         said.push("Pairs are tested of eight realizations at most.".to_owned());
+    } else if v.number(&format!("{pair}/p_t")).is_none() {
+        let why = super::super::no_pairs(a, low, high);
+        said.push(format!("{}.", apa::capital(&Untrusted(&why).to_string())));
     }
     said
 }
@@ -143,6 +146,20 @@ fn differ(a: &Analysis) -> Vec<String> {
                 p(value)
             ));
         }
+    }
+    if parts.is_empty()
+        && let Some(m) = super::super::mixed_f(a)
+    {
+        let verdict = if m.p < 0.05 { "Yes" } else { "Not shown" };
+        return vec![format!(
+            "{verdict}: F({}, {}) = {}, p {} (linear mixed model of all ratings, Satterthwaite); {} \
+             rated every realization.",
+            number(m.df1, 0),
+            number(m.df2, 1),
+            number(m.f, 2),
+            p(m.p),
+            super::super::complete(a)
+        )];
     }
     if parts.is_empty() {
         return Vec::new();

@@ -263,9 +263,17 @@ fn curvature(a: &Analysis) -> Option<String> {
     };
     let ((b, p), df) = get("square").zip(get("p")).zip(get("df"))?;
     let bent = if b < 0.0 { "downwards" } else { "upwards" };
+    let both = get("F").zip(get("p_F")).map_or_else(String::new, |(f, p)| {
+        format!(
+            " Both together: F(2, {}) = {}, p {}.",
+            apa::number(df, 0),
+            two(f),
+            apa::equals_p(p)
+        )
+    });
     Some(format!(
         "With a square term beside the line, {} (a curve bent {bent}), t({}) = {}, \
-         p {}. Line and curve are two tests: each is held against .025.",
+         p {}. Line and curve are two tests: each is held against .025.{both}",
         two(b),
         apa::number(df, 0),
         get("t").map_or_else(|| "–".to_owned(), two),
