@@ -97,6 +97,36 @@ fn complete(a: &crate::analyze::Analysis) -> String {
     )
 }
 
+/// What r hangs on: the one realization without which all means or all VAF are
+/// equal, as a sentence. Names in it are untrusted.
+fn hangs_on(a: &crate::analyze::Analysis) -> Option<String> {
+    a.values.number("corr/pearson/r")?;
+    let points: Vec<(&str, f64, f64)> = (a.realizations.iter())
+        .filter(|m| m.role == crate::outcome::Role::Test && m.duplicate_of.is_none())
+        .filter_map(|m| {
+            let mean = a
+                .values
+                .number(&format!("desc/{}/subject_mean/mean", m.id))?;
+            Some((m.id.as_str(), mean, m.vaf?))
+        })
+        .collect();
+    if points.len() < 3 {
+        return None;
+    }
+    let alike = |out: usize, of: fn(&(&str, f64, f64)) -> f64| {
+        let mut rest = (points.iter().enumerate()).filter(|(i, _)| *i != out);
+        let first = rest.next().map_or(0.0, |(_, p)| of(p));
+        rest.all(|(_, p)| (of(p) - first).abs() <= 1e-9 * first.abs().max(1.0))
+    };
+    let means = (0..points.len()).find(|i| alike(*i, |p| p.1));
+    let vaf = (0..points.len()).find(|i| alike(*i, |p| p.2));
+    let (at, what) = means.map(|i| (i, "means")).or(vaf.map(|i| (i, "VAF")))?;
+    Some(format!(
+        "Without {} all {what} are equal: r hangs on that one realization.",
+        points[at].0
+    ))
+}
+
 /// Why there is no p of a pair of realizations, `first` before `second` by name.
 fn no_pairs(a: &crate::analyze::Analysis, first: &str, second: &str) -> String {
     let why = a.values.reason(&format!("posthoc/{first}|{second}/p_t"));

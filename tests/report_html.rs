@@ -142,7 +142,7 @@ fn what_is_absent_is_left_out_politely() {
     assert!(!page.contains("For these realizations only"));
     let nothing = analysis_of("subject,model,repetition,rating,vaf\nS1,a,1,,\n");
     let page = report(&nothing, &[]);
-    assert!(page.contains("The data allow no answer"));
+    assert!(page.contains("Nothing is left to analyse"));
 }
 
 #[test]

@@ -516,3 +516,85 @@ fn line_and_curve_are_held_against_half_the_level_and_tested_together() {
         assert!(text.contains(&format!("F(2, 2) = {f:.2}, p")), "{text}");
     }
 }
+
+#[test]
+fn the_methods_count_what_was_rated_and_by_whom() {
+    // d is in the table, but nobody rated it.
+    let all = ratings(4, &FIVE[..3], |s, m, k| 1.0 + ((m + s * k) % 4 + m) as f64);
+    let csv = all.clone() + "S1,d,1,,0.9\n";
+    let a = analysis_of(&csv);
+    let text = words(&html(&a));
+    let methods = part(&text, "Methods ", "Results ");
+    assert!(
+        methods.contains("4 participants rated 3 of 4 realizations; nobody rated the others."),
+        "{methods}"
+    );
+    let whole = analysis_of(&ratings(4, &FIVE[..3], |s, m, k| {
+        1.0 + ((m + s * k) % 4 + m) as f64
+    }));
+    assert!(!html(&whole).contains("rated every realization: only they"));
+    let incomplete = analysis_of(&kept_of(&all, |l| !l.starts_with("S0,c")));
+    let text = words(&html(&incomplete));
+    assert!(
+        text.contains(
+            "Of the 4 participants, 3 rated every realization: only they are in the analysis of variance"
+        ),
+        "{text}"
+    );
+}
+
+/// Some lines of a table.
+fn kept_of(csv: &str, keep: impl Fn(&str) -> bool) -> String {
+    let kept = csv.lines().filter(|l| keep(l));
+    kept.fold(String::new(), |csv, l| csv + l + "\n")
+}
+
+#[test]
+fn one_participant_is_no_people_and_has_no_intervals() {
+    let a = analysis_of(&ratings(1, &FIVE, |_, m, k| 1.0 + ((m * k) % 5) as f64));
+    let text = words(&html(&a));
+    assert!(!text.contains("t intervals over subjects"), "{text}");
+    assert!(!text.contains("95 % t interval of the mean"), "{text}");
+    for text in [text, told(&a)] {
+        assert!(text.contains("nly one participant is analysed"), "{text}");
+    }
+    let two = analysis_of(&ratings(2, &FIVE, |s, m, k| 1.0 + ((m * k + s) % 5) as f64));
+    assert!(words(&html(&two)).contains("t intervals over subjects"));
+    assert!(!told(&two).contains("nly one participant"));
+}
+
+#[test]
+fn with_everything_left_out_nothing_is_said_to_be_found() {
+    use study::analyze::Exclusion;
+    let constant = ratings(3, &FIVE, |s, _, _| 2.0 + s as f64);
+    let ratings = Ratings::read_csv("data.csv", constant.as_bytes(), None).unwrap();
+    let rules = Rules {
+        exclude: vec![Exclusion::ConstantRater],
+        ..Rules::default()
+    };
+    let a = analyze(&ratings, &rules);
+    assert_eq!(a.counts.rated, 0);
+    let study = Source {
+        study: Some("s".to_owned()),
+        ..source()
+    };
+    let page = words(&document(&study, &Details::default(), &a, &[]));
+    assert!(!page.contains("r = –"), "{page}");
+    assert!(page.contains("No rating counts: there is nothing to analyse."));
+    for text in [page, told(&a)] {
+        assert!(text.contains("Nothing is left to analyse"), "{text}");
+    }
+}
+
+#[test]
+fn the_one_realization_that_r_hangs_on_is_named() {
+    let a = analysis_of(&ratings(5, &FIVE, |s, m, _| {
+        [3.0, 6.0][usize::from(m == 4)] + (s % 2) as f64
+    }));
+    for text in [words(&html(&a)), told(&a)] {
+        let said = "Without e all means are equal: r hangs on that one realization.";
+        assert!(text.contains(said), "{text}");
+    }
+    let other = analysis_of(&ratings(5, &FIVE, |s, m, _| (m + s % 2) as f64));
+    assert!(!told(&other).contains("hangs on that one"));
+}

@@ -63,6 +63,14 @@ pub(super) fn warnings(
             format!("deviation from what was stated beforehand: {change}"),
         );
     }
+    if counts.participants == 1 && counts.rated > 0 {
+        warn(
+            "one-participant",
+            "only one participant is analysed: the results tell of that one, and nothing about \
+             people in general"
+                .to_owned(),
+        );
+    }
     let changed = touches(&rules.deviations, Stated::Exclusions);
     excluded(&mut warn, exclusions, changed, values);
     headline(&mut warn, values);

@@ -33,7 +33,9 @@ pub(super) fn section(a: &Analysis) -> Markup {
     html! {
         section {
             h2 { "Answers" }
-            @if all.is_empty() {
+            @if a.counts.rated == 0 {
+                p { "Nothing is left to analyse: no rating counts. “What was counted and left out” tells why." }
+            } @else if all.is_empty() {
                 p { "The data allow no answer to any of the study's questions; the tables show what there is." }
             }
             @for answer in &all {

@@ -49,7 +49,7 @@ fn sentence(w: &Warning) -> String {
 /// What was stated before the data of what to leave out, what each rule did, and
 /// what was changed afterwards.
 fn stated(a: &Analysis) -> Markup {
-    let text = |id: &str| a.values.number(id).map_or_else(|| "–".to_owned(), apa::r);
+    let r = |id: &str| a.values.number(id).map(apa::r);
     let changed = a.changed(Stated::Exclusions);
     let caption = if changed {
         "Exclusions, changed after the study began: see Deviations"
@@ -79,12 +79,16 @@ fn stated(a: &Analysis) -> Markup {
                     }
                 }
             }
-            @if a.values.get("before_exclusion/corr/pearson/r").is_some() {
-                p {
-                    "With them, mean rating and VAF correlate at r = " (text("corr/pearson/r"))
-                    "; without them, at r = " (text("before_exclusion/corr/pearson/r"))
+            @match (r("corr/pearson/r"), r("before_exclusion/corr/pearson/r")) {
+                (Some(with), Some(without)) => p {
+                    "With them, mean rating and VAF correlate at r = " (with)
+                    "; without them, at r = " (without)
                     ". More of the headline with and without them is in a table above."
-                }
+                },
+                (None, Some(without)) => p {
+                    "With them, no correlation of mean rating and VAF is defined; without them, r = " (without) "."
+                },
+                _ => {},
             }
         }
         @if a.deviations.is_empty() {

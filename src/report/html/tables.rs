@@ -61,6 +61,10 @@ impl Table {
 }
 
 pub(super) fn section(a: &Analysis) -> Markup {
+    let any_interval = a.realizations.iter().any(|m| {
+        let id = format!("desc/{}/subject_mean/ci95_lo", m.id);
+        a.values.number(&id).is_some()
+    });
     html! {
         section {
             h2 { "Tables" }
@@ -68,7 +72,9 @@ pub(super) fn section(a: &Analysis) -> Markup {
                 (realizations(a).render())
                 p.note {
                     "n: ratings. Mean, SD (standard deviation, n − 1) and median are over all ratings of a \
-                     realization; the interval is a 95 % t interval of the mean over subjects."
+                     realization"
+                    @if any_interval { "; the interval is a 95 % t interval of the mean over subjects" }
+                    "."
                     @if a.realizations.len() > answers::tests(a).len() {
                         " Realizations in italics stand beside the tested ones."
                     }

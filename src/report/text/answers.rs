@@ -228,6 +228,7 @@ fn predicts(a: &Analysis) -> Vec<String> {
             apa::capital(&apa::count(n as usize))
         ));
     }
+    said.extend(super::super::hangs_on(a).map(|s| Untrusted(&s).to_string()));
     said.extend(beside(a));
     said
 }

@@ -74,6 +74,7 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
             apa::r(high)
         ));
     }
+    more.extend(crate::report::hangs_on(a));
     if let Some(share) = v.number("corr/share/r2") {
         let adjusted = v.number("corr/share/r2_adjusted");
         let adjusted = adjusted.map_or_else(String::new, |x| {
