@@ -598,3 +598,92 @@ fn the_one_realization_that_r_hangs_on_is_named() {
     let other = analysis_of(&ratings(5, &FIVE, |s, m, _| (m + s % 2) as f64));
     assert!(!told(&other).contains("hangs on that one"));
 }
+
+#[test]
+fn the_terminal_tells_the_crossed_slope_the_needed_r_and_the_order() {
+    let csv = ratings(6, &FIVE, |s, m, k| {
+        1.0 + ((m + s * k + m * k) % 4 + m) as f64
+    });
+    let mut n = 0;
+    let with_order = csv.lines().fold(String::new(), |out, l| {
+        n += 1;
+        let last = match n {
+            1 => "trial_index".to_owned(),
+            n => (1 + (n * 7) % 10).to_string(),
+        };
+        format!("{out}{l},{last}\n")
+    });
+    let a = analysis_of(&with_order);
+    let get = |id: &str| a.values.number(id).unwrap();
+    let text = told(&a);
+    for said in [
+        format!(
+            "Crossed mixed model: slope {:.1}",
+            get("lmm_vaf_crossed/slope")
+        ),
+        format!(
+            "needs |r| above {}",
+            format!("{:.3}", get("corr/pearson/critical_r")).trim_start_matches('0')
+        ),
+        "Do order and learning matter?".to_owned(),
+        "per trial, p ".to_owned(),
+    ] {
+        assert!(text.contains(&said), "{said}: {text}");
+    }
+    assert!(!told(&analysis_of(&csv)).contains("order and learning"));
+}
+
+#[test]
+fn references_repeats_and_whom_they_screen_stand_in_tables() {
+    let mut csv = "study,participant,session,row,trial,block,position,planned_position,model,role,\
+         repetition,practice,pilot,simulated,protocol_version,realism,corrected,strokes,attempt,\
+         status,vaf\n"
+        .to_owned();
+    let models = [
+        ("a", "test", 2),
+        ("b", "test", 5),
+        ("c", "test", 2),
+        ("R", "hidden-reference", 6),
+        ("L", "low-anchor", 1),
+    ];
+    for s in 0..4 {
+        for (i, (model, role, rating)) in models.iter().enumerate() {
+            let n = i + 1;
+            let rating = rating + (s * n) % 2;
+            let _ = writeln!(
+                csv,
+                "s,P{s},1,1,{n},1,{n},{n},{model},{role},1,false,false,false,1,{rating},false,9,1,ok,0.5"
+            );
+        }
+    }
+    let mut ratings = Ratings::read_csv("r.csv", csv.as_bytes(), None).unwrap();
+    ratings.set_duplicates([("c", "a")]);
+    let a = analyze(&ratings, &Rules::default());
+    let text = words(&html(&a));
+    for said in [
+        "Differences from R (hidden reference)",
+        "Differences from L (low anchor)",
+        "Hidden repeats minus their originals",
+        "mean of the references mean of the anchors distance of the repeats",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    let d = a.values.number("reference/R/b/mean_diff").unwrap();
+    let shown = format!("b 4 {d:.3}").replace('-', "−");
+    assert!(
+        part(&text, "Differences from R", "Differences from L").contains(&shown),
+        "{text}"
+    );
+    let plain = words(&html(&analysis_of(&ratings_of_three())));
+    for absent in [
+        "mean of the references",
+        "Differences from",
+        "Hidden repeats",
+    ] {
+        assert!(!plain.contains(absent), "{absent}");
+    }
+}
+
+fn ratings_of_three() -> String {
+    ratings(4, &FIVE[..3], |s, m, k| 1.0 + ((m + s * k) % 4 + m) as f64)
+}

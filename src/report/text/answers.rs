@@ -23,6 +23,7 @@ pub(super) fn answers(a: &Analysis, width: usize, paint: Paint) -> String {
     answer("Do the realizations differ?".to_owned(), differ(a));
     answer(format!("Does VAF predict {}?", asked(a)), predicts(a));
     answer("For these realizations only:".to_owned(), only_these(a));
+    answer("Do order and learning matter?".to_owned(), order(a));
     out
 }
 
@@ -185,8 +186,13 @@ fn predicts(a: &Analysis) -> Vec<String> {
         Some(_) => "Not shown: ",
         None => "",
     };
+    let needed = v
+        .number("corr/pearson/critical_r")
+        .map_or_else(String::new, |x| {
+            format!("; a t test needs |r| above {}", r(x))
+        });
     let mut said = vec![format!(
-        "{verdict}r = {} over {n} realizations{}{}.",
+        "{verdict}r = {} over {n} realizations{}{}{needed}.",
         r(pearson),
         interval(a, "corr/pearson/ci95"),
         with_p(a, "pearson")
@@ -198,6 +204,7 @@ fn predicts(a: &Analysis) -> Vec<String> {
             apa::capital(&apa::count(tied))
         ));
     }
+    said.extend(crossed(a));
     if let Some(rho) = v.number("corr/spearman/rho") {
         said.push(format!(
             "By ranks: Spearman's rho = {}{}.",
@@ -231,6 +238,51 @@ fn predicts(a: &Analysis) -> Vec<String> {
     said.extend(super::super::hangs_on(a).map(|s| Untrusted(&s).to_string()));
     said.extend(beside(a));
     said
+}
+
+/// The slope of the mixed model with subjects and realizations crossed.
+fn crossed(a: &Analysis) -> Option<String> {
+    let get = |id: &str| a.values.number(&format!("lmm_vaf_crossed/{id}"));
+    let (slope, se) = get("slope").zip(get("slope_se"))?;
+    let test = get("slope_satterthwaite_df").zip(get("slope_satterthwaite_p"));
+    let test = test.map_or_else(String::new, |(df, value)| {
+        format!(", {} df: p {}", number(df, 1), p(value))
+    });
+    let singular = match get("singular") {
+        Some(1.0) if get("var_model").is_none_or(|v| v <= 0.0) => {
+            " (no variance of the realizations is left: p is too small)"
+        }
+        _ => "",
+    };
+    Some(format!(
+        "Crossed mixed model: slope {} per unit of VAF (SE {}){test}{singular}.",
+        number(slope, apa::decimals(se, 2)),
+        number(se, apa::decimals(se, 2))
+    ))
+}
+
+/// Drift over the session and carry-over from the trial before.
+fn order(a: &Analysis) -> Vec<String> {
+    let effect = |id: &str, what: &str| {
+        let get = |name: &str| a.values.number(&format!("{id}/{name}"));
+        let (slope, se, value) = (get("slope")?, get("se")?, get("p")?);
+        let digits = apa::decimals(se, 3);
+        Some((
+            value,
+            format!("{} per {what}, p {}", number(slope, digits), p(value)),
+        ))
+    };
+    let Some((drift, shown)) = effect("order_trial", "trial") else {
+        return Vec::new();
+    };
+    let verdict = if drift < 0.05 {
+        "Ratings drift"
+    } else {
+        "No drift shown"
+    };
+    let before = effect("order_previous_rating", "point of the rating before")
+        .map_or_else(String::new, |(_, shown)| format!("; carry-over {shown}"));
+    vec![format!("{verdict}: {shown}{before}.")]
 }
 
 /// What VAF goes along with over the realizations.
