@@ -127,6 +127,34 @@ fn hangs_on(a: &crate::analyze::Analysis) -> Option<String> {
     ))
 }
 
+/// Whether the realizations are known to be identified with forgetting factors.
+fn identified(a: &crate::analyze::Analysis) -> bool {
+    a.values.get("covariate/log10_memory/r").is_some()
+}
+
+/// Why the smallest p is no smaller, if realizations share a VAF.
+fn shared_vaf(a: &crate::analyze::Analysis) -> Option<String> {
+    let own = |m: &&crate::analyze::Listed| {
+        let mean = format!("desc/{}/subject_mean/mean", m.id);
+        m.role == crate::outcome::Role::Test
+            && m.duplicate_of.is_none()
+            && a.values.number(&mean).is_some()
+    };
+    let mut vaf: Vec<f64> = (a.realizations.iter().filter(own))
+        .filter_map(|m| m.vaf)
+        .collect();
+    vaf.sort_by(f64::total_cmp);
+    let groups = vaf.chunk_by(|x, y| x == y).map(<[f64]>::len);
+    let tied: usize = groups.filter(|n| *n > 1).sum();
+    (tied > 1).then(|| {
+        format!(
+            "{} realizations share a VAF with another: exchanging them changes nothing, which is \
+             why the smallest p is no smaller",
+            apa::capital(&apa::count(tied))
+        )
+    })
+}
+
 /// Why there is no p of a pair of realizations, `first` before `second` by name.
 fn no_pairs(a: &crate::analyze::Analysis, first: &str, second: &str) -> String {
     let why = a.values.reason(&format!("posthoc/{first}|{second}/p_t"));

@@ -687,3 +687,97 @@ fn references_repeats_and_whom_they_screen_stand_in_tables() {
 fn ratings_of_three() -> String {
     ratings(4, &FIVE[..3], |s, m, k| 1.0 + ((m + s * k) % 4 + m) as f64)
 }
+
+#[test]
+fn a_table_from_elsewhere_is_told_nothing_of_the_paper_and_of_lambda() {
+    let foreign = analysis_of(&ratings_of_three());
+    let mut csv = String::from("subject,model,rating,vaf,lambda\n");
+    for s in 0..4 {
+        for (m, lambda) in [0.9, 0.99, 0.999, 0.9999].iter().enumerate() {
+            let _ = writeln!(
+                csv,
+                "S{s},m{m},{},0.{},{lambda}",
+                1 + (m * 2 + s) % 6,
+                m + 2
+            );
+        }
+    }
+    let own = analysis_of(&csv);
+    for word in [
+        "Fig. 1",
+        "validation recording",
+        "λ",
+        "lambda",
+        "activeness",
+    ] {
+        for text in [words(&html(&foreign)), told(&foreign)] {
+            assert!(!text.contains(word), "{word}: {text}");
+        }
+    }
+    let text = words(&html(&own));
+    for said in [
+        "as in Fig. 10 of Colton &amp; Hollerbach (World Haptics 2007)",
+        "validation recording",
+        "ladder of λ",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+}
+
+#[test]
+fn shared_vaf_explains_the_smallest_p() {
+    let models = [("a", 0.7), ("b", 0.7), ("c", 0.8), ("d", 0.95)];
+    let rate = |s: usize, m: usize, k: usize| 1.0 + ((m + s * k) % 4 + m) as f64;
+    let a = analysis_of(&ratings(5, &models, rate));
+    let b = analysis_of(&ratings(5, &FIVE, rate));
+    for (a, tied) in [(&a, true), (&b, false)] {
+        for text in [words(&html(a)), told(a)] {
+            let said = text.contains("Two realizations share a VAF with another");
+            assert_eq!(said, tied, "{text}");
+        }
+    }
+}
+
+#[test]
+fn friedmans_p_is_accompanied_by_a_closer_one_unless_it_is_exact() {
+    let many = analysis_of(&ratings(30, &FIVE, |s, m, k| {
+        1.0 + ((m + s * k + s * m) % 5 + m) as f64
+    }));
+    let few = analysis_of(&ratings_of_three());
+    for (a, exact) in [(&many, false), (&few, true)] {
+        assert_eq!(a.values.number("friedman/exact_p").is_some(), exact);
+        for (text, said) in [
+            (words(&html(a)), "by Iman and Davenport’s F, p "),
+            (told(a), "(Iman–Davenport p "),
+        ] {
+            assert_eq!(text.contains(said), !exact, "{text}");
+        }
+    }
+}
+
+#[test]
+fn correlations_in_warnings_read_as_on_the_page() {
+    let a = analysis_of(&ratings(5, &FIVE, |s, m, _| {
+        [5.0, 2.0, 6.0, 3.0, 4.0][m] + (s % 2) as f64
+    }));
+    let hangs = a
+        .warnings
+        .iter()
+        .find(|w| w.code == "one-realization")
+        .unwrap();
+    assert!(hangs.text.contains("between −."), "{}", hangs.text);
+    assert!(!hangs.text.contains("0."), "{}", hangs.text);
+}
+
+#[test]
+fn letters_are_explained_where_they_stand() {
+    let text = words(&html(&analysis_of(&ratings_of_three())));
+    for letter in ["ε: ", "Generalised η²: ", "W: how", "α: ", "dz: "] {
+        assert!(text.contains(letter), "{letter}: {text}");
+    }
+    assert!(text.contains("Shares are rounded"));
+    let one = words(&html(&analysis_of(&ratings(1, &FIVE, |_, m, k| {
+        1.0 + ((m * k) % 5) as f64
+    }))));
+    assert!(!one.contains("Generalised η²") && !one.contains("Shares are rounded"));
+}

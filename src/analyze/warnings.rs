@@ -120,7 +120,6 @@ fn excluded(
         before.zip(values.number(id))
     };
     if let Some((before, after)) = both("corr/pearson/r") {
-        let shown = |x: f64| format!("{x:.3}");
         let text = if shown(before) == shown(after) {
             format!(
                 "without the exclusions r would be the same to three digits, {}",
@@ -168,7 +167,9 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
             "one-realization",
             format!(
                 "the correlation hangs on single realizations: with one left out, r lies between \
-                 {low:.3} and {high:.3}"
+                 {} and {}",
+                shown(low),
+                shown(high)
             ),
         );
     }
@@ -178,7 +179,9 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
         warn(
             "not-linear",
             format!(
-                "r = {r:.3} and rho = {rho:.3} differ: the relation is no line, or one point is far out"
+                "r = {} and rho = {} differ: the relation is no line, or one point is far out",
+                shown(r),
+                shown(rho)
             ),
         );
     }
@@ -192,13 +195,17 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
                 .to_owned(),
         );
     }
-    warn(
-        "assumptions",
+    // Only what was identified with forgetting factors has them.
+    let identified = values.get("covariate/log10_memory/r").is_some();
+    let text = if identified {
         "the permutation takes the realizations as exchangeable, which neighbours on one ladder \
          of lambda are not; what goes along with VAF, such as lambda or activeness, cannot be \
          told from it"
-            .to_owned(),
-    );
+    } else {
+        "the permutation takes the realizations as exchangeable; what goes along with VAF cannot \
+         be told from it"
+    };
+    warn("assumptions", text.to_owned());
 }
 
 fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
@@ -293,6 +300,18 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
             people(constant)
         ),
     );
+}
+
+/// A correlation as the pages print it: three decimals, no zero before the point, a
+/// real minus and no negative zero.
+fn shown(r: f64) -> String {
+    let digits = format!("{:.3}", r.abs());
+    let sign = if r < 0.0 && digits != "0.000" {
+        "−"
+    } else {
+        ""
+    };
+    format!("{sign}{}", digits.strip_prefix('0').unwrap_or(&digits))
 }
 
 fn people(n: usize) -> String {

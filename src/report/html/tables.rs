@@ -89,10 +89,44 @@ pub(super) fn section(a: &Analysis) -> Markup {
                 p.note { "Shares are rounded to whole per cent: their sum can be 99 or 101." }
             }
             (agreement(a).render())
+            (glossary(a))
             (with_and_without(a).render())
             (subjects(a))
         }
     }
+}
+
+/// What the letters mean, of those that are on the page.
+fn glossary(a: &Analysis) -> Markup {
+    let any = |ids: &[&str]| ids.iter().any(|id| a.values.number(id).is_some());
+    let alpha = [
+        "krippendorff_subjects/ordinal",
+        "krippendorff_repetitions/ordinal",
+    ];
+    let all: Vec<&str> = [
+        (
+            any(&["rmanova/eps_gg"]),
+            "ε: how nearly all differences vary alike (1: they do); it lowers the degrees of freedom.",
+        ),
+        (
+            any(&["rmanova/ges"]),
+            "Generalised η²: share of the variance that the realizations have.",
+        ),
+        (
+            any(&["friedman/kendall_W"]),
+            "W: how alike subjects rank, from 0 to 1.",
+        ),
+        (any(&alpha), "α: agreement beyond chance, 1 at most."),
+        (
+            !crate::report::pairs(a).0.is_empty(),
+            "dz: mean difference by the standard deviation of the differences.",
+        ),
+    ]
+    .into_iter()
+    .filter(|(there, _)| *there)
+    .map(|(_, text)| text)
+    .collect();
+    html! { @if !all.is_empty() { p.note { (all.join(" ")) } } }
 }
 
 fn show(x: Option<f64>, decimals: usize) -> String {

@@ -138,11 +138,16 @@ fn differ(a: &Analysis) -> Vec<String> {
         let exact = v.number("friedman/exact_p");
         let kind = if exact.is_some() { "exact p" } else { "p" };
         if let Some(value) = exact.or_else(|| v.number("friedman/p")) {
+            // Closer than that of χ² where there is no exact one.
+            let better = v
+                .number("friedman/iman_davenport_p")
+                .filter(|_| exact.is_none())
+                .map_or_else(String::new, |x| format!(" (Iman–Davenport p {})", p(x)));
             let w = v
                 .number("friedman/kendall_W")
                 .map_or_else(String::new, |w| format!(", Kendall's W = {}", r(w)));
             parts.push(format!(
-                "Friedman χ²({df}) = {}, {kind} {}{w}",
+                "Friedman χ²({df}) = {}, {kind} {}{better}{w}",
                 number(chi2, 2),
                 p(value)
             ));
@@ -197,6 +202,9 @@ fn predicts(a: &Analysis) -> Vec<String> {
         interval(a, "corr/pearson/ci95"),
         with_p(a, "pearson")
     )];
+    if permuted(a, "pearson").is_some_and(|found| found.0 == "exact p") {
+        said.extend(super::super::shared_vaf(a).map(|s| format!("{s}.")));
+    }
     let tied = tied(a);
     if tied > 1 {
         said.push(format!(

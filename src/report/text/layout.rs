@@ -47,7 +47,7 @@ pub(super) fn number(x: f64, decimals: usize) -> String {
         let shown = format!("{x:.decimals$}");
         match shown.strip_prefix('-') {
             Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
-            _ => shown,
+            _ => shown.replace('-', "−"),
         }
     }
 }

@@ -90,12 +90,18 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     }
     more.extend(crossed(a));
     if p.is_some() {
-        more.push(
-            "The p by permutation assumes that the realizations are exchangeable, which neighbours on one ladder of \
-             λ are not, and it cannot tell VAF from what goes along with it: λ, and how active a \
-             realization is."
-                .to_owned(),
-        );
+        let (neighbours, such) = if crate::report::identified(a) {
+            (
+                ", which neighbours on one ladder of λ are not",
+                ": λ, and how active a realization is",
+            )
+        } else {
+            ("", "")
+        };
+        more.push(format!(
+            "The p by permutation assumes that the realizations are exchangeable{neighbours}, and it \
+             cannot tell VAF from what goes along with it{such}."
+        ));
     }
     Some(Answer {
         question,
@@ -132,6 +138,9 @@ fn points(a: &Analysis, n: f64) -> Vec<String> {
         "VAF differs between realizations only, so there are {n} points however many \
          participants rated. {smallest}{critical}."
     )];
+    if exact {
+        said.extend(crate::report::shared_vaf(a).map(|s| format!("{s}.")));
+    }
     let tied = tied(a);
     if tied > 1 {
         said.push(format!(
