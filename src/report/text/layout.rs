@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn no_minus_zero_is_shown() {
         assert_eq!(number(-0.0001, 2), "0.00");
-        assert_eq!(number(-0.01, 2), "-0.01");
+        assert_eq!(number(-0.01, 2), "−0.01");
         assert_eq!(number(1e300, 3), "1.000e300");
     }
 }
