@@ -40,6 +40,7 @@ use cells::Cells;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What was decided before the data.
 #[derive(Debug, Clone, PartialEq)]
@@ -223,24 +224,41 @@ impl Analysis {
     }
 }
 
+/// How far an analysis is, for who watches it from another thread.
+#[derive(Debug, Default)]
+pub struct Progress {
+    /// Groups of statistics to be made: a second round of them may follow.
+    pub groups: AtomicU64,
+    /// Of these, made.
+    pub made: AtomicU64,
+}
+
 /// Analyses ratings under rules.
 pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
+    analyze_watched(ratings, rules, &Progress::default())
+}
+
+/// The same; `progress` tells how far it is.
+pub fn analyze_watched(ratings: &Ratings, rules: &Rules, progress: &Progress) -> Analysis {
     let (decisions, exclusions) = select::decide(ratings, rules);
     let used = rows(ratings, |i| decisions[i].is_none());
     let (cells, rows_judged) = rayon::join(|| Cells::of(&used), || judged(ratings, &decisions));
     let (mut values, counts) = rayon::join(
-        || statistics(&cells, rules),
+        || statistics(&cells, rules, progress),
         || Counts::of(ratings, &used, &decisions, rules),
     );
     if let Some(smaller) = overflow::smaller(&used) {
-        overflow::explain(&mut values, &statistics(&Cells::of(&smaller), rules));
+        overflow::explain(
+            &mut values,
+            &statistics(&Cells::of(&smaller), rules, progress),
+        );
     }
     if exclusions.iter().any(|e| e.rows > 0) {
         let all = rows(ratings, |i| {
             let reason = decisions[i].as_deref();
             matches!(reason, None | Some(Reason::Rule(_)))
         });
-        headline::without_exclusions(&statistics(&Cells::of(&all), rules), &mut values);
+        headline::without_exclusions(&statistics(&Cells::of(&all), rules, progress), &mut values);
     }
     let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &values);
     Analysis {
@@ -298,12 +316,16 @@ const GROUPS: [Group; 10] = [
 
 /// Every statistic. Groups are computed side by side, in the order of the list;
 /// each by itself, so that the number of threads changes no bit.
-fn statistics(cells: &Cells<'_>, rules: &Rules) -> Values {
+fn statistics(cells: &Cells<'_>, rules: &Rules, progress: &Progress) -> Values {
+    progress
+        .groups
+        .fetch_add(GROUPS.len() as u64, Ordering::Relaxed);
     let mut parts: Vec<(usize, Values)> = (GROUPS.iter().enumerate())
         .par_bridge()
         .map(|(place, group)| {
             let mut values = Values::default();
             group(cells, rules, &mut values);
+            progress.made.fetch_add(1, Ordering::Relaxed);
             (place, values)
         })
         .collect();

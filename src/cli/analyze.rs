@@ -3,10 +3,11 @@
 mod possible;
 mod reading;
 mod report;
+mod waiting;
 
 use super::load::Loaded;
 use super::{Console, Failure, results};
-use crate::analyze::{self, Analysis, Include, Rules, Warning, analyze};
+use crate::analyze::{self, Analysis, Include, Rules, Warning};
 use crate::outcome::ratings::Ratings;
 use crate::protocol::Protocol;
 use crate::report::figures::Trace;
@@ -209,7 +210,7 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
             ..Details::default()
         },
         traces: Vec::new(),
-        analysis: analyze(&ratings, &rules),
+        analysis: waiting::analyze(&ratings, &rules),
     })
 }
 
@@ -253,7 +254,7 @@ fn of_study(
         protocol_version: Some(study.version()),
         path: study.path().display().to_string(),
     };
-    let analysis = analyze(&ratings, &rules);
+    let analysis = waiting::analyze(&ratings, &rules);
     let written = !args.json || args.out.is_some();
     Ok(Analysed {
         source,

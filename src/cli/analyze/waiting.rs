@@ -1,0 +1,45 @@
+//! An analysis with a bar once it has taken a second.
+
+use super::super::console::progress;
+use crate::analyze::{Analysis, Progress, Rules, analyze_watched};
+use crate::outcome::ratings::Ratings;
+use std::io::IsTerminal as _;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// Nobody wants a bar for less.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Between two looks at how far it is.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Analyses; who waits at a terminal sees how far it is.
+pub(super) fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
+    let made = Progress::default();
+    if !std::io::stderr().is_terminal() {
+        return analyze_watched(ratings, rules, &made);
+    }
+    let (done, wait) = channel::<()>();
+    let made = &made;
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            let mut bar = None;
+            let mut patience = PATIENCE;
+            // Nothing is ever sent: the sender goes when the analysis is there.
+            while let Err(RecvTimeoutError::Timeout) = wait.recv_timeout(patience) {
+                patience = LOOK;
+                let groups = made.groups.load(Ordering::Relaxed);
+                let bar = bar.get_or_insert_with(|| progress(groups, "groups of statistics"));
+                bar.set_length(groups);
+                bar.set_position(made.made.load(Ordering::Relaxed));
+            }
+            if let Some(bar) = bar {
+                bar.finish_and_clear();
+            }
+        });
+        let analysis = analyze_watched(ratings, rules, made);
+        drop(done);
+        analysis
+    })
+}
