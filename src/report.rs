@@ -160,6 +160,9 @@ fn no_pairs(a: &crate::analyze::Analysis, first: &str, second: &str) -> String {
     let why = a.values.reason(&format!("posthoc/{first}|{second}/p_t"));
     match (a.values.number("design/n_subjects_complete"), why) {
         (Some(n), Some(why)) if n >= 2.0 => format!("not tested: {why}"),
+        _ if a.values.number("design/n_subjects") == Some(1.0) => {
+            "not tested: there is one participant only".to_owned()
+        }
         _ => format!(
             "not tested: pairs are compared among those who rated every realization, and that is {}",
             complete(a)

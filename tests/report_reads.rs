@@ -512,7 +512,7 @@ fn line_and_curve_are_held_against_half_the_level_and_tested_together() {
         .number("covariate/log10_memory/quadratic/F")
         .unwrap();
     for text in [words(&html(&a)), told(&a)] {
-        assert!(text.contains("held against .025"), "{text}");
+        assert!(text.contains("verdict goes by them"), "{text}");
         assert!(text.contains(&format!("F(2, 2) = {f:.2}, p")), "{text}");
     }
 }
@@ -557,6 +557,10 @@ fn one_participant_is_no_people_and_has_no_intervals() {
     assert!(!text.contains("95 % t interval of the mean"), "{text}");
     for text in [text, told(&a)] {
         assert!(text.contains("nly one participant is analysed"), "{text}");
+        assert!(
+            text.contains("ot tested: there is one participant only"),
+            "{text}"
+        );
     }
     let two = analysis_of(&ratings(2, &FIVE, |s, m, k| 1.0 + ((m * k + s) % 5) as f64));
     assert!(words(&html(&two)).contains("t intervals over subjects"));

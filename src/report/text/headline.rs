@@ -127,7 +127,7 @@ fn memory(a: &Analysis) -> Vec<String> {
     }
     if let (Some(value), Some(df)) = (get("quadratic/p"), get("quadratic/df")) {
         said += &format!("; a curve beside the line, {df} df: p {}", p(value));
-        said += " (two tests, each held against .025)";
+        said += " (two tests, each held against .025: the verdict goes by them)";
         if let (Some(f), Some(both)) = (get("quadratic/F"), get("quadratic/p_F")) {
             said += &format!(
                 "; line and curve together, F(2, {df}) = {}, p {}",

@@ -130,7 +130,8 @@ pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String 
 }
 
 /// The words of a text. What stands around an equals or a less-than sign stays
-/// together, and a number with its per cent: `p = .023` is one word.
+/// together, a number with its per cent, and the degrees of freedom of an F: `p = .023`
+/// and `F(2, 5) = 8.10` are one word each.
 fn glued(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut open = false;
@@ -144,7 +145,7 @@ fn glued(text: &str) -> Vec<String> {
             }
             None => words.push(word.to_owned()),
         }
-        open = sign;
+        open = sign || (word.starts_with("F(") && word.ends_with(','));
     }
     words
 }
@@ -275,6 +276,11 @@ mod tests {
         assert_eq!(squeezed("よかったね", 6), "…たね");
         assert_eq!(cut("よかった", 5), "よか…");
         assert_eq!(pad("よ", 4), "よ  ");
+    }
+
+    #[test]
+    fn the_degrees_of_freedom_stay_together() {
+        assert_eq!(glued("a F(2, 5) = 8.10, p"), ["a", "F(2, 5) = 8.10,", "p"]);
     }
 
     #[test]

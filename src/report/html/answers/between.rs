@@ -283,7 +283,7 @@ fn curvature(a: &Analysis) -> Option<String> {
     });
     Some(format!(
         "With a square term beside the line, {} (a curve bent {bent}), t({}) = {}, \
-         p {}. Line and curve are two tests: each is held against .025.{both}",
+         p {}. Line and curve are two tests: each is held against .025, and the verdict goes by them.{both}",
         two(b),
         apa::number(df, 0),
         get("t").map_or_else(|| "–".to_owned(), two),
