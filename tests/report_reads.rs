@@ -221,7 +221,16 @@ fn the_methods_tell_of_no_test_that_was_not_done() {
                 "random permutations",
                 defined("corr/pearson/p_monte_carlo_two_sided", ""),
             ),
-            ("mixed model", defined("lmm_vaf_crossed/slope", "")),
+            (
+                "mixed model of the ratings on VAF",
+                defined("lmm_vaf_crossed/slope", ""),
+            ),
+            (
+                "mixed model of all ratings",
+                defined("lmm_model/satterthwaite_p", "")
+                    && !defined("rmanova/p_gg", "")
+                    && !defined("friedman/p", ""),
+            ),
         ] {
             let told = methods.contains(word);
             assert_eq!(told, done, "{}: {word}: {methods}", path.display());
@@ -438,7 +447,7 @@ fn incomplete_tables_are_told_with_numbers_and_answered_by_the_mixed_model() {
     let text = words(&html(&a));
     for text in [text.clone(), told(&a)] {
         assert!(!text.contains("too few subjects rated both"), "{text}");
-        assert!(text.contains("one of 6 participants"), "{text}");
+        assert!(text.contains("none of 6 participants"), "{text}");
         assert!(
             text.contains("pairs are compared among those who rated every realization"),
             "{text}"
@@ -447,6 +456,13 @@ fn incomplete_tables_are_told_with_numbers_and_answered_by_the_mixed_model() {
         assert!(text.contains(&format!(") = {f:.2}, p")), "{text}");
     }
     assert!(text.contains("Do the realizations differ at all?"));
+    let methods = part(&text, "Methods ", "Results ");
+    assert!(
+        methods.contains("because none of 6 participants rated every realization"),
+        "{methods}"
+    );
+    let results = part(&text, "Results ", "What was counted");
+    assert!(results.contains("(linear mixed model of all ratings): F("));
 }
 
 #[test]

@@ -257,6 +257,14 @@ fn tests_done(a: &Analysis) -> Vec<String> {
         (false, true) => Some(friedman.to_owned()),
         (false, false) => None,
     };
+    if crate::report::mixed_f(a).is_some() {
+        said.push(format!(
+            "Differences between realizations were tested by a linear mixed model of all ratings with \
+             an intercept for each subject, with Satterthwaite's degrees of freedom, because {} rated \
+             every realization.",
+            crate::report::complete(a)
+        ));
+    }
     said.extend(
         differences.map(|d| format!("Differences between realizations were tested by {d}.")),
     );

@@ -47,6 +47,15 @@ fn results(a: &Analysis) -> String {
             both.join("; ")
         ));
     }
+    if let Some(m) = crate::report::mixed_f(a) {
+        said.push(format!(
+            "Differences between realizations (linear mixed model of all ratings): F({}, {}) = {}, p {}.",
+            apa::number(m.df1, 0),
+            apa::number(m.df2, 1),
+            two(m.f),
+            apa::equals_p(m.p)
+        ));
+    }
     if let Some(r) = v.number("corr/pearson/r") {
         let n = v.number("corr/n_models").unwrap_or(0.0);
         let p = crate::report::permuted(a, "pearson");
