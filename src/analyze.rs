@@ -28,7 +28,7 @@ mod vaf;
 mod values;
 mod warnings;
 
-pub use deviation::deviations;
+pub use deviation::{Stated, deviations};
 pub use exclude::{Applied, Exclusion};
 pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
@@ -208,6 +208,12 @@ impl Analysis {
         self.subjects
             .get(row.subject as usize)
             .map_or("", String::as_str)
+    }
+
+    /// Whether a rule was changed after the study began: what was, is not called
+    /// stated beforehand.
+    pub fn changed(&self, rule: Stated) -> bool {
+        deviation::touches(&self.deviations, rule)
     }
 
     /// The row's realization, empty if there is none. Untrusted.

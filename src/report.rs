@@ -84,6 +84,129 @@ fn pairs(a: &crate::analyze::Analysis) -> (Vec<(String, String)>, Option<f64>) {
     (found, least)
 }
 
+/// `one of 8 participants`: those who rated every realization.
+fn complete(a: &crate::analyze::Analysis) -> String {
+    let get = |id: &str| a.values.number(&format!("design/{id}")).unwrap_or(0.0);
+    let who = match get("n_subjects_complete") {
+        0.0 => "none".to_owned(),
+        n => n.to_string(),
+    };
+    format!(
+        "{who} of {}",
+        apa::counted(get("n_subjects") as usize, "participant", "participants")
+    )
+}
+
+/// What r hangs on: the one realization without which all means or all VAF are
+/// equal, as a sentence. Names in it are untrusted.
+fn hangs_on(a: &crate::analyze::Analysis) -> Option<String> {
+    a.values.number("corr/pearson/r")?;
+    let points: Vec<(&str, f64, f64)> = (a.realizations.iter())
+        .filter(|m| m.role == crate::outcome::Role::Test && m.duplicate_of.is_none())
+        .filter_map(|m| {
+            let mean = a
+                .values
+                .number(&format!("desc/{}/subject_mean/mean", m.id))?;
+            Some((m.id.as_str(), mean, m.vaf?))
+        })
+        .collect();
+    if points.len() < 3 {
+        return None;
+    }
+    let alike = |out: usize, of: fn(&(&str, f64, f64)) -> f64| {
+        let mut rest = (points.iter().enumerate()).filter(|(i, _)| *i != out);
+        let first = rest.next().map_or(0.0, |(_, p)| of(p));
+        rest.all(|(_, p)| (of(p) - first).abs() <= 1e-9 * first.abs().max(1.0))
+    };
+    let means = (0..points.len()).find(|i| alike(*i, |p| p.1));
+    let vaf = (0..points.len()).find(|i| alike(*i, |p| p.2));
+    let (at, what) = means.map(|i| (i, "means")).or(vaf.map(|i| (i, "VAF")))?;
+    Some(format!(
+        "Without {} all {what} are equal: r hangs on that one realization.",
+        points[at].0
+    ))
+}
+
+/// Whether the realizations are known to be identified with forgetting factors.
+fn identified(a: &crate::analyze::Analysis) -> bool {
+    a.values.get("covariate/log10_memory/r").is_some()
+}
+
+/// Why the smallest p is no smaller, if realizations share a VAF.
+fn shared_vaf(a: &crate::analyze::Analysis) -> Option<String> {
+    let own = |m: &&crate::analyze::Listed| {
+        let mean = format!("desc/{}/subject_mean/mean", m.id);
+        m.role == crate::outcome::Role::Test
+            && m.duplicate_of.is_none()
+            && a.values.number(&mean).is_some()
+    };
+    let mut vaf: Vec<f64> = (a.realizations.iter().filter(own))
+        .filter_map(|m| m.vaf)
+        .collect();
+    vaf.sort_by(f64::total_cmp);
+    let groups = vaf.chunk_by(|x, y| x == y).map(<[f64]>::len);
+    let tied: usize = groups.filter(|n| *n > 1).sum();
+    (tied > 1).then(|| {
+        format!(
+            "{} realizations share a VAF with another: exchanging them changes nothing, which is \
+             why the smallest p is no smaller",
+            apa::capital(&apa::count(tied))
+        )
+    })
+}
+
+/// Why there is no p of a pair of realizations, `first` before `second` by name.
+fn no_pairs(a: &crate::analyze::Analysis, first: &str, second: &str) -> String {
+    let why = a.values.reason(&format!("posthoc/{first}|{second}/p_t"));
+    match (a.values.number("design/n_subjects_complete"), why) {
+        (Some(n), Some(why)) if n >= 2.0 => format!("not tested: {why}"),
+        _ => format!(
+            "not tested: pairs are compared among those who rated every realization, and that is {}",
+            complete(a)
+        ),
+    }
+}
+
+/// Why equivalence with a reference was not tested, by the identifier of the
+/// contrast; `None` if it was.
+fn no_equivalence(a: &crate::analyze::Analysis, contrast: &str) -> Option<String> {
+    let why = a.values.reason(&format!("{contrast}/p_tost"))?;
+    let margin = a.values.number(&format!("{contrast}/margin"));
+    let changed = a.changed(crate::analyze::Stated::Margin);
+    Some(match margin {
+        None if changed => {
+            "the margin of equivalence was taken back after the study began: see Deviations"
+                .to_owned()
+        }
+        None => "no margin of equivalence was stated beforehand".to_owned(),
+        Some(margin) => format!("equivalence within ± {margin} was not tested: {why}"),
+    })
+}
+
+/// The F test of a mixed model.
+struct MixedF {
+    f: f64,
+    df1: f64,
+    df2: f64,
+    p: f64,
+}
+
+/// That of the realizations over all ratings, where too few subjects are complete for
+/// the tests that need complete tables.
+fn mixed_f(a: &crate::analyze::Analysis) -> Option<MixedF> {
+    let get = |id: &str| a.values.number(&format!("lmm_model/satterthwaite_{id}"));
+    let complete = ["rmanova/p_gg", "friedman/p"];
+    if complete.iter().any(|id| a.values.number(id).is_some()) {
+        return None;
+    }
+    Some(MixedF {
+        f: get("F")?,
+        df1: a.values.number("lmm_model/lrt_df")?,
+        df2: get("df2")?,
+        p: get("p")?,
+    })
+}
+
 /// The question as a noun. Untrusted.
 fn asked(a: &crate::analyze::Analysis) -> String {
     match a.question.as_str() {

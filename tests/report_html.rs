@@ -142,7 +142,7 @@ fn what_is_absent_is_left_out_politely() {
     assert!(!page.contains("For these realizations only"));
     let nothing = analysis_of("subject,model,repetition,rating,vaf\nS1,a,1,,\n");
     let page = report(&nothing, &[]);
-    assert!(page.contains("The data allow no answer"));
+    assert!(page.contains("Nothing is left to analyse"));
 }
 
 #[test]
@@ -269,5 +269,61 @@ fn the_command_writes_the_same_bytes_whatever_the_locale_and_the_threads() {
         assert!(bytes(&format!("figures/{stem}.png")).starts_with(b"\x89PNG"));
         assert!(bytes(&format!("figures/{stem}.svg")).starts_with(b"<svg "));
         assert!(bytes(&format!("figures/{stem}.csv")).contains(&b','));
+    }
+}
+
+#[test]
+fn what_was_changed_after_the_study_began_is_not_called_stated_beforehand() {
+    let csv = "subject,model,repetition,rating,vaf\n\
+               S1,a,1,4,0.5\nS1,b,1,4,0.6\nS1,c,1,4,0.7\nS2,a,1,5,0.5\nS2,b,1,3,0.6\nS2,c,1,6,0.7\n\
+               S3,a,1,2,0.5\nS3,b,1,3,0.6\nS3,c,1,5,0.7\n";
+    let ratings = Ratings::read_csv("data.csv", csv.as_bytes(), None).unwrap();
+    let because = "protocol 2 of 2026-01-02, because \"a look\": ";
+    let mut rules = Rules {
+        exclude: vec![Exclusion::ConstantRater],
+        realistic_from: Some(4.0),
+        deviations: vec![
+            format!("{because}exclusion rules: none → constant-rater"),
+            format!("{because}realistic_from: 5 → 4"),
+        ],
+        ..Rules::default()
+    };
+    let told = |rules: &Rules| {
+        let a = analyze(&ratings, rules);
+        let page = study::report::text::page(
+            &source("A study"),
+            &a,
+            study::report::text::Page {
+                width: 100,
+                colour: false,
+            },
+        );
+        // The heading of the changes themselves, and their warnings.
+        let html = report(&a, &[]).replace("Deviations from what was stated beforehand", "");
+        format!("{html}{page}")
+            .replace('\u{a0}', " ")
+            .replace("eviation from what was stated beforehand", "")
+    };
+    let changed = told(&rules);
+    for bad in ["beforehand", "pre-stated"] {
+        assert!(!changed.contains(bad), "{bad}: {changed}");
+    }
+    for said in [
+        "The rules of exclusion were changed after the study began (see Deviations)",
+        "counts as realistic; this was changed after the study began",
+        "Exclusions, changed after the study began: see Deviations",
+        "ratings are 4 or higher, a bound changed after the study began",
+    ] {
+        assert!(changed.contains(said), "{said}: {changed}");
+    }
+    rules.deviations.clear();
+    let stated = told(&rules);
+    for said in [
+        "It was stated beforehand to leave out",
+        "said beforehand to count as realistic",
+        "Exclusions stated beforehand",
+        "pre-stated exclusion",
+    ] {
+        assert!(stated.contains(said), "{said}: {stated}");
     }
 }

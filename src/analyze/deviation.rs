@@ -71,6 +71,33 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<String> {
     found
 }
 
+/// A rule that a sentence would call stated before the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stated {
+    /// What to leave out.
+    Exclusions,
+    /// From which rating on one counts as realistic.
+    RealisticFrom,
+    /// The margin of equivalence.
+    Margin,
+}
+
+/// Whether any of the changes, as [`deviations`] words them (alone or behind a
+/// reason in quotes), is of this rule. Another primary question changes all of
+/// them: they were stated for the first one.
+pub(super) fn touches(changes: &[String], rule: Stated) -> bool {
+    let own = match rule {
+        Stated::Exclusions => "exclusion rules: ",
+        Stated::RealisticFrom => "realistic_from: ",
+        Stated::Margin => "equivalence_margin: ",
+    };
+    changes.iter().any(|change| {
+        [own, "primary question: "]
+            .iter()
+            .any(|key| change.starts_with(key) || change.contains(&format!("\": {key}")))
+    })
+}
+
 fn shown(x: &Option<impl Display>) -> String {
     x.as_ref()
         .map_or_else(|| "none".to_owned(), ToString::to_string)
@@ -113,5 +140,24 @@ mod tests {
         assert!(found.contains("realistic_from: 5 → 6"), "{found}");
         assert!(found.contains("planned participants: "), "{found}");
         assert!(found.contains("constant-rater"), "{found}");
+    }
+
+    #[test]
+    fn a_change_touches_the_rule_that_it_names() {
+        let before = example::protocol(3, 3);
+        let mut after = before.clone();
+        after.analysis.realistic_from = Some(6.0);
+        let mut found = deviations(&before, &after);
+        for _ in 0..2 {
+            assert!(touches(&found, Stated::RealisticFrom));
+            assert!(!touches(&found, Stated::Exclusions) && !touches(&found, Stated::Margin));
+            // As a command tells it, with a reason that names another rule.
+            found[0] = format!(
+                "protocol 2 of 2026-01-01, because \"exclusion rules: no\": {}",
+                found[0]
+            );
+        }
+        let other = ["primary question: a → b".to_owned()];
+        assert!(touches(&other, Stated::Margin) && touches(&other, Stated::Exclusions));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Rules;
 use super::cells::Cells;
+use super::deviation::{Stated, touches};
 use super::exclude::Applied;
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
@@ -62,7 +63,16 @@ pub(super) fn warnings(
             format!("deviation from what was stated beforehand: {change}"),
         );
     }
-    excluded(&mut warn, exclusions, values);
+    if counts.participants == 1 && counts.rated > 0 {
+        warn(
+            "one-participant",
+            "only one participant is analysed: the results tell of that one, and nothing about \
+             people in general"
+                .to_owned(),
+        );
+    }
+    let changed = touches(&rules.deviations, Stated::Exclusions);
+    excluded(&mut warn, exclusions, changed, values);
     headline(&mut warn, values);
     design(&mut warn, cells, values);
     raters(&mut warn, cells, values);
@@ -77,17 +87,27 @@ fn who(counts: &Counts) -> String {
     }
 }
 
-fn excluded(warn: &mut impl FnMut(&'static str, String), exclusions: &[Applied], values: &Values) {
+fn excluded(
+    warn: &mut impl FnMut(&'static str, String),
+    exclusions: &[Applied],
+    changed: bool,
+    values: &Values,
+) {
+    let (first, later) = if changed {
+        ("the", " (the rules were changed after the study began)")
+    } else {
+        ("the pre-stated", "")
+    };
     for e in exclusions {
         if let Some(problem) = e.problem {
-            let text = format!("the pre-stated exclusion `{}`: {problem}", e.rule);
+            let text = format!("{first} exclusion `{}`{later}: {problem}", e.rule);
             warn("rule-not-judged", text);
         }
         if e.rows > 0 {
             warn(
                 "excluded",
                 format!(
-                    "the pre-stated exclusion `{}` left out {} of {}",
+                    "{first} exclusion `{}`{later} left out {} of {}",
                     e.rule,
                     counted(e.rows, "row", "rows"),
                     people(e.participants)
@@ -100,9 +120,18 @@ fn excluded(warn: &mut impl FnMut(&'static str, String), exclusions: &[Applied],
         before.zip(values.number(id))
     };
     if let Some((before, after)) = both("corr/pearson/r") {
-        let text = format!(
-            "without the exclusions r would be {before:.3}, not {after:.3}: both are in the tables"
-        );
+        let text = if shown(before) == shown(after) {
+            format!(
+                "without the exclusions r would be the same to three digits, {}",
+                shown(after)
+            )
+        } else {
+            format!(
+                "without the exclusions r would be {}, not {}: both are in the tables",
+                shown(before),
+                shown(after)
+            )
+        };
         warn("with-and-without", text);
     }
 }
@@ -138,7 +167,9 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
             "one-realization",
             format!(
                 "the correlation hangs on single realizations: with one left out, r lies between \
-                 {low:.3} and {high:.3}"
+                 {} and {}",
+                shown(low),
+                shown(high)
             ),
         );
     }
@@ -148,7 +179,9 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
         warn(
             "not-linear",
             format!(
-                "r = {r:.3} and rho = {rho:.3} differ: the relation is no line, or one point is far out"
+                "r = {} and rho = {} differ: the relation is no line, or one point is far out",
+                shown(r),
+                shown(rho)
             ),
         );
     }
@@ -162,13 +195,17 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
                 .to_owned(),
         );
     }
-    warn(
-        "assumptions",
+    // Only what was identified with forgetting factors has them.
+    let identified = values.get("covariate/log10_memory/r").is_some();
+    let text = if identified {
         "the permutation takes the realizations as exchangeable, which neighbours on one ladder \
          of lambda are not; what goes along with VAF, such as lambda or activeness, cannot be \
          told from it"
-            .to_owned(),
-    );
+    } else {
+        "the permutation takes the realizations as exchangeable; what goes along with VAF cannot \
+         be told from it"
+    };
+    warn("assumptions", text.to_owned());
 }
 
 fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
@@ -263,6 +300,18 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
             people(constant)
         ),
     );
+}
+
+/// A correlation as the pages print it: three decimals, no zero before the point, a
+/// real minus and no negative zero.
+fn shown(r: f64) -> String {
+    let digits = format!("{:.3}", r.abs());
+    let sign = if r < 0.0 && digits != "0.000" {
+        "−"
+    } else {
+        ""
+    };
+    format!("{sign}{}", digits.strip_prefix('0').unwrap_or(&digits))
 }
 
 fn people(n: usize) -> String {

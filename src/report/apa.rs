@@ -168,6 +168,10 @@ pub(super) fn counted(n: usize, one: &str, many: &str) -> String {
 pub(super) fn memory_verdict(r: f64, line: Option<f64>, curve: Option<f64>) -> &'static str {
     let shown = |p: Option<f64>| p.is_some_and(|p| p < if curve.is_some() { 0.025 } else { 0.05 });
     match (shown(line), shown(curve)) {
+        (false, false) if line.is_none() && r.abs() > 1.0 - 1e-9 => {
+            "The mean ratings lie on one line over the memory, so that no t test is defined"
+        }
+        (false, false) if line.is_none() => "No t test is defined",
         (true, _) if r > 0.0 => {
             "Over these realizations, those with a longer memory are rated higher"
         }
@@ -188,6 +192,14 @@ mod tests {
         assert_eq!(said, ["", "a", "a and b", "a, b and c"]);
         let many = vec!["m".to_owned(); 20_000];
         assert!(listing(&many).ends_with("m, m and 19988 more"));
+    }
+
+    #[test]
+    fn a_correlation_without_a_test_is_not_called_unshown() {
+        let unshown = "These realizations do not show that it does";
+        assert_eq!(memory_verdict(0.5, Some(0.2), None), unshown);
+        assert!(memory_verdict(-1.0, None, None).contains("lie on one line"));
+        assert!(memory_verdict(0.5, None, None).contains("No t test"));
     }
 
     #[test]

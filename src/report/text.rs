@@ -53,6 +53,9 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
             out.push('\n');
         }
     }
+    if a.counts.rated == 0 {
+        out += &paint.warn("Nothing is left to analyse: no rating counts.\n\n");
+    }
     out += &answers::answers(a, width, paint);
     out += &headline::headline(a, width, paint);
     // The first stands at the top, the second in the answer.

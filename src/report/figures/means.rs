@@ -1,10 +1,10 @@
 //! Means of the realizations: Fig. 10, Fig. 11, and the mean against VAF.
 
 use super::{Canvas, Drawn, Scene, cell, drawn, head};
-use crate::report::apa;
 use crate::report::csv::digits;
 use crate::report::svg::{Anchor, Axis, Colour, Figure, Look, Mark, Note, Panel, Whisker};
 use crate::report::svg::{PALETTE, SMALL, for_names, shortened, text_width};
+use crate::report::{apa, identified};
 
 /// Mean and its deviation, by realization: (place, mean, half).
 fn deviations(scene: &Scene<'_>) -> Vec<(f64, f64, f64)> {
@@ -37,6 +37,15 @@ fn rating_panel(scene: &Scene<'_>, x_label: &str) -> Panel {
     )
 }
 
+/// The figure of the paper that it follows; only realizations of its kind are told so.
+fn as_in(scene: &Scene<'_>, figure: u8) -> String {
+    if identified(scene.a) {
+        format!(", as in Fig. {figure} of Colton & Hollerbach (World Haptics 2007)")
+    } else {
+        String::new()
+    }
+}
+
 pub(super) fn fig10(scene: &Scene<'_>) -> Option<Drawn> {
     if !scene.drawable() || deviations(scene).is_empty() {
         return None;
@@ -49,8 +58,9 @@ pub(super) fn fig10(scene: &Scene<'_>) -> Option<Drawn> {
     }
     let caption = format!(
         "Mean {} of each realization. Error bars: one standard deviation over all of its ratings \
-         (n − 1), as in Fig. 10 of the paper.",
-        scene.asked
+         (n − 1){}.",
+        scene.asked,
+        as_in(scene, 10)
     );
     let title = format!("Mean {} by realization", scene.asked);
     Some(drawn("fig10-means", caption, data, |c: Canvas| {
@@ -78,9 +88,14 @@ pub(super) fn fig11(scene: &Scene<'_>) -> Option<Drawn> {
         data.push(row);
     }
     let caption = format!(
-        "Mean {} (above) and variance accounted for on the validation recording (below) of each \
-         realization, as in Fig. 11 of the paper.",
-        scene.asked
+        "Mean {} (above) and variance accounted for{} (below) of each realization{}.",
+        scene.asked,
+        if identified(scene.a) {
+            " on the validation recording"
+        } else {
+            ""
+        },
+        as_in(scene, 11)
     );
     let title = format!("{} and VAF by realization", scene.asked);
     Some(drawn("fig11-rating-and-vaf", caption, data, |c: Canvas| {

@@ -3,7 +3,7 @@
 mod between;
 
 use super::{safe, typeset};
-use crate::analyze::{Analysis, Listed};
+use crate::analyze::{Analysis, Listed, Stated};
 use crate::outcome::Role;
 use crate::report::{MAX_PAIRED, apa};
 use maud::{Markup, html};
@@ -33,7 +33,9 @@ pub(super) fn section(a: &Analysis) -> Markup {
     html! {
         section {
             h2 { "Answers" }
-            @if all.is_empty() {
+            @if a.counts.rated == 0 {
+                p { "Nothing is left to analyse: no rating counts. “What was counted and left out” tells why." }
+            } @else if all.is_empty() {
                 p { "The data allow no answer to any of the study's questions; the tables show what there is." }
             }
             @for answer in &all {
@@ -100,6 +102,11 @@ fn real(a: &Analysis) -> Option<Answer> {
             two(mean),
             apa::percent(s)
         ),
+        None if a.changed(Stated::RealisticFrom) => format!(
+            "{who}, mean {}{scale}; from which rating on one counts as realistic was changed after \
+             the study began: see Deviations.",
+            two(mean)
+        ),
         None => format!(
             "{who}, mean {}{scale}; no rating was stated beforehand from which one counts as \
              realistic.",
@@ -159,20 +166,25 @@ fn against_references(a: &Analysis, best: &str) -> Vec<String> {
             let p = get("p_t_holm").map_or_else(String::new, |p| {
                 format!(", paired t test p {} (Holm)", apa::equals_p(p))
             });
-            let equivalent = get("margin").zip(get("p_tost")).map_or_else(
-                || " No margin of equivalence was stated beforehand.".to_owned(),
-                |(margin, p)| {
+            let later = match a.changed(Stated::Margin) {
+                true => ", a margin changed after the study began,",
+                false => "",
+            };
+            let equivalent = match (get("margin"), get("p_tost")) {
+                (Some(margin), Some(p)) => {
                     let verdict = if p < 0.05 {
                         "equivalent"
                     } else {
                         "not shown to be equivalent"
                     };
                     format!(
-                        " Within ± {margin} they are {verdict} (two one-sided tests, p {}).",
+                        " Within ± {margin}{later} they are {verdict} (two one-sided tests, p {}).",
                         apa::equals_p(p)
                     )
-                },
-            );
+                }
+                _ => crate::report::no_equivalence(a, &id)
+                    .map_or_else(String::new, |why| format!(" {}.", apa::capital(&why))),
+            };
             Some(format!(
                 "{best} minus {} over subjects: {}{interval}{p}.{equivalent}",
                 m.id,
@@ -232,7 +244,7 @@ fn separable(a: &Analysis) -> Option<Answer> {
             "{difference}; pairs are tested of {MAX_PAIRED} realizations at most, and there are {}.",
             ranked.len()
         ),
-        None => format!("{difference}; too few subjects rated both to test it."),
+        None => format!("{difference}; {}.", crate::report::no_pairs(a, low, high)),
     };
     let mut more = Vec::new();
     if let (Some(d), Some(dz)) = (get("mean_diff"), get("dz")) {
@@ -275,6 +287,23 @@ pub(super) fn none_left(a: &Analysis) -> Option<bool> {
     Some(get("var_model").is_none_or(|v| v <= 0.0))
 }
 
+const MIXED: &str = "linear mixed model, Satterthwaite's degrees of freedom";
+
+/// The test of all ratings, where too few subjects rated every realization.
+fn incomplete_test(a: &Analysis) -> Option<String> {
+    let m = crate::report::mixed_f(a)?;
+    Some(format!(
+        "Linear mixed model of all ratings, with an intercept for each subject: F({}, {}) = {}, \
+         p {}. {} rated every realization, too few for an analysis of variance or Friedman's test. \
+         The model takes what is missing as missing by chance.",
+        apa::number(m.df1, 0),
+        apa::number(m.df2, 1),
+        two(m.f),
+        apa::equals_p(m.p),
+        apa::capital(&crate::report::complete(a))
+    ))
+}
+
 fn differ(a: &Analysis) -> Option<Answer> {
     let v = &a.values;
     let mut more = Vec::new();
@@ -283,7 +312,11 @@ fn differ(a: &Analysis) -> Option<Answer> {
     let of = |id: &str, test: &'static str| v.number(id).map(|p| (p, test));
     let (p, test) = of("rmanova/p_gg", "repeated-measures analysis of variance")
         .or_else(|| of("friedman/exact_p", "Friedman's test, exact"))
-        .or_else(|| of("friedman/p", "Friedman's test"))?;
+        .or_else(|| of("friedman/p", "Friedman's test"))
+        .or_else(|| of("lmm_model/satterthwaite_p", MIXED))?;
+    if test == MIXED {
+        more.extend(incomplete_test(a));
+    }
     let verdict = if p < 0.05 {
         "Yes"
     } else {

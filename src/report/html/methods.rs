@@ -2,7 +2,7 @@
 //! tests that there are numbers of; no others.
 
 use super::Details;
-use crate::analyze::{Analysis, Exclusion, Listed, Value};
+use crate::analyze::{Analysis, Exclusion, Listed, Stated, Value};
 use crate::report::apa;
 use crate::stats::permutation::DRAWS;
 
@@ -10,12 +10,19 @@ use crate::stats::permutation::DRAWS;
 pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {
     let mut said = conduct(d, a);
     said.extend(tests_done(a));
-    if super::answers::tests(a).iter().any(|m| has_sd(a, m)) {
-        said.push(
-            "Standard deviations are over all ratings of a realization (n − 1); intervals of means are \
-             t intervals over subjects."
-                .to_owned(),
-        );
+    said.extend(complete_only(a));
+    let any = |what: &str| {
+        let id = |m: &Listed| format!("desc/{}/{what}", m.id);
+        let tests = super::answers::tests(a);
+        tests.iter().any(|m| a.values.number(&id(m)).is_some())
+    };
+    if any("sd") {
+        let sd = "Standard deviations are over all ratings of a realization (n − 1)";
+        said.push(if any("subject_mean/ci95_lo") {
+            format!("{sd}; intervals of means are t intervals over subjects.")
+        } else {
+            format!("{sd}.")
+        });
     }
     said.push(format!(
         "The level of significance is .05, two-sided. The analysis was done with study {}.",
@@ -24,9 +31,31 @@ pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {
     said.join(" ")
 }
 
-fn has_sd(a: &Analysis, m: &Listed) -> bool {
-    let sd = format!("desc/{}/sd", m.id);
-    a.values.number(&sd).is_some()
+/// Whose ratings stand behind what needs complete tables, where not all are complete.
+fn complete_only(a: &Analysis) -> Option<String> {
+    let v = &a.values;
+    let all = v.number("design/n_subjects")?;
+    let complete = v.number("design/n_subjects_complete")?;
+    let (pairs, _) = crate::report::pairs(a);
+    let done: Vec<String> = [
+        (v.number("rmanova/F").is_some(), "the analysis of variance"),
+        (v.number("friedman/chi2").is_some(), "Friedman's test"),
+        (!pairs.is_empty(), "the comparison of pairs"),
+        (
+            v.number("variance/share/model").is_some(),
+            "the shares of variance",
+        ),
+    ]
+    .into_iter()
+    .filter(|(done, _)| *done)
+    .map(|(_, what)| what.to_owned())
+    .collect();
+    (complete < all && !done.is_empty()).then(|| {
+        format!(
+            "Of the {all} participants, {complete} rated every realization: only they are in {}.",
+            apa::listing(&done)
+        )
+    })
 }
 
 /// Who rated what, how often and how, and what was left out.
@@ -59,12 +88,23 @@ fn conduct(d: &Details, a: &Analysis) -> Vec<String> {
         2 => " twice each".to_owned(),
         n => format!(" {n} times each"),
     });
-    said.push(if tests.is_empty() {
+    let rated = |m: &&&Listed| {
+        let n = a.values.number(&format!("desc/{}/n", m.id));
+        n.is_some_and(|n| n > 0.0)
+    };
+    let rated = tests.iter().filter(rated).count();
+    said.push(if c.rated == 0 {
+        "No rating counts: there is nothing to analyse.".to_owned()
+    } else if tests.is_empty() {
         let ratings = apa::counted(c.rated, "rating", "ratings");
         format!("{who}{others} gave {ratings}.")
     } else {
         let what = apa::counted(tests.len(), "realization", "realizations");
-        format!("{who}{others} rated {what}{times}.")
+        if rated < tests.len() {
+            format!("{who}{others} rated {rated} of {what}{times}; nobody rated the others.")
+        } else {
+            format!("{who}{others} rated {what}{times}.")
+        }
     });
     let beside: Vec<String> = a
         .realizations
@@ -107,9 +147,14 @@ fn conduct(d: &Details, a: &Analysis) -> Vec<String> {
         ));
     }
     if let Some(from) = a.realistic_from {
-        said.push(format!(
-            "A rating of {from} or higher was said beforehand to count as realistic."
-        ));
+        said.push(if a.changed(Stated::RealisticFrom) {
+            format!(
+                "A rating of {from} or higher counts as realistic; this was changed after the study \
+                 began (see Deviations)."
+            )
+        } else {
+            format!("A rating of {from} or higher was said beforehand to count as realistic.")
+        });
     }
     if d.states.iter().any(|(state, _)| state != "done") {
         let all: Vec<String> = (d.states.iter())
@@ -138,7 +183,7 @@ pub(super) fn in_words(rule: Exclusion) -> String {
     }
 }
 
-/// What was stated beforehand of leaving out, and what was left out.
+/// What was to be left out, since when, and what was left out.
 fn left_out(a: &Analysis) -> Vec<String> {
     let c = &a.counts;
     let mut said = Vec::new();
@@ -152,10 +197,15 @@ fn left_out(a: &Analysis) -> Vec<String> {
                 format!("{} ({rows} of {who})", in_words(e.rule))
             })
             .collect();
-        said.push(format!(
-            "It was stated beforehand to leave out {}.",
-            apa::listing(&rules)
-        ));
+        let rules = apa::listing(&rules);
+        said.push(if a.changed(Stated::Exclusions) {
+            format!(
+                "The rules of exclusion were changed after the study began (see Deviations); now \
+                 they leave out {rules}."
+            )
+        } else {
+            format!("It was stated beforehand to leave out {rules}.")
+        });
     }
     let rules: usize = a.exclusions.iter().map(|e| e.rows).sum();
     let rows: usize = c.excluded.values().sum();
@@ -250,11 +300,14 @@ fn tests_done(a: &Analysis) -> Vec<String> {
     if v.iter().any(|(id, value)| {
         id.starts_with("reference/") && id.ends_with("/p_tost") && matches!(value, Value::Number(_))
     }) {
-        said.push(
-            "Equivalence with the reference was tested by two one-sided t tests at the margin stated \
-             beforehand."
-                .to_owned(),
-        );
+        let margin = if a.changed(Stated::Margin) {
+            "a margin that was changed after the study began (see Deviations)"
+        } else {
+            "the margin stated beforehand"
+        };
+        said.push(format!(
+            "Equivalence with the reference was tested by two one-sided t tests at {margin}."
+        ));
     }
     said
 }

@@ -3,7 +3,7 @@
 use super::methods::in_words;
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
-use crate::analyze::{Analysis, Said, Warning};
+use crate::analyze::{Analysis, Said, Stated, Warning};
 use crate::report::{Source, apa};
 use maud::{Markup, html};
 
@@ -49,14 +49,22 @@ fn sentence(w: &Warning) -> String {
 /// What was stated before the data of what to leave out, what each rule did, and
 /// what was changed afterwards.
 fn stated(a: &Analysis) -> Markup {
-    let text = |id: &str| a.values.number(id).map_or_else(|| "–".to_owned(), apa::r);
+    let r = |id: &str| a.values.number(id).map(apa::r);
+    let changed = a.changed(Stated::Exclusions);
+    let caption = if changed {
+        "Exclusions, changed after the study began: see Deviations"
+    } else {
+        "Exclusions stated beforehand"
+    };
     html! {
-        @if a.exclusions.is_empty() {
+        @if a.exclusions.is_empty() && changed {
+            p { "The rules of exclusion were changed after the study began; none is left: see Deviations." }
+        } @else if a.exclusions.is_empty() {
             p { "No rule of exclusion was stated beforehand." }
         } @else {
-            div.scroll tabindex="0" role="region" aria-label="Exclusions stated beforehand" {
+            div.scroll tabindex="0" role="region" aria-label=(caption) {
                 table {
-                    caption { "Exclusions stated beforehand" }
+                    caption { (caption) }
                     thead { tr {
                         th scope="col" { "rule" } th.text scope="col" { "leaves out" } th scope="col" { "rows" }
                         th scope="col" { "participants" } th.text scope="col" { "remark" }
@@ -71,12 +79,16 @@ fn stated(a: &Analysis) -> Markup {
                     }
                 }
             }
-            @if a.values.get("before_exclusion/corr/pearson/r").is_some() {
-                p {
-                    "With them, mean rating and VAF correlate at r = " (text("corr/pearson/r"))
-                    "; without them, at r = " (text("before_exclusion/corr/pearson/r"))
+            @match (r("corr/pearson/r"), r("before_exclusion/corr/pearson/r")) {
+                (Some(with), Some(without)) => p {
+                    "With them, mean rating and VAF correlate at r = " (with)
+                    "; without them, at r = " (without)
                     ". More of the headline with and without them is in a table above."
-                }
+                },
+                (None, Some(without)) => p {
+                    "With them, no correlation of mean rating and VAF is defined; without them, r = " (without) "."
+                },
+                _ => {},
             }
         }
         @if a.deviations.is_empty() {

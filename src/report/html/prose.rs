@@ -136,11 +136,17 @@ pub(super) fn friedman(a: &Analysis) -> Option<String> {
         Some(p) => ("exact ", p),
         None => ("", get("p")?),
     };
+    // Closer than that of χ² where there is no exact one.
+    let better = get("iman_davenport_p")
+        .filter(|_| kind.is_empty())
+        .map_or_else(String::new, |p| {
+            format!(" (by Iman and Davenport’s F, p {})", apa::equals_p(p))
+        });
     let w = get("kendall_W").map_or_else(String::new, |w| {
         format!(", Kendall’s W = {}", apa::share(w, 2))
     });
     Some(format!(
-        "Friedman’s χ²({df}) = {}, {kind}p {}{w}",
+        "Friedman’s χ²({df}) = {}, {kind}p {}{better}{w}",
         apa::number(chi2, 2),
         apa::equals_p(p)
     ))

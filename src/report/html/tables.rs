@@ -1,7 +1,8 @@
 //! Tables that a reader looks for first.
 
 use super::{answers, safe};
-use crate::analyze::{Analysis, Listed};
+use crate::analyze::{Analysis, Listed, Value};
+use crate::outcome::Role;
 use crate::report::apa;
 use maud::{Markup, html};
 
@@ -61,6 +62,10 @@ impl Table {
 }
 
 pub(super) fn section(a: &Analysis) -> Markup {
+    let any_interval = a.realizations.iter().any(|m| {
+        let id = format!("desc/{}/subject_mean/ci95_lo", m.id);
+        a.values.number(&id).is_some()
+    });
     html! {
         section {
             h2 { "Tables" }
@@ -68,19 +73,60 @@ pub(super) fn section(a: &Analysis) -> Markup {
                 (realizations(a).render())
                 p.note {
                     "n: ratings. Mean, SD (standard deviation, n − 1) and median are over all ratings of a \
-                     realization; the interval is a 95 % t interval of the mean over subjects."
+                     realization"
+                    @if any_interval { "; the interval is a 95 % t interval of the mean over subjects" }
+                    "."
                     @if a.realizations.len() > answers::tests(a).len() {
                         " Realizations in italics stand beside the tested ones."
                     }
                 }
             }
             (pairs(a))
+            @for table in against_references(a) { (table.render()) }
+            (repeats(a).render())
             (shares(a).render())
+            @if !answers::shares(a).is_empty() {
+                p.note { "Shares are rounded to whole per cent: their sum can be 99 or 101." }
+            }
             (agreement(a).render())
+            (glossary(a))
             (with_and_without(a).render())
             (subjects(a))
         }
     }
+}
+
+/// What the letters mean, of those that are on the page.
+fn glossary(a: &Analysis) -> Markup {
+    let any = |ids: &[&str]| ids.iter().any(|id| a.values.number(id).is_some());
+    let alpha = [
+        "krippendorff_subjects/ordinal",
+        "krippendorff_repetitions/ordinal",
+    ];
+    let all: Vec<&str> = [
+        (
+            any(&["rmanova/eps_gg"]),
+            "ε: how nearly all differences vary alike (1: they do); it lowers the degrees of freedom.",
+        ),
+        (
+            any(&["rmanova/ges"]),
+            "Generalised η²: share of the variance that the realizations have.",
+        ),
+        (
+            any(&["friedman/kendall_W"]),
+            "W: how alike subjects rank, from 0 to 1.",
+        ),
+        (any(&alpha), "α: agreement beyond chance, 1 at most."),
+        (
+            !crate::report::pairs(a).0.is_empty(),
+            "dz: mean difference by the standard deviation of the differences.",
+        ),
+    ]
+    .into_iter()
+    .filter(|(there, _)| *there)
+    .map(|(_, text)| text)
+    .collect();
+    html! { @if !all.is_empty() { p.note { (all.join(" ")) } } }
 }
 
 fn show(x: Option<f64>, decimals: usize) -> String {
@@ -188,6 +234,84 @@ fn pairs(a: &Analysis) -> Markup {
     }
 }
 
+/// Each tested realization minus each reference, anchor and physical sample.
+fn against_references(a: &Analysis) -> Vec<Table> {
+    let v = &a.values;
+    let beside = [Role::HiddenReference, Role::Physical, Role::LowAnchor];
+    let references = a.realizations.iter().filter(|m| beside.contains(&m.role));
+    let one = |r: &Listed| {
+        let caption = format!(
+            "Differences from {} ({})",
+            apa::name(&r.id),
+            r.role.as_str().replace('-', " ")
+        );
+        let mut head = vec!["realization", "n", "difference", "95 % CI", "p (t, Holm)"];
+        let contrast =
+            |t: &Listed, what: &str| v.number(&format!("reference/{}/{}/{what}", r.id, t.id));
+        let tests = answers::tests(a);
+        let equivalence = tests.iter().any(|t| contrast(t, "p_tost").is_some());
+        head.extend(equivalence.then_some("p (equivalence)"));
+        let mut table = Table::new(&caption, &head);
+        for t in tests {
+            let get = |what: &str| contrast(t, what);
+            let Some(difference) = get("mean_diff") else {
+                continue;
+            };
+            let p = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), apa::p);
+            let mut row = vec![
+                apa::name(&t.id),
+                show(get("n"), 0),
+                apa::number(difference, 3),
+                ends(get("ci95_lo"), get("ci95_hi")),
+                p(get("p_t_holm")),
+            ];
+            row.extend(equivalence.then(|| p(get("p_tost"))));
+            table.row(false, row);
+        }
+        table
+    };
+    references.map(one).collect()
+}
+
+/// Each hidden repeat minus its original.
+fn repeats(a: &Analysis) -> Table {
+    let head = [
+        "repeat",
+        "of",
+        "n",
+        "difference",
+        "95 % CI",
+        "mean distance",
+    ];
+    let mut table = Table::new("Hidden repeats minus their originals, over subjects", &head);
+    for m in &a.realizations {
+        let get = |what: &str| a.values.number(&format!("duplicate/{}/{what}", m.id));
+        let (Some(of), Some(difference)) = (&m.duplicate_of, get("mean_diff")) else {
+            continue;
+        };
+        table.row(
+            false,
+            vec![
+                apa::name(&m.id),
+                apa::name(of),
+                show(get("n"), 0),
+                apa::number(difference, 3),
+                ends(get("ci95_lo"), get("ci95_hi")),
+                show(get("mean_absolute_diff"), 3),
+            ],
+        );
+    }
+    table
+}
+
+/// An interval, or a dash.
+fn ends(low: Option<f64>, high: Option<f64>) -> String {
+    low.zip(high).map_or_else(
+        || "–".to_owned(),
+        |(l, h)| apa::interval(l, h, |x| apa::number(x, 2)),
+    )
+}
+
 fn shares(a: &Analysis) -> Table {
     let mut table = Table::new("Shares of variance", &["of", "share"]);
     for (name, share) in answers::shares(a) {
@@ -289,7 +413,7 @@ fn with_and_without(a: &Analysis) -> Table {
 }
 
 fn subjects(a: &Analysis) -> Markup {
-    let head = [
+    let mut head = vec![
         "subject",
         "n",
         "mean",
@@ -300,8 +424,23 @@ fn subjects(a: &Analysis) -> Markup {
         "r with the others",
         "r with VAF",
     ];
-    let mut table = Table::new("Subjects: flagged, never dropped", &head);
     let v = &a.values;
+    // What the design has: a reference, an anchor, a repeat.
+    let beside: Vec<(&str, &str)> = [
+        ("hidden_reference_mean", "mean of the references"),
+        ("low_anchor_mean", "mean of the anchors"),
+        ("repeat_distance", "distance of the repeats"),
+    ]
+    .into_iter()
+    .filter(|(id, _)| {
+        let end = format!("/{id}");
+        v.iter().any(|(id, value)| {
+            id.starts_with("subject/") && id.ends_with(&end) && matches!(value, Value::Number(_))
+        })
+    })
+    .collect();
+    head.extend(beside.iter().map(|(_, what)| *what));
+    let mut table = Table::new("Subjects: flagged, never dropped", &head);
     let ids = v.iter().map(|(id, _)| id);
     let names = ids.filter_map(|id| id.strip_prefix("subject/")?.strip_suffix("/n"));
     // Two points always lie on a line.
@@ -312,20 +451,19 @@ fn subjects(a: &Analysis) -> Markup {
             let x = x.filter(|_| enough);
             x.map_or_else(|| "–".to_owned(), |x| apa::share(x, 2))
         };
-        table.row(
-            false,
-            vec![
-                apa::name(s),
-                show(get("n"), 0),
-                show(get("mean"), 2),
-                show(get("sd"), 2),
-                show(get("distinct"), 0),
-                show(get("longest_run"), 0),
-                show(get("within_cell_sd"), 2),
-                r(get("leave_one_out_r")),
-                r(v.number(&format!("subject_corr/{s}/r"))),
-            ],
-        );
+        let mut row = vec![
+            apa::name(s),
+            show(get("n"), 0),
+            show(get("mean"), 2),
+            show(get("sd"), 2),
+            show(get("distinct"), 0),
+            show(get("longest_run"), 0),
+            show(get("within_cell_sd"), 2),
+            r(get("leave_one_out_r")),
+            r(v.number(&format!("subject_corr/{s}/r"))),
+        ];
+        row.extend(beside.iter().map(|(id, _)| show(get(id), 2)));
+        table.row(false, row);
     }
     html! {
         (table.render())

@@ -23,6 +23,7 @@ pub(super) fn answers(a: &Analysis, width: usize, paint: Paint) -> String {
     answer("Do the realizations differ?".to_owned(), differ(a));
     answer(format!("Does VAF predict {}?", asked(a)), predicts(a));
     answer("For these realizations only:".to_owned(), only_these(a));
+    answer("Do order and learning matter?".to_owned(), order(a));
     out
 }
 
@@ -103,6 +104,9 @@ fn best(a: &Analysis) -> Vec<String> {
         }
     } else if pairs.is_empty() && ranked.len() > MAX_PAIRED {
         said.push("Pairs are tested of eight realizations at most.".to_owned());
+    } else if v.number(&format!("{pair}/p_t")).is_none() {
+        let why = super::super::no_pairs(a, low, high);
+        said.push(format!("{}.", apa::capital(&Untrusted(&why).to_string())));
     }
     said
 }
@@ -134,15 +138,34 @@ fn differ(a: &Analysis) -> Vec<String> {
         let exact = v.number("friedman/exact_p");
         let kind = if exact.is_some() { "exact p" } else { "p" };
         if let Some(value) = exact.or_else(|| v.number("friedman/p")) {
+            // Closer than that of χ² where there is no exact one.
+            let better = v
+                .number("friedman/iman_davenport_p")
+                .filter(|_| exact.is_none())
+                .map_or_else(String::new, |x| format!(" (Iman–Davenport p {})", p(x)));
             let w = v
                 .number("friedman/kendall_W")
                 .map_or_else(String::new, |w| format!(", Kendall's W = {}", r(w)));
             parts.push(format!(
-                "Friedman χ²({df}) = {}, {kind} {}{w}",
+                "Friedman χ²({df}) = {}, {kind} {}{better}{w}",
                 number(chi2, 2),
                 p(value)
             ));
         }
+    }
+    if parts.is_empty()
+        && let Some(m) = super::super::mixed_f(a)
+    {
+        let verdict = if m.p < 0.05 { "Yes" } else { "Not shown" };
+        return vec![format!(
+            "{verdict}: F({}, {}) = {}, p {} (linear mixed model of all ratings, Satterthwaite); {} \
+             rated every realization.",
+            number(m.df1, 0),
+            number(m.df2, 1),
+            number(m.f, 2),
+            p(m.p),
+            super::super::complete(a)
+        )];
     }
     if parts.is_empty() {
         return Vec::new();
@@ -168,12 +191,20 @@ fn predicts(a: &Analysis) -> Vec<String> {
         Some(_) => "Not shown: ",
         None => "",
     };
+    let needed = v
+        .number("corr/pearson/critical_r")
+        .map_or_else(String::new, |x| {
+            format!("; a t test needs |r| above {}", r(x))
+        });
     let mut said = vec![format!(
-        "{verdict}r = {} over {n} realizations{}{}.",
+        "{verdict}r = {} over {n} realizations{}{}{needed}.",
         r(pearson),
         interval(a, "corr/pearson/ci95"),
         with_p(a, "pearson")
     )];
+    if permuted(a, "pearson").is_some_and(|found| found.0 == "exact p") {
+        said.extend(super::super::shared_vaf(a).map(|s| format!("{s}.")));
+    }
     let tied = tied(a);
     if tied > 1 {
         said.push(format!(
@@ -181,6 +212,7 @@ fn predicts(a: &Analysis) -> Vec<String> {
             apa::capital(&apa::count(tied))
         ));
     }
+    said.extend(crossed(a));
     if let Some(rho) = v.number("corr/spearman/rho") {
         said.push(format!(
             "By ranks: Spearman's rho = {}{}.",
@@ -211,8 +243,54 @@ fn predicts(a: &Analysis) -> Vec<String> {
             apa::capital(&apa::count(n as usize))
         ));
     }
+    said.extend(super::super::hangs_on(a).map(|s| Untrusted(&s).to_string()));
     said.extend(beside(a));
     said
+}
+
+/// The slope of the mixed model with subjects and realizations crossed.
+fn crossed(a: &Analysis) -> Option<String> {
+    let get = |id: &str| a.values.number(&format!("lmm_vaf_crossed/{id}"));
+    let (slope, se) = get("slope").zip(get("slope_se"))?;
+    let test = get("slope_satterthwaite_df").zip(get("slope_satterthwaite_p"));
+    let test = test.map_or_else(String::new, |(df, value)| {
+        format!(", {} df: p {}", number(df, 1), p(value))
+    });
+    let singular = match get("singular") {
+        Some(1.0) if get("var_model").is_none_or(|v| v <= 0.0) => {
+            " (no variance of the realizations is left: p is too small)"
+        }
+        _ => "",
+    };
+    Some(format!(
+        "Crossed mixed model: slope {} per unit of VAF (SE {}){test}{singular}.",
+        number(slope, apa::decimals(se, 2)),
+        number(se, apa::decimals(se, 2))
+    ))
+}
+
+/// Drift over the session and carry-over from the trial before.
+fn order(a: &Analysis) -> Vec<String> {
+    let effect = |id: &str, what: &str| {
+        let get = |name: &str| a.values.number(&format!("{id}/{name}"));
+        let (slope, se, value) = (get("slope")?, get("se")?, get("p")?);
+        let digits = apa::decimals(se, 3);
+        Some((
+            value,
+            format!("{} per {what}, p {}", number(slope, digits), p(value)),
+        ))
+    };
+    let Some((drift, shown)) = effect("order_trial", "trial") else {
+        return Vec::new();
+    };
+    let verdict = if drift < 0.05 {
+        "Ratings drift"
+    } else {
+        "No drift shown"
+    };
+    let before = effect("order_previous_rating", "point of the rating before")
+        .map_or_else(String::new, |(_, shown)| format!("; carry-over {shown}"));
+    vec![format!("{verdict}: {shown}{before}.")]
 }
 
 /// What VAF goes along with over the realizations.

@@ -5,7 +5,7 @@ use super::super::apa;
 use super::answers::{p, r};
 use super::layout::{Paint, number, wrap};
 use super::listed;
-use crate::analyze::Analysis;
+use crate::analyze::{Analysis, Stated};
 use crate::outcome::Role;
 use crate::text::Untrusted;
 
@@ -52,9 +52,14 @@ fn target(a: &Analysis) -> Vec<String> {
             format!(" [{}, {}]", percent(low), percent(high))
         });
         said.push(format!(
-            "{}: {}{ends} of its ratings are {from} or higher.",
+            "{}: {}{ends} of its ratings are {from} or higher{}.",
             Untrusted(best),
-            percent(share)
+            percent(share),
+            if a.changed(Stated::RealisticFrom) {
+                ", a bound changed after the study began"
+            } else {
+                ""
+            }
         ));
     }
     for reference in a
@@ -63,32 +68,40 @@ fn target(a: &Analysis) -> Vec<String> {
         .filter(|m| m.role == Role::HiddenReference)
     {
         let get = |name: &str| v.number(&format!("reference/{}/{best}/{name}", reference.id));
-        let (Some(mean), Some(low), Some(high)) =
-            (get("mean_diff"), get("ci95_lo"), get("ci95_hi"))
-        else {
+        let Some(mean) = get("mean_diff") else {
             continue;
         };
+        let ends = get("ci95_lo").zip(get("ci95_hi"));
+        let ends = ends.map_or_else(String::new, |(low, high)| {
+            format!(" [{}, {}]", number(low, 2), number(high, 2))
+        });
         let within = match (get("margin"), get("p_tost")) {
             (Some(margin), Some(tost)) => {
+                let later = match a.changed(Stated::Margin) {
+                    true => ", a margin changed after the study began",
+                    false => "",
+                };
                 let verdict = if tost < 0.05 {
                     "equivalent"
                 } else {
                     "not shown to be equivalent"
                 };
                 format!(
-                    "; {verdict} within ±{margin} (two one-sided t tests, p {})",
+                    "; {verdict} within ±{margin}{later} (two one-sided t tests, p {})",
                     p(tost)
                 )
             }
-            _ => "; no margin of equivalence was stated beforehand".to_owned(),
+            _ => {
+                let id = format!("reference/{}/{best}", reference.id);
+                super::super::no_equivalence(a, &id)
+                    .map_or_else(String::new, |why| format!("; {why}"))
+            }
         };
         said.push(format!(
-            "{} minus {}: {} [{}, {}]{within}.",
+            "{} minus {}: {}{ends}{within}.",
             Untrusted(best),
             Untrusted(&reference.id),
-            number(mean, 2),
-            number(low, 2),
-            number(high, 2)
+            number(mean, 2)
         ));
     }
     said
@@ -114,6 +127,14 @@ fn memory(a: &Analysis) -> Vec<String> {
     }
     if let (Some(value), Some(df)) = (get("quadratic/p"), get("quadratic/df")) {
         said += &format!("; a curve beside the line, {df} df: p {}", p(value));
+        said += " (two tests, each held against .025)";
+        if let (Some(f), Some(both)) = (get("quadratic/F"), get("quadratic/p_F")) {
+            said += &format!(
+                "; line and curve together, F(2, {df}) = {}, p {}",
+                number(f, 2),
+                p(both)
+            );
+        }
     }
     vec![format!("{said}.")]
 }

@@ -47,7 +47,7 @@ pub(super) fn number(x: f64, decimals: usize) -> String {
         let shown = format!("{x:.decimals$}");
         match shown.strip_prefix('-') {
             Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
-            _ => shown,
+            _ => shown.replace('-', "−"),
         }
     }
 }
@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn no_minus_zero_is_shown() {
         assert_eq!(number(-0.0001, 2), "0.00");
-        assert_eq!(number(-0.01, 2), "-0.01");
+        assert_eq!(number(-0.01, 2), "−0.01");
         assert_eq!(number(1e300, 3), "1.000e300");
     }
 }

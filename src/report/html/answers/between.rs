@@ -74,6 +74,7 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
             apa::r(high)
         ));
     }
+    more.extend(crate::report::hangs_on(a));
     if let Some(share) = v.number("corr/share/r2") {
         let adjusted = v.number("corr/share/r2_adjusted");
         let adjusted = adjusted.map_or_else(String::new, |x| {
@@ -89,12 +90,18 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     }
     more.extend(crossed(a));
     if p.is_some() {
-        more.push(
-            "The p by permutation assumes that the realizations are exchangeable, which neighbours on one ladder of \
-             λ are not, and it cannot tell VAF from what goes along with it: λ, and how active a \
-             realization is."
-                .to_owned(),
-        );
+        let (neighbours, such) = if crate::report::identified(a) {
+            (
+                ", which neighbours on one ladder of λ are not",
+                ": λ, and how active a realization is",
+            )
+        } else {
+            ("", "")
+        };
+        more.push(format!(
+            "The p by permutation assumes that the realizations are exchangeable{neighbours}, and it \
+             cannot tell VAF from what goes along with it{such}."
+        ));
     }
     Some(Answer {
         question,
@@ -131,6 +138,9 @@ fn points(a: &Analysis, n: f64) -> Vec<String> {
         "VAF differs between realizations only, so there are {n} points however many \
          participants rated. {smallest}{critical}."
     )];
+    if exact {
+        said.extend(crate::report::shared_vaf(a).map(|s| format!("{s}.")));
+    }
     let tied = tied(a);
     if tied > 1 {
         said.push(format!(
@@ -263,9 +273,17 @@ fn curvature(a: &Analysis) -> Option<String> {
     };
     let ((b, p), df) = get("square").zip(get("p")).zip(get("df"))?;
     let bent = if b < 0.0 { "downwards" } else { "upwards" };
+    let both = get("F").zip(get("p_F")).map_or_else(String::new, |(f, p)| {
+        format!(
+            " Both together: F(2, {}) = {}, p {}.",
+            apa::number(df, 0),
+            two(f),
+            apa::equals_p(p)
+        )
+    });
     Some(format!(
         "With a square term beside the line, {} (a curve bent {bent}), t({}) = {}, \
-         p {}. Line and curve are two tests: each is held against .025.",
+         p {}. Line and curve are two tests: each is held against .025.{both}",
         two(b),
         apa::number(df, 0),
         get("t").map_or_else(|| "–".to_owned(), two),
