@@ -127,3 +127,77 @@ fn shares_of_the_variance_add_up() {
     );
     assert!((a - b).abs() < 1e-7, "{a} and {b}");
 }
+
+/// Realizations that do not differ on average, but by subject, and strongly.
+fn interacting(s: u32, m: u32, r: u32) -> f64 {
+    let own = f64::from((s * 5 + m * 3 + s * m * 2) % 7);
+    10.0 * own + 20.0 * f64::from(m % 3) + f64::from((s + 2 * m + 3 * r + m * r) % 3)
+}
+
+/// The share that VAF has compares two fits with the same random terms on the same
+/// ratings: interaction is nothing that VAF explains.
+#[test]
+fn the_share_of_vaf_is_the_fall_between_models_with_the_same_terms() {
+    let scattered_vaf =
+        |_, m: u32, _| ["0.2", "0.9", "0.5", "0.7", "0.35", "0.6"][m as usize].to_owned();
+    let v = table([5, 6, 8], interacting, scattered_vaf);
+    let number = |id: &str| v.number(id).unwrap();
+    let share = number("corr/share/var_model_crossed");
+    // Every realization has its VAF, so that the model without it is `lmm_variance`.
+    let without = number("lmm_variance/var_model");
+    let with = number("lmm_vaf_crossed/var_model");
+    assert!(
+        (share - (1.0 - with / without)).abs() < 1e-6,
+        "{share} {with} {without}"
+    );
+    assert!((number("lmm_vaf_crossed/var_model_without_vaf") - without).abs() < 1e-6 * without);
+    assert_eq!(share, number("lmm_variance/model_share_of_vaf"));
+    // The model without the interaction has another variance.
+    let other = 1.0 - with / number("lmm_crossed/var_model");
+    assert!((share - other).abs() > 0.01, "{share} {other}");
+}
+
+#[test]
+fn the_share_of_vaf_is_of_the_realizations_that_have_one() {
+    let vaf = |s, m, r| {
+        if m == 6 {
+            String::new()
+        } else {
+            by_model(s, m, r)
+        }
+    };
+    let all = table(
+        [5, 7, 3],
+        |s, m, r| if m == 6 { 90.0 } else { interacting(s, m, r) },
+        vaf,
+    );
+    let rated = table([5, 6, 3], interacting, by_model);
+    for id in [
+        "corr/share/var_model_crossed",
+        "lmm_vaf_crossed/var_model_without_vaf",
+        "lmm_variance/model_share_of_vaf",
+    ] {
+        let (a, b) = (all.number(id).unwrap(), rated.number(id).unwrap());
+        assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{id}: {a} {b}");
+    }
+}
+
+#[test]
+fn without_variance_between_realizations_nothing_can_be_explained() {
+    let v = table(
+        [6, 5, 2],
+        |s, m, r| f64::from((s + m + 3 * r * (s + 1)) % 5),
+        by_model,
+    );
+    assert_eq!(v.number("lmm_vaf_crossed/var_model_without_vaf"), Some(0.0));
+    undefined(
+        &v,
+        "corr/share/var_model_crossed",
+        "no variance between realizations",
+    );
+    undefined(
+        &v,
+        "lmm_variance/model_share_of_vaf",
+        "no variance between realizations",
+    );
+}

@@ -134,3 +134,52 @@ fn one_is_not_many() {
     let page = shown(&one);
     assert!(page.contains("1 subject · 1 rating\n"), "{page}");
 }
+
+#[test]
+fn the_realization_that_carries_a_correlation_alone_is_named() {
+    let lone = |odd: fn(usize) -> (f64, usize)| {
+        let mut csv = String::from("subject,model,rating,vaf\n");
+        for s in 0..3 {
+            for m in 0..4 {
+                let (vaf, rating) = odd(m);
+                csv += &format!("S{s},m{m},{rating},{vaf}\n");
+            }
+        }
+        of(&csv)
+    };
+    let why = |a: &Analysis, id: &str| match a.values.get(id) {
+        Some(Value::Undefined(why)) => why.clone(),
+        other => panic!("{id}: {other:?}"),
+    };
+    let a = lone(|m| (0.7 + 0.05 * m as f64, if m == 2 { 6 } else { 3 }));
+    assert!(a.values.number("corr/pearson/r").is_some());
+    for id in ["pearson_min", "pearson_max", "spearman_min", "spearman_max"] {
+        let said = why(&a, &format!("corr/leave_one_out/{id}"));
+        assert_eq!(said, "without `m2` all mean ratings are equal");
+    }
+    let said = why(&a, "corr/leave_one_out/m2/pearson");
+    assert_eq!(said, "without it all mean ratings are equal");
+    let a = lone(|m| (if m == 1 { 0.9 } else { 0.7 }, 1 + m));
+    let said = why(&a, "corr/leave_one_out/pearson_min");
+    assert_eq!(said, "without `m1` all VAF are equal");
+}
+
+#[test]
+fn repetitions_from_zero_give_what_those_from_one_give() {
+    let from_one = of(&table(some));
+    let mut csv = String::new();
+    for line in table(some).lines() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Ok(n) = cells[2].parse::<u32>() {
+            cells[2] = (n - 1).to_string();
+        }
+        csv += &(cells.join(",") + "\n");
+    }
+    let from_zero = of(&csv);
+    assert!(from_zero.values.number("order_repetition/0/mean").is_some());
+    for (id, value) in from_one.values.iter() {
+        if !id.starts_with("order_repetition/") {
+            assert_eq!(from_zero.values.get(id), Some(value), "{id}");
+        }
+    }
+}

@@ -59,7 +59,11 @@ fn ranks(table: &Table, values: &mut Values) {
     let why = "all subjects rank alike, or rate all alike";
     g.put_or("iman_davenport_F", f.iman_davenport, why);
     g.put_or("iman_davenport_p", f.iman_davenport_p, why);
-    let why = "too many orders of the ranks for the exact distribution, or no statistic";
+    let why = if f.chi2.is_none() {
+        "every subject rated all realizations alike"
+    } else {
+        "too many orders of the ranks for the exact distribution"
+    };
     g.put_or("exact_p", f.exact_p, why);
 }
 

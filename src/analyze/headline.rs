@@ -44,14 +44,10 @@ fn realistic(cells: &Cells<'_>, from: f64, values: &mut Values) {
 
 /// What of the variance between realizations goes along with VAF, and which |r|
 /// is needed: r² of the means, its unbiased version 1 − (1 − r²)(n − 1)/(n − 2)
-/// (Ezekiel 1930), and the fall of the crossed model's variance of realizations
-/// when VAF enters, where that model was fitted.
+/// (Ezekiel 1930). The crossed model's share stands with that model.
 fn explained(values: &mut Values) {
     let n = values.number("corr/n_models").unwrap_or(0.0);
     let r2 = values.number("corr/pearson/r").map(|r| r * r);
-    let variances = values
-        .number("lmm_crossed/var_model")
-        .zip(values.number("lmm_vaf_crossed/var_model"));
     let needed = t_quantile(0.975, n - 2.0)
         .filter(|_| n >= 3.0)
         .map(|t| t / (n - 2.0 + t * t).sqrt());
@@ -62,14 +58,6 @@ fn explained(values: &mut Values) {
         "r2_adjusted",
         r2.map(|r2| 1.0 - (1.0 - r2) * (n - 1.0) / (n - 2.0)),
     );
-    if let Some((without, with)) = variances {
-        let fall = (without > 0.0).then(|| 1.0 - with / without);
-        g.put_or(
-            "var_model_crossed",
-            fall,
-            "realizations have no variance of their own",
-        );
-    }
     values
         .group("corr/pearson", "fewer than three realizations with a VAF")
         .maybe("critical_r", needed);

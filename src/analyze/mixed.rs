@@ -40,6 +40,7 @@ pub(super) fn mixed(cells: &Cells<'_>, values: &mut Values) {
     vaf_crossed(cells, &data, values);
     crossed(cells, &data, values);
     variance(&data, values);
+    share_of_vaf(values);
 }
 
 impl Data {
@@ -362,12 +363,24 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         if cell {
             g.put("var_subject_model", v.cell);
         }
+        // What VAF explains is the fall from the same terms over the same ratings:
+        // another model would put the interaction to VAF's account.
+        let without = given(&data.vaf_null).and_then(|t| fit(t, random, Criterion::Reml));
+        match without {
+            Ok(without) => g.put("var_model_without_vaf", without.variances.model),
+            Err(error) => g.put_or("var_model_without_vaf", None, &error.to_string()),
+        }
         Ok(())
     })();
     if let Err(why) = found {
         let mut g = values.group("lmm_vaf_crossed", why);
         g.none(&COVARIATE);
-        g.none(&["var_subject", "var_model", "singular"]);
+        g.none(&[
+            "var_subject",
+            "var_model",
+            "var_model_without_vaf",
+            "singular",
+        ]);
         if cell {
             g.none(&["var_subject_model"]);
         }
@@ -404,7 +417,7 @@ fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
 }
 
 /// How much of the variance of a rating is whose: ~ 1 + (1|subject) + (1|model)
-/// + (1|subject:model), and how much of the realizations' VAF takes away.
+/// + (1|subject:model).
 fn variance(data: &Data, values: &mut Values) {
     let random = Random {
         model: true,
@@ -432,18 +445,26 @@ fn variance(data: &Data, values: &mut Values) {
             }
         }
     }
-    let why = "there is no variance between realizations with a VAF to explain";
-    let (null, full) = (components(&data.vaf_null), components(&data.vaf));
-    let share = match (null, full) {
-        (Ok(null), Ok(full)) if null.model > 0.0 && !data.by_row => {
-            Ok(1.0 - full.model / null.model)
-        }
-        (Err(e), _) | (_, Err(e)) => Err(why_no_vaf(data, e)),
-        _ => Err(why.to_owned()),
-    };
-    let mut g = values.group("lmm_variance", why);
-    match share {
-        Ok(share) => g.put("model_share_of_vaf", share),
-        Err(why) => g.put_or("model_share_of_vaf", None, &why),
-    }
+}
+
+/// The share of the variance between realizations that goes when VAF enters the
+/// crossed model, its random terms and its ratings the same. Below 0 where VAF
+/// explains less than a covariate without any relation is expected to.
+fn share_of_vaf(values: &mut Values) {
+    let why = ["var_model", "var_model_without_vaf"]
+        .iter()
+        .find_map(|v| values.reason(&format!("lmm_vaf_crossed/{v}")))
+        .unwrap_or("there is no variance between realizations with a VAF to explain")
+        .to_owned();
+    let number = |v: &str| values.number(&format!("lmm_vaf_crossed/{v}"));
+    let share = number("var_model")
+        .zip(number("var_model_without_vaf"))
+        .filter(|(_, without)| *without > 0.0)
+        .map(|(with, without)| 1.0 - with / without);
+    values
+        .group("lmm_variance", why.clone())
+        .maybe("model_share_of_vaf", share);
+    values
+        .group("corr/share", why)
+        .maybe("var_model_crossed", share);
 }

@@ -40,7 +40,11 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
         let test = one_sample(differences);
         let mut g = values.group(
             format!("reference/{r}/{t}"),
-            "fewer than two subjects rated both, or all differences are equal",
+            if differences.len() < 2 {
+                "fewer than two subjects rated both"
+            } else {
+                "all differences are equal"
+            },
         );
         g.put("n", differences.len() as f64);
         g.put_or("mean_diff", mean(differences), "nobody rated both");

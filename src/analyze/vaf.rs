@@ -18,6 +18,7 @@ use crate::stats::friedman::page;
 use crate::stats::paired::one_sample;
 use crate::stats::permutation::{self, Statistic};
 use crate::stats::regression::slope;
+use crate::text::Untrusted;
 
 const FEW: &str = "fewer than three realizations with a VAF";
 
@@ -124,6 +125,8 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
     };
     let (mut lowest, mut highest) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let mut complete = n > 3 && n <= MAX_LEFT_OUT;
+    let defined = pearson(x, y).is_some();
+    let mut lost = None;
     for (i, name) in names
         .iter()
         .enumerate()
@@ -131,9 +134,10 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
     {
         let (x, y) = (without(i, x), without(i, y));
         let both = [pearson(&x, &y), spearman(&x, &y)];
+        let left = if constant(&x) { "VAF" } else { "mean ratings" };
         let mut g = values.group(
             format!("corr/leave_one_out/{name}"),
-            "a constant column is left",
+            format!("without it all {left} are equal"),
         );
         g.maybe("pearson", both[0]);
         g.maybe("spearman", both[1]);
@@ -143,10 +147,18 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
                     lowest[k] = lowest[k].min(*r);
                     highest[k] = highest[k].max(*r);
                 }
-                None => complete = false,
+                None => {
+                    complete = false;
+                    // Where there is a correlation over all, it fails for this one.
+                    if defined && lost.is_none() {
+                        let name = Untrusted(name);
+                        lost = Some(format!("without `{name}` all {left} are equal"));
+                    }
+                }
             }
         }
     }
+    let why = lost.as_deref().unwrap_or(why);
     let mut g = values.group("corr/leave_one_out", why);
     for (k, name) in ["pearson", "spearman"].iter().enumerate() {
         g.maybe(&format!("{name}_min"), complete.then_some(lowest[k]));

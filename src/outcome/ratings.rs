@@ -84,7 +84,7 @@ pub struct Ratings {
     pub subject: Vec<u32>,
     /// Index into `models`, or [`NO_MODEL`].
     pub model: Vec<u32>,
-    /// The how-maniest time, from 1; 0 if it is not known.
+    /// The how-maniest time, from 1; a foreign table may count from 0.
     pub repetition: Vec<u32>,
     /// NaN: none.
     pub rating: Vec<f64>,

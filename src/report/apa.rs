@@ -142,6 +142,9 @@ pub(super) fn telling(all: &[f64]) -> usize {
 pub(super) fn plain(x: f64) -> String {
     if x.fract() == 0.0 && x.abs() < 1e7 {
         number(x, 0)
+    } else if x.abs() < 0.1 {
+        // Four digits that tell something, however small it is.
+        number(x, decimals(x, 2) + 2)
     } else {
         let decimals = match x.abs() {
             a if a >= 1000.0 => 1,
@@ -221,5 +224,10 @@ mod tests {
         assert_eq!(telling(&[0.9, 0.95]), 3);
         assert_eq!(plain(30.0), "30");
         assert_eq!(plain(0.12345), "0.1235");
+        // A small p keeps digits that tell something.
+        assert_eq!(
+            [0.05, 0.00004312, 1.0 / 120.0, -0.0012346, 3.2e-9].map(plain),
+            ["0.05000", "0.00004312", "0.008333", "−0.001235", "3.20e−9"]
+        );
     }
 }

@@ -7,6 +7,9 @@ use crate::protocol::Role;
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
+/// Stands for a repetition that is not written, until it is counted up.
+const NOT_WRITTEN: u32 = u32::MAX;
+
 const FOREIGN: &str = "subject,model,rating[,repetition][,vaf][,trial_index]";
 
 /// Columns of our own table that stand before the questions.
@@ -16,7 +19,8 @@ impl Ratings {
     /// Reads a CSV with the columns `subject,model,rating` and optionally
     /// `repetition`, `vaf` and `trial_index`, in any order, or one with the columns of
     /// our own `ratings.csv`. Empty fields of model, rating and vaf are missing, and so
-    /// are `NA` and `NaN`; a repetition that is empty or has no column is counted up.
+    /// are `NA` and `NaN`; a repetition that is empty or has no column is counted up
+    /// from 1; a written one is kept as it is, 0 too.
     /// A byte order mark is skipped. In our own table `question` names the column (default: the
     /// first after `protocol_version`).
     ///
@@ -143,7 +147,7 @@ impl Reading {
 
 /// Counts up the repetitions that a table leaves empty, in the order of its rows.
 fn number_repetitions(ratings: &mut Ratings) {
-    if !ratings.repetition.contains(&0) {
+    if !ratings.repetition.contains(&NOT_WRITTEN) {
         return;
     }
     let order = ratings.by_cell();
@@ -152,7 +156,7 @@ fn number_repetitions(ratings: &mut Ratings) {
         .collect::<Vec<_>>()
     {
         for (n, i) in (1u32..).zip(rows) {
-            if ratings.repetition[i] == 0 {
+            if ratings.repetition[i] == NOT_WRITTEN {
                 ratings.repetition[i] = n;
             }
         }
@@ -296,7 +300,7 @@ impl Columns {
         let mut row = Row {
             subject: 0,
             model: NO_MODEL,
-            repetition: self.repetition.map_or(Ok(0), |i| line.whole(i))?,
+            repetition: line.repetition(self.repetition)?,
             rating: line.number(self.rating)?,
             vaf: self.vaf.map_or(Ok(f64::NAN), |i| line.number(i))?,
             trial_index: self.trial_index.map_or(Ok(0), |i| line.whole(i))?,
@@ -419,6 +423,17 @@ impl Line<'_> {
             .ok_or_else(|| self.fault(at, "finite number"))
     }
 
+    /// A written repetition, from whichever number the table counts.
+    fn repetition(&self, at: Option<usize>) -> Result<u32, RatingsError> {
+        match at.filter(|&i| !self.text(i).is_empty()) {
+            None => Ok(NOT_WRITTEN),
+            Some(i) => match self.whole(i)? {
+                NOT_WRITTEN => Err(self.fault(i, "number of a repetition")),
+                n => Ok(n),
+            },
+        }
+    }
+
     /// A whole number from 1; empty is 0.
     fn whole(&self, at: usize) -> Result<u32, RatingsError> {
         match self.text(at) {
@@ -478,6 +493,23 @@ mod tests {
         let r = read("subject,model,rating\nS1,A,4\nS1,B,2\nS1,A,5\n").unwrap();
         assert_eq!(r.repetition, [1, 1, 2]);
         assert!(r.vaf.iter().all(|v| v.is_nan()));
+    }
+
+    #[test]
+    fn repetitions_may_count_from_zero_and_keep_their_numbers() {
+        let r = read(&format!(
+            "{HEAD}S1,A,0,4,\nS1,A,1,5,\nS1,B,0,4,\nS1,B,2,5,\n"
+        ))
+        .unwrap();
+        assert_eq!(r.repetition, [0, 1, 0, 2]);
+        // An empty field is no 0: it is counted up.
+        let r = read(&format!("{HEAD}S1,A,0,4,\nS1,A,,5,\nS1,B,,4,\nS1,B,,5,\n")).unwrap();
+        assert_eq!(r.repetition, [0, 2, 1, 2]);
+        assert_eq!(
+            says(&format!("{HEAD}S1,A,0,4,\nS1,A,0,5,\n")),
+            "r.csv, line 3: subject `S1`, model `A`, repetition 0 came already on line 2"
+        );
+        assert!(says(&format!("{HEAD}S1,A,4294967295,4,\n")).contains("number of a repetition"));
     }
 
     #[test]

@@ -182,14 +182,16 @@ pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
 pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     let mut by: BTreeMap<(&str, u32), Vec<f64>> = BTreeMap::new();
     for row in scene.a.rows.iter().filter(|r| r.excluded.is_none()) {
-        if let (Some(x), true) = (row.rating(), row.repetition > 0) {
+        if let Some(x) = row.rating() {
             let key = (scene.a.model(row), row.repetition);
             by.entry(key).or_default().push(x);
         }
     }
     let last = by.keys().map(|k| k.1).max().unwrap_or(0);
     let lines = (1..=MAX_LINES).contains(&scene.models.len());
-    if !(2..=MAX_REPETITIONS).contains(&last) || !lines {
+    // A foreign table may count from 0.
+    let first = by.keys().map(|k| k.1).min().unwrap_or(1).min(1);
+    if last <= first || last > MAX_REPETITIONS || !lines {
         return None;
     }
     let of = |model: &str, repetition: u32| by.get(&(model, repetition)).and_then(|x| mean(x));
@@ -199,7 +201,7 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     };
     let mut data = vec![head(["model", "repetition", "mean"])];
     for m in &scene.models {
-        for k in 1..=last {
+        for k in first..=last {
             data.push(vec![m.id.clone(), k.to_string(), cell(of(&m.id, k))]);
         }
     }
@@ -219,8 +221,10 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     );
     let title = format!("{} by repetition", scene.asked);
     Some(drawn("order", caption, data, |c: Canvas| {
-        let ticks = (1..=last).map(|k| (f64::from(k), k.to_string())).collect();
-        let x = Axis::new("repetition", 0.7, f64::from(last) + 0.3)
+        let ticks = (first..=last)
+            .map(|k| (f64::from(k), k.to_string()))
+            .collect();
+        let x = Axis::new("repetition", f64::from(first) - 0.3, f64::from(last) + 0.3)
             .at(ticks)
             .without_grid();
         let all: Vec<f64> = by.values().filter_map(|x| mean(x)).collect();
@@ -228,7 +232,7 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
         let mut panel = Panel::new(x, y);
         for (i, m) in scene.models.iter().enumerate() {
             let at = |k: u32| (f64::from(k), of(&m.id, k).unwrap_or(f64::NAN));
-            let line: Vec<(f64, f64)> = (1..=last).map(at).collect();
+            let line: Vec<(f64, f64)> = (first..=last).map(at).collect();
             let look = scene.look(i);
             panel = panel.with(look, Mark::Line(line.clone())).named(
                 &name(m),
@@ -238,7 +242,7 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
         }
         let at = |k: u32| (f64::from(k), over(k).unwrap_or(f64::NAN));
         let thick = Look::plain(Colour::INK).stroke(3.0);
-        let line: Vec<(f64, f64)> = (1..=last).map(at).collect();
+        let line: Vec<(f64, f64)> = (first..=last).map(at).collect();
         panel = panel.named("all", thick, Mark::Line(line));
         // A long legend takes nothing from the axes.
         let names = scene

@@ -169,7 +169,7 @@ fn crossed(a: &Analysis) -> Option<String> {
     });
     let between = a
         .values
-        .number("lmm_crossed/var_model")
+        .number("lmm_vaf_crossed/var_model_without_vaf")
         .zip(get("var_model"))
         .map_or_else(String::new, |(without, with)| {
             format!(
