@@ -34,7 +34,7 @@ pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
 pub use warnings::Warning;
 
-use crate::outcome::ratings::Ratings;
+use crate::outcome::ratings::{Practice, Ratings};
 use crate::protocol::{Protocol, Role, Unfinished};
 use cells::Cells;
 use rayon::prelude::*;
@@ -151,8 +151,9 @@ pub struct Listed {
 pub struct Judged {
     subject: u32,
     model: u32,
-    /// The how-maniest time; 0 unknown.
+    /// The how-maniest time.
     pub repetition: u32,
+    trial_index: u32,
     /// NaN: none.
     rating: f64,
     vaf: f64,
@@ -164,6 +165,11 @@ impl Judged {
     /// The rating, if there is one.
     pub fn rating(&self) -> Option<f64> {
         Some(self.rating).filter(|v| v.is_finite())
+    }
+
+    /// Place in the subject's order, from 1, if it is known.
+    pub fn trial_index(&self) -> Option<u32> {
+        Some(self.trial_index).filter(|t| *t > 0)
     }
 
     /// The VAF, if there is one.
@@ -187,6 +193,8 @@ pub struct Analysis {
     pub counts: Counts,
     /// Every row with the decision about it.
     pub rows: Vec<Judged>,
+    /// Practice rows, about which nothing is to be decided.
+    pub practice: Arc<Practice>,
     /// Names of the subjects and realizations of the rows.
     subjects: Vec<String>,
     models: Vec<String>,
@@ -275,6 +283,7 @@ pub fn analyze_watched(ratings: &Ratings, rules: &Rules, progress: &Progress) ->
             })
             .collect(),
         rows: rows_judged,
+        practice: Arc::clone(&ratings.practice),
         subjects: ratings.subjects.iter().map(|s| s.id.clone()).collect(),
         models: ratings.models.iter().map(|m| m.id.clone()).collect(),
         exclusions,
@@ -345,6 +354,7 @@ fn judged(ratings: &Ratings, decisions: &[select::Decision]) -> Vec<Judged> {
             subject: ratings.subject[i],
             model: ratings.model[i],
             repetition: ratings.repetition[i],
+            trial_index: ratings.trial_index[i],
             rating: ratings.rating[i],
             vaf: ratings.vaf[i],
             excluded,

@@ -3,7 +3,7 @@
 //!
 //! Nothing is inferred here: every statistic stands in the analysis, by its
 //! identifier, and what is absent is left out. Text from the data is escaped on
-//! its way to a terminal, to HTML and to SVG, and stored as it is in CSV and JSON.
+//! its way to a terminal, to HTML, to SVG and to CSV, and stored as it is in JSON.
 
 mod apa;
 pub mod csv;

@@ -7,10 +7,11 @@
 //! safe as part of a file name from then on.
 
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::fmt;
 
 /// Borrowed text whose `Display` is safe to print on one line: control, C1, line
-/// separator and bidirectional formatting characters come out as `\u{…}`.
+/// separator, bidirectional formatting and zero-width characters come out as `\u{…}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Untrusted<'a>(pub &'a str);
 
@@ -33,21 +34,42 @@ impl fmt::Display for Untrusted<'_> {
     }
 }
 
+/// Text as a cell of a table that may be opened in a spreadsheet: what
+/// [`Untrusted`] escapes is escaped, line ends and tabs too, and a text that starts
+/// like a formula (`=`, `+`, `-`, `@`) has a `'` before it. A number stays.
+pub fn cell(text: &str) -> Cow<'_, str> {
+    let shown = if text.contains(is_unsafe) {
+        Cow::Owned(Untrusted(text).to_string())
+    } else {
+        Cow::Borrowed(text)
+    };
+    let number = |t: &str| t.parse().is_ok_and(|x: f64| x.is_finite());
+    if shown.starts_with(['=', '+', '-', '@']) && !number(&shown) {
+        Cow::Owned(format!("'{shown}"))
+    } else {
+        shown
+    }
+}
+
 /// "1 session", "2 sessions": a number with the word for what is counted.
 pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// Whether a character can steer a terminal or hide the order of what is read:
-/// C0, DEL, C1, line and paragraph separators, bidirectional controls, tags.
+/// C0, DEL, C1, line and paragraph separators, bidirectional controls, tags, and
+/// what has no width but for the joiners, which emoji and Indic scripts need.
 pub fn is_unsafe(c: char) -> bool {
     matches!(c,
         '\u{0}'..='\u{1f}'
         | '\u{7f}'..='\u{9f}'
         | '\u{61c}'
+        | '\u{200b}'
         | '\u{200e}'..='\u{200f}'
         | '\u{2028}'..='\u{202e}'
+        | '\u{2060}'
         | '\u{2066}'..='\u{2069}'
+        | '\u{feff}'
         | '\u{fff9}'..='\u{fffb}'
         | '\u{e0000}'..='\u{e007f}')
 }
@@ -169,6 +191,40 @@ mod tests {
     fn ordinary_text_of_any_language_stays() {
         for text in ["leicht ruckelig", "よかった 👍🏽", "جيد جدا", "e\u{301}"] {
             assert_eq!(Untrusted(text).to_string(), text);
+        }
+    }
+
+    #[test]
+    fn names_that_look_alike_are_told_apart_and_joiners_stay() {
+        assert_eq!(Untrusted("P\u{200b}1").to_string(), "P\\u{200b}1");
+        assert_eq!(
+            Untrusted("\u{feff}P\u{2060}1").to_string(),
+            "\\u{feff}P\\u{2060}1"
+        );
+        for joined in ["👩\u{200d}🔬", "क्\u{200d}ष", "می\u{200c}خواهم"] {
+            assert_eq!(Untrusted(joined).to_string(), joined);
+        }
+    }
+
+    #[test]
+    fn a_cell_is_neither_a_formula_nor_steers_anything() {
+        for (typed, stored) in [
+            ("=1+1", "'=1+1"),
+            ("+49 30", "'+49 30"),
+            ("-inf", "'-inf"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("\t=1", "\\t=1"),
+            ("\r\n=1", "\\r\\n=1"),
+            (
+                "a\u{0}\u{1b}[2J\u{9b}\u{202e}\u{2066}b",
+                "a\\u{0}\\u{1b}[2J\\u{9b}\\u{202e}\\u{2066}b",
+            ),
+            ("-4.5e-7", "-4.5e-7"),
+            ("+3", "+3"),
+            ("a=b, \"c\"", "a=b, \"c\""),
+            ("", ""),
+        ] {
+            assert_eq!(cell(typed), stored, "{typed:?}");
         }
     }
 

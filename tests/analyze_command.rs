@@ -56,6 +56,23 @@ fn json_is_one_document_and_nothing_else() {
     );
 }
 
+#[cfg(unix)]
+#[test]
+fn figures_are_not_written_through_a_link() {
+    let dir = tempfile::tempdir().unwrap();
+    let (target, elsewhere) = (dir.path().join("out"), dir.path().join("elsewhere"));
+    fs::create_dir(&target).unwrap();
+    fs::create_dir(&elsewhere).unwrap();
+    std::os::unix::fs::symlink(&elsewhere, target.join("figures")).unwrap();
+    let mut command = study();
+    command.args(["analyze", &set("sim_paper"), "--out"]);
+    let done = command.arg(&target).assert().failure();
+    let said = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("figures: this is a symbolic link"), "{said}");
+    assert!(names(&elsewhere).is_empty());
+    assert_eq!(names(&target), ["figures"]);
+}
+
 #[test]
 fn tables_go_where_out_says() {
     let dir = tempfile::tempdir().unwrap();
@@ -88,7 +105,9 @@ fn tables_go_where_out_says() {
     assert_eq!(names(&target), expected);
     let used = fs::read_to_string(target.join("ratings_used.csv")).unwrap();
     assert_eq!(used.lines().count(), 151);
-    assert!(used.starts_with("subject,model,repetition,rating,vaf,included,reason\r\n"));
+    assert!(
+        used.starts_with("subject,model,repetition,trial_index,rating,vaf,included,reason\r\n")
+    );
     let rows = |name: &str| {
         let text = fs::read_to_string(target.join(name)).unwrap();
         text.lines().count() - 1

@@ -344,11 +344,41 @@ fn comments_stand_by_realization_and_stay_text() {
     assert!(said.contains("[remarks] phone rang"), "{said}");
     let files = csv::tables(&source(), &a);
     let table = files.iter().find(|f| f.name == "comments.csv").unwrap();
-    // Stored as typed: only quotes are doubled.
+    // No formula, and nothing that steers; quotes are doubled.
     assert!(
         table
             .content
-            .contains("\"=1+1 \u{1b}[2J\n\"\"crisp\"\" 👍🏽 よかった\"")
+            .contains("\"'=1+1 \\u{1b}[2J\\n\"\"crisp\"\" 👍🏽 よかった\"")
+    );
+    for file in files.iter().filter(|f| f.name.ends_with(".csv")) {
+        let lines = file.content.replace("\r\n", "");
+        assert!(!lines.contains(study::text::is_unsafe), "{}", file.name);
+    }
+}
+
+#[test]
+fn practice_is_among_the_rows_and_counts_nowhere() {
+    let mut practised = two();
+    let mut warming_up = row("P09", "Z", 0, 7);
+    warming_up.practice = true;
+    warming_up.position = None;
+    practised.insert(2, warming_up);
+    let a = analyze(&ratings(&practised, &[]), &Rules::default());
+    let without = analyze(&ratings(&two(), &[]), &Rules::default());
+    assert_eq!(a.values, without.values);
+    assert_eq!(a.counts.practice, 1);
+    let files = csv::tables(&source(), &a);
+    let used = files.iter().find(|f| f.name == "ratings_used.csv").unwrap();
+    assert_eq!(used.content.lines().count(), 1 + 6 + 1);
+    assert!(
+        used.content.contains("P01,A,1,1,2,0.7,true,\r\n"),
+        "{}",
+        used.content
+    );
+    assert!(
+        used.content.ends_with("P09,Z,0,,7,0.9,false,practice\r\n"),
+        "{}",
+        used.content
     );
 }
 

@@ -133,10 +133,10 @@ fn every_row_tells_whether_it_was_used_and_why_not() {
     let files = csv::tables(&source, &a);
     let used = files.iter().find(|f| f.name == "ratings_used.csv").unwrap();
     assert_eq!(used.content.lines().count(), 31);
-    assert!(used.content.contains("P1,A,1,2,0.7,true,\r\n"));
+    assert!(used.content.contains("P1,A,1,1,2,0.7,true,\r\n"));
     assert!(
         used.content
-            .contains("P4,A,1,4,0.7,false,rule constant-rater\r\n")
+            .contains("P4,A,1,1,4,0.7,false,rule constant-rater\r\n")
     );
 }
 

@@ -177,7 +177,7 @@ impl Counts {
             missing: with(Status::Missing) + with(Status::Ok),
             corrected: used.corrected.iter().filter(|c| **c).count(),
             repeated: used.attempt.iter().filter(|a| **a > 1).count(),
-            practice: all.practice,
+            practice: all.practice.len(),
             excluded,
             participants: used.subjects.len(),
             finished: (all.subjects.iter().zip(&took_part))

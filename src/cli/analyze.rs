@@ -15,7 +15,7 @@ use crate::report::html::Details;
 use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
 use crate::store::{Derived, SessionData, StudyFolder};
-use crate::text::QuestionId;
+use crate::text::{QuestionId, Untrusted};
 use rayon::prelude::*;
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -328,7 +328,16 @@ fn deviations(study: &StudyFolder) -> Result<Vec<String>, Failure> {
 /// Each file as a whole or not at all, and not again if it has these bytes. None is
 /// synced: all of them can be made again at any time from what is on the disk.
 fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
-    for item in [dir.to_owned(), dir.join("figures")] {
+    let figures = dir.join("figures");
+    // What stands there may be somebody else's folder: a link leads out of this one.
+    if fs::symlink_metadata(&figures).is_ok_and(|m| m.is_symlink()) {
+        return Err(Failure::input(format!(
+            "{}: this is a symbolic link, and the figures would be written where it leads",
+            Untrusted(&figures.display().to_string())
+        ))
+        .hint("remove the link, or name another folder with --out"));
+    }
+    for item in [dir.to_owned(), figures] {
         fs::create_dir_all(&item).map_err(|e| Failure::file(&item, &e))?;
     }
     files.par_iter().try_for_each(|output| {

@@ -2,8 +2,8 @@
 //!
 //! One row per presentation that counts. Subjects and realizations are sorted as
 //! strings (C locale) and named by their index; a missing number is NaN inside a
-//! column and never leaves this crate as a number. Practice rows are counted and
-//! left out at the door. What was excluded, and why, is decided in `analyze`.
+//! column and never leaves this crate as a number. Practice rows stand beside the
+//! columns. What was excluded, and why, is decided in `analyze`.
 
 mod build;
 mod error;
@@ -17,6 +17,7 @@ use crate::protocol::{Answer, Role};
 use crate::text::QuestionId;
 use build::{Builder, Row};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What stands for strokes that nobody counted.
 pub const NO_STROKES: u32 = u32::MAX;
@@ -106,8 +107,68 @@ pub struct Ratings {
     pub source_row: Vec<u32>,
     /// Texts answered or remarked in trials.
     pub comments: Vec<Comment>,
-    /// Practice rows that were left out.
-    pub practice: usize,
+    /// Practice rows, which are not among the columns.
+    pub practice: Arc<Practice>,
+}
+
+/// Practice rows, with names of their own: who only practised is no subject.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Practice {
+    names: Vec<String>,
+    rows: Vec<Practised>,
+}
+
+/// A practice row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Practised {
+    subject: u32,
+    model: u32,
+    repetition: u32,
+    trial_index: u32,
+    rating: f64,
+    vaf: f64,
+}
+
+/// A practice row with its names, which are untrusted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PracticeRow<'a> {
+    /// Who practised.
+    pub subject: &'a str,
+    /// With what; empty if it is not known.
+    pub model: &'a str,
+    /// As the table has it; 0 unknown.
+    pub repetition: u32,
+    /// Place in the subject's order, if it is known.
+    pub trial_index: Option<u32>,
+    /// The rating, if there is one.
+    pub rating: Option<f64>,
+    /// The VAF, if there is one.
+    pub vaf: Option<f64>,
+}
+
+impl Practice {
+    /// How many rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The rows, in the order of their table.
+    pub fn iter(&self) -> impl Iterator<Item = PracticeRow<'_>> {
+        let name = |at: u32| self.names.get(at as usize).map_or("", String::as_str);
+        self.rows.iter().map(move |row| PracticeRow {
+            subject: name(row.subject),
+            model: name(row.model),
+            repetition: row.repetition,
+            trial_index: Some(row.trial_index).filter(|t| *t > 0),
+            rating: Some(row.rating).filter(|v| v.is_finite()),
+            vaf: Some(row.vaf).filter(|v| v.is_finite()),
+        })
+    }
 }
 
 impl Ratings {
@@ -115,26 +176,14 @@ impl Ratings {
     pub fn from_rows(rows: &[RatingRow], question: &QuestionId) -> Self {
         let mut builder = Builder::new(question.to_string());
         for (i, r) in rows.iter().enumerate() {
-            if r.practice {
-                builder.practice();
-                continue;
-            }
-            let subject = builder.subject(r.participant.as_str());
-            let model = builder.model(r.model.as_str(), r.role, || r.covariates.clone());
-            for (question, text) in comments(r) {
-                builder.comment(question, text);
-            }
             let origin = match (r.simulated, r.pilot) {
                 (true, _) => Origin::Simulated,
                 (false, true) => Origin::Pilot,
                 (false, false) => Origin::Real,
             };
-            if let (Some(energy), Status::Ok) = (r.least_energy_j, r.status) {
-                builder.least_energy(model, origin, energy);
-            }
-            builder.push(Row {
-                subject,
-                model,
+            let mut row = Row {
+                subject: 0,
+                model: NO_MODEL,
                 repetition: r.repetition,
                 rating: rated(r, question),
                 vaf: r.vaf.filter(|v| v.is_finite()).unwrap_or(f64::NAN),
@@ -145,7 +194,20 @@ impl Ratings {
                 attempt: r.attempt.unwrap_or(0),
                 strokes: r.strokes.unwrap_or(NO_STROKES),
                 source_row: u32::try_from(i + 1).unwrap_or(u32::MAX),
-            });
+            };
+            if r.practice {
+                builder.practice(r.participant.as_str(), r.model.as_str(), &row);
+                continue;
+            }
+            row.subject = builder.subject(r.participant.as_str());
+            row.model = builder.model(r.model.as_str(), r.role, || r.covariates.clone());
+            for (question, text) in comments(r) {
+                builder.comment(question, text);
+            }
+            if let (Some(energy), Status::Ok) = (r.least_energy_j, r.status) {
+                builder.least_energy(row.model, origin, energy);
+            }
+            builder.push(row);
         }
         builder.finish()
     }
@@ -235,7 +297,7 @@ impl Ratings {
                     Some(Comment { row, ..c.clone() })
                 })
                 .collect(),
-            practice: self.practice,
+            practice: Arc::clone(&self.practice),
             subjects,
             models,
         }

@@ -1,7 +1,8 @@
-//! The tables of `analysis/`, RFC 4180. Text is stored as it was typed.
+//! The tables of `analysis/`, RFC 4180. Text is escaped by [`crate::text::cell`].
 
 use super::Source;
 use crate::analyze::{Analysis, Value};
+use crate::text::cell;
 
 /// A file of `analysis/`: name and content.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,10 +68,13 @@ fn written(write: impl FnOnce(&mut Rows)) -> String {
 struct Rows(csv::Writer<Vec<u8>>);
 
 impl Rows {
-    fn row<T: AsRef<[u8]>>(&mut self, row: impl IntoIterator<Item = T>) {
-        self.0
-            .write_record(row)
-            .expect("rows of a table are equally long and memory takes them");
+    fn row<T: AsRef<str>>(&mut self, row: impl IntoIterator<Item = T>) {
+        let taken = "rows of a table are equally long and memory takes them";
+        for text in row {
+            let cell = cell(text.as_ref());
+            self.0.write_field(cell.as_bytes()).expect(taken);
+        }
+        self.0.write_record(None::<&[u8]>).expect(taken);
     }
 }
 
@@ -80,6 +84,10 @@ fn cells<const N: usize>(texts: [&str; N]) -> Vec<String> {
 
 fn number(x: Option<f64>) -> String {
     x.map_or_else(String::new, digits)
+}
+
+fn whole(x: Option<u32>) -> String {
+    x.map_or_else(String::new, |x| x.to_string())
 }
 
 /// All digits of a number, and no zeros that only say how large or small it is.
@@ -300,6 +308,7 @@ fn ratings_used(a: &Analysis) -> String {
             "subject",
             "model",
             "repetition",
+            "trial_index",
             "rating",
             "vaf",
             "included",
@@ -316,10 +325,23 @@ fn ratings_used(a: &Analysis) -> String {
                 a.subject(row),
                 a.model(row),
                 &row.repetition.to_string(),
+                &whole(row.trial_index()),
                 &number(row.rating()),
                 &number(row.vaf()),
                 if reason.is_empty() { "true" } else { "false" },
                 reason,
+            ]);
+        }
+        for row in a.practice.iter() {
+            to.row([
+                row.subject,
+                row.model,
+                &row.repetition.to_string(),
+                &whole(row.trial_index),
+                &number(row.rating),
+                &number(row.vaf),
+                "false",
+                "practice",
             ]);
         }
     })

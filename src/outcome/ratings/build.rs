@@ -1,9 +1,10 @@
 //! Rows to columns: names become indices as they come, and are sorted at the end.
 
-use super::{Comment, NO_MODEL, Origin, Ratings, Realization, Subject};
+use super::{Comment, NO_MODEL, Origin, Practice, Practised, Ratings, Realization, Subject};
 use crate::outcome::columns::Status;
 use crate::protocol::Role;
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 /// One row, its names already indices.
 #[derive(Debug, Clone, Copy)]
@@ -62,6 +63,9 @@ pub(super) struct Builder {
     ratings: Ratings,
     subjects: Names,
     models: Names,
+    /// Subjects and realizations of practice rows.
+    practised: Names,
+    practice: Practice,
     /// Sum and number of the least energies, J, by realization: those of
     /// participants, and of pilots and simulated participants.
     energies: BTreeMap<u32, [(f64, f64); 2]>,
@@ -76,6 +80,8 @@ impl Builder {
             },
             subjects: Names::default(),
             models: Names::default(),
+            practised: Names::default(),
+            practice: Practice::default(),
             energies: BTreeMap::new(),
         }
     }
@@ -94,9 +100,25 @@ impl Builder {
         self.ratings.len()
     }
 
-    /// One more practice row, which is left out.
-    pub(super) fn practice(&mut self) {
-        self.ratings.practice += 1;
+    /// One more practice row, which is kept beside the others.
+    pub(super) fn practice(&mut self, subject: &str, model: &str, row: &Row) {
+        let mut place = |names: &mut Names, name: &str| {
+            let (at, new) = names.place(name);
+            if new {
+                self.practice.names.push(name.to_owned());
+            }
+            at
+        };
+        let subject = place(&mut self.practised, subject);
+        let model = place(&mut self.practised, model);
+        self.practice.rows.push(Practised {
+            subject,
+            model,
+            repetition: row.repetition,
+            trial_index: row.trial_index,
+            rating: row.rating,
+            vaf: row.vaf,
+        });
     }
 
     /// The index of a subject.
@@ -160,6 +182,7 @@ impl Builder {
     /// Tells the realizations their mean least energy and sorts the names.
     pub(super) fn finish(self) -> Ratings {
         let mut r = self.ratings;
+        r.practice = Arc::new(self.practice);
         // As in the analysis: the others where there is no participant.
         let others = usize::from(!r.origin.contains(&Origin::Real));
         for (model, both) in self.energies {

@@ -133,13 +133,10 @@ impl Reading {
                 record: &record,
                 line,
             };
-            match columns.row(&line, number, &mut self.builder)? {
-                Some(row) => {
-                    self.builder.push(row);
-                    self.lines
-                        .push(u32::try_from(line.line).unwrap_or(u32::MAX));
-                }
-                None => self.builder.practice(),
+            if let Some(row) = columns.row(&line, number, &mut self.builder)? {
+                self.builder.push(row);
+                self.lines
+                    .push(u32::try_from(line.line).unwrap_or(u32::MAX));
             }
         }
     }
@@ -316,6 +313,8 @@ impl Columns {
         if let Some(ours) = &self.ours {
             let flag = |at: Option<usize>| at.map_or(Ok(false), |i| line.flag(i));
             if flag(ours.practice)? {
+                row.repetition %= NOT_WRITTEN;
+                builder.practice(subject, line.text(self.model), &row);
                 return Ok(None);
             }
             role = ours.role.map_or(Ok(Role::Test), |i| {
@@ -582,7 +581,7 @@ mod tests {
                    x,SIM001,1,,3,1,2,2,B,low-anchor,1,false,false,true,1,,,false,,1,declined,0.1\n";
         let r = read(csv).unwrap();
         assert_eq!(
-            (r.question.as_str(), r.practice, r.len()),
+            (r.question.as_str(), r.practice.len(), r.len()),
             ("realism", 1, 2)
         );
         assert_eq!(r.models[1].role, Role::LowAnchor);
