@@ -7,7 +7,6 @@
 //! safe as part of a file name from then on.
 
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 use std::fmt;
 
 /// Borrowed text whose `Display` is safe to print on one line: control, C1, line
@@ -31,23 +30,6 @@ impl fmt::Display for Untrusted<'_> {
             }
         }
         f.pad(&safe)
-    }
-}
-
-/// Text as a cell of a table that may be opened in a spreadsheet: what
-/// [`Untrusted`] escapes is escaped, line ends and tabs too, and a text that starts
-/// like a formula (`=`, `+`, `-`, `@`) has a `'` before it. A number stays.
-pub fn cell(text: &str) -> Cow<'_, str> {
-    let shown = if text.contains(is_unsafe) {
-        Cow::Owned(Untrusted(text).to_string())
-    } else {
-        Cow::Borrowed(text)
-    };
-    let number = |t: &str| t.parse().is_ok_and(|x: f64| x.is_finite());
-    if shown.starts_with(['=', '+', '-', '@']) && !number(&shown) {
-        Cow::Owned(format!("'{shown}"))
-    } else {
-        shown
     }
 }
 
@@ -203,28 +185,6 @@ mod tests {
         );
         for joined in ["👩\u{200d}🔬", "क्\u{200d}ष", "می\u{200c}خواهم"] {
             assert_eq!(Untrusted(joined).to_string(), joined);
-        }
-    }
-
-    #[test]
-    fn a_cell_is_neither_a_formula_nor_steers_anything() {
-        for (typed, stored) in [
-            ("=1+1", "'=1+1"),
-            ("+49 30", "'+49 30"),
-            ("-inf", "'-inf"),
-            ("@SUM(A1)", "'@SUM(A1)"),
-            ("\t=1", "\\t=1"),
-            ("\r\n=1", "\\r\\n=1"),
-            (
-                "a\u{0}\u{1b}[2J\u{9b}\u{202e}\u{2066}b",
-                "a\\u{0}\\u{1b}[2J\\u{9b}\\u{202e}\\u{2066}b",
-            ),
-            ("-4.5e-7", "-4.5e-7"),
-            ("+3", "+3"),
-            ("a=b, \"c\"", "a=b, \"c\""),
-            ("", ""),
-        ] {
-            assert_eq!(cell(typed), stored, "{typed:?}");
         }
     }
 

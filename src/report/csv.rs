@@ -1,8 +1,7 @@
-//! The tables of `analysis/`, RFC 4180. Text is escaped by [`crate::text::cell`].
+//! The tables of `analysis/`, RFC 4180. Text is stored as it was typed.
 
 use super::Source;
 use crate::analyze::{Analysis, Value};
-use crate::text::cell;
 
 /// A file of `analysis/`: name and content.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -68,13 +67,10 @@ fn written(write: impl FnOnce(&mut Rows)) -> String {
 struct Rows(csv::Writer<Vec<u8>>);
 
 impl Rows {
-    fn row<T: AsRef<str>>(&mut self, row: impl IntoIterator<Item = T>) {
-        let taken = "rows of a table are equally long and memory takes them";
-        for text in row {
-            let cell = cell(text.as_ref());
-            self.0.write_field(cell.as_bytes()).expect(taken);
-        }
-        self.0.write_record(None::<&[u8]>).expect(taken);
+    fn row<T: AsRef<[u8]>>(&mut self, row: impl IntoIterator<Item = T>) {
+        self.0
+            .write_record(row)
+            .expect("rows of a table are equally long and memory takes them");
     }
 }
 

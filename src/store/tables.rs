@@ -1,13 +1,13 @@
 //! The derived tables as CSV.
 //!
-//! RFC 4180: UTF-8, lines end in CR LF, a cell with a comma or quotation mark is
-//! quoted. Cells are escaped by [`crate::text::cell`]; the journals hold what was
-//! typed.
+//! RFC 4180: UTF-8, lines end in CR LF, a cell with a comma, quotation mark or
+//! line end is quoted. Cells hold what was typed; no formula is guarded here, that
+//! is for an export to spreadsheets.
 
 use super::derive::Columns;
 use crate::outcome::{AttemptRow, Author, Failure, ParticipantRow, RatingRow};
 use crate::protocol::{Answer, columns};
-use crate::text::{self, QuestionId};
+use crate::text::QuestionId;
 use chrono::{DateTime, FixedOffset};
 use std::io;
 
@@ -41,11 +41,6 @@ fn bytes(writer: Writer) -> io::Result<Vec<u8>> {
     writer
         .into_inner()
         .map_err(|e| io::Error::other(e.to_string()))
-}
-
-fn write(out: &mut Writer, cells: &[String]) -> io::Result<()> {
-    out.write_record(cells.iter().map(|c| text::cell(c).into_owned()))?;
-    Ok(())
 }
 
 fn cell<T: ToString>(value: Option<T>) -> String {
@@ -116,7 +111,7 @@ pub(super) fn ratings(rows: &[RatingRow], own: &Columns) -> io::Result<Vec<u8>> 
         ]);
         let covariate = |name: &String| number(row.covariates.get(name).copied());
         cells.extend(own.covariates.iter().map(covariate));
-        write(&mut out, &cells)?;
+        out.write_record(&cells)?;
     }
     bytes(out)
 }
@@ -126,7 +121,7 @@ pub(super) fn attempts(rows: &[AttemptRow]) -> io::Result<Vec<u8>> {
     let mut out = writer();
     out.write_record(ATTEMPT_COLUMNS)?;
     for row in rows {
-        let cells = [
+        out.write_record([
             row.participant.to_string(),
             row.session.to_string(),
             row.pilot.to_string(),
@@ -142,8 +137,7 @@ pub(super) fn attempts(rows: &[AttemptRow]) -> io::Result<Vec<u8>> {
             row.by.map(author).unwrap_or_default().to_owned(),
             row.text.clone(),
             time(Some(row.at)),
-        ];
-        write(&mut out, &cells)?;
+        ])?;
     }
     bytes(out)
 }
@@ -173,7 +167,7 @@ pub(super) fn participants(rows: &[ParticipantRow], own: &Columns) -> io::Result
             time(row.started_at),
         ];
         cells.extend(own.forms.iter().map(|q| answer(row.answers.get(q))));
-        write(&mut out, &cells)?;
+        out.write_record(&cells)?;
     }
     bytes(out)
 }
