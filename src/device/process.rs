@@ -4,7 +4,7 @@
 //! is the description. Threads of their own read and write, so that nothing waits
 //! for the child: a child that does not read, says something else than what is
 //! described, says too much or ends is killed, and that is a lost device. A new one
-//! is started after a second. [`child`] has the threads, [`words`] the language.
+//! is started after a second. `child` has the threads, `words` the language.
 //!
 //! The host cannot make limp what it cannot reach. It says `limp`, it says `alive`
 //! as long as it polls, and it closes the child's input when it ends: the child has
