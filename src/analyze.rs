@@ -28,7 +28,7 @@ mod vaf;
 mod values;
 mod warnings;
 
-pub use deviation::{Stated, deviations};
+pub use deviation::{Deviation, Stated, deviations};
 pub use exclude::{Applied, Exclusion};
 pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
@@ -64,7 +64,7 @@ pub struct Rules {
     /// Differences from a hidden reference below this count as none.
     pub equivalence_margin: Option<f64>,
     /// What was changed of these rules after the study began, in words.
-    pub deviations: Vec<String>,
+    pub deviations: Vec<Deviation>,
 }
 
 impl Default for Rules {
@@ -201,7 +201,7 @@ pub struct Analysis {
     /// What each pre-stated rule of exclusion did, in the protocol's order.
     pub exclusions: Vec<Applied>,
     /// What was changed of the rules after the study began, in words.
-    pub deviations: Vec<String>,
+    pub deviations: Vec<Deviation>,
     /// Comments of the rows that count, by realization.
     pub comments: Vec<Said>,
     /// The threshold of "realistic".
@@ -221,7 +221,7 @@ impl Analysis {
     /// Whether a rule was changed after the study began: what was, is not called
     /// stated beforehand.
     pub fn changed(&self, rule: Stated) -> bool {
-        deviation::touches(&self.deviations, rule)
+        self.deviations.iter().any(|d| d.of.contains(&rule))
     }
 
     /// The row's realization, empty if there is none. Untrusted.

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use study::analyze::{Analysis, Exclusion, Rules, Said, analyze};
+use study::analyze::{Analysis, Deviation, Exclusion, Rules, Said, Stated, analyze};
 use study::outcome::ratings::Ratings;
 use study::report::Source;
 use study::report::figures::{self, Trace};
@@ -153,7 +153,10 @@ fn what_was_stated_beforehand_and_what_was_changed_is_told() {
     let ratings = Ratings::read_csv("data.csv", csv.as_bytes(), None).unwrap();
     let rules = Rules {
         exclude: vec![Exclusion::ConstantRater, Exclusion::Inconsistent(1.0)],
-        deviations: vec!["protocol 2 of 2026-01-02, because \"typo\": vaf: a → b".to_owned()],
+        deviations: vec![Deviation {
+            text: "protocol 2 of 2026-01-02, because \"typo\": vaf: a → b".to_owned(),
+            of: &[],
+        }],
         ..Rules::default()
     };
     let page = report(&analyze(&ratings, &rules), &[]);
@@ -204,7 +207,10 @@ fn hostile_names_and_comments_stay_text() {
         versions: vec![(1, EVIL.to_owned(), EVIL.to_owned())],
         ..Details::default()
     };
-    a.deviations.push(EVIL.to_owned());
+    a.deviations.push(Deviation {
+        text: EVIL.to_owned(),
+        of: &[],
+    });
     let figures = figures::all(&a, &[trace]);
     assert!(figures.iter().any(|f| f.name == "telemetry"));
     let page = document(&source(EVIL), &details, &a, &figures);
@@ -283,8 +289,14 @@ fn what_was_changed_after_the_study_began_is_not_called_stated_beforehand() {
         exclude: vec![Exclusion::ConstantRater],
         realistic_from: Some(4.0),
         deviations: vec![
-            format!("{because}exclusion rules: none → constant-rater"),
-            format!("{because}realistic_from: 5 → 4"),
+            Deviation {
+                text: format!("{because}exclusion rules: none → constant-rater"),
+                of: &[Stated::Exclusions],
+            },
+            Deviation {
+                text: format!("{because}realistic_from: 5 → 4"),
+                of: &[Stated::RealisticFrom],
+            },
         ],
         ..Rules::default()
     };

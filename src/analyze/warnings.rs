@@ -2,7 +2,7 @@
 
 use super::Rules;
 use super::cells::Cells;
-use super::deviation::{Stated, touches};
+use super::deviation::Stated;
 use super::exclude::Applied;
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
@@ -60,7 +60,7 @@ pub(super) fn warnings(
     for change in &rules.deviations {
         warn(
             "deviation",
-            format!("deviation from what was stated beforehand: {change}"),
+            format!("deviation from what was stated beforehand: {}", change.text),
         );
     }
     if counts.participants == 1 && counts.rated > 0 {
@@ -71,7 +71,7 @@ pub(super) fn warnings(
                 .to_owned(),
         );
     }
-    let changed = touches(&rules.deviations, Stated::Exclusions);
+    let changed = (rules.deviations.iter()).any(|d| d.of.contains(&Stated::Exclusions));
     excluded(&mut warn, exclusions, changed, values);
     headline(&mut warn, values);
     design(&mut warn, cells, values);

@@ -7,7 +7,7 @@ mod waiting;
 
 use super::load::Loaded;
 use super::{Console, Failure, results};
-use crate::analyze::{self, Analysis, Include, Rules, Warning};
+use crate::analyze::{self, Analysis, Deviation, Include, Rules, Warning};
 use crate::outcome::ratings::Ratings;
 use crate::protocol::Protocol;
 use crate::report::figures::Trace;
@@ -303,7 +303,7 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
 }
 
 /// What each later version of the protocol changed of the analysis.
-fn deviations(study: &StudyFolder) -> Result<Vec<String>, Failure> {
+fn deviations(study: &StudyFolder) -> Result<Vec<Deviation>, Failure> {
     let mut said = Vec::new();
     let mut before: Option<Protocol> = None;
     let versions = &study.manifest().versions;
@@ -311,13 +311,15 @@ fn deviations(study: &StudyFolder) -> Result<Vec<String>, Failure> {
         let after = results::frozen_version(study, version.version)?.protocol;
         if let Some(before) = &before {
             let changes = analyze::deviations(before, &after);
-            said.extend(changes.into_iter().map(|change| {
-                format!(
-                    "protocol {} of {}, because \"{}\": {change}",
+            said.extend(changes.into_iter().map(|change| Deviation {
+                text: format!(
+                    "protocol {} of {}, because \"{}\": {}",
                     version.version,
                     version.at.format("%Y-%m-%d"),
-                    version.reason
-                )
+                    version.reason,
+                    change.text
+                ),
+                ..change
             }));
         }
         before = Some(after);

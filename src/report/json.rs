@@ -51,7 +51,7 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
                 "participants": e.participants,
                 "problem": e.problem,
             })).collect::<Vec<_>>(),
-        "deviations": analysis.deviations,
+        "deviations": analysis.deviations.iter().map(|d| &d.text).collect::<Vec<_>>(),
         "counts": {
             "rows": c.rows,
             "rated": c.rated,

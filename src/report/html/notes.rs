@@ -95,7 +95,7 @@ fn stated(a: &Analysis) -> Markup {
             p { "No rule of the analysis was changed after the study began." }
         } @else {
             h3 { "Deviations from what was stated beforehand" }
-            ul { @for d in &a.deviations { li { (safe(d)) } } }
+            ul { @for d in &a.deviations { li { (safe(&d.text)) } } }
         }
     }
 }
