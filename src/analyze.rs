@@ -309,7 +309,7 @@ fn rows(ratings: &Ratings, keep: impl Fn(usize) -> bool) -> Cow<'_, Ratings> {
 /// Writes a group of statistics.
 type Group = fn(&Cells<'_>, &Rules, &mut Values);
 
-/// Groups that need nothing of each other, the longest first.
+/// Groups that need nothing of each other; those that take long for large tables first.
 const GROUPS: [Group; 10] = [
     order::order,
     vaf::against_vaf,

@@ -30,6 +30,9 @@ impl std::fmt::Debug for Console {
     }
 }
 
+/// Nobody wants a bar for work that takes less.
+pub(super) const PATIENCE: std::time::Duration = std::time::Duration::from_secs(1);
+
 /// A progress bar on standard error, only on a terminal and only for work that
 /// takes over a second.
 pub(super) fn progress(length: u64, unit: &'static str) -> indicatif::ProgressBar {

@@ -1,12 +1,9 @@
 //! A file that is being read, with a bar once that has taken a second.
 
-use super::super::console::progress;
+use super::super::console::{PATIENCE, progress};
 use indicatif::ProgressBar;
 use std::io::{self, Read};
-use std::time::{Duration, Instant};
-
-/// Nobody wants a bar for less.
-const PATIENCE: Duration = Duration::from_secs(1);
+use std::time::Instant;
 
 /// Passes reads on and counts the bytes.
 pub(super) struct Watched<R> {

@@ -1,15 +1,12 @@
 //! An analysis with a bar once it has taken a second.
 
-use super::super::console::progress;
+use super::super::console::{PATIENCE, progress};
 use crate::analyze::{Analysis, Progress, Rules, analyze_watched};
 use crate::outcome::ratings::Ratings;
 use std::io::IsTerminal as _;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
-
-/// Nobody wants a bar for less.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Between two looks at how far it is.
 const LOOK: Duration = Duration::from_millis(200);
