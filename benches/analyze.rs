@@ -5,9 +5,9 @@
 //! writes such a table for timing the whole program.
 
 use std::io::{BufWriter, Write};
-use study::analyze::{Rules, analyze};
-use study::outcome::ratings::Ratings;
-use study::rng::Stream;
+use study_base::rng::Stream;
+use study_core::analyze::{Rules, analyze};
+use study_core::outcome::ratings::Ratings;
 
 fn main() -> std::io::Result<()> {
     let args: Vec<String> = std::env::args().collect();

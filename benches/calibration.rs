@@ -16,11 +16,11 @@
 
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use study::analyze::{Rules, Values, analyze};
-use study::outcome::ratings::Ratings;
-use study::rng::Stream;
-use study::stats::correlation::{kendall, pearson, spearman};
-use study::stats::rank::doubled_ranks;
+use study_base::rng::Stream;
+use study_core::analyze::{Rules, Values, analyze};
+use study_core::outcome::ratings::Ratings;
+use study_stats::correlation::{kendall, pearson, spearman};
+use study_stats::rank::doubled_ranks;
 
 const SUBJECTS: u32 = 10;
 const MODELS: u32 = 5;

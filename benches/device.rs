@@ -2,17 +2,17 @@
 
 use divan::{Bencher, black_box};
 use std::time::Duration;
-use study::device::core::{Core, Rendering, Settings, State};
 use study::device::firmware::{self, Firmware};
 use study::device::virtual_device::{Options, VirtualDevice};
-use study::device::wire::{
+use study::device::{Device, Report, Stimulus};
+use study::rater::Impression;
+use study_base::limits::{Limit, Limits};
+use study_haptics::model::{Branch, Realization, Trained};
+use study_wire::message::{
     Commit, Few, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, TableCrc,
 };
-use study::device::{Device, Report, Stimulus};
-use study::limits::{Limit, Limits};
-use study::model::predict::{Direction, Lookup, Motion};
-use study::model::{Branch, Realization, Trained};
-use study::rater::Impression;
+use study_wire::predict::{Direction, Lookup, Motion};
+use study_wire::servo::{Core, Rendering, Settings, State};
 
 fn main() {
     divan::main();

@@ -12,15 +12,15 @@ mod switches;
 
 use std::fs::File;
 use std::io::BufReader;
-use study::identify::method::{
+use study_base::rng::Stream;
+use study_haptics::identify::method::{
     Delta, Ewls, Hat, Segments, Sort, Start, State, TwoSided, Width, Window,
 };
-use study::identify::resample::Resample;
-use study::identify::{Method, Training, vaf};
-use study::model::predict::{Direction, Lookup};
-use study::plant::Parameters;
-use study::recording::{self, Recording};
-use study::rng::Stream;
+use study_haptics::identify::resample::Resample;
+use study_haptics::identify::{Method, Training, vaf};
+use study_haptics::plant::Parameters;
+use study_haptics::recording::{self, Recording};
+use study_wire::predict::{Direction, Lookup};
 
 const DX_MM: f64 = 0.5;
 const SWITCHES: u64 = 12;

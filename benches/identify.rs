@@ -8,12 +8,12 @@
 //! other programs on the machine take does not count.
 
 use std::fmt::Write as _;
-use study::identify::grid::{self, Plan};
-use study::identify::lanes::Processor;
-use study::identify::resample::Resample;
-use study::identify::{Training, vaf};
-use study::model::predict::Lookup;
-use study::recording::{self, Recording};
+use study_haptics::identify::grid::{self, Plan};
+use study_haptics::identify::lanes::Processor;
+use study_haptics::identify::resample::Resample;
+use study_haptics::identify::{Training, vaf};
+use study_haptics::recording::{self, Recording};
+use study_wire::predict::Lookup;
 
 const LAMBDAS: [f64; 10] = [
     0.999, 0.9991, 0.9992, 0.9993, 0.9994, 0.9995, 0.9996, 0.9997, 0.9998, 0.9999,

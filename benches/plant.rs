@@ -1,8 +1,8 @@
 //! How long a recording of a minute takes on the simulated probe.
 
 use divan::{Bencher, black_box};
-use study::plant::{Parameters, Probe};
-use study::trajectory::{Trajectory, file};
+use study_haptics::plant::{Parameters, Probe};
+use study_haptics::trajectory::{Trajectory, file};
 
 fn main() {
     divan::main();

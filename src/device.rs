@@ -11,11 +11,8 @@
 //! the lab's, [`manual`] an experimenter who mounts samples.
 
 pub mod check;
-pub mod core;
 pub mod faults;
 pub mod firmware;
-pub mod frame;
-pub mod handler;
 pub mod host;
 pub mod link;
 pub mod manual;
@@ -24,12 +21,11 @@ pub mod process;
 pub mod serial;
 pub mod table;
 pub mod virtual_device;
-pub mod wire;
 
-use crate::limits::Limits;
-use crate::model::Realization;
-use crate::outcome::{Playback, Sample};
 use std::time::Duration;
+use study_base::limits::Limits;
+use study_core::outcome::{Playback, Sample};
+use study_haptics::model::Realization;
 
 /// Who a device is and what it can do.
 #[derive(Debug, Clone, PartialEq)]

@@ -44,25 +44,9 @@
 //! * `lambda`: forgetting factor; `dx`: resampling increment; `m`, `b`, `k`, `F0`:
 //!   mass, damping, stiffness, offset force. The paper's symbols.
 
-pub mod analyze;
 pub mod cli;
 pub mod device;
-pub mod diagnostic;
-pub mod identify;
-pub mod limits;
-pub mod model;
-pub mod outcome;
-pub mod plant;
-pub mod protocol;
 pub mod rater;
-pub mod recording;
 pub mod report;
-pub mod rng;
 pub mod runner;
-pub mod schedule;
-pub mod session;
-pub mod stats;
-pub mod store;
-pub mod text;
-pub mod trajectory;
 pub mod tui;

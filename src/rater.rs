@@ -19,8 +19,8 @@ mod words;
 
 pub use impression::Impression;
 
-use crate::protocol::{Answer, Question, QuestionKind};
-use crate::rng::Stream;
+use study_base::rng::Stream;
+use study_core::protocol::{Answer, Question, QuestionKind};
 
 /// Whether ratings depend on the realization.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -174,9 +174,9 @@ impl Rater {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::text::QuestionId;
     use proptest::prelude::*;
     use std::collections::BTreeMap;
+    use study_base::text::QuestionId;
 
     fn question(id: &str, required: bool, kind: QuestionKind) -> Question {
         Question {

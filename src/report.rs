@@ -31,7 +31,7 @@ pub struct Source {
 
 /// The permutation p of a correlation over realizations (`pearson`, `spearman`,
 /// `kendall`), with how it was found: from all orders, or from random ones.
-fn permuted(a: &crate::analyze::Analysis, name: &str) -> Option<(&'static str, f64)> {
+fn permuted(a: &study_core::analyze::Analysis, name: &str) -> Option<(&'static str, f64)> {
     let get = |id: &str| a.values.number(&format!("corr/{name}/{id}"));
     let exact = get("p_exact_two_sided").map(|p| ("exact p", p));
     exact.or_else(|| get("p_monte_carlo_two_sided").map(|p| ("permutation p", p)))
@@ -39,9 +39,9 @@ fn permuted(a: &crate::analyze::Analysis, name: &str) -> Option<(&'static str, f
 
 /// How many of the realizations behind the correlation have a mean that another
 /// one has, too.
-fn tied(a: &crate::analyze::Analysis) -> usize {
-    let of = |m: &&crate::analyze::Listed| {
-        let own = m.role == crate::outcome::Role::Test && m.duplicate_of.is_none();
+fn tied(a: &study_core::analyze::Analysis) -> usize {
+    let of = |m: &&study_core::analyze::Listed| {
+        let own = m.role == study_core::outcome::Role::Test && m.duplicate_of.is_none();
         let id = format!("desc/{}/subject_mean/mean", m.id);
         m.vaf.filter(|_| own).and(a.values.number(&id))
     };
@@ -57,9 +57,9 @@ const MAX_PAIRED: usize = 8;
 
 /// Pairs that were compared, by name, and the least p that Wilcoxon's test and
 /// Holm's correction could have given the clearest of them.
-fn pairs(a: &crate::analyze::Analysis) -> (Vec<(String, String)>, Option<f64>) {
-    let own = |m: &&crate::analyze::Listed| {
-        m.role == crate::outcome::Role::Test && m.duplicate_of.is_none()
+fn pairs(a: &study_core::analyze::Analysis) -> (Vec<(String, String)>, Option<f64>) {
+    let own = |m: &&study_core::analyze::Listed| {
+        m.role == study_core::outcome::Role::Test && m.duplicate_of.is_none()
     };
     let tests = a.realizations.iter().filter(own);
     let ids: Vec<&str> = tests.map(|m| m.id.as_str()).collect();
@@ -85,7 +85,7 @@ fn pairs(a: &crate::analyze::Analysis) -> (Vec<(String, String)>, Option<f64>) {
 }
 
 /// `one of 8 participants`: those who rated every realization.
-fn complete(a: &crate::analyze::Analysis) -> String {
+fn complete(a: &study_core::analyze::Analysis) -> String {
     let get = |id: &str| a.values.number(&format!("design/{id}")).unwrap_or(0.0);
     let who = match get("n_subjects_complete") {
         0.0 => "none".to_owned(),
@@ -99,10 +99,10 @@ fn complete(a: &crate::analyze::Analysis) -> String {
 
 /// What r hangs on: the one realization without which all means or all VAF are
 /// equal, as a sentence. Names in it are untrusted.
-fn hangs_on(a: &crate::analyze::Analysis) -> Option<String> {
+fn hangs_on(a: &study_core::analyze::Analysis) -> Option<String> {
     a.values.number("corr/pearson/r")?;
     let points: Vec<(&str, f64, f64)> = (a.realizations.iter())
-        .filter(|m| m.role == crate::outcome::Role::Test && m.duplicate_of.is_none())
+        .filter(|m| m.role == study_core::outcome::Role::Test && m.duplicate_of.is_none())
         .filter_map(|m| {
             let mean = a
                 .values
@@ -128,15 +128,15 @@ fn hangs_on(a: &crate::analyze::Analysis) -> Option<String> {
 }
 
 /// Whether the realizations are known to be identified with forgetting factors.
-fn identified(a: &crate::analyze::Analysis) -> bool {
+fn identified(a: &study_core::analyze::Analysis) -> bool {
     a.values.get("covariate/log10_memory/r").is_some()
 }
 
 /// Why the smallest p is no smaller, if realizations share a VAF.
-fn shared_vaf(a: &crate::analyze::Analysis) -> Option<String> {
-    let own = |m: &&crate::analyze::Listed| {
+fn shared_vaf(a: &study_core::analyze::Analysis) -> Option<String> {
+    let own = |m: &&study_core::analyze::Listed| {
         let mean = format!("desc/{}/subject_mean/mean", m.id);
-        m.role == crate::outcome::Role::Test
+        m.role == study_core::outcome::Role::Test
             && m.duplicate_of.is_none()
             && a.values.number(&mean).is_some()
     };
@@ -156,7 +156,7 @@ fn shared_vaf(a: &crate::analyze::Analysis) -> Option<String> {
 }
 
 /// Why there is no p of a pair of realizations, `first` before `second` by name.
-fn no_pairs(a: &crate::analyze::Analysis, first: &str, second: &str) -> String {
+fn no_pairs(a: &study_core::analyze::Analysis, first: &str, second: &str) -> String {
     let why = a.values.reason(&format!("posthoc/{first}|{second}/p_t"));
     match (a.values.number("design/n_subjects_complete"), why) {
         (Some(n), Some(why)) if n >= 2.0 => format!("not tested: {why}"),
@@ -172,10 +172,10 @@ fn no_pairs(a: &crate::analyze::Analysis, first: &str, second: &str) -> String {
 
 /// Why equivalence with a reference was not tested, by the identifier of the
 /// contrast; `None` if it was.
-fn no_equivalence(a: &crate::analyze::Analysis, contrast: &str) -> Option<String> {
+fn no_equivalence(a: &study_core::analyze::Analysis, contrast: &str) -> Option<String> {
     let why = a.values.reason(&format!("{contrast}/p_tost"))?;
     let margin = a.values.number(&format!("{contrast}/margin"));
-    let changed = a.changed(crate::analyze::Stated::Margin);
+    let changed = a.changed(study_core::analyze::Stated::Margin);
     Some(match margin {
         None if changed => {
             "the margin of equivalence was taken back after the study began: see Deviations"
@@ -196,7 +196,7 @@ struct MixedF {
 
 /// That of the realizations over all ratings, where too few subjects are complete for
 /// the tests that need complete tables.
-fn mixed_f(a: &crate::analyze::Analysis) -> Option<MixedF> {
+fn mixed_f(a: &study_core::analyze::Analysis) -> Option<MixedF> {
     let get = |id: &str| a.values.number(&format!("lmm_model/satterthwaite_{id}"));
     let complete = ["rmanova/p_gg", "friedman/p"];
     if complete.iter().any(|id| a.values.number(id).is_some()) {
@@ -211,7 +211,7 @@ fn mixed_f(a: &crate::analyze::Analysis) -> Option<MixedF> {
 }
 
 /// The question as a noun. Untrusted.
-fn asked(a: &crate::analyze::Analysis) -> String {
+fn asked(a: &study_core::analyze::Analysis) -> String {
     match a.question.as_str() {
         "rating" => "the rating".to_owned(),
         other => other.to_owned(),

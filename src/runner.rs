@@ -14,20 +14,20 @@ pub mod rehearsal;
 pub mod saver;
 
 use crate::device::{Device, Report, Stimulus, manual};
-use crate::limits::Limits;
-use crate::model::Realization;
-use crate::outcome::{Event, Moment};
-use crate::protocol::fingerprint::Fingerprints;
-use crate::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol};
-use crate::session::{Effect, Ending, Input, Session, View, input::Claim};
-use crate::store::{ClaimRequest, SeatKind, StudyFolder};
-use crate::text::{ModelId, ParticipantId};
 use clock::Clock;
 use saver::{Job, Saver, Word};
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
+use study_base::limits::Limits;
+use study_base::text::{ModelId, ParticipantId};
+use study_core::outcome::{Event, Moment};
+use study_core::protocol::fingerprint::Fingerprints;
+use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol};
+use study_core::session::{Effect, Ending, Input, Session, View, input::Claim};
+use study_core::store::{ClaimRequest, SeatKind, StudyFolder};
+use study_haptics::model::Realization;
 
 /// Longest wait for an input while nothing is expected: clocks move on screen.
 const IDLE: Duration = Duration::from_millis(100);
@@ -124,7 +124,7 @@ pub struct Runner {
 
 impl Runner {
     /// Opens a session; nothing is claimed yet.
-    pub fn new(setup: Setup, config: crate::session::Config) -> Self {
+    pub fn new(setup: Setup, config: study_core::session::Config) -> Self {
         let at = setup.clock.now();
         let (session, effects) =
             Session::new(setup.protocol.clone(), setup.orders.clone(), config, at);

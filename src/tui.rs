@@ -9,7 +9,7 @@
 //! has gone away.
 //!
 //! Text of others (protocol, comments, the device's words) passes through
-//! [`crate::text::Untrusted`] in [`wrap`] before it reaches a cell.
+//! [`study_base::text::Untrusted`] in [`wrap`] before it reaches a cell.
 
 pub mod draft;
 pub mod editor;
@@ -26,9 +26,9 @@ pub use surface::Surface;
 pub use theme::Colour;
 
 use crate::runner::{Operator, OperatorError, Strip};
-use crate::session::{Input, Screen, View};
 use crossterm::event::{Event, MouseEventKind};
 use std::time::{Duration, Instant};
+use study_core::session::{Input, Screen, View};
 use terminal::Terminal;
 
 /// How a terminal is used.

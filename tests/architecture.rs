@@ -1,11 +1,13 @@
-//! The walls of the house: who may import whom, and how long a file may be.
+//! The walls of the house: who may import whom, no circle of files, how long a
+//! file may be. docs/architecture.md has the picture.
 //!
-//! The table is design.md's. Imports are found as `crate::name` anywhere in a
-//! file of `src/`, doc comments and strings left out.
+//! Cargo holds the walls between crates; here stand which crates those are and what
+//! Cargo cannot see: the layers inside a crate, circles, and who touches files,
+//! clocks and terminals.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -13,72 +15,112 @@ const MAX_LINES: usize = 600;
 /// main.rs parses, runs, reports.
 const MAX_MAIN_LINES: usize = 30;
 
-/// Layer 0, open to all.
-const OPEN: [&str; 4] = ["rng", "text", "limits", "diagnostic"];
+/// Crate → the crates of this workspace that it may depend on, then those that only
+/// its tests may.
+const CRATES: [(&str, &[&str], &[&str]); 7] = [
+    ("study-base", &[], &[]),
+    ("study-wire", &[], &[]),
+    ("study-stats", &[], &["study-base"]),
+    ("study-haptics", &["study-base", "study-wire"], &[]),
+    ("study-core", &["study-base", "study-stats"], &[]),
+    (
+        "study",
+        &[
+            "study-base",
+            "study-core",
+            "study-haptics",
+            "study-stats",
+            "study-wire",
+        ],
+        &[],
+    ),
+    ("study-firmware", &["study-wire"], &[]),
+];
 
-/// Module → what it may import beyond layer 0.
-fn allowed() -> BTreeMap<&'static str, &'static [&'static str]> {
-    let all: &[&str] = &["*"];
-    BTreeMap::from([
-        ("rng", &[] as &[&str]),
-        ("text", &[]),
-        ("limits", &[]),
-        ("diagnostic", &[]),
-        ("protocol", &[]),
-        ("model", &[]),
-        ("trajectory", &[]),
-        ("recording", &[]),
-        ("stats", &[]),
-        ("schedule", &["protocol"]),
-        ("outcome", &["protocol"]),
-        ("plant", &["model", "trajectory"]),
-        ("identify", &["model", "recording", "stats"]),
-        ("session", &["protocol", "schedule", "outcome"]),
-        ("store", &["protocol", "schedule", "outcome", "model"]),
-        (
+/// Module → the modules that it may import. `study-base` is open to all who depend
+/// on it; `study-stats` and `study-wire` count as one module each.
+const IMPORTS: [(&str, &[&str]); 21] = [
+    ("diagnostic", &["text"]),
+    ("schedule", &["protocol"]),
+    ("outcome", &["protocol"]),
+    ("session", &["protocol", "schedule", "outcome"]),
+    ("store", &["protocol", "outcome"]),
+    ("analyze", &["protocol", "outcome", "stats"]),
+    ("model", &["wire"]),
+    ("plant", &["trajectory", "wire"]),
+    ("identify", &["model", "recording", "wire"]),
+    ("device", &["outcome", "model", "plant", "wire"]),
+    ("rater", &["protocol", "model", "plant", "wire"]),
+    (
+        "runner",
+        &[
+            "session", "device", "store", "outcome", "protocol", "model", "rater",
+        ],
+    ),
+    (
+        "report",
+        &[
+            "analyze",
+            "stats",
+            "identify",
+            "model",
+            "outcome",
+            "recording",
+        ],
+    ),
+    ("tui", &["runner", "session", "outcome", "protocol"]),
+    (
+        "cli",
+        &[
+            "analyze",
             "device",
-            &["outcome", "model", "plant", "trajectory", "recording"],
-        ),
-        ("rater", &["protocol", "outcome", "model", "plant"]),
-        ("analyze", &["protocol", "outcome", "stats", "model"]),
-        (
-            "runner",
-            &[
-                "session", "device", "store", "schedule", "outcome", "protocol", "model", "rater",
-            ],
-        ),
-        (
+            "identify",
+            "model",
+            "outcome",
+            "plant",
+            "protocol",
+            "rater",
+            "recording",
             "report",
-            &[
-                "analyze",
-                "stats",
-                "identify",
-                "model",
-                "outcome",
-                "recording",
-            ],
-        ),
-        (
-            "power",
-            &[
-                "protocol", "schedule", "outcome", "analyze", "stats", "rater", "model",
-            ],
-        ),
-        ("tui", &["runner", "session", "outcome", "protocol"]),
-        ("cli", all),
-        ("main", all),
-    ])
-}
+            "runner",
+            "schedule",
+            "session",
+            "stats",
+            "store",
+            "trajectory",
+            "tui",
+            "wire",
+        ],
+    ),
+    ("main", &["cli"]),
+    // between the modules of study-wire
+    ("certificate", &["predict"]),
+    ("message", &["frame", "predict"]),
+    ("servo", &["predict"]),
+    (
+        "handler",
+        &["certificate", "frame", "message", "predict", "servo"],
+    ),
+    ("stats", &[]),
+];
+
+/// Circles that stand and have to go: this list only gets shorter.
+const KNOWN_CIRCLES: [&str; 6] = [
+    "study/cli: circle of results, verify",
+    "study/report/html: circle of answers, methods, prose",
+    "study-core/analyze: circle of exclude, select",
+    "study-core/store: circle of derive, journal, participant, session_folder, sessions, tables, telemetry",
+    "study-haptics/identify: circle of constrained, ewls, lanes, method, resample",
+    "study-haptics/recording: circle of motion, swapped",
+];
 
 /// Modules that may touch files, clocks, terminals, processes or the network.
-const WITH_IO: [&str; 8] = [
+const WITH_IO: [&str; 6] = [
     "store",
     "tui",
     "runner",
     "cli",
-    "main",
     "device/link",
-    "device/serial",
     "device/process",
 ];
 const IO: [&str; 8] = [
@@ -92,143 +134,342 @@ const IO: [&str; 8] = [
     "Utc::now",
 ];
 
-/// Files and modules that use nothing but `core`, `libm`, `crc` and slices.
-const CORE_ONLY: [&str; 6] = [
-    "model/predict.rs",
-    "model/certificate.rs",
-    "device/core",
-    "device/frame",
-    "device/handler",
-    "device/wire",
-];
+/// A file of one of the crates.
+#[derive(Clone)]
+struct Source {
+    /// Such as `study-core`.
+    package: String,
+    /// Path below `src`, such as `store/journal.rs`.
+    file: String,
+    text: String,
+}
 
-fn sources() -> Vec<(String, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+impl Source {
+    fn new(package: &str, file: &str, text: &str) -> Self {
+        Self {
+            package: package.to_owned(),
+            file: file.to_owned(),
+            text: text.to_owned(),
+        }
+    }
+
+    /// Where it is, for messages.
+    fn shown(&self) -> String {
+        format!("{}: {}", self.package, self.file)
+    }
+
+    /// Its module path inside the crate: `store/journal.rs` is store, journal.
+    fn path(&self) -> Vec<&str> {
+        match self.file.trim_end_matches(".rs") {
+            "lib" => Vec::new(),
+            path => path.split('/').collect(),
+        }
+    }
+
+    /// The module of the import table: the first name, but one for all of
+    /// `study-stats`.
+    fn module(&self) -> &str {
+        match self.package.as_str() {
+            "study-stats" => "stats",
+            _ => self.path().first().copied().unwrap_or("lib"),
+        }
+    }
+
+    fn is_test(&self) -> bool {
+        self.path().contains(&"tests")
+    }
+
+    /// The code: without comments and without its tests.
+    fn code(&self) -> String {
+        let own = self.text.split("#[cfg(test)]\nmod tests").next();
+        (own.unwrap_or(&self.text).lines())
+            .map(|line| line.split("//").next().unwrap_or(line))
+            .collect::<Vec<_>>()
+            .join("\n")
+    }
+
+    /// Every path that starts at a crate, `super` or `self`, with the braces of
+    /// `use` multiplied out.
+    fn paths(&self) -> Vec<Vec<String>> {
+        let code = self.code();
+        let mut found = Vec::new();
+        for start in ["crate::", "super::", "self::", "study_", "study::"] {
+            for (at, _) in code.match_indices(start) {
+                let before = code[..at].chars().next_back();
+                if !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':') {
+                    tree(&code[at..], &mut Vec::new(), &mut found);
+                }
+            }
+        }
+        found
+    }
+}
+
+/// The paths of a use tree that begins `text`; returns how far it reaches.
+fn tree(text: &str, prefix: &mut Vec<String>, found: &mut Vec<Vec<String>>) -> usize {
+    let mut at = 0;
+    let depth = prefix.len();
+    loop {
+        let rest = &text[at..];
+        let word: String = rest
+            .chars()
+            .take_while(|c| c.is_alphanumeric() || *c == '_' || *c == '*')
+            .collect();
+        at += word.len();
+        if !word.is_empty() {
+            prefix.push(word);
+        }
+        if !text[at..].starts_with("::") {
+            break;
+        }
+        at += 2;
+        if text[at..].starts_with('{') {
+            at += 1;
+            loop {
+                at += text[at..].len() - text[at..].trim_start().len();
+                if text[at..].starts_with('}') || text[at..].is_empty() {
+                    break;
+                }
+                at += tree(&text[at..], prefix, found).max(1);
+                // what follows an item: `as name`, a comma
+                at += text[at..].find([',', '}']).unwrap_or(text.len() - at);
+                at += usize::from(text[at..].starts_with(','));
+            }
+            prefix.truncate(depth);
+            return at + 1;
+        }
+    }
+    found.push(prefix.clone());
+    prefix.truncate(depth);
+    at
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The folder of a package.
+fn folder(package: &str) -> PathBuf {
+    match package {
+        "study" => root().to_owned(),
+        "study-firmware" => root().join("firmware"),
+        _ => root().join("crates").join(package),
+    }
+}
+
+fn sources() -> Vec<Source> {
     let mut files = Vec::new();
-    let mut folders = vec![root.clone()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).unwrap() {
-            let path: PathBuf = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                let name = path.strip_prefix(&root).unwrap().to_str().unwrap();
-                files.push((name.replace('\\', "/"), fs::read_to_string(&path).unwrap()));
+    for (package, _, _) in CRATES {
+        let src = folder(package).join("src");
+        let mut folders = vec![src.clone()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(&folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|e| e == "rs") {
+                    let name = path.strip_prefix(&src).unwrap().to_str().unwrap();
+                    let text = fs::read_to_string(&path).unwrap();
+                    files.push(Source::new(package, &name.replace('\\', "/"), &text));
+                }
             }
         }
     }
-    files.sort();
-    assert!(files.len() > 20, "the sources were not found");
+    files.sort_by(|a, b| (&a.package, &a.file).cmp(&(&b.package, &b.file)));
+    assert!(files.len() > 300, "the sources were not found");
     files
 }
 
-fn module_of(file: &str) -> &str {
-    file.split('/').next().unwrap().trim_end_matches(".rs")
+/// The module of the import table that a path from a file leads to, if it is
+/// another one.
+fn imported<'a>(from: &'a Source, path: &'a [String]) -> Option<&'a str> {
+    let up = path.iter().take_while(|word| *word == "super").count();
+    let module = match path[0].as_str() {
+        "super" if up == from.path().len() => path.get(up)?.as_str(),
+        "study_base" => return None,
+        "study_stats" => "stats",
+        "study_wire" if from.package != "study-firmware" => "wire",
+        "crate" | "study" | "study_core" | "study_haptics" => path.get(1)?.as_str(),
+        _ => return None,
+    };
+    (from.package != "study-stats" && module != from.module()).then_some(module)
 }
 
-/// The code of a file: without comments and without its tests.
-fn code(text: &str) -> String {
-    let own = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
-    own.lines()
-        .map(|line| line.split("//").next().unwrap_or(line))
-        .collect::<Vec<_>>()
-        .join("\n")
+fn imports() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
+    IMPORTS
+        .iter()
+        .map(|(module, may)| (*module, may.iter().copied().collect()))
+        .collect()
 }
 
-/// Every `crate::name`, also inside `use crate::{a, b::c}`.
-fn imports(text: &str) -> Vec<String> {
-    let code = code(text);
-    let mut found = Vec::new();
-    for (at, _) in code.match_indices("crate::") {
-        let rest = &code[at + "crate::".len()..];
-        if let Some(group) = rest.strip_prefix('{') {
-            let mut depth = 0;
-            let mut word = String::new();
-            for c in group.chars() {
-                match c {
-                    '{' => depth += 1,
-                    '}' if depth == 0 => break,
-                    '}' => depth -= 1,
-                    // the first name of each item is the module
-                    ',' | ':' if depth == 0 => found.push(std::mem::take(&mut word)),
-                    c if depth == 0 && (c.is_alphanumeric() || c == '_') => word.push(c),
-                    _ => {}
-                }
-            }
-            found.push(word);
-        } else {
-            found.push(
-                rest.chars()
-                    .take_while(|c| c.is_alphanumeric() || *c == '_')
-                    .collect(),
-            );
-        }
-    }
-    found
-}
-
-/// What is wrong with a set of files.
-fn violations(files: &[(String, String)]) -> Vec<String> {
-    let allowed = allowed();
+/// What is wrong with single files.
+fn violations(files: &[Source]) -> Vec<String> {
+    let allowed = imports();
+    let known: BTreeSet<&str> = files.iter().map(Source::module).chain(["wire"]).collect();
     let mut wrong = Vec::new();
-    for (file, text) in files {
-        let module = module_of(file);
-        let lines = text.lines().count();
-        let most = if file == "main.rs" {
+    for source in files {
+        let (shown, module) = (source.shown(), source.module());
+        let lines = source.text.lines().count();
+        let most = if source.file == "main.rs" {
             MAX_MAIN_LINES
         } else {
             MAX_LINES
         };
         if lines > most {
-            wrong.push(format!("{file} has {lines} lines, more than {most}"));
+            wrong.push(format!("{shown} has {lines} lines, more than {most}"));
         }
-        if file.ends_with("/mod.rs") {
-            wrong.push(format!("{file}: name.rs + name/, never mod.rs"));
+        if source.file.ends_with("mod.rs") {
+            wrong.push(format!("{shown}: name.rs + name/, never mod.rs"));
         }
-        if file == "lib.rs" {
+        if source.is_test() {
             continue;
         }
-        let Some(may) = allowed.get(module) else {
-            wrong.push(format!(
-                "{file}: module {module} is not in the import table"
-            ));
-            continue;
-        };
-        for import in imports(text) {
-            let fine = import == module
-                || OPEN.contains(&import.as_str())
-                || may.contains(&"*")
-                || may.contains(&import.as_str())
-                // macros and re-exports at the crate root do not exist here
-                || !allowed.contains_key(import.as_str());
-            if !fine {
-                wrong.push(format!("{file} imports {import}"));
+        for path in source.paths() {
+            let Some(import) = imported(source, &path) else {
+                continue;
+            };
+            let may = allowed.get(module).is_some_and(|may| may.contains(import));
+            let open = source.package == "study-base" && import == "text";
+            if known.contains(import) && !may && !open {
+                wrong.push(format!("{shown} imports {import}"));
             }
         }
-        let with_io = WITH_IO.iter().any(|m| {
-            module == *m || file.starts_with(&format!("{m}.")) || file.starts_with(&format!("{m}/"))
-        });
+        let with_io = source.file == "main.rs"
+            || WITH_IO
+                .iter()
+                .any(|m| source.path().join("/").starts_with(m));
         if !with_io {
             for word in IO {
-                if code(text).contains(word) {
-                    wrong.push(format!("{file} uses {word}"));
-                }
-            }
-        }
-        let core_only = CORE_ONLY
-            .iter()
-            .any(|m| file == m || *file == format!("{m}.rs") || file.starts_with(&format!("{m}/")));
-        if core_only {
-            for word in [
-                "std::", "alloc::", "Vec<", "String", "Box<", "format!", "vec!",
-            ] {
-                if code(text).contains(word) {
-                    wrong.push(format!("{file} uses {word}"));
+                if source.code().contains(word) {
+                    wrong.push(format!("{shown} uses {word}"));
                 }
             }
         }
     }
+    wrong.dedup();
     wrong
+}
+
+/// What the tables permit and nobody needs.
+fn unused(files: &[Source]) -> Vec<String> {
+    let mut left = imports();
+    let mut io: BTreeSet<&str> = WITH_IO.into();
+    for source in files.iter().filter(|s| !s.is_test()) {
+        for path in source.paths() {
+            if let Some(import) = imported(source, &path)
+                && let Some(may) = left.get_mut(source.module())
+            {
+                may.remove(import);
+            }
+        }
+        let code = source.code();
+        if IO.iter().any(|word| code.contains(word)) {
+            io.retain(|m| !source.path().join("/").starts_with(m));
+        }
+    }
+    let imports = left
+        .into_iter()
+        .flat_map(|(module, may)| may.into_iter().map(move |m| (module, m)))
+        .map(|(module, may)| format!("{module} may import {may} and does not"));
+    let io = io
+        .into_iter()
+        .map(|m| format!("{m} may do input and output and does not"));
+    imports.chain(io).collect()
+}
+
+/// Circles among the children of each folder. A child is a file with the folder of
+/// its name; what a file takes from its own parents and children is no arrow.
+fn circles(files: &[Source]) -> Vec<String> {
+    type Uses = BTreeMap<String, BTreeSet<String>>;
+    // (crate, folder) → child → the children that it uses
+    let mut arrows: BTreeMap<(&str, Vec<String>), Uses> = BTreeMap::new();
+    for source in files.iter().filter(|s| !s.is_test()) {
+        let modules: BTreeSet<Vec<&str>> = files
+            .iter()
+            .filter(|s| s.package == source.package)
+            .map(Source::path)
+            .collect();
+        let own = source.path();
+        for path in source.paths() {
+            let mut at: Vec<&str> = match path[0].as_str() {
+                "crate" => Vec::new(),
+                "super" | "self" => own.clone(),
+                _ => continue,
+            };
+            for word in &path {
+                match word.as_str() {
+                    "crate" | "self" => {}
+                    "super" => drop(at.pop()),
+                    word => {
+                        at.push(word);
+                        if !modules.contains(&at) {
+                            at.pop();
+                            break;
+                        }
+                    }
+                }
+            }
+            let common = own.iter().zip(&at).take_while(|(a, b)| a == b).count();
+            if let (Some(from), Some(to)) = (own.get(common), at.get(common)) {
+                let folder = own[..common].iter().map(|s| (*s).to_owned()).collect();
+                (arrows.entry((&source.package, folder)).or_default())
+                    .entry((*from).to_owned())
+                    .or_default()
+                    .insert((*to).to_owned());
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for ((package, folder), uses) in arrows {
+        // What no child within the rest uses, and what uses no child within the
+        // rest, is on no circle.
+        let mut rest: BTreeSet<&String> = uses.keys().collect();
+        loop {
+            let on_circle = |child: &String| {
+                let ahead = uses[child].iter().any(|to| rest.contains(to));
+                ahead && rest.iter().any(|from| uses[*from].contains(child))
+            };
+            let kept: BTreeSet<&String> = rest.iter().copied().filter(|c| on_circle(c)).collect();
+            if kept.len() == rest.len() {
+                break;
+            }
+            rest = kept;
+        }
+        if !rest.is_empty() {
+            let names: Vec<&str> = rest.iter().map(|s| s.as_str()).collect();
+            let place = [&[package.to_owned()], folder.as_slice()]
+                .concat()
+                .join("/");
+            found.push(format!("{place}: circle of {}", names.join(", ")));
+        }
+    }
+    found
+}
+
+/// The crates of this workspace in a section of a manifest.
+fn dependencies(manifest: &toml::Table, section: &str) -> BTreeSet<String> {
+    let Some(table) = manifest.get(section).and_then(toml::Value::as_table) else {
+        return BTreeSet::new();
+    };
+    let names = table.keys().filter(|k| k.starts_with("study"));
+    names.cloned().collect()
+}
+
+#[test]
+fn crates_depend_on_what_the_table_says() {
+    for (package, normal, in_tests) in CRATES {
+        let text = fs::read_to_string(folder(package).join("Cargo.toml")).unwrap();
+        let manifest: toml::Table = text.parse().unwrap();
+        let expected = |names: &[&str]| names.iter().map(|s| (*s).to_owned()).collect();
+        let normal: BTreeSet<String> = expected(normal);
+        assert_eq!(dependencies(&manifest, "dependencies"), normal, "{package}");
+        let in_tests: BTreeSet<String> = expected(in_tests);
+        assert_eq!(
+            dependencies(&manifest, "dev-dependencies"),
+            in_tests,
+            "{package}"
+        );
+    }
 }
 
 #[test]
@@ -238,42 +479,109 @@ fn every_module_imports_only_what_the_table_allows() {
 }
 
 #[test]
+fn every_permission_is_used() {
+    let unused = unused(&sources());
+    assert!(unused.is_empty(), "{}", unused.join("\n"));
+}
+
+#[test]
+fn no_folder_has_a_circle_of_files() {
+    let mut found = circles(&sources());
+    found.retain(|c| !KNOWN_CIRCLES.contains(&c.as_str()));
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
 fn a_planted_violation_is_found() {
-    let planted = |file: &str, text: &str| violations(&[(file.to_owned(), text.to_owned())]);
-    assert_eq!(
-        planted("session.rs", "use crate::device::Device;\n"),
-        ["session.rs imports device"]
-    );
-    assert_eq!(
-        planted(
+    let planted = |package: &str, file: &str, text: &str| {
+        let mut files = sources();
+        let before: BTreeSet<String> = violations(&files).into_iter().collect();
+        files.push(Source::new(package, file, text));
+        let mut found = violations(&files);
+        found.retain(|v| !before.contains(v));
+        found
+    };
+    for (package, file, text, expected) in [
+        (
+            "study",
             "tui/views/x.rs",
-            "use crate::{outcome::Place, store::{Journal, x}};\n"
+            "use study_core::{outcome::Place, store::{Journal, x}};\n",
+            "study: tui/views/x.rs imports store",
         ),
-        ["tui/views/x.rs imports store"]
-    );
+        (
+            "study",
+            "tui/x.rs",
+            "fn f() { crate::device::g() }\n",
+            "study: tui/x.rs imports device",
+        ),
+        (
+            "study-core",
+            "session/x.rs",
+            "use crate::store::Journal;\n",
+            "study-core: session/x.rs imports store",
+        ),
+        (
+            "study-core",
+            "analyze/x.rs",
+            "fn f() { std::fs::read(\"x\"); }\n",
+            "study-core: analyze/x.rs uses std::fs",
+        ),
+        (
+            "study-core",
+            "session/x.rs",
+            "fn f() { let t = Instant::now(); }\n",
+            "study-core: session/x.rs uses Instant::now",
+        ),
+        (
+            "study-stats",
+            "x.rs",
+            &"\n".repeat(601),
+            "study-stats: x.rs has 601 lines, more than 600",
+        ),
+    ] {
+        assert_eq!(planted(package, file, text), [expected]);
+    }
+    let linked = "/// See [`crate::device`].\n";
+    assert!(planted("study-core", "session/x.rs", linked).is_empty());
+}
+
+#[test]
+fn a_planted_circle_is_found() {
+    let planted = |files: &[(&str, &str)]| {
+        let mut all = sources();
+        let before: BTreeSet<String> = circles(&all).into_iter().collect();
+        all.extend(files.iter().map(|(f, t)| Source::new("study-stats", f, t)));
+        let mut found = circles(&all);
+        found.retain(|v| !before.contains(v));
+        found
+    };
     assert_eq!(
-        planted("tui.rs", "use crate::{outcome, device};\n"),
-        ["tui.rs imports device"]
+        planted(&[
+            ("x.rs", "use super::{y::{Y, Z as W}, rank};\n"),
+            ("y.rs", "fn f() { crate::z::deep::g() }\n"),
+            ("z.rs", "pub mod deep;\n"),
+            ("z/deep.rs", "use super::super::x::X;\n"),
+        ]),
+        ["study-stats: circle of x, y, z"]
     );
-    assert_eq!(
-        planted("analyze.rs", "fn f() { std::fs::read(\"x\"); }\n"),
-        ["analyze.rs uses std::fs"]
+    // a chain and a parent with its child are none
+    let chain = [
+        ("x.rs", "use super::y::Y;\nuse super::rank;\n"),
+        ("y.rs", "pub mod child;\nuse child::C;\n"),
+        ("y/child.rs", "use super::Y;\n"),
+    ];
+    assert!(planted(&chain).is_empty());
+}
+
+#[test]
+fn a_permission_that_nobody_uses_is_found() {
+    // without the terminal's files nobody needs what only they need
+    let mut files = sources();
+    files.retain(|s| s.module() != "tui");
+    let found = unused(&files);
+    assert!(
+        found.contains(&"tui may import session and does not".to_owned()),
+        "{found:?}"
     );
-    assert_eq!(
-        planted("session/clock.rs", "fn f() { let t = Instant::now(); }\n"),
-        ["session/clock.rs uses Instant::now"]
-    );
-    assert_eq!(
-        planted("model/predict.rs", "fn f() -> Vec<f64> { todo() }\n"),
-        ["model/predict.rs uses Vec<"]
-    );
-    assert_eq!(
-        planted("stats/x.rs", &"\n".repeat(601)),
-        ["stats/x.rs has 601 lines, more than 600"]
-    );
-    assert_eq!(
-        planted("stranger.rs", ""),
-        ["stranger.rs: module stranger is not in the import table"]
-    );
-    assert!(planted("session.rs", "/// See [`crate::device`].\n").is_empty());
+    assert!(found.contains(&"tui may do input and output and does not".to_owned()));
 }

@@ -11,24 +11,8 @@
 
 #![no_std]
 
-/// Tables, the force they predict, their certificate.
-#[path = "../../src/model"]
-pub mod model {
-    pub mod certificate;
-    pub mod predict;
-}
-
-/// Servo, frames, messages, handler.
-#[path = "../../src/device"]
-pub mod device {
-    pub mod core;
-    pub mod frame;
-    pub mod handler;
-    pub mod wire;
-}
-
-use device::handler::{Drive, Handler, Measured};
-use device::wire::Fault;
+use study_wire::handler::{Drive, Handler, Measured};
+use study_wire::message::Fault;
 
 /// Room for a table of 512 nodes (36 KiB) and no probe mode. It belongs into a
 /// static, made in place: on a stack it takes 38 KiB.
@@ -78,6 +62,3 @@ pub fn period(device: &mut Device, board: &mut dyn Board) {
         board.drive(Drive::Force(0.0));
     }
 }
-
-#[cfg(test)]
-compile_error!("the tests of these modules are those of study itself");

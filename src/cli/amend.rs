@@ -1,8 +1,8 @@
 //! `study amend`
 
 use super::{Console, Failure, load, results};
-use crate::store::Frozen;
 use std::path::PathBuf;
+use study_core::store::Frozen;
 
 /// Arguments of `study amend`.
 #[derive(Debug, clap::Args)]

@@ -7,19 +7,19 @@ mod waiting;
 
 use super::load::Loaded;
 use super::{Console, Failure, results};
-use crate::analyze::{self, Analysis, Deviation, Include, Rules, Warning};
-use crate::outcome::ratings::Ratings;
-use crate::protocol::Protocol;
 use crate::report::figures::Trace;
 use crate::report::html::Details;
 use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
-use crate::store::{Derived, SessionData, StudyFolder};
-use crate::text::{QuestionId, Untrusted};
 use rayon::prelude::*;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use study_base::text::{QuestionId, Untrusted};
+use study_core::analyze::{self, Analysis, Deviation, Include, Rules, Warning};
+use study_core::outcome::ratings::Ratings;
+use study_core::protocol::Protocol;
+use study_core::store::{Derived, SessionData, StudyFolder};
 
 /// Arguments of `study analyze`.
 #[derive(Debug, clap::Args)]
@@ -276,7 +276,7 @@ fn of_study(
 
 /// The question that was asked for, or the primary one; it has to give numbers.
 fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Failure> {
-    use crate::protocol::QuestionKind as K;
+    use study_core::protocol::QuestionKind as K;
     let id = match asked {
         None => protocol.analysis.primary.clone(),
         Some(id) => QuestionId::new(id).map_err(Failure::input)?,

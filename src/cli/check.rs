@@ -1,12 +1,12 @@
 //! `study check`: every fault of a protocol and of what it names.
 
 use super::{Console, Failure, load};
-use crate::diagnostic::{Findings, Severity};
-use crate::model::Realization;
-use crate::protocol::{DeviceKind, ModelEntry, check};
-use crate::text::{ModelId, Untrusted};
 use serde::Serialize;
 use std::path::PathBuf;
+use study_base::diagnostic::{Findings, Severity};
+use study_base::text::{ModelId, Untrusted};
+use study_core::protocol::{DeviceKind, ModelEntry, check};
+use study_haptics::model::Realization;
 
 /// Arguments of `study check`.
 #[derive(Debug, clap::Args)]
@@ -29,7 +29,7 @@ struct Report<'a> {
     models: Option<usize>,
     trials: Option<usize>,
     minutes: Option<f64>,
-    fingerprints: Option<&'a crate::protocol::fingerprint::Fingerprints>,
+    fingerprints: Option<&'a study_core::protocol::fingerprint::Fingerprints>,
     certificates: Vec<Certified<'a>>,
 }
 

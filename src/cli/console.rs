@@ -1,9 +1,9 @@
 //! Standard output and standard error, and what they can show.
 
 use super::failure::Failure;
-use crate::diagnostic::{Findings, Severity};
-use crate::text::Untrusted;
 use std::io::{self, IsTerminal as _, Write};
+use study_base::diagnostic::{Findings, Severity};
+use study_base::text::Untrusted;
 
 /// Where a command prints. Output goes through [`Console::out`], everything for
 /// the person at the terminal through [`Console::say`].

@@ -8,10 +8,10 @@ mod safety;
 mod simulate;
 
 use super::{Console, Failure, Kind, load};
-use crate::protocol::DeviceKind;
-use crate::text::Untrusted;
 use serialport::SerialPortType;
 use std::path::{Path, PathBuf};
+use study_base::text::Untrusted;
+use study_core::protocol::DeviceKind;
 
 /// Arguments of `study device`.
 #[derive(Debug, clap::Args)]

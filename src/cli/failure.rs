@@ -1,7 +1,7 @@
 //! Why a command failed: decides the exit code and what the user reads.
 
-use crate::diagnostic::Findings;
 use std::fmt;
+use study_base::diagnostic::Findings;
 
 /// What kind of failure; the number is the exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,7 +64,7 @@ impl Failure {
 
     /// A file could not be read or written.
     pub fn file(path: &std::path::Path, error: &std::io::Error) -> Self {
-        let why = crate::store::plain(error);
+        let why = study_core::store::plain(error);
         Self::input(format!("{}: {why}", path.display()))
     }
 

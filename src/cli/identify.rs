@@ -7,13 +7,6 @@ mod output;
 pub(super) use args::Args;
 
 use super::{Console, Failure, Kind};
-use crate::identify::grid::{self, Cell, Plan};
-use crate::identify::signal::{self, Excitation};
-use crate::identify::validation::{self, Ceiling, Validation};
-use crate::identify::{IdentifyError, Training};
-use crate::model::certificate::{Certificate, SERVO_RATES_HZ};
-use crate::recording::{self, Recording};
-use crate::text::Untrusted;
 use args::{AccelerationWord, Named};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
@@ -22,6 +15,13 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+use study_base::text::Untrusted;
+use study_haptics::identify::grid::{self, Cell, Plan};
+use study_haptics::identify::signal::{self, Excitation};
+use study_haptics::identify::validation::{self, Ceiling, Validation};
+use study_haptics::identify::{IdentifyError, Training};
+use study_haptics::recording::{self, Recording};
+use study_wire::certificate::{Certificate, SERVO_RATES_HZ};
 
 /// The filter of [`signal::prepare`], for model files.
 const FILTER: &str = "zero-phase low-pass, Butterworth of 2nd order both ways,";

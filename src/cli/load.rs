@@ -6,16 +6,16 @@
 //! that cannot be made.
 
 use super::Failure;
-use crate::diagnostic::{Fault, Findings};
-use crate::model::Realization;
-use crate::protocol::file::{self, Named, Parsed};
-use crate::protocol::fingerprint::{self, Fingerprints};
-use crate::protocol::{FileOrders, Order, Protocol, check};
-use crate::text::ModelId;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
+use study_base::diagnostic::{Fault, Findings};
+use study_base::text::ModelId;
+use study_core::protocol::file::{self, Named, Parsed};
+use study_core::protocol::fingerprint::{self, Fingerprints};
+use study_core::protocol::{FileOrders, Order, Protocol, check};
+use study_haptics::model::Realization;
 
 mod join;
 
@@ -224,7 +224,7 @@ impl<'f> Others<'f> {
         } else {
             match text_of(&bytes) {
                 Ok(text) => {
-                    let (read, findings) = crate::model::file::parse(&shown, text);
+                    let (read, findings) = study_haptics::model::file::parse(&shown, text);
                     realization = read;
                     findings
                 }

@@ -1,11 +1,11 @@
 //! `study new`: a protocol to start from, or a replication of a study.
 
 use super::{Console, Failure, load};
-use crate::protocol::file;
-use crate::text::Untrusted;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use study_base::text::Untrusted;
+use study_core::protocol::file;
 
 /// What a new study starts from: three realizations of the paper's.
 const PROTOCOL: &str = include_str!("new/protocol.toml");

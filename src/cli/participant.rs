@@ -1,11 +1,11 @@
 //! `study participant`
 
 use super::{Console, Failure, results};
-use crate::outcome::State;
-use crate::store::{StateChange, StateRequest};
-use crate::text::{ParticipantId, counted};
 use clap::ValueEnum;
 use std::path::PathBuf;
+use study_base::text::{ParticipantId, counted};
+use study_core::outcome::State;
+use study_core::store::{StateChange, StateRequest};
 
 /// Arguments of `study participant`.
 #[derive(Debug, clap::Args)]

@@ -8,12 +8,12 @@ use crate::device::process::{HELLO_WITHIN, Opened, Opening, ProcessDevice};
 use crate::device::serial::{BAUD, SerialOpener};
 use crate::device::virtual_device::{Options, VirtualDevice};
 use crate::device::{Device, DeviceError};
-use crate::protocol::{DeviceKind, Protocol};
-use crate::text::Untrusted;
 use crate::tui;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::{Duration, Instant};
+use study_base::text::Untrusted;
+use study_core::protocol::{DeviceKind, Protocol};
 
 /// What a rig has, in the folder that `study` is started in.
 const RIG_FILE: &str = "device.toml";

@@ -11,13 +11,13 @@ use super::trajectory::{
     picture, rate, read_plant, read_trajectory, refuse_to_overwrite, write_file,
 };
 use super::{Console, Failure, Kind};
-use crate::identify::signal::{Excitation, LowPass, delay, difference, excitation};
-use crate::plant::{self, Measured, Parameters, Probe, ProbeError};
-use crate::recording::{self, Columns};
-use crate::text::Untrusted;
-use crate::trajectory::{self, Trajectory};
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use study_base::text::Untrusted;
+use study_haptics::identify::signal::{Excitation, LowPass, delay, difference, excitation};
+use study_haptics::plant::{self, Measured, Parameters, Probe, ProbeError};
+use study_haptics::recording::{self, Columns};
+use study_haptics::trajectory::{self, Trajectory};
 
 /// That of the recordings of the documentation, Hz.
 const FILTER_HZ: f64 = 30.0;

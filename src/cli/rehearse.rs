@@ -5,17 +5,17 @@ use super::{Console, Failure, Kind, load};
 use crate::device::faults::FaultPlan;
 use crate::device::manual::Manual;
 use crate::device::virtual_device::{Options, VirtualDevice};
-use crate::outcome::{State, Status};
-use crate::protocol::{DeviceKind, Seat};
 use crate::rater::{Effect, Impression, Rater};
 use crate::runner::Setup;
 use crate::runner::clock::{Clock as _, VirtualClock};
 use crate::runner::rehearsal::{first_day, run_one};
-use crate::store::{Frozen, SeatKind, StudyFolder};
-use crate::text::ModelId;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use study_base::text::ModelId;
+use study_core::outcome::{State, Status};
+use study_core::protocol::{DeviceKind, Seat};
+use study_core::store::{Frozen, SeatKind, StudyFolder};
 
 /// How likely a playback meets a fault with `--faults`.
 const FAULT_PROBABILITY: f64 = 0.08;

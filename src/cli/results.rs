@@ -3,10 +3,10 @@
 use super::failure::Kind;
 use super::load::{self, Loaded};
 use super::{Console, Failure};
-use crate::outcome::Moment;
-use crate::protocol::question::MAX_TEXT_BYTES;
-use crate::store::{SessionData, StoreError, StudyFolder, layout, plain};
 use std::path::Path;
+use study_core::outcome::Moment;
+use study_core::protocol::question::MAX_TEXT_BYTES;
+use study_core::store::{SessionData, StoreError, StudyFolder, layout, plain};
 
 impl From<StoreError> for Failure {
     fn from(error: StoreError) -> Self {

@@ -3,16 +3,16 @@
 use super::console::shell_command;
 use super::playback::{self, PlaybackArgs, Waiting};
 use super::{Console, Failure, Kind, load};
-use crate::protocol::DeviceKind;
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Runner, Setup};
-use crate::session::{Config, Ending, MAX_OPERATOR};
-use crate::store::{Frozen, SeatKind, StoreError, StudyFolder, layout};
-use crate::text::ParticipantId;
 use crate::tui::{self, Tui};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use study_base::text::ParticipantId;
+use study_core::protocol::DeviceKind;
+use study_core::session::{Config, Ending, MAX_OPERATOR};
+use study_core::store::{Frozen, SeatKind, StoreError, StudyFolder, layout};
 
 /// Arguments of `study run`.
 #[derive(Debug, clap::Args)]
@@ -242,7 +242,7 @@ fn again(args: &Args, participant: &str) -> String {
 fn finish(
     console: &mut Console,
     folder: &std::path::Path,
-    protocol: &crate::protocol::Protocol,
+    protocol: &study_core::protocol::Protocol,
     ending: &Ending,
     again: &str,
 ) -> Result<(), Failure> {

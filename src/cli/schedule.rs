@@ -3,11 +3,11 @@
 mod table;
 
 use super::{Console, Failure, Kind, results};
-use crate::protocol::{FileOrders, Protocol, Seat, Trial};
-use crate::schedule::{Planner, ScheduleError};
-use crate::store::{StudyFolder, layout};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use study_core::protocol::{FileOrders, Protocol, Seat, Trial};
+use study_core::schedule::{Planner, ScheduleError};
+use study_core::store::{StudyFolder, layout};
 
 /// More rows than this at once are taken for a slip of the finger.
 const MAX_ROWS: u32 = 100_000;
@@ -187,12 +187,12 @@ pub(super) fn parse_rows(given: &str) -> Result<RangeInclusive<u32>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::example::protocol;
-    use crate::protocol::{ModelEntry, Order, Role};
-    use crate::text::ModelId;
     use std::cell::RefCell;
     use std::io::Write;
     use std::rc::Rc;
+    use study_base::text::ModelId;
+    use study_core::protocol::example::protocol;
+    use study_core::protocol::{ModelEntry, Order, Role};
 
     #[derive(Clone, Default)]
     struct Shared(Rc<RefCell<Vec<u8>>>);

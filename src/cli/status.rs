@@ -1,11 +1,11 @@
 //! `study status`
 
 use super::{Console, Failure, results};
-use crate::outcome::{ParticipantRow, State};
-use crate::store::{SessionData, StudyFolder, next_row, participants};
-use crate::text::Untrusted;
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use study_base::text::Untrusted;
+use study_core::outcome::{ParticipantRow, State};
+use study_core::store::{SessionData, StudyFolder, next_row, participants};
 
 /// Arguments of `study status`.
 #[derive(Debug, clap::Args)]

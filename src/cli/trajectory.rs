@@ -3,12 +3,12 @@
 pub(super) mod picture;
 
 use super::{Console, Failure};
-use crate::plant::{self, MOST_RATE_HZ, Parameters, Probe};
-use crate::text::Untrusted;
-use crate::trajectory::{Trajectory, check, file, spectrum};
 use std::fs::{self, OpenOptions};
 use std::io::{BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
+use study_base::text::Untrusted;
+use study_haptics::plant::{self, MOST_RATE_HZ, Parameters, Probe};
+use study_haptics::trajectory::{Trajectory, check, file, spectrum};
 
 /// Trajectory and plant files are small.
 const MOST_BYTES: u64 = 1024 * 1024;
@@ -108,7 +108,7 @@ fn page(trajectory: &Trajectory, width: usize) -> String {
     for (heading, of) in [
         (
             "position, mm",
-            (|p| p.x_mm) as fn(crate::trajectory::Point) -> f64,
+            (|p| p.x_mm) as fn(study_haptics::trajectory::Point) -> f64,
         ),
         ("speed, mm/s", |p| p.v_mm_s),
     ] {

@@ -2,9 +2,9 @@
 
 use super::{Console, Failure, results};
 use crate::cli::load::{self, Loaded};
-use crate::store::{Finding, SessionData, StudyFolder, layout};
-use crate::text::{Untrusted, counted};
 use std::path::PathBuf;
+use study_base::text::{Untrusted, counted};
+use study_core::store::{Finding, SessionData, StudyFolder, layout};
 
 /// Arguments of `study verify`.
 #[derive(Debug, clap::Args)]

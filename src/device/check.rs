@@ -10,10 +10,10 @@ mod playing;
 pub(super) mod talk;
 mod uploads;
 
-use super::frame::crc32;
 use super::link::LinkError;
-use super::wire::Identity;
 use std::time::Duration;
+use study_wire::frame::crc32;
+use study_wire::message::Identity;
 use talk::Talk;
 
 /// Largest force that is asked for, N.

@@ -4,8 +4,8 @@
 //! a session's answer to that can be tried out, the simulated one does it on
 //! purpose, at the loads that a plan names or that a seed draws.
 
-use crate::rng::Stream;
 use std::collections::BTreeMap;
+use study_base::rng::Stream;
 
 /// What goes wrong with one load and its playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,15 +13,15 @@
 mod body;
 mod flaw;
 
-use super::core::Settings;
-use super::handler::{Bounds, Drive, Handler, Measured, Profile};
-use super::wire::{Fault, Flags, Loaded, Name, State};
-use crate::limits::{Limit, Limits};
-use crate::plant::{HandParameters, Parameters};
 use body::Body;
 pub use flaw::Flaw;
 use flaw::Tamper;
 use std::time::Duration;
+use study_base::limits::{Limit, Limits};
+use study_haptics::plant::{HandParameters, Parameters};
+use study_wire::handler::{Bounds, Drive, Handler, Measured, Profile};
+use study_wire::message::{Fault, Flags, Loaded, Name, State};
+use study_wire::servo::Settings;
 
 /// Room for a table's nodes.
 pub const MOST_NODES: usize = 1024;

@@ -15,13 +15,13 @@ mod upload;
 
 pub use clock::DeviceClock;
 
-use super::frame::Decoder;
-use super::wire::{self, Heartbeat, Hello, Outcome, Play, Reply, Request, Stop, WireError};
 use super::{DeviceError, Identity, Report, Stimulus};
-use crate::limits::{Limit, Limits};
-use crate::text::{Untrusted, is_unsafe};
 use std::collections::VecDeque;
 use std::time::Duration;
+use study_base::limits::{Limit, Limits};
+use study_base::text::{Untrusted, is_unsafe};
+use study_wire::frame::Decoder;
+use study_wire::message::{self, Heartbeat, Hello, Outcome, Play, Reply, Request, Stop, WireError};
 
 /// How long an answer is waited for before the request is sent again.
 pub const RETRY: Duration = Duration::from_millis(100);
@@ -156,7 +156,7 @@ pub struct Health {
 #[derive(Debug)]
 pub struct Host {
     stage: Stage,
-    identity: Option<wire::Identity>,
+    identity: Option<message::Identity>,
     decoder: Decoder,
     out: Vec<u8>,
     reports: Vec<Report>,
@@ -230,7 +230,7 @@ impl Host {
     }
 
     /// Who the device is, once it has said so.
-    pub fn device(&self) -> Option<&wire::Identity> {
+    pub fn device(&self) -> Option<&message::Identity> {
         self.identity.as_ref()
     }
 
@@ -555,7 +555,7 @@ impl Host {
         self.lose(
             &format!(
                 "it speaks version {version} of the wire format, and this program version {}",
-                wire::VERSION
+                message::VERSION
             ),
             at,
         );
@@ -569,7 +569,7 @@ fn every(servo_hz: f64, telemetry_hz: f64) -> u16 {
 }
 
 /// What a device says of itself, for a session; `None` if it is no device's.
-fn identity(device: &wire::Identity) -> Option<Identity> {
+fn identity(device: &message::Identity) -> Option<Identity> {
     Some(Identity {
         id: name(&device.serial),
         simulated: device.flags.simulated,
@@ -582,7 +582,7 @@ fn identity(device: &wire::Identity) -> Option<Identity> {
 }
 
 /// A device's text, harmless in a file and on a terminal.
-pub fn name(name: &wire::Name) -> String {
+pub fn name(name: &message::Name) -> String {
     let text = String::from_utf8_lossy(name.as_bytes());
     let text: String = text
         .chars()

@@ -10,14 +10,15 @@ pub mod memory;
 pub mod pty;
 
 use super::host::{Health, Host, Settings};
-use super::{Device, DeviceError, Identity, Report, Stimulus, wire};
-use crate::limits::Limits;
-use crate::model::Realization;
+use super::{Device, DeviceError, Identity, Report, Stimulus};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use study_base::limits::Limits;
+use study_haptics::model::Realization;
+use study_wire::message;
 
 /// A link that has ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -87,7 +88,7 @@ struct Shared {
 #[derive(Debug, Clone, Default)]
 pub struct Facts {
     /// As it introduced itself last.
-    pub device: Option<wire::Identity>,
+    pub device: Option<message::Identity>,
     /// The same for a session.
     pub identity: Option<Identity>,
     /// How the link is; brought up to date about once a second.
@@ -206,7 +207,7 @@ fn nonce() -> u32 {
 
 /// Before a device has said who it is; never seen outside.
 fn nobody() -> Identity {
-    let limit = |value| crate::limits::Limit::new(value).expect("a positive constant");
+    let limit = |value| study_base::limits::Limit::new(value).expect("a positive constant");
     Identity {
         id: String::new(),
         simulated: false,
@@ -452,7 +453,7 @@ impl Drop for Keeper {
         if std::thread::panicking()
             && let Some(link) = &mut self.link
         {
-            let _ = link.write(wire::Request::Limp.frame(0).as_bytes());
+            let _ = link.write(message::Request::Limp.frame(0).as_bytes());
         }
     }
 }

@@ -9,12 +9,12 @@
 //! in which only some samples are physical.
 
 use super::{Device, DeviceError, Identity, Report, Stimulus};
-use crate::limits::{Limit, Limits};
-use crate::outcome::Playback;
-use crate::rng::Stream;
-use crate::text::ModelId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
+use study_base::limits::{Limit, Limits};
+use study_base::rng::Stream;
+use study_base::text::ModelId;
+use study_core::outcome::Playback;
 
 /// Codes of three digits that there are, 100 to 999.
 const CODES: u64 = 900;

@@ -6,11 +6,11 @@
 
 use super::check::Wire;
 use super::check::talk::{Broken, Talk};
-use super::wire::{
+use std::time::Duration;
+use study_wire::message::{
     Commit, Few, Happening, Identity, PathBegin, PathChunk, PathCrc, RecordedPoint, Request, State,
     fixed,
 };
-use std::time::Duration;
 
 /// Between two looks at how far it is.
 const LOOK: Duration = Duration::from_millis(50);
@@ -82,7 +82,10 @@ fn follow(
     let crc = upload(talk, path, &x_nm, &device)?;
     let playback = talk.next_playback();
     talk.recorded.clear();
-    talk.done(Request::Record(super::wire::Record { playback, crc }))?;
+    talk.done(Request::Record(study_wire::message::Record {
+        playback,
+        crc,
+    }))?;
     let lasts = Duration::from_secs_f64(path.x_mm.len() as f64 / path.rate_hz);
     let until = talk.now() + lasts + EXTRA;
     loop {

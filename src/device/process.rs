@@ -14,11 +14,11 @@ mod child;
 mod words;
 
 use super::{Device, DeviceError, Identity, Report, Stimulus};
-use crate::limits::Limits;
-use crate::outcome::Playback;
-use crate::text::Untrusted;
 use child::{Running, Why};
 use std::time::{Duration, Instant};
+use study_base::limits::Limits;
+use study_base::text::Untrusted;
+use study_core::outcome::Playback;
 use words::{Hello, Say};
 
 pub use words::FORMAT;

@@ -3,8 +3,8 @@
 //! A device does not trust its host: a table with a hole in it would reach the
 //! motor. This says nothing about how the table feels or whether it is passive.
 
-use crate::model::predict::Direction;
-use crate::model::{Branch, Realization};
+use study_haptics::model::{Branch, Realization};
+use study_wire::predict::Direction;
 
 /// Checks that a table can be evaluated everywhere.
 ///

@@ -14,11 +14,11 @@ use super::faults::{Fate, FaultPlan, Injected};
 use super::firmware::{self, Firmware};
 use super::host::{Health, Host, Settings};
 use super::link::memory::{Line, Noise};
-use super::wire::Fault;
 use super::{Device, DeviceError, Identity, Report, Stimulus};
-use crate::limits::Limits;
-use crate::plant::HandParameters;
 use std::time::Duration;
+use study_base::limits::Limits;
+use study_haptics::plant::HandParameters;
+use study_wire::message::Fault;
 
 /// Each way: about what a USB serial adapter takes.
 const LATENCY: Duration = Duration::from_micros(500);

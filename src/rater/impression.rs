@@ -6,11 +6,11 @@
 //! same motion. Both are smoothed over 21 ms, as the recordings are filtered,
 //! because the target's impacts last a millisecond and no table has them.
 
-use crate::model::Realization;
-use crate::model::predict::{DirectionState, Motion, force_n};
-use crate::plant::{DT_S, HandParameters, Parameters, Target};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
+use study_haptics::model::Realization;
+use study_haptics::plant::{DT_S, HandParameters, Parameters, Target};
+use study_wire::predict::{DirectionState, Motion, force_n};
 
 /// How a realization compares with the target B, of which the shipped ones are. Deterministic.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -195,9 +195,9 @@ fn rate(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::predict::{Direction, Lookup};
-    use crate::model::{Branch, Provenance, Trained};
     use std::collections::BTreeMap;
+    use study_haptics::model::{Branch, Provenance, Trained};
+    use study_wire::predict::{Direction, Lookup};
 
     /// A table of nothing but the given mass and the target's quasi-static force
     /// of each direction, scaled.

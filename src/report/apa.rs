@@ -97,7 +97,7 @@ pub(super) fn capital(text: &str) -> String {
 
 /// A name of at most 60 characters, shortened in the middle.
 pub(super) fn name(text: &str) -> String {
-    super::svg::shortened(&crate::text::Untrusted(text).to_string(), 60)
+    super::svg::shortened(&study_base::text::Untrusted(text).to_string(), 60)
 }
 
 /// Decimals at which a standard error has two digits, at least so many.

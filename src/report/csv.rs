@@ -1,7 +1,7 @@
 //! The tables of `analysis/`, RFC 4180. Text is stored as it was typed.
 
 use super::Source;
-use crate::analyze::{Analysis, Value};
+use study_core::analyze::{Analysis, Value};
 
 /// A file of `analysis/`: name and content.
 #[derive(Debug, Clone, PartialEq, Eq)]

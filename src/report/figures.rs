@@ -11,9 +11,9 @@ mod subjects;
 mod traces;
 
 use super::svg::{Axis, Figure, Look};
-use crate::analyze::{Analysis, Listed};
-use crate::outcome::Role;
 use std::collections::BTreeMap;
+use study_core::analyze::{Analysis, Listed};
+use study_core::outcome::Role;
 
 /// Most realizations, and most subjects, that are drawn one by one.
 pub const MAX_DRAWN: usize = 60;

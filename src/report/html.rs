@@ -18,9 +18,9 @@ mod tables;
 
 use super::Source;
 use super::figures::Drawn;
-use crate::analyze::Analysis;
-use crate::text::Untrusted;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use study_base::text::Untrusted;
+use study_core::analyze::Analysis;
 
 /// What the report says of a study beyond its analysis. All text is untrusted.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -10,10 +10,10 @@
 mod spectrum;
 
 use super::svg::{Axis, ColourBar, Dash, Figure, Look, Mark, Note, PALETTE, Panel, Span, ramp};
-use crate::identify::vaf;
-use crate::model::{Branch, Realization};
-use crate::recording::Recording;
 use std::fmt::Write as _;
+use study_haptics::identify::vaf;
+use study_haptics::model::{Branch, Realization};
+use study_haptics::recording::Recording;
 
 /// Seconds that Fig. 6 shows.
 const SHOWN_S: f64 = 4.0;

@@ -1,8 +1,8 @@
 //! The analysis as one JSON document, `study-analysis/1`, numbers unrounded.
 
 use super::Source;
-use crate::analyze::{Analysis, Value};
 use serde_json::{Map, Value as Json, json};
+use study_core::analyze::{Analysis, Value};
 
 /// The name and version of the document.
 pub const FORMAT: &str = "study-analysis/1";

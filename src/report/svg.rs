@@ -306,7 +306,7 @@ pub fn text_width(text: &str, size: f64) -> f64 {
             _ => 1.02,
         },
     };
-    let shown = crate::text::Untrusted(text).to_string();
+    let shown = study_base::text::Untrusted(text).to_string();
     shown.chars().map(em).sum::<f64>() * size
 }
 
@@ -325,7 +325,7 @@ pub fn fitted(text: &str, size: f64, room: f64) -> String {
 /// third: names of realizations often begin alike.
 /// Characters that are shown as their code count as that.
 pub fn shortened(text: &str, most: usize) -> String {
-    let text = &crate::text::Untrusted(text).to_string();
+    let text = &study_base::text::Untrusted(text).to_string();
     let length = text.chars().count();
     if length <= most {
         return text.to_owned();

@@ -10,10 +10,10 @@ mod layout;
 
 use super::plot::{Axis, bars};
 use super::{Source, apa};
-use crate::analyze::{Analysis, Listed};
-use crate::outcome::Role;
-use crate::text::Untrusted;
 use layout::{Grid, Paint, number, pad, squeezed, wrap};
+use study_base::text::Untrusted;
+use study_core::analyze::{Analysis, Listed};
+use study_core::outcome::Role;
 use unicode_width::UnicodeWidthStr as _;
 
 /// How the page is set.

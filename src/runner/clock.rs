@@ -1,10 +1,10 @@
 //! Time for a runner: the machine's, or a virtual one.
 
-use crate::outcome::Moment;
 use chrono::{DateTime, FixedOffset, Local};
 use std::cell::Cell;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
+use study_core::outcome::Moment;
 
 /// Tells both clocks at once.
 pub trait Clock {

@@ -8,13 +8,13 @@
 
 use super::clock::VirtualClock;
 use super::{Runner, Setup};
-use crate::protocol::{Answer, Question};
 use crate::rater::{Impression, Rater};
-use crate::session::{Config, Ending, Input, Screen, View};
-use crate::text::{ModelId, QuestionId};
 use chrono::{DateTime, FixedOffset};
 use std::collections::BTreeMap;
 use std::time::Duration;
+use study_base::text::{ModelId, QuestionId};
+use study_core::protocol::{Answer, Question};
+use study_core::session::{Config, Ending, Input, Screen, View};
 
 /// How long a rater looks at a screen that asks nothing of it, s.
 const GLANCE_S: f64 = 2.0;
@@ -131,7 +131,9 @@ impl Plan {
                 pass(0.02);
                 Vec::new()
             }
-            Screen::ResumeChoice { .. } => vec![Input::Resume(crate::outcome::Choice::Continue)],
+            Screen::ResumeChoice { .. } => {
+                vec![Input::Resume(study_core::outcome::Choice::Continue)]
+            }
             Screen::Consent { .. } => {
                 pass(GLANCE_S);
                 vec![Input::Consent(true)]

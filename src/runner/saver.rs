@@ -6,11 +6,11 @@
 //! event in doubt into a new segment of the journal. Telemetry that cannot be
 //! written is dropped and told of: no answer waits for it.
 
-use crate::outcome::{Event, Moment, Sample};
-use crate::store::{Journal, SessionFolder, TelemetryWriter};
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
+use study_core::outcome::{Event, Moment, Sample};
+use study_core::store::{Journal, SessionFolder, TelemetryWriter};
 
 /// Something to write.
 #[derive(Debug)]

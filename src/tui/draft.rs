@@ -15,12 +15,12 @@ mod press;
 
 use super::editor::{Editor, Taken};
 use super::keys;
-use crate::outcome::Place;
-use crate::session::{Input, Screen, View};
-use crate::text::QuestionId;
 use crossterm::event::Event;
 use dialog::Dialog;
 use field::Field;
+use study_base::text::QuestionId;
+use study_core::outcome::Place;
+use study_core::session::{Input, Screen, View};
 
 /// The surface's state.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -9,7 +9,7 @@
 
 use super::keys::Key;
 use super::wrap::{self, Line};
-use crate::protocol::question::{MAX_TEXT_BYTES, cut_to_fit};
+use study_core::protocol::question::{MAX_TEXT_BYTES, cut_to_fit};
 use unicode_segmentation::{GraphemeCursor, UnicodeSegmentation as _};
 
 /// A text and the place in it.

@@ -7,11 +7,11 @@ use super::draft::Draft;
 use super::theme::{Colour, Theme};
 use super::views::Page;
 use crate::runner::Strip;
-use crate::session::{Input, Screen, View};
 use crossterm::event::{Event, MouseButton, MouseEventKind};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget as _;
+use study_core::session::{Input, Screen, View};
 
 /// A draft, its look and its size.
 #[derive(Debug, Clone)]

@@ -5,9 +5,9 @@
 //! disguise the order is escaped by [`Untrusted`]. Right-to-left text stays in
 //! the order it is stored in; the terminal turns it round, or not.
 
-use crate::text::{Untrusted, is_unsafe};
 use std::borrow::Cow;
 use std::ops::Range;
+use study_base::text::{Untrusted, is_unsafe};
 use unicode_segmentation::UnicodeSegmentation as _;
 use unicode_width::UnicodeWidthStr as _;
 

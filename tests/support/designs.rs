@@ -1,9 +1,10 @@
 //! Protocols for the tests and benches of the schedule, built without a file.
+#![allow(dead_code, reason = "each test binary uses its own part")]
 
 use std::collections::BTreeMap;
-use study::limits::{Limit, Limits};
-use study::protocol::*;
-use study::text::{ModelId, QuestionId};
+use study_base::limits::{Limit, Limits};
+use study_base::text::{ModelId, QuestionId};
+use study_core::protocol::*;
 
 /// Realizations `A`, `B`, … and nothing beside the design.
 pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol {

@@ -7,10 +7,10 @@
 #![allow(unreachable_pub, reason = "a module of a test and a bench")]
 
 use std::f64::consts::TAU;
-use study::model::predict::Motion;
-use study::plant::{DT_S, Parameters, Target};
-use study::recording::Recording;
-use study::rng::Stream;
+use study_base::rng::Stream;
+use study_haptics::plant::{DT_S, Parameters, Target};
+use study_haptics::recording::Recording;
+use study_wire::predict::Motion;
 
 const STEPS_PER_SAMPLE: u32 = 40;
 /// Ramp at the beginning, not recorded, s.

@@ -1,12 +1,12 @@
 //! `study analyze --possible`: which data can give a printed mean and SD.
 
 use crate::cli::{Console, Failure};
-use crate::stats::possible::{
-    Found, MAX_COUNTED, MAX_N, MAX_SCALE, Over, Printed, Question, possible, sums,
-};
-use crate::text::Untrusted;
 use serde_json::json;
 use std::fmt::Write as _;
+use study_base::text::Untrusted;
+use study_stats::possible::{
+    Found, MAX_COUNTED, MAX_N, MAX_SCALE, Over, Printed, Question, possible, sums,
+};
 
 /// The name and version of the document.
 const FORMAT: &str = "study-possible/1";

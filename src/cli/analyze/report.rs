@@ -1,21 +1,21 @@
 //! What the report says beyond the analysis, and its files.
 
 use super::super::{Failure, Kind};
-use crate::analyze::Analysis;
-use crate::outcome::{ParticipantRow, RatingRow, Status};
-use crate::protocol::{Order, Protocol, QuestionKind};
 use crate::report::Source;
 use crate::report::figures::{self, Drawn, Trace};
 use crate::report::html::{self, Details};
 use crate::report::png::{Painter, PngError};
-use crate::store::{StudyFolder, layout};
-use crate::text::counted;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
+use study_base::text::counted;
+use study_core::analyze::Analysis;
+use study_core::outcome::{ParticipantRow, RatingRow, Status};
+use study_core::protocol::{Order, Protocol, QuestionKind};
+use study_core::store::{StudyFolder, layout};
 
 /// Samples of a playback that are read.
 const MAX_SAMPLES: usize = 200_000;

@@ -1,12 +1,12 @@
 //! An analysis with a bar once it has taken a second.
 
 use super::super::console::{PATIENCE, progress};
-use crate::analyze::{Analysis, Progress, Rules, analyze_watched};
-use crate::outcome::ratings::Ratings;
 use std::io::IsTerminal as _;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
+use study_core::analyze::{Analysis, Progress, Rules, analyze_watched};
+use study_core::outcome::ratings::Ratings;
 
 /// Between two looks at how far it is.
 const LOOK: Duration = Duration::from_millis(200);

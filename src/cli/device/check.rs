@@ -6,10 +6,10 @@ use crate::cli::playback::{COMMISSIONED, COMMISSIONED_FILE, Commissioned, Place,
 use crate::cli::{Console, Failure, Kind};
 use crate::device::check::{self, Commissioning, Verdict};
 use crate::device::host::name;
-use crate::device::wire::Identity;
 use crate::device::{Device as _, process};
-use crate::text::Untrusted;
 use std::path::{Path, PathBuf};
+use study_base::text::Untrusted;
+use study_wire::message::Identity;
 
 /// Arguments of `study device info`.
 #[derive(Debug, clap::Args)]

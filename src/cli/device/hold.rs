@@ -9,13 +9,13 @@ use crate::device::host::Settings;
 use crate::device::link::Threaded;
 use crate::device::process::ProcessDevice;
 use crate::device::{Device, Report, Stimulus};
-use crate::limits::{Limit, Limits};
-use crate::model::predict::{Direction, Lookup};
-use crate::model::{Branch, Realization, Trained};
 use std::io::BufRead as _;
 use std::path::PathBuf;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
+use study_base::limits::{Limit, Limits};
+use study_haptics::model::{Branch, Realization, Trained};
+use study_wire::predict::{Direction, Lookup};
 
 /// The line of standard input that makes the loop stand still for a second.
 pub(super) const STALL: &str = "stall";

@@ -4,8 +4,8 @@ use crate::cli::playback::Port;
 use crate::cli::{Failure, Kind};
 use crate::device::check::Wire;
 use crate::device::link::{Link, LinkError, Opener as _};
-use crate::text::Untrusted;
 use std::time::{Duration, Instant};
+use study_base::text::Untrusted;
 
 /// An open port, and since when.
 pub(in crate::cli) struct PortWire {

@@ -10,17 +10,17 @@ use crate::cli::{Console, Failure, Kind, load};
 use crate::device::host::Settings;
 use crate::device::link::Threaded;
 use crate::device::{Device, Report, Stimulus};
-use crate::identify::signal::{LowPass, difference};
-use crate::identify::vaf::{self, Score};
-use crate::limits::Limits;
-use crate::model::Realization;
-use crate::outcome::Sample;
-use crate::protocol::DeviceKind;
-use crate::recording::{self, Columns};
 use crate::runner::playback_limits;
 use serde::Serialize;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use study_base::limits::Limits;
+use study_core::outcome::Sample;
+use study_core::protocol::DeviceKind;
+use study_haptics::identify::signal::{LowPass, difference};
+use study_haptics::identify::vaf::{self, Score};
+use study_haptics::model::Realization;
+use study_haptics::recording::{self, Columns};
 
 /// How long each is stroked.
 const STROKED: Duration = Duration::from_secs(8);

@@ -11,10 +11,10 @@ use crate::cli::{Console, Failure, Kind};
 use crate::device::firmware::{Firmware, Options};
 use crate::device::link::memory::Noise;
 use crate::device::link::pty::{Control, Simulator};
-use crate::device::wire::State;
 use std::io::Write as _;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
+use study_wire::message::State;
 
 /// Arguments of `study device safety`.
 #[derive(Debug, clap::Args)]

@@ -1,16 +1,16 @@
 //! The arguments of `study identify`, and the plan that they make.
 
 use super::{Failure, Kind};
-use crate::identify::Method;
-use crate::identify::grid::Plan;
-use crate::identify::method::{
-    Delta, Ewls, Hat, Segments, Sort, Start, State, TwoSided, Width, Window,
-};
-use crate::identify::resample::Resample;
-use crate::identify::signal;
-use crate::model::predict::Lookup;
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
+use study_haptics::identify::Method;
+use study_haptics::identify::grid::Plan;
+use study_haptics::identify::method::{
+    Delta, Ewls, Hat, Segments, Sort, Start, State, TwoSided, Width, Window,
+};
+use study_haptics::identify::resample::Resample;
+use study_haptics::identify::signal;
+use study_wire::predict::Lookup;
 
 /// More numbers in a list than this are a slip of the finger.
 const MOST_NUMBERS: usize = 1000;
@@ -264,7 +264,7 @@ impl Numbers {
         let number = |text: &str| {
             let text = text.trim();
             text.parse::<f64>()
-                .map_err(|_| format!("`{}` is no number", crate::text::Untrusted(text)))
+                .map_err(|_| format!("`{}` is no number", study_base::text::Untrusted(text)))
         };
         let parts: Vec<&str> = given.split(':').collect();
         let [from, to, step] = parts[..] else {

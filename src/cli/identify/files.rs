@@ -2,14 +2,14 @@
 
 use super::args::{Args, MethodWord};
 use super::{Failure, Found, Kind};
-use crate::identify::grid::Cell;
-use crate::model::file;
 use crate::report::identification::{self, Drawing, Place};
 use crate::report::png::Painter;
-use crate::text::{ModelId, Untrusted};
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use study_base::text::{ModelId, Untrusted};
+use study_haptics::identify::grid::Cell;
+use study_haptics::model::file;
 
 /// Path and content.
 type Written = (PathBuf, Vec<u8>);

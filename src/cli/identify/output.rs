@@ -2,15 +2,15 @@
 
 use super::Found;
 use super::args::Named;
-use crate::identify::Method;
-use crate::identify::grid::Cell;
-use crate::identify::validation::{JUST_NOTICEABLE_N, Part};
-use crate::model::certificate::Certificate;
-use crate::model::file::lookup_word;
-use crate::recording::Recording;
-use crate::text::Untrusted;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
+use study_base::text::Untrusted;
+use study_haptics::identify::Method;
+use study_haptics::identify::grid::Cell;
+use study_haptics::identify::validation::{JUST_NOTICEABLE_N, Part};
+use study_haptics::model::file::lookup_word;
+use study_haptics::recording::Recording;
+use study_wire::certificate::Certificate;
 use unicode_width::UnicodeWidthStr as _;
 
 /// More cells than this are shown as a surface instead of a list.
@@ -23,14 +23,15 @@ pub(super) fn json(found: &Found<'_>) -> String {
         .iter()
         .map(|cell| {
             let provenance = &cell.realization.provenance;
-            let by_file = |of: fn(&crate::identify::vaf::Score) -> f64| -> Map<String, Value> {
-                found
-                    .recordings
-                    .iter()
-                    .zip(&cell.scores)
-                    .map(|((named, _), score)| (key(found, named), of(score).into()))
-                    .collect()
-            };
+            let by_file =
+                |of: fn(&study_haptics::identify::vaf::Score) -> f64| -> Map<String, Value> {
+                    found
+                        .recordings
+                        .iter()
+                        .zip(&cell.scores)
+                        .map(|((named, _), score)| (key(found, named), of(score).into()))
+                        .collect()
+                };
             let warnings: Vec<String> = cell.warnings.iter().map(ToString::to_string).collect();
             json!({
                 "method": cell.method.word(),

@@ -2,12 +2,12 @@
 //! together.
 
 use super::Others;
-use crate::diagnostic::{Fault, Findings, did_you_mean};
-use crate::protocol::check::Spans;
-use crate::protocol::{DeviceKind, FileOrders, Order, Protocol, Role, Seat};
-use crate::schedule::balance::balances;
-use crate::schedule::{Planner, ScheduleError};
-use crate::text::Untrusted;
+use study_base::diagnostic::{Fault, Findings, did_you_mean};
+use study_base::text::Untrusted;
+use study_core::protocol::check::Spans;
+use study_core::protocol::{DeviceKind, FileOrders, Order, Protocol, Role, Seat};
+use study_core::schedule::balance::balances;
+use study_core::schedule::{Planner, ScheduleError};
 
 /// Rows whose order is tried, however many participants are planned.
 const MAX_ROWS: u32 = 200;

@@ -8,11 +8,11 @@ use crate::cli::trajectory::{read_trajectory, refuse_to_overwrite};
 use crate::cli::{Console, Failure, Kind};
 use crate::device::host::name;
 use crate::device::probe::{self, Path};
-use crate::identify::signal::LowPass;
-use crate::limits::Limit;
-use crate::plant::Measured;
-use crate::text::Untrusted;
-use crate::trajectory;
+use study_base::limits::Limit;
+use study_base::text::Untrusted;
+use study_haptics::identify::signal::LowPass;
+use study_haptics::plant::Measured;
+use study_haptics::trajectory;
 
 /// The command that records the same way, to be typed as it is. A port that stands in
 /// `device.toml` is found there again.

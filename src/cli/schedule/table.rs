@@ -1,10 +1,10 @@
 //! Orders and their balance as text for a terminal.
 
-use crate::protocol::{Design, Order, Protocol, Role, Trial};
-use crate::schedule::balance::{Balance, Balances, Spread, balances};
-use crate::text::{ModelId, Untrusted};
 use std::collections::HashMap;
 use std::fmt::Write as _;
+use study_base::text::{ModelId, Untrusted};
+use study_core::protocol::{Design, Order, Protocol, Role, Trial};
+use study_core::schedule::balance::{Balance, Balances, Spread, balances};
 
 /// Ids up to this length stand for themselves in the tables.
 const SHORT: usize = 3;
@@ -313,9 +313,9 @@ fn promise(design: &Design, balances: Option<Balances>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::Seat;
-    use crate::protocol::example::protocol;
-    use crate::schedule::Planner;
+    use study_core::protocol::Seat;
+    use study_core::protocol::example::protocol;
+    use study_core::schedule::Planner;
 
     fn rendered(p: &Protocol, rows: u32, width: usize) -> String {
         let planner = Planner::new(p, None).unwrap();

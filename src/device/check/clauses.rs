@@ -5,12 +5,12 @@ use super::playing;
 use super::talk::{Talk, name};
 use super::uploads::Upload;
 use super::{Broken, Clause, FORCE_N, Kept, percentile};
-use crate::device::frame::Frame;
 use crate::device::host::RETRY;
-use crate::device::wire::{
+use std::time::Duration;
+use study_wire::frame::Frame;
+use study_wire::message::{
     self, Fault, Heartbeat, Identity, Refusal, Reply, Request, State, TableChunk, kind,
 };
-use std::time::Duration;
 
 macro_rules! clauses {
     ($($clause:literal $what:literal $look:expr;)+) => {
@@ -63,10 +63,10 @@ pub(super) fn introduce(talk: &mut Talk<'_>) -> Result<Identity, Broken> {
 fn handshake(talk: &mut Talk<'_>) -> Kept {
     let device = introduce(talk)?;
     let [oldest, newest] = device.versions;
-    if !(oldest..=newest).contains(&wire::VERSION) {
+    if !(oldest..=newest).contains(&message::VERSION) {
         return Err(Broken::Gone(format!(
             "it speaks versions {oldest} to {newest} and not {}",
-            wire::VERSION
+            message::VERSION
         )));
     }
     let [low, high] = device.stroke_mm;
@@ -87,7 +87,7 @@ fn handshake(talk: &mut Talk<'_>) -> Kept {
         Some((_, what)) => Err(Broken::seen(*what)),
         None => Ok(format!(
             "version {}, servo {} Hz, watchdog {} ms, {} N, {} mm/s, {} nodes",
-            wire::VERSION,
+            message::VERSION,
             device.servo_hz,
             device.watchdog_ms,
             device.force_n,
@@ -401,7 +401,7 @@ fn checksum(talk: &mut Talk<'_>) -> Kept {
     let device = talk.identity()?;
     let table = Upload::sound(&device, 0.0);
     table.send(talk)?;
-    let wrong = wire::Commit {
+    let wrong = message::Commit {
         crc: table.crc() ^ 1,
     };
     talk.refused(Request::TableCommit(wrong), Refusal::Checksum)?;
@@ -529,13 +529,13 @@ fn wrong_play(talk: &mut Talk<'_>) -> Kept {
     let Request::Play(play) = table.play(talk, 1000, 0) else {
         return Err(Broken::seen("no PLAY"));
     };
-    let other = wire::Play {
+    let other = message::Play {
         crc: play.crc ^ 1,
         ..play
     };
     talk.refused(Request::Play(other), Refusal::OtherTable)?;
     for longest_ms in [0, device.longest_ms.saturating_add(1)] {
-        let endless = wire::Play { longest_ms, ..play };
+        let endless = message::Play { longest_ms, ..play };
         talk.refused(Request::Play(endless), Refusal::Duration)?;
     }
     Ok(format!("never more than {FORCE_N} N was asked for"))

@@ -3,10 +3,10 @@
 use super::talk::Talk;
 use super::uploads::Upload;
 use super::{Broken, Kept, tag};
-use crate::device::wire::{
+use std::time::Duration;
+use study_wire::message::{
     Ack, Fault, Happening, Heartbeat, Outcome, Request, State, Stop, TelemetrySample, fixed,
 };
-use std::time::Duration;
 
 const SECOND: Duration = Duration::from_secs(1);
 /// How far two clocks of whole ms may be apart, and a ms for what is on its way.
@@ -312,7 +312,7 @@ pub(super) fn deadline(talk: &mut Talk<'_>) -> Kept {
             deadline_ms,
         };
         let came = talk.ask(Request::Heartbeat(beat))?;
-        if let crate::device::wire::Reply::Pulse(pulse) = came.reply {
+        if let study_wire::message::Reply::Pulse(pulse) = came.reply {
             late += u32::from(!pulse.fresh);
         }
         talk.pass(SECOND / 200)?;

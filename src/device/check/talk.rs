@@ -2,14 +2,14 @@
 
 pub(in crate::device) use super::Broken;
 use super::Wire;
-use crate::device::frame::{Decoder, Frame};
 use crate::device::host::{BEAT, DeviceClock, RETRY, TRIES};
-use crate::device::wire::{
+use std::collections::VecDeque;
+use std::time::Duration;
+use study_wire::frame::{Decoder, Frame};
+use study_wire::message::{
     Ack, Event, Heartbeat, Hello, Identity, Outcome, Pulse, Recorded, Refusal, Reply, Request,
     State, Telemetry, VERSION, kind,
 };
-use std::collections::VecDeque;
-use std::time::Duration;
 
 /// One wait for bytes.
 const SLICE: Duration = Duration::from_millis(1);

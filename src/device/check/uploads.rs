@@ -2,10 +2,10 @@
 
 use super::talk::Talk;
 use super::{Broken, FORCE_N};
-use crate::device::wire::{
+use study_wire::message::{
     Ack, Commit, Few, Identity, Node, Play, Request, TableBegin, TableChunk, TableCrc,
 };
-use crate::model::predict::{Direction, Lookup};
+use study_wire::predict::{Direction, Lookup};
 
 /// Damping of the tables, N·s/mm.
 const DAMPING: f64 = 0.005;

@@ -1,9 +1,9 @@
 //! What a simulated device is mounted to: a handle, its sensors, a hand or a probe.
 
 use super::{Drive, Measured, Options};
-use crate::model::predict::Motion;
-use crate::plant::{DT_S, Hand, HandParameters, Parameters, Probe, Target};
-use crate::rng::Stream;
+use study_base::rng::Stream;
+use study_haptics::plant::{DT_S, Hand, HandParameters, Parameters, Probe, Target};
+use study_wire::predict::Motion;
 
 /// Corner of the one-pole low-pass that the speed is taken through, Hz.
 const SPEED_HZ: f64 = 200.0;

@@ -4,12 +4,12 @@
 //! A flaw sits between the link and the handler and spoils what goes by. The
 //! handler behind it stays as it is, so the force stays within its limit.
 
-use crate::device::frame::{Decoder, FRAME_CRC_LEN, Frame};
-use crate::device::wire::{
-    Ack, Fault, Few, Header, Heartbeat, Refusal, Reply, Request, State, kind,
-};
 use std::collections::VecDeque;
 use std::time::Duration;
+use study_wire::frame::{Decoder, FRAME_CRC_LEN, Frame};
+use study_wire::message::{
+    Ack, Fault, Few, Header, Heartbeat, Refusal, Reply, Request, State, kind,
+};
 
 /// What is wrong with a device, and the clause of `docs/wire.md` that it breaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -327,7 +327,7 @@ fn without_cobs(raw: &[u8]) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::frame::crc32;
+    use study_wire::frame::crc32;
 
     #[test]
     fn every_flaw_has_a_name_and_a_clause_of_the_document() {

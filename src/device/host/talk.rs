@@ -3,11 +3,11 @@
 use super::{GREET_AGAIN, Host, RETRY, Stage, upload};
 use crate::device::Report;
 use crate::device::host::DeviceClock;
-use crate::device::wire::{
+use std::time::Duration;
+use study_core::outcome::{Playback, Sample};
+use study_wire::message::{
     self, Fault, Happening, Outcome, Pulse, Refusal, Reply, Request, State, Telemetry,
 };
-use crate::outcome::{Playback, Sample};
-use std::time::Duration;
 
 impl Host {
     pub(super) fn take(&mut self, sequence: u16, reply: Reply, at: Duration) {
@@ -51,7 +51,7 @@ impl Host {
         }
     }
 
-    fn greeted(&mut self, sequence: u16, identity: wire::Identity, at: Duration) {
+    fn greeted(&mut self, sequence: u16, identity: message::Identity, at: Duration) {
         let asked = self
             .flight
             .filter(|f| self.stage == Stage::Greeting && f.sequence == sequence);
@@ -60,7 +60,7 @@ impl Host {
         };
         self.flight = None;
         let [oldest, newest] = identity.versions;
-        if !(oldest..=newest).contains(&wire::VERSION) {
+        if !(oldest..=newest).contains(&message::VERSION) {
             return self.other_version(newest, at);
         }
         let before = self.identity.map(|before| before.serial);
@@ -103,7 +103,7 @@ impl Host {
         }
     }
 
-    fn refused(&mut self, request: Request, why: Refusal, ack: &wire::Ack, at: Duration) {
+    fn refused(&mut self, request: Request, why: Refusal, ack: &message::Ack, at: Duration) {
         match (request, why) {
             (Request::Rearm, Refusal::Moving) => {
                 if let Some((again, until)) = &mut self.rest
@@ -248,10 +248,10 @@ impl Host {
             .iter()
             .map(|sample| Sample {
                 t_s: f64::from(sample.tick) / servo_hz,
-                x_mm: wire::fixed::from_nm(sample.x_nm),
-                v_mm_s: wire::fixed::from_um_s(sample.v_um_s),
-                force_command_n: wire::fixed::from_un(sample.command_un),
-                force_measured_n: wire::fixed::from_maybe_un(sample.measured_un),
+                x_mm: message::fixed::from_nm(sample.x_nm),
+                v_mm_s: message::fixed::from_um_s(sample.v_um_s),
+                force_command_n: message::fixed::from_un(sample.command_un),
+                force_measured_n: message::fixed::from_maybe_un(sample.measured_un),
             })
             .collect();
         self.reports.push(Report::Telemetry(samples));

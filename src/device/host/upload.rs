@@ -1,8 +1,8 @@
 //! A table as the requests that carry it.
 
-use crate::device::wire::{Commit, Few, Identity, Node, Request, TableBegin, TableChunk, TableCrc};
-use crate::limits::Limits;
-use crate::model::{Branch, Realization};
+use study_base::limits::Limits;
+use study_haptics::model::{Branch, Realization};
+use study_wire::message::{Commit, Few, Identity, Node, Request, TableBegin, TableChunk, TableCrc};
 
 /// The requests of an upload, in their order, and the CRC over the whole.
 #[derive(Debug)]

@@ -4,9 +4,9 @@
 //! written. Faults strike single writes, by a seed; a line that is dead takes bytes
 //! and gives none.
 
-use crate::rng::Stream;
 use std::collections::VecDeque;
 use std::time::Duration;
+use study_base::rng::Stream;
 
 /// Shares of the writes that meet a fault, each 0 … 1.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

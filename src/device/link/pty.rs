@@ -11,7 +11,6 @@
 use super::LinkError;
 use super::memory::{Line, Noise};
 use crate::device::firmware::Firmware;
-use crate::device::wire::Fault;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
@@ -20,6 +19,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use study_wire::message::Fault;
 
 /// A turn that took longer has made time stand still.
 pub const LONGEST_TURN: Duration = Duration::from_millis(5);

@@ -2,13 +2,13 @@
 
 use super::HELLO_WITHIN;
 use super::words::{self, Say};
-use crate::text::Untrusted;
 use std::io::{BufRead as _, BufReader, Read, Write as _};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use study_base::text::Untrusted;
 
 /// Longest line of a child, bytes.
 const MAX_LINE: u64 = 256 * 1024;

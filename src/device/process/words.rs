@@ -1,12 +1,12 @@
 //! What host and child say to each other, one JSON object a line.
 
 use crate::device::Stimulus;
-use crate::limits::Limits;
-use crate::model::predict::{Direction, Lookup};
-use crate::outcome::{Playback, Sample};
-use crate::text::Untrusted;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use study_base::limits::Limits;
+use study_base::text::Untrusted;
+use study_core::outcome::{Playback, Sample};
+use study_wire::predict::{Direction, Lookup};
 
 /// Version of the language, in the child's `hello`.
 pub const FORMAT: &str = "study-process/1";
@@ -187,7 +187,7 @@ pub(super) fn short(word: &str, load: u64) -> String {
 /// `load`, with everything that is to be played.
 pub(super) fn load(number: u64, what: &Stimulus<'_>, limits: Limits) -> String {
     let table = what.table.map(|table| {
-        let branch = |b: &crate::model::Branch| {
+        let branch = |b: &study_haptics::model::Branch| {
             json!({
                 "m_kg": b.m_kg, "b_n_s_per_mm": b.b_n_s_per_mm,
                 "k_n_per_mm": b.k_n_per_mm, "f0_n": b.f0_n,

@@ -6,8 +6,8 @@ use crate::report::svg::{
     Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, SMALL, Span, for_names, ramp,
     shortened, text_width,
 };
-use crate::stats::describe::mean;
 use std::collections::BTreeMap;
+use study_stats::describe::mean;
 
 fn mean_of(scene: &Scene<'_>, subject: &str, model: &str) -> Option<f64> {
     scene.cells.get(&(subject, model)).and_then(|x| mean(x))
@@ -110,7 +110,7 @@ fn share(value: f64, low: f64, high: f64) -> f64 {
 }
 
 /// The test realizations, by VAF where all have one.
-fn ordered<'s>(scene: &'s Scene<'_>) -> (Vec<&'s crate::analyze::Listed>, bool) {
+fn ordered<'s>(scene: &'s Scene<'_>) -> (Vec<&'s study_core::analyze::Listed>, bool) {
     let mut models = scene.models.clone();
     let by_vaf = models.iter().all(|m| m.vaf.is_some());
     if by_vaf {

@@ -3,10 +3,10 @@
 mod between;
 
 use super::{safe, typeset};
-use crate::analyze::{Analysis, Listed, Stated};
-use crate::outcome::Role;
 use crate::report::{MAX_PAIRED, apa};
 use maud::{Markup, html};
+use study_core::analyze::{Analysis, Listed, Stated};
+use study_core::outcome::Role;
 
 /// One question.
 pub(super) struct Answer {

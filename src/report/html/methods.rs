@@ -2,9 +2,9 @@
 //! tests that there are numbers of; no others.
 
 use super::Details;
-use crate::analyze::{Analysis, Exclusion, Listed, Stated, Value};
 use crate::report::apa;
-use crate::stats::permutation::DRAWS;
+use study_core::analyze::{Analysis, Exclusion, Listed, Stated, Value};
+use study_stats::permutation::DRAWS;
 
 /// The paragraph.
 pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {

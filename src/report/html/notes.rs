@@ -3,9 +3,9 @@
 use super::methods::in_words;
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
-use crate::analyze::{Analysis, Said, Stated, Warning};
 use crate::report::{Source, apa};
 use maud::{Markup, html};
+use study_core::analyze::{Analysis, Said, Stated, Warning};
 
 /// Warnings that stand at the top.
 const AT_THE_TOP: [&str; 3] = ["no-participants", "mixed", "interim"];

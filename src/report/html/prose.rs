@@ -3,9 +3,9 @@
 
 use super::answers::ci;
 use super::{Details, typeset};
-use crate::analyze::Analysis;
 use crate::report::apa;
 use maud::{Markup, html};
+use study_core::analyze::Analysis;
 
 pub(super) fn section(details: &Details, a: &Analysis) -> Markup {
     let results = results(a);

@@ -1,9 +1,9 @@
 //! Everything that was computed, by identifier, and what was not and why.
 
 use super::safe;
-use crate::analyze::{Analysis, Value};
 use crate::report::apa;
 use maud::{Markup, html};
+use study_core::analyze::{Analysis, Value};
 
 /// Most statistics that are listed.
 const MAX_LISTED: usize = 2000;

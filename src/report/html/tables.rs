@@ -1,10 +1,10 @@
 //! Tables that a reader looks for first.
 
 use super::{answers, safe};
-use crate::analyze::{Analysis, Listed, Value};
-use crate::outcome::Role;
 use crate::report::apa;
 use maud::{Markup, html};
+use study_core::analyze::{Analysis, Listed, Value};
+use study_core::outcome::Role;
 
 /// Most rows of a table; the rest is in the CSV.
 pub(super) const MAX_ROWS: usize = 200;

@@ -1,8 +1,8 @@
 //! Figures of small tables.
 
 use super::*;
-use crate::model::predict::{Direction, Lookup};
-use crate::model::{Provenance, Trained};
+use study_haptics::model::{Provenance, Trained};
+use study_wire::predict::{Direction, Lookup};
 
 fn realization(scale: f64) -> Realization {
     let branch = |f: f64| Branch {
@@ -89,7 +89,7 @@ fn force_over_time_shows_some_seconds_and_its_prediction() {
         let t = f64::from(i) * 0.001;
         let _ = writeln!(text, "{},{},5,0,{}", 10.0 + t, 1.0 + t.sin(), t.cos());
     }
-    let recording = crate::recording::read("r", text.as_bytes()).unwrap();
+    let recording = study_haptics::recording::read("r", text.as_bytes()).unwrap();
     let drawing = force(&realization(1.0), &recording);
     let last = drawing.csv.lines().last().unwrap();
     let t: f64 = last.split(',').next().unwrap().parse().unwrap();

@@ -2,7 +2,7 @@
 
 use super::look::Colour;
 use super::{Anchor, FONT_FAMILY};
-use crate::text::Untrusted;
+use study_base::text::Untrusted;
 
 /// A document that is being written.
 #[derive(Debug)]

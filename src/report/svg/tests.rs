@@ -56,7 +56,10 @@ fn hostile_text_stays_text() {
     let svg = figure.to_svg();
     assert!(!svg.contains("<script") && !svg.contains("]]>"), "{svg}");
     assert!(!svg.contains("onload='"), "{svg}");
-    assert!(!svg.chars().any(|c| c != '\n' && crate::text::is_unsafe(c)));
+    assert!(
+        !svg.chars()
+            .any(|c| c != '\n' && study_base::text::is_unsafe(c))
+    );
 }
 
 #[test]

@@ -3,9 +3,9 @@
 use super::super::{MAX_PAIRED, apa, pairs, permuted, tied};
 use super::layout::{Paint, number, wrap};
 use super::{asked, listed};
-use crate::analyze::{Analysis, Value};
-use crate::stats::permutation::DRAWS;
-use crate::text::Untrusted;
+use study_base::text::Untrusted;
+use study_core::analyze::{Analysis, Value};
+use study_stats::permutation::DRAWS;
 
 pub(super) fn answers(a: &Analysis, width: usize, paint: Paint) -> String {
     let mut out = String::new();

@@ -5,9 +5,9 @@ use super::super::apa;
 use super::answers::{p, r};
 use super::layout::{Paint, number, wrap};
 use super::listed;
-use crate::analyze::{Analysis, Stated};
-use crate::outcome::Role;
-use crate::text::Untrusted;
+use study_base::text::Untrusted;
+use study_core::analyze::{Analysis, Stated};
+use study_core::outcome::Role;
 
 pub(super) fn headline(a: &Analysis, width: usize, paint: Paint) -> String {
     let mut out = String::new();

@@ -2,12 +2,12 @@
 //! back. A dialog changes nothing until it is confirmed, and Esc closes it.
 
 use super::field::Field;
-use crate::outcome::{Author, Choice};
-use crate::protocol::Answer;
-use crate::session::view::{Correctable, View};
-use crate::session::{Input, Screen};
 use crate::tui::editor::{Editor, Taken};
 use crate::tui::keys::Key;
+use study_core::outcome::{Author, Choice};
+use study_core::protocol::Answer;
+use study_core::session::view::{Correctable, View};
+use study_core::session::{Input, Screen};
 
 /// What is open above the screen.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,9 @@
 //! An answer that is being made. None is preset: what nobody chose is not sent.
 
-use crate::protocol::{Answer, Question, QuestionKind};
 use crate::tui::editor::{Editor, Taken};
 use crate::tui::keys::Key;
 use std::collections::BTreeSet;
+use study_core::protocol::{Answer, Question, QuestionKind};
 
 /// The answer to one question, as far as it goes.
 #[derive(Debug, Clone, PartialEq)]
@@ -354,8 +354,8 @@ fn mark(marked: &mut BTreeSet<usize>, at: usize, multiple: bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::text::QuestionId;
     use std::collections::BTreeMap;
+    use study_base::text::QuestionId;
 
     fn question(kind: QuestionKind) -> Question {
         Question {

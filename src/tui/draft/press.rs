@@ -3,13 +3,13 @@
 
 use super::dialog::{Confirm, Dialog, Outcome};
 use super::{Draft, Here};
-use crate::outcome::Choice;
-use crate::protocol::{Answer, Question};
-use crate::session::{Input, Screen, View};
-use crate::text::QuestionId;
 use crate::tui::editor::Taken;
 use crate::tui::keys::{self, Key};
 use crossterm::event::Event;
+use study_base::text::QuestionId;
+use study_core::outcome::Choice;
+use study_core::protocol::{Answer, Question};
+use study_core::session::{Input, Screen, View};
 
 impl Draft {
     /// What a key means now.

@@ -2,7 +2,6 @@
 
 use super::choice::List;
 use super::scale::{self, Boxes, TRACK_ROWS, Track};
-use crate::protocol::{Question, QuestionKind};
 use crate::tui::draft::Target;
 use crate::tui::draft::field::{self, Field};
 use crate::tui::theme::Theme;
@@ -13,6 +12,7 @@ use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use std::collections::BTreeMap;
+use study_core::protocol::{Question, QuestionKind};
 
 /// A question's answer, as far as it goes.
 #[derive(Debug)]

@@ -1,8 +1,6 @@
 //! What opens above a screen.
 
 use super::answer::AnswerField;
-use crate::outcome::Author;
-use crate::protocol::Answer;
 use crate::tui::draft::dialog::{Confirm, Correct, Dialog, Step};
 use crate::tui::editor::Editor;
 use crate::tui::theme::Theme;
@@ -12,6 +10,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_core::outcome::Author;
+use study_core::protocol::Answer;
 
 /// A dialog above a page.
 #[derive(Debug)]

@@ -4,8 +4,6 @@
 //! types what is said sees the question to ask, compact, with the answers so far.
 
 use super::answer::AnswerField;
-use crate::protocol::{Entry, Question, QuestionKind};
-use crate::session::View;
 use crate::tui::draft::{Form, Target};
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre_all, left, left_all, middle, row, rows};
@@ -14,6 +12,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_core::protocol::{Entry, Question, QuestionKind};
+use study_core::session::View;
 
 /// The form on the screen.
 #[derive(Debug)]

@@ -9,10 +9,7 @@ use super::prose::{ProseView, prose};
 use super::status::{Status, Top};
 use super::trouble::Trouble;
 use super::who::WhoView;
-use crate::protocol::Entry;
 use crate::runner::Strip;
-use crate::session::view::DeviceState;
-use crate::session::{Screen, View};
 use crate::tui::draft::dialog::{Confirm, Dialog};
 use crate::tui::draft::{Draft, Target};
 use crate::tui::theme::Theme;
@@ -22,6 +19,9 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Clear, Widget};
+use study_core::protocol::Entry;
+use study_core::session::view::DeviceState;
+use study_core::session::{Screen, View};
 
 /// A notice that is longer is cut: it has its most important words first.
 const NOTICE_ROWS: usize = 3;

@@ -1,8 +1,6 @@
 //! The device plays: what to do, for how long already, and the strip if asked.
 
-use crate::protocol::DeviceKind;
 use crate::runner::Strip;
-use crate::session::View;
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, clock, middle, right, row, rows};
 use crate::tui::wrap;
@@ -12,6 +10,8 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use ratatui::widgets::canvas::{Canvas, Line as Stroke};
+use study_core::protocol::DeviceKind;
+use study_core::session::View;
 
 /// The screen while the device plays.
 #[derive(Debug)]

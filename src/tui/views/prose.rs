@@ -1,9 +1,6 @@
 //! Screens that are mainly words: texts to read, prompts, pauses, choices by a
 //! letter.
 
-use crate::protocol::{DeviceKind, Entry};
-use crate::session::view::MessageKind;
-use crate::session::{Screen, View};
 use crate::tui::draft::Reading;
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, centre_all, clock, left_all, middle, right, row, rows};
@@ -12,6 +9,9 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_core::protocol::{DeviceKind, Entry};
+use study_core::session::view::MessageKind;
+use study_core::session::{Screen, View};
 
 /// Widest column that is easy to read.
 const COLUMN: u16 = 84;

@@ -1,7 +1,5 @@
 //! The experimenter's line, the banner and the progress.
 
-use crate::session::view::{Banner, Counts, DeviceState, StatusLine};
-use crate::session::{Screen, View};
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, clock, left, right};
 use crate::tui::wrap;
@@ -9,6 +7,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_core::session::view::{Banner, Counts, DeviceState, StatusLine};
+use study_core::session::{Screen, View};
 
 /// The last row.
 #[derive(Debug)]

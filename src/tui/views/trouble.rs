@@ -1,7 +1,5 @@
 //! Troubles: what happened, what it means, what to do.
 
-use crate::protocol::DeviceKind;
-use crate::session::{Screen, View};
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, frame, left_all, middle, row, rows};
 use crate::tui::wrap;
@@ -9,6 +7,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_core::protocol::DeviceKind;
+use study_core::session::{Screen, View};
 
 /// A framed message that cannot be overlooked.
 #[derive(Debug)]

@@ -2,9 +2,9 @@
 //! factor, other covariates.
 
 use super::{Answer, ci, two};
-use crate::analyze::{Analysis, Value};
 use crate::report::{apa, permuted, tied};
-use crate::stats::permutation::DRAWS;
+use study_core::analyze::{Analysis, Value};
+use study_stats::permutation::DRAWS;
 
 pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     let v = &a.values;

@@ -1,0 +1,227 @@
+//! Subject × realization cells, and the complete tables made of them.
+//!
+//! Ratings are held as differences from a whole number near their mean, so that
+//! an offset costs no digits; what is a level (a mean, a quantile) adds it back.
+
+use crate::outcome::ratings::{NO_MODEL, Ratings};
+use crate::protocol::Role;
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::ops::Range;
+use study_stats::describe::{mean, mean_of, squares_about};
+
+/// One subject's ratings of one realization, with what suffices of them for
+/// every Gaussian model that has no terms of single trials.
+#[derive(Debug, Clone)]
+pub(super) struct Cell {
+    pub(super) subject: usize,
+    pub(super) model: usize,
+    /// Into [`Cells::order`] and [`Cells::sorted`].
+    pub(super) rows: Range<usize>,
+    /// Mean of the centred ratings.
+    pub(super) mean: f64,
+    /// Sum of squares about the mean; 0 for one rating, NaN if it overflows.
+    pub(super) squares: f64,
+}
+
+/// The ratings that count, sorted into cells.
+#[derive(Debug)]
+pub(super) struct Cells<'a> {
+    pub(super) ratings: &'a Ratings,
+    /// What was taken off every rating.
+    pub(super) offset: f64,
+    /// Ratings less the offset, by row; NaN missing.
+    pub(super) centred: Vec<f64>,
+    /// Every row, by subject and model (none comes last), otherwise as they stand.
+    pub(super) all: Vec<usize>,
+    /// Rows with a rating and a realization, by subject, model, repetition.
+    pub(super) order: Vec<usize>,
+    /// The centred ratings in that order: those of a cell stand together.
+    pub(super) sorted: Vec<f64>,
+    /// By subject, then model; none is empty.
+    pub(super) cells: Vec<Cell>,
+    /// VAF of each model, if its rows agree on one.
+    pub(super) vaf: Vec<Option<f64>>,
+    /// Whether anyone rated the model.
+    pub(super) rated: Vec<bool>,
+    /// The complete table of the realizations that the study asks about.
+    complete: Table,
+}
+
+/// A complete table: the subjects that rated all of some realizations.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Table {
+    /// Indices of the subjects.
+    pub(super) subjects: Vec<usize>,
+    /// Indices of the realizations.
+    pub(super) models: Vec<usize>,
+    /// Cell means less the offset. Equal thirds may differ in their last bit.
+    pub(super) rows: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// A column: one realization, by subject.
+    pub(super) fn column(&self, j: usize) -> Vec<f64> {
+        self.rows.iter().map(|r| r[j]).collect()
+    }
+}
+
+impl<'a> Cells<'a> {
+    /// Linear in the rows, but for sorting the repetitions of cells that do not
+    /// come in their order.
+    pub(super) fn of(ratings: &'a Ratings) -> Self {
+        let offset = match mean_of(ratings.rating.iter().copied().filter(|v| v.is_finite())) {
+            Some(mean) => mean.round(),
+            None => 0.0,
+        };
+        let centred: Vec<f64> = ratings.rating.iter().map(|v| v - offset).collect();
+        let (all, vaf) = rayon::join(|| ratings.by_cell(), || vafs(ratings));
+        let counts = |i: &usize| centred[*i].is_finite() && ratings.model[*i] != NO_MODEL;
+        let mut order: Vec<usize> = all.iter().copied().filter(counts).collect();
+        let place = |i: usize| (ratings.subject[i], ratings.model[i]);
+        let mut groups: Vec<Range<usize>> = Vec::new();
+        for group in order.chunk_by_mut(|&a, &b| place(a) == place(b)) {
+            if !group.is_sorted_by_key(|&i| ratings.repetition[i]) {
+                group.sort_by_key(|&i| ratings.repetition[i]);
+            }
+            let start = groups.last().map_or(0, |g| g.end);
+            groups.push(start..start + group.len());
+        }
+        let sorted: Vec<f64> = order.par_iter().map(|&i| centred[i]).collect();
+        let cell = |rows: Range<usize>| {
+            let numbers = &sorted[rows.clone()];
+            let (subject, model) = place(order[rows.start]);
+            let mean = mean(numbers)?;
+            Some(Cell {
+                subject: subject as usize,
+                model: model as usize,
+                rows,
+                mean,
+                squares: match numbers {
+                    [_] => 0.0,
+                    _ => squares_about(numbers, mean).unwrap_or(f64::NAN).max(0.0),
+                },
+            })
+        };
+        let cells: Vec<Cell> = (groups.into_par_iter().with_min_len(1000))
+            .filter_map(cell)
+            .collect();
+        let mut rated = vec![false; ratings.models.len()];
+        for cell in &cells {
+            rated[cell.model] = true;
+        }
+        let mut made = Self {
+            vaf,
+            rated,
+            ratings,
+            offset,
+            centred,
+            all,
+            order,
+            sorted,
+            cells,
+            complete: Table::default(),
+        };
+        made.complete = made.complete_table(&made.test_models());
+        made
+    }
+
+    /// Centred ratings of a cell, by repetition.
+    pub(super) fn of_cell(&self, cell: &Cell) -> &[f64] {
+        &self.sorted[cell.rows.clone()]
+    }
+
+    /// Realizations that the study asks about and somebody rated: role test and
+    /// no hidden repeat.
+    pub(super) fn test_models(&self) -> Vec<usize> {
+        (0..self.ratings.models.len())
+            .filter(|&m| {
+                let model = &self.ratings.models[m];
+                self.rated[m] && model.role == Role::Test && model.duplicate_of.is_none()
+            })
+            .collect()
+    }
+
+    /// The subjects that rated all of these realizations.
+    pub(super) fn table(&self, models: &[usize]) -> Cow<'_, Table> {
+        if models == self.complete.models {
+            Cow::Borrowed(&self.complete)
+        } else {
+            Cow::Owned(self.complete_table(models))
+        }
+    }
+
+    fn complete_table(&self, models: &[usize]) -> Table {
+        let mut table = Table {
+            subjects: Vec::new(),
+            models: models.to_vec(),
+            rows: Vec::new(),
+        };
+        if models.is_empty() {
+            return table;
+        }
+        let mut place = vec![usize::MAX; self.ratings.models.len()];
+        for (j, &m) in models.iter().enumerate() {
+            place[m] = j;
+        }
+        for cells in self.cells.chunk_by(|a, b| a.subject == b.subject) {
+            let mut row = vec![f64::NAN; models.len()];
+            for cell in cells {
+                if let Some(slot) = row.get_mut(place[cell.model]) {
+                    *slot = cell.mean;
+                }
+            }
+            if row.iter().all(|v| v.is_finite()) {
+                table.subjects.push(cells[0].subject);
+                table.rows.push(row);
+            }
+        }
+        table
+    }
+
+    /// Mean over the subjects of their cell means, less the offset, by model.
+    pub(super) fn subject_means(&self) -> Vec<Vec<f64>> {
+        let mut means = vec![Vec::new(); self.ratings.models.len()];
+        for cell in &self.cells {
+            means[cell.model].push(cell.mean);
+        }
+        means
+    }
+
+    /// The name of a subject.
+    pub(super) fn subject_name(&self, subject: usize) -> &str {
+        &self.ratings.subjects[subject].id
+    }
+
+    /// The name of a realization.
+    pub(super) fn model_name(&self, model: usize) -> &str {
+        &self.ratings.models[model].id
+    }
+}
+
+/// Sum of squares and degrees of freedom within some cells.
+pub(super) fn within<'c>(cells: impl IntoIterator<Item = &'c Cell>) -> (f64, usize) {
+    let (mut squares, mut df) = (0.0, 0);
+    for cell in cells {
+        squares += cell.squares;
+        df += cell.rows.len() - 1;
+    }
+    (squares, df)
+}
+
+fn vafs(ratings: &Ratings) -> Vec<Option<f64>> {
+    let mut found: Vec<Option<Option<f64>>> = vec![None; ratings.models.len()];
+    for (&m, &v) in ratings.model.iter().zip(&ratings.vaf) {
+        if m == NO_MODEL || !v.is_finite() {
+            continue;
+        }
+        let slot = &mut found[m as usize];
+        *slot = match *slot {
+            None => Some(Some(v)),
+            Some(Some(before)) if before == v => *slot,
+            // Two values: the realization has none.
+            Some(_) => Some(None),
+        };
+    }
+    found.into_iter().map(Option::flatten).collect()
+}

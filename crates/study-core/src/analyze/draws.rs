@@ -1,0 +1,27 @@
+//! The random streams of the resampling methods.
+
+use study_base::rng::Stream;
+use study_stats::random::Random;
+
+/// A stream named after the method that draws from it.
+pub(super) struct Draws(Stream);
+
+impl Draws {
+    pub(super) fn new(seed: u64, method: &str) -> Self {
+        Self(Stream::new(seed, &[method]))
+    }
+}
+
+impl Random for Draws {
+    fn below(&mut self, n: u64) -> u64 {
+        self.0.below(n)
+    }
+
+    fn shuffle(&mut self, items: &mut [usize]) {
+        self.0.shuffle(items);
+    }
+
+    fn normal(&mut self) -> f64 {
+        self.0.normal()
+    }
+}

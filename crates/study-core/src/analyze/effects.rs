@@ -1,0 +1,321 @@
+//! Do realizations differ, and do raters agree: `friedman/*`, `rmanova/*`,
+//! `rmanova2/*`, `posthoc/*`, `icc_*`, `krippendorff_*`. All of them over the
+//! test realizations, hidden repeats left out.
+
+use super::Rules;
+use super::cells::{Cell, Cells, Table};
+use super::values::Values;
+use study_stats::agreement::{Alpha, Coefficient, Icc, icc, krippendorff};
+use study_stats::anova::{Effect, one_way, two_way};
+use study_stats::friedman::friedman;
+use study_stats::paired::{holm, paired};
+
+/// Most realizations (times repetitions) for an analysis of variance.
+const MAX_COLUMNS: usize = 300;
+
+/// Most realizations that are compared pair by pair.
+const MAX_PAIRED: usize = 8;
+
+/// Most different repetitions that agreement is computed over.
+const MAX_LABELS: usize = 10_000;
+
+const FEW: &str = "fewer than two complete subjects or realizations";
+const NO_END: &str = "the interval of ICC2 ends where Spearman–Brown's formula has its pole";
+const NO_ERROR: &str = "the ratings leave no variance of error";
+
+pub(super) fn ranks_and_anova(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+    let table = cells.table(&cells.test_models());
+    ranks(&table, values);
+    anova(&table, values);
+    anova_with_repetitions(cells, &table, values);
+}
+
+pub(super) fn pairs(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+    posthoc(cells, &cells.table(&cells.test_models()), values);
+}
+
+pub(super) fn agree(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+    let models = cells.test_models();
+    agreement(cells, &cells.table(&models), values);
+    repetitions(cells, &models, values);
+}
+
+fn ranks(table: &Table, values: &mut Values) {
+    let Some(f) = friedman(&table.rows) else {
+        values
+            .group("friedman", FEW)
+            .none(&["chi2", "p", "kendall_W"]);
+        return;
+    };
+    let df2 = f.df * (table.rows.len() as f64 - 1.0);
+    let mut g = values.group("friedman", "every subject rated all realizations alike");
+    g.list("mean_ranks", f.mean_ranks);
+    g.put("df", f.df);
+    g.maybe("chi2", f.chi2);
+    g.maybe("p", f.p);
+    g.maybe("kendall_W", f.kendall_w);
+    g.put("iman_davenport_df1", f.df);
+    g.put("iman_davenport_df2", df2);
+    let why = "all subjects rank alike, or rate all alike";
+    g.put_or("iman_davenport_F", f.iman_davenport, why);
+    g.put_or("iman_davenport_p", f.iman_davenport_p, why);
+    let why = if f.chi2.is_none() {
+        "every subject rated all realizations alike"
+    } else {
+        "too many orders of the ranks for the exact distribution"
+    };
+    g.put_or("exact_p", f.exact_p, why);
+}
+
+fn anova(table: &Table, values: &mut Values) {
+    let wide = table.models.len() > MAX_COLUMNS;
+    let Some(a) = one_way(&table.rows).filter(|_| !wide) else {
+        let why = if wide {
+            "more than 300 realizations"
+        } else {
+            FEW
+        };
+        values.group("rmanova", why).none(&["F", "p", "p_gg"]);
+        return;
+    };
+    let e = &a.effect;
+    let mut g = values.group("rmanova", NO_ERROR);
+    g.put("ss_model", e.ss);
+    g.put("ss_subject", a.ss_subject);
+    g.put("ss_error", e.ss_error);
+    g.put("df1", e.df1);
+    g.put("df2", e.df2);
+    g.maybe("F", e.f);
+    g.maybe("p", e.p);
+    g.maybe("eps_gg", e.eps_gg);
+    g.maybe("p_gg", e.p_gg);
+    g.put_or("eps_hf_unclipped", e.eps_hf, "too few subjects for it");
+    g.put_or("p_hf", e.p_hf, "too few subjects for it");
+    g.put_or("ges", a.ges, "all ratings are equal");
+    g.put_or("pes", a.pes, "all ratings are equal");
+    let why = "two realizations, too few subjects, or a singular covariance";
+    g.put_or("mauchly_W", e.mauchly.map(|m| m.w), why);
+    g.put_or("mauchly_p", e.mauchly.and_then(|m| m.p), why);
+    g.put_or(
+        "mauchly_p_as_R_prints",
+        e.mauchly.and_then(|m| m.p_as_r),
+        why,
+    );
+}
+
+/// Complete subjects whose cells all hold the same repetitions, once each.
+fn anova_with_repetitions(cells: &Cells<'_>, table: &Table, values: &mut Values) {
+    let why = "not every cell has the same two or more repetitions";
+    let Some((rows, repetitions)) = balanced(cells, table) else {
+        for effect in ["model", "rep", "inter"] {
+            values
+                .group(format!("rmanova2/{effect}"), why)
+                .none(&["F", "p"]);
+        }
+        return;
+    };
+    let Some(a) = two_way(&rows, repetitions) else {
+        return;
+    };
+    for ((effect, ges), name) in a.effects.iter().zip(["model", "rep", "inter"]) {
+        let Effect {
+            df1,
+            df2,
+            f,
+            p,
+            eps_gg,
+            p_gg,
+            ..
+        } = effect;
+        let mut g = values.group(format!("rmanova2/{name}"), NO_ERROR);
+        g.put("df1", *df1);
+        g.put("df2", *df2);
+        g.maybe("F", *f);
+        g.maybe("p", *p);
+        g.maybe("eps_gg", *eps_gg);
+        // Without an F there is nothing to correct and nothing to explain.
+        if f.is_some() {
+            g.maybe("p_gg", *p_gg);
+            g.maybe("ges", *ges);
+        }
+    }
+}
+
+fn balanced(cells: &Cells<'_>, table: &Table) -> Option<(Vec<Vec<f64>>, usize)> {
+    let r = cells.ratings;
+    let labels = |c: &Cell| cells.order[c.rows.clone()].iter().map(|&i| r.repetition[i]);
+    let mut place = vec![usize::MAX; r.models.len()];
+    for (j, &m) in table.models.iter().enumerate() {
+        place[m] = j;
+    }
+    let first = cells.cells.iter().find(|c| place[c.model] != usize::MAX)?;
+    let wanted: Vec<u32> = labels(first).collect();
+    let n = wanted.len();
+    let distinct = wanted.windows(2).all(|w| w[0] < w[1]);
+    if n < 2 || !distinct || n * table.models.len() > MAX_COLUMNS {
+        return None;
+    }
+    let mut rows = vec![vec![f64::NAN; n * table.models.len()]; table.subjects.len()];
+    for cell in &cells.cells {
+        let j = place[cell.model];
+        let Ok(s) = table.subjects.binary_search(&cell.subject) else {
+            continue;
+        };
+        if j == usize::MAX {
+            continue;
+        }
+        if !labels(cell).eq(wanted.iter().copied()) {
+            return None;
+        }
+        rows[s][j * n..(j + 1) * n].copy_from_slice(cells.of_cell(cell));
+    }
+    (rows.len() >= 2 && table.models.len() >= 2).then_some((rows, n))
+}
+
+fn posthoc(cells: &Cells<'_>, table: &Table, values: &mut Values) {
+    let m = table.models.len();
+    if !(2..=MAX_PAIRED).contains(&m) || table.rows.len() < 2 {
+        return;
+    }
+    let columns: Vec<Vec<f64>> = (0..m).map(|j| table.column(j)).collect();
+    let mut pairs = Vec::new();
+    for a in 0..m {
+        for b in a + 1..m {
+            if let Some(p) = paired(&columns[a], &columns[b]) {
+                let name = |j: usize| cells.model_name(table.models[j]);
+                pairs.push((format!("posthoc/{}|{}", name(a), name(b)), p));
+            }
+        }
+    }
+    let t_holm = holm(&pairs.iter().map(|(_, p)| p.p_t).collect::<Vec<_>>());
+    let w_holm = holm(&pairs.iter().map(|(_, p)| p.p_exact).collect::<Vec<_>>());
+    for (i, (id, p)) in pairs.iter().enumerate() {
+        let mut g = values.group(id.clone(), "all differences are equal");
+        g.put("mean_diff", p.mean_diff);
+        g.maybe("t", p.t);
+        g.maybe("p_t", p.p_t);
+        g.maybe("p_t_holm", t_holm[i]);
+        g.maybe("dz", p.dz);
+        g.put_or("d_av", p.d_av, "neither realization's ratings vary");
+        g.put("wilcoxon_n", p.wilcoxon_n as f64);
+        let why = "no difference other than zero";
+        g.put_or("wilcoxon_Wplus", p.w_plus, why);
+        g.put_or("rank_biserial", p.rank_biserial, why);
+        g.put_or("p_wilcoxon_normal", p.p_normal, why);
+        let why = "no difference other than zero, or more than 500";
+        g.put_or("p_wilcoxon_exact", p.p_exact, why);
+        g.put_or("p_wilcoxon_exact_holm", w_holm[i], why);
+    }
+}
+
+fn agreement(cells: &Cells<'_>, table: &Table, values: &mut Values) {
+    let transposed: Vec<Vec<f64>> = (0..table.models.len()).map(|j| table.column(j)).collect();
+    put_icc(icc(&transposed).as_ref(), "icc_subjects", FEW, values);
+    let r = cells.ratings;
+    let labels = labels(cells, &table.models);
+    // Units are realization and repetition; a rating's is found by counting.
+    let mut place = vec![usize::MAX; r.models.len()];
+    for (j, &m) in table.models.iter().enumerate() {
+        place[m] = j;
+    }
+    let mut units = vec![Vec::new(); table.models.len() * labels.len()];
+    for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
+        let j = place[r.model[i] as usize];
+        if let (Ok(k), true) = (labels.binary_search(&r.repetition[i]), j != usize::MAX) {
+            units[j * labels.len() + k].push(v);
+        }
+    }
+    put_alpha(krippendorff(&units), "krippendorff_subjects", values);
+}
+
+/// The repetitions that there are of some realizations, sorted.
+fn labels(cells: &Cells<'_>, models: &[usize]) -> Vec<u32> {
+    let r = cells.ratings;
+    let mut labels: Vec<u32> = Vec::new();
+    for cell in &cells.cells {
+        if models.binary_search(&cell.model).is_err() {
+            continue;
+        }
+        for &i in &cells.order[cell.rows.clone()] {
+            if let Err(at) = labels.binary_search(&r.repetition[i]) {
+                labels.insert(at, r.repetition[i]);
+            }
+        }
+        // A table that numbers its rows through has no repetitions to speak of.
+        if labels.len() > MAX_LABELS {
+            return Vec::new();
+        }
+    }
+    labels
+}
+
+/// Targets are the cells that hold every repetition, raters the repetitions.
+fn repetitions(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
+    let labels = labels(cells, models);
+    let units: Vec<&[f64]> = (cells.cells.iter())
+        .filter(|c| models.binary_search(&c.model).is_ok())
+        .map(|c| cells.of_cell(c))
+        .collect();
+    let complete: Vec<&[f64]> = (units.iter().copied())
+        .filter(|u| u.len() == labels.len())
+        .collect();
+    let found = icc(&complete);
+    let why = "fewer than two cells with two repetitions or more";
+    put_icc(found.as_ref(), "icc_repetitions", why, values);
+    let mut g = values.group("icc_repetitions", why);
+    g.put(
+        "n_cells",
+        if labels.len() > 1 {
+            complete.len() as f64
+        } else {
+            0.0
+        },
+    );
+    let sem = found.map(|i| i.ms_error.max(0.0).sqrt());
+    g.maybe("sem", sem);
+    let change = sem.map(|s| 1.96 * std::f64::consts::SQRT_2 * s);
+    g.maybe("smallest_detectable_change", change);
+    put_alpha(krippendorff(&units), "krippendorff_repetitions", values);
+}
+
+fn put_icc(found: Option<&Icc>, prefix: &str, few: &str, values: &mut Values) {
+    let Some(i) = found else {
+        let names = ["ICC1", "ICC2", "ICC3", "ICC1k", "ICC2k", "ICC3k"];
+        values.group(prefix, few).none(&names);
+        return;
+    };
+    let mut g = values.group(prefix, NO_ERROR);
+    g.put("ms_targets", i.ms_targets);
+    g.put("ms_raters", i.ms_raters);
+    g.put("ms_error", i.ms_error);
+    g.maybe("F_1", i.f_1);
+    g.maybe("p_1", i.p_1);
+    g.maybe("F_3", i.f_3);
+    g.maybe("p_3", i.p_3);
+    g.maybe("ICC1k", i.icc1k);
+    let coefficients: [(&str, Option<Coefficient>); 5] = [
+        ("ICC1", i.icc1),
+        ("ICC2", i.icc2),
+        ("ICC3", i.icc3),
+        ("ICC2k", i.icc2k),
+        ("ICC3k", i.icc3k),
+    ];
+    for (name, c) in coefficients {
+        g.maybe(name, c.map(|c| c.value));
+        let ends = c.and_then(|c| c.ci95);
+        for (end, value) in [("lo", ends.map(|e| e.0)), ("hi", ends.map(|e| e.1))] {
+            match value.filter(|v| !v.is_finite()) {
+                Some(_) => g.put_or(&format!("{name}/{end}"), None, NO_END),
+                None => g.maybe(&format!("{name}/{end}"), value),
+            }
+        }
+    }
+}
+
+fn put_alpha(alpha: Alpha, prefix: &str, values: &mut Values) {
+    let why = "no unit has two ratings, or all are equal, or more than 1000 differ";
+    let mut g = values.group(prefix, why);
+    g.maybe("nominal", alpha.nominal);
+    g.maybe("ordinal", alpha.ordinal);
+    g.maybe("interval", alpha.interval);
+}

@@ -1,0 +1,142 @@
+//! The study's questions in numbers: `realistic/*`, the share of the variance
+//! between realizations that VAF has (`corr/share/*`), how much of the variance
+//! is whose (`variance/*`), and the same without the exclusions
+//! (`before_exclusion/*`).
+
+use super::Rules;
+use super::cells::{Cells, within};
+use super::values::Values;
+use study_stats::anova::one_way;
+use study_stats::distribution::t_quantile;
+use study_stats::proportion::share;
+
+pub(super) fn headline(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
+    if let Some(from) = rules.realistic_from {
+        realistic(cells, from, values);
+    }
+    explained(values);
+    components(cells, values);
+}
+
+/// Shares of ratings at or above a threshold; subjects are what was sampled.
+fn realistic(cells: &Cells<'_>, from: f64, values: &mut Values) {
+    let r = cells.ratings;
+    let mut clusters: Vec<Vec<(f64, f64)>> = vec![Vec::new(); r.models.len()];
+    for cell in &cells.cells {
+        let rows = &cells.order[cell.rows.clone()];
+        let hits = rows.iter().filter(|&&i| r.rating[i] >= from).count();
+        clusters[cell.model].push((hits as f64, rows.len() as f64));
+    }
+    for (m, clusters) in clusters.iter().enumerate() {
+        let found = share(clusters);
+        let id = format!("realistic/{}", cells.model_name(m));
+        let mut g = values.group(id, "no ratings");
+        g.put("n", clusters.iter().map(|c| c.1).sum());
+        g.maybe("share", found.map(|s| s.share));
+        g.maybe("n_effective", found.map(|s| s.n_effective));
+        let mut g = values.group(
+            format!("realistic/{}", cells.model_name(m)),
+            "fewer than two subjects",
+        );
+        g.interval("ci95", found.and_then(|s| s.ci95));
+    }
+}
+
+/// What of the variance between realizations goes along with VAF, and which |r|
+/// is needed: r² of the means, its unbiased version 1 − (1 − r²)(n − 1)/(n − 2)
+/// (Ezekiel 1930). The crossed model's share stands with that model.
+fn explained(values: &mut Values) {
+    let n = values.number("corr/n_models").unwrap_or(0.0);
+    let r2 = values.number("corr/pearson/r").map(|r| r * r);
+    let needed = t_quantile(0.975, n - 2.0)
+        .filter(|_| n >= 3.0)
+        .map(|t| t / (n - 2.0 + t * t).sqrt());
+    let why = "no correlation over realizations";
+    let mut g = values.group("corr/share", why);
+    g.maybe("r2", r2);
+    g.maybe(
+        "r2_adjusted",
+        r2.map(|r2| 1.0 - (1.0 - r2) * (n - 1.0) / (n - 2.0)),
+    );
+    values
+        .group("corr/pearson", "fewer than three realizations with a VAF")
+        .maybe("critical_r", needed);
+}
+
+/// Variance components of the complete table, by the expected mean squares of its
+/// cells: with h the mean of 1/(ratings of a cell), σ² within cells,
+/// E(MS subjects) = M σ²ₛ + σ²ₛₘ + hσ², E(MS realizations) = S σ²ₘ + σ²ₛₘ + hσ²,
+/// E(MS error) = σ²ₛₘ + hσ² (Searle, Casella & McCulloch 1992, §5.3; of balanced
+/// tables the usual analysis of variance). Negative ones are 0.
+fn components(cells: &Cells<'_>, values: &mut Values) {
+    let table = cells.table(&cells.test_models());
+    let (s, m) = (table.rows.len() as f64, table.models.len() as f64);
+    let found = one_way(&table.rows);
+    let own: Vec<_> = (cells.cells.iter())
+        .filter(|c| table.subjects.binary_search(&c.subject).is_ok())
+        .filter(|c| table.models.binary_search(&c.model).is_ok())
+        .collect();
+    let (squares, df) = within(own.iter().copied());
+    let h = own.iter().map(|c| 1.0 / c.rows.len() as f64).sum::<f64>() / own.len() as f64;
+    let noise = (df > 0).then(|| squares / df as f64);
+    let why = "fewer than two complete subjects or realizations";
+    let mut g = values.group("variance", why);
+    let Some(a) = found else {
+        g.none(&["subject", "model", "interaction", "noise"]);
+        return;
+    };
+    let error = a.effect.ss_error / a.effect.df2;
+    let subject = ((a.ss_subject / (s - 1.0) - error) / m).max(0.0);
+    let model = ((a.effect.ss / a.effect.df1 - error) / s).max(0.0);
+    let interaction = noise.map(|noise| (error - h * noise).max(0.0));
+    // Without repetitions interaction and noise cannot be told apart.
+    let rest = interaction.zip(noise).map_or(error, |(i, n)| i + n);
+    let total = subject + model + rest;
+    let why = "no cell has two ratings: it is part of `interaction_and_noise`";
+    g.put("subject", subject);
+    g.put("model", model);
+    g.put_or("interaction", interaction, why);
+    g.put_or("noise", noise, why);
+    g.put("interaction_and_noise", rest);
+    let of = |x: f64| (total > 0.0).then(|| x / total);
+    let mut g = values.group("variance/share", "all ratings are equal");
+    g.maybe("subject", of(subject));
+    g.maybe("model", of(model));
+    g.maybe("interaction_and_noise", of(rest));
+    if let Some((interaction, noise)) = interaction.zip(noise) {
+        g.maybe("interaction", of(interaction));
+        g.maybe("noise", of(noise));
+    } else {
+        g.put_or("interaction", None, why);
+        g.put_or("noise", None, why);
+    }
+}
+
+/// What is shown with and without the exclusions.
+const BOTH: [&str; 14] = [
+    "corr/n_models",
+    "corr/pearson/",
+    "corr/spearman/",
+    "corr/kendall/",
+    "corr/share/",
+    "desc/",
+    "design/",
+    "friedman/",
+    "lmm_vaf_crossed/",
+    "posthoc/",
+    "realistic/",
+    "reference/",
+    "rmanova/",
+    "variance/",
+];
+
+/// Copies the headline of `all` rows that the rules left out or kept.
+pub(super) fn without_exclusions(all: &Values, values: &mut Values) {
+    let ids: Vec<&str> = (all.iter())
+        .map(|(id, _)| id)
+        .filter(|id| BOTH.iter().any(|b| id.starts_with(b)))
+        .collect();
+    for id in ids {
+        values.copy(all, id, format!("before_exclusion/{id}"));
+    }
+}

@@ -1,0 +1,470 @@
+//! Gaussian mixed models: `lmm_model`, `lmm_vaf`, `lmm_vaf_slope`,
+//! `lmm_vaf_crossed`, `lmm_crossed`, `lmm_variance`. All of them over the test
+//! realizations, hidden repeats left out; subjects need not be complete.
+//!
+//! Only `lmm_vaf_crossed` speaks of other realizations than these: it has a
+//! realization effect of its own beside VAF.
+
+use super::cells::Cells;
+use super::values::{Group, Values};
+use study_stats::describe::{mean, sum_of_squares};
+use study_stats::distribution::chi2_upper;
+use study_stats::lmm::{
+    Cell, ContrastT, Criterion, Fit, Fixed, LmmError, Random, Table, fit, kenward_roger,
+};
+
+/// The ratings as the models need them.
+struct Data {
+    /// Of all test realizations.
+    all: Result<Table, LmmError>,
+    /// Of those with a VAF, with the VAF and without.
+    vaf: Result<Table, LmmError>,
+    vaf_null: Result<Table, LmmError>,
+    /// Whether any has a VAF.
+    has_vaf: bool,
+    /// Whether a cell with a VAF has two ratings.
+    repeats: bool,
+    /// The slope beside fixed subjects.
+    within_subjects: Option<f64>,
+    /// Mean of the VAF over realizations; over rows if each row has its own.
+    centre: f64,
+    /// Whether VAF differs between the rows of one realization.
+    by_row: bool,
+}
+
+pub(super) fn mixed(cells: &Cells<'_>, values: &mut Values) {
+    let data = Data::of(cells);
+    model(cells, &data, values);
+    vaf(cells, &data, values);
+    vaf_slope(cells, &data, values);
+    vaf_crossed(cells, &data, values);
+    crossed(cells, &data, values);
+    variance(&data, values);
+    share_of_vaf(values);
+}
+
+impl Data {
+    fn of(cells: &Cells<'_>) -> Self {
+        let models = cells.test_models();
+        let own: Vec<_> = (cells.cells.iter())
+            .filter(|c| models.binary_search(&c.model).is_ok())
+            .collect();
+        let of_rows = |subject, model, x, rows: &[f64]| -> Option<Cell> {
+            Some(Cell {
+                subject,
+                model,
+                x,
+                n: rows.len(),
+                mean: mean(rows)?,
+                within: sum_of_squares(rows)?,
+            })
+        };
+        let all: Vec<Cell> = own
+            .iter()
+            .filter(|c| c.squares.is_finite())
+            .map(|c| Cell {
+                subject: c.subject,
+                model: c.model,
+                x: 0.0,
+                n: c.rows.len(),
+                mean: c.mean,
+                within: c.squares,
+            })
+            .collect();
+        let vafs: Vec<f64> = models.iter().filter_map(|&m| cells.vaf[m]).collect();
+        let by_row = vafs.is_empty();
+        let mut with_vaf: Vec<Cell> = Vec::new();
+        if by_row {
+            for c in &own {
+                let mut rows: Vec<(f64, f64)> = cells.order[c.rows.clone()]
+                    .iter()
+                    .map(|&i| (cells.ratings.vaf[i], cells.centred[i]))
+                    .filter(|r| r.0.is_finite())
+                    .collect();
+                rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+                for same in rows.chunk_by(|a, b| a.0 == b.0) {
+                    let ratings: Vec<f64> = same.iter().map(|r| r.1).collect();
+                    with_vaf.extend(of_rows(c.subject, c.model, same[0].0, &ratings));
+                }
+            }
+        } else {
+            with_vaf.extend(
+                all.iter()
+                    .filter_map(|c| cells.vaf[c.model].map(|x| Cell { x, ..*c })),
+            );
+        }
+        let centre = if by_row {
+            let n: f64 = with_vaf.iter().map(|c| c.n as f64).sum();
+            with_vaf.iter().map(|c| c.x * c.n as f64).sum::<f64>() / n
+        } else {
+            let mut rated: Vec<usize> = with_vaf.iter().map(|c| c.model).collect();
+            rated.sort_unstable();
+            rated.dedup();
+            let rated: Vec<f64> = rated.iter().filter_map(|&m| cells.vaf[m]).collect();
+            mean(&rated).unwrap_or(f64::NAN)
+        };
+        let vaf_null = Table::new(&with_vaf, Fixed::Intercept);
+        // Where every realization has its VAF the ratings are the same.
+        let all = if all.len() == with_vaf.len() && !by_row {
+            vaf_null.clone()
+        } else {
+            Table::new(&all, Fixed::Intercept)
+        };
+        Self {
+            vaf: (vaf_null.clone()).and_then(|t| t.with(Fixed::Covariate { centre })),
+            vaf_null,
+            all,
+            has_vaf: !with_vaf.is_empty(),
+            repeats: with_vaf.iter().any(|c| c.n > 1),
+            within_subjects: within_subjects(&with_vaf),
+            centre,
+            by_row: by_row && !with_vaf.is_empty(),
+        }
+    }
+}
+
+/// A table, or the reason why there is none.
+fn given(table: &Result<Table, LmmError>) -> Result<&Table, LmmError> {
+    table.as_ref().map_err(|e| *e)
+}
+
+/// Why there is nothing about VAF.
+fn why_no_vaf(data: &Data, error: LmmError) -> String {
+    if !data.has_vaf {
+        "no test realization has a VAF".to_owned()
+    } else {
+        error.to_string()
+    }
+}
+
+const NO_DF: &str = "the likelihood has no curvature to take degrees of freedom from";
+
+/// −2 log likelihood ratio; rounding below 0 is 0.
+fn ratio(null: &Fit<'_>, full: &Fit<'_>) -> f64 {
+    (null.deviance - full.deviance).max(0.0)
+}
+
+fn likelihood(g: &mut Group<'_>, null: &Fit<'_>, full: &Fit<'_>, df: f64) {
+    let chi2 = ratio(null, full);
+    g.put("ml_deviance", full.deviance);
+    g.put("ml_aic", full.aic());
+    g.put("ml_bic", full.bic());
+    g.put("lrt_chi2", chi2);
+    g.maybe("lrt_p", chi2_upper(chi2, df));
+}
+
+fn model(cells: &Cells<'_>, data: &Data, values: &mut Values) {
+    let found = (|| {
+        let null = given(&data.all)?;
+        let table = &null.with(Fixed::Models)?;
+        if table.models().len() < 2 {
+            return Err(LmmError::OneModel);
+        }
+        let random = Random::default();
+        let reml = fit(table, random, Criterion::Reml)?;
+        let ml = fit(table, random, Criterion::Ml)?;
+        let null = fit(null, random, Criterion::Ml)?;
+        let mut g = values.group("lmm_model", NO_DF);
+        g.put("reml_deviance", reml.deviance);
+        let v = reml.variances;
+        g.put("var_subject", v.intercept);
+        g.put("sigma2", v.error);
+        g.put("icc_subject", v.intercept / (v.intercept + v.error));
+        let df = table.models().len() as f64 - 1.0;
+        likelihood(&mut g, &null, &ml, df);
+        g.put("lrt_df", df);
+        g.put("null_ml_deviance", null.deviance);
+        let f = reml.f_test();
+        g.maybe("satterthwaite_F", f.map(|f| f.f));
+        g.maybe("satterthwaite_df2", f.and_then(|f| f.df2));
+        g.maybe("satterthwaite_p", f.and_then(|f| f.p));
+        let f = kenward_roger(&reml);
+        let why = "the adjustment is not defined for so few ratings";
+        g.put_or("kenward_roger_F", f.map(|f| f.f), why);
+        g.put_or("kenward_roger_df2", f.and_then(|f| f.df2), why);
+        g.put_or("kenward_roger_p", f.and_then(|f| f.p), why);
+        let width = table.models().len();
+        let contrasts: Vec<Vec<f64>> = (0..width)
+            .map(|j| (0..width).map(|i| f64::from(u8::from(i == j))).collect())
+            .collect();
+        let means = reml.t_tests(&contrasts);
+        for (&m, t) in table.models().iter().zip(means) {
+            let mut g = values.group(format!("lmm_model/emm/{}", cells.model_name(m)), NO_DF);
+            g.put("estimate", t.estimate + cells.offset);
+            g.put("se", t.se);
+            let shift = |e: f64| e + cells.offset;
+            g.interval("ci95", t.ci95.map(|(l, h)| (shift(l), shift(h))));
+        }
+        Ok(())
+    })();
+    if let Err(error) = found {
+        let names = [
+            "reml_deviance",
+            "var_subject",
+            "sigma2",
+            "icc_subject",
+            "ml_deviance",
+            "ml_aic",
+            "ml_bic",
+            "lrt_chi2",
+            "lrt_df",
+            "lrt_p",
+            "null_ml_deviance",
+            "satterthwaite_F",
+            "satterthwaite_df2",
+            "satterthwaite_p",
+            "kenward_roger_F",
+            "kenward_roger_df2",
+            "kenward_roger_p",
+        ];
+        values.group("lmm_model", error.to_string()).none(&names);
+    }
+}
+
+const COVARIATE: [&str; 11] = [
+    "reml_deviance",
+    "sigma2",
+    "intercept",
+    "intercept_se",
+    "slope",
+    "slope_se",
+    "slope_t",
+    "slope_satterthwaite_df",
+    "slope_satterthwaite_p",
+    "slope_ci95_lo",
+    "slope_ci95_hi",
+];
+
+/// Intercept at a VAF, slope with its test.
+fn coefficients(g: &mut Group<'_>, fit: &Fit<'_>, at: f64, offset: f64) -> ContrastT {
+    let tests = fit.t_tests(&[vec![1.0, at], vec![0.0, 1.0]]);
+    let (intercept, slope) = (tests[0], tests[1]);
+    g.put("reml_deviance", fit.deviance);
+    g.put("sigma2", fit.variances.error);
+    g.put("intercept", intercept.estimate + offset);
+    g.put("intercept_se", intercept.se);
+    g.put("slope", slope.estimate);
+    g.put("slope_se", slope.se);
+    g.maybe("slope_t", slope.t);
+    g.maybe("slope_satterthwaite_df", slope.df);
+    g.maybe("slope_satterthwaite_p", slope.p);
+    g.interval("slope_ci95", slope.ci95);
+    slope
+}
+
+fn vaf(cells: &Cells<'_>, data: &Data, values: &mut Values) {
+    let found = (|| {
+        let table = given(&data.vaf)?;
+        let random = Random::default();
+        let reml = fit(table, random, Criterion::Reml)?;
+        let ml = fit(table, random, Criterion::Ml)?;
+        let null = fit(given(&data.vaf_null)?, random, Criterion::Ml)?;
+        let mut g = values.group("lmm_vaf", NO_DF);
+        let slope = coefficients(&mut g, &reml, -data.centre, cells.offset);
+        let v = reml.variances;
+        g.put("var_subject", v.intercept);
+        likelihood(&mut g, &null, &ml, 1.0);
+        let explained = slope.estimate.powi(2) * table.covariate_variance();
+        let total = explained + v.intercept + v.error;
+        g.put("r2_marginal", explained / total);
+        g.put("r2_conditional", (explained + v.intercept) / total);
+        Ok(())
+    })();
+    let mut g = values.group("lmm_vaf", "no subject has two values of VAF");
+    g.maybe("statsmodels_slope", data.within_subjects);
+    if let Err(error) = found {
+        let mut g = values.group("lmm_vaf", why_no_vaf(data, error));
+        g.none(&COVARIATE);
+        g.none(&[
+            "var_subject",
+            "ml_deviance",
+            "ml_aic",
+            "ml_bic",
+            "lrt_chi2",
+            "lrt_p",
+            "r2_marginal",
+            "r2_conditional",
+        ]);
+    }
+}
+
+/// The slope beside fixed subjects, Σn(x − x̄ₛ)(y − ȳₛ)/Σn(x − x̄ₛ)²: the limit of
+/// the mixed model's as the subject variance grows.
+fn within_subjects(cells: &[Cell]) -> Option<f64> {
+    let (mut xx, mut xy, mut scale) = (0.0, 0.0, 0.0f64);
+    for own in cells.chunk_by(|a, b| a.subject == b.subject) {
+        let n: f64 = own.iter().map(|c| c.n as f64).sum();
+        let about = |f: fn(&Cell) -> f64| own.iter().map(|c| c.n as f64 * f(c)).sum::<f64>() / n;
+        let (mx, my) = (about(|c| c.x), about(|c| c.mean));
+        for c in own {
+            xx += c.n as f64 * (c.x - mx).powi(2);
+            xy += c.n as f64 * (c.x - mx) * (c.mean - my);
+            scale = scale.max(c.x.abs());
+        }
+    }
+    (xx > 1e-24 * scale * scale)
+        .then(|| xy / xx)
+        .filter(|b| b.is_finite())
+}
+
+fn vaf_slope(cells: &Cells<'_>, data: &Data, values: &mut Values) {
+    let found = (|| {
+        let table = given(&data.vaf)?;
+        let random = Random {
+            slope: true,
+            ..Random::default()
+        };
+        let reml = fit(table, random, Criterion::Reml)?;
+        let mut g = values.group("lmm_vaf_slope", NO_DF);
+        coefficients(&mut g, &reml, 0.0, cells.offset);
+        let v = reml.variances;
+        g.put("vaf_centre", data.centre);
+        g.put("var_intercept", v.intercept);
+        g.put("var_slope", v.slope);
+        g.put("cov", v.covariance);
+        g.put("singular", f64::from(u8::from(reml.singular)));
+        Ok(())
+    })();
+    if let Err(error) = found {
+        let mut g = values.group("lmm_vaf_slope", why_no_vaf(data, error));
+        g.none(&COVARIATE);
+        g.none(&[
+            "vaf_centre",
+            "var_intercept",
+            "var_slope",
+            "cov",
+            "singular",
+        ]);
+    }
+}
+
+const BY_ROW: &str = "VAF differs between the ratings of one realization";
+
+fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
+    let cell = data.repeats;
+    let found = (|| {
+        if data.by_row {
+            return Err(BY_ROW.to_owned());
+        }
+        let why = |e| why_no_vaf(data, e);
+        let table = given(&data.vaf).map_err(why)?;
+        let random = Random {
+            model: true,
+            cell,
+            ..Random::default()
+        };
+        let reml = fit(table, random, Criterion::Reml).map_err(why)?;
+        let mut g = values.group("lmm_vaf_crossed", NO_DF);
+        coefficients(&mut g, &reml, -data.centre, cells.offset);
+        let v = reml.variances;
+        g.put("var_subject", v.intercept);
+        g.put("var_model", v.model);
+        g.put("singular", f64::from(u8::from(reml.singular)));
+        if cell {
+            g.put("var_subject_model", v.cell);
+        }
+        // What VAF explains is the fall from the same terms over the same ratings:
+        // another model would put the interaction to VAF's account.
+        let without = given(&data.vaf_null).and_then(|t| fit(t, random, Criterion::Reml));
+        match without {
+            Ok(without) => g.put("var_model_without_vaf", without.variances.model),
+            Err(error) => g.put_or("var_model_without_vaf", None, &error.to_string()),
+        }
+        Ok(())
+    })();
+    if let Err(why) = found {
+        let mut g = values.group("lmm_vaf_crossed", why);
+        g.none(&COVARIATE);
+        g.none(&[
+            "var_subject",
+            "var_model",
+            "var_model_without_vaf",
+            "singular",
+        ]);
+        if cell {
+            g.none(&["var_subject_model"]);
+        }
+    }
+}
+
+fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
+    let found = (|| {
+        let random = Random {
+            model: true,
+            ..Random::default()
+        };
+        let reml = fit(given(&data.all)?, random, Criterion::Reml)?;
+        let mean = reml.t_test(&[1.0]);
+        let mut g = values.group("lmm_crossed", NO_DF);
+        g.put("reml_deviance", reml.deviance);
+        g.put("intercept", mean.estimate + cells.offset);
+        g.put("intercept_se", mean.se);
+        g.put("var_subject", reml.variances.intercept);
+        g.put("var_model", reml.variances.model);
+        g.put("sigma2", reml.variances.error);
+        Ok::<(), LmmError>(())
+    })();
+    if let Err(error) = found {
+        values.group("lmm_crossed", error.to_string()).none(&[
+            "reml_deviance",
+            "intercept",
+            "intercept_se",
+            "var_subject",
+            "var_model",
+            "sigma2",
+        ]);
+    }
+}
+
+/// How much of the variance of a rating is whose: ~ 1 + (1|subject) + (1|model)
+/// + (1|subject:model).
+fn variance(data: &Data, values: &mut Values) {
+    let random = Random {
+        model: true,
+        cell: true,
+        ..Random::default()
+    };
+    let components = |table: &Result<Table, LmmError>| -> Result<_, LmmError> {
+        Ok(fit(given(table)?, random, Criterion::Reml)?.variances)
+    };
+    let names = ["subject", "model", "subject_model", "error"];
+    match components(&data.all) {
+        Ok(v) => {
+            let parts = [v.intercept, v.model, v.cell, v.error];
+            let total: f64 = parts.iter().sum();
+            let mut g = values.group("lmm_variance", "it overflows");
+            for (name, part) in names.iter().zip(parts) {
+                g.put(&format!("var_{name}"), part);
+                g.put(&format!("share_{name}"), part / total);
+            }
+        }
+        Err(error) => {
+            let mut g = values.group("lmm_variance", error.to_string());
+            for name in names {
+                g.none(&[&format!("var_{name}"), &format!("share_{name}")]);
+            }
+        }
+    }
+}
+
+/// The share of the variance between realizations that goes when VAF enters the
+/// crossed model, its random terms and its ratings the same. Below 0 where VAF
+/// explains less than a covariate without any relation is expected to.
+fn share_of_vaf(values: &mut Values) {
+    let why = ["var_model", "var_model_without_vaf"]
+        .iter()
+        .find_map(|v| values.reason(&format!("lmm_vaf_crossed/{v}")))
+        .unwrap_or("there is no variance between realizations with a VAF to explain")
+        .to_owned();
+    let number = |v: &str| values.number(&format!("lmm_vaf_crossed/{v}"));
+    let share = number("var_model")
+        .zip(number("var_model_without_vaf"))
+        .filter(|(_, without)| *without > 0.0)
+        .map(|(with, without)| 1.0 - with / without);
+    values
+        .group("lmm_variance", why.clone())
+        .maybe("model_share_of_vaf", share);
+    values
+        .group("corr/share", why)
+        .maybe("var_model_crossed", share);
+}

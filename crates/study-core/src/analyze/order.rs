@@ -1,0 +1,83 @@
+//! Learning and carry-over: `order_trial/*`, `order_previous_rating/*`,
+//! `order_repetition/*`.
+
+use super::Rules;
+use super::cells::Cells;
+use super::values::Values;
+use std::collections::BTreeMap;
+use study_stats::beside::{Beside, beside_factors};
+use study_stats::describe::Sum;
+
+pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+    let r = cells.ratings;
+    // Rows of a subject stand together and stay so.
+    let known: Vec<usize> = cells
+        .order
+        .iter()
+        .copied()
+        .filter(|&i| r.trial_index[i] > 0)
+        .collect();
+    let trial: Vec<f64> = known.iter().map(|&i| f64::from(r.trial_index[i])).collect();
+    // The rating of the trial just before, and of no other.
+    let (mut rows, mut previous) = (Vec::new(), Vec::new());
+    let mut places: Vec<(u32, usize)> = Vec::new();
+    for own in known.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
+        places.clear();
+        places.extend(own.iter().map(|&i| (r.trial_index[i], i)));
+        places.sort_by_key(|p| p.0);
+        for &i in own {
+            let before = r.trial_index[i] - 1;
+            let first = places.partition_point(|p| p.0 < before);
+            // Where several claim the place, which one was before is not known.
+            if let [(place, j), after, ..] = &places[first..]
+                && *place == before
+                && after.0 != before
+            {
+                rows.push(i);
+                previous.push(cells.centred[*j]);
+            }
+        }
+    }
+    let (by_trial, by_previous) = rayon::join(
+        || slope(cells, &known, &trial),
+        || slope(cells, &rows, &previous),
+    );
+    put("order_trial", by_trial, values);
+    put("order_previous_rating", by_previous, values);
+    let mut by_repetition: BTreeMap<u32, (Sum, f64)> = BTreeMap::new();
+    for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
+        let (sum, n) = by_repetition.entry(r.repetition[i]).or_default();
+        sum.add(v);
+        *n += 1.0;
+    }
+    if by_repetition.len() > MAX_REPETITIONS {
+        return;
+    }
+    for (repetition, (sum, n)) in by_repetition {
+        values
+            .group(format!("order_repetition/{repetition}"), "no ratings")
+            .put("mean", sum.get() / n + cells.offset);
+    }
+}
+
+/// Most repetitions whose means are listed.
+const MAX_REPETITIONS: usize = 10_000;
+
+/// The slope of the rating on x beside fixed subjects and realizations.
+fn slope(cells: &Cells<'_>, rows: &[usize], x: &[f64]) -> Option<Beside> {
+    let r = cells.ratings;
+    let y: Vec<f64> = rows.iter().map(|&i| cells.centred[i]).collect();
+    let subjects: Vec<u32> = rows.iter().map(|&i| r.subject[i]).collect();
+    let models: Vec<u32> = rows.iter().map(|&i| r.model[i]).collect();
+    beside_factors(x, &y, &subjects, &models)
+}
+
+fn put(id: &str, found: Option<Beside>, values: &mut Values) {
+    let why = "the order is not known, or is one with subjects and realizations";
+    let mut g = values.group(id, why);
+    g.maybe("slope", found.map(|f| f.slope));
+    g.maybe("se", found.map(|f| f.se));
+    g.maybe("t", found.and_then(|f| f.t));
+    g.maybe("p", found.and_then(|f| f.p));
+    g.maybe("df", found.map(|f| f.df));
+}

@@ -1,0 +1,297 @@
+//! Ratings as ordered categories: `clm_*` over all ratings as if independent,
+//! `clmm_*` with an intercept for each subject. `*_model` has an effect of each
+//! test realization against the first, hidden repeats left out; `*_vaf` one of
+//! the row's VAF. All of them hold for these realizations only.
+//!
+//! The categories are the whole numbers that occur; the others have no
+//! probability, and a threshold between them no estimate.
+
+use super::cells::Cells;
+use super::values::{self, Values};
+use rayon::prelude::*;
+use study_stats::clm::counts::{Count, Predictor, Table};
+use study_stats::clm::{Cause, Fit, clm};
+use study_stats::clmm::{Mixed, clmm};
+
+/// More than these are no longer a rating scale: a slider.
+const MAX_CATEGORIES: usize = 20;
+
+/// Most realizations that get an effect of their own.
+const MAX_MODELS: usize = 50;
+
+/// Most different VAF.
+const MAX_LEVELS: usize = 10_000;
+
+/// Most subjects of a mixed model: its cost is proportional to them.
+const MAX_SUBJECTS: usize = 10_000;
+
+/// Beyond, not every whole number is a double.
+const WHOLE: f64 = 9_007_199_254_740_992.0;
+
+pub(super) fn ordinal(cells: &Cells<'_>, values: &mut Values) {
+    let mut test = vec![false; cells.ratings.models.len()];
+    for m in cells.test_models() {
+        test[m] = true;
+    }
+    let of_test = |i: &usize| test[cells.ratings.model[*i] as usize];
+    let rows: Vec<usize> = cells.order.iter().copied().filter(of_test).collect();
+    let both: [Group; 2] = [by_model, by_vaf];
+    let parts = both.par_iter().map(|group| {
+        let mut values = Values::default();
+        group(cells, &rows, &mut values);
+        values
+    });
+    for part in parts.collect::<Vec<Values>>() {
+        values.take(part);
+    }
+}
+
+/// Writes the models of one predictor.
+type Group = fn(&Cells<'_>, &[usize], &mut Values);
+
+/// Whether there are more subjects than a mixed model is fitted to. Nobody needs
+/// to be told apart then: the counts are pooled.
+fn many(cells: &Cells<'_>, rows: &[usize]) -> bool {
+    let subject = |i: usize| cells.ratings.subject[i];
+    let same = rows.windows(2).filter(|w| subject(w[0]) != subject(w[1]));
+    same.count() >= MAX_SUBJECTS
+}
+
+fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
+    let model = |i: usize| cells.ratings.model[i];
+    let mut present: Vec<u32> = rows.iter().map(|&i| model(i)).collect();
+    present.sort_unstable();
+    present.dedup();
+    let names: Vec<&str> = present
+        .iter()
+        .skip(1)
+        .map(|&m| cells.model_name(m as usize))
+        .collect();
+    // The first realization is the origin: no column, a zero in the first.
+    let predictors: Vec<Predictor> = (0..present.len())
+        .map(|g| Predictor {
+            column: g.saturating_sub(1),
+            x: if g == 0 { 0.0 } else { 1.0 },
+        })
+        .collect();
+    let mut place = vec![0; cells.ratings.models.len()];
+    for (g, &m) in (0u32..).zip(&present) {
+        place[m as usize] = g;
+    }
+    let scale = Scale {
+        names: &names,
+        unit: 1.0,
+        origin: 0.0,
+    };
+    let made = if present.len() > MAX_MODELS {
+        Err(format!("more than {MAX_MODELS} realizations"))
+    } else {
+        categories(cells, rows).map(|ratings| {
+            let n = predictors.len();
+            let counts = counts(cells, rows, &ratings, n, |i| place[model(i) as usize]);
+            let table = Table::new(predictors, names.len(), ratings.len(), &counts);
+            (table, ratings)
+        })
+    };
+    put_all("model", made, many(cells, rows), &scale, values);
+}
+
+fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
+    let vaf = |i: usize| cells.ratings.vaf[i];
+    let rows: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|&i| vaf(i).is_finite())
+        .collect();
+    let mut levels: Vec<f64> = rows.iter().map(|&i| vaf(i)).collect();
+    levels.sort_unstable_by(f64::total_cmp);
+    levels.dedup_by(|a, b| a.total_cmp(b).is_eq());
+    // From −1 to 1, so that the search sees no units.
+    let (low, high) = match (levels.first(), levels.last()) {
+        (Some(low), Some(high)) => (*low, *high),
+        _ => (0.0, 0.0),
+    };
+    let (origin, unit) = (0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low);
+    let scale = Scale {
+        names: &["vaf"],
+        unit,
+        origin,
+    };
+    let made = if rows.is_empty() {
+        Err("no rating has a realization and a VAF".to_owned())
+    } else if unit <= 0.0 {
+        Err("all VAF are equal".to_owned())
+    } else if levels.len() > MAX_LEVELS {
+        Err(format!("more than {MAX_LEVELS} different VAF"))
+    } else {
+        categories(cells, &rows).map(|ratings| {
+            let predictors = levels
+                .iter()
+                .map(|v| Predictor {
+                    column: 0,
+                    x: (v - origin) / unit,
+                })
+                .collect();
+            let index = |i: usize| {
+                let found = levels.binary_search_by(|v| v.total_cmp(&vaf(i)));
+                found.unwrap_or(0) as u32
+            };
+            let counts = counts(cells, &rows, &ratings, levels.len(), index);
+            (Table::new(predictors, 1, ratings.len(), &counts), ratings)
+        })
+    };
+    put_all("vaf", made, many(cells, &rows), &scale, values);
+}
+
+/// The ratings that occur, rising, or why they are no categories.
+fn categories(cells: &Cells<'_>, rows: &[usize]) -> Result<Vec<f64>, String> {
+    let mut found: Vec<f64> = Vec::new();
+    for &i in rows {
+        // Adding 0 makes one zero of two.
+        let rating = cells.ratings.rating[i] + 0.0;
+        if let Err(at) = found.binary_search_by(|v| v.total_cmp(&rating)) {
+            if rating.fract() != 0.0 || rating.abs() > WHOLE {
+                return Err("the ratings are not whole numbers".to_owned());
+            }
+            if found.len() == MAX_CATEGORIES {
+                return Err(format!("more than {MAX_CATEGORIES} different ratings"));
+            }
+            found.insert(at, rating);
+        }
+    }
+    match found.len() {
+        0 => Err("no rating has a realization".to_owned()),
+        _ => Ok(found),
+    }
+}
+
+/// The rows, which come cell by cell, counted; `predictors` is how many there are.
+fn counts(
+    cells: &Cells<'_>,
+    rows: &[usize],
+    ratings: &[f64],
+    predictors: usize,
+    predictor: impl Fn(usize) -> u32,
+) -> Vec<Count> {
+    let category = |i: usize| {
+        let rating = cells.ratings.rating[i] + 0.0;
+        ratings.partition_point(|v| *v < rating) as u32
+    };
+    if many(cells, rows) {
+        let mut tally = vec![0u32; predictors * ratings.len()];
+        for &i in rows {
+            tally[predictor(i) as usize * ratings.len() + category(i) as usize] += 1;
+        }
+        let of = |(at, n): (usize, u32)| Count {
+            subject: 0,
+            predictor: (at / ratings.len()) as u32,
+            category: (at % ratings.len()) as u32,
+            n,
+        };
+        return tally.into_iter().enumerate().map(of).collect();
+    }
+    let mut counts: Vec<Count> = Vec::new();
+    let mut from = 0;
+    for &i in rows {
+        let new = Count {
+            subject: cells.ratings.subject[i],
+            predictor: predictor(i),
+            category: category(i),
+            n: 1,
+        };
+        if counts.get(from).is_some_and(|c| c.subject != new.subject) {
+            from = counts.len();
+        }
+        let same = |c: &&mut Count| (c.predictor, c.category) == (new.predictor, new.category);
+        // The last ones of the subject are of the same cell.
+        match counts[from..].iter_mut().rev().find(same) {
+            Some(c) => c.n += 1,
+            None => counts.push(new),
+        }
+    }
+    counts
+}
+
+/// How β is named, and its unit: x = (value − origin)/unit.
+struct Scale<'a> {
+    names: &'a [&'a str],
+    unit: f64,
+    origin: f64,
+}
+
+fn put_all(
+    what: &str,
+    made: Result<(Table, Vec<f64>), String>,
+    many: bool,
+    scale: &Scale<'_>,
+    values: &mut Values,
+) {
+    let ids = [
+        format!("clm_{what}"),
+        format!("clmm_{what}_laplace"),
+        format!("clmm_{what}_quad"),
+    ];
+    let (table, ratings) = match made {
+        Ok(made) => made,
+        Err(why) => {
+            for id in ids {
+                none(&mut values.group(id, why.as_str()), what);
+            }
+            return;
+        }
+    };
+    let labels: Vec<String> = ratings
+        .windows(2)
+        .map(|w| format!("{}|{}", w[0], w[1]))
+        .collect();
+    let fixed = clm(&table);
+    match &fixed {
+        Ok(fit) => put(fit, &labels, scale, &mut values.group(&ids[0], "")),
+        Err(cause) => none(&mut values.group(&ids[0], cause.to_string()), what),
+    }
+    let mixed: [Result<Mixed, String>; 2] = if many {
+        let why = format!("more than {MAX_SUBJECTS} subjects");
+        [Err(why.clone()), Err(why)]
+    } else {
+        let both = clmm(&table);
+        [both.laplace, both.quadrature].map(|m| m.map_err(|cause: Cause| cause.to_string()))
+    };
+    for (id, mixed) in ids[1..].iter().zip(mixed) {
+        match mixed {
+            Ok(mixed) => {
+                let mut g = values.group(id, "");
+                put(&mixed.fit, &labels, scale, &mut g);
+                g.put("sd_subject", mixed.sd);
+                g.put("boundary", f64::from(u8::from(mixed.boundary)));
+            }
+            Err(why) => {
+                let mut g = values.group(id, why);
+                none(&mut g, what);
+                g.none(&["sd_subject"]);
+            }
+        }
+    }
+}
+
+fn none(g: &mut values::Group<'_>, what: &str) {
+    g.none(&["loglik"]);
+    if what == "vaf" {
+        g.none(&["beta/vaf", "se/vaf"]);
+    }
+}
+
+/// On the scale of the data: θ + β·origin/unit, β/unit.
+fn put(fit: &Fit, labels: &[String], scale: &Scale<'_>, g: &mut values::Group<'_>) {
+    g.put("loglik", fit.loglik);
+    for ((name, beta), se) in scale.names.iter().zip(&fit.beta).zip(&fit.se) {
+        g.put(&format!("beta/{name}"), beta / scale.unit);
+        g.put(&format!("se/{name}"), se / scale.unit);
+    }
+    let shift = match fit.beta.first() {
+        Some(beta) => beta / scale.unit * scale.origin,
+        None => 0.0,
+    };
+    for (label, threshold) in labels.iter().zip(&fit.thresholds) {
+        g.put(&format!("threshold/{label}"), threshold + shift);
+    }
+}

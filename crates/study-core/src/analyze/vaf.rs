@@ -1,0 +1,333 @@
+//! Does VAF predict the rating: `corr/*` over realizations, which is the
+//! headline; `subject_corr/*`, `subject_slope/*`, `rmcorr_*`, `bootstrap/*`,
+//! `page/*` over subjects, which hold for these realizations only.
+//!
+//! Only test realizations with a VAF, hidden repeats left out.
+
+use super::Rules;
+use super::cells::{Cells, Table};
+use super::draws::Draws;
+use super::subjects::MAX_LISTED;
+use super::values::Values;
+use study_base::text::Untrusted;
+use study_stats::bayes::{correlation_bf10, jzs_bf10};
+use study_stats::bootstrap;
+use study_stats::correlation::{
+    fisher_interval, kendall, p_of_r, pearson, spearman, within_subjects,
+};
+use study_stats::describe::{constant, mean};
+use study_stats::friedman::page;
+use study_stats::paired::one_sample;
+use study_stats::permutation::{self, Statistic};
+use study_stats::regression::slope;
+
+const FEW: &str = "fewer than three realizations with a VAF";
+
+/// Most realizations that are left out one by one: the work goes with the square.
+const MAX_LEFT_OUT: usize = 1000;
+
+pub(super) fn against_vaf(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
+    let models: Vec<usize> = cells
+        .test_models()
+        .into_iter()
+        .filter(|&m| cells.vaf[m].is_some())
+        .collect();
+    let vaf: Vec<f64> = models.iter().filter_map(|&m| cells.vaf[m]).collect();
+    let table = cells.table(&models);
+    between_realizations(cells, &models, &vaf, rules, values);
+    by_subject(cells, &table, &vaf, values);
+    trend(&table, &vaf, values);
+    resampled(&table, &vaf, rules, values);
+    within(cells, &models, values);
+}
+
+/// The means over subjects of the cells, one for each realization.
+fn between_realizations(
+    cells: &Cells<'_>,
+    models: &[usize],
+    vaf: &[f64],
+    rules: &Rules,
+    values: &mut Values,
+) {
+    let by_model = cells.subject_means();
+    let (mut x, mut y, mut names) = (Vec::new(), Vec::new(), Vec::new());
+    for (&m, &v) in models.iter().zip(vaf) {
+        if let Some(mean) = mean(&by_model[m]) {
+            x.push(v);
+            y.push(mean);
+            names.push(cells.model_name(m));
+        }
+    }
+    let n = x.len();
+    values.group("corr", "").put("n_models", n as f64);
+    let why = if n < 3 {
+        FEW
+    } else if constant(&x) {
+        "all realizations have the same VAF"
+    } else {
+        "all realizations have the same mean rating"
+    };
+    // Two points always lie on a line.
+    let enough = |r: Option<f64>| r.filter(|_| n >= 3);
+    let r = enough(pearson(&x, &y));
+    let line = "the means lie on a line";
+    let mut g = values.group("corr/pearson", why);
+    g.maybe("r", r);
+    g.put_or(
+        "p_t",
+        r.and_then(|r| p_of_r(r, n as f64 - 2.0)),
+        if r.is_some() { line } else { why },
+    );
+    let interval = r.and_then(|r| fisher_interval(r, n as f64 - 3.0));
+    let no_interval = match r {
+        None => why,
+        Some(_) if n == 3 => "three realizations have no interval",
+        Some(_) => line,
+    };
+    g.put_or("ci95_lo", interval.map(|i| i.0), no_interval);
+    g.put_or("ci95_hi", interval.map(|i| i.1), no_interval);
+    let bf10 = r.and_then(|r| correlation_bf10(r, n));
+    g.put_or("bf10", bf10, if r.is_some() { line } else { why });
+    let rho = enough(spearman(&x, &y));
+    values.group("corr/spearman", why).maybe("rho", rho);
+    values
+        .group("corr/kendall", why)
+        .maybe("tau_b", enough(kendall(&x, &y)));
+    for (name, statistic) in [
+        ("pearson", Statistic::Pearson),
+        ("spearman", Statistic::Spearman),
+        ("kendall", Statistic::Kendall),
+    ] {
+        let mut draws = Draws::new(rules.seed, "permutation");
+        let test = permutation::test(statistic, &x, &y, &mut draws);
+        let mut g = values.group(format!("corr/{name}"), why);
+        let kind = if n > permutation::MAX_EXACT {
+            "monte_carlo"
+        } else {
+            "exact"
+        };
+        g.maybe(&format!("p_{kind}_two_sided"), test.map(|t| t.two_sided));
+        g.maybe(&format!("p_{kind}_greater"), test.map(|t| t.greater));
+        g.maybe("smallest_p_two_sided", test.map(|t| t.smallest));
+    }
+    leave_one_out(&x, &y, &names, why, values);
+}
+
+/// The correlations without each realization in turn.
+fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut Values) {
+    let n = x.len();
+    let without = |i: usize, v: &[f64]| -> Vec<f64> {
+        let kept = v.iter().enumerate().filter(|(j, _)| *j != i);
+        kept.map(|(_, v)| *v).collect()
+    };
+    let why = match n {
+        3 => "leaving one out leaves two",
+        n if n > MAX_LEFT_OUT => "more than 1000 realizations",
+        _ => why,
+    };
+    let (mut lowest, mut highest) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    let mut complete = n > 3 && n <= MAX_LEFT_OUT;
+    let defined = pearson(x, y).is_some();
+    let mut lost = None;
+    for (i, name) in names
+        .iter()
+        .enumerate()
+        .filter(|_| n > 3 && n <= MAX_LEFT_OUT)
+    {
+        let (x, y) = (without(i, x), without(i, y));
+        let both = [pearson(&x, &y), spearman(&x, &y)];
+        let left = if constant(&x) { "VAF" } else { "mean ratings" };
+        let mut g = values.group(
+            format!("corr/leave_one_out/{name}"),
+            format!("without it all {left} are equal"),
+        );
+        g.maybe("pearson", both[0]);
+        g.maybe("spearman", both[1]);
+        for (k, r) in both.iter().enumerate() {
+            match r {
+                Some(r) => {
+                    lowest[k] = lowest[k].min(*r);
+                    highest[k] = highest[k].max(*r);
+                }
+                None => {
+                    complete = false;
+                    // Where there is a correlation over all, it fails for this one.
+                    if defined && lost.is_none() {
+                        let name = Untrusted(name);
+                        lost = Some(format!("without `{name}` all {left} are equal"));
+                    }
+                }
+            }
+        }
+    }
+    let why = lost.as_deref().unwrap_or(why);
+    let mut g = values.group("corr/leave_one_out", why);
+    for (k, name) in ["pearson", "spearman"].iter().enumerate() {
+        g.maybe(&format!("{name}_min"), complete.then_some(lowest[k]));
+        g.maybe(&format!("{name}_max"), complete.then_some(highest[k]));
+    }
+}
+
+/// Correlations and slopes of each complete subject, then over them.
+fn by_subject(cells: &Cells<'_>, table: &Table, vaf: &[f64], values: &mut Values) {
+    let (mut z, mut slopes, mut perfect) = (Vec::new(), Vec::new(), false);
+    let enough = vaf.len() >= 3 && !constant(vaf);
+    for (&s, row) in table.subjects.iter().zip(&table.rows).filter(|_| enough) {
+        let r = pearson(vaf, row);
+        let b = slope(vaf, row);
+        if table.subjects.len() <= MAX_LISTED {
+            let id = format!("subject_corr/{}", cells.subject_name(s));
+            let mut g = values.group(id, "the subject rated all realizations alike");
+            g.maybe("r", r);
+            g.maybe("spearman", spearman(vaf, row));
+            g.maybe("slope", b);
+        }
+        slopes.extend(b);
+        if let Some(r) = r {
+            perfect |= 1.0 - r.abs() < 1e-12;
+            z.push(r.atanh());
+        }
+    }
+    let why = if !enough {
+        FEW
+    } else if perfect {
+        "a subject's ratings lie on a line with VAF: its z is infinite"
+    } else {
+        "fewer than two subjects with a correlation"
+    };
+    let test = one_sample(&z).filter(|_| !perfect);
+    let mut g = values.group("subject_corr", why);
+    g.put("n_defined", z.len() as f64);
+    g.maybe("fisher_z_mean", test.map(|t| t.mean));
+    g.maybe("r_back", test.map(|t| t.mean.tanh()));
+    g.maybe("t", test.and_then(|t| t.t));
+    g.maybe("p", test.and_then(|t| t.p));
+    let ends = test.and_then(|t| t.ci95);
+    g.interval("r_ci95", ends.map(|(l, h)| (l.tanh(), h.tanh())));
+    let test = one_sample(&slopes);
+    let why = if enough {
+        "fewer than two complete subjects, or equal slopes"
+    } else {
+        FEW
+    };
+    let mut g = values.group("subject_slope", why);
+    g.maybe("mean", test.map(|t| t.mean));
+    g.maybe("sd", test.map(|t| t.sd));
+    g.maybe("t", test.and_then(|t| t.t));
+    g.maybe("p", test.and_then(|t| t.p));
+    g.interval("ci95", test.and_then(|t| t.ci95));
+    let t = test.and_then(|t| t.t);
+    g.maybe("jzs_bf10", t.and_then(|t| jzs_bf10(t, slopes.len(), 0.707)));
+}
+
+fn trend(table: &Table, vaf: &[f64], values: &mut Values) {
+    let Some(p) = page(&table.rows, vaf).filter(|_| vaf.len() >= 3) else {
+        let why = "fewer than two complete subjects, or three realizations, or one VAF";
+        values.group("page", why).none(&["L", "z", "p_greater"]);
+        return;
+    };
+    let mut g = values.group("page", "every subject rated all realizations alike");
+    g.put("L", p.l);
+    g.maybe("z", p.z);
+    g.maybe("p_greater", p.p_greater);
+    let why = "realizations share a VAF";
+    g.put_or(
+        "p_greater_no_tie_correction",
+        p.p_greater_no_tie_correction,
+        why,
+    );
+}
+
+fn resampled(table: &Table, vaf: &[f64], rules: &Rules, values: &mut Values) {
+    let found = bootstrap::correlation(&table.rows, vaf, &mut Draws::new(rules.seed, "bootstrap"));
+    let why = "fewer than two complete subjects or three realizations, or no correlation";
+    let mut g = values.group("bootstrap", why);
+    let Some(b) = found else {
+        g.none(&[
+            "mean",
+            "se",
+            "percentile_lo",
+            "percentile_hi",
+            "bca_lo",
+            "bca_hi",
+        ]);
+        return;
+    };
+    g.put("mean", b.mean);
+    g.put("se", b.se);
+    g.put("percentile_lo", b.percentile.0);
+    g.put("percentile_hi", b.percentile.1);
+    g.put("p_le_zero", b.p_le_zero);
+    g.put("undefined_probability", b.undefined_probability);
+    g.put("exact", f64::from(u8::from(b.exact)));
+    g.put("normal_limit", f64::from(u8::from(b.normal_limit)));
+    let why = "the correlation lies at the end of its own distribution";
+    g.put_or("z0", b.z0, why);
+    g.put_or("bca_lo", b.bca.map(|c| c.0), why);
+    g.put_or("bca_hi", b.bca.map(|c| c.1), why);
+    let why = "leaving any subject out changes nothing, or all";
+    g.put_or("jackknife_acceleration", b.acceleration, why);
+}
+
+/// The correlation within subjects, of cells and of trials. Trials need no
+/// realization, only a VAF.
+fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
+    let r = cells.ratings;
+    let mut by_cell = Flat::default();
+    for own in cells.cells.chunk_by(|a, b| a.subject == b.subject) {
+        by_cell.next();
+        for c in own {
+            if let (Ok(_), Some(v)) = (models.binary_search(&c.model), cells.vaf[c.model]) {
+                by_cell.push(v, c.mean);
+            }
+        }
+    }
+    // Whether the trials of a realization count; the last place is for none.
+    let mut counts = vec![false; r.models.len() + 1];
+    counts[r.models.len()] = true;
+    for m in cells.test_models() {
+        counts[m] = true;
+    }
+    let mut by_trial = Flat::default();
+    for own in cells.all.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
+        by_trial.next();
+        for &i in own {
+            let known = cells.centred[i].is_finite() && r.vaf[i].is_finite();
+            if known && counts[(r.model[i] as usize).min(r.models.len())] {
+                by_trial.push(r.vaf[i], cells.centred[i]);
+            }
+        }
+    }
+    for (id, groups) in [("rmcorr_cells", by_cell), ("rmcorr_trials", by_trial)] {
+        let found = within_subjects(&groups.x, &groups.y, &groups.lengths);
+        let why = "too few ratings with a VAF, or no variation within subjects";
+        let mut g = values.group(id, why);
+        g.maybe("r", found.map(|w| w.r));
+        g.maybe("df", found.map(|w| w.df));
+        g.maybe("p", found.and_then(|w| w.p));
+        g.interval("ci95", found.and_then(|w| w.ci95));
+    }
+}
+
+/// Pairs by subject, in one piece.
+#[derive(Default)]
+struct Flat {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    lengths: Vec<usize>,
+}
+
+impl Flat {
+    /// Begins the next subject.
+    fn next(&mut self) {
+        self.lengths.push(0);
+    }
+
+    fn push(&mut self, x: f64, y: f64) {
+        self.x.push(x);
+        self.y.push(y);
+        if let Some(n) = self.lengths.last_mut() {
+            *n += 1;
+        }
+    }
+}

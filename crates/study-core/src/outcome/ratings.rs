@@ -1,0 +1,414 @@
+//! Ratings by column, for analysis.
+//!
+//! One row per presentation that counts. Subjects and realizations are sorted as
+//! strings (C locale) and named by their index; a missing number is NaN inside a
+//! column and never leaves this crate as a number. Practice rows stand beside the
+//! columns. What was excluded, and why, is decided in `analyze`.
+
+mod build;
+mod error;
+mod read;
+
+pub use error::RatingsError;
+
+use super::columns::{ParticipantRow, RatingRow, Status};
+use super::event::State;
+use crate::protocol::{Answer, Role};
+use build::{Builder, Row};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use study_base::text::QuestionId;
+
+/// What stands for strokes that nobody counted.
+pub const NO_STROKES: u32 = u32::MAX;
+
+/// The index of a row without a realization, as some foreign data have it.
+pub const NO_MODEL: u32 = u32::MAX;
+
+/// A realization as the ratings know it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Realization {
+    /// Its name. Untrusted: a foreign file may say anything.
+    pub id: String,
+    /// What it is in the study.
+    pub role: Role,
+    /// The realization that it repeats in secret.
+    pub duplicate_of: Option<String>,
+    /// Numbers that may explain the ratings; `least_energy_j`, the mean over
+    /// playbacks, where telemetry tells it.
+    pub covariates: BTreeMap<String, f64>,
+}
+
+/// Who a row is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Origin {
+    /// A participant.
+    Real,
+    /// Somebody who tried the study out.
+    Pilot,
+    /// Nobody.
+    Simulated,
+}
+
+/// A subject as the ratings know it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Subject {
+    /// The name. Untrusted.
+    pub id: String,
+    /// The state, where the study keeps one.
+    pub state: Option<State>,
+    /// Why, where somebody set it.
+    pub reason: String,
+}
+
+/// A text that was answered in a trial.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Comment {
+    /// Row of the ratings.
+    pub row: usize,
+    /// Question, or `remarks`.
+    pub question: String,
+    /// As typed. Untrusted.
+    pub text: String,
+}
+
+/// Ratings by column. All columns are equally long.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Ratings {
+    /// The question whose answers these are.
+    pub question: String,
+    /// Sorted by name.
+    pub subjects: Vec<Subject>,
+    /// Sorted by name.
+    pub models: Vec<Realization>,
+    /// Index into `subjects`.
+    pub subject: Vec<u32>,
+    /// Index into `models`, or [`NO_MODEL`].
+    pub model: Vec<u32>,
+    /// The how-maniest time, from 1; a foreign table may count from 0.
+    pub repetition: Vec<u32>,
+    /// NaN: none.
+    pub rating: Vec<f64>,
+    /// NaN: none.
+    pub vaf: Vec<f64>,
+    /// Place in the subject's order, from 1; 0 if it is not known.
+    pub trial_index: Vec<u32>,
+    /// Who the row is from.
+    pub origin: Vec<Origin>,
+    /// What became of the trial.
+    pub status: Vec<Status>,
+    /// Whether an answer was corrected.
+    pub corrected: Vec<bool>,
+    /// The attempt that counts; above 1 the trial was repeated, 0 not known.
+    pub attempt: Vec<u32>,
+    /// Full strokes, or [`NO_STROKES`].
+    pub strokes: Vec<u32>,
+    /// Row of the source, from 1 (the line of a file, header not counted).
+    pub source_row: Vec<u32>,
+    /// Texts answered or remarked in trials.
+    pub comments: Vec<Comment>,
+    /// Practice rows, which are not among the columns.
+    pub practice: Arc<Practice>,
+}
+
+/// Practice rows, with names of their own: who only practised is no subject.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Practice {
+    names: Vec<String>,
+    rows: Vec<Practised>,
+}
+
+/// A practice row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Practised {
+    subject: u32,
+    model: u32,
+    repetition: u32,
+    trial_index: u32,
+    rating: f64,
+    vaf: f64,
+}
+
+/// A practice row with its names, which are untrusted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PracticeRow<'a> {
+    /// Who practised.
+    pub subject: &'a str,
+    /// With what; empty if it is not known.
+    pub model: &'a str,
+    /// As the table has it; 0 unknown.
+    pub repetition: u32,
+    /// Place in the subject's order, if it is known.
+    pub trial_index: Option<u32>,
+    /// The rating, if there is one.
+    pub rating: Option<f64>,
+    /// The VAF, if there is one.
+    pub vaf: Option<f64>,
+}
+
+impl Practice {
+    /// How many rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The rows, in the order of their table.
+    pub fn iter(&self) -> impl Iterator<Item = PracticeRow<'_>> {
+        let name = |at: u32| self.names.get(at as usize).map_or("", String::as_str);
+        self.rows.iter().map(move |row| PracticeRow {
+            subject: name(row.subject),
+            model: name(row.model),
+            repetition: row.repetition,
+            trial_index: Some(row.trial_index).filter(|t| *t > 0),
+            rating: Some(row.rating).filter(|v| v.is_finite()),
+            vaf: Some(row.vaf).filter(|v| v.is_finite()),
+        })
+    }
+}
+
+impl Ratings {
+    /// From the rows of a study, for one question.
+    pub fn from_rows(rows: &[RatingRow], question: &QuestionId) -> Self {
+        let mut builder = Builder::new(question.to_string());
+        for (i, r) in rows.iter().enumerate() {
+            let origin = match (r.simulated, r.pilot) {
+                (true, _) => Origin::Simulated,
+                (false, true) => Origin::Pilot,
+                (false, false) => Origin::Real,
+            };
+            let mut row = Row {
+                subject: 0,
+                model: NO_MODEL,
+                repetition: r.repetition,
+                rating: rated(r, question),
+                vaf: r.vaf.filter(|v| v.is_finite()).unwrap_or(f64::NAN),
+                trial_index: r.position.unwrap_or(0),
+                origin,
+                status: r.status,
+                corrected: r.corrected,
+                attempt: r.attempt.unwrap_or(0),
+                strokes: r.strokes.unwrap_or(NO_STROKES),
+                source_row: u32::try_from(i + 1).unwrap_or(u32::MAX),
+            };
+            if r.practice {
+                builder.practice(r.participant.as_str(), r.model.as_str(), &row);
+                continue;
+            }
+            row.subject = builder.subject(r.participant.as_str());
+            row.model = builder.model(r.model.as_str(), r.role, || r.covariates.clone());
+            for (question, text) in comments(r) {
+                builder.comment(question, text);
+            }
+            if let (Some(energy), Status::Ok) = (r.least_energy_j, r.status) {
+                builder.least_energy(row.model, origin, energy);
+            }
+            builder.push(row);
+        }
+        builder.finish()
+    }
+
+    /// Marks hidden repeats: (repeat, original) each.
+    pub fn set_duplicates<'a>(&mut self, pairs: impl IntoIterator<Item = (&'a str, &'a str)>) {
+        for (repeat, original) in pairs {
+            if let Some(model) = self.models.iter_mut().find(|m| m.id == repeat) {
+                model.duplicate_of = Some(original.to_owned());
+            }
+        }
+    }
+
+    /// Tells a number about a realization, unless its rows told it already.
+    pub fn add_covariate(&mut self, model: &str, name: &str, value: f64) {
+        if let Some(m) = self.models.iter_mut().find(|m| m.id == model)
+            && value.is_finite()
+        {
+            m.covariates.entry(name.to_owned()).or_insert(value);
+        }
+    }
+
+    /// Tells the states of participants, as the study's table has them.
+    pub fn set_states(&mut self, participants: &[ParticipantRow]) {
+        for p in participants {
+            let id = p.participant.as_str();
+            if let Ok(i) = self.subjects.binary_search_by(|s| s.id.as_str().cmp(id)) {
+                self.subjects[i].state = Some(p.state);
+                self.subjects[i].reason.clone_from(&p.reason);
+            }
+        }
+    }
+
+    /// How many rows.
+    pub fn len(&self) -> usize {
+        self.rating.len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.rating.is_empty()
+    }
+
+    /// The same with only some of the rows. Subjects and realizations without a
+    /// row are gone too.
+    #[must_use]
+    pub fn keep(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let rows: Vec<usize> = (0..self.len()).filter(|&i| keep(i)).collect();
+        let (subject_map, subjects) = remap(&self.subjects, rows.iter().map(|&i| self.subject[i]));
+        let (model_map, models) = remap(
+            &self.models,
+            rows.iter()
+                .map(|&i| self.model[i])
+                .filter(|&m| m != NO_MODEL),
+        );
+        fn pick<T: Copy>(rows: &[usize], column: &[T]) -> Vec<T> {
+            rows.iter().map(|&i| column[i]).collect()
+        }
+        Self {
+            question: self.question.clone(),
+            subject: rows
+                .iter()
+                .map(|&i| subject_map[self.subject[i] as usize])
+                .collect(),
+            model: rows
+                .iter()
+                .map(|&i| match self.model[i] {
+                    NO_MODEL => NO_MODEL,
+                    m => model_map[m as usize],
+                })
+                .collect(),
+            repetition: pick(&rows, &self.repetition),
+            rating: pick(&rows, &self.rating),
+            vaf: pick(&rows, &self.vaf),
+            trial_index: pick(&rows, &self.trial_index),
+            origin: pick(&rows, &self.origin),
+            status: pick(&rows, &self.status),
+            corrected: pick(&rows, &self.corrected),
+            attempt: pick(&rows, &self.attempt),
+            strokes: pick(&rows, &self.strokes),
+            source_row: pick(&rows, &self.source_row),
+            comments: self
+                .comments
+                .iter()
+                .filter_map(|c| {
+                    let row = rows.binary_search(&c.row).ok()?;
+                    Some(Comment { row, ..c.clone() })
+                })
+                .collect(),
+            practice: Arc::clone(&self.practice),
+            subjects,
+            models,
+        }
+    }
+
+    /// The rows sorted by subject, then realization (none comes last), otherwise
+    /// as they stand. Linear: two passes of counting.
+    pub fn by_cell(&self) -> Vec<usize> {
+        let models = self.models.len();
+        let place = |i: usize| (self.model[i] as usize).min(models);
+        let by_model = counted(0..self.len(), self.len(), models + 1, place);
+        counted(
+            by_model.iter().copied(),
+            self.len(),
+            self.subjects.len(),
+            |i| self.subject[i] as usize,
+        )
+    }
+}
+
+/// Some rows in the order of their keys, equal ones as they come.
+fn counted(
+    rows: impl IntoIterator<Item = usize> + Clone,
+    n: usize,
+    keys: usize,
+    key: impl Fn(usize) -> usize,
+) -> Vec<usize> {
+    let mut next = vec![0; keys + 1];
+    for i in rows.clone() {
+        next[key(i) + 1] += 1;
+    }
+    for k in 1..=keys {
+        next[k] += next[k - 1];
+    }
+    let mut sorted = vec![0; n];
+    for i in rows {
+        let at = &mut next[key(i)];
+        sorted[*at] = i;
+        *at += 1;
+    }
+    sorted
+}
+
+/// The rating of a row, if the trial counts and it is a finite number.
+fn rated(row: &RatingRow, question: &QuestionId) -> f64 {
+    let answer = row.answers.get(question).and_then(Answer::number);
+    match row.status {
+        Status::Failed => f64::NAN,
+        Status::Ok | Status::Declined | Status::Missing => {
+            answer.filter(|v| v.is_finite()).unwrap_or(f64::NAN)
+        }
+    }
+}
+
+fn comments(row: &RatingRow) -> Vec<(String, String)> {
+    let mut found: Vec<(String, String)> = row
+        .answers
+        .iter()
+        .filter_map(|(q, a)| match a {
+            Answer::Text(text) if !text.trim().is_empty() => Some((q.to_string(), text.clone())),
+            _ => None,
+        })
+        .collect();
+    if !row.remarks.trim().is_empty() {
+        found.push(("remarks".to_owned(), row.remarks.clone()));
+    }
+    found
+}
+
+/// Keeps the named items that are used; also tells where each of the old went.
+fn remap<T: Clone>(items: &[T], used: impl Iterator<Item = u32>) -> (Vec<u32>, Vec<T>) {
+    let mut is_used = vec![false; items.len()];
+    for i in used {
+        is_used[i as usize] = true;
+    }
+    let mut map = vec![NO_MODEL; items.len()];
+    let mut kept = Vec::new();
+    for (old, item) in items.iter().enumerate().filter(|(old, _)| is_used[*old]) {
+        map[old] = u32::try_from(kept.len()).unwrap_or(NO_MODEL - 1);
+        kept.push(item.clone());
+    }
+    (map, kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn small() -> Ratings {
+        let csv = "subject,model,repetition,rating,vaf\n\
+                   S2,B,1,3,0.9\nS1,A,1,4,0.8\nS1,B,1,,0.9\nS2,A,1,5,0.8\n";
+        Ratings::read_csv("t.csv", csv.as_bytes(), None).unwrap()
+    }
+
+    #[test]
+    fn names_are_sorted_and_rows_keep_their_order() {
+        let r = small();
+        let subjects: Vec<&str> = r.subjects.iter().map(|s| s.id.as_str()).collect();
+        assert_eq!(subjects, ["S1", "S2"]);
+        assert_eq!(r.subject, [1, 0, 0, 1]);
+        assert_eq!(r.model, [1, 0, 1, 0]);
+        assert!(r.rating[2].is_nan());
+    }
+
+    #[test]
+    fn keeping_rows_forgets_who_is_gone() {
+        let r = small();
+        let kept = r.keep(|i| r.subject[i] == 1);
+        assert_eq!(kept.subjects.len(), 1);
+        assert_eq!(kept.subjects[0].id, "S2");
+        assert_eq!(kept.subject, [0, 0]);
+        assert_eq!(kept.rating, [3.0, 5.0]);
+    }
+}

@@ -1,0 +1,382 @@
+//! What can be doubted about a readable protocol.
+//!
+//! Nothing here keeps a study from running: each finding is a warning that a
+//! careful reader of the protocol would raise before the first participant comes.
+//! Doubts that need the models' tables or the orders are raised by those who have
+//! them.
+
+use super::{Design, DeviceKind, Protocol, Question, QuestionKind, Role};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use study_base::diagnostic::Fault;
+use study_base::text::ModelId;
+
+/// Test realizations below which a correlation over them says little.
+const ENOUGH_REALIZATIONS: usize = 8;
+
+/// Trials, and minutes, that a hand can judge without a rest.
+const TRIALS_WITHOUT_BREAK: u32 = 15;
+
+/// Minutes after which attention is in doubt.
+const LONG_SESSION_MIN: f64 = 60.0;
+
+/// Just noticeable difference of a force, N (Doerrer & Werthschützky 2002).
+const FORCE_JND_N: f64 = 0.1;
+
+/// Standard deviation of the force of a turn-signal switch worked by hand, N: the
+/// scale on which a VAF becomes a force where no recording is at hand. The
+/// simulated switch at 1.5 Hz has 5.3 N.
+const FORCE_SD_N: f64 = 5.0;
+
+/// Where each value of the file stood, as `file::Parsed` has it.
+pub type Spans = BTreeMap<String, Range<usize>>;
+
+/// Every doubt, as warnings. VAFs should have been filled in from the model files;
+/// those of `unread` could not be, which is an error of its own.
+pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    realizations(protocol, spans, &mut faults);
+    vaf(protocol, spans, unread, &mut faults);
+    practice(protocol, spans, &mut faults);
+    duration(protocol, spans, &mut faults);
+    roles(protocol, spans, &mut faults);
+    faults
+}
+
+/// Trials of a session, practice included. An orders file may hold fewer.
+pub fn trials(protocol: &Protocol) -> u32 {
+    let Design {
+        repetitions,
+        practice,
+        ..
+    } = &protocol.design;
+    let models = u32::try_from(protocol.scheduled_models().count()).unwrap_or(u32::MAX);
+    let practice = u32::try_from(practice.len()).unwrap_or(u32::MAX);
+    models.saturating_mul(*repetitions).saturating_add(practice)
+}
+
+/// Seconds that things are assumed to take, for a participant in no hurry.
+mod pace {
+    /// Coming in: welcome, instructions, a hand on the device.
+    pub(super) const ARRIVAL_S: f64 = 120.0;
+    /// Reading and signing a consent form.
+    pub(super) const CONSENT_S: f64 = 120.0;
+    /// Working the reference, or being told to, before a trial.
+    pub(super) const REFERENCE_S: f64 = 15.0;
+    /// Loading a table, or mounting a sample by hand.
+    pub(super) const LOAD_S: f64 = 2.0;
+    pub(super) const MOUNT_S: f64 = 30.0;
+    /// Exploring a realization without a time limit.
+    pub(super) const EXPLORE_S: f64 = 25.0;
+    /// Answering a question that is chosen, and one that is typed.
+    pub(super) const CHOOSE_S: f64 = 6.0;
+    pub(super) const TYPE_S: f64 = 15.0;
+}
+
+/// Minutes that a session takes, from assumed paces: 25 s of exploration and 15 s
+/// with the reference in a trial, 6 s for an answer that is chosen, 15 s for one
+/// that is typed (8 s if it may be left empty), 30 s for a sample mounted by
+/// hand, 2 minutes of arrival and 2 of consent, breaks at their least.
+pub fn minutes(protocol: &Protocol) -> f64 {
+    let mut seconds = pace::ARRIVAL_S;
+    if protocol.consent.is_some() {
+        seconds += pace::CONSENT_S;
+    }
+    for once in [&protocol.setup, &protocol.intake, &protocol.outro] {
+        seconds += answers_s(once);
+    }
+    let reference = match protocol.trial.reference {
+        Some(_) => pace::REFERENCE_S.max(protocol.trial.reference_min_s),
+        None => protocol.trial.reference_min_s,
+    };
+    let trial = reference + pace::EXPLORE_S + answers_s(&protocol.questions);
+    let load = |kind: Option<DeviceKind>| match kind.unwrap_or(protocol.device.kind) {
+        DeviceKind::Manual => pace::MOUNT_S,
+        DeviceKind::Simulated | DeviceKind::Serial | DeviceKind::Process => pace::LOAD_S,
+    };
+    let repetitions = f64::from(protocol.design.repetitions);
+    for model in protocol.scheduled_models() {
+        seconds += repetitions * (trial + load(model.device));
+    }
+    for id in &protocol.design.practice {
+        seconds += trial + load(protocol.model(id).and_then(|m| m.device));
+    }
+    if let Some(breaks) = protocol.design.breaks {
+        let counted = trials(protocol).saturating_sub(practice_trials(protocol));
+        let rests = counted.saturating_sub(1) / breaks.every.max(1);
+        seconds += f64::from(rests) * breaks.at_least_s;
+    }
+    seconds / 60.0
+}
+
+fn answers_s(questions: &[Question]) -> f64 {
+    questions
+        .iter()
+        .map(|q| match q.kind {
+            QuestionKind::Rating { .. }
+            | QuestionKind::Slider { .. }
+            | QuestionKind::Choice { .. } => pace::CHOOSE_S,
+            QuestionKind::Number { .. } | QuestionKind::Text if q.required => pace::TYPE_S,
+            QuestionKind::Number { .. } | QuestionKind::Text => 8.0,
+        })
+        .sum()
+}
+
+fn practice_trials(protocol: &Protocol) -> u32 {
+    u32::try_from(protocol.design.practice.len()).unwrap_or(u32::MAX)
+}
+
+fn tests(protocol: &Protocol) -> impl Iterator<Item = &super::ModelEntry> {
+    protocol
+        .models
+        .iter()
+        .filter(|m| m.role == Role::Test && m.duplicate_of.is_none())
+}
+
+fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let n = tests(protocol).count();
+    if n >= ENOUGH_REALIZATIONS {
+        return;
+    }
+    let so = match n {
+        0..=2 => "no correlation of ratings with VAF can be tested".to_owned(),
+        _ => format!(
+            "|r| with VAF has to exceed {:.3} for p < .05",
+            critical_r(n)
+        ),
+    };
+    let word = if n == 1 {
+        "realization"
+    } else {
+        "realizations"
+    };
+    faults.push(
+        Fault::warning(format!("{n} test {word}: {so}"))
+            .at(spans.get("models").cloned().or(spans.get("models[0]").cloned()).map(first_line))
+            .hint(format!(
+                "what differs between realizations is tested over realizations, not over ratings; {ENOUGH_REALIZATIONS} or more are better"
+            )),
+    );
+}
+
+/// |r| of n points at two-sided p = .05: t/√(t² + n − 2).
+fn critical_r(n: usize) -> f64 {
+    // t(.975, df) for df = 1 … 5
+    let t: f64 = match n {
+        3 => 12.7062,
+        4 => 4.3027,
+        5 => 3.1824,
+        6 => 2.7764,
+        _ => 2.5706,
+    };
+    let df = n as f64 - 2.0;
+    t / (t * t + df).sqrt()
+}
+
+fn vaf(protocol: &Protocol, spans: &Spans, unread: &[&ModelId], faults: &mut Vec<Fault>) {
+    let known: Vec<f64> = tests(protocol).filter_map(|m| m.vaf).collect();
+    if known.is_empty() {
+        return;
+    }
+    let without: Vec<&str> = tests(protocol)
+        .filter(|m| m.vaf.is_none() && !unread.contains(&&m.id))
+        .map(|m| m.id.as_str())
+        .collect();
+    if !without.is_empty() {
+        faults.push(
+            Fault::warning(format!(
+                "no VAF is known of {}: the correlation leaves them out",
+                without.join(", ")
+            ))
+            .at(spans.get("analysis.vaf").cloned()),
+        );
+    }
+    // what could not be read may differ enough
+    if known.len() < 2 || !unread.is_empty() {
+        return;
+    }
+    let low = known.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // residual force: σ_F √(1 − VAF)
+    let span_n = FORCE_SD_N * ((1.0 - low).sqrt() - (1.0 - high).sqrt());
+    if span_n < FORCE_JND_N {
+        faults.push(
+            Fault::warning(format!(
+                "the test realizations differ too little: VAF {low:.4} to {high:.4} is {span_n:.2} N of residual force at {FORCE_SD_N} N rms, and {FORCE_JND_N} N is just noticeable"
+            ))
+            .hint("take realizations that are further apart"),
+        );
+    }
+}
+
+fn practice(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    for (i, id) in protocol.design.practice.iter().enumerate() {
+        let role = protocol.model(id).map(|m| m.role);
+        if role == Some(Role::Test) {
+            faults.push(
+                Fault::warning(format!("`{id}` is practised and then tested"))
+                    .at(spans.get(&format!("design.practice[{i}]")).cloned())
+                    .hint("practise with realizations of role \"practice\" or an anchor"),
+            );
+        }
+    }
+    for (i, model) in protocol.models.iter().enumerate() {
+        if model.role == Role::Practice && !protocol.design.practice.contains(&model.id) {
+            faults.push(
+                Fault::warning(format!("`{}` is never played", model.id))
+                    .at(spans.get(&format!("models[{i}].id")).cloned())
+                    .label("not in `design.practice`"),
+            );
+        }
+    }
+}
+
+fn duration(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let counted = trials(protocol).saturating_sub(practice_trials(protocol));
+    let minutes = minutes(protocol);
+    let place = spans.get("design.repetitions").cloned();
+    if protocol.design.breaks.is_none() && counted > TRIALS_WITHOUT_BREAK {
+        faults.push(
+            Fault::warning(format!("{counted} trials without a break"))
+                .at(place.clone())
+                .hint("such as breaks = { every = 15, at_least_s = 60 }"),
+        );
+    }
+    if let Some(breaks) = protocol.design.breaks
+        && breaks.every >= counted
+    {
+        faults.push(
+            Fault::warning(format!(
+                "no break comes: a session has {counted} trials, the first break would be after {}",
+                breaks.every
+            ))
+            .at(spans.get("design.breaks").cloned()),
+        );
+    }
+    if minutes > LONG_SESSION_MIN {
+        faults.push(
+            Fault::warning(format!("a session takes about {minutes:.0} minutes"))
+                .at(place)
+                .hint("fewer repetitions or realizations keep the hand and the mind fresh"),
+        );
+    }
+}
+
+fn roles(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    for (i, model) in protocol.models.iter().enumerate() {
+        let by_hand = model.device.unwrap_or(protocol.device.kind) == DeviceKind::Manual;
+        if model.role == Role::Physical && !by_hand {
+            faults.push(
+                Fault::warning(format!(
+                    "`{}` is a physical sample, but a device plays it",
+                    model.id
+                ))
+                .at(spans.get(&format!("models[{i}].role")).cloned())
+                .hint("add device = \"manual\""),
+            );
+        }
+    }
+    let needs = |rule: &str| {
+        protocol
+            .analysis
+            .exclude
+            .iter()
+            .position(|e| e.rule == rule)
+    };
+    let has_reference = protocol
+        .models
+        .iter()
+        .any(|m| m.role == Role::HiddenReference);
+    let has_duplicate = protocol.models.iter().any(|m| m.duplicate_of.is_some());
+    for (rule, met, what) in [
+        (
+            "hidden-reference-below",
+            has_reference,
+            "no realization has the role \"hidden-reference\"",
+        ),
+        (
+            "inconsistent",
+            has_duplicate,
+            "no realization has a `duplicate_of`",
+        ),
+    ] {
+        if let Some(i) = needs(rule)
+            && !met
+        {
+            faults.push(
+                Fault::warning(format!("the rule `{rule}` excludes nobody: {what}"))
+                    .at(spans.get(&format!("analysis.exclude[{i}].rule")).cloned()),
+            );
+        }
+    }
+}
+
+/// Only the start of a long span, so that the caret does not cover the file.
+fn first_line(span: Range<usize>) -> Range<usize> {
+    span.start..span.end.min(span.start + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::{Breaks, example};
+
+    fn messages(protocol: &Protocol) -> Vec<String> {
+        warnings(protocol, &Spans::new(), &[])
+            .into_iter()
+            .map(|f| f.message)
+            .collect()
+    }
+
+    #[test]
+    fn eight_spread_realizations_in_fifteen_trials_raise_no_doubt() {
+        let mut protocol = example::protocol(8, 1);
+        for (i, model) in protocol.models.iter_mut().enumerate() {
+            model.vaf = Some(0.9 - 0.1 * i as f64);
+        }
+        assert_eq!(messages(&protocol), Vec::<String>::new());
+    }
+
+    #[test]
+    fn five_realizations_are_few_and_the_number_to_beat_is_told() {
+        let found = messages(&example::protocol(5, 3));
+        assert_eq!(
+            found,
+            ["5 test realizations: |r| with VAF has to exceed 0.878 for p < .05"]
+        );
+    }
+
+    #[test]
+    fn vafs_that_nobody_can_feel_apart_are_doubted() {
+        let mut protocol = example::protocol(8, 1);
+        for (i, model) in protocol.models.iter_mut().enumerate() {
+            model.vaf = Some(0.75 + 0.001 * i as f64);
+        }
+        let found = messages(&protocol);
+        assert!(found[0].contains("differ too little"), "{found:?}");
+    }
+
+    #[test]
+    fn minutes_grow_with_trials_and_breaks() {
+        let mut protocol = example::protocol(5, 3);
+        // 120 s + 15 × (15 + 25 + 2 + 6 + 8) s
+        assert!((minutes(&protocol) - (120.0 + 15.0 * 56.0) / 60.0).abs() < 1e-9);
+        protocol.design.breaks = Some(Breaks {
+            every: 5,
+            at_least_s: 60.0,
+        });
+        // after trials 5 and 10, not after the last
+        assert!((minutes(&protocol) - (240.0 + 15.0 * 56.0) / 60.0).abs() < 1e-9);
+        assert_eq!(trials(&protocol), 15);
+    }
+
+    #[test]
+    fn practice_with_what_is_tested_is_doubted() {
+        let mut protocol = example::protocol(8, 1);
+        let id = protocol.models[0].id.clone();
+        protocol.design.practice = vec![id];
+        assert_eq!(messages(&protocol), ["`A` is practised and then tested"]);
+        protocol.models[1].role = Role::Practice;
+        assert!(messages(&protocol).contains(&"`B` is never played".to_owned()));
+    }
+}

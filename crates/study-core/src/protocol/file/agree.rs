@@ -1,0 +1,356 @@
+//! Whether the sections of a file agree: ids that collide, ids that nobody has,
+//! rules that the device cannot keep.
+
+use super::{models, questions};
+use crate::protocol::columns::{is_participants_column, is_ratings_column};
+use crate::protocol::{AnalysisRules, Design, DeviceKind, DeviceRules, QuestionKind, Role};
+use study_base::diagnostic::table::Document;
+use study_base::diagnostic::{Fault, did_you_mean};
+use study_base::text::{ModelId, QuestionId, Untrusted};
+
+/// What the sections hold, as far as it could be read.
+#[derive(Debug)]
+pub(super) struct Draft<'a> {
+    pub(super) design: Option<&'a Design>,
+    pub(super) device: Option<&'a DeviceRules>,
+    pub(super) minimum_strokes: u32,
+    pub(super) models: Vec<models::Draft>,
+    pub(super) questions: Vec<questions::Draft>,
+    pub(super) setup: Vec<questions::Draft>,
+    pub(super) intake: Vec<questions::Draft>,
+    pub(super) outro: Vec<questions::Draft>,
+    pub(super) analysis: Option<&'a AnalysisRules>,
+}
+
+impl Draft<'_> {
+    /// Reports every disagreement.
+    pub(super) fn agree(&self, document: &Document<'_>) {
+        self.something_to_feel_and_ask(document);
+        self.model_ids(document);
+        self.duplicates(document);
+        self.practice(document);
+        self.devices(document);
+        self.columns(document);
+        self.analysis(document);
+    }
+
+    /// A hidden duplicate without a file plays its original's.
+    pub(super) fn fill_duplicates(&mut self) {
+        for i in 0..self.models.len() {
+            let model = &self.models[i];
+            if model.has_file {
+                continue;
+            }
+            let original = model.duplicate_of.as_ref().and_then(|id| self.model(id));
+            if let Some(file) = original.and_then(|o| o.file.clone()) {
+                self.models[i].file = Some(file);
+            }
+        }
+    }
+
+    fn model(&self, id: &ModelId) -> Option<&models::Draft> {
+        self.models.iter().find(|m| m.id.as_ref() == Some(id))
+    }
+
+    fn model_ids_as_words(&self) -> impl Iterator<Item = &str> {
+        self.models
+            .iter()
+            .filter_map(|m| m.id.as_ref())
+            .map(ModelId::as_str)
+    }
+
+    fn something_to_feel_and_ask(&self, document: &Document<'_>) {
+        if self.models.iter().all(|m| m.role == Role::Practice) {
+            document.fault(
+                Fault::error(
+                    "nothing is to be felt: no [[models]] with another role than practice",
+                )
+                .hint("add [[models]] with an id and a file"),
+            );
+        }
+        if self.questions.is_empty() {
+            document.fault(
+                Fault::error("nothing is asked: no [[questions]]")
+                    .hint("add [[questions]] with an id, a prompt and a kind"),
+            );
+        }
+    }
+
+    fn model_ids(&self, document: &Document<'_>) {
+        for (i, model) in self.models.iter().enumerate() {
+            let Some(id) = &model.id else { continue };
+            let earlier = self.models[..i]
+                .iter()
+                .filter_map(|m| m.id.as_ref())
+                .find(|other| other.collides_with(id));
+            if let Some(other) = earlier {
+                document.fault(collision(id.as_str(), other.as_str()).at(at(
+                    document,
+                    &model.path,
+                    "id",
+                )));
+            }
+        }
+    }
+
+    fn duplicates(&self, document: &Document<'_>) {
+        for model in &self.models {
+            let Some(of) = &model.duplicate_of else {
+                continue;
+            };
+            let place = at(document, &model.path, "duplicate_of");
+            if model.id.as_ref() == Some(of) {
+                document.fault(Fault::error(format!("`{of}` cannot repeat itself")).at(place));
+                continue;
+            }
+            let Some(original) = self.model(of) else {
+                document.fault(unknown("model", of.as_str(), self.model_ids_as_words()).at(place));
+                continue;
+            };
+            if let Some(first) = &original.duplicate_of {
+                document.fault(
+                    Fault::error(format!("`{of}` is itself a duplicate, of `{first}`"))
+                        .at(place)
+                        .label("name the original"),
+                );
+            } else if model.file.is_some() && original.file.is_some() && model.file != original.file
+            {
+                document.fault(
+                    Fault::error(format!("a duplicate of `{of}` plays the same file"))
+                        .at(at(document, &model.path, "file"))
+                        .hint("leave `file` out"),
+                );
+            } else if (model.role == Role::Practice) != (original.role == Role::Practice) {
+                document.fault(
+                    Fault::error(format!(
+                        "a duplicate and its original, `{of}`, are both for practice or both not"
+                    ))
+                    .at(place),
+                );
+            }
+        }
+    }
+
+    fn practice(&self, document: &Document<'_>) {
+        let Some(design) = self.design else { return };
+        for (i, id) in design.practice.iter().enumerate() {
+            if self.model(id).is_none() {
+                document.fault(
+                    unknown("model", id.as_str(), self.model_ids_as_words())
+                        .at(document.span_of(&format!("design.practice[{i}]"))),
+                );
+            }
+        }
+    }
+
+    fn devices(&self, document: &Document<'_>) {
+        let Some(device) = self.device else { return };
+        let mut by_hand = None;
+        let mut by_process = device.kind == DeviceKind::Process;
+        for model in &self.models {
+            let kind = model.device.unwrap_or(device.kind);
+            let name = model.id.as_ref().map_or("?", ModelId::as_str);
+            match kind {
+                DeviceKind::Manual => by_hand = by_hand.or(Some(name)),
+                DeviceKind::Process => by_process = true,
+                DeviceKind::Simulated | DeviceKind::Serial => {
+                    if !model.has_file && model.duplicate_of.is_none() && model.id.is_some() {
+                        document.fault(
+                            Fault::error(format!("model `{name}` has no `file`"))
+                                .at(document.span_of(&model.path))
+                                .hint(format!(
+                                    "a {} device plays a model file; a sample mounted by hand says device = \"manual\"",
+                                    kind.as_str()
+                                )),
+                        );
+                    }
+                }
+            }
+            if model
+                .device
+                .is_some_and(|own| own != device.kind && own != DeviceKind::Manual)
+            {
+                document.fault(
+                    Fault::error(format!(
+                        "model `{name}` cannot have a {} device of its own",
+                        kind.as_str()
+                    ))
+                    .at(at(document, &model.path, "device"))
+                    .label("only `manual` differs from [device]"),
+                );
+            }
+        }
+        if self.minimum_strokes == 0 {
+            return;
+        }
+        let place = document.span_of("trial.minimum_strokes");
+        if let Some(name) = by_hand {
+            document.fault(
+                Fault::error(format!(
+                    "`minimum_strokes` can never be reached by `{name}`: a sample mounted by hand reports no strokes"
+                ))
+                .at(place)
+                .hint("leave it out, or ask for the strokes in `trial.reference`"),
+            );
+        } else if by_process {
+            document.fault(
+                Fault::warning(
+                    "`minimum_strokes` needs telemetry; whether this process device has it is not known before it runs",
+                )
+                .at(place),
+            );
+        }
+    }
+
+    /// Questions and covariates become columns: of `ratings.csv`, or of
+    /// `participants.csv` for those that are asked once.
+    fn columns(&self, document: &Document<'_>) {
+        let mut taken: Vec<String> = Vec::new();
+        for question in &self.questions {
+            column(
+                document,
+                question,
+                &mut taken,
+                is_ratings_column,
+                "ratings.csv",
+            );
+        }
+        let mut once: Vec<String> = Vec::new();
+        for question in self.setup.iter().chain(&self.intake).chain(&self.outro) {
+            column(
+                document,
+                question,
+                &mut once,
+                is_participants_column,
+                "participants.csv",
+            );
+        }
+        let mut reported: Vec<&str> = Vec::new();
+        for model in &self.models {
+            for name in model.covariates.keys() {
+                let place = document.span_of(&format!("{}.covariates.{name}", model.path));
+                let fault = if is_ratings_column(name) {
+                    fixed(name, "ratings.csv")
+                } else if taken.iter().any(|t| t.eq_ignore_ascii_case(name)) {
+                    Fault::error(format!(
+                        "`{}` is a question and a covariate",
+                        Untrusted(name)
+                    ))
+                } else {
+                    continue;
+                };
+                // the same covariate of every model is one fault
+                if !reported.contains(&name.as_str()) {
+                    reported.push(name);
+                    document.fault(fault.at(place));
+                }
+            }
+        }
+    }
+
+    fn analysis(&self, document: &Document<'_>) {
+        let Some(analysis) = self.analysis else {
+            return;
+        };
+        let place = document.span_of("analysis.primary");
+        let asked = self
+            .questions
+            .iter()
+            .find(|q| q.id.as_ref() == Some(&analysis.primary));
+        let Some(question) = asked else {
+            let ids = self.questions.iter().filter_map(|q| q.id.as_ref());
+            document.fault(
+                unknown(
+                    "question",
+                    analysis.primary.as_str(),
+                    ids.map(QuestionId::as_str),
+                )
+                .at(place),
+            );
+            return;
+        };
+        let (from, to) = match &question.kind {
+            Some(QuestionKind::Rating { from, to, .. }) => (*from as f64, *to as f64),
+            Some(QuestionKind::Slider { from, to, .. }) => (*from, *to),
+            Some(QuestionKind::Number { min, max, .. }) => (
+                min.unwrap_or(f64::NEG_INFINITY),
+                max.unwrap_or(f64::INFINITY),
+            ),
+            Some(QuestionKind::Choice { .. } | QuestionKind::Text) => {
+                document.fault(
+                    Fault::error(format!(
+                        "`{}` cannot be the primary question: its answers are no numbers",
+                        analysis.primary
+                    ))
+                    .at(place)
+                    .hint("a rating, a slider or a number can"),
+                );
+                return;
+            }
+            None => return,
+        };
+        if analysis
+            .realistic_from
+            .is_some_and(|r| !(from..=to).contains(&r))
+        {
+            document.fault(
+                Fault::error(format!(
+                    "`analysis.realistic_from` is outside the scale of `{}`",
+                    analysis.primary
+                ))
+                .at(document.span_of("analysis.realistic_from"))
+                .label(format!("{from} to {to}")),
+            );
+        }
+    }
+}
+
+fn column(
+    document: &Document<'_>,
+    question: &questions::Draft,
+    taken: &mut Vec<String>,
+    is_fixed: fn(&str) -> bool,
+    table: &str,
+) {
+    let Some(id) = &question.id else { return };
+    let name = id.as_str();
+    let place = at(document, &question.path, "id");
+    if is_fixed(name) {
+        document.fault(fixed(name, table).at(place));
+    } else if let Some(other) = taken.iter().find(|t| t.eq_ignore_ascii_case(name)) {
+        document.fault(collision(name, other).at(place));
+    } else {
+        taken.push(name.to_owned());
+    }
+}
+
+fn fixed(name: &str, table: &str) -> Fault {
+    Fault::error(format!(
+        "`{}` is a column of {table} already",
+        Untrusted(name)
+    ))
+    .label("choose another name")
+}
+
+fn collision(id: &str, other: &str) -> Fault {
+    if id == other {
+        Fault::error(format!("`{id}` is there twice"))
+    } else {
+        Fault::error(format!("`{id}` and `{other}` differ only in case"))
+            .label("some file systems and tools take them for the same")
+    }
+}
+
+fn unknown<'a>(what: &str, given: &str, known: impl IntoIterator<Item = &'a str>) -> Fault {
+    let fault = Fault::error(format!("there is no {what} `{}`", Untrusted(given)));
+    match did_you_mean(given, known) {
+        Some(near) => fault.label(format!("did you mean `{near}`?")),
+        None => fault,
+    }
+}
+
+fn at(document: &Document<'_>, path: &str, key: &str) -> Option<std::ops::Range<usize>> {
+    document
+        .span_of(&format!("{path}.{key}"))
+        .or_else(|| document.span_of(path))
+}

@@ -1,0 +1,236 @@
+//! `orders.csv`: orders made elsewhere, one line a trial: `row,position,model`.
+
+use crate::protocol::FileOrders;
+use std::collections::BTreeMap;
+use std::io::BufRead;
+use study_base::diagnostic::{Fault, Findings};
+use study_base::text::{ModelId, Untrusted};
+
+const COLUMNS: [&str; 3] = ["row", "position", "model"];
+
+/// Most faults that are listed; a file of another kind has one a line.
+const MAX_FAULTS: usize = 20;
+
+/// Reads `orders.csv`. Positions of a row are 1, 2, 3, … in any order of lines;
+/// whether the realizations fit the design is the schedule's business. The
+/// orders are complete only if the findings hold no error.
+pub fn parse_orders(path: &str, mut reader: impl BufRead) -> (FileOrders, Findings) {
+    let mut bytes = Vec::new();
+    if let Err(e) = reader.read_to_end(&mut bytes) {
+        let mut findings = Findings::new(path, "");
+        findings
+            .faults
+            .push(Fault::error(format!("it could not be read: {e}")));
+        return (FileOrders::new(), findings);
+    }
+    let text = match String::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(e) => {
+            let line = e.as_bytes()[..e.utf8_error().valid_up_to()]
+                .iter()
+                .filter(|b| **b == b'\n')
+                .count()
+                + 1;
+            let mut findings = Findings::new(path, "");
+            findings
+                .faults
+                .push(Fault::error(format!("line {line} is not UTF-8")));
+            return (FileOrders::new(), findings);
+        }
+    };
+    let mut lines = Lines {
+        findings: Findings::new(path, text.as_str()),
+        rows: BTreeMap::new(),
+    };
+    lines.read(&text);
+    lines.finish()
+}
+
+struct Lines {
+    findings: Findings,
+    /// row → position → realization
+    rows: BTreeMap<u32, BTreeMap<u32, ModelId>>,
+}
+
+impl Lines {
+    fn read(&mut self, text: &str) {
+        let body = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let skipped = text.len() - body.len();
+        let mut csv = csv::ReaderBuilder::new()
+            .flexible(true)
+            .has_headers(false)
+            .trim(csv::Trim::All)
+            .from_reader(body.as_bytes());
+        let mut record = csv::StringRecord::new();
+        let mut header_seen = false;
+        loop {
+            let start = skipped + offset(csv.position());
+            match csv.read_record(&mut record) {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(e) => {
+                    self.fault(Fault::error(e.to_string()));
+                    break;
+                }
+            }
+            let end = skipped + offset(csv.position());
+            let span = trimmed(text, start, end);
+            if header_seen {
+                self.line(&record, span);
+            } else {
+                header_seen = true;
+                if record.iter().ne(COLUMNS) {
+                    self.fault(
+                        Fault::error(format!("the first line has to be `{}`", COLUMNS.join(",")))
+                            .at(span),
+                    );
+                    return;
+                }
+            }
+        }
+        if !header_seen {
+            self.fault(Fault::error(format!(
+                "the file is empty; its first line has to be `{}`",
+                COLUMNS.join(",")
+            )));
+        }
+    }
+
+    fn line(&mut self, record: &csv::StringRecord, span: std::ops::Range<usize>) {
+        if record.len() != COLUMNS.len() {
+            let (line, _) = self.findings.line_and_column(span.start);
+            self.fault(
+                Fault::error(format!(
+                    "line {line} has {} of {} columns",
+                    record.len(),
+                    COLUMNS.len()
+                ))
+                .at(span),
+            );
+            return;
+        }
+        let row = self.number("row", &record[0], &span);
+        let position = self.number("position", &record[1], &span);
+        let model = match ModelId::new(&record[2]) {
+            Ok(model) => Some(model),
+            Err(bad) => {
+                self.fault(Fault::error(bad.to_string()).at(span.clone()));
+                None
+            }
+        };
+        let (Some(row), Some(position), Some(model)) = (row, position, model) else {
+            return;
+        };
+        let positions = self.rows.entry(row).or_default();
+        if positions.insert(position, model).is_some() {
+            self.fault(Fault::error(format!("row {row} has position {position} twice")).at(span));
+        }
+    }
+
+    fn number(&mut self, what: &str, given: &str, span: &std::ops::Range<usize>) -> Option<u32> {
+        let number = given.parse().ok().filter(|n| *n > 0);
+        if number.is_none() {
+            self.fault(
+                Fault::error(format!(
+                    "{what} has to be a whole number from 1, not `{}`",
+                    Untrusted(given)
+                ))
+                .at(span.clone()),
+            );
+        }
+        number
+    }
+
+    fn fault(&mut self, fault: Fault) {
+        if self.findings.faults.len() < MAX_FAULTS {
+            self.findings.faults.push(fault);
+        }
+    }
+
+    fn finish(mut self) -> (FileOrders, Findings) {
+        let mut orders = FileOrders::new();
+        for (row, positions) in std::mem::take(&mut self.rows) {
+            let gap = (1..)
+                .zip(positions.keys())
+                .find(|(want, have)| want != *have);
+            if let Some((want, _)) = gap
+                && !self.findings.has_errors()
+            {
+                self.fault(Fault::error(format!("row {row} has no position {want}")));
+            }
+            orders.insert(row, positions.into_values().collect());
+        }
+        (orders, self.findings)
+    }
+}
+
+fn offset(position: &csv::Position) -> usize {
+    usize::try_from(position.byte()).unwrap_or(usize::MAX)
+}
+
+/// The bytes without white space around them.
+fn trimmed(text: &str, start: usize, end: usize) -> std::ops::Range<usize> {
+    let Some(line) = text.get(start..end) else {
+        return start..start;
+    };
+    let start = start + (line.len() - line.trim_start().len());
+    start..start + line.trim().len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn messages(text: &str) -> Vec<String> {
+        let (_, findings) = parse_orders("orders.csv", text.as_bytes());
+        findings.faults.into_iter().map(|f| f.message).collect()
+    }
+
+    #[test]
+    fn lines_in_any_order_become_rows_by_position() {
+        let text = "\u{feff}row,position,model\r\n2,2,a\r\n2,1,b\r\n1,1,a\r\n1,2,b\r\n";
+        let (orders, findings) = parse_orders("orders.csv", text.as_bytes());
+        assert_eq!(findings.faults, []);
+        let row = |n: u32| -> Vec<&str> { orders[&n].iter().map(ModelId::as_str).collect() };
+        assert_eq!(row(1), ["a", "b"]);
+        assert_eq!(row(2), ["b", "a"]);
+    }
+
+    #[test]
+    fn every_bad_line_is_named() {
+        let text = "row,position,model\n1,1\n0,1,a\n1,x,a\n1,1,a/b\n1,1,a\n1,1,b\n";
+        assert_eq!(
+            messages(text),
+            [
+                "line 2 has 2 of 3 columns",
+                "row has to be a whole number from 1, not `0`",
+                "position has to be a whole number from 1, not `x`",
+                "`a/b` is no model id: use 1 to 32 of A-Z a-z 0-9 . _ -",
+                "row 1 has position 1 twice",
+            ]
+        );
+        let (_, findings) = parse_orders("orders.csv", text.as_bytes());
+        let last = findings.faults[4].span.clone().unwrap();
+        assert_eq!(&text[last], "1,1,b");
+    }
+
+    #[test]
+    fn a_gap_an_empty_file_and_a_foreign_header_are_faults() {
+        assert_eq!(
+            messages("row,position,model\n7,1,a\n7,3,b\n"),
+            ["row 7 has no position 2"]
+        );
+        assert_eq!(messages("").len(), 1);
+        assert_eq!(
+            messages("subject,position,model\n1,1,a\n"),
+            ["the first line has to be `row,position,model`"]
+        );
+        assert_eq!(
+            parse_orders("o", &b"row,position,model\n1,1,\xff\n"[..])
+                .1
+                .faults[0]
+                .message,
+            "line 2 is not UTF-8"
+        );
+    }
+}

@@ -1,0 +1,355 @@
+//! Fingerprints: what of a study may change while it runs.
+//!
+//! A change of the *stimulus* fingerprint is a new study; *wording* and
+//! *analysis* can be amended, and each session records its own.
+//!
+//! Each is the SHA-256 of a canonical JSON text: no white space, keys sorted,
+//! numbers as serde_json writes them (the shortest that reads back the same).
+//! Every field of a [`Protocol`] stands in exactly one of the three, except the
+//! paths of files: moving a file changes nothing that anybody feels.
+//!
+//! * stimulus: study id and seed; the design without the planned number of
+//!   participants (more of them change no order); device kind, limits,
+//!   `uncertified`; each realization's id, role, device, `duplicate_of` and the
+//!   SHA-256 of its file; minimum strokes and duration of the reference; id,
+//!   scale and `required` of the questions after a trial; the orders file.
+//! * wording: title, authors and the like; all texts, prompts and labels; consent;
+//!   questions asked once (setup, intake, outro); who types, and when a session
+//!   can be resumed.
+//! * analysis: `[analysis]`, planned participants, VAF and covariates.
+
+use super::{FileOrders, Order, Protocol, Question, QuestionKind};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use study_base::text::ModelId;
+
+/// SHA-256 in hexadecimal of the three parts of a study.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fingerprints {
+    /// Design, models' bytes, limits, rating scales, orders file.
+    pub stimulus: String,
+    /// Every text that a person reads.
+    pub wording: String,
+    /// `[analysis]` and what enters only the analysis.
+    pub analysis: String,
+}
+
+/// The fingerprints of a study: its protocol (with VAFs filled in from the model
+/// files), the bytes of each realization's file and the orders file, if any.
+pub fn of(
+    protocol: &Protocol,
+    model_bytes: &BTreeMap<ModelId, Vec<u8>>,
+    orders: Option<&FileOrders>,
+) -> Fingerprints {
+    // Taken apart without `..`, so that a new field has to be given its part.
+    let Protocol {
+        study,
+        text,
+        consent,
+        design,
+        session,
+        device,
+        trial,
+        models,
+        questions,
+        setup,
+        intake,
+        outro,
+        analysis,
+    } = protocol;
+    let super::Study {
+        id,
+        title,
+        seed,
+        authors,
+        license,
+        ethics,
+        contact,
+        funding,
+        doi,
+    } = study;
+    let super::Design {
+        participants,
+        repetitions,
+        order,
+        max_run,
+        min_distance,
+        practice,
+        breaks,
+        max_attempts,
+    } = design;
+    let super::TrialRules {
+        reference,
+        reference_min_s,
+        minimum_strokes,
+    } = trial;
+    let order = match order {
+        Order::File(_) => json!("file"),
+        order => json!(order),
+    };
+    let orders: Option<BTreeMap<String, &Vec<ModelId>>> =
+        orders.map(|rows| rows.iter().map(|(n, row)| (n.to_string(), row)).collect());
+    let felt: Vec<Value> = models
+        .iter()
+        .map(|m| {
+            json!({
+                "id": m.id,
+                "role": m.role,
+                "device": m.device,
+                "duplicate_of": m.duplicate_of,
+                "sha256": model_bytes.get(&m.id).map(|bytes| hex(bytes)),
+            })
+        })
+        .collect();
+    let stimulus = json!({
+        "study": { "id": id, "seed": seed },
+        "design": {
+            "repetitions": repetitions,
+            "order": order,
+            "max_run": max_run,
+            "min_distance": min_distance,
+            "practice": practice,
+            "breaks": breaks,
+            "max_attempts": max_attempts,
+        },
+        "orders": orders,
+        "device": device,
+        "trial": { "reference_min_s": reference_min_s, "minimum_strokes": minimum_strokes },
+        "models": felt,
+        "questions": questions.iter().map(scale).collect::<Vec<_>>(),
+    });
+    let wording = json!({
+        "study": {
+            "title": title,
+            "authors": authors,
+            "license": license,
+            "ethics": ethics,
+            "contact": contact,
+            "funding": funding,
+            "doi": doi,
+        },
+        "text": text,
+        "consent": consent,
+        "session": session,
+        "reference": reference,
+        "questions": questions.iter().map(words).collect::<Vec<_>>(),
+        "setup": setup,
+        "intake": intake,
+        "outro": outro,
+    });
+    let known: Vec<Value> = models
+        .iter()
+        .map(|m| json!({ "id": m.id, "vaf": m.vaf, "covariates": m.covariates }))
+        .collect();
+    let analysis = json!({
+        "analysis": analysis,
+        "participants": participants,
+        "models": known,
+    });
+    Fingerprints {
+        stimulus: hex(canonical(&stimulus).as_bytes()),
+        wording: hex(canonical(&wording).as_bytes()),
+        analysis: hex(canonical(&analysis).as_bytes()),
+    }
+}
+
+/// What of a question decides which answers there are.
+fn scale(question: &Question) -> Value {
+    let Question {
+        id,
+        prompt: _,
+        kind,
+        required,
+    } = question;
+    let kind = match kind {
+        QuestionKind::Rating { from, to, .. } => json!({ "rating": [from, to] }),
+        QuestionKind::Slider { from, to, step, .. } => json!({ "slider": [from, to, step] }),
+        QuestionKind::Choice { options, multiple } => {
+            json!({ "choice": options, "multiple": multiple })
+        }
+        QuestionKind::Number { unit, min, max } => {
+            json!({ "number": [min, max], "unit": unit })
+        }
+        QuestionKind::Text => json!("text"),
+    };
+    json!({ "id": id, "required": required, "kind": kind })
+}
+
+/// What of a question is only read.
+fn words(question: &Question) -> Value {
+    let labels = match &question.kind {
+        QuestionKind::Rating { labels, .. } => labels
+            .iter()
+            .map(|(at, label)| (at.to_string(), label.clone()))
+            .collect(),
+        QuestionKind::Slider { labels, .. } => labels.clone(),
+        QuestionKind::Choice { .. } | QuestionKind::Number { .. } | QuestionKind::Text => {
+            BTreeMap::new()
+        }
+    };
+    json!({ "id": question.id, "prompt": question.prompt, "labels": labels })
+}
+
+fn hex(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(64);
+    for byte in Sha256::digest(bytes) {
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+/// JSON with sorted keys, whatever order the map of `serde_json` keeps: a crate
+/// elsewhere in the build can switch that order.
+fn canonical(value: &Value) -> String {
+    let mut text = String::new();
+    write_canonical(value, &mut text);
+    text
+}
+
+fn write_canonical(value: &Value, text: &mut String) {
+    match value {
+        Value::Object(map) => {
+            let sorted: BTreeMap<&String, &Value> = map.iter().collect();
+            text.push('{');
+            for (i, (key, value)) in sorted.into_iter().enumerate() {
+                if i > 0 {
+                    text.push(',');
+                }
+                text.push_str(&json!(key).to_string());
+                text.push(':');
+                write_canonical(value, text);
+            }
+            text.push('}');
+        }
+        Value::Array(items) => {
+            text.push('[');
+            for (i, item) in items.iter().enumerate() {
+                if i > 0 {
+                    text.push(',');
+                }
+                write_canonical(item, text);
+            }
+            text.push(']');
+        }
+        plain => text.push_str(&plain.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::{Text, example};
+
+    fn bytes(protocol: &Protocol) -> BTreeMap<ModelId, Vec<u8>> {
+        protocol
+            .models
+            .iter()
+            .map(|m| (m.id.clone(), m.id.as_str().as_bytes().to_vec()))
+            .collect()
+    }
+
+    fn print(protocol: &Protocol) -> Fingerprints {
+        of(protocol, &bytes(protocol), None)
+    }
+
+    /// These stand in results folders: do not change the test. If it fails, a
+    /// study that is running could not be continued with this version. The first was
+    /// reproduced from the description above with Python's `json.dumps(…,
+    /// sort_keys=True, separators=(",", ":"))`.
+    #[test]
+    fn the_fingerprint_of_an_example_never_changes() {
+        let prints = print(&example::protocol(3, 2));
+        assert_eq!(
+            [prints.stimulus, prints.wording, prints.analysis],
+            [
+                "4fe9ece2c9624508a7387c19f8011b7ec75e9131cf0f505dab048a94ac6793b2",
+                "243c3af4477ee521f02286c6fe83c3ed8c74930b0369270843cb20d7ca8a8574",
+                "14412c8515c6492234ba6d5a3b5bcea2f4dd17268f4c4f18f1d4979f17edc9c0",
+            ]
+        );
+    }
+
+    #[test]
+    fn keys_are_sorted_and_nothing_else_is() {
+        let value = json!({ "b": [2, 1], "a": { "d": null, "c": "\u{e9}\n" }, "x": 0.1 });
+        assert_eq!(
+            canonical(&value),
+            "{\"a\":{\"c\":\"é\\n\",\"d\":null},\"b\":[2,1],\"x\":0.1}"
+        );
+    }
+
+    #[test]
+    fn each_change_moves_one_fingerprint() {
+        let base = example::protocol(3, 2);
+        let first = print(&base);
+        let parts = |f: &dyn Fn(&mut Protocol)| {
+            let mut changed = base.clone();
+            f(&mut changed);
+            let prints = of(&changed, &bytes(&base), None);
+            [
+                prints.stimulus != first.stimulus,
+                prints.wording != first.wording,
+                prints.analysis != first.analysis,
+            ]
+        };
+        assert_eq!(parts(&|p| p.study.seed += 1), [true, false, false]);
+        assert_eq!(
+            parts(&|p| p.design.order = Order::Shuffled),
+            [true, false, false]
+        );
+        assert_eq!(
+            parts(&|p| p.device.limits.force_n = study_base::limits::Limit::new(9.0).unwrap()),
+            [true, false, false]
+        );
+        assert_eq!(
+            parts(&|p| p.questions[1].required = true),
+            [true, false, false]
+        );
+        assert_eq!(
+            parts(&|p| p.text = Text {
+                welcome: Some("hello".to_owned()),
+                ..Text::default()
+            }),
+            [false, true, false]
+        );
+        assert_eq!(
+            parts(&|p| p.questions[0].prompt.push('?')),
+            [false, true, false]
+        );
+        assert_eq!(
+            parts(&|p| {
+                if let QuestionKind::Rating { labels, .. } = &mut p.questions[0].kind {
+                    labels.insert(4, "so so".to_owned());
+                }
+            }),
+            [false, true, false]
+        );
+        assert_eq!(
+            parts(&|p| p.models[0].vaf = Some(0.5)),
+            [false, false, true]
+        );
+        assert_eq!(parts(&|p| p.design.participants = 12), [false, false, true]);
+        assert_eq!(
+            parts(&|p| p.models[0].file = Some("elsewhere.toml".to_owned())),
+            [false, false, false]
+        );
+    }
+
+    #[test]
+    fn the_bytes_of_a_model_and_the_orders_are_stimulus() {
+        let protocol = example::protocol(2, 1);
+        let mut files = bytes(&protocol);
+        let first = of(&protocol, &files, None);
+        let orders = FileOrders::from([(1, vec![protocol.models[0].id.clone()])]);
+        assert_ne!(
+            of(&protocol, &files, Some(&orders)).stimulus,
+            first.stimulus
+        );
+        files.insert(protocol.models[0].id.clone(), b"other".to_vec());
+        assert_ne!(of(&protocol, &files, None).stimulus, first.stimulus);
+        assert_eq!(of(&protocol, &files, None).wording, first.wording);
+    }
+}

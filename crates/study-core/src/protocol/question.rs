@@ -1,0 +1,308 @@
+//! Questions and answers: every kind declares here what it accepts.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use study_base::text::QuestionId;
+use unicode_segmentation::UnicodeSegmentation as _;
+
+/// Longest text that an answer or remark may have, bytes. What is longer is cut
+/// on a character with a notice before it is confirmed, never after.
+pub const MAX_TEXT_BYTES: usize = 4096;
+
+/// A question to a participant or an experimenter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Question {
+    /// Its name; a column of `ratings.csv` or `participants.csv`.
+    pub id: QuestionId,
+    /// What is asked, in any language.
+    pub prompt: String,
+    /// What can be answered.
+    pub kind: QuestionKind,
+    /// Whether it can be left empty (text is by default optional, the rest not).
+    /// "Declined", with a reason, is possible always.
+    pub required: bool,
+}
+
+/// What can be answered to a question.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum QuestionKind {
+    /// A whole number on a labelled scale.
+    Rating {
+        /// Smallest.
+        from: i64,
+        /// Largest, above `from`.
+        to: i64,
+        /// Words at some of the numbers.
+        labels: BTreeMap<i64, String>,
+    },
+    /// A number on a continuous scale.
+    Slider {
+        /// Left end.
+        from: f64,
+        /// Right end, above `from`.
+        to: f64,
+        /// What one key press moves.
+        step: f64,
+        /// Words at the two ends (keys are the ends as text).
+        labels: BTreeMap<String, String>,
+    },
+    /// One or several of a list.
+    Choice {
+        /// What there is to choose from; no two alike.
+        options: Vec<String>,
+        /// Whether several can be chosen.
+        multiple: bool,
+    },
+    /// A number that is typed.
+    Number {
+        /// Its unit, for the prompt and the data dictionary.
+        unit: Option<String>,
+        /// Smallest that is accepted.
+        min: Option<f64>,
+        /// Largest that is accepted.
+        max: Option<f64>,
+    },
+    /// Free text.
+    Text,
+}
+
+/// What was answered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// To a rating.
+    Rating(i64),
+    /// To a slider or a number.
+    Number(f64),
+    /// To a choice: what was chosen, in the order of the options.
+    Choice(Vec<String>),
+    /// To a text, as typed.
+    Text(String),
+    /// To any question: none, and why.
+    Declined {
+        /// The participant's or experimenter's words.
+        reason: String,
+    },
+}
+
+impl Answer {
+    /// As a number, where it is one.
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Rating(n) => Some(*n as f64),
+            Self::Number(n) => Some(*n),
+            Self::Choice(_) | Self::Text(_) | Self::Declined { .. } => None,
+        }
+    }
+
+    /// Whether the question was declined.
+    pub fn is_declined(&self) -> bool {
+        matches!(self, Self::Declined { .. })
+    }
+
+    /// As it stands in a cell of a CSV: numbers plain, choices joined by `; `,
+    /// declined empty.
+    pub fn cell(&self) -> String {
+        match self {
+            Self::Rating(n) => n.to_string(),
+            Self::Number(n) => n.to_string(),
+            Self::Choice(chosen) => chosen.join("; "),
+            Self::Text(text) => text.clone(),
+            Self::Declined { .. } => String::new(),
+        }
+    }
+}
+
+impl Question {
+    /// Checks an answer against the question.
+    ///
+    /// # Errors
+    /// A short sentence that says what is accepted, for the person who typed it.
+    pub fn accepts(&self, answer: &Answer) -> Result<(), String> {
+        match (&self.kind, answer) {
+            (_, Answer::Declined { reason }) => {
+                if reason.trim().is_empty() {
+                    Err("say why it is declined".to_owned())
+                } else {
+                    fits(reason)
+                }
+            }
+            (QuestionKind::Rating { from, to, .. }, Answer::Rating(n)) => {
+                if (from..=to).contains(&n) {
+                    Ok(())
+                } else {
+                    Err(format!("choose {from} to {to}"))
+                }
+            }
+            (QuestionKind::Slider { from, to, .. }, Answer::Number(n)) => {
+                if (from..=to).contains(&n) {
+                    Ok(())
+                } else {
+                    Err(format!("choose {from} to {to}"))
+                }
+            }
+            (QuestionKind::Number { min, max, .. }, Answer::Number(n)) => {
+                let low = min.is_some_and(|m| *n < m);
+                let high = max.is_some_and(|m| *n > m);
+                if n.is_finite() && !low && !high {
+                    Ok(())
+                } else {
+                    Err(match (min, max) {
+                        (Some(a), Some(b)) => format!("a number from {a} to {b}"),
+                        (Some(a), None) => format!("a number from {a} up"),
+                        (None, Some(b)) => format!("a number up to {b}"),
+                        (None, None) => "a number".to_owned(),
+                    })
+                }
+            }
+            (QuestionKind::Choice { options, multiple }, Answer::Choice(chosen)) => {
+                let known = chosen.iter().all(|c| options.contains(c));
+                let once = (1..chosen.len()).all(|i| !chosen[..i].contains(&chosen[i]));
+                let count = *multiple || chosen.len() <= 1;
+                if !known || !once || !count {
+                    Err("choose from the list".to_owned())
+                } else if chosen.is_empty() && self.required {
+                    Err("choose one".to_owned())
+                } else {
+                    Ok(())
+                }
+            }
+            (QuestionKind::Text, Answer::Text(text)) => {
+                if text.trim().is_empty() && self.required {
+                    Err("an answer is needed".to_owned())
+                } else {
+                    fits(text)
+                }
+            }
+            _ => Err("the answer is of another kind than the question".to_owned()),
+        }
+    }
+}
+
+fn fits(text: &str) -> Result<(), String> {
+    if text.len() > MAX_TEXT_BYTES {
+        Err(format!("at most {MAX_TEXT_BYTES} bytes"))
+    } else {
+        Ok(())
+    }
+}
+
+/// Cuts text to [`MAX_TEXT_BYTES`] between what a reader sees as characters;
+/// says whether anything was cut.
+pub fn cut_to_fit(text: &str) -> (&str, bool) {
+    if text.len() <= MAX_TEXT_BYTES {
+        return (text, false);
+    }
+    let end = text
+        .grapheme_indices(true)
+        .map(|(at, g)| at + g.len())
+        .take_while(|end| *end <= MAX_TEXT_BYTES)
+        .last()
+        .unwrap_or(0);
+    (&text[..end], true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(kind: QuestionKind, required: bool) -> Question {
+        Question {
+            id: QuestionId::new("q").unwrap(),
+            prompt: "?".to_owned(),
+            kind,
+            required,
+        }
+    }
+
+    #[test]
+    fn a_rating_is_on_the_scale() {
+        let rating = question(
+            QuestionKind::Rating {
+                from: 1,
+                to: 7,
+                labels: BTreeMap::new(),
+            },
+            true,
+        );
+        for (given, good) in [(0, false), (1, true), (7, true), (8, false)] {
+            assert_eq!(
+                rating.accepts(&Answer::Rating(given)).is_ok(),
+                good,
+                "{given}"
+            );
+        }
+        assert!(rating.accepts(&Answer::Number(3.0)).is_err());
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_refused() {
+        let slider = question(
+            QuestionKind::Slider {
+                from: 0.0,
+                to: 1.0,
+                step: 0.1,
+                labels: BTreeMap::new(),
+            },
+            true,
+        );
+        let number = question(
+            QuestionKind::Number {
+                unit: None,
+                min: None,
+                max: Some(99.0),
+            },
+            true,
+        );
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 100.0] {
+            assert!(slider.accepts(&Answer::Number(bad)).is_err(), "{bad}");
+            assert!(number.accepts(&Answer::Number(bad)).is_err(), "{bad}");
+        }
+        assert!(slider.accepts(&Answer::Number(0.25)).is_ok());
+        assert_eq!(
+            number.accepts(&Answer::Number(100.0)),
+            Err("a number up to 99".to_owned())
+        );
+    }
+
+    #[test]
+    fn a_choice_is_from_the_list_and_each_option_once() {
+        let choose = |multiple, required, chosen: &[&str]| {
+            let options = vec!["a".to_owned(), "b".to_owned()];
+            question(QuestionKind::Choice { options, multiple }, required)
+                .accepts(&Answer::Choice(
+                    chosen.iter().map(|c| (*c).to_owned()).collect(),
+                ))
+                .is_ok()
+        };
+        assert!(choose(false, true, &["a"]));
+        assert!(!choose(false, true, &["a", "b"]));
+        assert!(!choose(false, true, &["c"]));
+        assert!(!choose(true, true, &[]));
+        assert!(choose(true, false, &[]));
+        assert!(choose(true, true, &["b", "a"]));
+        assert!(!choose(true, true, &["a", "a"]));
+    }
+
+    #[test]
+    fn any_question_can_be_declined_with_a_reason() {
+        let text = question(QuestionKind::Text, true);
+        let declined = |reason: &str| Answer::Declined {
+            reason: reason.to_owned(),
+        };
+        assert!(text.accepts(&declined("too personal")).is_ok());
+        assert!(text.accepts(&declined(" ")).is_err());
+        assert!(text.accepts(&Answer::Text(" ".to_owned())).is_err());
+    }
+
+    #[test]
+    fn long_text_is_cut_between_characters() {
+        let flag = "🇩🇪"; // one character of two code points, 8 bytes
+        let long = "x".repeat(MAX_TEXT_BYTES - 4) + flag;
+        let (cut, was_cut) = cut_to_fit(&long);
+        assert!(was_cut);
+        assert_eq!(cut.len(), MAX_TEXT_BYTES - 4);
+        assert_eq!(cut_to_fit("short"), ("short", false));
+    }
+}

@@ -1,0 +1,474 @@
+//! Design and seat to a whole, frozen order of trials.
+//!
+//! A [`Planner`] is made once per protocol and gives the order of any seat. The
+//! order depends on (seed, design, seat) alone and is the same on every machine
+//! and for ever; `docs/schedule.md` specifies it so that another language can
+//! reproduce it, and golden orders in the tests hold it.
+//!
+//! Not here: who gets which row (`store`), and what is felt when (`session`,
+//! which only asks [`requeue`] where a failed trial comes back).
+//!
+//! Invariant: no order leaves this module that breaks `max_run` or
+//! `min_distance`. Random orders are drawn exactly uniformly from those that
+//! keep them; orders that are given (Williams, Latin square, fixed, file) are
+//! verified, and one that breaks them is an error. Both constraints hold over all
+//! trials that count, across the ends of blocks; practice is not looked at.
+//!
+//! Positions are without unit, from 1.
+
+pub mod balance;
+mod completions;
+pub mod constraints;
+pub mod orders;
+mod requeue;
+
+pub use crate::protocol::{Seat, Trial};
+pub use requeue::{Requeued, requeue};
+
+use crate::protocol::{Design, FileOrders, Order, Protocol};
+use completions::Completions;
+use constraints::{Rule, Violation};
+use std::collections::HashMap;
+use study_base::rng::Stream;
+use study_base::text::ModelId;
+
+/// More trials than this in one session are taken for a slip of the pen.
+pub const MAX_TRIALS: u64 = 10_000;
+
+/// Why there is no order.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ScheduleError {
+    /// Nothing to schedule.
+    #[error("no realization to schedule: all models have the role practice")]
+    NoRealizations,
+    /// Nothing to schedule either.
+    #[error("repetitions = 0 schedules no trial")]
+    NoRepetitions,
+    /// Beyond [`MAX_TRIALS`].
+    #[error(
+        "{realizations} realizations × {repetitions} repetitions are {trials} trials; at most {MAX_TRIALS} are possible"
+    )]
+    TooLong {
+        /// Realizations that are scheduled.
+        realizations: usize,
+        /// How often each.
+        repetitions: u32,
+        /// The product.
+        trials: u64,
+    },
+    /// `max_run = 0`
+    #[error("max_run = 0 allows no trial at all")]
+    MaxRunZero,
+    /// The same realization cannot stay away for so long.
+    #[error(
+        "min_distance = {min_distance} needs at least {min_distance} realizations, there are {realizations}"
+    )]
+    MinDistance {
+        /// What was asked for.
+        min_distance: u32,
+        /// Realizations that are scheduled.
+        realizations: usize,
+    },
+    /// Nothing to put between.
+    #[error(
+        "max_run = {max_run} cannot hold: the only realization is felt {repetitions} times in a row"
+    )]
+    MaxRun {
+        /// What was asked for.
+        max_run: u32,
+        /// How often the only realization is felt.
+        repetitions: u32,
+    },
+    /// Counting the valid orders would take too much memory.
+    #[error(
+        "the orders of {realizations} realizations × {repetitions} repetitions, shuffled with {constraint}, are too many to count"
+    )]
+    TooManyStates {
+        /// Realizations that are scheduled.
+        realizations: usize,
+        /// How often each.
+        repetitions: u32,
+        /// Such as `max_run = 2`.
+        constraint: String,
+    },
+    /// Rows, pilots and simulated participants are numbered from 1.
+    #[error("there is no {0}: numbers start at 1")]
+    SeatZero(Seat),
+    /// A given order breaks a constraint.
+    #[error("{seat}, {violation}")]
+    Broken {
+        /// Whose order.
+        seat: Seat,
+        /// Where and how.
+        violation: Violation,
+    },
+    /// `order = { file = … }`, and nobody has read the file.
+    #[error("the order comes from a file, which was not read")]
+    NoOrders,
+    /// The file of orders does not have the row.
+    #[error("the file of orders has no row {row}")]
+    NoRow {
+        /// The row that was asked for.
+        row: u32,
+    },
+    /// A row of the file is too short or too long.
+    #[error("the file of orders, row {row}: {found} positions; {expected} are needed")]
+    WrongLength {
+        /// Row of the file.
+        row: u32,
+        /// How many it has.
+        found: usize,
+        /// Realizations × repetitions.
+        expected: usize,
+    },
+    /// A row of the file names something else than a scheduled realization.
+    #[error(
+        "the file of orders, row {row}, position {position}: `{model}` is no scheduled realization"
+    )]
+    UnknownModel {
+        /// Row of the file.
+        row: u32,
+        /// Position in it, from 1.
+        position: usize,
+        /// What stands there.
+        model: ModelId,
+    },
+    /// A row of the file has a realization too often or not often enough.
+    #[error(
+        "the file of orders, row {row}: `{model}` comes {found} times; repetitions = {expected}"
+    )]
+    WrongCount {
+        /// Row of the file.
+        row: u32,
+        /// Which realization.
+        model: ModelId,
+        /// How often it comes.
+        found: u32,
+        /// How often it should.
+        expected: u32,
+    },
+}
+
+impl ScheduleError {
+    /// What to do next, where the message does not say it.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::MinDistance { .. } => Some("lower min_distance or add realizations"),
+            Self::MaxRun { .. } => Some("add a realization or leave max_run out"),
+            Self::MaxRunZero => Some("max_run = 1 forbids the same realization twice in a row"),
+            Self::TooManyStates { .. } => {
+                Some("take order = \"blocked\", fewer repetitions or a smaller min_distance")
+            }
+            Self::Broken { .. } => {
+                Some("leave the constraint out, or take a random order (blocked, shuffled)")
+            }
+            Self::NoRow { .. } => Some("add the row to the file; rows are numbered from 1"),
+            Self::UnknownModel { .. } => {
+                Some("use the ids of [[models]] whose role is not practice")
+            }
+            Self::TooLong { .. } => Some("lower repetitions"),
+            Self::NoRealizations
+            | Self::NoRepetitions
+            | Self::SeatZero(_)
+            | Self::NoOrders
+            | Self::WrongLength { .. }
+            | Self::WrongCount { .. } => None,
+        }
+    }
+}
+
+/// The order of one seat: practice first, then every trial that counts.
+///
+/// Whoever needs many seats makes a [`Planner`] once.
+///
+/// # Errors
+/// [`ScheduleError`] if the design is infeasible, or the given order of this seat
+/// is incomplete or breaks a constraint.
+pub fn plan(
+    protocol: &Protocol,
+    orders: Option<&FileOrders>,
+    seat: Seat,
+) -> Result<Vec<Trial>, ScheduleError> {
+    Planner::new(protocol, orders)?.plan(seat)
+}
+
+/// Makes the orders of one study.
+#[derive(Debug)]
+pub struct Planner {
+    seed: u64,
+    max_run: Option<u32>,
+    min_distance: Option<u32>,
+    repetitions: u32,
+    practice: Vec<ModelId>,
+    models: Vec<ModelId>,
+    source: Source,
+}
+
+/// What an order is made from.
+#[derive(Debug)]
+enum Source {
+    Blocked { distance: usize },
+    Shuffled,
+    ShuffledWithin(Box<Completions>),
+    Lines { of: Lines, symbols: Vec<usize> },
+    Fixed,
+    File(FileOrders),
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Lines {
+    Williams,
+    Latin,
+}
+
+impl Planner {
+    /// Checks the design and counts what has to be counted.
+    ///
+    /// `orders` is the content of the file that `order = { file = … }` names.
+    ///
+    /// # Errors
+    /// [`ScheduleError`] if no seat can have an order.
+    pub fn new(protocol: &Protocol, orders: Option<&FileOrders>) -> Result<Self, ScheduleError> {
+        let design = &protocol.design;
+        let models: Vec<ModelId> = protocol.scheduled_models().map(|m| m.id.clone()).collect();
+        let rule = feasible(design, models.len())?;
+        let seed = protocol.study.seed;
+        let repetitions = design.repetitions as usize;
+        let source = match &design.order {
+            Order::Blocked => Source::Blocked {
+                // In a block each comes once, so that no run is longer than two.
+                distance: match rule {
+                    Rule::Distance(d) => d as usize,
+                    Rule::Run(_) | Rule::None => 1,
+                },
+            },
+            Order::Shuffled => match rule {
+                Rule::None => Source::Shuffled,
+                rule => Source::ShuffledWithin(Box::new(
+                    Completions::count(models.len(), repetitions, rule).ok_or_else(|| {
+                        ScheduleError::TooManyStates {
+                            realizations: models.len(),
+                            repetitions: design.repetitions,
+                            constraint: rule.to_string(),
+                        }
+                    })?,
+                )),
+            },
+            Order::Williams => Source::Lines {
+                of: Lines::Williams,
+                symbols: orders::symbols(seed, models.len()),
+            },
+            Order::LatinSquare => Source::Lines {
+                of: Lines::Latin,
+                symbols: orders::symbols(seed, models.len()),
+            },
+            Order::Fixed => Source::Fixed,
+            Order::File(_) => Source::File(orders.ok_or(ScheduleError::NoOrders)?.clone()),
+        };
+        Ok(Self {
+            seed,
+            max_run: design.max_run,
+            min_distance: design.min_distance,
+            repetitions: design.repetitions,
+            practice: design.practice.clone(),
+            models,
+            source,
+        })
+    }
+
+    /// The realizations that are scheduled, in the order of the protocol.
+    pub fn models(&self) -> &[ModelId] {
+        &self.models
+    }
+
+    /// The order of a seat: practice first, then every trial that counts.
+    ///
+    /// # Errors
+    /// [`ScheduleError`] if the number is 0, or the given order of this seat is
+    /// incomplete or breaks a constraint.
+    pub fn plan(&self, seat: Seat) -> Result<Vec<Trial>, ScheduleError> {
+        if seat.number() == 0 {
+            return Err(ScheduleError::SeatZero(seat));
+        }
+        let order = self.order(seat)?;
+        if !matches!(
+            self.source,
+            Source::Blocked { .. } | Source::Shuffled | Source::ShuffledWithin(_)
+        ) {
+            let felt: Vec<&ModelId> = order.iter().map(|&m| &self.models[m]).collect();
+            if let Some(violation) =
+                constraints::first_violation(&felt, self.max_run, self.min_distance)
+            {
+                return Err(ScheduleError::Broken { seat, violation });
+            }
+        }
+        Ok(self.trials(&order))
+    }
+
+    /// Indices of realizations in the order of a seat.
+    fn order(&self, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
+        let n = self.models.len();
+        let repetitions = self.repetitions as usize;
+        let stream = || {
+            let number = seat.number().to_string();
+            Stream::new(self.seed, &["schedule", seat.stream(), &number])
+        };
+        Ok(match &self.source {
+            Source::Blocked { distance } => {
+                orders::blocked(&mut stream(), n, repetitions, *distance)
+            }
+            Source::Shuffled => orders::shuffled(&mut stream(), n, repetitions),
+            Source::ShuffledWithin(completions) => completions.draw(&mut stream()),
+            Source::Lines { of, symbols } => {
+                let first = u64::from(self.repetitions) * u64::from(seat.number() - 1);
+                (0..u64::from(self.repetitions))
+                    .flat_map(|block| match of {
+                        Lines::Williams => orders::williams_line(n, first + block),
+                        Lines::Latin => orders::latin_line(n, first + block),
+                    })
+                    .map(|symbol| symbols[symbol])
+                    .collect()
+            }
+            Source::Fixed => (0..repetitions).flat_map(|_| 0..n).collect(),
+            Source::File(file) => self.row_of(file, seat)?,
+        })
+    }
+
+    /// The row of a file of orders, complete or an error.
+    ///
+    /// A pilot or simulated participant takes the rows of the file in turn, from
+    /// the first again after the last.
+    fn row_of(&self, file: &FileOrders, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
+        let row = match seat {
+            Seat::Row(row) => row,
+            Seat::Pilot(number) | Seat::Simulated(number) => {
+                let turn = (number as usize - 1) % file.len().max(1);
+                *file
+                    .keys()
+                    .nth(turn)
+                    .ok_or(ScheduleError::NoRow { row: number })?
+            }
+        };
+        let named = file.get(&row).ok_or(ScheduleError::NoRow { row })?;
+        let place: HashMap<&ModelId, usize> = self
+            .models
+            .iter()
+            .enumerate()
+            .map(|(i, m)| (m, i))
+            .collect();
+        let mut counts = vec![0u32; self.models.len()];
+        let mut order = Vec::with_capacity(named.len());
+        for (i, model) in named.iter().enumerate() {
+            let Some(&index) = place.get(model) else {
+                return Err(ScheduleError::UnknownModel {
+                    row,
+                    position: i + 1,
+                    model: model.clone(),
+                });
+            };
+            counts[index] += 1;
+            order.push(index);
+        }
+        let expected = self.models.len() * self.repetitions as usize;
+        if order.len() != expected {
+            return Err(ScheduleError::WrongLength {
+                row,
+                found: order.len(),
+                expected,
+            });
+        }
+        match counts.iter().position(|&c| c != self.repetitions) {
+            Some(wrong) => Err(ScheduleError::WrongCount {
+                row,
+                model: self.models[wrong].clone(),
+                found: counts[wrong],
+                expected: self.repetitions,
+            }),
+            None => Ok(order),
+        }
+    }
+
+    /// Numbers the trials.
+    fn trials(&self, order: &[usize]) -> Vec<Trial> {
+        let blocks = !matches!(
+            self.source,
+            Source::Shuffled | Source::ShuffledWithin(_) | Source::File(_)
+        );
+        let mut trials = Vec::with_capacity(self.practice.len() + order.len());
+        let mut number = 0;
+        for (position, model) in (1..).zip(&self.practice) {
+            number += 1;
+            trials.push(Trial {
+                trial: number,
+                block: 0,
+                position,
+                model: model.clone(),
+                repetition: 0,
+                practice: true,
+            });
+        }
+        let mut felt = vec![0u32; self.models.len()];
+        for (position, &model) in (1..).zip(order) {
+            number += 1;
+            felt[model] += 1;
+            trials.push(Trial {
+                trial: number,
+                // Each block holds each realization once.
+                block: if blocks { felt[model] } else { 1 },
+                position,
+                model: self.models[model].clone(),
+                repetition: felt[model],
+                practice: false,
+            });
+        }
+        trials
+    }
+}
+
+/// Whether the design has any order; if so, the one rule that its constraints
+/// come down to.
+fn feasible(design: &Design, realizations: usize) -> Result<Rule, ScheduleError> {
+    let repetitions = design.repetitions;
+    if realizations == 0 {
+        return Err(ScheduleError::NoRealizations);
+    }
+    if repetitions == 0 {
+        return Err(ScheduleError::NoRepetitions);
+    }
+    let trials = (realizations as u64).saturating_mul(u64::from(repetitions));
+    if trials > MAX_TRIALS {
+        return Err(ScheduleError::TooLong {
+            realizations,
+            repetitions,
+            trials,
+        });
+    }
+    if design.max_run == Some(0) {
+        return Err(ScheduleError::MaxRunZero);
+    }
+    if let Some(max_run) = design.max_run
+        && realizations == 1
+        && max_run < repetitions
+    {
+        return Err(ScheduleError::MaxRun {
+            max_run,
+            repetitions,
+        });
+    }
+    // The n first places are at least 0 … n−1 and the n last ones at most the n
+    // last of all n R: first and last lie n (R − 1) apart on average, R − 1
+    // distances each. Their mean is at most n, so one of them is.
+    if let Some(min_distance) = design.min_distance
+        && repetitions > 1
+        && min_distance as usize > realizations
+    {
+        return Err(ScheduleError::MinDistance {
+            min_distance,
+            realizations,
+        });
+    }
+    Ok(Rule::of(design.max_run, design.min_distance, repetitions))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,201 @@
+//! `max_run` and `min_distance`: what an order may not do.
+//!
+//! `max_run = k`: at most k trials in a row with the same realization.
+//! `min_distance = d`: positions of the same realization differ by at least d.
+//! A realization is its id; a hidden duplicate is another one.
+
+use std::fmt;
+use study_base::text::ModelId;
+
+/// Where an order breaks a constraint.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Violation {
+    /// Position of the trial that breaks it, from 1.
+    pub position: usize,
+    /// Its realization.
+    pub model: ModelId,
+    /// What it breaks.
+    pub broken: Broken,
+}
+
+/// Which constraint is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Broken {
+    /// More in a row than allowed.
+    MaxRun {
+        /// `max_run`
+        limit: u32,
+    },
+    /// Back too soon.
+    MinDistance {
+        /// `min_distance`
+        limit: u32,
+        /// Positions since the last time.
+        found: usize,
+    },
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "position {}: `{}` ", self.position, self.model)?;
+        match self.broken {
+            Broken::MaxRun { limit } => {
+                write!(f, "comes {} times in a row (max_run = {limit})", limit + 1)
+            }
+            Broken::MinDistance { limit, found } => {
+                write!(f, "is {found} after its last time (min_distance = {limit})")
+            }
+        }
+    }
+}
+
+/// The first place at which an order breaks a constraint; at one place `max_run`
+/// comes first.
+pub fn first_violation(
+    models: &[&ModelId],
+    max_run: Option<u32>,
+    min_distance: Option<u32>,
+) -> Option<Violation> {
+    let mut run = 0u32;
+    for (i, &model) in models.iter().enumerate() {
+        let violation = |broken| Violation {
+            position: i + 1,
+            model: model.clone(),
+            broken,
+        };
+        let again = i > 0 && models[i - 1] == model;
+        run = if again { run + 1 } else { 1 };
+        if let Some(limit) = max_run
+            && run > limit
+        {
+            return Some(violation(Broken::MaxRun { limit }));
+        }
+        if let Some(limit) = min_distance
+            && let Some(found) = back(&models[..i], model)
+            && found < limit as usize
+        {
+            return Some(violation(Broken::MinDistance { limit, found }));
+        }
+    }
+    None
+}
+
+/// Whether the trial at `at` (an index) keeps the constraints with those around
+/// it, whatever the others do among themselves.
+pub(super) fn keeps(
+    models: &[&ModelId],
+    at: usize,
+    max_run: Option<u32>,
+    min_distance: Option<u32>,
+) -> bool {
+    let (before, model, after) = (&models[..at], models[at], &models[at + 1..]);
+    let same = |other: &&&ModelId| **other == model;
+    let run =
+        1 + before.iter().rev().take_while(same).count() + after.iter().take_while(same).count();
+    let nearest = back(before, model)
+        .into_iter()
+        .chain(after.iter().position(|m| *m == model).map(|i| i + 1))
+        .min();
+    max_run.is_none_or(|limit| run <= limit as usize)
+        && min_distance.is_none_or(|limit| nearest.is_none_or(|d| d >= limit as usize))
+}
+
+/// How far back the last `model` is from the end of `before`, from 1.
+fn back(before: &[&ModelId], model: &ModelId) -> Option<usize> {
+    before.iter().rev().position(|m| *m == model).map(|i| i + 1)
+}
+
+/// What the two constraints together come down to.
+///
+/// A distance of two or more forbids every run, so that `max_run` adds nothing
+/// to it, and `max_run = 1` is a distance of two.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Rule {
+    /// Every order is valid.
+    None,
+    /// At most so many in a row, two or more.
+    Run(u32),
+    /// At least so far apart, two or more.
+    Distance(u32),
+}
+
+impl Rule {
+    /// The rule of a design in which every realization is felt `repetitions`
+    /// times.
+    pub(super) fn of(max_run: Option<u32>, min_distance: Option<u32>, repetitions: u32) -> Self {
+        let apart = min_distance.unwrap_or(1);
+        match max_run {
+            _ if repetitions <= 1 => Self::None,
+            _ if apart >= 2 => Self::Distance(apart),
+            Some(1) => Self::Distance(2),
+            Some(k) if k < repetitions => Self::Run(k),
+            _ => Self::None,
+        }
+    }
+}
+
+impl fmt::Display for Rule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::None => f.write_str("no constraint"),
+            Self::Run(k) => write!(f, "max_run = {k}"),
+            Self::Distance(2) => f.write_str("max_run = 1 (min_distance = 2)"),
+            Self::Distance(d) => write!(f, "min_distance = {d}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ids(letters: &str) -> Vec<ModelId> {
+        letters
+            .chars()
+            .map(|c| ModelId::new(c.to_string()).unwrap())
+            .collect()
+    }
+
+    fn first(letters: &str, run: Option<u32>, distance: Option<u32>) -> Option<String> {
+        let ids = ids(letters);
+        let models: Vec<_> = ids.iter().collect();
+        first_violation(&models, run, distance).map(|v| v.to_string())
+    }
+
+    #[test]
+    fn a_run_that_is_too_long_is_found_where_it_becomes_so() {
+        assert_eq!(first("AABBA", Some(2), None), None);
+        assert_eq!(
+            first("ABBBA", Some(2), None).unwrap(),
+            "position 4: `B` comes 3 times in a row (max_run = 2)"
+        );
+        assert_eq!(first("ABBA", Some(1), None).unwrap()[..10], *"position 3");
+    }
+
+    #[test]
+    fn a_realization_that_is_back_too_soon_is_found() {
+        assert_eq!(first("ABCABC", None, Some(3)), None);
+        assert_eq!(
+            first("ABCBAC", None, Some(3)).unwrap(),
+            "position 4: `B` is 2 after its last time (min_distance = 3)"
+        );
+    }
+
+    #[test]
+    fn a_distance_of_one_and_a_long_run_constrain_nothing() {
+        assert_eq!(first("AAAA", Some(4), Some(1)), None);
+        assert_eq!(Rule::of(Some(4), Some(1), 4), Rule::None);
+        assert_eq!(Rule::of(Some(2), Some(3), 4), Rule::Distance(3));
+        assert_eq!(Rule::of(Some(1), Some(1), 4), Rule::Distance(2));
+        assert_eq!(Rule::of(Some(3), None, 4), Rule::Run(3));
+    }
+
+    #[test]
+    fn keeping_looks_at_both_sides() {
+        let ids = ids("ABACA");
+        let models: Vec<_> = ids.iter().collect();
+        assert!(keeps(&models, 2, Some(1), Some(2)));
+        assert!(!keeps(&models, 2, None, Some(3)));
+        assert!(keeps(&models, 3, Some(1), Some(9)));
+    }
+}

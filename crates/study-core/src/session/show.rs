@@ -1,0 +1,304 @@
+//! What may be seen: the view of a session. Nothing here identifies a realization.
+
+use super::course::Cover;
+use super::failing::title;
+use super::phase::{Form, Phase};
+use super::view::{Banner, Correctable, DeviceState, Progress, Screen, StatusLine, View};
+use super::{Ending, Session};
+use crate::outcome::{Moment, Place};
+use crate::protocol::{DeviceKind, Seat};
+use study_base::text::Untrusted;
+
+/// Where the protocol has no words of its own.
+const REFERENCE: &str = "Ready for the next one?";
+const REST: &str = "Time for a break.";
+const THANKS: &str = "That was all. Thank you.";
+const NO_MORE: &str = "Nothing more is asked. Thank you.";
+
+impl Session {
+    /// What the screen shows at a moment.
+    pub fn view(&self, at: Moment) -> View {
+        let screen = self.screen(at);
+        View {
+            progress: self.progress(),
+            line: self.line(at),
+            device: self.plays_now(),
+            banner: self.claim.as_ref().and_then(|c| banner(c.seat)),
+            notice: self.notice.clone().or_else(|| self.trouble_in_form()),
+            entry: self.protocol.session.entry,
+            correctable: self.correctable(),
+            can_mark_bad: self
+                .markable()
+                .filter(|_| self.cover().is_none())
+                .map(|(_, _, title)| title),
+            armed: self.phase.armed(),
+            can_advance: can_advance(&screen),
+            screen,
+        }
+    }
+
+    fn screen(&self, at: Moment) -> Screen {
+        let ended = matches!(self.phase, Phase::Over(_));
+        match self.cover().filter(|_| !ended) {
+            Some(Cover::Disk) if self.ledger.retrying => Screen::Saving,
+            Some(Cover::Disk) => Screen::SaveTrouble {
+                what: self.safe(self.ledger.trouble.as_deref().unwrap_or_default()),
+            },
+            Some(Cover::Pause) if self.phase.under_way() => Screen::Paused {
+                since_s: self.paused.map_or(0.0, |since| at.seconds_since(&since)),
+            },
+            Some(Cover::Device) if self.phase.under_way() => Screen::DeviceTrouble {
+                what: self
+                    .trouble
+                    .as_ref()
+                    .map_or(String::new(), |t| t.what.clone()),
+                can_go_on: self.can_go_on(),
+            },
+            _ => self.phase_screen(at),
+        }
+    }
+
+    fn phase_screen(&self, at: Moment) -> Screen {
+        match &self.phase {
+            Phase::Who | Phase::Claiming => Screen::Who {
+                participant: self.participant.clone(),
+                operator: self.operator.clone(),
+                claiming: matches!(self.phase, Phase::Claiming),
+            },
+            Phase::ResumeChoice { gap_s } => Screen::ResumeChoice {
+                gap_h: gap_s / 3600.0,
+                done: self.history.closed(false),
+                total: self.history.planned_total(false),
+            },
+            Phase::Consent => match &self.protocol.consent {
+                Some(consent) => Screen::Consent {
+                    document: consent.document.clone(),
+                    version: consent.version.clone(),
+                },
+                None => Screen::Saving,
+            },
+            Phase::Message(kind) => Screen::Message {
+                kind: *kind,
+                text: self.message(*kind).unwrap_or_default().to_owned(),
+            },
+            Phase::Form(form) => form_screen(form),
+            Phase::Reference { .. } => Screen::Reference {
+                prompt: self
+                    .protocol
+                    .trial
+                    .reference
+                    .clone()
+                    .unwrap_or(REFERENCE.into()),
+                wait_s: self.reference_wait_s(at),
+            },
+            Phase::Loading { .. } | Phase::Ready { .. } => Screen::Loading,
+            Phase::Mounting { code } => Screen::Mount { code: code.clone() },
+            Phase::Playing { since, counts } => Screen::Playing {
+                since_s: at.seconds_since(since),
+                strokes_missing: self
+                    .strokes_needed()
+                    .saturating_sub(counts.unwrap_or_default().strokes),
+            },
+            Phase::Stopping { .. } => Screen::Stopping,
+            Phase::Stopped => Screen::Stopped {
+                can_rate: self.can_rate(),
+            },
+            Phase::Break { .. } => Screen::Break {
+                text: self.protocol.text.rest.clone().unwrap_or(REST.into()),
+                wait_s: self.break_wait_s(at),
+            },
+            Phase::Saving | Phase::Leaving { .. } => Screen::Saving,
+            Phase::End | Phase::Over(_) => Screen::End {
+                text: self.last_words(),
+            },
+        }
+    }
+
+    fn last_words(&self) -> String {
+        let finished = self.history.finished && !matches!(self.phase, Phase::Over(Ending::Nothing));
+        let own = self.protocol.text.end.clone().filter(|_| finished);
+        own.unwrap_or_else(|| if finished { THANKS } else { NO_MORE }.to_owned())
+    }
+
+    fn strokes_needed(&self) -> u32 {
+        let open = self.history.open.as_ref();
+        open.map_or(0, |open| self.minimum_strokes(&open.trial))
+    }
+
+    /// Counted by trials closed, so that one that came back looks like any other.
+    fn progress(&self) -> Option<Progress> {
+        let rating =
+            matches!(&self.phase, Phase::Form(f) if matches!(f.place, Place::Trial { .. }));
+        let prompt = matches!(self.phase, Phase::Reference { .. } | Phase::Stopped);
+        if !(rating || prompt || self.phase.armed()) {
+            return None;
+        }
+        let trial = match &self.history.open {
+            Some(open) => &open.trial,
+            None => self.history.next_trial()?,
+        };
+        let total = self.history.planned_total(trial.practice);
+        Some(Progress {
+            practice: trial.practice,
+            current: (self.history.closed(trial.practice) + 1).min(total),
+            total,
+        })
+    }
+
+    fn line(&self, at: Moment) -> StatusLine {
+        StatusLine {
+            participant: self.participant.clone(),
+            operator: self.operator.clone(),
+            device: self.device_state(),
+            elapsed_s: self.opened.map_or(0.0, |opened| at.seconds_since(&opened)),
+            trials_saved: self.history.answered(|trial| self.ledger.has_trial(trial)),
+            trials_answered: self.history.answered(|_| true),
+            all_saved: self.ledger.all_saved(),
+        }
+    }
+
+    fn device_state(&self) -> DeviceState {
+        if self.claim.is_none() {
+            return DeviceState::Unknown;
+        }
+        if self.device_lost {
+            return DeviceState::Lost;
+        }
+        if self.trouble.as_ref().is_some_and(|t| t.fault) {
+            return DeviceState::Fault;
+        }
+        let none = self.claim.as_ref().map(|c| c.device_kind) == Some(DeviceKind::Manual);
+        match self.phase {
+            Phase::Playing { .. } if self.plays_now() == DeviceKind::Manual => DeviceState::Felt,
+            _ if none => DeviceState::ByHand,
+            _ if self.plays_now() == DeviceKind::Manual => DeviceState::Limp,
+            Phase::Loading { .. } => DeviceState::Loading,
+            Phase::Ready { .. } => DeviceState::Ready,
+            Phase::Playing { counts, .. } => DeviceState::Running(counts),
+            Phase::Stopping { .. } => DeviceState::Stopping,
+            _ => DeviceState::Limp,
+        }
+    }
+
+    /// What gives the force in the trial under way; between trials, in the study.
+    fn plays_now(&self) -> DeviceKind {
+        let under_way = self
+            .history
+            .open
+            .as_ref()
+            .filter(|_| self.phase.armed() || matches!(self.phase, Phase::Stopped));
+        let own = under_way.and_then(|open| self.protocol.model(&open.trial.model)?.device);
+        let claimed = self.claim.as_ref().map(|c| c.device_kind);
+        own.or(claimed).unwrap_or(self.protocol.device.kind)
+    }
+
+    /// A form is not covered by the device's trouble: it is told below it, as long
+    /// as it lasts.
+    fn trouble_in_form(&self) -> Option<String> {
+        let trouble = self.trouble.as_ref().filter(|_| self.in_form())?;
+        Some(format!("device: {}", trouble.what))
+    }
+
+    fn correctable(&self) -> Vec<Correctable> {
+        let given = self.history.answers.iter().rev();
+        given
+            .filter(|g| self.history.is_current(g.place))
+            .filter_map(|g| {
+                let asked = self.questions(g.place).iter();
+                let question = asked.clone().find(|q| q.id == g.question)?.clone();
+                Some(Correctable {
+                    place: g.place,
+                    title: self.place_title(g.place),
+                    question,
+                    answer: g.answer.clone(),
+                })
+            })
+            .collect()
+    }
+
+    fn place_title(&self, place: Place) -> String {
+        match place {
+            Place::Setup => "set-up".to_owned(),
+            Place::Intake => "intake".to_owned(),
+            Place::Outro => "closing questions".to_owned(),
+            Place::Trial { trial, .. } => {
+                let practice = self.history.planned(trial).is_some_and(|t| t.practice);
+                let now = || self.history.closed(practice) + 1;
+                let number = self.history.done_as(trial).map_or_else(now, |(_, n)| n);
+                title(practice, number)
+            }
+        }
+    }
+
+    /// Foreign words, blinded and harmless to a terminal.
+    pub(super) fn safe(&self, foreign: &str) -> String {
+        Untrusted(&self.blind(foreign)).to_string()
+    }
+
+    /// Foreign words (a device's, a store's) without what names a realization.
+    pub(super) fn blind(&self, foreign: &str) -> String {
+        let mut blinded = String::with_capacity(foreign.len());
+        let in_name = |c: char| c.is_ascii_alphanumeric() || "._-/\\".contains(c);
+        let mut rest = foreign;
+        while !rest.is_empty() {
+            let name_end = rest.find(|c| !in_name(c)).unwrap_or(rest.len());
+            let (name, after) = rest.split_at(name_end);
+            blinded.push_str(if self.names_a_realization(name) {
+                "…"
+            } else {
+                name
+            });
+            let other_end = after.find(in_name).unwrap_or(after.len());
+            let (other, next) = after.split_at(other_end);
+            blinded.push_str(other);
+            rest = next;
+        }
+        blinded
+    }
+
+    fn names_a_realization(&self, name: &str) -> bool {
+        self.protocol.models.iter().any(|model| {
+            let id = model.id.as_str();
+            let id_in = name.trim_end_matches('.') == id || (id.len() > 3 && name.contains(id));
+            id_in
+                || model
+                    .file
+                    .as_deref()
+                    .is_some_and(|file| name.contains(file))
+        })
+    }
+}
+
+fn form_screen(form: &Form) -> Screen {
+    let page = form.total - form.pages.len() + 1;
+    let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    Screen::Form {
+        place: form.place,
+        questions: form.pages.first().cloned().unwrap_or_default(),
+        page: number(page),
+        pages: number(form.total),
+        to_experimenter: form.place == Place::Setup,
+    }
+}
+
+fn banner(seat: Seat) -> Option<Banner> {
+    match seat {
+        Seat::Row(_) => None,
+        Seat::Pilot(_) => Some(Banner::Pilot),
+        Seat::Simulated(_) => Some(Banner::Simulated),
+    }
+}
+
+/// Whether Enter does anything on a screen.
+fn can_advance(screen: &Screen) -> bool {
+    match screen {
+        Screen::Message { .. } | Screen::SaveTrouble { .. } | Screen::Paused { .. } => true,
+        Screen::End { .. } | Screen::Mount { .. } => true,
+        Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => *wait_s <= 0.0,
+        Screen::Playing {
+            strokes_missing, ..
+        } => *strokes_missing == 0,
+        Screen::DeviceTrouble { can_go_on, .. } => *can_go_on,
+        _ => false,
+    }
+}

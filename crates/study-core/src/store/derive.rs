@@ -1,0 +1,170 @@
+//! The derived tables, from the journals: which rows there are.
+//!
+//! Sorted by participant, session and trial, so the same journals give the same
+//! bytes. [`super::tables`] writes them.
+
+use super::error::{At as _, StoreError};
+use super::sessions::SessionData;
+use super::{StudyFolder, atomic, layout, tables as csv};
+use crate::outcome::{AttemptRow, ParticipantRow, RatingRow, State, fold};
+use crate::protocol::Protocol;
+use std::collections::BTreeSet;
+use std::io;
+use study_base::text::QuestionId;
+
+/// Every row of a study.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Derived {
+    /// One for each planned trial of each session that was started. Not of void
+    /// sessions, nor of participants who took back what they gave.
+    pub rows: Vec<RatingRow>,
+    /// Every attempt, answer, correction, failure, remark and change of state.
+    pub attempts: Vec<AttemptRow>,
+    /// One for each participant, by their last session.
+    pub participants: Vec<ParticipantRow>,
+    /// The columns that depend on the protocol.
+    pub columns: Columns,
+}
+
+/// The columns of the tables that depend on the protocol.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Columns {
+    /// Of `ratings.csv`: the questions after each trial, in the protocol's order.
+    pub questions: Vec<QuestionId>,
+    /// Of `ratings.csv`: the models' covariates, sorted.
+    pub covariates: Vec<String>,
+    /// Of `participants.csv`: setup, intake, outro, in the protocol's order.
+    pub forms: Vec<QuestionId>,
+}
+
+impl Columns {
+    /// Those of a protocol.
+    pub fn of(protocol: &Protocol) -> Self {
+        let forms = [&protocol.setup, &protocol.intake, &protocol.outro];
+        let covariates: BTreeSet<&String> = protocol
+            .models
+            .iter()
+            .flat_map(|m| m.covariates.keys())
+            .collect();
+        Self {
+            questions: protocol.questions.iter().map(|q| q.id.clone()).collect(),
+            covariates: covariates.into_iter().cloned().collect(),
+            forms: forms.into_iter().flatten().map(|q| q.id.clone()).collect(),
+        }
+    }
+}
+
+impl StudyFolder {
+    /// Replaces the derived tables, each as a whole, unless they are the same.
+    ///
+    /// # Errors
+    /// [`StoreError`]; each table then is the old one or the new one.
+    pub fn write_derived(&self, derived: &Derived) -> Result<(), StoreError> {
+        let _lock = self.lock()?;
+        self.replace_tables(derived)
+    }
+
+    /// Derives and writes under one lock, so that of two processes the later one
+    /// has the last word.
+    ///
+    /// # Errors
+    /// As [`StudyFolder::sessions`] and [`StudyFolder::write_derived`], and if the
+    /// tables name a session that is not there: nobody is dropped unasked.
+    pub fn refresh(&self, protocol: &Protocol) -> Result<Derived, StoreError> {
+        self.refresh_with(protocol, false)
+    }
+
+    /// The same; with `drop_missing` sessions that are not there leave the tables.
+    ///
+    /// # Errors
+    /// As [`StudyFolder::refresh`].
+    pub fn refresh_with(
+        &self,
+        protocol: &Protocol,
+        drop_missing: bool,
+    ) -> Result<Derived, StoreError> {
+        let _lock = self.lock()?;
+        let sessions = self.sessions()?;
+        let vanished = self.vanished(&sessions);
+        if !drop_missing && !vanished.is_empty() {
+            let who: Vec<String> = vanished.iter().map(ToString::to_string).collect();
+            return Err(StoreError::Vanished {
+                path: self.path.clone(),
+                who: who.join(", "),
+            });
+        }
+        let derived = Derived::of(&sessions, protocol);
+        self.replace_tables(&derived)?;
+        Ok(derived)
+    }
+
+    fn replace_tables(&self, derived: &Derived) -> Result<(), StoreError> {
+        for (name, bytes) in tables(derived).at(&self.path)? {
+            atomic::replace_if_new(self.disk.as_ref(), &self.path.join(name), &bytes)?;
+        }
+        Ok(())
+    }
+}
+
+impl Derived {
+    /// The rows of all sessions of a study, with a protocol whose models have their
+    /// VAF. Damaged lines are passed over; [`StudyFolder::verify`] tells of them.
+    pub fn of(sessions: &[SessionData], protocol: &Protocol) -> Self {
+        let mut derived = Self {
+            participants: participants(sessions),
+            columns: Columns::of(protocol),
+            ..Self::default()
+        };
+        for session in sessions {
+            let (id, number, entries) = (&session.participant, session.session, &session.entries);
+            if !matches!(session.standing().state, State::Void | State::Withdrawn) {
+                derived.rows.extend(fold::ratings(entries, protocol));
+            }
+            if session.standing().state != State::Withdrawn {
+                derived.attempts.extend(fold::attempts(id, number, entries));
+            }
+        }
+        derived
+    }
+}
+
+/// One row for each participant; needs no protocol.
+pub fn participants(sessions: &[SessionData]) -> Vec<ParticipantRow> {
+    let mut rows: Vec<ParticipantRow> = Vec::new();
+    for session in sessions.iter().filter(|s| s.claimed) {
+        let mut row = fold::participant(&session.participant, session.session, &session.entries);
+        if let Some(seat) = session.seat {
+            row.row = seat.row();
+            row.pilot = seat.is_pilot();
+            row.simulated = seat.is_simulated();
+        }
+        if let Some(stone) = &session.tombstone {
+            row.state = stone.state;
+            row.reason.clone_from(&stone.reason);
+            row.erased = true;
+        } else if row.state == State::Withdrawn {
+            // Taken back: only that they took part stays in the tables.
+            row.answers.clear();
+        }
+        match rows.last_mut() {
+            Some(last) if last.participant == row.participant => *last = row,
+            _ => rows.push(row),
+        }
+    }
+    rows
+}
+
+/// File name and bytes of each table.
+pub(super) fn tables(derived: &Derived) -> io::Result<[(&'static str, Vec<u8>); 3]> {
+    Ok([
+        (
+            layout::RATINGS,
+            csv::ratings(&derived.rows, &derived.columns)?,
+        ),
+        (layout::ATTEMPTS, csv::attempts(&derived.attempts)?),
+        (
+            layout::PARTICIPANTS,
+            csv::participants(&derived.participants, &derived.columns)?,
+        ),
+    ])
+}

@@ -1,0 +1,128 @@
+//! Where things are in a results folder. Names only.
+
+use std::path::{Path, PathBuf};
+use study_base::text::ParticipantId;
+
+/// What the study is and which versions its protocol has had.
+pub const MANIFEST: &str = "study.json";
+/// Frozen copies of the protocol, by version.
+pub const PROTOCOLS: &str = "protocol";
+/// The protocol file in each of them.
+pub const PROTOCOL: &str = "protocol.toml";
+/// One folder for each participant, in it one for each session.
+pub const SESSIONS: &str = "sessions";
+/// What is left of a participant whose data were erased.
+pub const TOMBSTONE: &str = "tombstone.json";
+/// Telemetry of a session, one file for each attempt.
+pub const TELEMETRY: &str = "telemetry";
+/// Room for the last records of a session on a full disk.
+pub const RESERVE: &str = "reserve";
+/// The same, before it belongs to a session.
+pub const PROBE: &str = ".probe";
+/// Which orders were shown while the study ran, to whom it may matter.
+pub const REVEALS: &str = "reveals.jsonl";
+/// Derived: one row for each trial.
+pub const RATINGS: &str = "ratings.csv";
+/// Derived: every attempt, answer, correction and failure.
+pub const ATTEMPTS: &str = "attempts.csv";
+/// Derived: one row for each participant.
+pub const PARTICIPANTS: &str = "participants.csv";
+
+/// The derived tables.
+pub const TABLES: [&str; 3] = [RATINGS, ATTEMPTS, PARTICIPANTS];
+/// Derived, by `study analyze`: what the ratings come to.
+pub const ANALYSIS: &str = "analysis";
+
+/// The frozen copy of a version of the protocol.
+pub fn protocol(study: &Path, version: u32) -> PathBuf {
+    study.join(PROTOCOLS).join(version.to_string())
+}
+
+/// A participant's folder.
+pub fn participant(study: &Path, id: &ParticipantId) -> PathBuf {
+    study.join(SESSIONS).join(id.as_str())
+}
+
+/// A session's folder.
+pub fn session(study: &Path, id: &ParticipantId, session: u32) -> PathBuf {
+    participant(study, id).join(session.to_string())
+}
+
+/// A segment of a journal, from 1.
+pub fn segment(number: u32) -> String {
+    if number == 1 {
+        "journal.jsonl".to_owned()
+    } else {
+        format!("journal-{number}.jsonl")
+    }
+}
+
+/// Which segment of a journal a file name is.
+pub fn segment_number(name: &str) -> Option<u32> {
+    let number = match name.strip_prefix("journal")?.strip_suffix(".jsonl")? {
+        "" => 1,
+        rest => rest.strip_prefix('-')?.parse().ok()?,
+    };
+    (segment(number) == name).then_some(number)
+}
+
+/// Bytes of a torn tail that were set apart, from 1.
+pub fn torn(number: u32) -> String {
+    format!("torn-{number}.bin")
+}
+
+/// Whether a file name is one of [`torn`].
+pub fn is_torn(name: &str) -> bool {
+    name.strip_prefix("torn-")
+        .and_then(|n| n.strip_suffix(".bin"))
+        .is_some_and(|n| n.parse::<u32>().is_ok())
+}
+
+/// The telemetry of an attempt; `copy` from 1 tells files of the same attempt apart.
+pub fn telemetry(trial: u32, attempt: u32, copy: u32) -> String {
+    if copy == 1 {
+        format!("{trial:03}-a{attempt}.csv")
+    } else {
+        format!("{trial:03}-a{attempt}-{copy}.csv")
+    }
+}
+
+/// A number from 1 as this program writes it in a name, without leading zeros.
+pub fn number(name: &str) -> Option<u32> {
+    let n: u32 = name.parse().ok()?;
+    (n > 0 && n.to_string() == name).then_some(n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_segment_has_one_name_and_a_name_one_segment() {
+        for n in 1..12 {
+            assert_eq!(segment_number(&segment(n)), Some(n));
+        }
+        for other in [
+            "journal-1.jsonl",
+            "journal-02.jsonl",
+            "journal.json",
+            "journal-x.jsonl",
+        ] {
+            assert_eq!(segment_number(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn the_design_names_the_telemetry() {
+        assert_eq!(telemetry(7, 1, 1), "007-a1.csv");
+        assert_eq!(telemetry(7, 1, 2), "007-a1-2.csv");
+    }
+
+    #[test]
+    fn only_a_plain_number_names_a_session() {
+        assert_eq!(number("12"), Some(12));
+        for bad in ["0", "01", "+1", "1 ", "", "x"] {
+            assert_eq!(number(bad), None, "{bad}");
+        }
+    }
+}

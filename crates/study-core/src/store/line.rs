@@ -1,0 +1,307 @@
+//! One line of a journal, as bytes.
+//!
+//! ```text
+//! {"crc":"3f2a9c01","v":1,"seq":7,"prev":"9b1c…","wall":"…","mono_ns":…,"event":"…",…}
+//! ```
+//!
+//! `crc` is the CRC-32 (ISO-HDLC, as in zlib) of every byte after its comma up to
+//! the closing brace; `prev` the first 16 hexadecimal digits of the SHA-256 of the
+//! line before, without its line end. The first 8 bytes of a line occur nowhere
+//! else in it, because JSON escapes quotation marks in text: records can be told
+//! apart even where a line end is damaged. Pure: bytes in, bytes out.
+
+use crate::outcome::{Event, Moment};
+use crate::protocol::Seat;
+use chrono::{DateTime, FixedOffset};
+use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use study_base::text::ParticipantId;
+
+/// The version of the line format that this program writes.
+pub const VERSION: u32 = 1;
+
+/// `prev` of the first line.
+pub const NO_LINE: &str = "0000000000000000";
+
+/// How every line starts, and nothing else in it.
+pub(super) const PREFIX: &[u8] = b"{\"crc\":\"";
+
+/// Bytes up to where the checksum begins to count: `{"crc":"3f2a9c01",`.
+const HEAD: usize = 18;
+
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// What a line says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// The first line: the session folder belongs to this participant.
+    Claim(Claim),
+    /// Any other.
+    Event(Moment, Event),
+    /// An event of a later version of the program: its name.
+    Unknown(String),
+}
+
+/// The first line of a journal, written when the session's folder is made.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Claim {
+    /// Whose session.
+    pub participant: ParticipantId,
+    /// From 1.
+    pub session: u32,
+    /// Where the order comes from; none for somebody who never came.
+    pub seat: Option<Seat>,
+    /// Newest version of the protocol then.
+    pub protocol_version: u32,
+}
+
+/// A line that is whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// Place in the journal, from 0.
+    pub seq: u64,
+    /// Hash of the line before.
+    pub prev: String,
+    /// What it says.
+    pub record: Record,
+}
+
+/// Why bytes are no line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BadLine {
+    /// Not what this program writes.
+    #[error("it is no record")]
+    Shape,
+    /// Some byte is not what was written.
+    #[error("its checksum does not fit")]
+    Checksum,
+    /// A later version of the format.
+    #[error("it has version {0} of the format")]
+    Newer(u32),
+    /// The checksum fits, but this program would not have written it.
+    #[error("it does not read as an event: {0}")]
+    Content(String),
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Body<'a> {
+    Claim {
+        v: u32,
+        seq: u64,
+        prev: &'a str,
+        claim: &'a Claim,
+    },
+    Event {
+        v: u32,
+        seq: u64,
+        prev: &'a str,
+        wall: DateTime<FixedOffset>,
+        mono_ns: u64,
+        #[serde(flatten)]
+        event: &'a Event,
+    },
+}
+
+#[derive(Deserialize)]
+struct Version {
+    v: u32,
+}
+
+#[derive(Deserialize)]
+struct Head {
+    v: u32,
+    seq: Option<u64>,
+    prev: Option<String>,
+    claim: Option<Claim>,
+    wall: Option<DateTime<FixedOffset>>,
+    mono_ns: Option<u64>,
+    event: Option<String>,
+}
+
+/// A line without its line end.
+///
+/// # Errors
+/// What the serialiser says; no event of this program is known to do that.
+pub fn encode(seq: u64, prev: &str, record: &Record) -> Result<Vec<u8>, BadLine> {
+    let body = match record {
+        Record::Claim(claim) => Body::Claim {
+            v: VERSION,
+            seq,
+            prev,
+            claim,
+        },
+        Record::Event(at, event) => Body::Event {
+            v: VERSION,
+            seq,
+            prev,
+            wall: at.wall,
+            mono_ns: at.mono_ns,
+            event,
+        },
+        Record::Unknown(name) => return Err(BadLine::Content(format!("unknown event {name}"))),
+    };
+    let body = serde_json::to_string(&body).map_err(|e| BadLine::Content(e.to_string()))?;
+    // The body's own opening brace gives way to the checksum.
+    let counted = &body[1..];
+    let sum = CRC.checksum(counted.as_bytes());
+    Ok(format!("{{\"crc\":\"{sum:08x}\",{counted}").into_bytes())
+}
+
+/// Reads a line without its line end.
+///
+/// # Errors
+/// [`BadLine`], never a panic, whatever the bytes.
+pub fn decode(bytes: &[u8]) -> Result<Line, BadLine> {
+    let (head, counted) = bytes.split_at_checked(HEAD).ok_or(BadLine::Shape)?;
+    if !head.starts_with(PREFIX) || !head.ends_with(b"\",") {
+        return Err(BadLine::Shape);
+    }
+    if head[PREFIX.len()..HEAD - 2] != *format!("{:08x}", CRC.checksum(counted)).as_bytes() {
+        return Err(BadLine::Checksum);
+    }
+    let content = |e: serde_json::Error| BadLine::Content(e.to_string());
+    let head: Head = serde_json::from_slice(bytes).map_err(|e| {
+        // The rest of a newer line may have any shape.
+        match serde_json::from_slice(bytes) {
+            Ok(Version { v }) if v > VERSION => BadLine::Newer(v),
+            _ => content(e),
+        }
+    })?;
+    if head.v > VERSION {
+        return Err(BadLine::Newer(head.v));
+    }
+    let missing = |what: &str| BadLine::Content(format!("{what} is missing"));
+    let seq = head.seq.ok_or_else(|| missing("seq"))?;
+    let prev = head.prev.ok_or_else(|| missing("prev"))?;
+    let record = match (head.claim, head.event) {
+        (Some(claim), None) => Record::Claim(claim),
+        (None, Some(name)) => {
+            let at = Moment {
+                wall: head.wall.ok_or_else(|| missing("wall"))?,
+                mono_ns: head.mono_ns.ok_or_else(|| missing("mono_ns"))?,
+            };
+            match serde_json::from_slice::<Event>(bytes) {
+                Ok(event) => Record::Event(at, event),
+                Err(e) if e.to_string().starts_with("unknown variant `") => Record::Unknown(name),
+                Err(e) => return Err(content(e)),
+            }
+        }
+        _ => return Err(missing("event")),
+    };
+    Ok(Line { seq, prev, record })
+}
+
+/// `prev` of the line after this one.
+pub fn hash(line: &[u8]) -> String {
+    let digest = Sha256::digest(line);
+    digest[..8].iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// SHA-256 of a file's bytes in hexadecimal.
+pub(super) fn sha256(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::Playback;
+    use proptest::prelude::*;
+
+    fn remark(text: &str) -> Record {
+        Record::Event(
+            Moment {
+                wall: DateTime::parse_from_rfc3339("2007-03-22T10:00:00.123456789+01:00").unwrap(),
+                mono_ns: u64::MAX,
+            },
+            Event::Remark {
+                by: crate::outcome::Author::Participant,
+                trial: Some(7),
+                text: text.to_owned(),
+            },
+        )
+    }
+
+    #[test]
+    fn the_start_of_a_line_occurs_nowhere_else_in_it() {
+        let hostile = remark("{\"crc\":\"00000000\",\n{\"crc\":\"");
+        let bytes = encode(3, NO_LINE, &hostile).unwrap();
+        let found = bytes.windows(PREFIX.len()).filter(|w| *w == PREFIX).count();
+        assert_eq!(found, 1);
+        assert!(!bytes.contains(&b'\n'));
+        assert_eq!(decode(&bytes).unwrap().record, hostile);
+    }
+
+    /// 0xcbf43926 is the check value of CRC-32/ISO-HDLC for "123456789".
+    #[test]
+    fn the_checksum_is_that_of_zlib() {
+        assert_eq!(CRC.checksum(b"123456789"), 0xcbf4_3926);
+    }
+
+    /// SHA-256("abc"), FIPS 180-4 example: ba7816bf 8f01cfea 414140de …
+    #[test]
+    fn the_chain_is_of_sha_256() {
+        assert_eq!(hash(b"abc"), "ba7816bf8f01cfea");
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_stored_and_read() {
+        let at = Moment {
+            wall: DateTime::parse_from_rfc3339("2007-03-22T10:00:00+01:00").unwrap(),
+            mono_ns: 1,
+        };
+        let event = Event::PlaybackEnded {
+            trial: 1,
+            attempt: 1,
+            playback: Playback {
+                least_energy_j: f64::NAN,
+                exploration_s: 2.5,
+                ..Playback::default()
+            },
+            stopped: false,
+        };
+        let bytes = encode(1, NO_LINE, &Record::Event(at, event)).unwrap();
+        let Record::Event(_, Event::PlaybackEnded { playback, .. }) =
+            decode(&bytes).unwrap().record
+        else {
+            panic!("another event");
+        };
+        assert!(playback.least_energy_j.is_nan());
+        assert_eq!(playback.exploration_s, 2.5);
+    }
+
+    #[test]
+    fn an_event_of_a_later_version_is_named_and_not_damage() {
+        let body = r#""v":1,"seq":4,"prev":"0000000000000000","wall":"2007-03-22T10:00:00+01:00","mono_ns":1,"event":"levitated","height_m":2}"#;
+        let sum = CRC.checksum(body.as_bytes());
+        let bytes = format!("{{\"crc\":\"{sum:08x}\",{body}").into_bytes();
+        assert_eq!(
+            decode(&bytes).unwrap().record,
+            Record::Unknown("levitated".to_owned())
+        );
+        let newer = body.replace("\"v\":1", "\"v\":2");
+        let sum = CRC.checksum(newer.as_bytes());
+        let bytes = format!("{{\"crc\":\"{sum:08x}\",{newer}").into_bytes();
+        assert_eq!(decode(&bytes), Err(BadLine::Newer(2)));
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_make_the_reader_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            let _ = decode(&bytes);
+            let mut line = PREFIX.to_vec();
+            line.extend_from_slice(&bytes);
+            let _ = decode(&line);
+        }
+
+        #[test]
+        fn any_text_reads_back_as_typed(text in any::<String>()) {
+            let record = remark(&text);
+            let bytes = encode(1, NO_LINE, &record).unwrap();
+            prop_assert_eq!(decode(&bytes).unwrap().record, record);
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! States that are set from outside a session, and the erasure of data.
+//!
+//! An erasure is committed by the tombstone: from then on the participant counts
+//! as erased, whatever is left of the files, and doing it again completes it.
+
+use super::disk::Disk;
+use super::error::{At as _, StoreError};
+use super::journal::{self, Journal};
+use super::line::{Claim, Record};
+use super::session_folder::Held;
+use super::sessions::SessionData;
+use super::{StudyFolder, atomic, layout};
+use crate::outcome::fold::has_rating;
+use crate::outcome::{Event, Moment, State};
+use crate::protocol::Seat;
+use chrono::{DateTime, FixedOffset};
+use serde::{Deserialize, Serialize};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use study_base::text::ParticipantId;
+
+/// The version of the tombstone's format.
+const FORMAT: &str = "study-tombstone/1";
+
+/// What is left of a participant whose data were erased: nothing that they gave.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tombstone {
+    format: String,
+    /// Whose.
+    pub participant: ParticipantId,
+    /// State that was set with it.
+    pub state: State,
+    /// Why.
+    pub reason: String,
+    /// When.
+    pub erased_at: DateTime<FixedOffset>,
+    /// The sessions that were erased.
+    pub sessions: Vec<ErasedSession>,
+}
+
+/// A session that was erased.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ErasedSession {
+    /// Which, from 1.
+    pub session: u32,
+    /// The seat that it had.
+    pub seat: Option<Seat>,
+    /// Records that its journal had.
+    pub lines: u64,
+    /// Hash of the last, as the next line would have had it in `prev`.
+    pub last_hash: String,
+}
+
+impl Tombstone {
+    /// The last session that was erased.
+    pub fn last_session(&self) -> u32 {
+        self.sessions.last().map_or(1, |s| s.session)
+    }
+
+    /// The seat of the last session that had one.
+    pub fn seat(&self) -> Option<Seat> {
+        self.sessions.iter().rev().find_map(|s| s.seat)
+    }
+
+    /// The one in a participant's folder, if there is one.
+    pub(super) fn read(disk: &dyn Disk, folder: &Path) -> Result<Option<Self>, StoreError> {
+        let path = folder.join(layout::TOMBSTONE);
+        let bytes = match disk.read(&path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+            read => read.at(&path)?,
+        };
+        let stone: Self = serde_json::from_slice(&bytes).map_err(|e| StoreError::Damaged {
+            path: path.clone(),
+            what: e.to_string(),
+        })?;
+        if stone.format != FORMAT {
+            return Err(StoreError::Newer {
+                path,
+                found: stone.format,
+            });
+        }
+        Ok(Some(stone))
+    }
+}
+
+/// A state that an operator sets.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StateRequest {
+    /// Whose.
+    pub participant: ParticipantId,
+    /// Which.
+    pub state: State,
+    /// Why.
+    pub reason: String,
+    /// Whether what the participant gave is erased.
+    pub erase: bool,
+}
+
+/// What setting a state came to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StateChange {
+    /// The state before; `None` for somebody who had never come.
+    pub before: Option<State>,
+    /// The row that goes to the next participant.
+    pub freed_row: Option<u32>,
+    /// Sessions whose data were erased.
+    pub erased: usize,
+    /// When the data had been erased before this, if they had.
+    pub erased_before: Option<DateTime<FixedOffset>>,
+    /// Whether `analysis/`, which held what they gave too, was removed.
+    pub analysis_removed: bool,
+    /// What the operator should know.
+    pub notices: Vec<String>,
+}
+
+impl StudyFolder {
+    /// Sets a participant's state, and erases what they gave if that is asked.
+    /// The derived tables are then to be written again.
+    ///
+    /// # Errors
+    /// [`StoreError`]: nobody of that id, a state that cannot follow, a session
+    /// that is open, or the disk's.
+    pub fn set_state(&self, request: &StateRequest, at: Moment) -> Result<StateChange, StoreError> {
+        let _lock = self.lock()?;
+        let id = &request.participant;
+        self.check_id(id)?;
+        let own = self.sessions_of(id)?;
+        if let Some(stone) = own.last().and_then(|s| s.tombstone.as_ref()) {
+            if !request.erase {
+                return Err(StoreError::Erased {
+                    participant: id.clone(),
+                });
+            }
+            // There is something left if it was killed after its commit.
+            return Ok(StateChange {
+                before: Some(stone.state),
+                freed_row: None,
+                erased: self.remove_sessions(id)?,
+                erased_before: Some(stone.erased_at),
+                analysis_removed: self.remove_analysis()?,
+                notices: Vec::new(),
+            });
+        }
+        let last = own.last();
+        self.check_change(request, last)?;
+        let before = last.map(|s| s.standing().state);
+        let freed_row = last.and_then(SessionData::held_row);
+        let mut notices = Vec::new();
+        let (mut erased, mut analysis_removed) = (0, false);
+        if request.erase {
+            erased = self.erase(request, &own, at)?;
+            analysis_removed = self.remove_analysis()?;
+        } else {
+            let number = last.map_or(1, |s| s.session);
+            self.append_state(request, last.is_none(), number, at, &mut notices)?;
+        }
+        Ok(StateChange {
+            before,
+            freed_row,
+            erased,
+            erased_before: None,
+            analysis_removed,
+            notices,
+        })
+    }
+
+    fn check_change(
+        &self,
+        request: &StateRequest,
+        last: Option<&SessionData>,
+    ) -> Result<(), StoreError> {
+        let refused = |why: &str| {
+            Err(StoreError::StateRefused {
+                participant: request.participant.clone(),
+                state: request.state,
+                why: why.to_owned(),
+            })
+        };
+        let Some(last) = last else {
+            if request.state == State::NoShow && !request.erase {
+                return Ok(());
+            }
+            return Err(StoreError::Unknown {
+                participant: request.participant.clone(),
+                near: self.near(&request.participant)?,
+            });
+        };
+        let started = crate::outcome::fold::start(&last.entries).is_some();
+        match request.state {
+            State::Unfinished | State::Done => refused("only a session itself says that"),
+            State::Void if has_rating(&last.entries) => {
+                refused("a trial has been rated; use dropped-out or excluded")
+            }
+            State::NoShow if started => refused("the session was started; use dropped-out or void"),
+            State::DroppedOut if last.standing().state == State::Done => {
+                refused("every trial is done; use excluded or withdrawn")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn near(&self, id: &ParticipantId) -> Result<Option<ParticipantId>, StoreError> {
+        let ids = self.participant_ids()?;
+        let near =
+            study_base::diagnostic::did_you_mean(id.as_str(), ids.iter().map(|i| i.as_str()));
+        Ok(near.and_then(|near| ids.iter().find(|i| i.as_str() == near).cloned()))
+    }
+
+    /// Appends the state to the journal of a session that nobody has open. Somebody
+    /// who never came gets a folder without a seat, so that it is on record.
+    fn append_state(
+        &self,
+        request: &StateRequest,
+        new: bool,
+        number: u32,
+        at: Moment,
+        notices: &mut Vec<String>,
+    ) -> Result<(), StoreError> {
+        let disk = self.disk.as_ref();
+        let folder = layout::session(&self.path, &request.participant, number);
+        if new {
+            self.make_session(&request.participant, &folder)?;
+        }
+        let held = self.hold(&request.participant, number)?;
+        if !self.has_journal(&folder)? {
+            let path = folder.join(layout::segment(1));
+            disk.create(&path).at(&path)?;
+            disk.sync_folder(&folder).at(&folder)?;
+        }
+        let (segments, replay, recovered) = journal::recover(disk, &folder)?;
+        notices.extend(recovered);
+        if let Some(found) = replay.newer() {
+            return Err(StoreError::Newer {
+                path: folder,
+                found,
+            });
+        }
+        let segment = segments
+            .last()
+            .and_then(|s| layout::segment_number(&s.name));
+        let mut journal = Journal::open(held, segment.unwrap_or(1), &replay)?;
+        if replay.records == 0 {
+            journal.record(&Record::Claim(Claim {
+                participant: request.participant.clone(),
+                session: number,
+                seat: None,
+                protocol_version: self.version(),
+            }))?;
+        }
+        let event = Event::StateSet {
+            state: request.state,
+            reason: request.reason.clone(),
+        };
+        journal.append(at, &event)?;
+        Ok(())
+    }
+
+    fn hold(&self, id: &ParticipantId, number: u32) -> Result<Arc<Held>, StoreError> {
+        let folder = layout::session(&self.path, id, number);
+        match self.disk.lock(&folder).at(&folder)? {
+            Some(lock) => Ok(Arc::new(Held::new(Arc::clone(&self.disk), folder, lock))),
+            None => Err(StoreError::Open {
+                participant: id.clone(),
+                session: number,
+                path: folder,
+            }),
+        }
+    }
+
+    fn erase(
+        &self,
+        request: &StateRequest,
+        own: &[SessionData],
+        at: Moment,
+    ) -> Result<usize, StoreError> {
+        let id = &request.participant;
+        let mut held = Vec::new();
+        let mut sessions = Vec::new();
+        for session in own {
+            held.push(self.hold(id, session.session)?);
+            let segments = journal::segments(self.disk.as_ref(), &session.path)?;
+            let replay = super::replay::replay(&segments);
+            sessions.push(ErasedSession {
+                session: session.session,
+                seat: session.seat,
+                lines: replay.records,
+                last_hash: replay.prev,
+            });
+        }
+        let stone = Tombstone {
+            format: FORMAT.to_owned(),
+            participant: id.clone(),
+            state: request.state,
+            reason: request.reason.clone(),
+            erased_at: at.wall,
+            sessions,
+        };
+        let folder = layout::participant(&self.path, id);
+        let path = folder.join(layout::TOMBSTONE);
+        let mut text =
+            serde_json::to_string_pretty(&stone).map_err(|e| StoreError::Unstorable {
+                path: path.clone(),
+                what: e.to_string(),
+            })?;
+        text.push('\n');
+        atomic::replace(self.disk.as_ref(), &path, text.as_bytes())?;
+        let erased = self.remove_sessions(id);
+        drop(held);
+        erased
+    }
+
+    /// Removes the sessions of a participant and says how many there were.
+    fn remove_sessions(&self, id: &ParticipantId) -> Result<usize, StoreError> {
+        let folder = layout::participant(&self.path, id);
+        let numbers = self.session_numbers(&folder)?;
+        for number in &numbers {
+            let session = layout::session(&self.path, id, *number);
+            remove_all(self.disk.as_ref(), &session)?;
+        }
+        self.disk.sync_folder(&folder).at(&folder)?;
+        Ok(numbers.len())
+    }
+
+    /// Removes what was derived from everybody's ratings, if it is there: single
+    /// ratings and comments are in it. Anything but a folder of that name is not
+    /// ours and stays.
+    fn remove_analysis(&self) -> Result<bool, StoreError> {
+        let items = self.disk.list(&self.path).at(&self.path)?;
+        let is_analysis = |i: &super::disk::Item| i.name == layout::ANALYSIS && i.is_folder;
+        if !items.iter().any(is_analysis) {
+            return Ok(false);
+        }
+        remove_all(self.disk.as_ref(), &self.path.join(layout::ANALYSIS))?;
+        self.disk.sync_folder(&self.path).at(&self.path)?;
+        Ok(true)
+    }
+}
+
+/// Removes a folder with everything in it; follows no links.
+fn remove_all(disk: &dyn Disk, folder: &Path) -> Result<(), StoreError> {
+    for item in disk.list(folder).at(folder)? {
+        let path = folder.join(&item.name);
+        if item.is_folder {
+            remove_all(disk, &path)?;
+        } else {
+            disk.remove_file(&path).at(&path)?;
+        }
+    }
+    disk.remove_folder(folder).at(folder)
+}

@@ -1,0 +1,309 @@
+//! Re-reading everything and comparing it.
+
+mod telemetry;
+
+use super::derive::{Derived, tables};
+use super::error::{At as _, StoreError, plain};
+use super::ledger::SeatKind;
+use super::line::sha256;
+use super::manifest::Manifest;
+use super::replay::DamageKind;
+use super::sessions::SessionData;
+use super::{StudyFolder, layout};
+use crate::outcome::{Event, State, fold};
+use crate::protocol::{Protocol, Seat};
+use std::collections::{BTreeMap, BTreeSet};
+use study_base::text::{ParticipantId, Untrusted};
+
+/// Something that a check of a results folder found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    /// Whether something is wrong; else it is only worth knowing.
+    pub wrong: bool,
+    /// Which file or folder, relative to the study's.
+    pub place: String,
+    /// What.
+    pub what: String,
+}
+
+impl Finding {
+    fn wrong(place: impl Into<String>, what: impl Into<String>) -> Self {
+        Self {
+            wrong: true,
+            place: place.into(),
+            what: what.into(),
+        }
+    }
+
+    fn note(place: impl Into<String>, what: impl Into<String>) -> Self {
+        Self {
+            wrong: false,
+            ..Self::wrong(place, what)
+        }
+    }
+}
+
+impl StudyFolder {
+    /// Re-reads every journal and compares it with itself, the frozen protocol with
+    /// its hashes, the telemetry with the number of its samples, and, given a
+    /// protocol, the tables with what the journals give.
+    ///
+    /// # Errors
+    /// [`StoreError`] if a folder or journal cannot be read at all.
+    pub fn verify(&self, protocol: Option<&Protocol>) -> Result<Vec<Finding>, StoreError> {
+        let sessions = self.sessions()?;
+        let mut found = self.verify_journals(&sessions)?;
+        for session in &sessions {
+            let place = place_of(session);
+            self.verify_telemetry(session, &place, &mut found)?;
+        }
+        if let Some(protocol) = protocol {
+            self.verify_tables(&sessions, protocol, &mut found)?;
+        }
+        Ok(found)
+    }
+
+    /// What is wrong with the frozen protocol and the journals: whatever is made of
+    /// them is to be read with that in mind.
+    ///
+    /// # Errors
+    /// As [`StudyFolder::verify`].
+    pub fn faults(&self, sessions: &[SessionData]) -> Result<Vec<Finding>, StoreError> {
+        let mut found = self.verify_journals(sessions)?;
+        found.retain(|f| f.wrong);
+        Ok(found)
+    }
+
+    fn verify_journals(&self, sessions: &[SessionData]) -> Result<Vec<Finding>, StoreError> {
+        let mut found = Vec::new();
+        self.verify_frozen(&mut found)?;
+        self.verify_names(sessions, &mut found)?;
+        for session in sessions {
+            self.verify_session(session, &mut found)?;
+        }
+        verify_rows(sessions, &mut found);
+        for gone in self.vanished(sessions) {
+            let what = format!("{} names {gone}, whose journal is not there", gone.table);
+            found.push(Finding::wrong(layout::SESSIONS, what));
+        }
+        Ok(found)
+    }
+
+    fn verify_frozen(&self, found: &mut Vec<Finding>) -> Result<(), StoreError> {
+        let manifest = Manifest::read(self.disk.as_ref(), &self.path)?;
+        for version in &manifest.versions {
+            let folder = layout::protocol(&self.path, version.version);
+            for (name, hash) in &version.files {
+                let place = format!("{}/{}/{name}", layout::PROTOCOLS, version.version);
+                match self.disk.read(&folder.join(name)) {
+                    Err(e) => found.push(Finding::wrong(place, plain(&e))),
+                    Ok(bytes) if sha256(&bytes) != *hash => found.push(Finding::wrong(
+                        place,
+                        "it is not the file that was frozen (SHA-256 in study.json)",
+                    )),
+                    Ok(_) => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What stands among the sessions that this program did not put there.
+    fn verify_names(
+        &self,
+        sessions: &[SessionData],
+        found: &mut Vec<Finding>,
+    ) -> Result<(), StoreError> {
+        let folder = self.path.join(layout::SESSIONS);
+        let Ok(items) = self.disk.list(&folder) else {
+            return Ok(());
+        };
+        let mut ids: Vec<ParticipantId> = Vec::new();
+        for item in items {
+            let place = format!("{}/{}", layout::SESSIONS, Untrusted(&item.name));
+            match ParticipantId::new(item.name) {
+                Ok(id) if item.is_folder => {
+                    if let Some(other) = ids.iter().find(|i| i.collides_with(&id)) {
+                        found.push(Finding::wrong(
+                            &place,
+                            format!("differs from {other} only in upper and lower case"),
+                        ));
+                    }
+                    let erased = |s: &SessionData| s.participant == id && s.tombstone.is_some();
+                    let erased = sessions.iter().any(erased);
+                    self.verify_participant(&id, erased, &place, found)?;
+                    ids.push(id);
+                }
+                _ => found.push(Finding::note(place, "no participant's folder; passed over")),
+            }
+        }
+        Ok(())
+    }
+
+    fn verify_participant(
+        &self,
+        id: &ParticipantId,
+        erased: bool,
+        place: &str,
+        found: &mut Vec<Finding>,
+    ) -> Result<(), StoreError> {
+        let folder = layout::participant(&self.path, id);
+        for item in self.disk.list(&folder).at(&folder)? {
+            let is_session = item.is_folder && layout::number(&item.name).is_some();
+            let place = format!("{place}/{}", Untrusted(&item.name));
+            if is_session && erased {
+                found.push(Finding::wrong(
+                    place,
+                    "the erasure was not completed; give the same command again",
+                ));
+            } else if !is_session && item.name != layout::TOMBSTONE {
+                found.push(Finding::note(place, "not written by study; passed over"));
+            }
+        }
+        Ok(())
+    }
+
+    fn verify_session(
+        &self,
+        session: &SessionData,
+        found: &mut Vec<Finding>,
+    ) -> Result<(), StoreError> {
+        let place = place_of(session);
+        if let Some(stone) = &session.tombstone {
+            let place = format!("{}/{}", layout::SESSIONS, session.participant);
+            if stone.participant != session.participant {
+                found.push(Finding::wrong(
+                    &place,
+                    "the tombstone is another participant's",
+                ));
+            }
+            let when = stone.erased_at.to_rfc3339();
+            found.push(Finding::note(place, format!("erased at {when}")));
+            return Ok(());
+        }
+        if !session.claimed && session.damage.iter().all(is_torn) {
+            found.push(Finding::note(place, "made, but never claimed to the end"));
+            return Ok(());
+        }
+        // A line that a dying process did not finish was never acknowledged.
+        let under_way = session.is_unfinished();
+        for damage in &session.damage {
+            let expected = is_torn(damage) && (under_way || damage.file != session.last_file);
+            found.push(Finding {
+                wrong: !expected,
+                place: place.clone(),
+                what: damage.to_string(),
+            });
+        }
+        if let Some(claim) = &session.claim
+            && (claim.participant != session.participant || claim.session != session.session)
+        {
+            let whose = format!(
+                "the journal is of {}, session {}",
+                claim.participant, claim.session
+            );
+            found.push(Finding::wrong(&place, whose));
+        }
+        self.verify_start(session, &place, found);
+        for item in self.disk.list(&session.path).at(&session.path)? {
+            let known = layout::segment_number(&item.name).is_some()
+                || [layout::TELEMETRY, layout::RESERVE].contains(&item.name.as_str());
+            let place = format!("{place}/{}", Untrusted(&item.name));
+            if layout::is_torn(&item.name) {
+                found.push(Finding::note(
+                    place,
+                    "bytes of a line that was never acknowledged",
+                ));
+            } else if !known {
+                found.push(Finding::note(place, "not written by study; passed over"));
+            }
+        }
+        Ok(())
+    }
+
+    fn verify_start(&self, session: &SessionData, place: &str, found: &mut Vec<Finding>) {
+        let Some(start) = fold::start(&session.entries) else {
+            let only_state = |e: &Event| matches!(e, Event::StateSet { .. });
+            if !session.entries.iter().all(|e| only_state(&e.event)) {
+                found.push(Finding::wrong(
+                    place,
+                    "the event that starts the session is missing",
+                ));
+            }
+            return;
+        };
+        if start.participant != session.participant
+            || start.session != session.session
+            || Some(start.seat) != session.seat
+        {
+            let what = "its first event tells of another participant, session or row";
+            found.push(Finding::wrong(place, what));
+        }
+        let version = start.protocol_version;
+        match self.manifest.versions.iter().find(|v| v.version == version) {
+            None => found.push(Finding::wrong(
+                place,
+                format!("version {version} of the protocol is not in study.json"),
+            )),
+            Some(v) if v.fingerprints != start.fingerprints => found.push(Finding::wrong(
+                place,
+                format!("its fingerprints are not those of version {version} of the protocol"),
+            )),
+            Some(_) => {}
+        }
+    }
+
+    fn verify_tables(
+        &self,
+        sessions: &[SessionData],
+        protocol: &Protocol,
+        found: &mut Vec<Finding>,
+    ) -> Result<(), StoreError> {
+        let derived = Derived::of(sessions, protocol);
+        for (name, bytes) in tables(&derived).at(&self.path)? {
+            match self.disk.read(&self.path.join(name)) {
+                Ok(old) if old == bytes => {}
+                Ok(_) => found.push(Finding::wrong(name, "it is not what the journals give")),
+                Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                    found.push(Finding::note(name, "not written yet"));
+                }
+                Err(e) => found.push(Finding::wrong(name, plain(&e))),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn place_of(session: &SessionData) -> String {
+    let (id, number) = (&session.participant, session.session);
+    format!("{}/{id}/{number}", layout::SESSIONS)
+}
+
+fn is_torn(damage: &super::Damage) -> bool {
+    matches!(damage.kind, DamageKind::Torn(_))
+}
+
+/// Two participants who both keep one row, or have one number.
+fn verify_rows(sessions: &[SessionData], found: &mut Vec<Finding>) {
+    let mut holders: BTreeMap<Seat, BTreeSet<&ParticipantId>> = BTreeMap::new();
+    for session in sessions {
+        let Some(seat) = session.seat else {
+            continue;
+        };
+        let keeps = session.standing().state.keeps_row();
+        let is_real = SeatKind::of(seat) == SeatKind::Real;
+        if keeps || (!is_real && session.standing().state != State::Void) {
+            holders
+                .entry(seat)
+                .or_default()
+                .insert(&session.participant);
+        }
+    }
+    for (seat, who) in holders.into_iter().filter(|(_, who)| who.len() > 1) {
+        let names: Vec<&str> = who.iter().map(|id| id.as_str()).collect();
+        found.push(Finding::wrong(
+            layout::SESSIONS,
+            format!("{} have the same {seat}", names.join(" and ")),
+        ));
+    }
+}

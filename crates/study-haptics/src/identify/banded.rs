@@ -1,0 +1,250 @@
+//! Symmetric systems whose matrix is zero far from the diagonal, with bounds.
+//!
+//! [`Banded::solve`] is Cholesky within the band, n·h² operations for n unknowns
+//! and half-width h. [`Banded::solve_bounded`] finds the minimum of ½xᵀAx − rᵀx with
+//! some x ≥ 0 by block principal pivoting (Portugal, Júdice & Vicente 1994, Math.
+//! Comp. 63:625): all unknowns that break a condition change sides at once, and one
+//! at a time where that does not help, which ends for every positive definite A.
+
+/// A symmetric matrix with `half` diagonals beside the main one.
+#[derive(Debug, Clone)]
+pub(super) struct Banded {
+    n: usize,
+    half: usize,
+    /// Row by row, the diagonal element last: (i, j) at i·(half + 1) + half − (i − j).
+    lower: Vec<f64>,
+}
+
+/// What an unknown may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Bound {
+    /// Anything.
+    Free,
+    /// 0 or more.
+    NotNegative,
+    /// 0.
+    Zero,
+}
+
+/// Changes of all unknowns at once without fewer faults, before one at a time.
+const PATIENCE: usize = 3;
+/// A pivot this small beside its diagonal element has no digit left.
+const NO_RANK: f64 = 1e-13;
+
+impl Banded {
+    pub(super) fn zero(n: usize, half: usize) -> Self {
+        Self {
+            n,
+            half,
+            lower: vec![0.0; n * (half + 1)],
+        }
+    }
+
+    fn at(&self, i: usize, j: usize) -> usize {
+        i * (self.half + 1) + self.half + j - i
+    }
+
+    /// Adds to (i, j) and its mirror; j ≤ i ≤ j + half.
+    pub(super) fn add(&mut self, i: usize, j: usize, value: f64) {
+        let at = self.at(i, j);
+        self.lower[at] += value;
+    }
+
+    /// A x.
+    pub(super) fn times(&self, x: &[f64]) -> Vec<f64> {
+        let mut product = vec![0.0; self.n];
+        for i in 0..self.n {
+            for j in i.saturating_sub(self.half)..=i {
+                let value = self.lower[self.at(i, j)];
+                product[i] += value * x[j];
+                if j < i {
+                    product[j] += value * x[i];
+                }
+            }
+        }
+        product
+    }
+
+    /// The minimum with the unknowns that are not `free` held at 0; `None` if A has
+    /// no rank on the others.
+    pub(super) fn solve(&self, right: &[f64], free: &[bool]) -> Option<Vec<f64>> {
+        let mut factor = self.lower.clone();
+        for i in 0..self.n {
+            let first = i.saturating_sub(self.half);
+            for j in first..=i {
+                let at = self.at(i, j);
+                if !(free[i] && free[j]) {
+                    factor[at] = if i == j { 1.0 } else { 0.0 };
+                    continue;
+                }
+                let start = first.max(j.saturating_sub(self.half));
+                let (row_i, row_j) = (self.at(i, start), self.at(j, start));
+                let done: f64 = factor[row_i..row_i + j - start]
+                    .iter()
+                    .zip(&factor[row_j..row_j + j - start])
+                    .map(|(a, b)| a * b)
+                    .sum();
+                let left = factor[at] - done;
+                factor[at] = if i == j {
+                    // false for a NaN
+                    let has_rank = left > NO_RANK * self.lower[at];
+                    if !has_rank {
+                        return None;
+                    }
+                    left.sqrt()
+                } else {
+                    left / factor[self.at(j, j)]
+                };
+            }
+        }
+        let mut x: Vec<f64> = right
+            .iter()
+            .zip(free)
+            .map(|(r, free)| if *free { *r } else { 0.0 })
+            .collect();
+        for i in 0..self.n {
+            for j in i.saturating_sub(self.half)..i {
+                x[i] -= factor[self.at(i, j)] * x[j];
+            }
+            x[i] /= factor[self.at(i, i)];
+        }
+        for i in (0..self.n).rev() {
+            x[i] /= factor[self.at(i, i)];
+            for j in i.saturating_sub(self.half)..i {
+                x[j] -= factor[self.at(i, j)] * x[i];
+            }
+        }
+        Some(x)
+    }
+
+    /// The minimum within the bounds; `None` if A has no rank.
+    pub(super) fn solve_bounded(&self, right: &[f64], bounds: &[Bound]) -> Option<Vec<f64>> {
+        let mut free: Vec<bool> = bounds.iter().map(|b| *b != Bound::Zero).collect();
+        let mut least = usize::MAX;
+        let mut patience = PATIENCE;
+        // far more than block pivoting takes; one at a time it may need all of them
+        for _ in 0..20 * self.n + 100 {
+            let x = self.solve(right, &free)?;
+            let faults = self.faults(right, bounds, &free, &x);
+            let Some(last) = faults.last() else {
+                return Some(x);
+            };
+            if faults.len() < least {
+                least = faults.len();
+                patience = PATIENCE;
+            } else if patience > 0 {
+                patience -= 1;
+            } else {
+                free[*last] = !free[*last];
+                continue;
+            }
+            for i in faults {
+                free[i] = !free[i];
+            }
+        }
+        None
+    }
+
+    /// Bounded unknowns below 0, and those at 0 that would rather rise.
+    fn faults(&self, right: &[f64], bounds: &[Bound], free: &[bool], x: &[f64]) -> Vec<usize> {
+        let product = self.times(x);
+        (0..self.n)
+            .filter(|i| {
+                if bounds[*i] != Bound::NotNegative {
+                    false
+                } else if free[*i] {
+                    x[*i] < 0.0
+                } else {
+                    // rounding may not send an unknown to and fro
+                    let rounding = 1e-10 * (product[*i].abs() + right[*i].abs());
+                    product[*i] - right[*i] < -rounding
+                }
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use study_base::rng::Stream;
+
+    /// A positive definite matrix of half-width 3 and a right side.
+    fn system(noise: &mut Stream, n: usize) -> (Banded, Vec<f64>) {
+        let half = 3;
+        let mut a = Banded::zero(n, half);
+        // Σ φφᵀ of windows, as a normal matrix is
+        for _ in 0..3 * n {
+            let first = noise.below(n as u64 - 1) as usize;
+            let end = (first + 1 + half).min(n);
+            let phi: Vec<f64> = (first..end).map(|_| noise.normal()).collect();
+            for (i, p) in phi.iter().enumerate() {
+                for (j, q) in phi[..=i].iter().enumerate() {
+                    a.add(first + i, first + j, p * q);
+                }
+            }
+        }
+        for i in 0..n {
+            a.add(i, i, 1e-3);
+        }
+        (a, (0..n).map(|_| noise.normal()).collect())
+    }
+
+    #[test]
+    fn a_solution_solves() {
+        let mut noise = Stream::new(1, &["banded"]);
+        for n in [2, 5, 40] {
+            let (a, right) = system(&mut noise, n);
+            let x = a.solve(&right, &vec![true; n]).unwrap();
+            for (p, r) in a.times(&x).iter().zip(&right) {
+                assert!((p - r).abs() < 1e-8, "{p} {r}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bounded_solution_meets_the_kkt_conditions() {
+        let mut noise = Stream::new(2, &["banded"]);
+        let mut at_bounds = 0;
+        for round in 0..300 {
+            let n = 2 + round % 40;
+            let (a, right) = system(&mut noise, n);
+            let bounds: Vec<Bound> = (0..n)
+                .map(|i| {
+                    [
+                        Bound::Free,
+                        Bound::NotNegative,
+                        Bound::NotNegative,
+                        Bound::Zero,
+                    ][i % 4]
+                })
+                .collect();
+            let x = a.solve_bounded(&right, &bounds).unwrap();
+            let slope: Vec<f64> = a.times(&x).iter().zip(&right).map(|(p, r)| p - r).collect();
+            for i in 0..n {
+                match bounds[i] {
+                    Bound::Zero => assert_eq!(x[i], 0.0),
+                    Bound::Free => assert!(slope[i].abs() < 1e-7, "{}", slope[i]),
+                    Bound::NotNegative => {
+                        assert!(x[i] >= 0.0, "{}", x[i]);
+                        assert!(slope[i] > -1e-7, "{}", slope[i]);
+                        assert!(x[i] == 0.0 || slope[i].abs() < 1e-7);
+                        at_bounds += usize::from(x[i] == 0.0);
+                    }
+                }
+            }
+        }
+        assert!(at_bounds > 500, "{at_bounds}");
+    }
+
+    #[test]
+    fn without_rank_there_is_no_solution() {
+        let mut a = Banded::zero(2, 1);
+        for (i, j) in [(0, 0), (1, 0), (1, 1)] {
+            a.add(i, j, 1.0);
+        }
+        assert_eq!(a.solve(&[1.0, 1.0], &[true, true]), None);
+        let nothing = Banded::zero(2, 1);
+        assert_eq!(nothing.solve_bounded(&[0.0; 2], &[Bound::Free; 2]), None);
+    }
+}

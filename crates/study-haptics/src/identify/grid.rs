@@ -1,0 +1,434 @@
+//! A realization for every method and dx, each compared with other recordings.
+//!
+//! What a grid of the paper's method repeats is done once: the samples are passed
+//! once for all λ (`lanes::recursion`) and all dx (`runs`), and no estimate is
+//! kept, only sums over runs of samples. A recording is walked once for all tables
+//! with the same nodes (`lanes::errors`). Memory is that of the recordings and
+//! the tables. The rest runs side by side in chunks that do not depend on the number
+//! of threads, so neither do the numbers.
+//!
+//! Sums depend on where the runs of all dx cut them: in the last digits a table made
+//! together with other dx can differ from the same table made alone (not with
+//! `point`, whose runs are the same).
+
+mod runs;
+
+use super::lanes::errors::errors;
+use super::lanes::recursion::{self, Run, Sums};
+use super::lanes::{LAMBDAS_A_PASS, Processor};
+use super::method::{Ewls, Sort, Start};
+use super::resample::{Resample, Resampled};
+use super::vaf::{self, Score};
+use super::{Identified, IdentifyError, Method, Training, Warning, ewls};
+use crate::model::Realization;
+use crate::recording::Recording;
+use rayon::prelude::*;
+use runs::{Nodes, Runs};
+use study_wire::certificate::Certificate;
+use study_wire::predict::{Direction, Lookup};
+
+/// What to identify: every method with every dx.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Methods with their options.
+    pub methods: Vec<Method>,
+    /// Resampling increments, mm, for those methods that have them.
+    pub dx_mm: Vec<f64>,
+}
+
+impl Plan {
+    /// The paper's method with each λ.
+    pub fn ewls(lambdas: &[f64], dx_mm: &[f64], resample: Resample) -> Self {
+        Self {
+            methods: lambdas
+                .iter()
+                .map(|lambda| Method::Ewls(Ewls::paper(*lambda, resample)))
+                .collect(),
+            dx_mm: dx_mm.to_vec(),
+        }
+    }
+
+    /// One method.
+    pub fn one(method: Method, dx_mm: &[f64]) -> Self {
+        Self {
+            methods: vec![method],
+            dx_mm: dx_mm.to_vec(),
+        }
+    }
+
+    /// How many realizations it makes.
+    pub fn cells(&self) -> usize {
+        let of = |method: &Method| {
+            if method.has_dx() { self.dx_mm.len() } else { 1 }
+        };
+        self.methods.iter().map(of).sum()
+    }
+}
+
+/// One realization and how well it predicts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// How it was identified.
+    pub method: Method,
+    /// With VAF by the names of the recordings; its id is empty.
+    pub realization: Realization,
+    /// In the order of the recordings.
+    pub scores: Vec<Score>,
+    /// Whether it can put energy into a hand.
+    pub certificate: Certificate,
+    /// What is doubtful.
+    pub warnings: Vec<Warning>,
+}
+
+/// Identifies every cell, method by method, and scores it on `recordings`. `done`
+/// is told after each cell.
+///
+/// # Errors
+/// [`IdentifyError`] of the first cell that cannot be identified.
+pub fn run(
+    training: &Training<'_>,
+    plan: &Plan,
+    lookup: Lookup,
+    recordings: &[&Recording],
+    done: impl Fn() + Sync,
+) -> Result<Vec<Cell>, IdentifyError> {
+    run_on(Processor::best(), training, plan, lookup, recordings, done)
+}
+
+/// [`run`] on the loops of one kind of processor.
+///
+/// # Errors
+/// As [`run`].
+///
+/// # Panics
+/// If this machine does not have that processor.
+pub fn run_on(
+    processor: Processor,
+    training: &Training<'_>,
+    plan: &Plan,
+    lookup: Lookup,
+    recordings: &[&Recording],
+    done: impl Fn() + Sync,
+) -> Result<Vec<Cell>, IdentifyError> {
+    // faults of the arguments before the work begins
+    for method in &plan.methods {
+        method.check()?;
+    }
+    let mut tables = Vec::new();
+    if plan.methods.iter().any(|m| m.has_dx()) {
+        for dx_mm in &plan.dx_mm {
+            tables.push(Nodes {
+                dx_mm: *dx_mm,
+                x_mm: training.nodes(*dx_mm)?,
+            });
+        }
+    }
+    let identified = identify(processor, training, &plan.methods, &tables, lookup)?;
+    let methods: Vec<Method> = plan
+        .methods
+        .iter()
+        .zip(&identified)
+        .flat_map(|(method, made)| vec![*method; made.len()])
+        .collect();
+    let identified: Vec<Identified> = identified.into_iter().flatten().collect();
+    let realizations: Vec<&Realization> = identified.iter().map(|i| &i.realization).collect();
+    let scores = score(processor, &realizations, recordings, done);
+    Ok(methods
+        .into_iter()
+        .zip(identified)
+        .zip(scores)
+        .map(|((method, identified), scores)| cell(method, identified, scores, recordings))
+        .collect())
+}
+
+/// The tables of each method, in the order of dx.
+fn identify(
+    processor: Processor,
+    training: &Training<'_>,
+    methods: &[Method],
+    tables: &[Nodes],
+    lookup: Lookup,
+) -> Result<Vec<Vec<Identified>>, IdentifyError> {
+    let mut made: Vec<Option<Result<Vec<Identified>, IdentifyError>>> = vec![None; methods.len()];
+    for (options, members) in families(methods) {
+        let lambdas: Vec<f64> = members
+            .iter()
+            .filter_map(|i| methods[*i].lambda())
+            .collect();
+        let found = ewls_tables(processor, training, options, &lambdas, tables, lookup);
+        for (i, tables) in members.into_iter().zip(found) {
+            made[i] = Some(tables);
+        }
+    }
+    made.into_par_iter()
+        .zip(methods)
+        .map(|(made, method)| made.unwrap_or_else(|| each(training, *method, tables, lookup)))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
+}
+
+/// One method by itself.
+fn each(
+    training: &Training<'_>,
+    method: Method,
+    tables: &[Nodes],
+    lookup: Lookup,
+) -> Result<Vec<Identified>, IdentifyError> {
+    if let Method::Ewls(options) = method {
+        let estimates = training.estimates_of(options)?;
+        return tables
+            .iter()
+            .map(|nodes| training.ewls(&estimates, nodes.dx_mm, options.resample, lookup))
+            .collect();
+    }
+    if !method.has_dx() {
+        let any = 1.0;
+        return Ok(vec![training.identify(method, any, lookup)?]);
+    }
+    tables
+        .par_iter()
+        .map(|nodes| training.identify(method, nodes.dx_mm, lookup))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
+}
+
+/// The EWLS methods that differ in λ only, by their indices.
+fn families(methods: &[Method]) -> Vec<(Ewls, Vec<usize>)> {
+    let mut families: Vec<(Ewls, Vec<usize>)> = Vec::new();
+    for (i, method) in methods.iter().enumerate() {
+        let Method::Ewls(options) = method else {
+            continue;
+        };
+        if !options.bounded && options.lambda < recursion::LEAST_LAMBDA {
+            continue;
+        }
+        let same = |family: &Ewls| {
+            Ewls {
+                lambda: options.lambda,
+                ..*family
+            } == *options
+        };
+        match families.iter_mut().find(|(family, _)| same(family)) {
+            Some((_, members)) => members.push(i),
+            None => families.push((*options, vec![i])),
+        }
+    }
+    families
+}
+
+/// The tables of each λ, all from one pass over the samples for every dozen of λ.
+fn ewls_tables(
+    processor: Processor,
+    training: &Training<'_>,
+    options: Ewls,
+    lambdas: &[f64],
+    tables: &[Nodes],
+    lookup: Lookup,
+) -> Vec<Result<Vec<Identified>, IdentifyError>> {
+    let runs = training
+        .directions()
+        .map(|samples| Runs::new(options.resample, &samples.x_mm, tables));
+    let together = if options.bounded { 1 } else { LAMBDAS_A_PASS };
+    let passes: Vec<(usize, &[f64])> = [0, 1]
+        .into_iter()
+        .flat_map(|direction| lambdas.chunks(together).map(move |l| (direction, l)))
+        .collect();
+    let sums: Vec<Option<Vec<Sums>>> = passes
+        .into_par_iter()
+        .flat_map_iter(|(direction, lambdas)| {
+            let samples = training.directions()[direction];
+            pass(
+                processor,
+                options,
+                samples,
+                direction == 1,
+                lambdas,
+                &runs[direction],
+            )
+        })
+        .collect();
+    let (plus, minus) = sums.split_at(lambdas.len());
+    lambdas
+        .par_iter()
+        .zip(plus)
+        .zip(minus)
+        .map(|((lambda, plus), minus)| {
+            let options = Ewls {
+                lambda: *lambda,
+                ..options
+            };
+            let (Some(plus), Some(minus)) = (plus, minus) else {
+                return Err(IdentifyError::Diverged { lambda: *lambda });
+            };
+            let table = |(i, nodes): (usize, &Nodes)| {
+                let found: Option<[Resampled; 2]> = runs[0]
+                    .table(i, nodes, plus)
+                    .zip(runs[1].table(i, nodes, minus))
+                    .map(Into::into);
+                match found {
+                    Some([mut positive, mut negative]) => {
+                        if options.bounded {
+                            // what is left of taking moments off may be -1e-18
+                            let thetas = positive.theta.iter_mut().chain(&mut negative.theta);
+                            for p in thetas.flat_map(|theta| &mut theta[..2]) {
+                                *p = p.max(0.0);
+                            }
+                        }
+                        Ok(training.ewls_table(
+                            options,
+                            nodes.dx_mm,
+                            nodes.x_mm.clone(),
+                            positive,
+                            negative,
+                            lookup,
+                        ))
+                    }
+                    // no node has a sample of its own: see `resample`
+                    None => training.identify(Method::Ewls(options), nodes.dx_mm, lookup),
+                }
+            };
+            tables.iter().enumerate().map(table).collect()
+        })
+        .collect()
+}
+
+/// The sums of one direction for a dozen of λ, in ascending order of x whatever the
+/// order of the recursion.
+fn pass(
+    processor: Processor,
+    options: Ewls,
+    samples: &ewls::Sorted,
+    backward: bool,
+    lambdas: &[f64],
+    runs: &Runs,
+) -> Vec<Option<Vec<Sums>>> {
+    let warm = |lambda: f64| match options.start {
+        Start::Cold => 0,
+        Start::Warm => ewls::warm_samples(lambda),
+    };
+    let moments = runs.moments;
+    let of = |samples: &ewls::Sorted, runs: &[Run]| -> Vec<Option<Vec<Sums>>> {
+        if options.bounded {
+            let alone = |l: &f64| ewls::bounded_sums(samples, *l, warm(*l), runs, moments);
+            lambdas.iter().map(alone).collect()
+        } else {
+            recursion::sums(processor, samples, lambdas, warm, runs, moments)
+        }
+    };
+    if !(backward && options.sort == Sort::Travel) {
+        return of(samples, &runs.runs);
+    }
+    let n = samples.len();
+    let turn = |run: &Run| Run {
+        from: n - run.to,
+        to: n - run.from,
+        ..*run
+    };
+    let turned: Vec<Run> = runs.runs.iter().rev().map(turn).collect();
+    let mut sums = of(&samples.descending(), &turned);
+    for sums in sums.iter_mut().flatten() {
+        sums.reverse();
+    }
+    sums
+}
+
+/// The scores of every realization on every recording.
+fn score(
+    processor: Processor,
+    realizations: &[&Realization],
+    recordings: &[&Recording],
+    done: impl Fn() + Sync,
+) -> Vec<Vec<Score>> {
+    let variances: Vec<f64> = recordings.iter().map(|r| vaf::variance(&r.f_n)).collect();
+    // those with the same nodes are walked through together
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (i, r) in realizations.iter().enumerate() {
+        let alike = |group: &Vec<usize>| {
+            let first = realizations[group[0]];
+            group.len() < LAMBDAS_A_PASS
+                && r.direction == Direction::Sign
+                && first.direction == Direction::Sign
+                && first.x_mm == r.x_mm
+        };
+        match groups.iter_mut().find(|group| alike(group)) {
+            Some(group) => group.push(i),
+            None => groups.push(vec![i]),
+        }
+    }
+    let scored: Vec<Vec<Vec<Score>>> = groups
+        .par_iter()
+        .map(|group| {
+            let alike: Vec<&Realization> = group.iter().map(|i| realizations[*i]).collect();
+            let mut scores = vec![Vec::new(); group.len()];
+            for (recording, variance) in recordings.iter().zip(&variances) {
+                if alike[0].direction == Direction::Sign {
+                    let errors = errors(processor, &alike, recording);
+                    for (scores, errors) in scores.iter_mut().zip(errors) {
+                        scores.push(Score {
+                            vaf: 1.0 - errors.variance_n2 / variance,
+                            bias_n: errors.mean_n,
+                            residual_n: errors.variance_n2.sqrt(),
+                        });
+                    }
+                } else {
+                    scores[0].push(vaf::score(alike[0], recording));
+                }
+            }
+            for _ in group {
+                done();
+            }
+            scores
+        })
+        .collect();
+    let mut by_realization = vec![Vec::new(); realizations.len()];
+    for (group, scores) in groups.into_iter().zip(scored) {
+        for (i, scores) in group.into_iter().zip(scores) {
+            by_realization[i] = scores;
+        }
+    }
+    by_realization
+}
+
+fn cell(
+    method: Method,
+    identified: Identified,
+    scores: Vec<Score>,
+    recordings: &[&Recording],
+) -> Cell {
+    let Identified {
+        mut realization,
+        warnings,
+    } = identified;
+    for (recording, score) in recordings.iter().zip(&scores) {
+        let name = recording.name.clone();
+        let hash = recording.sha256.clone();
+        realization.provenance.recordings.insert(name.clone(), hash);
+        realization.vaf.insert(name, score.vaf);
+    }
+    Cell {
+        method,
+        certificate: realization.certificate(),
+        realization,
+        scores,
+        warnings,
+    }
+}
+
+/// The cell with the highest mean VAF over the first `validations` recordings;
+/// of equals the first.
+pub fn best(cells: &[Cell], validations: usize) -> Option<usize> {
+    let mean = |cell: &Cell| {
+        let scores = &cell.scores[..validations.min(cell.scores.len())];
+        scores.iter().map(|s| s.vaf).sum::<f64>() / scores.len() as f64
+    };
+    let mut best: Option<(usize, f64)> = None;
+    for (i, cell) in cells.iter().enumerate() {
+        let vaf = mean(cell);
+        if vaf.is_finite() && best.is_none_or(|(_, highest)| vaf > highest) {
+            best = Some((i, vaf));
+        }
+    }
+    best.map(|(i, _)| i)
+}

@@ -1,0 +1,170 @@
+//! The hat table: all nodes of both directions at once, by penalised least squares.
+//!
+//! F = Σ_j h_j(x) (m_j a + b_j v + F_j) for each direction, joined with (1 ± z)/2,
+//! is exactly what [`study_wire::predict`] computes from the table: h_j is the
+//! look-up, z the direction state, k = 0 and F0 = F_j. So the table is the least
+//! squares solution for the force that will be predicted, not for a force at one
+//! place. The fit is linear in the table; only δ of the direction state is not, and
+//! is tried.
+//!
+//! What is minimised is the mean square error plus, over the mean information of a
+//! node, ridges on second differences of F_j (curvature) and on first differences
+//! of m_j and 60·b_j (b in N·s/mm is that much smaller than m in kg). The ridges
+//! carry the table over places that were not visited; m, b ≥ 0 is a bound on each
+//! node, held exactly.
+
+use super::banded::{Banded, Bound};
+use super::ewls::Theta;
+use crate::recording::Recording;
+use study_wire::predict::{Direction, DirectionState, Lookup, Motion};
+
+/// Unknowns of a node: m, b·B_SCALE, F in + and in −.
+const PER_NODE: usize = 6;
+/// Unknowns beside the diagonal: second differences of F reach two nodes.
+const HALF: usize = 2 * PER_NODE;
+/// b in N·s/mm times this is of the size of m in kg.
+const B_SCALE: f64 = 60.0;
+/// Share of a node's information that keeps m and b at 0 where nothing tells them.
+const FLOOR: f64 = 1e-12;
+
+/// Weights of the penalties and what m and b may be.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Penalty {
+    pub(super) ridge_force: f64,
+    pub(super) ridge_dynamics: f64,
+    pub(super) dynamics: Bound,
+}
+
+/// θ at the nodes, and how much each rests on.
+#[derive(Debug, Clone)]
+pub(super) struct Table {
+    pub(super) positive: Vec<Theta>,
+    pub(super) negative: Vec<Theta>,
+    /// Σ h_j (1 ± z)/2 of each node, + and −.
+    pub(super) weight: Vec<[f64; 2]>,
+}
+
+/// The best table; `None` if the recording and the ridges leave it undetermined.
+pub(super) fn table(
+    recording: &Recording,
+    nodes: &[f64],
+    lookup: Lookup,
+    rule: Direction,
+    penalty: Penalty,
+) -> Option<Table> {
+    let n = nodes.len() * PER_NODE;
+    let mut normal = Banded::zero(n, HALF);
+    let mut right = vec![0.0; n];
+    let mut weight = vec![[0.0; 2]; nodes.len()];
+    let mut state = DirectionState::default();
+    for i in 0..recording.len() {
+        let motion = Motion {
+            x_mm: recording.x_mm[i],
+            v_mm_s: recording.v_mm_s[i],
+            a_m_s2: recording.a_m_s2[i],
+        };
+        let z = state.step(rule, motion);
+        let sides = [0.5 * (1.0 + z), 0.5 * (1.0 - z)];
+        let features = [motion.a_m_s2, motion.v_mm_s / B_SCALE, 1.0];
+        let (left, share) = locate(nodes, lookup, motion.x_mm);
+        let mut entries = [(0, 0.0); 2 * PER_NODE];
+        let mut used = 0;
+        for (node, hat) in [(left, 1.0 - share), (left + 1, share)] {
+            if hat == 0.0 {
+                continue;
+            }
+            for (side, part) in sides.into_iter().enumerate() {
+                if part == 0.0 {
+                    continue;
+                }
+                weight[node][side] += hat * part;
+                for (p, feature) in features.into_iter().enumerate() {
+                    entries[used] = (node * PER_NODE + side * 3 + p, hat * part * feature);
+                    used += 1;
+                }
+            }
+        }
+        let entries = &entries[..used];
+        for (k, (row, one)) in entries.iter().enumerate() {
+            right[*row] += one * recording.f_n[i];
+            for (column, other) in &entries[..=k] {
+                normal.add(*row, *column, one * other);
+            }
+        }
+    }
+    let information = recording.len() as f64 / nodes.len() as f64;
+    add_ridges(&mut normal, nodes.len(), information, penalty);
+    let bounds: Vec<Bound> = (0..n)
+        .map(|i| {
+            if i % 3 == 2 {
+                Bound::Free
+            } else {
+                penalty.dynamics
+            }
+        })
+        .collect();
+    let x = normal.solve_bounded(&right, &bounds)?;
+    if !x.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let side = |side: usize| {
+        let of = |node: &[f64]| {
+            let p = &node[side * 3..];
+            [p[0], p[1] / B_SCALE, 0.0, p[2]]
+        };
+        x.chunks_exact(PER_NODE).map(of).collect()
+    };
+    Some(Table {
+        positive: side(0),
+        negative: side(1),
+        weight,
+    })
+}
+
+fn add_ridges(normal: &mut Banded, nodes: usize, information: f64, penalty: Penalty) {
+    let mut add = |at: &[(usize, f64)], weight: f64| {
+        for (k, (row, one)) in at.iter().enumerate() {
+            for (column, other) in &at[..=k] {
+                normal.add(*row, *column, weight * one * other);
+            }
+        }
+    };
+    let unknown = |node: usize, side: usize, p: usize| node * PER_NODE + side * 3 + p;
+    let on_force = information * penalty.ridge_force;
+    let on_dynamics = information * penalty.ridge_dynamics;
+    for side in 0..2 {
+        for j in 0..nodes {
+            for p in 0..2 {
+                let here = unknown(j, side, p);
+                add(&[(here, 1.0)], information * FLOOR);
+                if j > 0 {
+                    add(&[(unknown(j - 1, side, p), -1.0), (here, 1.0)], on_dynamics);
+                }
+            }
+            if j > 1 {
+                let second = [
+                    (unknown(j - 2, side, 2), 1.0),
+                    (unknown(j - 1, side, 2), -2.0),
+                    (unknown(j, side, 2), 1.0),
+                ];
+                add(&second, on_force);
+            }
+        }
+    }
+}
+
+/// The node that a look-up begins with and the share of the next one; the ends
+/// are held, as in prediction.
+fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
+    let right = nodes.partition_point(|node| *node <= x_mm);
+    if right == 0 || right == nodes.len() {
+        return (right.saturating_sub(1), 0.0);
+    }
+    let left = right - 1;
+    let share = (x_mm - nodes[left]) / (nodes[right] - nodes[left]);
+    match lookup {
+        Lookup::Linear => (left, share),
+        Lookup::Floor => (left, 0.0),
+        Lookup::Nearest => (left + usize::from(share > 0.5), 0.0),
+    }
+}

@@ -1,0 +1,228 @@
+//! Reading and writing of plant files: the parameters of a target.
+//!
+//! TOML with `format = "study-plant/1"`. `like = "a"` (or `"b"`) starts from a
+//! built-in target, and only what differs has to be said; without `like` every key
+//! is required. Strict, every fault with its line; what is no target is refused by
+//! [`Parameters::check`].
+
+use super::parameters::{Parameters, Well};
+use std::fmt::Write as _;
+use study_base::diagnostic::table::{Document, Table, Value};
+use study_base::diagnostic::{Fault, Findings};
+use study_base::text::Untrusted;
+
+/// The first line of a plant file.
+pub const FORMAT: &str = "study-plant/1";
+/// Most valleys, and most crests.
+const MOST_WELLS: usize = 100;
+
+/// Every number of a target under its key.
+fn numbers(p: &mut Parameters) -> [(&'static str, &mut f64); 21] {
+    [
+        ("slope", &mut p.slope),
+        ("preload_n", &mut p.preload_n),
+        ("preload_at_mm", &mut p.preload_at_mm),
+        ("spring_n_per_mm", &mut p.spring_n_per_mm),
+        ("ripple_n", &mut p.ripple_n),
+        ("ripple_mm", &mut p.ripple_mm),
+        ("friction", &mut p.friction),
+        ("stribeck", &mut p.stribeck),
+        ("stribeck_mm_s", &mut p.stribeck_mm_s),
+        ("presliding_mm", &mut p.presliding_mm),
+        ("bristle_n_s_per_m", &mut p.bristle_n_s_per_m),
+        ("follower_n_s_per_m", &mut p.follower_n_s_per_m),
+        ("pivot_n", &mut p.pivot_n),
+        ("pivot_n_s_per_m", &mut p.pivot_n_s_per_m),
+        ("handle_kg", &mut p.handle_kg),
+        ("follower_kg", &mut p.follower_kg),
+        ("backlash_mm", &mut p.backlash_mm),
+        ("contact_n_per_mm", &mut p.contact_n_per_mm),
+        ("contact_n_s_per_m", &mut p.contact_n_s_per_m),
+        ("stop_n_per_mm", &mut p.stop_n_per_mm),
+        ("stop_n_s_per_m", &mut p.stop_n_s_per_m),
+    ]
+}
+
+/// Reads a plant file; `path` is for the messages. The parameters are there if and
+/// only if the findings have no error.
+pub fn parse(path: &str, text: &str) -> (Option<Parameters>, Findings) {
+    let document = Document::parse(text);
+    let parameters = read(&document);
+    let mut findings = Findings::new(path, text);
+    findings.faults = document.finish().faults;
+    findings.sort();
+    if !findings.has_errors()
+        && let Some(Err(bad)) = parameters.as_ref().map(Parameters::check)
+    {
+        findings.faults.push(Fault::error(bad.to_string()));
+    }
+    let good = !findings.has_errors();
+    (parameters.filter(|_| good), findings)
+}
+
+fn read(document: &Document<'_>) -> Option<Parameters> {
+    let mut root = document.root();
+    if let Some(format) = root.required("format")
+        && let Some(given) = format.text()
+        && given != FORMAT
+    {
+        format.fault(
+            Fault::error(format!("this is not a {FORMAT} file"))
+                .hint(format!("a plant file begins with format = \"{FORMAT}\"")),
+        );
+        return None;
+    }
+    let like = root.value("like").map(|value| {
+        let named = value.text().map(|name| (Parameters::named(&name), name));
+        if let Some((None, name)) = &named {
+            value.fault(
+                Fault::error(format!("there is no built-in target `{}`", Untrusted(name)))
+                    .hint("they are `a` and `b`"),
+            );
+        }
+        named.and_then(|(parameters, _)| parameters)
+    });
+    let whole = like.is_none();
+    let mut parameters = like.flatten().unwrap_or_else(Parameters::a);
+    for (key, place) in numbers(&mut parameters) {
+        if let Some(number) = need(&mut root, key, whole).and_then(|value| value.f64()) {
+            *place = number;
+        }
+    }
+    if let Some(stops) = need(&mut root, "stops_mm", whole).and_then(|v| pair(&v)) {
+        parameters.stops_mm = stops;
+    }
+    if let Some(valleys) = need(&mut root, "valleys", whole).and_then(wells) {
+        parameters.valleys = valleys;
+    }
+    if let Some(crests) = need(&mut root, "crests", whole).and_then(wells) {
+        parameters.crests = crests;
+    }
+    root.finish();
+    Some(parameters)
+}
+
+/// The value of a key, whose absence is a fault where the file has to be whole.
+fn need<'d, 't>(root: &mut Table<'d, 't>, key: &str, whole: bool) -> Option<Value<'d, 't>> {
+    if whole {
+        root.required(key)
+    } else {
+        root.value(key)
+    }
+}
+
+fn pair(value: &Value<'_, '_>) -> Option<[f64; 2]> {
+    let numbers: Vec<f64> = value.array()?.iter().filter_map(Value::f64).collect();
+    let pair = <[f64; 2]>::try_from(numbers).ok();
+    if pair.is_none() {
+        value.fault(Fault::error(format!(
+            "`{}` has to be two numbers",
+            value.path()
+        )));
+    }
+    pair
+}
+
+/// `[{ at_mm = 5, width_mm = 1.5 }, …]`
+fn wells(value: Value<'_, '_>) -> Option<Vec<Well>> {
+    let all = value.array()?;
+    if all.len() > MOST_WELLS {
+        value.fault(Fault::error(format!(
+            "`{}` has {} entries: at most {MOST_WELLS}",
+            value.path(),
+            all.len()
+        )));
+        return None;
+    }
+    all.into_iter()
+        .map(|value| {
+            let mut table = value.table()?;
+            let at_mm = table.required("at_mm").and_then(|v| v.f64());
+            let width_mm = table.required("width_mm").and_then(|v| v.f64());
+            table.finish();
+            Some(Well {
+                at_mm: at_mm?,
+                width_mm: width_mm?,
+            })
+        })
+        .collect()
+}
+
+/// The file of a target, every parameter said.
+pub fn write(parameters: &Parameters) -> String {
+    let mut p = parameters.clone();
+    let mut out = format!("format = \"{FORMAT}\"\n");
+    for (key, wells) in [("valleys", &p.valleys), ("crests", &p.crests)] {
+        let wells: Vec<String> = wells
+            .iter()
+            .map(|w| format!("{{ at_mm = {:?}, width_mm = {:?} }}", w.at_mm, w.width_mm))
+            .collect();
+        // writing to a String cannot fail
+        let _ = writeln!(out, "{key} = [{}]", wells.join(", "));
+    }
+    let _ = writeln!(out, "stops_mm = {:?}", p.stops_mm);
+    for (key, number) in numbers(&mut p) {
+        let _ = writeln!(out, "{key} = {number:?}");
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn messages(text: &str) -> Vec<String> {
+        let (parameters, findings) = parse("p.toml", text);
+        assert_eq!(parameters.is_none(), findings.has_errors());
+        findings.faults.iter().map(|f| f.message.clone()).collect()
+    }
+
+    #[test]
+    fn what_was_written_is_read_back() {
+        for plant in [Parameters::a(), Parameters::b()] {
+            let (read, findings) = parse("p.toml", &write(&plant));
+            assert!(findings.faults.is_empty(), "{findings:?}");
+            assert_eq!(read, Some(plant));
+        }
+    }
+
+    #[test]
+    fn only_what_differs_has_to_be_said() {
+        let text = "format = \"study-plant/1\"\nlike = \"a\"\nslope = 0.4\ncrests = [{ at_mm = 12, width_mm = 0.5 }]\n";
+        let plant = parse("p.toml", text).0.unwrap();
+        let expected = Parameters {
+            slope: 0.4,
+            crests: vec![Well {
+                at_mm: 12.0,
+                width_mm: 0.5,
+            }],
+            ..Parameters::a()
+        };
+        assert_eq!(plant, expected);
+    }
+
+    #[test]
+    fn faults_are_told_all_at_once() {
+        let text = "format = \"study-plant/1\"\nlike = \"c\"\nslop = 1\nfriction = \"x\"\nvalleys = [{ at_mm = 1 }]\nstops_mm = [1]\n";
+        assert_eq!(
+            messages(text),
+            [
+                "there is no built-in target `c`",
+                "unknown key `slop` at the top level",
+                "`friction` has to be a number, not text",
+                "[valleys[0]] has no `width_mm`",
+                "`stops_mm` has to be two numbers",
+            ]
+        );
+        let physics = "format = \"study-plant/1\"\nlike = \"a\"\nfollower_kg = nan\n";
+        assert_eq!(
+            messages(physics),
+            ["a target's follower mass has to be finite and above zero"]
+        );
+        assert!(messages("format = \"study-plant/1\"\n").len() >= 24);
+        assert_eq!(
+            messages("format = \"study-model/1\"\nx = 1\n"),
+            ["this is not a study-plant/1 file"]
+        );
+    }
+}

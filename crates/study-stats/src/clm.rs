@@ -1,0 +1,129 @@
+//! Proportional odds: the cumulative-link model with the logit link.
+//!
+//! logit P(Y ≤ j) = θⱼ − xβ for the categories j = 1 … J − 1, with rising θ
+//! (McCullagh 1980; Agresti, *Analysis of Ordinal Categorical Data*, 2nd ed.,
+//! 2010, ch. 3). Not the mixed model: that is [`super::clmm`].
+//!
+//! With F the logistic function, aⱼ = θⱼ − xβ and s(a) = ln(1 + eᵃ),
+//!
+//! ```text
+//! F(A) − F(B) = (e^A − e^B) / ((1 + e^A)(1 + e^B))
+//! ln P(Y = j) = [j < J] (aⱼ − s(aⱼ)) − [j > 1] s(aⱼ₋₁) + [1 < j < J] κ(θⱼ − θⱼ₋₁)
+//! κ(δ) = ln(1 − e^−δ)
+//! ```
+//!
+//! so nothing is lost where two thresholds are close or far out, and the
+//! likelihood of a table of counts n is Σ nₖaₖ − mₖs(aₖ) + Σ Nⱼκⱼ over the pairs
+//! k of a predictor and a threshold, m = nⱼ + nⱼ₊₁: logistic regressions side by
+//! side, and a term that keeps the thresholds apart. It is concave, and its
+//! derivatives are sums over k. The whole table is [`counts::Table`].
+
+pub mod counts;
+pub mod newton;
+#[cfg(test)]
+pub(crate) mod tests;
+
+use counts::Table;
+use newton::{Point, Square, maximise};
+
+/// Why a model has no estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Cause {
+    /// All ratings fall in one category.
+    #[error("all ratings are equal")]
+    OneCategory,
+    /// Nothing varies beside the ratings.
+    #[error("there are no two different predictors")]
+    OnePredictor,
+    /// A mixed model needs two subjects.
+    #[error("one subject has no variance between subjects")]
+    OneSubject,
+    /// The likelihood rises for ever: an estimate is infinite.
+    #[error(
+        "complete separation: the ratings of some realizations do not overlap with others, so an estimate is infinite"
+    )]
+    Separated,
+    /// The standard deviation of the subjects rises for ever.
+    #[error("the subjects' ratings do not overlap: their standard deviation is infinite")]
+    SubjectsSeparated,
+    /// The search ended without a maximum, or at one without a curvature.
+    #[error("the likelihood has no maximum that could be found")]
+    NoMaximum,
+}
+
+/// Estimates of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// θ, rising.
+    pub thresholds: Vec<f64>,
+    /// β, by column.
+    pub beta: Vec<f64>,
+    /// Standard errors of β, from the observed information.
+    pub se: Vec<f64>,
+    /// Log-likelihood at the maximum.
+    pub loglik: f64,
+}
+
+/// Maximum likelihood by Newton's method, subjects ignored.
+pub fn clm(table: &Table) -> Result<Fit, Cause> {
+    table.estimable()?;
+    let found = maximise(start(table), |at| point(table, at)).ok_or(Cause::NoMaximum)?;
+    fit_of(table, &found.at, found.value, &found.information)
+}
+
+/// The estimates at a maximum; parameters after β are not reported.
+pub(super) fn fit_of(
+    table: &Table,
+    at: &[f64],
+    loglik: f64,
+    information: &Square,
+) -> Result<Fit, Cause> {
+    let t = table.thresholds();
+    let end = table.parameters();
+    let variances = information.inverse_diagonal().ok_or(Cause::NoMaximum)?;
+    let se: Vec<f64> = variances[t..end].iter().map(|v| v.sqrt()).collect();
+    if se.iter().chain(at).all(|v| v.is_finite()) {
+        Ok(Fit {
+            thresholds: at[..t].to_vec(),
+            beta: at[t..end].to_vec(),
+            se,
+            loglik,
+        })
+    } else {
+        Err(Cause::NoMaximum)
+    }
+}
+
+/// Thresholds at the logits of the cumulative shares, no effect.
+fn start(table: &Table) -> Vec<f64> {
+    let mut at = table.marginal_logits();
+    at.resize(table.parameters(), 0.0);
+    at
+}
+
+/// Value, gradient and Hessian at (θ, β); `None` where the thresholds do not
+/// rise.
+pub(super) fn point(table: &Table, at: &[f64]) -> Option<Point> {
+    let mut point = table.spacing(at, table.parameters())?;
+    let a = table.linear(at);
+    let (mut first, mut second) = (Vec::new(), Vec::new());
+    for (k, &(n, m)) in a.iter().zip(table.pooled()) {
+        let f = logistic(*k);
+        point.value += n * k - m * softplus(*k);
+        first.push(n - m * f);
+        second.push(-m * f * (1.0 - f));
+    }
+    table.add_gradient(&first, &mut point.gradient);
+    table.add_hessian(&second, &mut point.hessian);
+    point.value.is_finite().then_some(point)
+}
+
+/// F(a) = 1/(1 + e^−a).
+pub(super) fn logistic(a: f64) -> f64 {
+    1.0 / (1.0 + (-a).exp())
+}
+
+/// s(a) = ln(1 + eᵃ).
+pub(super) fn softplus(a: f64) -> f64 {
+    a.max(0.0) + (-a.abs()).exp().ln_1p()
+}

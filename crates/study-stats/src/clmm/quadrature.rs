@@ -1,0 +1,155 @@
+//! Adaptive Gauss–Hermite quadrature (Liu & Pierce 1994; Pinheiro & Bates 1995).
+//!
+//! With the nodes laid about the mode, b_r = b̂ + √2 z_r/√H,
+//!
+//! ```text
+//! ln ∫ e^f db/√(2π) ≈ f(b̂) − ½ ln H + ln Σ_r w_r e^(z_r²) e^(f(b_r) − f(b̂)) / √π
+//! ```
+//!
+//! One node is Laplace's method. The terms, scaled to sum to 1, are the posterior
+//! π_r of b; by Fisher's and Louis's (1982) identities, with s the derivative of f
+//! in the parameters, the gradient is E s and the Hessian E ∂²f + E ssᵀ − E s E sᵀ.
+
+use super::hermite::Node;
+use super::mode::mode;
+use crate::clm::counts::{Table, Term};
+use crate::clm::logistic;
+use crate::clm::newton::Point;
+use std::f64::consts::{PI, SQRT_2};
+
+/// A node whose share of the integral is smaller adds nothing to a derivative.
+const NEGLIGIBLE: f64 = 1e-17;
+
+/// Value, gradient and Hessian of the likelihood at (θ, β, ln σ).
+pub(super) fn point(table: &Table, at: &[f64], rule: &[Node], modes: &mut [f64]) -> Option<Point> {
+    let size = table.parameters() + 1;
+    let tau = size - 1;
+    let precision = (-2.0 * at[tau]).exp();
+    if !(precision.is_finite() && precision > 0.0) {
+        return None;
+    }
+    let mut point = table.spacing(at, size)?;
+    let a = table.linear(at);
+    let mut flat = vec![0.0; a.len()];
+    let mut curved = vec![0.0; a.len()];
+    let mut ln_share = vec![0.0; rule.len()];
+    let odds = Odds::of(&a);
+    // F of every node and term.
+    let mut below_all = Vec::new();
+    let (mut residual, mut mean_residual) = (Vec::new(), Vec::new());
+    let (mut score, mut mean) = (vec![0.0; size], vec![0.0; size]);
+    for (terms, start) in table.by_subject().zip(modes) {
+        let centre = mode(terms, &a, precision, *start)?;
+        *start = centre;
+        let mut h = precision;
+        for t in terms {
+            let f = logistic(a[t.place as usize] - centre);
+            h += t.m * f * (1.0 - f);
+        }
+        let width = SQRT_2 / h.sqrt();
+        let linear: f64 = terms.iter().map(|t| t.n * a[t.place as usize]).sum();
+        let successes: f64 = terms.iter().map(|t| t.n).sum();
+        below_all.clear();
+        for (share, node) in ln_share.iter_mut().zip(rule) {
+            let b = centre + width * node.z;
+            let at_node = odds.at(terms, b, &mut below_all);
+            *share = node.ln_weight - 0.5 * b * b * precision + linear - successes * b - at_node;
+        }
+        let top = ln_share.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+        let total: f64 = ln_share.iter().map(|s| (s - top).exp()).sum();
+        let ln_total = top + total.ln();
+        point.value += ln_total - 0.5 * (h * PI).ln() - at[tau];
+        mean_residual.clear();
+        mean_residual.resize(terms.len(), 0.0);
+        mean.fill(0.0);
+        for (r, (ln_share, node)) in ln_share.iter().zip(rule).enumerate() {
+            let share = (ln_share - ln_total).exp();
+            if share < NEGLIGIBLE {
+                continue;
+            }
+            let b = centre + width * node.z;
+            residual.clear();
+            let below = &below_all[r * terms.len()..];
+            for (i, (t, &f)) in terms.iter().zip(below).enumerate() {
+                let place = t.place as usize;
+                let r = t.n - t.m * f;
+                residual.push(r);
+                mean_residual[i] += share * r;
+                curved[place] -= share * t.m * f * (1.0 - f);
+            }
+            let q = b * b * precision;
+            score.fill(0.0);
+            table.add_terms(terms, &residual, &mut score);
+            score[tau] = q - 1.0;
+            for (m, s) in mean.iter_mut().zip(&score) {
+                *m += share * s;
+            }
+            point.hessian.add_outer(share, &score);
+            point.hessian.add(tau, tau, -2.0 * share * q);
+        }
+        for (t, r) in terms.iter().zip(&mean_residual) {
+            flat[t.place as usize] += r;
+        }
+        point.gradient[tau] += mean[tau];
+        point.hessian.add_outer(-1.0, &mean);
+    }
+    table.add_gradient(&flat, &mut point.gradient);
+    table.add_hessian(&curved, &mut point.hessian);
+    point.value.is_finite().then_some(point)
+}
+
+/// e^a of every place: with it e^(a−b) costs a product and no exponential.
+struct Odds<'a> {
+    a: &'a [f64],
+    exp: Vec<f64>,
+    /// Whether no product of them with a moderate e^−b overflows.
+    moderate: bool,
+}
+
+const MODERATE: f64 = 300.0;
+
+impl<'a> Odds<'a> {
+    fn of(a: &'a [f64]) -> Self {
+        Self {
+            a,
+            exp: a.iter().map(|a| a.exp()).collect(),
+            moderate: a.iter().all(|a| a.abs() < MODERATE),
+        }
+    }
+
+    /// Σ mₖs(aₖ − b); appends F(aₖ − b) of each term. With G = max(F, 1 − F),
+    /// s(x) = max(x, 0) − ln G, and one logarithm serves a product of many G.
+    fn at(&self, terms: &[Term], b: f64, below: &mut Vec<f64>) -> f64 {
+        let shared = (self.moderate && b.abs() < MODERATE).then(|| (-b).exp());
+        let (mut sum, mut product) = (0.0, 1.0);
+        for t in terms {
+            let place = t.place as usize;
+            let x = self.a[place] - b;
+            let f = match shared {
+                Some(e) => {
+                    let odds = self.exp[place] * e;
+                    odds / (1.0 + odds)
+                }
+                None => logistic(x),
+            };
+            below.push(f);
+            if x > 0.0 {
+                sum += t.m * x;
+            }
+            let larger = f.max(1.0 - f);
+            if t.m <= 8.0 {
+                // At least 2^−8 each time.
+                for _ in 0..t.m as u32 {
+                    product *= larger;
+                }
+                if product < 1e-200 {
+                    sum -= product.ln();
+                    product = 1.0;
+                }
+            } else {
+                sum -= t.m * larger.ln();
+            }
+        }
+        sum - product.ln()
+    }
+}

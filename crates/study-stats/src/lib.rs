@@ -1,0 +1,31 @@
+//! Numbers in, estimates out.
+//!
+//! Plain functions over slices: no subjects, no realizations, no files. A
+//! function whose result is not defined for its input returns `None`; it never
+//! returns NaN, an infinity or an invented 0 or 1. `docs/statistics.md` derives
+//! the formulas and names their sources; here each stands above its code.
+
+pub mod agreement;
+pub mod anova;
+pub mod bayes;
+pub mod beside;
+pub mod bootstrap;
+pub mod clm;
+pub mod clmm;
+pub mod correlation;
+pub mod describe;
+pub mod distribution;
+pub mod friedman;
+pub mod lmm;
+pub mod paired;
+pub mod permutation;
+pub mod possible;
+pub mod proportion;
+pub mod random;
+pub mod rank;
+pub mod regression;
+
+/// The number, if it is one that can be printed.
+pub(crate) fn finite(x: f64) -> Option<f64> {
+    x.is_finite().then_some(x)
+}

@@ -1,0 +1,116 @@
+//! Kenward & Roger's (1997) F for realization means beside a subject intercept.
+//!
+//! V = σ²I + τ²J within a subject of n ratings, c of them of each realization.
+//! With e = 1/(1 + nγ): V⁻ᵏ = (I − (1 − eᵏ)/n·J)/σ²ᵏ and J V⁻¹ = e/σ² J. For
+//! the parameters τ² (G₁ = J) and σ² (G₂ = I):
+//!
+//! * Φ = (X'V⁻¹X)⁻¹; Pᵢ = −X'V⁻¹GᵢV⁻¹X; Qᵢⱼ = X'V⁻¹GᵢV⁻¹GⱼV⁻¹X;
+//! * W = 2I⁻¹, Iᵢⱼ = tr V⁻¹GᵢV⁻¹Gⱼ − 2 tr ΦQᵢⱼ + tr ΦPᵢΦPⱼ;
+//! * Φ_A = Φ + 2Φ{Σ Wᵢⱼ(Qᵢⱼ − PᵢΦPⱼ)}Φ;
+//! * Θ = L'(LΦL')⁻¹L, A₁ = Σ Wᵢⱼ tr ΘΦPᵢΦ tr ΘΦPⱼΦ, A₂ = Σ Wᵢⱼ tr ΘΦPᵢΦΘΦPⱼΦ,
+//!   B = (A₁ + 6A₂)/2q, g = ((q+1)A₁ − (q+4)A₂)/((q+2)A₂),
+//!   d = 3q + 2(1 − g), c₁ = g/d, c₂ = (q − g)/d, c₃ = (q + 2 − g)/d,
+//!   E = 1/(1 − A₂/q), V = (2/q)(1 + c₁B)/((1 − c₂B)²(1 − c₃B)), ρ = V/2E²,
+//!   m = 4 + (q + 2)/(qρ − 1), λ = m/(E(m − 2)), F = (λ/q) β'L'(LΦ_AL')⁻¹Lβ.
+
+use super::Random;
+use super::data::Fixed;
+use super::fit::{Criterion, Fit};
+use super::satterthwaite::ContrastF;
+use crate::distribution::f_upper;
+use crate::finite;
+use nalgebra::{Cholesky, DMatrix};
+
+/// Tests that all realizations have the same mean. `None` for any other model
+/// than means with a subject intercept by REML, and where it is not defined.
+pub fn kenward_roger(fit: &Fit<'_>) -> Option<ContrastF> {
+    let table = fit.table;
+    let wanted = table.fixed == Fixed::Models
+        && fit.coordinates.random == Random::default()
+        && fit.criterion == Criterion::Reml;
+    let p = table.columns();
+    let q = p.checked_sub(1).filter(|q| *q > 0 && wanted)?;
+    // σ² = 1 without loss: the scale cancels in F and its df.
+    let gamma = fit.coordinates.ratios(&fit.at).intercept;
+    let zero = || DMatrix::<f64>::zeros(p, p);
+    let mut information = zero();
+    let mut p_of = [zero(), zero()];
+    let mut q_of = [zero(), zero(), zero()];
+    let mut traces = [0.0; 3];
+    for pattern in &table.patterns {
+        let k = pattern.subjects;
+        let n: f64 = pattern.units.iter().map(|u| u.n).sum();
+        let e = 1.0 / (1.0 + n * gamma);
+        let less = |power: i32| (1.0 - e.powi(power)) / n;
+        traces[0] += k * (n * e).powi(2);
+        traces[1] += k * n * e * e;
+        traces[2] += k * (n - 1.0 + e * e);
+        for a in &pattern.units {
+            let i = a.model;
+            information[(i, i)] += k * a.n;
+            p_of[1][(i, i)] -= k * a.n;
+            q_of[2][(i, i)] += k * a.n;
+            for b in &pattern.units {
+                let j = b.model;
+                let both = k * a.n * b.n;
+                information[(i, j)] -= both * less(1);
+                p_of[0][(i, j)] -= both * e * e;
+                p_of[1][(i, j)] += both * less(2);
+                q_of[0][(i, j)] += both * n * e.powi(3);
+                q_of[1][(i, j)] += both * e.powi(3);
+                q_of[2][(i, j)] -= both * less(3);
+            }
+        }
+    }
+    let phi = Cholesky::new(information)?.inverse();
+    let phi_p = [&phi * &p_of[0], &phi * &p_of[1]];
+    let at = |i: usize, j: usize| i + j;
+    let mut expected = nalgebra::Matrix2::<f64>::zeros();
+    for i in 0..2 {
+        for j in 0..2 {
+            expected[(i, j)] = traces[at(i, j)] - 2.0 * (&phi * &q_of[at(i, j)]).trace()
+                + (&phi_p[i] * &phi_p[j]).trace();
+        }
+    }
+    let w = expected.try_inverse()? * 2.0;
+    let l = DMatrix::from_fn(q, p, |i, j| {
+        f64::from(i8::from(j == i + 1) - i8::from(j == 0))
+    });
+    let theta = l.transpose() * Cholesky::new(&l * &phi * l.transpose())?.inverse() * &l;
+    let mut inner = zero();
+    let (mut a1, mut a2) = (0.0, 0.0);
+    let tpp = [&theta * &phi_p[0] * &phi, &theta * &phi_p[1] * &phi];
+    for i in 0..2 {
+        for j in 0..2 {
+            inner += (&q_of[at(i, j)] - &p_of[i] * &phi_p[j]) * w[(i, j)];
+            a1 += w[(i, j)] * tpp[i].trace() * tpp[j].trace();
+            a2 += w[(i, j)] * (&tpp[i] * &tpp[j]).trace();
+        }
+    }
+    let adjusted = &phi + &phi * inner * &phi * 2.0;
+    let (df2, lambda) = scaled(a1, a2, q as f64)?;
+    let values = &l * &fit.profile.beta;
+    let middle = Cholesky::new(&l * adjusted * l.transpose())?;
+    let wald = values.dot(&middle.solve(&values)) / fit.sigma2;
+    let f = finite(lambda * wald / q as f64)?;
+    Some(ContrastF {
+        f,
+        df1: q as f64,
+        df2: Some(df2),
+        p: f_upper(f, q as f64, df2),
+    })
+}
+
+/// m and λ.
+fn scaled(a1: f64, a2: f64, q: f64) -> Option<(f64, f64)> {
+    let b = (a1 + 6.0 * a2) / (2.0 * q);
+    let g = ((q + 1.0) * a1 - (q + 4.0) * a2) / ((q + 2.0) * a2);
+    let d = 3.0 * q + 2.0 * (1.0 - g);
+    let (c1, c2, c3) = (g / d, (q - g) / d, (q + 2.0 - g) / d);
+    let e = 1.0 / (1.0 - a2 / q);
+    let v = 2.0 / q * (1.0 + c1 * b) / ((1.0 - c2 * b).powi(2) * (1.0 - c3 * b));
+    let rho = v / (2.0 * e * e);
+    let m = finite(4.0 + (q + 2.0) / (q * rho - 1.0)).filter(|m| *m > 0.0)?;
+    let lambda = finite(m / (e * (m - 2.0))).filter(|l| *l > 0.0)?;
+    Some((m, lambda))
+}

@@ -1,0 +1,226 @@
+//! Satterthwaite's degrees of freedom.
+//!
+//! With f(φ) = l'C(φ)l the variance of an estimate, C the covariance of the fixed
+//! effects, φ the coordinates off the boundary and log σ², g = ∂f/∂φ, H the
+//! Hessian of the REML deviance: var φ = 2H⁻¹, and ν = 2f²/(g'2H⁻¹g). A variance
+//! on the boundary is taken as known. F over several contrasts: lmerTest's
+//! contrasts, rotated to independent ones (Kuznetsova et al. 2017, §2.3): tₘ² = (l̃ₘ'β)²/dₘ,
+//! F = mean tₘ², E = Σ νₘ/(νₘ − 2), ν = 2E/(E − q).
+
+use super::data::Fixed;
+use super::differences::{first, second};
+use super::fit::{Fit, weight};
+use super::profile::profile;
+use crate::distribution::{f_upper, t_quantile, t_two_sided};
+use crate::finite;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// A test of one contrast of the fixed effects.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContrastT {
+    /// Σ lᵢβᵢ.
+    pub estimate: f64,
+    /// Its standard error.
+    pub se: f64,
+    /// estimate/se.
+    pub t: Option<f64>,
+    /// Satterthwaite's.
+    pub df: Option<f64>,
+    /// Two-sided.
+    pub p: Option<f64>,
+    /// 95 % by t.
+    pub ci95: Option<(f64, f64)>,
+}
+
+/// A test that several contrasts are 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContrastF {
+    /// On `df1` and `df2`.
+    pub f: f64,
+    /// Number of contrasts.
+    pub df1: f64,
+    /// Of the denominator.
+    pub df2: Option<f64>,
+    /// P(F ≥ f).
+    pub p: Option<f64>,
+}
+
+/// Covariance of the fixed effects, its derivatives, and H⁻¹; standardised.
+struct Uncertainty {
+    covariance: DMatrix<f64>,
+    /// By the free coordinates, then log σ².
+    derivatives: Vec<DMatrix<f64>>,
+    /// H⁻¹ of these.
+    inverse: DMatrix<f64>,
+}
+
+impl Uncertainty {
+    fn df(&self, l: &DVector<f64>) -> Option<f64> {
+        let f = l.dot(&(&self.covariance * l));
+        let g = DVector::from_iterator(
+            self.derivatives.len(),
+            self.derivatives.iter().map(|d| l.dot(&(d * l))),
+        );
+        let spread = g.dot(&(&self.inverse * &g));
+        finite(f * f / spread).filter(|df| spread > 0.0 && *df > 0.0)
+    }
+}
+
+impl Fit<'_> {
+    /// Tests Σ lᵢβᵢ = 0.
+    pub fn t_test(&self, l: &[f64]) -> ContrastT {
+        let u = self.uncertainty();
+        self.t_with(l, u.as_ref())
+    }
+
+    /// Tests each of several contrasts.
+    pub fn t_tests(&self, contrasts: &[Vec<f64>]) -> Vec<ContrastT> {
+        let u = self.uncertainty();
+        contrasts
+            .iter()
+            .map(|l| self.t_with(l, u.as_ref()))
+            .collect()
+    }
+
+    /// The contrast in units of the standardised effects.
+    fn scaled(&self, l: &[f64]) -> DVector<f64> {
+        DVector::from_iterator(
+            l.len(),
+            self.units().iter().zip(l).map(|((unit, _), l)| l * unit),
+        )
+    }
+
+    fn t_with(&self, l: &[f64], u: Option<&Uncertainty>) -> ContrastT {
+        let scaled = self.scaled(l);
+        let covariance = self.profile.inverse() * self.sigma2;
+        let se = scaled.dot(&(&covariance * &scaled)).max(0.0).sqrt();
+        let estimate = self.estimate(l);
+        let df = u.and_then(|u| u.df(&scaled));
+        let t = finite(estimate / se);
+        let half = df.and_then(|df| t_quantile(0.975, df)).map(|q| q * se);
+        ContrastT {
+            estimate,
+            se,
+            t,
+            df,
+            p: t.zip(df).and_then(|(t, df)| t_two_sided(t, df)),
+            ci95: half.map(|h| (estimate - h, estimate + h)),
+        }
+    }
+
+    /// Tests that the means of all realizations are equal; for a table of
+    /// [`super::Fixed::Models`] with two or more.
+    pub fn f_test(&self) -> Option<ContrastF> {
+        let p = self.table.columns();
+        let of_models = matches!(self.table.fixed, Fixed::Models);
+        let q = p.checked_sub(1).filter(|q| of_models && *q > 0)?;
+        let l = sequential(&self.table.ratings_by_model());
+        let covariance = self.profile.inverse() * self.sigma2;
+        let eigen = SymmetricEigen::new(&l * covariance * l.transpose());
+        let rotated = eigen.eigenvectors.transpose() * l;
+        let values = &rotated * &self.profile.beta;
+        let f = values
+            .iter()
+            .zip(eigen.eigenvalues.iter())
+            .map(|(v, d)| v * v / d)
+            .sum::<f64>()
+            / q as f64;
+        let f = finite(f)?;
+        let df2 = self.uncertainty().and_then(|u| {
+            let dfs: Option<Vec<f64>> = (0..q).map(|m| u.df(&rotated.row(m).transpose())).collect();
+            pooled(&dfs?)
+        });
+        Some(ContrastF {
+            f,
+            df1: q as f64,
+            df2,
+            p: df2.and_then(|df2| f_upper(f, q as f64, df2)),
+        })
+    }
+
+    /// `None` if the criterion has no curvature to go by.
+    fn uncertainty(&self) -> Option<Uncertainty> {
+        let (table, random) = (self.table, self.coordinates.random);
+        let place = |free: &[f64]| {
+            let mut at = self.at.clone();
+            for (&i, v) in self.free.iter().zip(free) {
+                at[i] = *v;
+            }
+            profile(table, random, &self.coordinates.ratios(&at))
+        };
+        let at: Vec<f64> = self.free.iter().map(|&i| self.at[i]).collect();
+        let all: Vec<usize> = (0..at.len()).collect();
+        let p = table.columns();
+        // At the fitted σ²; REML whatever the fit's criterion.
+        let value = |x: &[f64]| {
+            let p = place(x)?;
+            Some(p.log_det_z + p.log_det_x + p.rss / self.sigma2)
+        };
+        let (_, curvature) = second(&value, &at, &all)?;
+        let parts = |x: &[f64]| {
+            let found = place(x)?;
+            let inverse = found.inverse();
+            Some(DVector::from_iterator(
+                p * p + 1,
+                inverse.iter().copied().chain([found.rss]),
+            ))
+        };
+        let d = at.len();
+        let mut hessian = DMatrix::zeros(d + 1, d + 1);
+        hessian.view_mut((0, 0), (d, d)).copy_from(&curvature);
+        hessian[(d, d)] = weight(table, self.criterion);
+        let covariance = self.profile.inverse() * self.sigma2;
+        let mut derivatives = Vec::with_capacity(d + 1);
+        for i in 0..d {
+            let by = first(&parts, &at, i)?;
+            let cross = -by[p * p] / self.sigma2;
+            hessian[(i, d)] = cross;
+            hessian[(d, i)] = cross;
+            let own = DMatrix::from_iterator(p, p, by.iter().copied().take(p * p));
+            derivatives.push(own * self.sigma2);
+        }
+        derivatives.push(covariance.clone());
+        let eigen = SymmetricEigen::new(hessian);
+        let floor = 1e-8 * eigen.eigenvalues.amax();
+        let mut inverse = DMatrix::zeros(d + 1, d + 1);
+        for (k, value) in eigen.eigenvalues.iter().enumerate() {
+            if *value > floor {
+                let q = eigen.eigenvectors.column(k);
+                inverse += q * q.transpose() / *value;
+            }
+        }
+        Some(Uncertainty {
+            covariance,
+            derivatives,
+            inverse,
+        })
+    }
+}
+
+/// The contrasts of a sequential decomposition (lmerTest's for one factor): each
+/// level but the first against the ratings of the first and of all later ones.
+/// F is the same for every basis, its degrees of freedom are not where the
+/// levels have unequal numbers.
+fn sequential(ratings: &[f64]) -> DMatrix<f64> {
+    let p = ratings.len();
+    let others = |i: usize| ratings[0] + ratings[i + 2..].iter().sum::<f64>();
+    DMatrix::from_fn(p - 1, p, |i, j| match j {
+        j if j == i + 1 => 1.0,
+        j if j == 0 || j > i + 1 => -ratings[j] / others(i),
+        _ => 0.0,
+    })
+}
+
+/// Denominator degrees of freedom of F from those of its parts.
+fn pooled(dfs: &[f64]) -> Option<f64> {
+    let q = dfs.len() as f64;
+    let mean = dfs.iter().sum::<f64>() / q;
+    if dfs.iter().all(|v| (v - mean).abs() < 1e-6 * mean) {
+        return finite(mean);
+    }
+    if dfs.iter().any(|v| *v <= 2.0) {
+        return Some(2.0);
+    }
+    let e: f64 = dfs.iter().map(|v| v / (v - 2.0)).sum();
+    finite(2.0 * e / (e - q))
+}

@@ -1,0 +1,374 @@
+//! What must hold for every fit. The digits are held by tests/analyze_golden.rs.
+
+use super::*;
+use crate::correlation::{p_of_r, pearson};
+use study_base::rng::Stream;
+
+/// Balanced complete cells: subject + model + cell + noise.
+fn balanced(seed: u64, subjects: usize, x: &[f64], n: usize, spread: [f64; 4]) -> Vec<Cell> {
+    let mut noise = Stream::new(seed, &["lmm"]);
+    let of_model: Vec<f64> = x.iter().map(|x| x + spread[1] * noise.normal()).collect();
+    let mut cells = Vec::new();
+    for subject in 0..subjects {
+        let bias = spread[0] * noise.normal();
+        for (model, level) in of_model.iter().enumerate() {
+            let here = level + bias + spread[2] * noise.normal();
+            let rows: Vec<f64> = (0..n).map(|_| here + spread[3] * noise.normal()).collect();
+            let mean = rows.iter().sum::<f64>() / n as f64;
+            cells.push(Cell {
+                subject,
+                model,
+                x: x[model],
+                n,
+                mean,
+                within: rows.iter().map(|r| (r - mean).powi(2)).sum(),
+            });
+        }
+    }
+    cells
+}
+
+const X: [f64; 6] = [0.1, 0.5, 0.55, 0.9, 1.3, 2.0];
+const CROSSED: Random = Random {
+    slope: false,
+    model: true,
+    cell: true,
+};
+
+fn table(cells: &[Cell]) -> Table {
+    Table::new(cells, Fixed::Covariate { centre: 0.9 }).unwrap()
+}
+
+fn close(a: f64, b: f64, relative: f64) {
+    assert!(
+        (a - b).abs() <= relative * a.abs().max(b.abs()),
+        "{a} is not {b}"
+    );
+}
+
+/// The level of inference: in balanced complete data off the boundary the
+/// realizations are the units, and the crossed model says what Pearson says.
+#[test]
+fn the_crossed_models_p_is_pearsons_over_realization_means() {
+    let mut off_the_boundary = 0;
+    for seed in 0..20 {
+        let cells = balanced(seed, 8, &X, 3, [0.7, 0.8, 0.5, 1.0]);
+        let table = table(&cells);
+        let fit = fit(&table, CROSSED, Criterion::Reml).unwrap();
+        if fit.singular {
+            continue;
+        }
+        off_the_boundary += 1;
+        let means: Vec<f64> = (0..X.len())
+            .map(|m| {
+                let own = cells.iter().filter(|c| c.model == m);
+                own.map(|c| c.mean).sum::<f64>() / 8.0
+            })
+            .collect();
+        let p = p_of_r(pearson(&X, &means).unwrap(), X.len() as f64 - 2.0).unwrap();
+        let slope = fit.t_test(&[0.0, 1.0]);
+        close(slope.df.unwrap(), X.len() as f64 - 2.0, 1e-5);
+        close(slope.p.unwrap(), p, 1e-5);
+    }
+    assert!(off_the_boundary >= 10, "only {off_the_boundary}");
+}
+
+/// Mean squares of balanced data: REML off the boundary is the analysis of variance.
+#[test]
+fn a_balanced_random_intercept_has_its_closed_form() {
+    let (subjects, n) = (7usize, 2usize);
+    let cells = balanced(3, subjects, &X, n, [1.0, 0.5, 0.0, 1.0]);
+    let table = Table::new(&cells, Fixed::Models).unwrap();
+    let fit = fit(&table, Random::default(), Criterion::Reml).unwrap();
+    let per_subject = (X.len() * n) as f64;
+    let of_subject = |s: usize| {
+        let own = cells.iter().filter(|c| c.subject == s);
+        own.map(|c| c.mean).sum::<f64>() / X.len() as f64
+    };
+    let of_model = |m: usize| {
+        let own = cells.iter().filter(|c| c.model == m);
+        own.map(|c| c.mean).sum::<f64>() / subjects as f64
+    };
+    let grand = (0..subjects).map(of_subject).sum::<f64>() / subjects as f64;
+    let ms_subject = (0..subjects)
+        .map(|s| per_subject * (of_subject(s) - grand).powi(2))
+        .sum::<f64>()
+        / (subjects as f64 - 1.0);
+    let ss_error: f64 = cells
+        .iter()
+        .map(|c| {
+            let e = c.mean - of_subject(c.subject) - of_model(c.model) + grand;
+            c.within + n as f64 * e * e
+        })
+        .sum();
+    let total = subjects as f64 * per_subject;
+    let df = total - subjects as f64 - X.len() as f64 + 1.0;
+    close(fit.variances.error, ss_error / df, 1e-9);
+    close(
+        fit.variances.intercept,
+        (ms_subject - ss_error / df) / per_subject,
+        1e-8,
+    );
+    // Then both denominators are the residual's.
+    close(fit.f_test().unwrap().df2.unwrap(), df, 1e-5);
+    let adjusted = kenward_roger(&fit).unwrap();
+    close(adjusted.df2.unwrap(), df, 1e-8);
+    close(adjusted.f, fit.f_test().unwrap().f, 1e-8);
+}
+
+/// Unequal numbers of ratings, cells missing: the degrees of freedom of F hang on
+/// the contrasts that are taken. R 4.2.2, lmerTest 3.1.3,
+/// `anova(lmer(y ~ m + (1 | s)))`: F 4.5316903505 on 2 and 11.5614721934,
+/// p .0352250596.
+#[test]
+fn f_over_unequal_numbers_takes_the_contrasts_of_lmertest() {
+    let ratings: [&[(usize, f64)]; 6] = [
+        &[(0, 3.0), (0, 4.0), (1, 5.0), (2, 4.0)],
+        &[(0, 2.0), (1, 4.0), (1, 3.0)],
+        &[(0, 5.0), (1, 6.0), (2, 6.0), (2, 7.0)],
+        &[(1, 5.0), (2, 5.0), (2, 7.0)],
+        &[(0, 2.0), (2, 4.0), (2, 3.0)],
+        &[(0, 6.0), (1, 6.0)],
+    ];
+    let mut cells = Vec::new();
+    for (subject, own) in ratings.iter().enumerate() {
+        for cell in own.chunk_by(|a, b| a.0 == b.0) {
+            let mean = cell.iter().map(|c| c.1).sum::<f64>() / cell.len() as f64;
+            cells.push(Cell {
+                subject,
+                model: cell[0].0,
+                x: 0.0,
+                n: cell.len(),
+                mean,
+                within: cell.iter().map(|c| (c.1 - mean).powi(2)).sum(),
+            });
+        }
+    }
+    let table = Table::new(&cells, Fixed::Models).unwrap();
+    let found = fit(&table, Random::default(), Criterion::Reml)
+        .unwrap()
+        .f_test()
+        .unwrap();
+    close(found.f, 4.531_690_350_5, 1e-6);
+    close(found.df2.unwrap(), 11.561_472_193_4, 1e-5);
+    close(found.p.unwrap(), 0.035_225_059_6, 1e-5);
+}
+
+#[test]
+fn a_variance_on_the_boundary_is_zero_exactly() {
+    // Each subject has the same mean.
+    let mut cells = balanced(5, 6, &X, 2, [0.0, 1.0, 0.0, 1.0]);
+    for own in cells.chunk_by_mut(|a, b| a.subject == b.subject) {
+        let mean = own.iter().map(|c| c.mean).sum::<f64>() / X.len() as f64;
+        own.iter_mut().for_each(|c| c.mean -= mean);
+    }
+    let table = Table::new(&cells, Fixed::Models).unwrap();
+    let fit = fit(&table, Random::default(), Criterion::Reml).unwrap();
+    assert_eq!(fit.variances.intercept, 0.0);
+    assert!(fit.singular);
+}
+
+/// Every n, mean and covariate another: each subject a pattern of its own.
+fn ragged(seed: u64) -> Vec<Cell> {
+    let mut noise = Stream::new(seed, &["ragged"]);
+    balanced(seed, 9, &X, 3, [0.8, 0.4, 0.3, 1.0])
+        .into_iter()
+        .filter_map(|c| {
+            let n = (noise.normal().abs() * 2.0) as usize;
+            (n > 0).then_some(Cell { n, ..c })
+        })
+        .map(|c| Cell {
+            within: if c.n == 1 { 0.0 } else { c.within },
+            ..c
+        })
+        .collect()
+}
+
+#[test]
+fn shift_scale_names_and_order_do_not_matter() {
+    for random in [
+        Random::default(),
+        Random {
+            slope: true,
+            ..Random::default()
+        },
+        CROSSED,
+    ] {
+        let cells = ragged(11);
+        let table = table(&cells);
+        let a = fit(&table, random, Criterion::Reml).unwrap();
+        let mut moved: Vec<Cell> = cells
+            .iter()
+            .map(|c| Cell {
+                subject: 100 - c.subject,
+                model: 50 - c.model,
+                x: 10.0 * c.x - 3.0,
+                n: c.n,
+                mean: 4.0 * c.mean + 1000.0,
+                within: 16.0 * c.within,
+            })
+            .collect();
+        moved.reverse();
+        let moved = Table::new(&moved, Fixed::Covariate { centre: 6.0 }).unwrap();
+        let b = fit(&moved, random, Criterion::Reml).unwrap();
+        let (v, w) = (a.variances, b.variances);
+        close(16.0 * v.error, w.error, 1e-6);
+        assert!((16.0 * v.intercept - w.intercept).abs() < 1e-5 * w.error);
+        assert!((0.16 * v.slope - w.slope).abs() < 1e-5 * w.error);
+        assert!((16.0 * v.model - w.model).abs() < 1e-5 * w.error);
+        assert!((16.0 * v.cell - w.cell).abs() < 1e-5 * w.error);
+        let (s, t) = (a.t_test(&[0.0, 1.0]), b.t_test(&[0.0, 1.0]));
+        close(0.4 * s.estimate, t.estimate, 1e-6);
+        close(s.df.unwrap(), t.df.unwrap(), 1e-3);
+        close(s.p.unwrap(), t.p.unwrap(), 1e-3);
+    }
+}
+
+/// The sufficient statistics of a shared pattern say what the subjects say.
+#[test]
+fn many_subjects_of_one_pattern_are_as_each_alone() {
+    let cells = balanced(2, 30, &X, 3, [0.7, 0.6, 0.4, 1.0]);
+    let shared = table(&cells);
+    assert_eq!(shared.patterns.len(), 1);
+    assert!(shared.patterns[0].rows.len() <= X.len());
+    let mut apart = shared.clone();
+    apart.patterns = cells
+        .chunks(6)
+        .map(|own| {
+            let row: Vec<f64> = own
+                .iter()
+                .map(|c| (c.mean - shared.y_centre) / shared.y_scale)
+                .collect();
+            data::Pattern {
+                subjects: 1.0,
+                units: shared.patterns[0].units.clone(),
+                sum: row.clone(),
+                rows: vec![row],
+            }
+        })
+        .collect();
+    let a = fit(&shared, CROSSED, Criterion::Reml).unwrap();
+    let b = fit(&apart, CROSSED, Criterion::Reml).unwrap();
+    close(a.deviance, b.deviance, 1e-12);
+    close(a.variances.model, b.variances.model, 1e-7);
+}
+
+#[test]
+fn what_is_not_defined_says_why() {
+    let cells = balanced(1, 4, &X, 1, [1.0, 1.0, 1.0, 1.0]);
+    let table = table(&cells);
+    let why = |r: Result<Fit<'_>, LmmError>| r.unwrap_err();
+    assert_eq!(
+        why(fit(&table, CROSSED, Criterion::Reml)),
+        LmmError::NoRepetition
+    );
+    let new = |cells: &[Cell]| Table::new(cells, Fixed::Covariate { centre: 0.0 }).unwrap_err();
+    assert_eq!(new(&[]), LmmError::NoData);
+    assert_eq!(new(&cells[..6]), LmmError::OneSubject);
+    let change = |f: &dyn Fn(&Cell) -> Cell| cells.iter().map(f).collect::<Vec<_>>();
+    assert_eq!(
+        new(&change(&|c| Cell { x: 0.7, ..*c })),
+        LmmError::ConstantCovariate
+    );
+    assert_eq!(
+        new(&change(&|c| Cell { mean: 4.0, ..*c })),
+        LmmError::ConstantRatings
+    );
+    assert_eq!(
+        new(&change(&|c| Cell {
+            mean: f64::INFINITY,
+            ..*c
+        })),
+        LmmError::NoData
+    );
+    let additive = change(&|c| Cell {
+        mean: c.x + c.subject as f64,
+        ..*c
+    });
+    let additive = Table::new(&additive, Fixed::Models).unwrap();
+    assert_eq!(
+        why(fit(&additive, Random::default(), Criterion::Ml)),
+        LmmError::NoError
+    );
+    let two: Vec<Cell> = cells.iter().filter(|c| c.model < 2).copied().collect();
+    let two = Table::new(&two, Fixed::Covariate { centre: 0.3 }).unwrap();
+    let crossed = Random {
+        cell: false,
+        ..CROSSED
+    };
+    assert_eq!(
+        why(fit(&two, crossed, Criterion::Reml)),
+        LmmError::FewModels
+    );
+}
+
+/// Small tables of small whole numbers: the worst for boundaries and ties.
+#[test]
+fn random_small_tables_give_numbers_or_reasons() {
+    let mut draws = Stream::new(9, &["small"]);
+    let mut fits = 0;
+    for _ in 0..60 {
+        let mut below = |n: f64| ((draws.normal().abs() * 7.0) % n) as usize;
+        let (subjects, models) = (1 + below(5.0), 1 + below(5.0));
+        let mut cells = Vec::new();
+        for subject in 0..subjects {
+            for model in 0..models {
+                let n = below(4.0);
+                if n > 0 {
+                    cells.push(Cell {
+                        subject,
+                        model,
+                        x: below(3.0) as f64,
+                        n,
+                        mean: below(7.0) as f64,
+                        within: if n > 1 { below(5.0) as f64 } else { 0.0 },
+                    });
+                }
+            }
+        }
+        for fixed in [
+            Fixed::Intercept,
+            Fixed::Models,
+            Fixed::Covariate { centre: 1.0 },
+        ] {
+            let Ok(table) = Table::new(&cells, fixed) else {
+                continue;
+            };
+            for bits in 0..8 {
+                let random = Random {
+                    slope: bits & 1 > 0 && matches!(fixed, Fixed::Covariate { .. }),
+                    model: bits & 2 > 0 && fixed != Fixed::Models,
+                    cell: bits & 4 > 0,
+                };
+                let Ok(found) = fit(&table, random, Criterion::Reml) else {
+                    continue;
+                };
+                fits += 1;
+                let v = found.variances;
+                for x in [
+                    found.deviance,
+                    v.intercept,
+                    v.slope,
+                    v.model,
+                    v.cell,
+                    v.error,
+                ] {
+                    assert!(x.is_finite(), "{random:?} {found:?}");
+                }
+                assert!(v.intercept >= 0.0 && v.slope >= 0.0 && v.model >= 0.0 && v.cell >= 0.0);
+                let mut l = vec![0.0; table.columns()];
+                l[0] = 1.0;
+                let t = found.t_test(&l);
+                assert!(t.estimate.is_finite() && t.se.is_finite());
+                for p in [t.p, found.f_test().and_then(|f| f.p)]
+                    .into_iter()
+                    .flatten()
+                {
+                    assert!((0.0..=1.0).contains(&p));
+                }
+                kenward_roger(&found);
+            }
+        }
+    }
+    assert!(fits > 120, "only {fits} fits");
+}

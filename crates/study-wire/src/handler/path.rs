@@ -1,0 +1,242 @@
+//! Probe mode: a path that the handle is moved along while its force is measured.
+
+use super::table::{Bounds, Refused};
+use super::{Drive, Handler, Measured, Out};
+use crate::message::probe::PathCrc;
+use crate::message::{Fault, PathBegin, PathChunk, RecordedPoint, Refusal, State, fixed};
+
+/// Further from its path than this the probe has lost it, mm.
+const LOST_MM: f64 = 5.0;
+/// Mean speed at which it goes to where the path begins, mm/s.
+const APPROACH_MM_S: f64 = 20.0;
+/// It takes at least so long, s.
+const APPROACH_S: f64 = 0.5;
+
+/// Room for `N` points.
+#[derive(Debug, Clone)]
+pub(super) struct Path<const N: usize> {
+    x_nm: [i32; N],
+    len: usize,
+    begin: Option<PathBegin>,
+    crc: PathCrc,
+    /// Where the handle was when it began.
+    from_mm: Option<f64>,
+    /// Servo periods of the approach, and so far of it or of the path.
+    approach: u32,
+    ticks: u32,
+}
+
+impl<const N: usize> Path<N> {
+    pub(super) fn new() -> Self {
+        Self {
+            x_nm: [0; N],
+            len: 0,
+            begin: None,
+            crc: PathCrc::default(),
+            from_mm: None,
+            approach: 0,
+            ticks: 0,
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.begin = None;
+        self.len = 0;
+    }
+
+    pub(super) fn begin(&mut self, begin: &PathBegin) -> Result<(), Refused> {
+        self.clear();
+        if begin.points as usize > N {
+            return Err((Refusal::TooMany, N as u32));
+        }
+        self.crc = PathCrc::of(begin);
+        self.begin = Some(*begin);
+        Ok(())
+    }
+
+    pub(super) fn chunk(&mut self, chunk: &PathChunk) -> Result<(), Refused> {
+        let Some(begin) = &self.begin else {
+            return Err((Refusal::WrongState, 0));
+        };
+        let points = chunk.x_nm.as_slice();
+        if chunk.first as usize != self.len {
+            return Err((Refusal::Order, self.len as u32));
+        }
+        if self.len + points.len() > begin.points as usize {
+            return Err((Refusal::TooMany, begin.points));
+        }
+        for point in points {
+            self.x_nm[self.len] = *point;
+            self.crc.point(*point);
+            self.len += 1;
+        }
+        Ok(())
+    }
+
+    /// Whether it is whole and can be followed: with which largest force, N.
+    pub(super) fn judge(&self, crc: u32, bounds: &Bounds, servo_hz: f64) -> Result<f64, Refused> {
+        let Some(begin) = &self.begin else {
+            return Err((Refusal::WrongState, 0));
+        };
+        if self.len != begin.points as usize {
+            return Err((Refusal::Incomplete, self.len as u32));
+        }
+        if self.crc.value() != crc {
+            return Err((Refusal::Checksum, self.crc.value()));
+        }
+        let within = |value: f64, most: f64| value.is_finite() && value > 0.0 && value <= most;
+        if self.len < 2 || !within(begin.rate_hz, servo_hz) {
+            return Err((Refusal::BadTable, self.len as u32));
+        }
+        if !within(begin.force_n, bounds.force_n) {
+            return Err((Refusal::Limit, 1));
+        }
+        if !within(begin.velocity_mm_s, bounds.velocity_mm_s) {
+            return Err((Refusal::Limit, 2));
+        }
+        for (i, x_nm) in self.x_nm[..self.len].iter().enumerate() {
+            let x_mm = fixed::from_nm(*x_nm);
+            let before_mm = fixed::from_nm(self.x_nm[i.saturating_sub(1)]);
+            if x_mm < bounds.stroke_mm[0] || x_mm > bounds.stroke_mm[1] {
+                return Err((Refusal::Limit, 3));
+            }
+            if libm::fabs(x_mm - before_mm) * begin.rate_hz > begin.velocity_mm_s {
+                return Err((Refusal::BadTable, i as u32));
+            }
+        }
+        Ok(begin.force_n)
+    }
+
+    pub(super) fn velocity_mm_s(&self) -> f64 {
+        self.begin.map_or(0.0, |begin| begin.velocity_mm_s)
+    }
+
+    /// To the beginning, from wherever the handle is.
+    pub(super) fn rewind(&mut self) {
+        self.from_mm = None;
+        self.ticks = 0;
+    }
+
+    /// mm and mm/s of the approach; `None` when it is over.
+    fn approach(&mut self, x_mm: f64, servo_hz: f64) -> Option<(f64, f64)> {
+        let first_mm = fixed::from_nm(self.x_nm.first().copied().unwrap_or_default());
+        let from_mm = match self.from_mm {
+            Some(from_mm) => from_mm,
+            None => {
+                let way_s = libm::fabs(first_mm - x_mm) / APPROACH_MM_S;
+                self.approach = libm::ceil(way_s.max(APPROACH_S) * servo_hz) as u32;
+                self.from_mm = Some(x_mm);
+                x_mm
+            }
+        };
+        if self.ticks >= self.approach {
+            return None;
+        }
+        let share = f64::from(self.ticks) / f64::from(self.approach);
+        let turn = core::f64::consts::PI;
+        let by_mm = first_mm - from_mm;
+        let rate = turn * servo_hz / f64::from(self.approach);
+        Some((
+            from_mm + by_mm * (0.5 - 0.5 * libm::cos(turn * share)),
+            by_mm * 0.5 * libm::sin(turn * share) * rate,
+        ))
+    }
+
+    /// mm and mm/s on the path, and whether a point has just been reached; `None`
+    /// behind the last one.
+    fn along(&self, servo_hz: f64) -> Option<(f64, f64, bool)> {
+        let rate_hz = self.begin?.rate_hz;
+        // the hair keeps a point that is due now from coming a period late
+        let at = |tick: u32| f64::from(tick) * rate_hz / servo_hz + 1e-9;
+        let now = at(self.ticks);
+        let point = now as usize;
+        if point >= self.len {
+            return None;
+        }
+        let reached = self.ticks == 0 || at(self.ticks - 1) as usize != point;
+        let near = |offset: usize| {
+            // the point itself is 1 away, the ends stand still
+            let at = (point + offset).saturating_sub(1).min(self.len - 1);
+            fixed::from_nm(self.x_nm[at])
+        };
+        let [before, x, next, after] = [near(0), near(1), near(2), near(3)];
+        // a cubic with the slopes of the central differences, so that the speed has
+        // no steps
+        let (slope, next_slope) = (0.5 * (next - before), 0.5 * (after - x));
+        let square = 3.0 * (next - x) - 2.0 * slope - next_slope;
+        let cube = slope + next_slope - 2.0 * (next - x);
+        let u = now - point as f64;
+        Some((
+            x + u * (slope + u * (square + u * cube)),
+            (slope + u * (2.0 * square + u * 3.0 * cube)) * rate_hz,
+            reached,
+        ))
+    }
+}
+
+impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
+    /// One servo period of a recording.
+    pub(super) fn follow(&mut self, measured: Measured, now_ms: u32, out: Out<'_>) -> Drive {
+        let servo_hz = self.profile.servo.servo_hz;
+        let motion = measured.motion;
+        let bounds = self.profile.bounds;
+        let known = motion.x_mm.is_finite()
+            && motion.v_mm_s.is_finite()
+            && motion.a_m_s2.is_finite()
+            && measured.force_n.unwrap_or(0.0).is_finite();
+        // asked this way round, a limit that is no number trips
+        let slow = libm::fabs(motion.v_mm_s) <= self.path.velocity_mm_s();
+        let inside = motion.x_mm >= bounds.stroke_mm[0] && motion.x_mm <= bounds.stroke_mm[1];
+        let fault = if !known {
+            Fault::NotANumber
+        } else if !slow {
+            Fault::Velocity
+        } else if !inside {
+            Fault::Stroke
+        } else {
+            Fault::None
+        };
+        if fault != Fault::None {
+            self.trip(fault, now_ms, out);
+            return Drive::Force(0.0);
+        }
+        if self.state == State::Ramp {
+            if let Some((x_mm, v_mm_s)) = self.path.approach(motion.x_mm, servo_hz) {
+                self.path.ticks += 1;
+                return self.go(motion.x_mm, x_mm, v_mm_s, now_ms, out);
+            }
+            self.path.ticks = 0;
+            self.state = State::Run;
+        }
+        let Some((x_mm, v_mm_s, reached)) = self.path.along(servo_hz) else {
+            self.end();
+            self.supervise(now_ms, out);
+            return Drive::Force(0.0);
+        };
+        self.path.ticks = self.path.ticks.saturating_add(1);
+        self.run.ticks = self.path.ticks;
+        if reached {
+            let point = RecordedPoint {
+                x_nm: fixed::nm(motion.x_mm),
+                force_un: fixed::maybe_un(measured.force_n),
+                a_um_s2: fixed::um_s2(motion.a_m_s2),
+            };
+            if self.run.recorded(point, now_ms) {
+                self.flush(out);
+            }
+        }
+        self.go(motion.x_mm, x_mm, v_mm_s, now_ms, out)
+    }
+
+    fn go(&mut self, is_mm: f64, x_mm: f64, v_mm_s: f64, now_ms: u32, out: Out<'_>) -> Drive {
+        if libm::fabs(x_mm - is_mm) > LOST_MM {
+            self.trip(Fault::Following, now_ms, out);
+            return Drive::Force(0.0);
+        }
+        Drive::Position {
+            x_mm,
+            v_mm_s,
+            force_n: self.limit_n,
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! The table that a device has been given, and whether it may be played.
+
+use crate::certificate::{self, Certificate};
+use crate::message::{Node, Refusal, TableBegin, TableChunk, TableCrc};
+use crate::predict::{BranchView, Direction, Lookup, TableView};
+
+/// What a device renders stably and reaches, whatever is asked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Largest force, N.
+    pub force_n: f64,
+    /// Speed above which it trips, mm/s.
+    pub velocity_mm_s: f64,
+    /// Stiffest table, N/mm.
+    pub stiffness_n_per_mm: f64,
+    /// Strongest damping of a table, N·s/mm.
+    pub damping_n_s_per_mm: f64,
+    /// Lowest and highest position that the handle can reach, mm.
+    pub stroke_mm: [f64; 2],
+}
+
+/// Room for `N` nodes.
+#[derive(Debug, Clone)]
+pub(super) struct Table<const N: usize> {
+    x_mm: [f64; N],
+    /// m, b, k, F0 of v > 0 and of v < 0.
+    positive: [[f64; N]; 4],
+    negative: [[f64; N]; 4],
+    len: usize,
+    pub(super) begin: Option<TableBegin>,
+    crc: TableCrc,
+}
+
+/// A refusal and its detail.
+pub(super) type Refused = (Refusal, u32);
+
+impl<const N: usize> Table<N> {
+    pub(super) fn new() -> Self {
+        Self {
+            x_mm: [0.0; N],
+            positive: [[0.0; N]; 4],
+            negative: [[0.0; N]; 4],
+            len: 0,
+            begin: None,
+            crc: TableCrc::default(),
+        }
+    }
+
+    /// Forgets what is there and takes in the next.
+    pub(super) fn begin(&mut self, begin: &TableBegin) -> Result<(), Refused> {
+        self.clear();
+        if usize::from(begin.nodes) > N {
+            return Err((Refusal::TooMany, N as u32));
+        }
+        self.crc = TableCrc::of(begin);
+        self.begin = Some(*begin);
+        Ok(())
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.begin = None;
+        self.len = 0;
+    }
+
+    pub(super) fn chunk(&mut self, chunk: &TableChunk) -> Result<(), Refused> {
+        let Some(begin) = &self.begin else {
+            return Err((Refusal::WrongState, 0));
+        };
+        let nodes = chunk.nodes.as_slice();
+        if usize::from(chunk.first) != self.len {
+            return Err((Refusal::Order, self.len as u32));
+        }
+        if self.len + nodes.len() > usize::from(begin.nodes) {
+            return Err((Refusal::TooMany, u32::from(begin.nodes)));
+        }
+        for node in nodes {
+            self.add(node);
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, node: &Node) {
+        let at = self.len;
+        self.x_mm[at] = node.x_mm;
+        for parameter in 0..4 {
+            self.positive[parameter][at] = node.positive[parameter];
+            self.negative[parameter][at] = node.negative[parameter];
+        }
+        self.crc.node(node);
+        self.len += 1;
+    }
+
+    pub(super) fn crc(&self) -> u32 {
+        self.crc.value()
+    }
+
+    pub(super) fn view(&self) -> TableView<'_> {
+        let lookup = self.begin.map(|begin| begin.lookup);
+        TableView {
+            x_mm: &self.x_mm[..self.len],
+            positive: branch(&self.positive, self.len),
+            negative: branch(&self.negative, self.len),
+            lookup: lookup.unwrap_or(Lookup::Linear),
+        }
+    }
+
+    /// Whether it is whole and may be played: with which largest force, N.
+    pub(super) fn judge(&self, crc: u32, bounds: &Bounds) -> Result<f64, Refused> {
+        let Some(begin) = &self.begin else {
+            return Err((Refusal::WrongState, 0));
+        };
+        if self.len != usize::from(begin.nodes) {
+            return Err((Refusal::Incomplete, self.len as u32));
+        }
+        if self.crc() != crc {
+            return Err((Refusal::Checksum, self.crc()));
+        }
+        self.evaluable(begin)?;
+        limits(begin, bounds)?;
+        let range = certificate::Range {
+            x_mm: begin.range_mm,
+            v_mm_s: begin.trained_mm_s,
+        };
+        let certificate = certificate::certify(&self.view(), begin.direction, range);
+        match (physics(&certificate, bounds), begin.uncertified_n) {
+            (Ok(()), _) => Ok(begin.force_n),
+            (Err(_), Some(cap_n)) => Ok(cap_n.min(begin.force_n)),
+            (Err(refused), None) => Err(refused),
+        }
+    }
+
+    /// Whether every position has a force.
+    fn evaluable(&self, begin: &TableBegin) -> Result<(), Refused> {
+        let bad = |node: usize| Err((Refusal::BadTable, node as u32));
+        if self.len < 2 {
+            return bad(self.len);
+        }
+        for node in 0..self.len {
+            let ascends = node == 0 || self.x_mm[node - 1] < self.x_mm[node];
+            let mut parameters = self.positive.iter().chain(&self.negative);
+            let finite =
+                self.x_mm[node].is_finite() && parameters.all(|values| values[node].is_finite());
+            if !(ascends && finite) {
+                return bad(node);
+            }
+        }
+        let [low, high] = begin.range_mm;
+        let delta_mm = match begin.direction {
+            Direction::Sign => 1.0,
+            Direction::Play { delta_mm } | Direction::Dahl { delta_mm } => delta_mm,
+        };
+        let ordered = low.is_finite() && high.is_finite() && low < high;
+        if ordered && positive(delta_mm) && positive(begin.trained_mm_s) {
+            Ok(())
+        } else {
+            bad(self.len)
+        }
+    }
+}
+
+fn branch<const N: usize>(parameters: &[[f64; N]; 4], len: usize) -> BranchView<'_> {
+    let [m, b, k, f0] = parameters;
+    BranchView {
+        m_kg: &m[..len],
+        b_n_s_per_mm: &b[..len],
+        k_n_per_mm: &k[..len],
+        f0_n: &f0[..len],
+    }
+}
+
+/// Every limit is a finite positive number and not above the device's.
+fn limits(begin: &TableBegin, bounds: &Bounds) -> Result<(), Refused> {
+    let within = |value: f64, most: f64| positive(value) && value <= most;
+    let cap_fits = begin
+        .uncertified_n
+        .is_none_or(|cap| within(cap, bounds.force_n));
+    let [low, high] = begin.range_mm;
+    if !within(begin.force_n, bounds.force_n) || !cap_fits {
+        Err((Refusal::Limit, 1))
+    } else if !within(begin.velocity_mm_s, bounds.velocity_mm_s) {
+        Err((Refusal::Limit, 2))
+    } else if low < bounds.stroke_mm[0] || high > bounds.stroke_mm[1] {
+        Err((Refusal::Limit, 3))
+    } else {
+        Ok(())
+    }
+}
+
+/// What a table has to keep to be played without being armed.
+fn physics(certificate: &Certificate, bounds: &Bounds) -> Result<(), Refused> {
+    if !certificate.mass.holds() {
+        Err((Refusal::Uncertified, 1))
+    } else if !certificate.damping.holds() {
+        Err((Refusal::Uncertified, 2))
+    } else if !certificate.hysteresis.holds() {
+        Err((Refusal::Uncertified, 3))
+    } else if !at_most(certificate.stiffness_n_per_mm, bounds.stiffness_n_per_mm) {
+        Err((Refusal::Limit, 4))
+    } else if !at_most(certificate.damping_n_s_per_mm, bounds.damping_n_s_per_mm) {
+        Err((Refusal::Limit, 5))
+    } else {
+        Ok(())
+    }
+}
+
+/// Asked this way round, what is no number is too much.
+fn at_most(value: f64, most: f64) -> bool {
+    value <= most
+}
+
+fn positive(value: f64) -> bool {
+    value.is_finite() && value > 0.0
+}

@@ -1,0 +1,21 @@
+//! From ratings to statistics, report and figures.
+
+mod command;
+#[path = "../support/designs.rs"]
+mod designs;
+mod docs;
+mod golden;
+mod mixed;
+mod nist;
+mod odd;
+mod possible;
+mod properties;
+mod report_answers;
+mod report_html;
+mod report_reads;
+mod report_support;
+mod rows;
+mod rules;
+mod study;
+#[path = "../support/world.rs"]
+mod world;

@@ -1,0 +1,395 @@
+//! Walls: what the report and the page answer, and which words they use where data are odd.
+#![allow(clippy::unwrap_used)]
+
+use crate::report_support::{FIVE, analysis_of, html, part, ratings, source, words};
+use std::fmt::Write as _;
+use study::report::Source;
+use study::report::html::{Details, document};
+use study::report::text::{Page, page};
+use study_core::analyze::{Analysis, Rules, analyze};
+use study_core::outcome::ratings::Ratings;
+const WIDE: Page = Page {
+    width: 100,
+    colour: false,
+};
+
+/// The terminal page on one line.
+fn told(a: &Analysis) -> String {
+    let text = page(&source(), a, WIDE);
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Nobody rates everything: each leaves out another realization.
+fn incomplete() -> Analysis {
+    let all = ratings(6, &FIVE, |s, m, k| 1.0 + ((m + s * k) % 4 + m) as f64);
+    let kept = all.lines().filter(|l| {
+        let mut cells = l.split(',');
+        let (who, what) = (cells.next().unwrap(), cells.next().unwrap());
+        let left_out = who.strip_prefix('S').and_then(|n| n.parse::<usize>().ok());
+        left_out.is_none_or(|s| FIVE[s % 5].0 != what)
+    });
+    analysis_of(&kept.fold(String::new(), |csv, l| csv + l + "\n"))
+}
+
+#[test]
+fn incomplete_tables_are_told_with_numbers_and_answered_by_the_mixed_model() {
+    let a = incomplete();
+    assert!(a.values.number("rmanova/F").is_none());
+    let f = a.values.number("lmm_model/satterthwaite_F").unwrap();
+    let text = words(&html(&a));
+    for text in [text.clone(), told(&a)] {
+        assert!(!text.contains("too few subjects rated both"), "{text}");
+        assert!(text.contains("none of 6 participants"), "{text}");
+        assert!(
+            text.contains("pairs are compared among those who rated every realization"),
+            "{text}"
+        );
+        assert!(text.contains("inear mixed model of all ratings"), "{text}");
+        assert!(text.contains(&format!(") = {f:.2}, p")), "{text}");
+    }
+    assert!(text.contains("Do the realizations differ at all?"));
+    let methods = part(&text, "Methods ", "Results ");
+    assert!(
+        methods.contains("because none of 6 participants rated every realization"),
+        "{methods}"
+    );
+    let results = part(&text, "Results ", "What was counted");
+    assert!(results.contains("(linear mixed model of all ratings): F("));
+}
+
+#[test]
+fn an_undefined_test_of_equivalence_names_its_own_reason() {
+    use study_core::protocol::Role;
+    // Everybody rates a one above the reference: no variance, no test.
+    let text = "study,participant,session,row,trial,block,position,planned_position,model,role,\
+         repetition,practice,pilot,simulated,protocol_version,realism,corrected,strokes,attempt,\
+         status,vaf\n";
+    let mut csv = text.to_owned();
+    for s in 0..4 {
+        for (i, (model, role, up)) in [
+            ("a", "test", 1),
+            ("b", "test", 0),
+            ("R", "hidden-reference", 0),
+        ]
+        .iter()
+        .enumerate()
+        {
+            let n = i + 1;
+            let _ = writeln!(
+                csv,
+                "s,P{s},1,1,{n},1,{n},{n},{model},{role},1,false,false,false,1,{},false,9,1,ok,0.{n}",
+                s + up + 1
+            );
+        }
+    }
+    let ratings = Ratings::read_csv("r.csv", csv.as_bytes(), None).unwrap();
+    let rules = Rules {
+        equivalence_margin: Some(0.5),
+        ..Rules::default()
+    };
+    let a = analyze(&ratings, &rules);
+    assert!(
+        a.realizations
+            .iter()
+            .any(|m| m.role == Role::HiddenReference)
+    );
+    assert!(a.values.reason("reference/R/a/p_tost").is_some());
+    for text in [words(&html(&a)), told(&a)] {
+        assert!(!text.contains("margin of equivalence was stated"), "{text}");
+        assert!(
+            text.contains("quivalence within ± 0.5 was not tested: "),
+            "{text}"
+        );
+    }
+    let without = analyze(&ratings, &Rules::default());
+    assert!(told(&without).contains("no margin of equivalence was stated beforehand"));
+}
+
+#[test]
+fn line_and_curve_are_held_against_half_the_level_and_tested_together() {
+    let mut csv = String::from("subject,model,rating,vaf,lambda\n");
+    for s in 0..3 {
+        for (m, lambda) in [0.9, 0.99, 0.999, 0.9999, 0.99999].iter().enumerate() {
+            let rating = [2, 5, 6, 5, 3][m] + s % 2;
+            let _ = writeln!(csv, "S{s},m{m},{rating},0.{},{lambda}", [3, 5, 9, 7, 4][m]);
+        }
+    }
+    let a = analysis_of(&csv);
+    let f = a
+        .values
+        .number("covariate/log10_memory/quadratic/F")
+        .unwrap();
+    for text in [words(&html(&a)), told(&a)] {
+        assert!(text.contains("verdict goes by them"), "{text}");
+        assert!(text.contains(&format!("F(2, 2) = {f:.2}, p")), "{text}");
+    }
+}
+
+#[test]
+fn the_methods_count_what_was_rated_and_by_whom() {
+    // d is in the table, but nobody rated it.
+    let all = ratings(4, &FIVE[..3], |s, m, k| 1.0 + ((m + s * k) % 4 + m) as f64);
+    let csv = all.clone() + "S1,d,1,,0.9\n";
+    let a = analysis_of(&csv);
+    let text = words(&html(&a));
+    let methods = part(&text, "Methods ", "Results ");
+    assert!(
+        methods.contains("4 participants rated 3 of 4 realizations; nobody rated the others."),
+        "{methods}"
+    );
+    let whole = analysis_of(&ratings(4, &FIVE[..3], |s, m, k| {
+        1.0 + ((m + s * k) % 4 + m) as f64
+    }));
+    assert!(!html(&whole).contains("rated every realization: only they"));
+    let incomplete = analysis_of(&kept_of(&all, |l| !l.starts_with("S0,c")));
+    let text = words(&html(&incomplete));
+    assert!(
+        text.contains(
+            "Of the 4 participants, 3 rated every realization: only they are in the analysis of variance"
+        ),
+        "{text}"
+    );
+}
+
+/// Some lines of a table.
+fn kept_of(csv: &str, keep: impl Fn(&str) -> bool) -> String {
+    let kept = csv.lines().filter(|l| keep(l));
+    kept.fold(String::new(), |csv, l| csv + l + "\n")
+}
+
+#[test]
+fn one_participant_is_no_people_and_has_no_intervals() {
+    let a = analysis_of(&ratings(1, &FIVE, |_, m, k| 1.0 + ((m * k) % 5) as f64));
+    let text = words(&html(&a));
+    assert!(!text.contains("t intervals over subjects"), "{text}");
+    assert!(!text.contains("95 % t interval of the mean"), "{text}");
+    for text in [text, told(&a)] {
+        assert!(text.contains("nly one participant is analysed"), "{text}");
+        assert!(
+            text.contains("ot tested: there is one participant only"),
+            "{text}"
+        );
+    }
+    let two = analysis_of(&ratings(2, &FIVE, |s, m, k| 1.0 + ((m * k + s) % 5) as f64));
+    assert!(words(&html(&two)).contains("t intervals over subjects"));
+    assert!(!told(&two).contains("nly one participant"));
+}
+
+#[test]
+fn with_everything_left_out_nothing_is_said_to_be_found() {
+    use study_core::analyze::Exclusion;
+    let constant = ratings(3, &FIVE, |s, _, _| 2.0 + s as f64);
+    let ratings = Ratings::read_csv("data.csv", constant.as_bytes(), None).unwrap();
+    let rules = Rules {
+        exclude: vec![Exclusion::ConstantRater],
+        ..Rules::default()
+    };
+    let a = analyze(&ratings, &rules);
+    assert_eq!(a.counts.rated, 0);
+    let study = Source {
+        study: Some("s".to_owned()),
+        ..source()
+    };
+    let page = words(&document(&study, &Details::default(), &a, &[]));
+    assert!(!page.contains("r = –"), "{page}");
+    assert!(page.contains("No rating counts: there is nothing to analyse."));
+    for text in [page, told(&a)] {
+        assert!(text.contains("Nothing is left to analyse"), "{text}");
+    }
+}
+
+#[test]
+fn the_one_realization_that_r_hangs_on_is_named() {
+    let a = analysis_of(&ratings(5, &FIVE, |s, m, _| {
+        [3.0, 6.0][usize::from(m == 4)] + (s % 2) as f64
+    }));
+    for text in [words(&html(&a)), told(&a)] {
+        let said = "Without e all means are equal: r hangs on that one realization.";
+        assert!(text.contains(said), "{text}");
+    }
+    let other = analysis_of(&ratings(5, &FIVE, |s, m, _| (m + s % 2) as f64));
+    assert!(!told(&other).contains("hangs on that one"));
+}
+
+#[test]
+fn the_terminal_tells_the_crossed_slope_the_needed_r_and_the_order() {
+    let csv = ratings(6, &FIVE, |s, m, k| {
+        1.0 + ((m + s * k + m * k) % 4 + m) as f64
+    });
+    let mut n = 0;
+    let with_order = csv.lines().fold(String::new(), |out, l| {
+        n += 1;
+        let last = match n {
+            1 => "trial_index".to_owned(),
+            n => (1 + (n * 7) % 10).to_string(),
+        };
+        format!("{out}{l},{last}\n")
+    });
+    let a = analysis_of(&with_order);
+    let get = |id: &str| a.values.number(id).unwrap();
+    let text = told(&a);
+    for said in [
+        format!(
+            "Crossed mixed model: slope {:.1}",
+            get("lmm_vaf_crossed/slope")
+        ),
+        format!(
+            "needs |r| above {}",
+            format!("{:.3}", get("corr/pearson/critical_r")).trim_start_matches('0')
+        ),
+        "Do order and learning matter?".to_owned(),
+        "per trial, p ".to_owned(),
+    ] {
+        assert!(text.contains(&said), "{said}: {text}");
+    }
+    assert!(!told(&analysis_of(&csv)).contains("order and learning"));
+}
+
+#[test]
+fn references_repeats_and_whom_they_screen_stand_in_tables() {
+    let mut csv = "study,participant,session,row,trial,block,position,planned_position,model,role,\
+         repetition,practice,pilot,simulated,protocol_version,realism,corrected,strokes,attempt,\
+         status,vaf\n"
+        .to_owned();
+    let models = [
+        ("a", "test", 2),
+        ("b", "test", 5),
+        ("c", "test", 2),
+        ("R", "hidden-reference", 6),
+        ("L", "low-anchor", 1),
+    ];
+    for s in 0..4 {
+        for (i, (model, role, rating)) in models.iter().enumerate() {
+            let n = i + 1;
+            let rating = rating + (s * n) % 2;
+            let _ = writeln!(
+                csv,
+                "s,P{s},1,1,{n},1,{n},{n},{model},{role},1,false,false,false,1,{rating},false,9,1,ok,0.5"
+            );
+        }
+    }
+    let mut ratings = Ratings::read_csv("r.csv", csv.as_bytes(), None).unwrap();
+    ratings.set_duplicates([("c", "a")]);
+    let a = analyze(&ratings, &Rules::default());
+    let text = words(&html(&a));
+    for said in [
+        "Differences from R (hidden reference)",
+        "Differences from L (low anchor)",
+        "Hidden repeats minus their originals",
+        "mean of the references mean of the anchors distance of the repeats",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    let d = a.values.number("reference/R/b/mean_diff").unwrap();
+    let shown = format!("b 4 {d:.3}").replace('-', "−");
+    assert!(
+        part(&text, "Differences from R", "Differences from L").contains(&shown),
+        "{text}"
+    );
+    let plain = words(&html(&analysis_of(&ratings_of_three())));
+    for absent in [
+        "mean of the references",
+        "Differences from",
+        "Hidden repeats",
+    ] {
+        assert!(!plain.contains(absent), "{absent}");
+    }
+}
+
+fn ratings_of_three() -> String {
+    ratings(4, &FIVE[..3], |s, m, k| 1.0 + ((m + s * k) % 4 + m) as f64)
+}
+
+#[test]
+fn a_table_from_elsewhere_is_told_nothing_of_the_paper_and_of_lambda() {
+    let foreign = analysis_of(&ratings_of_three());
+    let mut csv = String::from("subject,model,rating,vaf,lambda\n");
+    for s in 0..4 {
+        for (m, lambda) in [0.9, 0.99, 0.999, 0.9999].iter().enumerate() {
+            let _ = writeln!(
+                csv,
+                "S{s},m{m},{},0.{},{lambda}",
+                1 + (m * 2 + s) % 6,
+                m + 2
+            );
+        }
+    }
+    let own = analysis_of(&csv);
+    for word in [
+        "Fig. 1",
+        "validation recording",
+        "λ",
+        "lambda",
+        "activeness",
+    ] {
+        for text in [words(&html(&foreign)), told(&foreign)] {
+            assert!(!text.contains(word), "{word}: {text}");
+        }
+    }
+    let text = words(&html(&own));
+    for said in [
+        "as in Fig. 10 of Colton &amp; Hollerbach (World Haptics 2007)",
+        "validation recording",
+        "ladder of λ",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+}
+
+#[test]
+fn shared_vaf_explains_the_smallest_p() {
+    let models = [("a", 0.7), ("b", 0.7), ("c", 0.8), ("d", 0.95)];
+    let rate = |s: usize, m: usize, k: usize| 1.0 + ((m + s * k) % 4 + m) as f64;
+    let a = analysis_of(&ratings(5, &models, rate));
+    let b = analysis_of(&ratings(5, &FIVE, rate));
+    for (a, tied) in [(&a, true), (&b, false)] {
+        for text in [words(&html(a)), told(a)] {
+            let said = text.contains("Two realizations share a VAF with another");
+            assert_eq!(said, tied, "{text}");
+        }
+    }
+}
+
+#[test]
+fn friedmans_p_is_accompanied_by_a_closer_one_unless_it_is_exact() {
+    let many = analysis_of(&ratings(30, &FIVE, |s, m, k| {
+        1.0 + ((m + s * k + s * m) % 5 + m) as f64
+    }));
+    let few = analysis_of(&ratings_of_three());
+    for (a, exact) in [(&many, false), (&few, true)] {
+        assert_eq!(a.values.number("friedman/exact_p").is_some(), exact);
+        for (text, said) in [
+            (words(&html(a)), "by Iman and Davenport’s F, p "),
+            (told(a), "(Iman–Davenport p "),
+        ] {
+            assert_eq!(text.contains(said), !exact, "{text}");
+        }
+    }
+}
+
+#[test]
+fn correlations_in_warnings_read_as_on_the_page() {
+    let a = analysis_of(&ratings(5, &FIVE, |s, m, _| {
+        [5.0, 2.0, 6.0, 3.0, 4.0][m] + (s % 2) as f64
+    }));
+    let hangs = a
+        .warnings
+        .iter()
+        .find(|w| w.code == "one-realization")
+        .unwrap();
+    assert!(hangs.text.contains("between −."), "{}", hangs.text);
+    assert!(!hangs.text.contains("0."), "{}", hangs.text);
+}
+
+#[test]
+fn letters_are_explained_where_they_stand() {
+    let text = words(&html(&analysis_of(&ratings_of_three())));
+    for letter in ["ε: ", "Generalised η²: ", "W: how", "α: ", "dz: "] {
+        assert!(text.contains(letter), "{letter}: {text}");
+    }
+    assert!(text.contains("Shares are rounded"));
+    let one = words(&html(&analysis_of(&ratings(1, &FIVE, |_, m, k| {
+        1.0 + ((m * k) % 5) as f64
+    }))));
+    assert!(!one.contains("Generalised η²") && !one.contains("Shares are rounded"));
+}

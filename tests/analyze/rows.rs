@@ -1,0 +1,389 @@
+//! Walls: which rows of a study count, and what is said of the others.
+#![allow(clippy::unwrap_used)]
+
+use chrono::DateTime;
+use std::collections::BTreeMap;
+use study::report::text::{Page, comments, page};
+use study::report::{Source, csv};
+use study_base::text::{ModelId, ParticipantId, QuestionId};
+use study_core::analyze::{Analysis, Exclusion, Include, Rules, analyze};
+use study_core::outcome::ratings::Ratings;
+use study_core::outcome::{ParticipantRow, RatingRow, State, Status};
+use study_core::protocol::{Answer, DeviceKind, Role, Unfinished};
+
+fn id(text: &str) -> QuestionId {
+    QuestionId::new(text).unwrap()
+}
+
+fn row(who: &str, model: &str, repetition: u32, rating: i64) -> RatingRow {
+    RatingRow {
+        study: "example".to_owned(),
+        participant: ParticipantId::new(who).unwrap(),
+        session: 1,
+        row: Some(1),
+        trial: 1,
+        block: repetition,
+        position: Some(1),
+        planned_position: 1,
+        model: ModelId::new(model).unwrap(),
+        role: Role::Test,
+        repetition,
+        previous_model: None,
+        practice: false,
+        pilot: false,
+        simulated: false,
+        device_kind: DeviceKind::Simulated,
+        device_id: "d".to_owned(),
+        operator: "lw".to_owned(),
+        tool_version: "0".to_owned(),
+        protocol_version: 1,
+        answers: BTreeMap::from([(id("realism"), Answer::Rating(rating))]),
+        corrected: false,
+        declined: false,
+        remarks: String::new(),
+        reference_s: None,
+        exploration_s: None,
+        response_s: None,
+        strokes: None,
+        least_energy_j: None,
+        switches_per_s: None,
+        clamp_count: None,
+        started_at: None,
+        rated_at: None,
+        attempt: Some(1),
+        status: Status::Ok,
+        vaf: Some(match model {
+            "A" => 0.7,
+            "B" => 0.8,
+            _ => 0.9,
+        }),
+        covariates: BTreeMap::new(),
+    }
+}
+
+fn participant(who: &str, state: State, reason: &str) -> ParticipantRow {
+    ParticipantRow {
+        participant: ParticipantId::new(who).unwrap(),
+        session: 1,
+        state,
+        reason: reason.to_owned(),
+        row: Some(1),
+        pilot: false,
+        simulated: false,
+        erased: false,
+        consent_version: None,
+        protocol_version: 1,
+        trials_done: 3,
+        trials_planned: 3,
+        started_at: DateTime::parse_from_rfc3339("2026-11-20T10:00:00+01:00").ok(),
+        answers: BTreeMap::new(),
+    }
+}
+
+/// Two participants who rate A, B, C as 2, 4, 6 and 3, 4, 7.
+fn two() -> Vec<RatingRow> {
+    let mut rows = Vec::new();
+    for (who, ratings) in [("P01", [2, 4, 6]), ("P02", [3, 4, 7])] {
+        for (model, rating) in ["A", "B", "C"].iter().zip(ratings) {
+            rows.push(row(who, model, 1, rating));
+        }
+    }
+    rows
+}
+
+fn ratings(rows: &[RatingRow], participants: &[ParticipantRow]) -> Ratings {
+    let mut ratings = Ratings::from_rows(rows, &id("realism"));
+    ratings.set_states(participants);
+    ratings
+}
+
+fn source() -> Source {
+    Source {
+        title: "An example".to_owned(),
+        study: Some("example".to_owned()),
+        protocol_version: Some(1),
+        path: "results/example".to_owned(),
+    }
+}
+
+fn shown(a: &Analysis) -> String {
+    let set = Page {
+        width: 100,
+        colour: false,
+    };
+    page(&source(), a, set)
+}
+
+#[test]
+fn real_rows_are_analysed_alone_unless_others_are_asked_for() {
+    let mut rows = two();
+    for (who, pilot) in [("T01", true), ("SIM001", false)] {
+        let mut other = row(who, "A", 1, 7);
+        (other.pilot, other.simulated) = (pilot, !pilot);
+        rows.push(other);
+    }
+    let all = ratings(&rows, &[]);
+    let n = |include| {
+        let rules = Rules {
+            include,
+            ..Rules::default()
+        };
+        let a = analyze(&all, &rules);
+        (
+            a.values.number("desc/A/n").unwrap(),
+            a.counts.excluded.len(),
+        )
+    };
+    let with = |pilot, simulated| Include { pilot, simulated };
+    assert_eq!(n(with(false, false)), (2.0, 2));
+    assert_eq!(n(with(true, false)), (3.0, 1));
+    assert_eq!(n(with(true, true)), (4.0, 0));
+    let a = analyze(&all, &Rules::default());
+    let text = shown(&a);
+    assert!(text.contains("1 row left out (pilot)"), "{text}");
+    assert!(text.contains("1 row left out (simulated)"), "{text}");
+}
+
+#[test]
+fn a_folder_without_participants_is_analysed_under_a_banner() {
+    let mut rows = two();
+    rows.iter_mut().for_each(|r| r.simulated = true);
+    let a = analyze(&ratings(&rows, &[]), &Rules::default());
+    assert_eq!(a.counts.rated, 6);
+    let text = shown(&a);
+    assert!(text.contains("*** NO PARTICIPANTS: 2 simulated"), "{text}");
+}
+
+#[test]
+fn pilots_are_not_mixed_with_rehearsals() {
+    let mut rows = two();
+    for row in &mut rows {
+        row.pilot = row.participant.as_str() == "P01";
+        row.simulated = !row.pilot;
+    }
+    let counts = |simulated| {
+        let rules = Rules {
+            include: Include {
+                pilot: false,
+                simulated,
+            },
+            ..Rules::default()
+        };
+        let a = analyze(&ratings(&rows, &[]), &rules);
+        (a.counts.pilots, a.counts.simulated)
+    };
+    assert_eq!(counts(false), (1, 0));
+    assert_eq!(counts(true), (1, 1));
+}
+
+#[test]
+fn states_decide_and_are_named() {
+    let people = [
+        participant("P01", State::Excluded, "fell asleep"),
+        participant("P02", State::Unfinished, ""),
+    ];
+    let all = ratings(&two(), &people);
+    let a = analyze(&all, &Rules::default());
+    assert_eq!(a.counts.rated, 3);
+    assert!(shown(&a).contains("3 rows left out (excluded: fell asleep)"));
+    let files = csv::tables(&source(), &a);
+    let excluded = files.iter().find(|f| f.name == "excluded.csv").unwrap();
+    assert!(
+        excluded
+            .content
+            .contains("P01,A,1,2,excluded: fell asleep\r\n")
+    );
+    let without = Rules {
+        unfinished: Unfinished::Exclude,
+        ..Rules::default()
+    };
+    let a = analyze(&all, &without);
+    assert_eq!(a.counts.rated, 0);
+    assert_eq!(a.counts.excluded["unfinished"], 3);
+    // Nothing is left, and that is no crash.
+    assert!(shown(&a).contains("0 ratings"));
+}
+
+#[test]
+fn before_the_planned_number_it_is_interim() {
+    let people = [
+        participant("P01", State::Done, ""),
+        participant("P02", State::Done, ""),
+    ];
+    let all = ratings(&two(), &people);
+    let code = |planned| {
+        let rules = Rules {
+            planned: Some(planned),
+            ..Rules::default()
+        };
+        let a = analyze(&all, &rules);
+        a.warnings.iter().any(|w| w.code == "interim")
+    };
+    assert!(code(10));
+    assert!(!code(2));
+}
+
+/// Those who were planned are no pilots: neither beside others nor alone.
+#[test]
+fn pilots_are_none_of_the_planned_participants() {
+    let mut rows = two();
+    for row in &mut rows {
+        row.pilot = row.participant.as_str() == "P01";
+    }
+    let people = [
+        participant("P01", State::Done, ""),
+        participant("P02", State::Done, ""),
+    ];
+    let rules = Rules {
+        planned: Some(2),
+        include: Include {
+            pilot: true,
+            simulated: false,
+        },
+        ..Rules::default()
+    };
+    let a = analyze(&ratings(&rows, &people), &rules);
+    assert_eq!((a.counts.participants, a.counts.finished), (2, 1));
+    let said = a.warnings.iter().find(|w| w.code == "interim").unwrap();
+    assert!(
+        said.text
+            .contains("1 of 2 planned participants has finished"),
+        "{}",
+        said.text
+    );
+    for row in &mut rows {
+        row.pilot = true;
+    }
+    let a = analyze(&ratings(&rows, &people), &rules);
+    let codes: Vec<&str> = a.warnings.iter().map(|w| w.code).collect();
+    assert!(
+        codes.contains(&"no-participants") && !codes.contains(&"interim"),
+        "{codes:?}"
+    );
+}
+
+#[test]
+fn failed_declined_missing_corrected_and_repeated_trials_are_counted() {
+    let mut rows = two();
+    rows[0].status = Status::Failed;
+    rows[1].status = Status::Declined;
+    let why = "no idea".to_owned();
+    rows[1]
+        .answers
+        .insert(id("realism"), Answer::Declined { reason: why });
+    rows[2].status = Status::Missing;
+    rows[2].answers.clear();
+    rows[3].corrected = true;
+    rows[4].attempt = Some(2);
+    let mut practice = row("P02", "Z", 0, 1);
+    practice.practice = true;
+    rows.push(practice);
+    let a = analyze(&ratings(&rows, &[]), &Rules::default());
+    let c = &a.counts;
+    assert_eq!((c.failed, c.declined, c.missing), (1, 1, 1));
+    assert_eq!((c.corrected, c.repeated, c.practice, c.rated), (1, 1, 1, 3));
+    // A failed trial's rating does not count.
+    assert_eq!(a.values.number("desc/A/n"), Some(1.0));
+    assert!(a.values.get("desc/Z/n").is_none());
+    let text = shown(&a).replace('\n', " ");
+    for part in [
+        "1 trial failed",
+        "1 rating declined",
+        "1 trial corrected",
+        "1 practice trial",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
+fn references_anchors_and_repeats_stay_out_of_the_correlation() {
+    let mut rows = two();
+    for who in ["P01", "P02"] {
+        rows.push(row(who, "D", 1, 5));
+        let mut target = row(who, "target", 1, 7);
+        target.role = Role::HiddenReference;
+        rows.push(target);
+        rows.push(row(who, "C2", 1, 5));
+    }
+    let mut all = ratings(&rows, &[]);
+    all.set_duplicates([("C2", "C")]);
+    let rules = Rules {
+        realistic_from: Some(5.0),
+        ..Rules::default()
+    };
+    let a = analyze(&all, &rules);
+    assert_eq!(a.values.number("corr/n_models"), Some(4.0));
+    assert_eq!(a.values.number("desc/target/mean"), Some(7.0));
+    // C was rated 6 and 7, its repeat 5 and 5.
+    assert_eq!(a.values.number("duplicate/C2/mean_diff"), Some(-1.5));
+    assert_eq!(a.values.number("realistic/C/share"), Some(1.0));
+    let text = shown(&a);
+    assert!(text.contains("target (hidden-reference)"), "{text}");
+    assert!(text.contains("C2 (repeats C)"), "{text}");
+}
+
+#[test]
+fn comments_stand_by_realization_and_stay_text() {
+    let mut rows = two();
+    let text = "=1+1 \u{1b}[2J\n\"crisp\" 👍🏽 よかった";
+    rows[2]
+        .answers
+        .insert(id("comment"), Answer::Text(text.to_owned()));
+    rows[0].remarks = "phone rang".to_owned();
+    let a = analyze(&ratings(&rows, &[]), &Rules::default());
+    let set = Page {
+        width: 80,
+        colour: true,
+    };
+    let said = comments(&a, set);
+    assert!(
+        said.contains("\\u{1b}[2J\\n\"crisp\" 👍🏽 よかった"),
+        "{said}"
+    );
+    assert!(said.contains("[remarks] phone rang"), "{said}");
+    let files = csv::tables(&source(), &a);
+    let table = files.iter().find(|f| f.name == "comments.csv").unwrap();
+    // Stored as typed: only quotes are doubled.
+    assert!(
+        table
+            .content
+            .contains("\"=1+1 \u{1b}[2J\n\"\"crisp\"\" 👍🏽 よかった\"")
+    );
+}
+
+#[test]
+fn practice_is_among_the_rows_and_counts_nowhere() {
+    let mut practised = two();
+    let mut warming_up = row("P09", "Z", 0, 7);
+    warming_up.practice = true;
+    warming_up.position = None;
+    practised.insert(2, warming_up);
+    let a = analyze(&ratings(&practised, &[]), &Rules::default());
+    let without = analyze(&ratings(&two(), &[]), &Rules::default());
+    assert_eq!(a.values, without.values);
+    assert_eq!(a.counts.practice, 1);
+    let files = csv::tables(&source(), &a);
+    let used = files.iter().find(|f| f.name == "ratings_used.csv").unwrap();
+    assert_eq!(used.content.lines().count(), 1 + 6 + 1);
+    assert!(
+        used.content.contains("P01,A,1,1,2,0.7,true,\r\n"),
+        "{}",
+        used.content
+    );
+    assert!(
+        used.content.ends_with("P09,Z,0,,7,0.9,false,practice\r\n"),
+        "{}",
+        used.content
+    );
+}
+
+#[test]
+fn a_rule_that_cannot_be_judged_is_named() {
+    let rules = Rules {
+        exclude: vec![Exclusion::HiddenReferenceBelow(5.0)],
+        ..Rules::default()
+    };
+    let a = analyze(&ratings(&two(), &[]), &rules);
+    assert!(shown(&a).contains("the design has no hidden reference"));
+}

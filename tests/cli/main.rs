@@ -1,0 +1,7 @@
+//! What the other commands say, above all of bad input.
+
+mod bad_input;
+mod protocol_check;
+mod protocol_schema;
+#[path = "../support/mod.rs"]
+mod support;

@@ -1,0 +1,120 @@
+//! The shipped realizations in the simulated device: whoever rehearses or tries a
+//! session shall not meet one fault after the other.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::time::Duration;
+use study::device::virtual_device::{Options, VirtualDevice};
+use study::device::{Device, Report, Stimulus};
+use study_base::limits::{Limit, Limits};
+use study_core::outcome::Playback;
+use study_haptics::model::{Realization, file};
+
+/// What the protocols allow for tables without a certificate.
+const UNCERTIFIED_N: f64 = 9.0;
+
+fn shipped() -> BTreeMap<String, Realization> {
+    ["turn-signal", "turn-signal-extended"]
+        .iter()
+        .flat_map(|protocol| fs::read_dir(format!("protocols/{protocol}/models")).unwrap())
+        .map(|entry| {
+            let path = entry.unwrap().path();
+            let text = fs::read_to_string(&path).unwrap();
+            let realization = file::parse(&path.display().to_string(), &text).0.unwrap();
+            (realization.id.clone(), realization)
+        })
+        .collect()
+}
+
+/// Twelve seconds of it; `Err` is the fault.
+fn played(realization: &Realization, options: Options, force_n: f64) -> Result<Playback, String> {
+    let ms = Duration::from_millis;
+    let limits = Limits {
+        force_n: Limit::new(force_n).unwrap(),
+        velocity_mm_s: Limit::new(1000.0).unwrap(),
+    };
+    let mut device = VirtualDevice::new(options);
+    let what = Stimulus::of_table(realization);
+    device.load(&what, limits, ms(0)).unwrap();
+    device.poll(ms(100));
+    device.start(ms(100)).unwrap();
+    let mut reports = device.poll(ms(12_102));
+    if let Some(Report::Fault(said)) = reports.iter().find(|r| matches!(r, Report::Fault(_))) {
+        return Err(said.clone());
+    }
+    device.stop(ms(12_102)).unwrap();
+    reports.extend(device.poll(ms(12_200)));
+    let playback = reports.iter().find_map(|report| match report {
+        Report::Stopped(playback) => Some(*playback),
+        _ => None,
+    });
+    Ok(playback.unwrap())
+}
+
+#[test]
+fn every_shipped_realization_plays_without_a_fault_and_gives_no_energy_to_speak_of() {
+    let shipped = shipped();
+    assert_eq!(shipped.len(), 16);
+    for (id, realization) in shipped {
+        for seed in 0..3 {
+            let options = Options {
+                seed,
+                ..Options::default()
+            };
+            let playback = played(&realization, options, UNCERTIFIED_N).unwrap();
+            // a table that starts on a detent's flank gives a few mJ
+            assert!(
+                playback.least_energy_j > -0.01,
+                "{id}, {seed}: {playback:?}"
+            );
+            assert!(playback.strokes >= 1, "{id}, {seed}: {playback:?}");
+        }
+    }
+}
+
+/// The table of docs/simulation.md.
+/// `cargo test --release --test device_shipped -- --ignored --nocapture`
+#[test]
+#[ignore = "prints a table"]
+fn what_the_device_makes_of_each() {
+    for (id, realization) in shipped() {
+        let branches = [&realization.positive, &realization.negative];
+        let masses = branches.iter().flat_map(|branch| &branch.m_kg);
+        let least = masses.copied().fold(f64::INFINITY, f64::min);
+        let mut line = format!("{id:32} {least:6.2} kg");
+        for (least_mass_kg, force_n) in [
+            (f64::NEG_INFINITY, UNCERTIFIED_N),
+            (Options::default().least_mass_kg, UNCERTIFIED_N),
+            (Options::default().least_mass_kg, 12.0),
+        ] {
+            let playbacks: Vec<_> = (0..20)
+                .map(|seed| {
+                    let options = Options {
+                        seed,
+                        least_mass_kg,
+                        ..Options::default()
+                    };
+                    played(&realization, options, force_n)
+                })
+                .collect();
+            let ended: Vec<&Playback> = playbacks.iter().flatten().collect();
+            let mean = |of: fn(&Playback) -> f64| {
+                ended.iter().map(|p| of(p)).sum::<f64>() / ended.len() as f64
+            };
+            line += &format!(
+                " | {force_n} N: {} trips, {:.3} J, {:.0} switches/s, {:.0} clamps, {:.1} strokes",
+                20 - ended.len(),
+                ended
+                    .iter()
+                    .map(|p| p.least_energy_j)
+                    .fold(f64::INFINITY, f64::min),
+                mean(|p| p.switches_per_s),
+                mean(|p| p.clamp_count as f64),
+                mean(|p| p.strokes as f64),
+            );
+        }
+        println!("{line}");
+    }
+}

@@ -1,0 +1,282 @@
+//! `study identify` on recordings that are not what they should be: one clear error,
+//! or a warning beside the table; never a panic, never a silent table.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
+use assert_cmd::Command;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+use study_haptics::recording;
+
+const NAMES: &str = "t_s,x_mm,v_mm_s,a_m_s2,f_n";
+
+/// t, x, v, a, F of a made-up switch, 4 s at 500 Hz.
+fn rows(sines: &[(f64, f64)]) -> Vec<[f64; 5]> {
+    (0..2000)
+        .map(|i| {
+            let t = f64::from(i) / 500.0;
+            let (mut x, mut v, mut a) = (17.5, 0.0, 0.0);
+            for (hz, mm) in sines {
+                let w = hz * std::f64::consts::TAU;
+                x += mm * (w * t).sin();
+                v += mm * w * (w * t).cos();
+                a -= mm * w * w * (w * t).sin() / 1000.0;
+            }
+            let f = 0.2 * a + 0.01 * v + 6.0 * (x / 2.0).sin() + 0.8 * v.signum();
+            [t, x, v, a, f]
+        })
+        .collect()
+}
+
+fn training() -> Vec<[f64; 5]> {
+    rows(&[(0.5, 12.0), (2.37, 4.0)])
+}
+
+fn text(names: &str, rows: &[[f64; 5]]) -> String {
+    let mut text = format!("{names}\n");
+    for [t, x, v, a, f] in rows {
+        // writing to a String cannot fail
+        let _ = writeln!(text, "{t},{x},{v},{a},{f}");
+    }
+    text
+}
+
+/// Exit code, standard output and standard error with this training recording.
+fn identify(training: &str, more: &[&str]) -> (i32, String, String) {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| -> PathBuf {
+        let path = dir.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let training = file("training.csv", training);
+    let validation = file("validation.csv", &text(NAMES, &rows(&[(1.5, 15.0)])));
+    let output = Command::cargo_bin("study")
+        .unwrap()
+        .arg("identify")
+        .arg(training)
+        .arg("--validate")
+        .arg(validation)
+        .args(["--lambda", "0.98", "--dx", "1"])
+        .args(more)
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (
+        output.status.code().expect("it was not killed"),
+        text(&output.stdout),
+        text(&output.stderr),
+    )
+}
+
+/// An error of the input, and no table.
+fn refused(training: &str, said: &str) {
+    let (code, out, err) = identify(training, &[]);
+    assert_eq!((code, out.as_str()), (1, ""), "{err}");
+    assert!(err.contains(said), "{said:?} in {err}");
+}
+
+/// A table, and a warning beside it, also in the JSON document.
+fn warned(training: &str, said: &str) {
+    let (code, out, err) = identify(training, &[]);
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("VAF"), "{out}");
+    assert!(
+        err.contains("warning: ") && err.contains(said),
+        "{said:?} in {err}"
+    );
+    let (code, out, _) = identify(training, &["--json"]);
+    assert_eq!(code, 0);
+    let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let warnings = document["training"]["warnings"].to_string();
+    assert!(warnings.contains(said), "{said:?} in {warnings}");
+}
+
+#[test]
+fn a_good_recording_has_no_warning() {
+    let (code, _, err) = identify(&text(NAMES, &training()), &[]);
+    assert_eq!((code, err.as_str()), (0, ""));
+}
+
+#[test]
+fn gaps_are_warned_of_and_cannot_be_filtered() {
+    let mut rows = training();
+    rows.drain(300..420);
+    let gappy = text(NAMES, &rows);
+    warned(&gappy, "1 gaps in time, the longest 0.2420 s");
+    let (code, out, err) = identify(&gappy, &["--filter", "30"]);
+    assert_eq!((code, out.as_str()), (1, ""), "{err}");
+    assert!(err.contains("gap"), "{err}");
+}
+
+#[test]
+fn what_is_no_number_is_refused_with_its_line() {
+    for (value, said) in [
+        (
+            f64::NAN,
+            "line 12: f_n is NaN, which cannot be a measurement",
+        ),
+        (f64::INFINITY, "line 12: f_n is inf"),
+    ] {
+        let mut rows = training();
+        rows[10][4] = value;
+        refused(&text(NAMES, &rows), said);
+    }
+    let words = text(NAMES, &training()).replacen(",", ",a\u{1b}[31m", 6);
+    let (code, _, err) = identify(&words, &[]);
+    assert_eq!(code, 1, "{err}");
+    assert!(!err.contains('\u{1b}'), "{err}");
+}
+
+#[test]
+fn a_constant_column_is_refused_or_warned_of() {
+    let constant = |column: usize| {
+        let mut rows = training();
+        for row in &mut rows {
+            row[column] = 3.0;
+        }
+        text(NAMES, &rows)
+    };
+    refused(
+        &constant(1),
+        "x_mm is the same in every row: nothing was measured",
+    );
+    refused(
+        &constant(4),
+        "f_n is the same in every row: nothing was measured",
+    );
+    refused(&constant(0), "time has to increase");
+    warned(&constant(3), "a_m_s2 is the same in every row");
+    // a constant velocity is a motion in one direction
+    refused(&constant(2), "one direction");
+}
+
+#[test]
+fn one_direction_is_refused() {
+    let mut rows = training();
+    rows.retain(|row| row[2] > 0.0);
+    refused(&text(NAMES, &rows), "direction");
+}
+
+#[test]
+fn metres_are_refused_and_a_wrong_unit_of_velocity_is_warned_of() {
+    let scaled = |column: usize, factor: f64| {
+        let mut rows = training();
+        for row in &mut rows {
+            row[column] *= factor;
+        }
+        text(NAMES, &rows)
+    };
+    refused(&scaled(1, 1e-3), "x_mm looks like metres");
+    warned(
+        &scaled(2, 1e-3),
+        "times as fast as v_mm_s says: look at the units",
+    );
+    warned(
+        &scaled(3, 1e3),
+        "times as fast as a_m_s2 says: look at the units",
+    );
+    warned(&scaled(2, -1.0), "look at the units and the sign");
+}
+
+#[test]
+fn swapped_columns_do_not_fit_together() {
+    for (names, column) in [
+        ("t_s,x_mm,a_m_s2,v_mm_s,f_n", "v_mm_s"),
+        ("t_s,f_n,v_mm_s,a_m_s2,x_mm", "v_mm_s"),
+        ("t_s,v_mm_s,x_mm,a_m_s2,f_n", "v_mm_s"),
+        ("t_s,x_mm,v_mm_s,f_n,a_m_s2", "a_m_s2"),
+    ] {
+        let (code, _, err) = identify(&text(names, &training()), &[]);
+        let said = format!("as {column} says: look at the units");
+        assert!(err.contains(&said) || code == 1, "{names}: {err}");
+    }
+    refused(
+        &text("x_mm,t_s,v_mm_s,a_m_s2,f_n", &training()),
+        "time has to increase",
+    );
+}
+
+/// Without v and a nothing has a scale; what is left to tell is how position and force
+/// move, in every recording that is here.
+#[test]
+fn position_and_force_in_each_others_columns_are_doubted_and_no_right_recording_is() {
+    for name in [
+        "recordings/training_a.csv",
+        "recordings/validation_a.csv",
+        "plant/switch_a_1.5hz.csv",
+    ] {
+        let file = fs::File::open(format!("tests/data/{name}")).unwrap();
+        let whole = recording::read(name, std::io::BufReader::new(file)).unwrap();
+        let doubts = |x_mm: &[f64], f_n: &[f64]| {
+            let mut bytes = Vec::from("t_s,x_mm,f_n\n");
+            for ((t, x), f) in whole.t_s.iter().zip(x_mm).zip(f_n) {
+                bytes.extend(format!("{t},{x},{f}\n").bytes());
+            }
+            let read = recording::read(name, &bytes[..]).unwrap();
+            let said = read.warnings.iter().map(ToString::to_string);
+            said.filter(|w| w.contains("look swapped")).count()
+        };
+        assert_eq!(doubts(&whole.x_mm, &whole.f_n), 0, "{name}");
+        assert_eq!(doubts(&whole.f_n, &whole.x_mm), 1, "{name}");
+    }
+    let rows: Vec<[f64; 5]> = training();
+    let names = "t_s,x_mm,ignored,unused,f_n";
+    let swapped = "t_s,f_n,ignored,unused,x_mm";
+    let (_, _, err) = identify(&text(names, &rows), &[]);
+    assert!(!err.contains("look swapped"), "{err}");
+    warned(&text(swapped, &rows), "x_mm and f_n look swapped: f_n is ");
+}
+
+#[test]
+fn one_row_or_none_is_refused() {
+    let all = text(NAMES, &training());
+    let lines = |n: usize| all.lines().take(n).collect::<Vec<_>>().join("\n");
+    refused(&lines(2), "1 rows: a recording has at least 3");
+    refused(&lines(1), "0 rows: a recording has at least 3");
+    refused("", "the file ends before a line of column names");
+    // three rows are a recording, and no stroke
+    let (code, out, err) = identify(&lines(4), &[]);
+    assert_eq!((code, out.as_str()), (1, ""), "{err}");
+}
+
+#[test]
+fn factors_and_increments_out_of_range_are_refused() {
+    let good = text(NAMES, &training());
+    for (flag, value, exit, said) in [
+        (
+            "--lambda",
+            "0",
+            2,
+            "a forgetting factor is above 0 and at most 1",
+        ),
+        (
+            "--lambda",
+            "-0.5",
+            2,
+            "a forgetting factor is above 0 and at most 1",
+        ),
+        (
+            "--lambda",
+            "1.0001",
+            2,
+            "a forgetting factor is above 0 and at most 1",
+        ),
+        ("--dx", "-1", 2, "an increment is a length above 0 mm"),
+        ("--dx", "40", 1, "dx = 40 mm leaves"),
+        ("--dx", "0.0001", 1, "dx = 0.0001 mm"),
+    ] {
+        for method in ["ewls", "constrained"] {
+            let given = format!("{flag}={value}");
+            let (code, out, err) = identify(&good, &[&given, "--method", method]);
+            assert_eq!((code, out.as_str()), (exit, ""), "{given}: {err}");
+            assert!(err.contains(said), "{given}: {err}");
+        }
+    }
+    // the smallest and the largest λ that there are
+    for lambda in ["1e-9", "1"] {
+        let (code, out, err) = identify(&good, &["--lambda", lambda]);
+        assert!(code == 0 && out.contains("VAF") || code == 1, "{err}");
+    }
+}

@@ -1,0 +1,14 @@
+//! From trajectories and recordings to model files.
+
+mod bad_input;
+mod cli;
+mod estimators_switches;
+mod estimators_tables;
+mod golden;
+mod grid;
+mod metamorphic;
+mod record;
+mod shipped;
+#[path = "../support/switches.rs"]
+mod switches;
+mod trajectory;

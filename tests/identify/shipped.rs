@@ -1,0 +1,185 @@
+//! The model files of the protocols are what `protocols/identify.sh` makes, to the
+//! last byte; and a file of this format's first day still reads as it did.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
+use assert_cmd::Command;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::Path;
+use study_haptics::model::{Branch, Provenance, Realization, Trained, file};
+use study_haptics::recording;
+use study_wire::predict::{Direction, Lookup};
+
+const FOLDERS: [&str; 2] = ["turn-signal", "turn-signal-extended"];
+const VALIDATION: &str = "validation-1.5hz";
+
+/// File name → text of one protocol's models.
+fn files(protocols: &Path, protocol: &str) -> BTreeMap<String, String> {
+    fs::read_dir(protocols.join(protocol).join("models"))
+        .unwrap()
+        .map(|entry| {
+            let path = entry.unwrap().path();
+            let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
+            (stem, fs::read_to_string(path).unwrap())
+        })
+        .collect()
+}
+
+fn shipped(protocol: &str) -> BTreeMap<String, Realization> {
+    files(Path::new("protocols"), protocol)
+        .iter()
+        .map(|(stem, text)| {
+            let (realization, findings) = file::parse(stem, text);
+            assert_eq!(findings.faults, []);
+            let realization = realization.unwrap();
+            assert_eq!(realization.id, *stem);
+            (stem.clone(), realization)
+        })
+        .collect()
+}
+
+/// Everything again, from the trajectories. Unoptimised this takes a minute:
+/// `cargo test --release --test identify_shipped -- --ignored`
+#[test]
+#[ignore = "a minute unoptimised"]
+fn the_script_makes_every_file_to_the_last_byte() {
+    let dir = tempfile::tempdir().unwrap();
+    Command::new("sh")
+        .arg("protocols/identify.sh")
+        .env("STUDY", assert_cmd::cargo::cargo_bin!("study"))
+        .env("PROTOCOLS", dir.path())
+        .assert()
+        .success();
+    for protocol in FOLDERS {
+        let made = files(dir.path(), protocol);
+        let shipped = files(Path::new("protocols"), protocol);
+        assert_eq!(
+            shipped.keys().collect::<Vec<_>>(),
+            made.keys().collect::<Vec<_>>()
+        );
+        for (stem, text) in shipped {
+            assert!(text == made[&stem], "{protocol}/{stem}.toml");
+        }
+    }
+}
+
+/// The simulated probe, its filter and the digits of the file are what they were when
+/// the realizations were identified. If this fails for a good reason, raise
+/// `plant::SIMULATION` and run `protocols/identify.sh`.
+#[test]
+fn the_recordings_of_the_shipped_realizations_can_be_made_again_to_the_byte() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("again.csv");
+    Command::cargo_bin("study")
+        .unwrap()
+        .args(["record", "protocols/turn-signal/validation-1.5hz.toml"])
+        .args(["--plant", "b", "--rate", "10000", "--seed", "2", "--out"])
+        .arg(&path)
+        .assert()
+        .success();
+    let made = recording::read("again", BufReader::new(File::open(path).unwrap())).unwrap();
+    for protocol in FOLDERS {
+        for (stem, realization) in shipped(protocol) {
+            let recordings = &realization.provenance.recordings;
+            assert_eq!(recordings[VALIDATION], made.sha256, "{protocol}/{stem}");
+        }
+    }
+}
+
+#[test]
+fn the_shipped_realizations_say_where_they_come_from() {
+    let mut trainings = BTreeSet::new();
+    for (stem, realization) in FOLDERS.into_iter().flat_map(shipped) {
+        let provenance = realization.provenance;
+        assert!(realization.vaf.contains_key(VALIDATION), "{stem}");
+        let note = provenance.note.unwrap();
+        assert!(note.starts_with("simulated, not measured"), "{note}");
+        assert!(
+            note.contains("study record training.toml --plant b --rate 10000 --seed 1"),
+            "{note}"
+        );
+        assert!(provenance.filter.unwrap().ends_with("at 30 Hz"), "{stem}");
+        trainings.insert(provenance.recordings["training"].clone());
+    }
+    assert_eq!(trainings.len(), 1);
+}
+
+/// Colton & Hollerbach 2007, Fig. 11: of the five realizations of the study λ = 0.9995
+/// has the highest VAF, and it falls to both sides.
+#[test]
+fn the_papers_five_have_the_papers_order() {
+    let vafs: Vec<f64> = [0.9991, 0.9993, 0.9995, 0.9997, 0.9999]
+        .iter()
+        .map(|lambda| shipped("turn-signal")[&format!("lambda-{lambda}")].vaf[VALIDATION])
+        .collect();
+    let [a, b, peak, d, e] = vafs[..] else {
+        unreachable!()
+    };
+    assert!(a < b && b < peak && peak > d && d > e, "{vafs:?}");
+}
+
+/// What VAF predicts can only be told where it differs.
+#[test]
+fn the_extended_realizations_are_spread_in_vaf() {
+    let mut vafs: Vec<f64> = shipped("turn-signal-extended")
+        .into_iter()
+        .filter(|(stem, _)| stem.starts_with("lambda-"))
+        .map(|(_, realization)| realization.vaf[VALIDATION])
+        .collect();
+    vafs.sort_by(f64::total_cmp);
+    assert_eq!(vafs.len(), 8);
+    assert!(vafs[7] - vafs[0] > 0.4, "{vafs:?}");
+    // no half of them in a heap
+    assert!(vafs[4] < vafs[7] - 0.05, "{vafs:?}");
+    let anchor = shipped("turn-signal-extended")["spring"].vaf[VALIDATION];
+    assert!(anchor < 0.1, "{anchor}");
+}
+
+/// Do not change this test or its file: a file that somebody has stays readable.
+#[test]
+fn a_version_1_file_reads_as_it_always_did() {
+    let text = fs::read_to_string("tests/golden/model_v1.toml").unwrap();
+    let (realization, findings) = file::parse("model_v1.toml", &text);
+    assert_eq!(findings.faults, []);
+    let zero = vec![0.0, 0.0, 0.0];
+    let expected = Realization {
+        id: "golden-1".into(),
+        provenance: Provenance {
+            method: "ewls".into(),
+            lambda: Some(0.9995),
+            memory_mm: Some(2.25),
+            dx_mm: Some(0.5),
+            resample: Some("hat".into()),
+            filter: Some("Butterworth 2, 20 Hz, zero phase".into()),
+            recordings: [("train \"1\"".to_owned(), "00ff".to_owned())].into(),
+            note: Some("made by hand\nfor this test".into()),
+        },
+        vaf: [
+            ("validation-1.5hz".to_owned(), 0.79),
+            ("other".to_owned(), -11.0),
+        ]
+        .into(),
+        lookup: Lookup::Nearest,
+        direction: Direction::Dahl { delta_mm: 0.6 },
+        trained: Trained {
+            x_mm: [-1.0, 35.25],
+            v_mm_s: 140.0,
+        },
+        x_mm: vec![-0.5, 0.0, 30.0],
+        positive: Branch {
+            m_kg: vec![0.1, -0.2, 1e-7],
+            b_n_s_per_mm: vec![0.01, 0.02, 0.03],
+            k_n_per_mm: zero.clone(),
+            f0_n: vec![-8.9, 0.0, 8.9],
+        },
+        negative: Branch {
+            m_kg: zero.clone(),
+            b_n_s_per_mm: zero.clone(),
+            k_n_per_mm: vec![1.5, -1.5, 2.0],
+            f0_n: zero,
+        },
+    };
+    assert_eq!(realization, Some(expected));
+}

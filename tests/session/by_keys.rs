@@ -1,0 +1,161 @@
+//! Whole sessions in a pseudo-terminal of 80×24, by keys alone.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::support::player::{Did, play};
+use crate::support::{Terminal, changed_protocol, repository, study};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn start(folder: &Path, protocol: &Path) -> Terminal {
+    let path = protocol.to_str().unwrap();
+    let mut terminal = Terminal::start(&["run", path, "--operator", "lw"], folder, 24, 80);
+    terminal.wait_for("Who takes part?");
+    terminal
+}
+
+/// Plays on until the screen contains `text`.
+fn play_until(terminal: &mut Terminal, text: &str) {
+    let mut turns = 0;
+    while !terminal.screen().contains(text) {
+        if play(terminal, "P01") == Did::Waited {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        turns += 1;
+        assert!(
+            turns < 20_000,
+            "`{text}` never comes:\n{}",
+            terminal.screen()
+        );
+    }
+}
+
+/// Opens a dialog by its key and types into it.
+fn dialog(terminal: &mut Terminal, key: &str, title: &str, typed: &str) {
+    terminal.keys(key);
+    terminal.wait_for(title);
+    terminal.keys(typed);
+    terminal.wait_until("the dialog to close", |s| !s.contains(title));
+}
+
+const F2: &str = "\u{1b}OQ";
+const F3: &str = "\u{1b}OR";
+const F4: &str = "\u{1b}OS";
+const F10: &str = "\u{1b}[21~";
+
+/// A session with everything that can happen in it.
+fn eventful(protocol: &Path, id: &str, trials: usize) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut terminal = start(folder.path(), protocol);
+    // a remark while the first trial that counts plays
+    play_until(&mut terminal, "trial 1 of");
+    play_until(&mut terminal, "Enter to rate");
+    dialog(&mut terminal, F2, "Tab who", "motor hums\r");
+    assert!(
+        terminal.screen().contains("Feel the device"),
+        "the remark ended the playback"
+    );
+    play_until(&mut terminal, "trial 2 of");
+    // a bad one
+    play_until(&mut terminal, "Enter to rate");
+    dialog(&mut terminal, F4, "Enter marks it", "somebody came in\r");
+    play_until(&mut terminal, "trial 3 of");
+    // a correction: the newest answer
+    terminal.keys(F3);
+    terminal.wait_for("Correct");
+    terminal.keys("\r");
+    terminal.wait_until("the new answer", |s| s.contains("Enter goes on"));
+    terminal.keys("3\r");
+    terminal.wait_until("the reason", |s| s.contains("Enter corrects"));
+    terminal.keys("mistyped\r");
+    terminal.wait_until("the dialog to close", |s| !s.contains("Enter corrects"));
+    // leave in the middle, and come back
+    terminal.keys(F10);
+    terminal.wait_for("Are you sure?");
+    terminal.keys("y");
+    assert_eq!(terminal.exit_code(), 0);
+    assert!(!terminal.alternate());
+    assert!(
+        terminal.screen().contains("not finished"),
+        "{}",
+        terminal.screen()
+    );
+
+    let mut terminal = start(folder.path(), protocol);
+    play_until(&mut terminal, "Enter closes");
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+
+    let results = folder.path().join("results").join(id);
+    let (code, out, err) = study(&["verify", "results"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+    let (code, out, err) = study(&["status", "results"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+    assert!(out.contains("done"), "{out}");
+    let (code, out, err) = study(&["analyze", "results"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("pilot"), "{out}");
+
+    let mut ratings = csv::Reader::from_path(results.join("ratings.csv")).unwrap();
+    let headers = ratings.headers().unwrap().clone();
+    let column = |name: &str| headers.iter().position(|h| h == name).unwrap();
+    let (status, practice) = (column("status"), column("practice"));
+    let (corrected, pilot) = (column("corrected"), column("pilot"));
+    let rows: Vec<csv::StringRecord> = ratings.records().map(Result::unwrap).collect();
+    let counted: Vec<_> = rows.iter().filter(|r| &r[practice] == "false").collect();
+    assert_eq!(counted.len(), trials);
+    assert!(
+        counted
+            .iter()
+            .all(|r| &r[status] == "ok" && &r[pilot] == "true")
+    );
+    assert_eq!(rows.iter().filter(|r| &r[corrected] == "true").count(), 1);
+    let attempts = fs::read_to_string(results.join("attempts.csv")).unwrap();
+    let again = counted.iter().filter(|r| &r[column("attempt")] == "2");
+    // the simulated device may trip as well, and that trial then comes back too
+    assert!(again.count() >= 1, "{attempts}");
+    assert_eq!(
+        attempts.matches("somebody came in").count(),
+        1,
+        "{attempts}"
+    );
+    assert!(
+        counted
+            .iter()
+            .any(|r| &r[column("remarks")] == "motor hums")
+    );
+    for word in ["mistyped", "motor hums"] {
+        assert!(attempts.contains(word), "{word}");
+    }
+}
+
+#[test]
+fn the_papers_study_with_a_correction_a_remark_a_bad_trial_a_quit_and_a_resume() {
+    eventful(
+        Path::new(&repository("protocols/turn-signal")),
+        "turn-signal",
+        15,
+    );
+}
+
+/// The extended protocol with one repetition and short waits: nobody is tired here.
+fn shortened(folder: &Path) -> PathBuf {
+    let to = folder.join("extended");
+    let changes = [
+        ("repetitions = 3", "repetitions = 1"),
+        (
+            "breaks = { every = 10, at_least_s = 60 }",
+            "breaks = { every = 4, at_least_s = 1 }",
+        ),
+        ("reference_min_s = 3", "reference_min_s = 0"),
+        ("minimum_strokes = 2", "minimum_strokes = 1"),
+    ];
+    changed_protocol("turn-signal-extended", &to, &changes);
+    to
+}
+
+#[test]
+fn the_extended_study_with_the_same_and_its_consent_forms_practice_and_breaks() {
+    let folder = tempfile::tempdir().unwrap();
+    eventful(&shortened(folder.path()), "turn-signal-extended", 10);
+}

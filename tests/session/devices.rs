@@ -1,0 +1,595 @@
+//! Whole sessions by keys on each way to a device.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(clippy::print_stderr, reason = "what is skipped is told")]
+
+use crate::support::player::{Did, play};
+use crate::support::simulator::Simulator;
+use crate::support::{Terminal, changed_protocol, repository, study};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The paper's protocol with one repetition, changed.
+fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
+    let to = folder.join("protocol");
+    let changes = [&[("repetitions = 3", "repetitions = 1")], changes].concat();
+    changed_protocol("turn-signal", &to, &changes);
+    to
+}
+
+/// Plays on until the screen contains `text`; every screen that was seen.
+fn play_until(terminal: &mut Terminal, text: &str) -> Vec<String> {
+    let mut seen: Vec<String> = Vec::new();
+    let mut turns = 0;
+    while !terminal.screen().contains(text) {
+        let screen = terminal.screen();
+        if seen.last() != Some(&screen) {
+            seen.push(screen);
+        }
+        if play(terminal, "P01") == Did::Waited {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        turns += 1;
+        assert!(
+            turns < 20_000,
+            "`{text}` never comes:\n{}",
+            terminal.screen()
+        );
+    }
+    seen
+}
+
+/// A finished session; what was seen, and the rows of ratings.csv by column.
+fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<Row>) {
+    let path = protocol.to_str().unwrap();
+    let mut arguments = vec!["run", path, "--operator", "lw"];
+    arguments.extend(more);
+    let mut terminal = Terminal::start(&arguments, folder, 24, 80);
+    terminal.wait_for("Who takes part?");
+    let seen = play_until(&mut terminal, "Enter closes");
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+    let (code, out, err) = study(&["verify", "results"], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    (
+        seen,
+        ratings(&folder.join("results/turn-signal/ratings.csv")),
+    )
+}
+
+type Row = std::collections::BTreeMap<String, String>;
+
+fn ratings(path: &Path) -> Vec<Row> {
+    let mut file = csv::Reader::from_path(path).unwrap();
+    file.deserialize().map(Result::unwrap).collect()
+}
+
+#[test]
+fn a_session_on_a_child_program_is_real_data_with_telemetry() {
+    if std::process::Command::new("python3")
+        .arg("--version")
+        .output()
+        .is_err()
+    {
+        eprintln!("SKIPPED: python3 is not on this machine");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
+    // the documented example, as if a motor were behind it
+    let example = fs::read_to_string(repository("docs/process_device.py")).unwrap();
+    let real = example.replace(" simulated=True,", "");
+    assert_ne!(real, example);
+    let script = folder.path().join("controller.py");
+    fs::write(&script, real).unwrap();
+    let command = format!("python3 {}", script.display());
+    let (_, rows) = session(folder.path(), &protocol, &["--command", &command]);
+    assert_eq!(rows.len(), 5);
+    for row in &rows {
+        assert_eq!(row["status"], "ok");
+        assert_eq!(row["pilot"], "false");
+        assert_eq!(row["device_kind"], "process");
+        assert_eq!(row["device_id"], "example-1");
+    }
+    let telemetry = folder
+        .path()
+        .join("results/turn-signal/sessions/P01/1/telemetry");
+    assert_eq!(fs::read_dir(telemetry).unwrap().count(), 5);
+}
+
+/// A program that is slow to say hello: what is waited for is on the screen, and a key
+/// leaves. Nothing has been made.
+#[test]
+fn a_program_that_is_slow_to_say_hello_is_waited_for_in_sight() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
+    let path = protocol.to_str().unwrap();
+    let arguments = ["run", path, "--command", "sleep 60"];
+    for key in ["\u{1b}", "q"] {
+        let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
+        terminal.wait_for("Waiting for the device.");
+        terminal.wait_for("`sleep 60` has not said hello yet: 1 of at most 10 s.");
+        terminal.keys(key);
+        terminal.wait_for("Nothing was recorded.");
+        assert!(!terminal.alternate());
+        assert_eq!(terminal.exit_code(), 0);
+    }
+    // one that ends is told with its own words
+    let script = folder.path().join("broken.sh");
+    fs::write(&script, "sleep 1; echo no encoder >&2; exit 7").unwrap();
+    let command = format!("sh {}", script.display());
+    let arguments = ["run", path, "--command", &command];
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 3, "{err}");
+    assert!(
+        err.contains("` has ended with exit status 7; its last words: no encoder"),
+        "{err}"
+    );
+    assert!(!folder.path().join("results").exists());
+}
+
+/// A controller that ends in the middle of a trial: it is no cable that was pulled.
+#[test]
+fn a_program_that_ends_is_told_with_its_status_and_its_last_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
+    let script = folder.path().join("c.sh");
+    let hello = r#"{"say":"hello","format":"study-process/1","id":"c","telemetry":false,"limits":{"force_n":9,"velocity_mm_s":500}}"#;
+    let text = format!(
+        "test -e gone && sleep 60\necho '{hello}'\nwhile read line; do case $line in *load*lambda*) touch gone; echo 'no encoder for lambda-0.9995' >&2; exit 7;; esac; done\n"
+    );
+    fs::write(&script, text).unwrap();
+    let arguments = [
+        "run",
+        protocol.to_str().unwrap(),
+        "--operator",
+        "lw",
+        "--command",
+        "sh c.sh",
+    ];
+    let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
+    terminal.wait_for("Who takes part?");
+    play_until(&mut terminal, "DEVICE TROUBLE");
+    let screen = terminal.screen().replace('┃', "");
+    let words: Vec<&str> = screen.split_whitespace().collect();
+    let screen = words.join(" ");
+    for words in [
+        "`sh c.sh` has ended",
+        "exit status 7",
+        "no encoder",
+        "by hand",
+    ] {
+        assert!(screen.contains(words), "{words}:\n{screen}");
+    }
+    for words in ["cable", "lambda"] {
+        assert!(!screen.contains(words), "{words}:\n{screen}");
+    }
+}
+
+#[test]
+fn info_asks_a_program_who_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = folder.path().join("c.sh");
+    let hello = r#"{"say":"hello","format":"study-process/1","id":"rig-2","telemetry":true,"limits":{"force_n":9,"velocity_mm_s":500}}"#;
+    fs::write(
+        &script,
+        format!("echo '{hello}'\nwhile read line; do :; done\n"),
+    )
+    .unwrap();
+    let ask = ["device", "info", "--command", "sh c.sh"];
+    let (code, out, err) = study(&ask, folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("rig-2") && out.contains("at most 9 N"),
+        "{out}"
+    );
+    let (_, out, _) = study(&[&ask[..], &["--json"]].concat(), folder.path());
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["device"]["id"], "rig-2");
+    // device.toml names it as well as an argument does
+    fs::write(
+        folder.path().join("device.toml"),
+        "[process]\ncommand = [\"sh\", \"c.sh\"]\n",
+    )
+    .unwrap();
+    let (code, out, _) = study(&["device", "info"], folder.path());
+    assert!(code == 0 && out.contains("rig-2"), "{out}");
+    // what a program has no use for is not offered
+    for command in [&["device", "check"][..], &["record", "x.toml"]] {
+        let arguments = [command, &["--command", "sh c.sh"]].concat();
+        let (code, _, err) = study(&arguments, folder.path());
+        assert_eq!(code, 2, "{err}");
+        assert!(err.contains("unexpected argument '--command'"), "{err}");
+    }
+}
+
+/// Samples have a code that names nothing; the codes are for who labels them.
+#[test]
+fn a_session_on_samples_mounted_by_hand_shows_their_codes_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"manual\"")]);
+    let path = protocol.to_str().unwrap();
+    let (code, codes, err) = study(&["device", "codes", path], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let codes: Vec<(&str, &str)> = codes
+        .lines()
+        .map(|line| line.split_once("  ").unwrap())
+        .collect();
+    assert_eq!(codes.len(), 5);
+    let (seen, rows) = session(folder.path(), &protocol, &[]);
+    assert_eq!(rows.len(), 5);
+    // the order of the codes on the screen is that of the realizations in the file
+    let mut asked: Vec<&str> = Vec::new();
+    for screen in &seen {
+        if let Some((_, after)) = screen.split_once("Mount sample ") {
+            let code = after.split('.').next().unwrap();
+            let (code, model) = codes.iter().find(|(c, _)| *c == code).unwrap();
+            if asked.last() != Some(model) {
+                asked.push(model);
+            }
+            assert!(!screen.contains(model), "{code}: {screen}");
+        }
+        assert!(!screen.contains("lambda"), "{screen}");
+    }
+    let felt: Vec<&str> = rows.iter().map(|row| row["model"].as_str()).collect();
+    assert_eq!(asked, felt);
+    for row in &rows {
+        assert_eq!(row["device_kind"], "manual");
+        assert_eq!(row["pilot"], "false");
+        assert!(row["exploration_s"].parse::<f64>().unwrap() > 0.0);
+    }
+}
+
+/// One physical sample among tables, and Esc while it is being mounted.
+#[test]
+fn a_sample_among_tables_is_mounted_and_a_stopped_mounting_comes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let manual = "id = \"lambda-0.9995\"\ndevice = \"manual\"";
+    let protocol = protocol(folder.path(), &[("id = \"lambda-0.9995\"", manual)]);
+    let path = protocol.to_str().unwrap();
+    let mut terminal = Terminal::start(&["run", path, "--operator", "lw"], folder.path(), 24, 80);
+    terminal.wait_for("Who takes part?");
+    play_until(&mut terminal, "Mount sample");
+    terminal.keys("\u{1b}");
+    terminal.wait_for("Operate the real switch");
+    let seen = play_until(&mut terminal, "Enter closes");
+    let mounts = seen.iter().filter(|s| s.contains("Mount sample"));
+    assert!(mounts.count() >= 1);
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+    let rows = ratings(&folder.path().join("results/turn-signal/ratings.csv"));
+    assert_eq!(rows.len(), 5);
+    let mounted = rows.iter().find(|r| r["model"] == "lambda-0.9995").unwrap();
+    assert_eq!((&*mounted["status"], &*mounted["attempt"]), ("ok", "2"));
+}
+
+/// Device on a port, program in a terminal.
+struct Rig {
+    folder: tempfile::TempDir,
+    device: Simulator,
+    terminal: Terminal,
+}
+
+impl Rig {
+    fn start(faults: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let device = Simulator::start(folder.path(), faults);
+        let changes = [
+            ("\"simulated\"", "\"serial\""),
+            // a busy machine loses playbacks of its own
+            (
+                "order = \"blocked\"\n",
+                "order = \"blocked\"\nmax_attempts = 50\n",
+            ),
+        ];
+        let protocol = protocol(folder.path(), &changes);
+        let port = device.port.to_str().unwrap().to_owned();
+        let arguments = [
+            "run",
+            protocol.to_str().unwrap(),
+            "--operator",
+            "lw",
+            "--port",
+            &port,
+        ];
+        let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
+        terminal.wait_for("Who takes part?");
+        Self {
+            folder,
+            device,
+            terminal,
+        }
+    }
+
+    fn to(&mut self, text: &str) {
+        play_until(&mut self.terminal, text);
+    }
+
+    /// Plays to the end; the rows, and the journal's events.
+    fn finish(mut self) -> (Vec<Row>, Vec<serde_json::Value>) {
+        self.to("Enter closes");
+        self.terminal.keys("\r");
+        assert_eq!(self.terminal.exit_code(), 0);
+        let (code, out, err) = study(&["verify", "results"], self.folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        let results = self.folder.path().join("results/turn-signal");
+        let rows = ratings(&results.join("ratings.csv"));
+        assert_eq!(rows.len(), 5);
+        for row in &rows {
+            assert_eq!(row["status"], "ok");
+            assert_eq!(row["device_kind"], "serial");
+            assert_eq!(row["device_id"], "simulated-1");
+            assert_eq!(row["pilot"], "true", "a simulated device is no real data");
+        }
+        let journal = fs::read_to_string(results.join("sessions/P01/1/journal.jsonl")).unwrap();
+        let events = journal
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        let events: Vec<serde_json::Value> = events.collect();
+        no_rating_without_a_playback(&events);
+        (rows, events)
+    }
+}
+
+/// The part of an entry that says what happened.
+fn event(entry: &serde_json::Value) -> &serde_json::Value {
+    if entry["event"].is_string() {
+        entry
+    } else {
+        &entry["event"]
+    }
+}
+
+fn no_rating_without_a_playback(entries: &[serde_json::Value]) {
+    let mut ended = std::collections::BTreeSet::new();
+    let mut answers = 0;
+    for entry in entries {
+        let event = event(entry);
+        let attempt = |of: &serde_json::Value| (of["trial"].as_u64(), of["attempt"].as_u64());
+        match event["event"].as_str() {
+            Some("playback_ended") => {
+                ended.insert(attempt(event));
+            }
+            Some("answered") => {
+                let place = &event["place"]["trial"];
+                if place.is_object() {
+                    answers += 1;
+                    assert!(ended.contains(&attempt(place)), "{entry}");
+                }
+            }
+            _ => {}
+        }
+    }
+    assert!(answers >= 5, "the journal's form has changed: {answers}");
+}
+
+#[test]
+fn a_session_over_a_port_with_telemetry_that_is_whole() {
+    let rig = Rig::start(&[]);
+    let telemetry = rig
+        .folder
+        .path()
+        .join("results/turn-signal/sessions/P01/1/telemetry");
+    let folder = rig.folder.path().to_owned();
+    // the files are looked at before the folder goes with the rig
+    let mut rig = rig;
+    rig.to("Enter closes");
+    let files: Vec<PathBuf> = fs::read_dir(&telemetry)
+        .unwrap()
+        .map(|f| f.unwrap().path())
+        .collect();
+    assert_eq!(files.len(), 5);
+    let lines: usize = files
+        .iter()
+        .map(|f| fs::read_to_string(f).unwrap().lines().count() - 1)
+        .sum();
+    assert!(folder.exists());
+    let (_, events) = rig.finish();
+    let ended = events
+        .iter()
+        .map(event)
+        .filter(|e| e["event"] == "playback_ended");
+    let (mut samples, mut lost) = (0, 0);
+    for event in ended {
+        samples += event["playback"]["samples"].as_u64().unwrap();
+        lost += event["playback"]["samples_lost"].as_u64().unwrap();
+    }
+    assert!(samples > 0);
+    assert_eq!((samples as usize, lost), (lines, 0));
+}
+
+/// Commissioned in the same folder: the verdict stands in the session.
+#[test]
+fn a_commissioning_is_told_in_the_session_and_a_broken_device_fails_it() {
+    let mut rig = Rig::start(&[]);
+    // the port has one owner
+    let port = rig.device.port.to_str().unwrap().to_owned();
+    let check = ["device", "check", "--save", "--port", &port];
+    let (code, _, err) = study(&check, rig.folder.path());
+    assert_eq!(code, 3);
+    assert!(err.contains("another program has it"), "{err}");
+    rig.to("Operate the real switch");
+    drop(rig.terminal);
+    // a busy machine may fail a time limit
+    let tries = (0..4).map(|_| study(&check, rig.folder.path()));
+    let (_, out, _) = tries.into_iter().find(|(code, ..)| *code == 0).unwrap();
+    assert!(out.contains("26 of 26 clauses kept"), "{out}");
+    let protocol = rig.folder.path().join("protocol");
+    let arguments = [
+        "run",
+        protocol.to_str().unwrap(),
+        "--operator",
+        "lw",
+        "--port",
+        &port,
+    ];
+    let mut terminal = Terminal::start(&arguments, rig.folder.path(), 24, 80);
+    terminal.wait_for("Who takes part?");
+    terminal.keys("\u{15}P02\r");
+    terminal.wait_for("Operate the real switch");
+    drop(terminal);
+    let journal = rig
+        .folder
+        .path()
+        .join("results/turn-signal/sessions/P02/1/journal.jsonl");
+    let journal = fs::read_to_string(journal).unwrap();
+    assert!(journal.contains("\"device_check\":\""), "{journal}");
+    assert!(
+        journal.contains("26 of 26 clauses kept; round trip"),
+        "{journal}"
+    );
+    drop(rig.device);
+
+    let folder = tempfile::tempdir().unwrap();
+    let device = Simulator::start(folder.path(), &["--flaw", "takes-bad-tables"]);
+    let port = device.port.to_str().unwrap();
+    let check = ["device", "check", "--json", "--port", port];
+    let mut tries = (0..4).map(|_| study(&check, folder.path()));
+    let alone = |(_, _, err): &(i32, String, String)| err.contains("clause 8.3 of docs/wire.md");
+    let (code, out, _) = tries.find(alone).expect("the planted defect alone");
+    assert_eq!(code, 3, "{out}");
+    let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["format"], "study-device-check/1");
+    assert_eq!(document["pass"], false);
+    assert_eq!(document["device"]["serial"], "simulated-1");
+}
+
+/// The cable comes out while a table is waited for, while it plays, while the rating
+/// is typed and between two trials, and the device loses its power while it plays.
+#[test]
+fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
+    let mut rig = Rig::start(&[]);
+    // before the first trial
+    rig.to("Operate the real switch");
+    rig.device.control("unplug");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    assert!(
+        rig.terminal.screen().contains("unplugged"),
+        "{}",
+        rig.terminal.screen()
+    );
+    rig.device.control("plug");
+    // while it plays
+    rig.to("Enter to rate");
+    rig.device.control("unplug");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    rig.device.control("plug");
+    // while the rating is typed: it is not disturbed
+    rig.to("1–7 choose");
+    rig.device.control("unplug");
+    rig.terminal.keys("6\r");
+    rig.terminal
+        .wait_until("the rating to be taken", |s| !s.contains("1–7 choose"));
+    // the next trial has to wait for the device
+    rig.to("DEVICE TROUBLE");
+    rig.device.control("plug");
+    // power, while it plays
+    rig.to("Enter to rate");
+    rig.device.control("reset");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    // the stop button of the device
+    rig.to("Enter to rate");
+    rig.device.control("trip");
+    rig.terminal.wait_for("DEVICE TROUBLE");
+    let (rows, events) = rig.finish();
+    assert!(rows.iter().any(|row| row["realism"] == "6"));
+    let failed = events
+        .iter()
+        .map(event)
+        .filter(|e| e["event"] == "attempt_failed");
+    assert!(failed.count() >= 3);
+}
+
+/// One frame in fifty is damaged, lost, doubled or late, each way.
+#[test]
+fn a_bad_line_costs_telemetry_and_no_answer() {
+    let faults = ["corrupt", "drop", "duplicate", "reorder", "delay"];
+    let faults: Vec<String> = faults.iter().map(|f| format!("{f}=0.005")).collect();
+    let faults: Vec<&str> = faults.iter().flat_map(|f| ["--fault", f]).collect();
+    let rig = Rig::start(&faults);
+    let (rows, _) = rig.finish();
+    assert_eq!(rows.len(), 5);
+}
+
+/// `study record` with a probe at a port: a recording that can be identified.
+#[test]
+fn a_recording_over_a_port_can_be_identified() {
+    let folder = tempfile::tempdir().unwrap();
+    let device = Simulator::start(folder.path(), &[]);
+    let port = device.port.to_str().unwrap();
+    let trajectory = folder.path().join("short.toml");
+    let text = "format = \"study-trajectory/1\"\noffset_mm = 17.5\nduration_s = 4.0\nramp_s = 1.0\n[[parts]]\nkind = \"sine\"\namplitude_mm = 14.0\nfrequency_hz = 0.7\n";
+    fs::write(&trajectory, text).unwrap();
+    // a busy machine may starve the probe
+    let record = |arguments: &[&str]| {
+        let mut tries = (0..4).map(|_| study(arguments, folder.path()));
+        tries.find(|(code, ..)| *code == 0).expect("a recording")
+    };
+    let first = [
+        "--device",
+        "serial",
+        "--port",
+        port,
+        "--out",
+        "training.csv",
+    ];
+    let (_, _, err) = record(&[&["record", "short.toml"][..], &first].concat());
+    assert!(err.contains("wrote training.csv"), "{err}");
+    let training = fs::read_to_string(folder.path().join("training.csv")).unwrap();
+    let header = training.lines().next().unwrap();
+    assert!(header.contains("simulated, not measured"), "{header}");
+    // the command of the header can be run as it is written
+    let (_, command) = header.split_once("; ").unwrap();
+    let (command, _) = command.split_once(" (study ").unwrap();
+    assert_eq!(
+        command,
+        format!(
+            "study record short.toml --device serial --port {port} --rate 1000 --max-force 12 --filter 30"
+        )
+    );
+    let words: Vec<&str> = command.split(' ').skip(1).collect();
+    let (_, probe, _) = record(&words);
+    assert_eq!(probe.lines().next().unwrap(), header);
+    fs::write(folder.path().join("probe.csv"), probe).unwrap();
+    let (code, _, err) = study(&["record", "short.toml", "--port", port], folder.path());
+    assert_eq!(code, 2, "{err}");
+    let identify = [
+        "identify",
+        "training.csv",
+        "--validate",
+        "probe.csv",
+        "--method",
+        "ewls",
+    ];
+    let (code, out, err) = study(&identify, folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+}
+
+#[test]
+fn what_is_wrong_with_a_port_is_said_before_anything_is_created() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = protocol(folder.path(), &[("\"simulated\"", "\"serial\"")]);
+    let path = protocol.to_str().unwrap();
+    let (code, _, err) = study(&["run", path], folder.path());
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("needs a port") && err.contains("--port"),
+        "{err}"
+    );
+    let (code, _, err) = study(&["run", path, "--port", "/dev/no-such-port"], folder.path());
+    assert_eq!(code, 3);
+    assert!(
+        err.contains("/dev/no-such-port: there is no such port"),
+        "{err}"
+    );
+    let file = folder.path().join("file");
+    fs::write(&file, "x").unwrap();
+    let (code, _, err) = study(
+        &["run", path, "--port", file.to_str().unwrap()],
+        folder.path(),
+    );
+    assert_eq!(code, 3);
+    assert!(err.contains("it is no serial port"), "{err}");
+    assert_eq!(fs::read(&file).unwrap(), b"x");
+    assert!(!folder.path().join("results").exists());
+}

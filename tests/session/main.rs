@@ -1,0 +1,16 @@
+//! A session from the first screen to the last: state machine, terminal, kills.
+
+mod by_keys;
+#[path = "../support/designs.rs"]
+mod designs;
+mod devices;
+mod flow;
+mod kill;
+mod rehearsed;
+#[path = "../support/mod.rs"]
+mod support;
+mod tui_hostile;
+mod tui_keys;
+mod tui_pictures;
+mod tui_terminal;
+mod views;

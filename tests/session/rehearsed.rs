@@ -1,0 +1,121 @@
+//! Whole studies without people, through the real binary.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::support::{repository, study};
+use std::fs;
+use std::path::Path;
+
+fn rehearse(folder: &Path, protocol: &str, more: &[&str]) -> String {
+    let path = repository(protocol);
+    let mut arguments = vec!["rehearse", &path, "--out", "r", "--telemetry", "20"];
+    arguments.extend(more);
+    let (code, out, err) = study(&arguments, folder);
+    assert_eq!(code, 0, "{out}{err}");
+    let (code, out, err) = study(&["verify", "r"], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    out
+}
+
+/// Samples are mounted by simulated hands; what needs a table and has none is refused
+/// before anything is made.
+#[test]
+fn a_study_of_samples_can_be_rehearsed() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = folder.path().join("protocol.toml");
+    let text = "format = \"study-protocol/1\"\n[study]\nid = \"samples\"\ntitle = \"t\"\nseed = 4\n\
+        [design]\nparticipants = 4\nrepetitions = 2\norder = \"shuffled\"\n[device]\nkind = \"manual\"\n\
+        [[models]]\nid = \"soft\"\n[[models]]\nid = \"hard\"\n[[questions]]\nid = \"realism\"\n\
+        kind = \"rating\"\nprompt = \"How?\"\nfrom = 1\nto = 7\n[analysis]\nprimary = \"realism\"\n";
+    fs::write(&protocol, text).unwrap();
+    let arguments = ["rehearse", "protocol.toml", "--participants", "2"];
+    let (code, out, err) = study(&arguments, folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.starts_with("2 simulated participants, 8 rated trials"),
+        "{out}"
+    );
+    let process = text.replace(
+        "kind = \"manual\"",
+        "kind = \"process\"\nlimits = { force_n = 9.0, velocity_mm_s = 500.0 }",
+    );
+    fs::write(&protocol, process).unwrap();
+    let arguments = [&arguments[..], &["--out", "other"]].concat();
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 1, "{err}");
+    assert!(
+        err.contains("model `soft` has no table for a simulated device"),
+        "{err}"
+    );
+    assert!(!folder.path().join("other").exists());
+}
+
+#[test]
+fn a_study_with_a_failing_device_ends_and_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let more = ["--participants", "2", "--faults"];
+    rehearse(folder, "protocols/turn-signal-extended", &more);
+    let attempts = fs::read_to_string(folder.join("r/turn-signal-extended/attempts.csv")).unwrap();
+    for met in [
+        "device-fault",
+        "the device refuses the table",
+        "it does not answer any more",
+        "unplugged",
+    ] {
+        assert!(attempts.contains(met), "`{met}` was never met");
+    }
+    let ratings = folder.join("r/turn-signal-extended/ratings.csv");
+    let mut ratings = csv::Reader::from_path(ratings).unwrap();
+    let headers = ratings.headers().unwrap().clone();
+    let column = |name: &str| headers.iter().position(|h| h == name).unwrap();
+    for row in ratings.records() {
+        let row = row.unwrap();
+        assert_eq!(&row[column("simulated")], "true");
+        assert!(
+            ["ok", "failed"].contains(&&row[column("status")]),
+            "{row:?}"
+        );
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_and_another_seed_other_ratings_in_the_same_orders() {
+    let read = |seed: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let more = ["--participants", "2", "--seed", seed];
+        rehearse(folder.path(), "protocols/turn-signal", &more);
+        let study = folder.path().join("r/turn-signal");
+        let journal = study.join("sessions/SIM002/1/journal.jsonl");
+        let ratings = csv::Reader::from_path(study.join("ratings.csv"))
+            .unwrap()
+            .into_records()
+            .map(|r| r.unwrap().iter().map(str::to_owned).collect::<Vec<_>>())
+            .collect::<Vec<_>>();
+        (fs::read(journal).unwrap(), ratings)
+    };
+    let (journal, ratings) = read("1");
+    assert_eq!((journal.clone(), ratings.clone()), read("1"));
+    let (other_journal, other_ratings) = read("2");
+    assert_ne!(journal, other_journal);
+    // study … trial … model: the ninth column
+    let models = |rows: &[Vec<String>]| rows.iter().map(|r| r[8].clone()).collect::<Vec<_>>();
+    assert_eq!(models(&ratings), models(&other_ratings));
+}
+
+#[test]
+fn people_and_rehearsals_do_not_mix() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    rehearse(folder, "protocols/turn-signal", &["--participants", "1"]);
+    let path = repository("protocols/turn-signal");
+    let again = ["rehearse", &path, "--participants", "1", "--out", "r"];
+    let (code, _, err) = study(&again, folder);
+    assert_eq!(code, 4, "{err}");
+    assert!(err.contains("already holds 1 rehearsed session"), "{err}");
+    let (code, out, _) = study(&["analyze", "r", "--json"], folder);
+    assert_eq!(code, 0);
+    let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["format"], "study-analysis/1");
+    assert_eq!(document["values"]["design/n_ratings"], 15.0);
+}

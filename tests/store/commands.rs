@@ -1,0 +1,384 @@
+//! `study status`, `verify`, `participant` and `amend`, as commands.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::world::{at, real, session, telemetry};
+use assert_cmd::Command;
+use predicates::prelude::*;
+use std::path::{Path, PathBuf};
+use study_core::outcome::Event;
+use study_core::store::{Frozen, StudyFolder};
+
+/// A study of the repository's protocol with a finished and an unfinished session.
+fn turn_signal(results: &Path) -> PathBuf {
+    let loaded = study::cli::load::load(Path::new("protocols/turn-signal")).unwrap();
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let folder = StudyFolder::open_or_create(results, &frozen, at(0)).unwrap();
+    for (id, count) in [("P01", 99), ("P02", 14)] {
+        let mut claimed = folder.claim(&real(id)).unwrap();
+        let mut journal = claimed.folder.journal().unwrap();
+        let mut events = session(id, 1, claimed.seat);
+        if let Event::SessionStarted(start) = &mut events[0] {
+            start.fingerprints = loaded.fingerprints.clone();
+        }
+        for (event, n) in events.iter().zip(0..).take(count) {
+            journal.append(at(n), event).unwrap();
+        }
+        let taken = events.len().min(count);
+        telemetry(claimed.folder.path(), &events[..taken]);
+    }
+    folder.refresh(&loaded.protocol).unwrap();
+    folder.path().to_owned()
+}
+
+fn study_command() -> Command {
+    Command::cargo_bin("study").unwrap()
+}
+
+#[test]
+fn status_tells_who_is_done_and_no_order() {
+    let results = tempfile::tempdir().unwrap();
+    turn_signal(results.path());
+    let said = study_command()
+        .arg("status")
+        .arg(results.path())
+        .assert()
+        .success();
+    let text = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    for part in [
+        "P01",
+        "done",
+        "3/3",
+        "P02",
+        "unfinished",
+        "1/3",
+        "10 planned",
+        "Next free row: 3",
+    ] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    assert!(!text.contains("lambda"), "{text}");
+}
+
+#[test]
+fn verify_is_content_until_a_bit_flips() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    study_command()
+        .arg("verify")
+        .arg(results.path())
+        .assert()
+        .success();
+    let journal = folder.join("sessions/P01/1/journal.jsonl");
+    let mut bytes = std::fs::read(&journal).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&journal, bytes).unwrap();
+    study_command()
+        .arg("verify")
+        .arg(results.path())
+        .assert()
+        .code(4)
+        .stdout(predicate::str::contains(
+            "sessions/P01/1: journal.jsonl, line",
+        ));
+}
+
+#[test]
+fn analyze_and_status_warn_of_a_damaged_journal_and_an_altered_protocol() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    for command in ["status", "analyze"] {
+        study_command()
+            .arg(command)
+            .arg(results.path())
+            .assert()
+            .success()
+            .stderr(predicate::str::contains("warning").not());
+    }
+    let journal = folder.join("sessions/P01/1/journal.jsonl");
+    let mut bytes = std::fs::read(&journal).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&journal, bytes).unwrap();
+    let frozen = folder.join("protocol/1/protocol.toml");
+    let text = std::fs::read_to_string(&frozen).unwrap();
+    std::fs::write(&frozen, text.replace("realistic", "plausible")).unwrap();
+    let journal = predicate::str::contains("sessions/P01/1: journal.jsonl, line");
+    let protocol = predicate::str::contains("protocol/1/protocol.toml: it is not the file");
+    for command in ["status", "analyze"] {
+        study_command()
+            .arg(command)
+            .arg(results.path())
+            .assert()
+            .success()
+            .stderr(journal.clone())
+            .stderr(protocol.clone())
+            .stderr(predicate::str::contains("hint: `study verify"));
+    }
+    let said = study_command()
+        .args(["analyze", "--json"])
+        .arg(results.path())
+        .assert()
+        .success();
+    let json: serde_json::Value = serde_json::from_slice(&said.get_output().stdout).unwrap();
+    let told = json["warnings"].as_array().unwrap().iter().any(|w| {
+        w["code"] == "damaged-results" && w["text"].as_str().unwrap().contains("sessions/P01/1")
+    });
+    assert!(told, "{}", json["warnings"]);
+}
+
+#[test]
+fn participant_sets_a_state_and_refuses_what_is_no_id() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let set = |id: &str, state: &str| {
+        let mut command = study_command();
+        command.arg("participant").arg(results.path()).arg(id);
+        command.args(["--state", state, "--reason", "test \u{1b}[2J"]);
+        command
+    };
+    set("../../x", "excluded")
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("is no participant id"));
+    set("P03", "excluded")
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("no participant `P03`"));
+    set("P02", "dropped-out")
+        .assert()
+        .success()
+        .stdout(predicate::str::contains(
+            "Row 2 goes to the next participant",
+        ));
+    set("P01", "withdrawn")
+        .arg("--erase")
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("erased"));
+    let table = std::fs::read_to_string(folder.join("participants.csv")).unwrap();
+    assert!(table.contains("P02,1,dropped-out,"), "{table}");
+    study_command()
+        .arg("status")
+        .arg(results.path())
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("\u{1b}").not());
+    study_command()
+        .arg("verify")
+        .arg(results.path())
+        .assert()
+        .success();
+}
+
+#[test]
+fn erasing_leaves_nothing_in_the_analysis_and_says_so_twice() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    study_command()
+        .arg("analyze")
+        .arg(results.path())
+        .assert()
+        .success();
+    let used = folder.join("analysis/ratings_used.csv");
+    assert!(std::fs::read_to_string(&used).unwrap().contains("P01"));
+    let erase = |state: &str| {
+        let mut command = study_command();
+        command.arg("participant").arg(results.path()).arg("P01");
+        command.args(["--state", state, "--reason", "asked", "--erase"]);
+        command.assert()
+    };
+    erase("excluded")
+        .code(1)
+        .stderr(predicate::str::contains("exclusion keeps the data"))
+        .stderr(predicate::str::contains("--state withdrawn --erase"));
+    assert!(folder.join("sessions/P01/1/journal.jsonl").exists());
+    erase("withdrawn")
+        .success()
+        .stdout(predicate::str::contains("cannot be brought back"))
+        .stdout(predicate::str::contains("analysis/ held some of it"));
+    assert!(!folder.join("analysis").exists());
+    erase("withdrawn")
+        .success()
+        .stdout(predicate::str::contains("was erased already, on 20"))
+        .stdout(predicate::str::contains("Nothing of theirs was left"));
+}
+
+#[test]
+fn a_session_that_is_gone_is_told_and_not_dropped_unasked() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let verify = |more: &[&str]| {
+        let mut command = study_command();
+        command.arg("verify").arg(results.path()).args(more);
+        command.assert()
+    };
+    std::fs::remove_dir_all(folder.join("sessions/P02")).unwrap();
+    let names = "participants.csv names P02, whose journal is not there";
+    verify(&[]).code(4).stdout(predicate::str::contains(names));
+    study_command()
+        .arg("analyze")
+        .arg(results.path())
+        .assert()
+        .success()
+        .stderr(predicate::str::contains(names));
+    let table = || std::fs::read_to_string(folder.join("participants.csv")).unwrap();
+    verify(&["--rebuild"])
+        .code(4)
+        .stderr(predicate::str::contains("the tables name P02"))
+        .stderr(predicate::str::contains("--rebuild --drop-missing"));
+    assert!(table().contains("P02"));
+    verify(&["--drop-missing"]).code(2);
+    verify(&["--rebuild", "--drop-missing"]).success();
+    assert!(!table().contains("P02"));
+    // A journal that is gone from a folder that stayed is the same.
+    std::fs::remove_file(folder.join("sessions/P01/1/journal.jsonl")).unwrap();
+    verify(&[]).code(4).stdout(predicate::str::contains(
+        "names P01, whose journal is not there",
+    ));
+}
+
+#[test]
+fn verify_misses_telemetry_that_the_journal_counts_and_says_what_it_does_not_check() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let verify = || {
+        let mut command = study_command();
+        command.arg("verify").arg(results.path());
+        command.assert()
+    };
+    verify()
+        .success()
+        .stdout(predicate::str::contains("telemetry").count(1))
+        .stdout(predicate::str::contains(
+            "Not checked: the numbers in telemetry files",
+        ));
+    let file = folder.join("sessions/P01/1/telemetry/002-a1.csv");
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &whole[..whole.len() - 20]).unwrap();
+    verify().success().stdout(predicate::str::contains(
+        "002-a1.csv: 3248 of the 3250 samples",
+    ));
+    std::fs::write(
+        &file,
+        "somebody's notes, longer than the header of a telemetry file\n",
+    )
+    .unwrap();
+    verify().code(4).stdout(predicate::str::contains(
+        "002-a1.csv: it is not what study writes",
+    ));
+    std::fs::remove_file(&file).unwrap();
+    verify()
+        .code(4)
+        .stdout(predicate::str::contains("002-a1.csv: it is not there"))
+        .stdout(predicate::str::contains("made again").not());
+}
+
+#[test]
+fn an_analysis_is_printed_although_its_tables_have_no_place() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    // A file in the place of the folder stops root too, which no permission does.
+    std::fs::write(folder.join("analysis"), "in the way").unwrap();
+    study_command()
+        .arg("analyze")
+        .arg(results.path())
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("realization"))
+        .stderr(predicate::str::contains(
+            "the tables could not be written: ",
+        ))
+        .stderr(predicate::str::contains("hint: `--out DIR`"));
+    study_command()
+        .arg("analyze")
+        .arg(results.path())
+        .arg("--out")
+        .arg(folder.join("analysis"))
+        .assert()
+        .code(1)
+        .stdout("")
+        .stderr(predicate::str::contains("error: "));
+}
+
+#[test]
+fn amend_keeps_the_old_version_and_refuses_other_stimuli() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let copy = tempfile::tempdir().unwrap();
+    for (name, bytes) in study::cli::load::load(Path::new("protocols/turn-signal"))
+        .unwrap()
+        .files
+    {
+        let path = copy.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
+    let file = copy.path().join("protocol.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let amend = || {
+        let mut command = study_command();
+        command.arg("amend").arg(results.path()).arg(&file);
+        command.args(["--reason", "a clearer prompt"]);
+        command
+    };
+    amend()
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("nothing differs"));
+    let prompt = "reference = \"";
+    assert!(text.contains(prompt));
+    std::fs::write(&file, text.replace(prompt, "reference = \"Please: ")).unwrap();
+    amend()
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("version 2"));
+    assert!(folder.join("protocol/1/protocol.toml").exists());
+    assert!(folder.join("protocol/2/protocol.toml").exists());
+    let design = "repetitions = 3";
+    assert!(text.contains(design));
+    std::fs::write(&file, text.replace(design, "repetitions = 4")).unwrap();
+    amend()
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("stimuli"));
+    study_command()
+        .arg("verify")
+        .arg(results.path())
+        .assert()
+        .success();
+}
+
+#[test]
+fn a_folder_that_is_none_or_of_a_newer_version_is_refused() {
+    let results = tempfile::tempdir().unwrap();
+    for command in ["status", "verify"] {
+        study_command()
+            .arg(command)
+            .arg(results.path())
+            .assert()
+            .code(4)
+            .stderr(predicate::str::contains("no results of a study"));
+    }
+    let folder = turn_signal(results.path());
+    let manifest = folder.join("study.json");
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    std::fs::write(
+        &manifest,
+        text.replace("study-results/1", "study-results/2"),
+    )
+    .unwrap();
+    for command in ["status", "verify"] {
+        study_command()
+            .arg(command)
+            .arg(results.path())
+            .assert()
+            .code(4)
+            .stderr(predicate::str::contains("newer version of study"));
+    }
+}

@@ -1,0 +1,15 @@
+//! The results folder: journals, crashes, ledger, derived tables.
+
+mod commands;
+mod crash;
+#[path = "../support/designs.rs"]
+mod designs;
+mod example_study;
+mod folder;
+mod journal;
+mod memory;
+mod processes;
+#[path = "../support/mod.rs"]
+mod support;
+#[path = "../support/world.rs"]
+mod world;

@@ -1,0 +1,452 @@
+//! Random and mutated frames against a device that plays: no panic, no force above
+//! the limit, and the frame after the noise is understood.
+//!
+//! In virtual time. A million of each kind; `STUDY_FUZZ_FRAMES` asks for another
+//! number, which is for a release build.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::support::{begin, detents};
+use std::time::Duration;
+use study::device::firmware::{Firmware, Options};
+use study_wire::frame::{Decoder, Frame, MAX_BODY};
+use study_wire::message::probe::PathCrc;
+use study_wire::message::{
+    Commit, Few, Heartbeat, Hello, PathBegin, PathChunk, Play, Record, Reply, Request, State, Stop,
+    TableBegin, TableChunk, TableCrc, kind,
+};
+use study_wire::predict::{Direction, Lookup};
+
+/// What went over the wire, and what it did.
+#[derive(Debug, Default)]
+struct Count {
+    frames: u64,
+    accepted: u64,
+    playing: u64,
+    /// Largest force over its limit.
+    most_share: f64,
+    replies: u64,
+}
+
+struct Fuzz {
+    device: Firmware,
+    /// xorshift64*: millions of bytes are drawn.
+    random: u64,
+    at: Duration,
+    decoder: Decoder,
+    sequence: u16,
+    beats: u32,
+    nonce: u32,
+    /// Of the table that was uploaded last.
+    crc: u32,
+    count: Count,
+}
+
+impl Fuzz {
+    fn new(seed: u64) -> Self {
+        Self {
+            device: Firmware::new(Options {
+                seed,
+                servo_hz: 1000.0,
+                ..Options::default()
+            }),
+            random: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15),
+            at: Duration::ZERO,
+            decoder: Decoder::new(),
+            sequence: 0,
+            beats: 0,
+            nonce: 0,
+            crc: 0,
+            count: Count::default(),
+        }
+    }
+
+    fn next(&mut self) -> u64 {
+        self.random ^= self.random >> 12;
+        self.random ^= self.random << 25;
+        self.random ^= self.random >> 27;
+        self.random.wrapping_mul(0x2545_F491_4F6C_DD1D)
+    }
+
+    fn below(&mut self, n: u64) -> u64 {
+        ((u128::from(self.next()) * u128::from(n)) >> 64) as u64
+    }
+
+    fn bytes(&mut self, most: u64) -> Vec<u8> {
+        let len = self.below(most + 1);
+        (0..len).map(|_| self.below(256) as u8).collect()
+    }
+
+    fn float(&mut self) -> f64 {
+        let bits = self.next();
+        match self.below(6) {
+            0 => f64::from_bits(bits),
+            1 => f64::NAN,
+            2 => [0.0, -0.0, f64::INFINITY, 1e308, 1e-308][self.below(5) as usize],
+            3 => 15.0,
+            _ => 0.1 * self.below(400) as f64 - 12.0,
+        }
+    }
+
+    /// A message that a host may send, with fields that it should or should not.
+    fn request(&mut self) -> Request {
+        let word = self.below(1 << 32) as u32;
+        let small = self.below(40) as u16;
+        let clock_ms = self.at.as_millis() as u32;
+        match self.below(20) {
+            0 => Request::Hello(Hello {
+                nonce: self.nonce + self.below(2) as u32,
+            }),
+            1 => Request::TableBegin(TableBegin {
+                nodes: small,
+                lookup: [Lookup::Linear, Lookup::Floor, Lookup::Nearest][self.below(3) as usize],
+                direction: Direction::Play {
+                    delta_mm: self.float(),
+                },
+                range_mm: [self.float(), self.float()],
+                trained_mm_s: self.float(),
+                force_n: self.float(),
+                velocity_mm_s: self.float(),
+                uncertified_n: Some(self.float()),
+            }),
+            2 => Request::TableChunk(TableChunk {
+                first: small,
+                nodes: Few::of(&detents(self.float(), self.float())[..3]),
+            }),
+            3 => Request::TableCommit(Commit { crc: self.crc }),
+            4..=6 => Request::Play(Play {
+                playback: word,
+                crc: self.crc,
+                longest_ms: word % 1_000_000,
+                every: small,
+            }),
+            7 => Request::Stop(Stop { playback: word }),
+            8 => Request::Limp,
+            9..=13 => {
+                self.beats = self.beats.wrapping_add(1);
+                Request::Heartbeat(Heartbeat {
+                    count: self.beats,
+                    deadline_ms: clock_ms.wrapping_add(word % 60),
+                })
+            }
+            14 => Request::Rearm,
+            15 => Request::State,
+            16 => Request::PathBegin(PathBegin {
+                points: u32::from(small),
+                rate_hz: self.float(),
+                force_n: self.float(),
+                velocity_mm_s: self.float(),
+            }),
+            17 => Request::PathChunk(PathChunk {
+                first: u32::from(small),
+                x_nm: Few::of(&[word as i32; 56][..usize::from(small) + 1]),
+            }),
+            18 => Request::PathCommit(Commit { crc: word }),
+            _ => Request::Record(Record {
+                playback: word,
+                crc: self.crc,
+            }),
+        }
+    }
+
+    /// Sends, lets up to two milliseconds pass, and looks at the force.
+    fn send(&mut self, bytes: &[u8]) {
+        self.device.receive(bytes, self.at);
+        self.look();
+        if self.below(4) == 0 {
+            let passed = self.below(3);
+            self.at += Duration::from_millis(passed);
+            self.device.advance(self.at);
+            self.look();
+        }
+        for byte in self.device.take_output() {
+            if let Some(body) = self.decoder.push(byte) {
+                // whatever came in, what goes out is a message
+                Reply::decode(body.unwrap()).unwrap();
+                self.count.replies += 1;
+            }
+        }
+    }
+
+    fn look(&mut self) {
+        let (force_n, limit_n) = (self.device.held_n(), self.device.limit_n());
+        let state = self.device.state();
+        assert!(force_n.abs() <= limit_n && limit_n <= 15.0, "{force_n}");
+        assert!(force_n == 0.0 || state.forceful(), "{force_n} {state:?}");
+        self.count.playing += u64::from(state.forceful());
+        if limit_n > 0.0 {
+            self.count.most_share = self.count.most_share.max(force_n.abs() / limit_n);
+        }
+    }
+
+    fn say(&mut self, request: Request) {
+        self.sequence = self.sequence.wrapping_add(1);
+        self.send(request.frame(self.sequence).as_bytes());
+    }
+
+    fn beat(&mut self) {
+        self.beats = self.beats.wrapping_add(1);
+        let deadline_ms = (self.at.as_millis() as u32).wrapping_add(40);
+        self.say(Request::Heartbeat(Heartbeat {
+            count: self.beats,
+            deadline_ms,
+        }));
+    }
+
+    /// From whatever state to idle, in a connection of its own.
+    fn open(&mut self) {
+        self.say(Request::Limp);
+        self.at += Duration::from_millis(500);
+        self.nonce += 2;
+        self.say(Request::Hello(Hello { nonce: self.nonce }));
+        self.at += Duration::from_millis(100);
+        self.say(Request::Rearm);
+    }
+
+    fn live(&mut self) {
+        for _ in 0..50 {
+            self.beat();
+            self.at += Duration::from_millis(10);
+        }
+        assert!(self.device.state().forceful(), "{:?}", self.device.fault());
+    }
+
+    /// To one that plays a table that pushes hard.
+    fn play(&mut self) {
+        self.open();
+        let mut nodes = detents(0.05, 0.02);
+        for node in &mut nodes {
+            node.positive[3] *= 4.0;
+            node.negative[3] *= 4.0;
+        }
+        let begin = TableBegin {
+            uncertified_n: Some(9.0),
+            ..begin(&nodes)
+        };
+        let mut crc = TableCrc::of(&begin);
+        nodes.iter().for_each(|node| crc.node(node));
+        self.crc = crc.value();
+        self.say(Request::TableBegin(begin));
+        for (i, some) in nodes.chunks(TableChunk::MOST).enumerate() {
+            self.say(Request::TableChunk(TableChunk {
+                first: (i * TableChunk::MOST) as u16,
+                nodes: Few::of(some),
+            }));
+        }
+        self.beat();
+        self.say(Request::TableCommit(Commit { crc: self.crc }));
+        self.say(Request::Play(Play {
+            playback: 1,
+            crc: self.crc,
+            longest_ms: 60_000,
+            every: 1,
+        }));
+        self.live();
+    }
+
+    /// To one that moves the handle along a path.
+    fn record(&mut self) {
+        self.open();
+        let begin = PathBegin {
+            points: 2000,
+            rate_hz: 1000.0,
+            force_n: 15.0,
+            velocity_mm_s: 1000.0,
+        };
+        let x_nm: Vec<i32> = (0..2000).map(|i| 17_500_000 + 6_000 * i).collect();
+        let mut crc = PathCrc::of(&begin);
+        x_nm.iter().for_each(|x| crc.point(*x));
+        self.crc = crc.value();
+        self.say(Request::PathBegin(begin));
+        for (i, some) in x_nm.chunks(PathChunk::MOST).enumerate() {
+            self.say(Request::PathChunk(PathChunk {
+                first: (i * PathChunk::MOST) as u32,
+                x_nm: Few::of(some),
+            }));
+        }
+        self.beat();
+        self.say(Request::PathCommit(Commit { crc: self.crc }));
+        self.say(Request::Record(Record {
+            playback: 1,
+            crc: self.crc,
+        }));
+        self.live();
+    }
+
+    /// After whatever came before: the next frame is understood.
+    fn in_step(&mut self) {
+        self.device.take_output();
+        let at = self.at;
+        self.device.receive(Request::State.frame(77).as_bytes(), at);
+        let mut found = None;
+        for byte in self.device.take_output() {
+            if let Some(Ok(body)) = self.decoder.push(byte) {
+                found = Reply::decode(body).ok();
+            }
+        }
+        assert!(matches!(found, Some((header, Reply::Outcome(_))) if header.sequence == 77));
+    }
+}
+
+fn frames() -> u64 {
+    std::env::var("STUDY_FUZZ_FRAMES").map_or(1_000_000, |frames| frames.parse().unwrap())
+}
+
+/// Valid frames of random bodies: the CRC fits, whatever is in them.
+#[test]
+fn random_frames() {
+    let mut fuzz = Fuzz::new(1);
+    while fuzz.count.frames < frames() {
+        let i = fuzz.count.frames;
+        if i.is_multiple_of(5000) {
+            fuzz.record();
+        } else if i.is_multiple_of(1000) {
+            fuzz.play();
+        }
+        if i.is_multiple_of(10) {
+            fuzz.beat();
+        }
+        let body = match fuzz.below(4) {
+            0 => fuzz.bytes(MAX_BODY as u64),
+            // any bytes behind a header that is one, except that of LIMP
+            1 => {
+                let mut body = vec![1, fuzz.below(0x14) as u8, 0, 0];
+                body.extend(fuzz.bytes(30));
+                if body[1] == kind::LIMP && fuzz.below(50) != 0 {
+                    body[1] = kind::PLAY;
+                }
+                body
+            }
+            _ => {
+                let mut request = fuzz.request();
+                if matches!(request, Request::Limp | Request::Hello(_)) && fuzz.below(50) != 0 {
+                    request = Request::State;
+                }
+                fuzz.sequence = fuzz.sequence.wrapping_add(1);
+                let frame = request.frame(fuzz.sequence);
+                fuzz.count.accepted += 1;
+                fuzz.send(frame.as_bytes());
+                fuzz.count.frames += 1;
+                continue;
+            }
+        };
+        let frame = Frame::of(&body).unwrap();
+        fuzz.send(frame.as_bytes());
+        fuzz.count.frames += 1;
+        if i.is_multiple_of(16) {
+            fuzz.in_step();
+        }
+    }
+    eprintln!("random: {:?}", fuzz.count);
+    assert!(
+        fuzz.count.playing > fuzz.count.frames / 20,
+        "{:?}",
+        fuzz.count
+    );
+    assert_eq!(fuzz.count.most_share, 1.0, "the limit was never reached");
+}
+
+/// What a link does to frames: bits, bytes, pieces.
+#[test]
+fn mutated_frames() {
+    let mut fuzz = Fuzz::new(2);
+    for i in 0..frames() {
+        if i.is_multiple_of(5000) {
+            fuzz.record();
+        } else if i.is_multiple_of(1000) {
+            fuzz.play();
+        }
+        if i.is_multiple_of(10) {
+            fuzz.beat();
+        }
+        let mut request = fuzz.request();
+        if matches!(request, Request::Limp | Request::Hello(_)) && fuzz.below(50) != 0 {
+            request = Request::State;
+        }
+        fuzz.sequence = fuzz.sequence.wrapping_add(1);
+        let mut bytes = request.frame(fuzz.sequence).as_bytes().to_vec();
+        for _ in 0..=fuzz.below(3) {
+            let at = fuzz.below(bytes.len() as u64) as usize;
+            match fuzz.below(6) {
+                0 => bytes[at] ^= 1 << fuzz.below(8),
+                1 => bytes[at] = fuzz.below(256) as u8,
+                2 => {
+                    bytes.remove(at);
+                }
+                3 => bytes.insert(at, fuzz.below(256) as u8),
+                4 => bytes.truncate(at + 1),
+                _ => {
+                    let again = bytes[at..].to_vec();
+                    bytes.extend(again);
+                }
+            }
+            if bytes.is_empty() {
+                bytes.push(0x55);
+            }
+        }
+        fuzz.send(&bytes);
+        fuzz.count.frames += 1;
+        if i.is_multiple_of(16) {
+            fuzz.in_step();
+        }
+    }
+    eprintln!("mutated: {:?}", fuzz.count);
+    assert!(
+        fuzz.count.playing > fuzz.count.frames / 20,
+        "{:?}",
+        fuzz.count
+    );
+    assert_eq!(fuzz.count.most_share, 1.0, "the limit was never reached");
+    assert_ne!(fuzz.device.state(), State::Boot);
+}
+
+/// What a device may send a host: any bytes behind a header that is one. What is a
+/// message is the same message when it is sent on.
+#[test]
+fn random_replies() {
+    let mut fuzz = Fuzz::new(3);
+    let kinds = [
+        kind::ACK,
+        kind::IDENTITY,
+        kind::OUTCOME,
+        kind::PULSE,
+        kind::TELEMETRY,
+        kind::EVENT,
+        kind::RECORDED,
+    ];
+    // the length of each, as far as it is fixed, so that most are not refused for it
+    let lengths = [12, 153, 91, 11, 21, 15, 13];
+    let mut messages = 0u64;
+    for _ in 0..frames() {
+        let which = fuzz.below(7) as usize;
+        let samples = fuzz.below(4) as usize;
+        let mut body = vec![1, kinds[which], 0, 0];
+        let more = match kinds[which] {
+            kind::TELEMETRY => 20 * samples,
+            kind::RECORDED => 12 * samples,
+            _ => 0,
+        };
+        let small = fuzz.below(2) == 0;
+        for i in 0..lengths[which] + more {
+            // small bytes are codes more often than not
+            let byte = fuzz.below(if small && i < 12 { 9 } else { 256 });
+            body.push(byte as u8);
+        }
+        if more > 0 {
+            body[4 + lengths[which] - 1] = samples as u8;
+        }
+        let Ok((header, reply)) = Reply::decode(&body) else {
+            continue;
+        };
+        messages += 1;
+        let frame = reply.frame(header.sequence);
+        let mut decoder = Decoder::new();
+        let again = frame.as_bytes().iter().find_map(|byte| {
+            let body = decoder.push(*byte)?;
+            Some(Reply::decode(body.unwrap()).unwrap())
+        });
+        assert_eq!(again, Some((header, reply)));
+    }
+    eprintln!("random replies: {messages} were messages");
+    assert!(messages > frames() / 10, "{messages}");
+}

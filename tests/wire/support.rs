@@ -1,0 +1,221 @@
+//! A host of a few lines in front of a simulated device, in virtual time.
+
+#![allow(dead_code, reason = "each test uses its part")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::time::Duration;
+use study::device::firmware::{Firmware, Options};
+use study_wire::frame::Decoder;
+use study_wire::message::{
+    Ack, Commit, Few, Heartbeat, Hello, Node, Outcome, Play, Pulse, Refusal, Reply, Request, Stop,
+    TableBegin, TableChunk, TableCrc,
+};
+use study_wire::predict::{Direction, Lookup};
+
+pub(crate) fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+pub(crate) struct Host {
+    pub(crate) device: Firmware,
+    pub(crate) at: Duration,
+    decoder: Decoder,
+    sequence: u16,
+    beats: u32,
+    /// What the device's clock was, ms, when the host's was zero.
+    offset_ms: u32,
+    /// Everything that was not a reply to a request.
+    pub(crate) heard: Vec<Reply>,
+}
+
+impl Host {
+    /// A device 100 ms after power-up.
+    pub(crate) fn new(options: Options) -> Self {
+        let offset_ms = options.clock_ms;
+        let mut device = Firmware::new(options);
+        device.advance(ms(100));
+        Self {
+            device,
+            at: ms(100),
+            decoder: Decoder::new(),
+            sequence: 0,
+            beats: 0,
+            offset_ms,
+            heard: Vec::new(),
+        }
+    }
+
+    /// LIMP, HELLO, REARM.
+    pub(crate) fn opened(options: Options) -> Self {
+        let mut host = Self::new(options);
+        host.open(1);
+        host
+    }
+
+    pub(crate) fn open(&mut self, nonce: u32) {
+        self.ask(Request::Limp);
+        self.ask(Request::Hello(Hello { nonce }));
+        assert_eq!(self.ack(Request::Rearm).refusal, Refusal::None);
+    }
+
+    pub(crate) fn clock_ms(&self) -> u32 {
+        self.offset_ms.wrapping_add(self.at.as_millis() as u32)
+    }
+
+    /// Replies that the device has sent, in order.
+    pub(crate) fn read(&mut self) -> Vec<Reply> {
+        let mut replies = Vec::new();
+        for byte in self.device.take_output() {
+            if let Some(body) = self.decoder.push(byte) {
+                replies.push(Reply::decode(body.unwrap()).unwrap().1);
+            }
+        }
+        replies
+    }
+
+    /// Sends with the next sequence number; the reply to it.
+    pub(crate) fn ask(&mut self, request: Request) -> Reply {
+        self.sequence = self.sequence.wrapping_add(1);
+        self.ask_as(self.sequence, request).unwrap()
+    }
+
+    /// Sends with this sequence number.
+    pub(crate) fn ask_as(&mut self, sequence: u16, request: Request) -> Option<Reply> {
+        self.send(request.frame(sequence).as_bytes())
+    }
+
+    /// Sends bytes; the first reply, if any.
+    pub(crate) fn send(&mut self, bytes: &[u8]) -> Option<Reply> {
+        self.device.receive(bytes, self.at);
+        let mut answer = None;
+        for reply in self.read() {
+            if reply.answers() && answer.is_none() {
+                answer = Some(reply);
+            } else {
+                self.heard.push(reply);
+            }
+        }
+        answer
+    }
+
+    pub(crate) fn ack(&mut self, request: Request) -> Ack {
+        match self.ask(request) {
+            Reply::Ack(ack) => {
+                assert_eq!(ack.request, request.kind());
+                ack
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub(crate) fn beat(&mut self) -> Pulse {
+        self.beats = self.beats.wrapping_add(1);
+        self.beat_as(self.beats, self.clock_ms().wrapping_add(40))
+    }
+
+    pub(crate) fn beat_as(&mut self, count: u32, deadline_ms: u32) -> Pulse {
+        match self.ask(Request::Heartbeat(Heartbeat { count, deadline_ms })) {
+            Reply::Pulse(pulse) => pulse,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub(crate) fn outcome(&mut self) -> Outcome {
+        match self.ask(Request::State) {
+            Reply::Outcome(outcome) => outcome,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Time passes without a word of the host.
+    pub(crate) fn wait(&mut self, lasting: Duration) {
+        self.at += lasting;
+        self.device.advance(self.at);
+        let heard = self.read();
+        self.heard.extend(heard);
+    }
+
+    /// Time passes with a heartbeat every 10 ms.
+    pub(crate) fn live(&mut self, lasting: Duration) {
+        let until = self.at + lasting;
+        while self.at < until {
+            self.beat();
+            self.wait(ms(10).min(until - self.at));
+        }
+    }
+
+    /// The whole upload; the reply to its end, or the first refusal.
+    pub(crate) fn upload(&mut self, begin: TableBegin, nodes: &[Node]) -> (Ack, u32) {
+        let mut crc = TableCrc::of(&begin);
+        nodes.iter().for_each(|node| crc.node(node));
+        let first = self.ack(Request::TableBegin(begin));
+        if first.refusal != Refusal::None {
+            return (first, crc.value());
+        }
+        for (i, some) in nodes.chunks(TableChunk::MOST).enumerate() {
+            let ack = self.ack(Request::TableChunk(TableChunk {
+                first: (i * TableChunk::MOST) as u16,
+                nodes: Few::of(some),
+            }));
+            if ack.refusal != Refusal::None {
+                return (ack, crc.value());
+            }
+        }
+        self.beat();
+        let crc = crc.value();
+        (self.ack(Request::TableCommit(Commit { crc })), crc)
+    }
+
+    pub(crate) fn play(&mut self, playback: u32, crc: u32) -> Ack {
+        self.beat();
+        self.ack(Request::Play(Play {
+            playback,
+            crc,
+            longest_ms: 60_000,
+            every: 4,
+        }))
+    }
+
+    pub(crate) fn stop(&mut self, playback: u32) -> Ack {
+        self.ack(Request::Stop(Stop { playback }))
+    }
+
+    /// A device that has been playing for `lasting`.
+    pub(crate) fn playing(options: Options, lasting: Duration) -> Self {
+        let mut host = Self::opened(options);
+        let nodes = detents(0.05, 0.02);
+        let (ack, crc) = host.upload(begin(&nodes), &nodes);
+        assert_eq!(ack.refusal, Refusal::None, "{ack:?}");
+        assert_eq!(host.play(7, crc).refusal, Refusal::None);
+        host.live(lasting);
+        host
+    }
+}
+
+/// A switch of three detents with friction; m in kg, b in N·s/mm.
+pub(crate) fn detents(m: f64, b: f64) -> Vec<Node> {
+    (2..=33)
+        .map(|x| {
+            let x_mm = f64::from(x);
+            let spring_n = 4.0 * libm::sin((x_mm - 5.0) / 12.5 * std::f64::consts::TAU);
+            Node {
+                x_mm,
+                positive: [m, b, 0.0, spring_n + 1.0],
+                negative: [m, b, 0.0, spring_n - 1.0],
+            }
+        })
+        .collect()
+}
+
+pub(crate) fn begin(nodes: &[Node]) -> TableBegin {
+    TableBegin {
+        nodes: nodes.len() as u16,
+        lookup: Lookup::Linear,
+        direction: Direction::Play { delta_mm: 0.5 },
+        range_mm: [1.5, 33.5],
+        trained_mm_s: 138.0,
+        force_n: 12.0,
+        velocity_mm_s: 1000.0,
+        uncertified_n: None,
+    }
+}

@@ -1,0 +1,463 @@
+//! Version 1 of the wire format, byte by byte.
+//!
+//! The bytes below were written by another implementation than the one that they
+//! test: Python's `struct` and `zlib.crc32`, from the tables of `docs/wire.md`. They
+//! never change: what would change them is version 2.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod replies;
+mod requests;
+
+use self::replies::replies;
+use self::requests::requests;
+use study_wire::frame::{Decoder, crc32};
+use study_wire::handler::{Bounds, Handler, Measured, Profile};
+use study_wire::message::probe::PathCrc;
+use study_wire::message::{
+    Ack, Commit, Event, Fault, Few, Flags, Happening, Heartbeat, Hello, Identity, Loaded, Name,
+    Node, Outcome, PathBegin, PathChunk, Play, Pulse, Record, Recorded, RecordedPoint, Refusal,
+    Reply, Request, State, Stop, TableBegin, TableChunk, TableCrc, Telemetry, TelemetrySample,
+    WireError, fixed, kind,
+};
+use study_wire::predict::{Direction, Lookup, Motion};
+use study_wire::servo::Settings;
+
+/// Of the four nodes of [`chunk`] under [`begin`].
+const TABLE_CRC: u32 = 0xDDE60A90;
+/// Of the three points below.
+const PATH_CRC: u32 = 0xD46CF557;
+
+struct Golden<M> {
+    name: &'static str,
+    sequence: u16,
+    message: M,
+    /// Bytes of each field and what they say, in order: together the body.
+    body: &'static [(&'static str, &'static str)],
+    /// Of the body, as it follows it.
+    crc: &'static str,
+    /// What goes over the wire.
+    frame: &'static str,
+}
+
+fn begin() -> TableBegin {
+    TableBegin {
+        nodes: 4,
+        lookup: Lookup::Linear,
+        direction: Direction::Play { delta_mm: 0.5 },
+        range_mm: [1.5, 33.5],
+        trained_mm_s: 138.0,
+        force_n: 12.0,
+        velocity_mm_s: 1000.0,
+        uncertified_n: None,
+    }
+}
+
+fn nodes() -> [Node; 4] {
+    [
+        (5.0, 0.0, 1.0, -1.0),
+        (10.0, 0.25, -1.5, -3.5),
+        (20.0, -0.5, 11.0, 9.0),
+        (30.0, 0.0, 1.0, -1.0),
+    ]
+    .map(|(x_mm, k, plus, minus)| Node {
+        x_mm,
+        positive: [0.05, 0.01, k, plus],
+        negative: [0.05, 0.01, k, minus],
+    })
+}
+
+fn chunk(first: u16, count: usize) -> Request {
+    let from = usize::from(first);
+    Request::TableChunk(TableChunk {
+        first,
+        nodes: Few::of(&nodes()[from..from + count]),
+    })
+}
+
+fn identity() -> Identity {
+    Identity {
+        nonce: 0xC0FF_EE01,
+        versions: [1, 1],
+        state: State::Idle,
+        fault: Fault::None,
+        flags: Flags {
+            simulated: true,
+            telemetry: true,
+            ..Flags::default()
+        },
+        clock_ms: 12,
+        watchdog_ms: 30,
+        most_nodes: 512,
+        most_points: 0,
+        longest_ms: 600_000,
+        servo_hz: 4000.0,
+        telemetry_hz: 1000.0,
+        force_n: 15.0,
+        velocity_mm_s: 1000.0,
+        stiffness_n_per_mm: 20.0,
+        damping_n_s_per_mm: 0.1,
+        stroke_mm: [-5.0, 40.0],
+        firmware: Name::new("example 1.0"),
+        serial: Name::new("A-0001"),
+    }
+}
+
+fn outcome() -> Outcome {
+    Outcome {
+        state: State::Loaded,
+        fault: Fault::None,
+        loaded: Loaded::Table,
+        clock_ms: 20_000,
+        crc: TABLE_CRC,
+        playback: 7,
+        ticks: 48_000,
+        samples: 12_000,
+        strokes: 11,
+        switches: 95,
+        clamps: 2,
+        slewed: 31,
+        mass_held: 0,
+        energy_j: 0.75,
+        least_energy_j: -0.0625,
+        most_force_n: 12.0,
+        rough_n2: 0.125,
+        limit_n: 12.0,
+        bad_frames: 1,
+        stale_beats: 0,
+    }
+}
+
+fn telemetry() -> Telemetry {
+    let sample = |tick, x_mm, v_mm_s, command_n, measured_n| TelemetrySample {
+        tick,
+        x_nm: fixed::nm(x_mm),
+        v_um_s: fixed::um_s(v_mm_s),
+        command_un: fixed::un(command_n),
+        measured_un: fixed::maybe_un(measured_n),
+    };
+    Telemetry {
+        playback: 7,
+        first: 20,
+        clock_ms: 123_483,
+        strokes: 1,
+        clamps: 0,
+        samples: Few::of(&[
+            sample(80, 17.205, -120.5, -1.25, Some(-1.2)),
+            sample(84, 17.085, -120.0, -1.3, None),
+        ]),
+    }
+}
+
+fn unhex(text: &str) -> Vec<u8> {
+    (0..text.len())
+        .step_by(2)
+        .map(|i| u8::from_str_radix(&text[i..i + 2], 16).unwrap())
+        .collect()
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The only body in a stream.
+fn body_of(stream: &[u8]) -> Vec<u8> {
+    let mut decoder = Decoder::new();
+    let mut found = Vec::new();
+    for byte in stream {
+        if let Some(body) = decoder.push(*byte) {
+            found.push(body.unwrap().to_vec());
+        }
+    }
+    assert_eq!(found.len(), 1);
+    found.remove(0)
+}
+
+fn joined<M>(golden: &Golden<M>) -> Vec<u8> {
+    unhex(
+        &golden
+            .body
+            .iter()
+            .map(|(bytes, _)| *bytes)
+            .collect::<String>(),
+    )
+}
+
+/// Frame, body and CRC of a message are those that are written down; the body.
+fn bytes_agree<M>(golden: &Golden<M>, frame: &[u8]) -> Vec<u8> {
+    assert_eq!(hex(frame), golden.frame, "{}", golden.name);
+    let body = body_of(frame);
+    assert_eq!(body, joined(golden), "{}", golden.name);
+    let crc = hex(&crc32(&body).to_le_bytes());
+    assert_eq!(crc, golden.crc, "{}", golden.name);
+    body
+}
+
+#[test]
+fn every_request_is_the_bytes_of_the_document() {
+    let mut kinds = Vec::new();
+    for golden in requests() {
+        let body = bytes_agree(&golden, golden.message.frame(golden.sequence).as_bytes());
+        let (header, message) = Request::decode(&body).unwrap();
+        assert_eq!(message, golden.message, "{}", golden.name);
+        assert_eq!(header.sequence, golden.sequence);
+        assert_eq!(header.kind, golden.message.kind());
+        kinds.push(header.kind);
+    }
+    kinds.dedup();
+    let all = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0x10, 0x11, 0x12, 0x13];
+    assert_eq!(kinds, all, "a message is not in the list");
+}
+
+#[test]
+fn every_reply_is_the_bytes_of_the_document() {
+    let mut kinds = Vec::new();
+    for golden in replies() {
+        let body = bytes_agree(&golden, golden.message.frame(golden.sequence).as_bytes());
+        let (header, message) = Reply::decode(&body).unwrap();
+        assert_eq!(message, golden.message, "{}", golden.name);
+        assert_eq!(header.sequence, golden.sequence);
+        kinds.push(header.kind);
+    }
+    kinds.dedup();
+    let all = [0x80, 0x81, 0x82, 0x83, 0x90, 0x91, 0x92];
+    assert_eq!(kinds, all, "a message is not in the list");
+}
+
+#[test]
+fn the_crc_over_a_whole_is_that_of_its_fields_in_a_row() {
+    let mut crc = TableCrc::of(&begin());
+    nodes().iter().for_each(|node| crc.node(node));
+    assert_eq!(crc.value(), TABLE_CRC);
+    let mut crc = PathCrc::of(&PathBegin {
+        points: 3,
+        rate_hz: 1000.0,
+        force_n: 20.0,
+        velocity_mm_s: 500.0,
+    });
+    for point in [17_500_000, 17_500_250, -1] {
+        crc.point(point);
+    }
+    assert_eq!(crc.value(), PATH_CRC);
+}
+
+#[test]
+fn a_message_of_any_other_length_is_refused() {
+    for golden in requests() {
+        let body = joined(&golden);
+        for cut in 4..body.len() {
+            assert!(
+                Request::decode(&body[..cut]).is_err(),
+                "{} {cut}",
+                golden.name
+            );
+        }
+        let longer = [&body[..], &[0]].concat();
+        assert_eq!(Request::decode(&longer).unwrap_err(), WireError::Length);
+    }
+    for golden in replies() {
+        let body = joined(&golden);
+        for cut in 4..body.len() {
+            assert!(
+                Reply::decode(&body[..cut]).is_err(),
+                "{} {cut}",
+                golden.name
+            );
+        }
+        let longer = [&body[..], &[0]].concat();
+        assert_eq!(Reply::decode(&longer).unwrap_err(), WireError::Length);
+    }
+}
+
+#[test]
+fn what_a_device_may_not_say_is_no_message() {
+    let spoiled = |reply: Reply, at: usize, bytes: &[u8]| {
+        let mut body = body_of(reply.frame(0).as_bytes());
+        body[at..at + bytes.len()].copy_from_slice(bytes);
+        Reply::decode(&body)
+    };
+    let nan = f64::NAN.to_le_bytes();
+    let zero = 0.0f64.to_le_bytes();
+    // servo rate, force limit, state
+    for (at, bytes) in [(33, &nan[..]), (49, &nan), (49, &zero), (10, &[9])] {
+        let spoilt = spoiled(Reply::Identity(identity()), at, bytes);
+        assert_eq!(spoilt, Err(WireError::Field), "{at}");
+    }
+    // energy
+    let spoilt = spoiled(Reply::Outcome(outcome()), 47, &nan);
+    assert_eq!(spoilt, Err(WireError::Field));
+    // no sample, more samples than there can be
+    for count in [0, 11] {
+        let spoilt = spoiled(Reply::Telemetry(telemetry()), 24, &[count]);
+        assert_eq!(spoilt, Err(WireError::Field));
+    }
+    assert_eq!(Reply::decode(&[2, 0x80, 0, 0]), Err(WireError::Version(2)));
+    assert_eq!(
+        Reply::decode(&[1, 0x05, 0, 0]),
+        Err(WireError::UnknownType(5))
+    );
+    assert_eq!(Reply::decode(&[1, 2, 3]), Err(WireError::Header));
+}
+
+#[test]
+fn a_name_is_cut_between_characters() {
+    let name = Name::new("äöüßäöüßäöüßäöü€€");
+    assert_eq!(name.as_bytes(), "äöüßäöüßäöüßäöü".as_bytes());
+    assert_eq!(Name::new("").as_bytes(), b"");
+    let long = Name::new(&"x".repeat(99));
+    assert_eq!(long.as_bytes().len(), Name::LEN);
+}
+
+/// The device of `docs/wire.md`, chapter 15.
+fn documented() -> Box<Handler<8, 0>> {
+    let identity = identity();
+    Box::new(Handler::new(Profile {
+        firmware: identity.firmware,
+        serial: identity.serial,
+        flags: identity.flags,
+        watchdog_ms: identity.watchdog_ms,
+        longest_ms: identity.longest_ms,
+        telemetry_hz: identity.telemetry_hz,
+        bounds: Bounds {
+            force_n: identity.force_n,
+            velocity_mm_s: identity.velocity_mm_s,
+            stiffness_n_per_mm: identity.stiffness_n_per_mm,
+            damping_n_s_per_mm: identity.damping_n_s_per_mm,
+            stroke_mm: identity.stroke_mm,
+        },
+        servo: Settings::default(),
+        rest_mm_s: 5.0,
+        rest_s: 0.05,
+    }))
+}
+
+/// What the host of the exchange sends, and at what time, ms.
+fn conversation() -> Vec<(u32, u16, Request)> {
+    let beat = |count, deadline_ms| Request::Heartbeat(Heartbeat { count, deadline_ms });
+    vec![
+        (100, 1, Request::Limp),
+        (102, 2, Request::Hello(Hello { nonce: 0xC0FF_EE01 })),
+        (104, 3, Request::Rearm),
+        (106, 4, Request::TableBegin(begin())),
+        (112, 5, chunk(0, 3)),
+        (118, 6, chunk(3, 1)),
+        (120, 0, beat(1, 160)),
+        (121, 7, Request::TableCommit(Commit { crc: TABLE_CRC })),
+        (130, 0, beat(2, 170)),
+        (
+            131,
+            8,
+            Request::Play(Play {
+                playback: 7,
+                crc: TABLE_CRC,
+                longest_ms: 60_000,
+                every: 40,
+            }),
+        ),
+        (140, 0, beat(3, 180)),
+        (150, 0, beat(4, 190)),
+        (160, 9, Request::Stop(Stop { playback: 7 })),
+        // the reply was lost: the same again
+        (162, 9, Request::Stop(Stop { playback: 7 })),
+        (164, 10, Request::State),
+        // and then nothing more is heard of the host
+        (185, 11, Request::State),
+    ]
+}
+
+fn word(message: &str) -> String {
+    let end = message.find(['(', ' ']).unwrap_or(message.len());
+    message[..end].to_owned()
+}
+
+/// What goes over the wire, a line each.
+fn exchange() -> Vec<String> {
+    let mut device = documented();
+    let at_rest = Measured {
+        motion: Motion {
+            x_mm: 10.0,
+            v_mm_s: 0.0,
+            a_m_s2: 0.0,
+        },
+        force_n: None,
+    };
+    let mut lines = Vec::new();
+    let mut requests = conversation();
+    requests.reverse();
+    for now_ms in 0..200 {
+        let mut out = |bytes: &[u8], request: Option<&str>| {
+            if let Some(request) = request {
+                lines.push(format!("{now_ms:3} > {}  {request}", hex(bytes)));
+                return;
+            }
+            let (_, reply) = Reply::decode(&body_of(bytes)).unwrap();
+            let mut what = word(&format!("{reply:?}"));
+            match reply {
+                Reply::Ack(ack) => {
+                    what = format!("Ack {:?} {:?}", ack.refusal, ack.state);
+                }
+                Reply::Event(event) => {
+                    what = format!("Event {:?} {:?} {:?}", event.what, event.state, event.fault);
+                }
+                _ => {}
+            }
+            lines.push(format!("{now_ms:3} < {}  {what}", hex(bytes)));
+        };
+        while requests.last().is_some_and(|(at, ..)| *at == now_ms) {
+            let (_, sequence, request) = requests.pop().unwrap();
+            let frame = request.frame(sequence);
+            let what = word(&format!("{request:?}"));
+            out(frame.as_bytes(), Some(&what));
+            device.receive(frame.as_bytes(), now_ms, &mut |bytes| out(bytes, None));
+        }
+        for _ in 0..4 {
+            device.servo(at_rest, now_ms, &mut |bytes| out(bytes, None));
+        }
+    }
+    lines
+}
+
+#[test]
+fn the_exchange_of_the_document_is_what_a_device_says() {
+    let document = include_str!("../../docs/wire.md");
+    let (_, rest) = document.split_once("```exchange\n").unwrap();
+    let (written, _) = rest.split_once("```").unwrap();
+    let said = exchange();
+    assert_eq!(
+        written.lines().collect::<Vec<_>>(),
+        said,
+        "docs/wire.md, chapter 15, should be:\n{}",
+        said.join("\n")
+    );
+}
+
+/// Every code of the program stands in the document with its number.
+#[test]
+fn the_document_lists_every_code() {
+    let document = include_str!("../../docs/wire.md");
+    let listed = |heading: &str| {
+        let (_, rest) = document.split_once(heading).unwrap();
+        let end = rest.find("\n#").unwrap_or(rest.len());
+        let rows = rest[..end].lines().filter_map(|line| {
+            let cell = line.strip_prefix("| ")?.split(" |").next()?;
+            cell.parse::<u8>().ok()
+        });
+        rows.collect::<Vec<_>>()
+    };
+    let refusals: Vec<u8> = Refusal::ALL.iter().map(|r| r.code()).collect();
+    assert_eq!(listed("### Refusals\n"), refusals);
+    let faults: Vec<u8> = Fault::ALL.iter().map(|f| f.code()).collect();
+    assert_eq!(listed("### Faults\n"), faults);
+    let states: Vec<u8> = State::ALL.iter().map(|s| s.code()).collect();
+    assert_eq!(listed("## 5. States\n"), states);
+    for golden in requests() {
+        let name = golden.name.split(' ').next().unwrap();
+        let entry = format!("**{name} 0x{:02X}**", golden.message.kind());
+        assert!(document.contains(&entry), "{entry}");
+    }
+    for golden in replies() {
+        let name = golden.name.split(' ').next().unwrap();
+        let entry = format!("**{name} 0x{:02X}**", golden.message.kind());
+        assert!(document.contains(&entry), "{entry}");
+    }
+}
