@@ -58,11 +58,14 @@ fn session(folder: &Path) {
     let mut terminal = start(folder, "P01");
     let mut saved = Vec::new();
     let mut memory_kib = 0;
-    while !terminal.screen().contains("Enter closes") {
+    loop {
         let screen = terminal.screen();
+        if screen.contains("Enter closes") {
+            break;
+        }
         if screen.contains("Tab comment") {
             terminal.keys("5");
-            until(&terminal, |s| s.contains('┏'));
+            until(&terminal, |s| s.contains("┃  5  ┃"));
             let count = saved.len() + 1;
             let began = Instant::now();
             terminal.keys("\r");

@@ -11,9 +11,10 @@ use crossterm::event::{
     DisableBracketedPaste, DisableMouseCapture, EnableBracketedPaste, EnableMouseCapture, Event,
 };
 use crossterm::terminal::{
-    EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
+    BeginSynchronizedUpdate, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen,
+    disable_raw_mode, enable_raw_mode,
 };
-use crossterm::{cursor, execute, style};
+use crossterm::{cursor, execute, queue, style};
 use ratatui::Frame;
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
@@ -133,7 +134,7 @@ impl Terminal {
         let one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         if TAKEN.load(Ordering::SeqCst) {
             WRITES.set(true);
-            let drawn = self.screen.draw(page).map(drop);
+            let drawn = self.draw_whole(page);
             WRITES.set(false);
             drop(one);
             drawn.map_err(|error| format!("the terminal cannot be written: {error}"))
@@ -141,6 +142,14 @@ impl Terminal {
             drop(one);
             self.check().map(drop)
         }
+    }
+
+    /// Draws a page as one update: a terminal that knows synchronized updates never
+    /// shows half a page, and others ignore the request.
+    fn draw_whole(&mut self, page: impl FnOnce(&mut Frame<'_>)) -> io::Result<()> {
+        queue!(io::stdout(), BeginSynchronizedUpdate)?;
+        self.screen.draw(page)?;
+        execute!(io::stdout(), EndSynchronizedUpdate)
     }
 
     /// Whether what is pasted comes as one event. A paste whose end is lost on the way
@@ -266,6 +275,7 @@ fn give_back() {
     }
     let _ = execute!(
         io::stdout(),
+        EndSynchronizedUpdate,
         DisableBracketedPaste,
         style::ResetColor,
         LeaveAlternateScreen,

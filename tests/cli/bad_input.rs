@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::player::{Did, play};
+use crate::support::player::play_until;
 use crate::support::{Terminal, changed_protocol, repository, study};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -193,15 +193,7 @@ fn a_hostile_comment_is_stored_as_typed_and_shown_escaped() {
     let path = repository("protocols/turn-signal");
     let arguments = ["run", &path, "--participant", "P01", "--operator", "x"];
     let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
-    loop {
-        terminal.wait_until("a screen", |s| !s.trim().is_empty());
-        if terminal.screen().contains("Tab comment") {
-            break;
-        }
-        if play(&mut terminal, "P01") == Did::Waited {
-            std::thread::sleep(std::time::Duration::from_millis(5));
-        }
-    }
+    play_until(&mut terminal, "P01", "Tab comment");
     let comment = "=1+1, \"quoted\"\r\nsecond\u{1b}[2J line 👍🏽 \u{202e}abc";
     // the keys choose, a paste brings the rest as it is
     terminal.keys(&format!("4\t\u{1b}[200~{comment}\u{1b}[201~"));

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::player::{Did, play};
-use crate::support::{Terminal, changed_protocol, repository, study};
+use crate::support::player::{play_to_end, play_until as until};
+use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -14,20 +14,8 @@ fn start(folder: &Path, protocol: &Path) -> Terminal {
     terminal
 }
 
-/// Plays on until the screen contains `text`.
 fn play_until(terminal: &mut Terminal, text: &str) {
-    let mut turns = 0;
-    while !terminal.screen().contains(text) {
-        if play(terminal, "P01") == Did::Waited {
-            std::thread::sleep(std::time::Duration::from_millis(5));
-        }
-        turns += 1;
-        assert!(
-            turns < 20_000,
-            "`{text}` never comes:\n{}",
-            terminal.screen()
-        );
-    }
+    until(terminal, "P01", text);
 }
 
 /// Opens a dialog by its key and types into it.
@@ -51,10 +39,10 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     play_until(&mut terminal, "trial 1 of");
     play_until(&mut terminal, "Enter to rate");
     dialog(&mut terminal, F2, "Tab who", "motor hums\r");
-    assert!(
-        terminal.screen().contains("Feel the device"),
-        "the remark ended the playback"
-    );
+    // a busy machine may lose the playback, the remark does not end it
+    terminal.wait_until("the playback to go on", |s| {
+        s.contains("Feel the device") || s.contains("DEVICE TROUBLE")
+    });
     play_until(&mut terminal, "trial 2 of");
     // a bad one
     play_until(&mut terminal, "Enter to rate");
@@ -82,9 +70,7 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     );
 
     let mut terminal = start(folder.path(), protocol);
-    play_until(&mut terminal, "Enter closes");
-    terminal.keys("\r");
-    assert_eq!(terminal.exit_code(), 0);
+    play_to_end(&mut terminal, "P01");
 
     let results = folder.path().join("results").join(id);
     let (code, out, err) = study(&["verify", "results"], folder.path());
@@ -131,11 +117,10 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
 
 #[test]
 fn the_papers_study_with_a_correction_a_remark_a_bad_trial_a_quit_and_a_resume() {
-    eventful(
-        Path::new(&repository("protocols/turn-signal")),
-        "turn-signal",
-        15,
-    );
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("paper");
+    changed_protocol("turn-signal", &to, &[PATIENT]);
+    eventful(&to, "turn-signal", 15);
 }
 
 /// The extended protocol with one repetition and short waits: nobody is tired here.
@@ -149,6 +134,7 @@ fn shortened(folder: &Path) -> PathBuf {
         ),
         ("reference_min_s = 3", "reference_min_s = 0"),
         ("minimum_strokes = 2", "minimum_strokes = 1"),
+        ("max_attempts = 3", "max_attempts = 50"),
     ];
     changed_protocol("turn-signal-extended", &to, &changes);
     to

@@ -7,8 +7,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::player::{Did, play, play_before};
-use crate::support::{Terminal, repository, study};
+use crate::support::player::{Did, play_before, play_to_end};
+use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use study_base::rng::Stream;
@@ -39,14 +39,16 @@ fn done(folder: &Path, participant: &str) -> usize {
 fn kills(seed: u64, count: u32) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let protocol = repository("protocols/turn-signal");
+    let protocol = folder.join("protocol");
+    changed_protocol("turn-signal", &protocol, &[PATIENT]);
+    let protocol = protocol.to_str().unwrap();
     let mut chance = Stream::new(seed, &["kill"]);
     let mut participant = 1;
     let mut survived = 0;
     for kill in 0..count {
         let id = format!("P{participant:02}");
         let mut terminal = Terminal::start(
-            &["run", &protocol, "--participant", &id, "--operator", "x"],
+            &["run", protocol, "--participant", &id, "--operator", "x"],
             folder,
             24,
             80,
@@ -80,18 +82,12 @@ fn kills(seed: u64, count: u32) {
     // what is left of the last session can be finished and is whole
     let id = format!("P{participant:02}");
     let mut terminal = Terminal::start(
-        &["run", &protocol, "--participant", &id, "--operator", "x"],
+        &["run", protocol, "--participant", &id, "--operator", "x"],
         folder,
         24,
         80,
     );
-    while !terminal.screen().contains("Enter closes") {
-        if play(&mut terminal, &id) == Did::Waited {
-            std::thread::sleep(Duration::from_millis(2));
-        }
-    }
-    terminal.keys("\r");
-    assert_eq!(terminal.exit_code(), 0);
+    play_to_end(&mut terminal, &id);
     let (code, out, err) = study(&["verify", "results"], folder);
     assert_eq!(code, 0, "{out}{err}");
     assert_eq!(done(folder, &id), 15);

@@ -12,15 +12,78 @@ use std::io::{Read, Write};
 use std::num::NonZero;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How long a screen may take to come before the test is given up. Generous: the
+/// How long the program may take for one step before the test gives up. Generous: the
 /// machine may be busy; nothing is asserted about time.
-const PATIENCE: Duration = Duration::from_secs(30);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
-/// The emulator knows no empty screen.
+/// The emulator does not accept a size of 0.
 fn cells(n: u16) -> NonZero<u16> {
     NonZero::new(n.max(1)).unwrap()
+}
+
+/// A terminal emulator that shows whole pages only: what comes between the beginning
+/// and the end of a synchronized update is published at its end.
+struct Emulator {
+    parser: vt100::Parser,
+    /// The last bytes, in which a control sequence may have begun.
+    tail: Vec<u8>,
+    updating: bool,
+    shown: Shown,
+}
+
+/// What a person at the terminal sees.
+#[derive(Clone, Default, PartialEq, Eq)]
+pub struct Shown {
+    /// The text.
+    pub text: String,
+    /// Row and column of the cursor, if it is visible.
+    pub cursor: Option<(u16, u16)>,
+    /// Whether the program uses the alternate screen.
+    pub alternate: bool,
+}
+
+impl Emulator {
+    const UPDATE: &[u8] = b"\x1b[?2026";
+
+    fn process(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.parser.process(&[*byte]);
+            self.tail.push(*byte);
+            if let Some(marker) = self.tail.strip_prefix(Self::UPDATE) {
+                match marker {
+                    [] => continue,
+                    [b'l'] => {
+                        self.updating = false;
+                        self.publish();
+                    }
+                    // the page before is complete
+                    _ if !self.updating => self.updating = true,
+                    _ => {}
+                }
+                self.tail.clear();
+            } else if !Self::UPDATE.starts_with(&self.tail) {
+                self.tail.clear();
+                if *byte == Self::UPDATE[0] {
+                    self.tail.push(*byte);
+                }
+            }
+        }
+        if !self.updating {
+            self.publish();
+        }
+    }
+
+    fn publish(&mut self) {
+        let screen = self.parser.screen();
+        self.shown = Shown {
+            text: screen.contents(),
+            cursor: (!screen.hide_cursor()).then(|| screen.cursor_position()),
+            alternate: screen.alternate_screen(),
+        };
+    }
 }
 
 /// The binary in a terminal.
@@ -28,7 +91,8 @@ pub struct Terminal {
     child: Box<dyn Child + Send + Sync>,
     master: Box<dyn MasterPty + Send>,
     keys: Box<dyn Write + Send>,
-    screen: Arc<Mutex<vt100::Parser>>,
+    screen: Arc<Mutex<Emulator>>,
+    reader: JoinHandle<()>,
 }
 
 impl Terminal {
@@ -48,14 +112,15 @@ impl Terminal {
         command.env("TERM", "xterm-256color");
         let child = pair.slave.spawn_command(command).unwrap();
         drop(pair.slave);
-        let screen = Arc::new(Mutex::new(vt100::Parser::new(
-            cells(rows),
-            cells(columns),
-            0,
-        )));
+        let screen = Arc::new(Mutex::new(Emulator {
+            parser: vt100::Parser::new(cells(rows), cells(columns), 0),
+            tail: Vec::new(),
+            updating: false,
+            shown: Shown::default(),
+        }));
         let mut reader = pair.master.try_clone_reader().unwrap();
         let shown = screen.clone();
-        std::thread::spawn(move || {
+        let reader_thread = std::thread::spawn(move || {
             let mut bytes = [0; 8192];
             while let Ok(n) = reader.read(&mut bytes) {
                 if n == 0 {
@@ -70,22 +135,28 @@ impl Terminal {
             master: pair.master,
             keys,
             screen,
+            reader: reader_thread,
         }
     }
 
-    /// What the screen shows now.
+    /// The last complete page.
+    pub fn shown(&self) -> Shown {
+        self.screen.lock().unwrap().shown.clone()
+    }
+
+    /// The text of the last complete page.
     pub fn screen(&self) -> String {
-        self.screen.lock().unwrap().screen().contents()
+        self.shown().text
     }
 
     /// Whether the program is on the alternate screen.
     pub fn alternate(&self) -> bool {
-        self.screen.lock().unwrap().screen().alternate_screen()
+        self.shown().alternate
     }
 
     /// Types.
     pub fn keys(&mut self, keys: &str) {
-        // A program that has ended hears no keys; the test sees that elsewhere.
+        // A program that has ended reads no keys; the test sees that elsewhere.
         let _ = self.keys.write_all(keys.as_bytes());
         let _ = self.keys.flush();
     }
@@ -95,7 +166,7 @@ impl Terminal {
         self.wait_until(text, |screen| screen.contains(text));
     }
 
-    /// Waits until the screen is as wanted.
+    /// Waits until the text of the screen satisfies a condition.
     pub fn wait_until(&mut self, what: &str, mut fine: impl FnMut(&str) -> bool) {
         let start = Instant::now();
         loop {
@@ -110,13 +181,13 @@ impl Terminal {
         }
     }
 
-    /// Waits for the end; the exit code.
+    /// Waits for the program to end and for its last output; the exit code.
     pub fn exit_code(&mut self) -> u32 {
         let start = Instant::now();
         loop {
-            if let Some(status) = self.child.try_wait().unwrap() {
-                // what it printed last is still on its way
-                std::thread::sleep(Duration::from_millis(30));
+            if let Some(status) = self.child.try_wait().unwrap()
+                && self.reader.is_finished()
+            {
                 return status.exit_code();
             }
             if start.elapsed() > PATIENCE {
@@ -126,7 +197,7 @@ impl Terminal {
         }
     }
 
-    /// Whether it still runs.
+    /// Whether the program still runs.
     pub fn runs(&mut self) -> bool {
         self.child.try_wait().unwrap().is_none()
     }
@@ -162,11 +233,9 @@ impl Terminal {
                 pixel_height: 0,
             })
             .unwrap();
-        self.screen
-            .lock()
-            .unwrap()
-            .screen_mut()
-            .set_size(cells(rows), cells(columns));
+        let mut emulator = self.screen.lock().unwrap();
+        let screen = emulator.parser.screen_mut();
+        screen.set_size(cells(rows), cells(columns));
     }
 }
 
@@ -200,7 +269,7 @@ pub fn repository(path: &str) -> String {
         .to_owned()
 }
 
-/// Copies a folder with all that is in it.
+/// Copies a folder with its contents.
 pub fn copy_folder(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in std::fs::read_dir(from).unwrap() {
@@ -213,6 +282,12 @@ pub fn copy_folder(from: &Path, to: &Path) {
         }
     }
 }
+
+/// A change to a protocol: a busy machine loses playbacks of its own.
+pub const PATIENT: (&str, &str) = (
+    "order = \"blocked\"\n",
+    "order = \"blocked\"\nmax_attempts = 50\n",
+);
 
 /// A copy of a protocol of the repository in `to`, each text replaced once.
 pub fn changed_protocol(name: &str, to: &Path, changes: &[(&str, &str)]) {

@@ -1,9 +1,13 @@
-//! Somebody who takes part by keys alone, looking only at the screen.
+//! A participant who takes part by keys alone, looking only at the screen.
+//!
+//! Every key is pressed once, on a complete page that asks for it, and the player then
+//! waits for what only that key can have changed. A clock that ticks, a notice that
+//! appears and a counter that moves do not count as an answer.
 
-use super::Terminal;
+use super::{PATIENCE, Shown, Terminal};
 use std::time::{Duration, Instant};
 
-/// What the player did at a screen.
+/// What the player did at a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Did {
     /// Nothing is asked at the moment.
@@ -18,59 +22,93 @@ pub enum Did {
     WentOn,
 }
 
-/// Does the one thing that the screen asks for, and waits for what comes of it.
+/// Between two looks at the screen.
+const LOOK: Duration = Duration::from_millis(3);
+
+/// Does the one thing that the screen asks for, and waits for its effect.
 pub fn play(terminal: &mut Terminal, participant: &str) -> Did {
-    let screen = terminal.screen();
-    let did = press(terminal, participant, &screen);
-    if did != Did::Waited {
-        // the clock in the last line says nothing of the key: it might be pressed twice
-        let since = Instant::now();
-        terminal.wait_until("the screen to change", |now| {
-            body(now) != body(&screen) || (now != screen && since.elapsed() > CLOCK)
-        });
-    }
-    did
-}
-
-/// After so long a change of the clock alone is taken for an answer.
-const CLOCK: Duration = Duration::from_secs(5);
-
-/// The screen without the experimenter's line.
-fn body(screen: &str) -> &str {
-    screen
-        .trim_end()
-        .rsplit_once('\n')
-        .map_or(screen, |(body, _)| body)
+    let page = terminal.shown();
+    act(terminal, participant, &page, None)
 }
 
 /// The same, but waits no longer than `until`.
 pub fn play_before(terminal: &mut Terminal, participant: &str, until: Instant) -> Did {
-    let screen = terminal.screen();
-    let did = press(terminal, participant, &screen);
-    while did != Did::Waited && terminal.screen() == screen && Instant::now() < until {
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    did
+    let page = terminal.shown();
+    act(terminal, participant, &page, Some(until))
 }
 
-fn press(terminal: &mut Terminal, participant: &str, screen: &str) -> Did {
-    let shows = |text: &str| screen.contains(text);
-    let (keys, did) = if shows("Who takes part?") && shows("Enter begin") {
-        (format!("\u{15}{participant}\r"), Did::Who)
+/// Plays until the screen contains `text`; the pages that were seen on the way. That
+/// page itself is left as it is.
+pub fn play_until(terminal: &mut Terminal, participant: &str, text: &str) -> Vec<String> {
+    play_while(terminal, participant, |terminal, page| {
+        assert!(
+            terminal.runs() || page.contains(text),
+            "it ended before `{text}`:\n{page}"
+        );
+        !page.contains(text)
+    })
+}
+
+/// Plays until the program has ended with success; the pages that were seen.
+pub fn play_to_end(terminal: &mut Terminal, participant: &str) -> Vec<String> {
+    let seen = play_while(terminal, participant, |terminal, _| terminal.runs());
+    assert_eq!(terminal.exit_code(), 0, "{}", terminal.screen());
+    seen
+}
+
+fn play_while(
+    terminal: &mut Terminal,
+    participant: &str,
+    mut goes_on: impl FnMut(&mut Terminal, &str) -> bool,
+) -> Vec<String> {
+    let mut seen: Vec<String> = Vec::new();
+    let mut last = (String::new(), Instant::now());
+    loop {
+        // One look decides: a later one may show another page.
+        let page = terminal.shown();
+        if !goes_on(terminal, &page.text) {
+            return seen;
+        }
+        let now = without_clocks(&page);
+        if last.0 != now {
+            last = (now, Instant::now());
+        }
+        assert!(
+            last.1.elapsed() < PATIENCE,
+            "nothing happens:\n{}",
+            page.text
+        );
+        if seen.last() != Some(&page.text) {
+            seen.push(page.text.clone());
+        }
+        if act(terminal, participant, &page, None) == Did::Waited {
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<Instant>) -> Did {
+    let shows = |text: &str| page.text.contains(text);
+    let answer = rating(&page.text);
+    // What is typed first, how the page shows that it has been read, and the key.
+    let (typed, look, key, did) = if shows("Who takes part?") && shows("Enter begin") {
+        let look = format!("┃ {participant}");
+        (participant.to_owned(), look, "\r", Did::Who)
     } else if shows("yes, I agree") {
-        ("y".to_owned(), Did::WentOn)
+        (String::new(), String::new(), "y", Did::WentOn)
     } else if shows("Enter to rate") {
-        ("\r".to_owned(), Did::Felt)
-    } else if shows("Feel the device") || shows("saving") {
+        (String::new(), String::new(), "\r", Did::Felt)
+    } else if shows("Feel the device") || shows("aving …") {
         return Did::Waited;
     } else if shows("Are you sure?") {
-        ("n".to_owned(), Did::WentOn)
+        (String::new(), String::new(), "n", Did::WentOn)
     } else if shows("1–7 choose") {
-        (format!("{}\r", rating(screen)), Did::Answered)
+        let look = format!("┃  {answer}  ┃");
+        (answer.to_string(), look, "\r", Did::Answered)
     } else if shows("↑ ↓ choose") {
-        ("1\r".to_owned(), Did::Answered)
+        ("1".to_owned(), "(●)".to_owned(), "\r", Did::Answered)
     } else if shows("Enter save") {
-        ("33\r".to_owned(), Did::Answered)
+        ("33".to_owned(), "33".to_owned(), "\r", Did::Answered)
     } else if [
         "when ready",
         "it is mounted",
@@ -81,12 +119,76 @@ fn press(terminal: &mut Terminal, participant: &str, screen: &str) -> Did {
     .iter()
     .any(|word| shows(&format!("Enter {word}")))
     {
-        ("\r".to_owned(), Did::WentOn)
+        (String::new(), String::new(), "\r", Did::WentOn)
     } else {
         return Did::Waited;
     };
-    terminal.keys(&keys);
+    let mut before = page.clone();
+    if !body(page).contains(&look) {
+        terminal.keys(&typed);
+        let read = waited(terminal, until, &look, |now| {
+            before = now.clone();
+            body(now).contains(&look)
+        });
+        if !read {
+            return did;
+        }
+    }
+    terminal.keys(key);
+    let before = asked(&before);
+    waited(terminal, until, "the page to change", |now| {
+        asked(now) != before
+    });
     did
+}
+
+/// Whether it came to that before `until`, if there is one. Without one, patience
+/// decides, and the end of the program counts as well.
+fn waited(
+    terminal: &mut Terminal,
+    until: Option<Instant>,
+    what: &str,
+    mut fine: impl FnMut(&Shown) -> bool,
+) -> bool {
+    let start = Instant::now();
+    loop {
+        let now = terminal.shown();
+        if fine(&now) {
+            return true;
+        }
+        if until.is_some_and(|until| Instant::now() >= until) || !terminal.runs() {
+            return false;
+        }
+        assert!(
+            start.elapsed() < PATIENCE,
+            "waited for {what}:\n{}",
+            now.text
+        );
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// The lines of a page, without the experimenter's line, the keys and the notice above
+/// them.
+fn body(page: &Shown) -> String {
+    let lines: Vec<&str> = page.text.trim_end().lines().collect();
+    lines[..lines.len().saturating_sub(6)].join("\n")
+}
+
+/// What a page asks for: its body and keys without numbers that move by themselves, and
+/// the cursor. While the device plays only the keys count.
+fn asked(page: &Shown) -> (String, Option<(u16, u16)>) {
+    let keys = page.text.trim_end().lines().rev().nth(2);
+    let mut text = keys.unwrap_or_default().to_owned();
+    if !page.text.contains("Feel the ") {
+        text.push_str(&body(page));
+    }
+    (text.replace(|c: char| c.is_ascii_digit(), ""), page.cursor)
+}
+
+/// The page without numbers, which move by themselves.
+fn without_clocks(page: &Shown) -> String {
+    page.text.replace(|c: char| c.is_ascii_digit(), "")
 }
 
 /// An opinion that changes from trial to trial: somebody who always says the same

@@ -14,11 +14,14 @@ use study_base::text::Untrusted;
 const MAX_LINE: u64 = 256 * 1024;
 /// Lines that wait to be taken in, and to be read by the child.
 const WAITING: usize = 256;
-/// How long a child may take to end by itself once its input or output is closed.
+/// How long a child may take to end by itself once its input is closed.
 const END_WITHIN: Duration = Duration::from_millis(300);
+/// How long its exit status is waited for once its output is closed: a busy machine
+/// takes a moment between the two.
+const STATUS_WITHIN: Duration = Duration::from_secs(2);
 /// How long its standard error is read on after it has ended: whom it has started may
 /// hold it open.
-const LAST_WORDS_WITHIN: Duration = Duration::from_millis(100);
+const LAST_WORDS_WITHIN: Duration = Duration::from_secs(1);
 /// What is kept of the child's standard error, bytes.
 const LAST_WORDS: usize = 1024;
 /// Between two looks whether something has ended.
@@ -163,7 +166,7 @@ impl Running {
     /// itself. Safe to print.
     pub(super) fn end(&mut self, why: &Why) -> String {
         let within = match why {
-            Why::Gone => END_WITHIN,
+            Why::Gone => STATUS_WITHIN,
             Why::Wrong(_) => Duration::ZERO,
         };
         let ended = self.ended_within(within);
