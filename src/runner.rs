@@ -15,7 +15,7 @@ pub mod saver;
 
 use crate::device::{Device, Report, Stimulus, manual};
 use clock::Clock;
-use saver::{Job, Saver, Word};
+use saver::{Job, SaveEvent, Saver};
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -403,16 +403,16 @@ impl Runner {
     }
 
     fn hear_saver(&mut self) {
-        let words = self.saver.as_mut().map(Saver::words).unwrap_or_default();
-        for word in words {
-            let input = match word {
-                Word::Saved => {
+        let events = self.saver.as_mut().map(Saver::drain).unwrap_or_default();
+        for event in events {
+            let input = match event {
+                SaveEvent::Saved => {
                     self.saved += 1;
                     self.pending = self.pending.saturating_sub(1);
                     Input::Saved { count: self.saved }
                 }
-                Word::Failed(why) => Input::SaveFailed(why),
-                Word::TelemetryLost(why) => Input::Notice(why),
+                SaveEvent::Failed(why) => Input::SaveFailed(why),
+                SaveEvent::TelemetryLost(why) => Input::Notice(why),
             };
             self.feed(input);
         }

@@ -11,12 +11,12 @@
 //! Text of others (protocol, comments, the device's words) passes through
 //! [`study_base::text::Untrusted`] in [`wrap`] before it reaches a cell.
 
-pub mod draft;
 pub mod editor;
 pub mod keys;
 pub mod surface;
 mod terminal;
 pub mod theme;
+pub mod ui_state;
 pub mod views;
 pub mod waiting;
 pub mod widgets;
@@ -30,6 +30,7 @@ use crossterm::event::{Event, MouseEventKind};
 use std::time::{Duration, Instant};
 use study_core::session::{Input, Screen, View};
 use terminal::Terminal;
+pub(crate) use terminal::survive_file_size_limit;
 
 /// How a terminal is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +53,11 @@ pub enum TuiError {
     /// It can show nothing at a place.
     #[error("the terminal (TERM={0:?}) cannot show a page")]
     DumbTerminal(String),
+    /// The platform has no signals that would end a session in order.
+    #[error(
+        "a session cannot run on this platform: nothing would stop the device when the terminal closes"
+    )]
+    Platform,
     /// It cannot be used.
     #[error("the terminal cannot be used: {0}")]
     Terminal(#[source] std::io::Error),
@@ -68,9 +74,18 @@ impl TuiError {
                 "use a terminal such as xterm, or set TERM to what it really is; \
                  `study rehearse` needs none"
             }
+            Self::Platform => "run it on Linux or macOS, or in the Windows Subsystem for Linux",
             Self::Terminal(_) => "try another terminal window",
         }
     }
+}
+
+/// Refuses a platform on which a session could not end in order.
+///
+/// # Errors
+/// [`TuiError::Platform`].
+pub fn check_platform() -> Result<(), TuiError> {
+    terminal::check_platform()
 }
 
 /// How often the terminal is looked after while nothing happens.

@@ -1,9 +1,9 @@
 //! `study analyze`
 
 mod possible;
+mod progress;
 mod reading;
 mod report;
-mod waiting;
 
 use super::load::Loaded;
 use super::{Console, Failure, results};
@@ -210,7 +210,7 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
             ..Details::default()
         },
         traces: Vec::new(),
-        analysis: waiting::analyze(&ratings, &rules),
+        analysis: progress::analyze(&ratings, &rules),
     })
 }
 
@@ -254,7 +254,7 @@ fn of_study(
         protocol_version: Some(study.version()),
         path: study.path().display().to_string(),
     };
-    let analysis = waiting::analyze(&ratings, &rules);
+    let analysis = progress::analyze(&ratings, &rules);
     let written = !args.json || args.out.is_some();
     Ok(Analysed {
         source,

@@ -8,7 +8,6 @@ use crate::runner::{Runner, Setup};
 use crate::tui::{self, Tui};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use study_base::text::ParticipantId;
 use study_core::protocol::DeviceKind;
 use study_core::session::{Config, Ending, MAX_OPERATOR};
@@ -46,6 +45,7 @@ pub(super) struct Args {
 
 /// Does it.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    tui::check_platform().map_err(unusable)?;
     let loaded = load::load(&args.protocol)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
     let kind = args.playback.device.unwrap_or(loaded.protocol.device.kind);
@@ -94,14 +94,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     } else {
         SeatKind::Real
     };
-    // Past a file size limit a write shall fail, which is told, instead of ending
-    // the program. Where the handler cannot be set it ends as it always did.
-    let _ = signal_hook::flag::register(
-        rustix::process::Signal::XFSZ.as_raw(),
-        Arc::new(AtomicBool::new(false)),
-    );
+    tui::survive_file_size_limit();
     // The terminal before the folder: without one, nothing is created.
-    let mut tui = Tui::open(options).map_err(|e| Failure::new(Kind::Usage, &e).hint(e.hint()))?;
+    let mut tui = Tui::open(options).map_err(unusable)?;
     let study = match begun {
         Some(study) => study,
         None => StudyFolder::open_or_create(&args.results, &frozen, at)?,
@@ -142,6 +137,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         &ending,
         &again(args, &participant),
     )
+}
+
+fn unusable(error: tui::TuiError) -> Failure {
+    Failure::new(Kind::Usage, &error).hint(error.hint())
 }
 
 /// What is typed on the first screen, if it stands in the arguments.

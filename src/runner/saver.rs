@@ -1,10 +1,10 @@
 //! Saving, away from the loop: journal and telemetry of one session.
 //!
-//! Jobs are done in order. An event is acknowledged by [`Word::Saved`] after its
+//! Jobs are done in order. An event is acknowledged by [`SaveEvent::Saved`] after its
 //! line is on disk, in the order of the events. After a failed write nothing is
 //! acknowledged, and nothing is forgotten, until [`Job::Retry`] has put every
 //! event in doubt into a new segment of the journal. Telemetry that cannot be
-//! written is dropped and told of: no answer waits for it.
+//! written is dropped and reported of: no answer waits for it.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -34,7 +34,7 @@ pub enum Job {
 
 /// What the saver says.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Word {
+pub enum SaveEvent {
     /// The next event in order is on disk.
     Saved,
     /// An event is not; why, and what to do.
@@ -45,20 +45,20 @@ pub enum Word {
 
 /// The saver of one session; holds its folder, and so its lock.
 pub struct Saver {
-    way: Way,
+    mode: Mode,
 }
 
-enum Way {
+enum Mode {
     Inline {
         worker: Box<Worker>,
-        words: Vec<Word>,
+        events: Vec<SaveEvent>,
     },
     Thread {
         jobs: Sender<Job>,
-        words: Receiver<Word>,
+        events: Receiver<SaveEvent>,
         handle: JoinHandle<()>,
-        /// Whether its early end has been told.
-        told: bool,
+        /// Whether its early end has been reported.
+        reported: bool,
     },
 }
 
@@ -66,7 +66,7 @@ struct Worker {
     folder: SessionFolder,
     journal: Journal,
     telemetry: Option<TelemetryWriter>,
-    doubtful: VecDeque<(Moment, Event)>,
+    unsaved: VecDeque<(Moment, Event)>,
     broken: bool,
 }
 
@@ -77,43 +77,43 @@ impl Saver {
             folder,
             journal,
             telemetry: None,
-            doubtful: VecDeque::new(),
+            unsaved: VecDeque::new(),
             broken: false,
         });
-        let way = if threaded {
+        let mode = if threaded {
             let (jobs, todo) = channel();
-            let (say, words) = channel();
+            let (say, events) = channel();
             let handle = std::thread::spawn(move || {
                 while let Ok(job) = todo.recv() {
-                    for word in worker.work(job) {
-                        // A loop that is gone needs no words; the work goes on.
-                        let _ = say.send(word);
+                    for event in worker.work(job) {
+                        // A loop that is gone needs no events; the work goes on.
+                        let _ = say.send(event);
                     }
                 }
                 // Nobody is left to tell.
                 let _ = worker.end_telemetry();
             });
-            Way::Thread {
+            Mode::Thread {
                 jobs,
-                words,
+                events,
                 handle,
-                told: false,
+                reported: false,
             }
         } else {
-            Way::Inline {
+            Mode::Inline {
                 worker,
-                words: Vec::new(),
+                events: Vec::new(),
             }
         };
-        Self { way }
+        Self { mode }
     }
 
     /// Hands over a job.
     pub fn send(&mut self, job: Job) {
-        match &mut self.way {
-            Way::Inline { worker, words } => words.extend(worker.work(job)),
-            Way::Thread { jobs, .. } => {
-                // The thread only ends before us by a panic; then no word comes
+        match &mut self.mode {
+            Mode::Inline { worker, events } => events.extend(worker.work(job)),
+            Mode::Thread { jobs, .. } => {
+                // The thread only ends before us by a panic; then no event comes
                 // back, and nothing is shown as saved.
                 let _ = jobs.send(job);
             }
@@ -121,19 +121,21 @@ impl Saver {
     }
 
     /// What has been said since the last call.
-    pub fn words(&mut self) -> Vec<Word> {
-        match &mut self.way {
-            Way::Inline { words, .. } => std::mem::take(words),
-            Way::Thread {
-                words,
+    pub fn drain(&mut self) -> Vec<SaveEvent> {
+        match &mut self.mode {
+            Mode::Inline { events, .. } => std::mem::take(events),
+            Mode::Thread {
+                events,
                 handle,
-                told,
+                reported,
                 ..
             } => {
-                let mut said: Vec<Word> = words.try_iter().collect();
-                if handle.is_finished() && !*told {
-                    *told = true;
-                    said.push(Word::Failed("the thread that saves has ended".to_owned()));
+                let mut said: Vec<SaveEvent> = events.try_iter().collect();
+                if handle.is_finished() && !*reported {
+                    *reported = true;
+                    said.push(SaveEvent::Failed(
+                        "the thread that saves has ended".to_owned(),
+                    ));
                 }
                 said
             }
@@ -142,12 +144,12 @@ impl Saver {
 
     /// Does what is left and closes the folder.
     pub fn finish(self) {
-        match self.way {
-            Way::Inline { mut worker, .. } => {
+        match self.mode {
+            Mode::Inline { mut worker, .. } => {
                 // Nobody is left to tell.
                 let _ = worker.end_telemetry();
             }
-            Way::Thread { jobs, handle, .. } => {
+            Mode::Thread { jobs, handle, .. } => {
                 drop(jobs);
                 // A panic in it has been reported by the hook.
                 let _ = handle.join();
@@ -157,10 +159,10 @@ impl Saver {
 }
 
 impl Worker {
-    fn work(&mut self, job: Job) -> Vec<Word> {
+    fn work(&mut self, job: Job) -> Vec<SaveEvent> {
         match job {
             Job::Append(at, event) => {
-                self.doubtful.push_back((at, event));
+                self.unsaved.push_back((at, event));
                 if self.broken {
                     return Vec::new();
                 }
@@ -175,18 +177,18 @@ impl Worker {
                         self.broken = false;
                         self.append()
                     }
-                    Err(error) => vec![Word::Failed(error.to_string())],
+                    Err(error) => vec![SaveEvent::Failed(error.to_string())],
                 }
             }
             Job::TelemetryBegin { trial, attempt } => {
-                let mut words = self.end_telemetry();
+                let mut events = self.end_telemetry();
                 match self.folder.telemetry(trial, attempt) {
                     Ok(telemetry) => {
                         self.telemetry = Some(telemetry);
                     }
-                    Err(error) => words.push(Word::TelemetryLost(error.to_string())),
+                    Err(error) => events.push(SaveEvent::TelemetryLost(error.to_string())),
                 }
-                words
+                events
             }
             Job::Telemetry(samples) => {
                 let Some(telemetry) = &mut self.telemetry else {
@@ -196,7 +198,7 @@ impl Worker {
                     Ok(()) => Vec::new(),
                     Err(error) => {
                         self.telemetry = None;
-                        vec![Word::TelemetryLost(error.to_string())]
+                        vec![SaveEvent::TelemetryLost(error.to_string())]
                     }
                 }
             }
@@ -204,29 +206,29 @@ impl Worker {
         }
     }
 
-    fn append(&mut self) -> Vec<Word> {
-        let mut words = Vec::new();
-        while let Some((at, event)) = self.doubtful.front() {
+    fn append(&mut self) -> Vec<SaveEvent> {
+        let mut events = Vec::new();
+        while let Some((at, event)) = self.unsaved.front() {
             match self.journal.append(*at, event) {
                 Ok(_) => {
-                    self.doubtful.pop_front();
-                    words.push(Word::Saved);
+                    self.unsaved.pop_front();
+                    events.push(SaveEvent::Saved);
                 }
                 Err(error) => {
                     self.broken = true;
-                    words.push(Word::Failed(error.to_string()));
+                    events.push(SaveEvent::Failed(error.to_string()));
                     break;
                 }
             }
         }
-        words
+        events
     }
 
     /// Telemetry is evidence, not an answer: no answer waits for it, and a file cut
     /// short shows beside the number of samples in the journal.
-    fn end_telemetry(&mut self) -> Vec<Word> {
+    fn end_telemetry(&mut self) -> Vec<SaveEvent> {
         match self.telemetry.take().map(TelemetryWriter::finish) {
-            Some(Err(error)) => vec![Word::TelemetryLost(error.to_string())],
+            Some(Err(error)) => vec![SaveEvent::TelemetryLost(error.to_string())],
             Some(Ok(())) | None => Vec::new(),
         }
     }

@@ -24,7 +24,7 @@ pub struct Editor {
 
 /// What came of a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Taken {
+pub enum Handled {
     /// Nothing: somebody else may want it.
     No,
     /// It was used.
@@ -68,7 +68,7 @@ impl Editor {
     }
 
     /// Puts typed or pasted text at the cursor.
-    pub fn insert(&mut self, piece: &str) -> Taken {
+    pub fn insert(&mut self, piece: &str) -> Handled {
         let (piece, mut cut) = cut_to_fit(piece);
         let mut clean = piece.replace("\r\n", "\n").replace('\r', "\n");
         if self.one_line {
@@ -88,18 +88,18 @@ impl Editor {
         self.cursor = self.boundary_from(self.cursor + kept);
         if cut {
             let kib = MAX_TEXT_BYTES / 1024;
-            Taken::Notice(format!(
+            Handled::Notice(format!(
                 "That was too long: a text holds {kib} KiB, the rest was left out."
             ))
         } else if nul {
-            Taken::Notice("Characters that no file can hold were left out.".to_owned())
+            Handled::Notice("Characters that no file can hold were left out.".to_owned())
         } else {
-            Taken::Yes
+            Handled::Yes
         }
     }
 
     /// Edits or moves.
-    pub fn key(&mut self, key: Key) -> Taken {
+    pub fn key(&mut self, key: Key) -> Handled {
         match key {
             Key::Char(c) => return self.insert(c.encode_utf8(&mut [0; 4])),
             Key::NewLine if !self.one_line => return self.insert("\n"),
@@ -115,9 +115,9 @@ impl Editor {
             Key::Delete => self.remove(self.cursor, self.after(self.cursor)),
             Key::DeleteWord => self.remove(self.word_before(), self.cursor),
             Key::DeleteToStart => self.remove(self.row_range().0, self.cursor),
-            _ => return Taken::No,
+            _ => return Handled::No,
         }
-        Taken::Yes
+        Handled::Yes
     }
 
     /// The lines at a width, and the cursor's line and column among them.
@@ -190,7 +190,7 @@ impl Editor {
         (range.start, end)
     }
 
-    fn move_row(&mut self, down: bool) -> Taken {
+    fn move_row(&mut self, down: bool) -> Handled {
         let (lines, row, column) = self.layout(self.columns);
         let target = if down {
             Some(row + 1).filter(|r| *r < lines.len())
@@ -198,7 +198,7 @@ impl Editor {
             row.checked_sub(1)
         };
         let Some(target) = target else {
-            return Taken::No;
+            return Handled::No;
         };
         let range = lines[target].range.clone();
         let last = target + 1 == lines.len() || self.text[range.end..].starts_with('\n');
@@ -213,7 +213,7 @@ impl Editor {
             at = end;
         }
         self.cursor = at;
-        Taken::Yes
+        Handled::Yes
     }
 }
 
@@ -264,11 +264,11 @@ mod tests {
     fn a_pasted_megabyte_is_cut_between_characters_and_said() {
         let mut editor = typed("start ");
         let taken = editor.insert(&"日👍🏽".repeat(100_000));
-        assert!(matches!(taken, Taken::Notice(_)));
+        assert!(matches!(taken, Handled::Notice(_)));
         assert!(editor.text().len() <= MAX_TEXT_BYTES);
         assert!(editor.text().len() > MAX_TEXT_BYTES - 12);
         assert!(editor.text().starts_with("start 日👍🏽"));
-        assert!(matches!(editor.insert("日本日本"), Taken::Notice(_)));
+        assert!(matches!(editor.insert("日本日本"), Handled::Notice(_)));
     }
 
     #[test]
@@ -282,7 +282,7 @@ mod tests {
     fn a_line_stays_a_line() {
         let mut editor = Editor::line("");
         editor.insert("a\nb\tc");
-        assert_eq!(editor.key(Key::NewLine), Taken::No);
+        assert_eq!(editor.key(Key::NewLine), Handled::No);
         assert_eq!(editor.text(), "a b c");
     }
 
@@ -291,10 +291,10 @@ mod tests {
         let mut editor = typed("one");
         editor.key(Key::NewLine);
         editor.insert("two three");
-        assert_eq!(editor.key(Key::Up), Taken::Yes);
+        assert_eq!(editor.key(Key::Up), Handled::Yes);
         editor.key(Key::Char('!'));
         assert_eq!(editor.text(), "one!\ntwo three");
-        assert_eq!(editor.key(Key::Up), Taken::No);
+        assert_eq!(editor.key(Key::Up), Handled::No);
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //! Everything that the terminal shows and does is here, so that whole sessions
 //! can be driven by keys in a test.
 
-use super::draft::Draft;
 use super::theme::{Colour, Theme};
+use super::ui_state::UiState;
 use super::views::Page;
 use crate::runner::Strip;
 use crossterm::event::{Event, MouseButton, MouseEventKind};
@@ -16,7 +16,7 @@ use study_core::session::{Input, Screen, View};
 /// A draft, its look and its size.
 #[derive(Debug, Clone)]
 pub struct Surface {
-    draft: Draft,
+    state: UiState,
     theme: Theme,
     area: Rect,
     screen: Option<Screen>,
@@ -26,7 +26,7 @@ impl Surface {
     /// An empty surface of no size yet.
     pub fn new(colour: Colour) -> Self {
         Self {
-            draft: Draft::default(),
+            state: UiState::default(),
             theme: Theme::new(colour),
             area: Rect::ZERO,
             screen: None,
@@ -34,20 +34,20 @@ impl Surface {
     }
 
     /// What is typed and not yet sent.
-    pub fn draft(&self) -> &Draft {
-        &self.draft
+    pub fn state(&self) -> &UiState {
+        &self.state
     }
 
     /// Whether Ctrl-Z was pressed since this was last asked.
     pub fn take_suspend(&mut self) -> bool {
-        self.draft.take_suspend()
+        self.state.take_suspend()
     }
 
     /// Follows the view to another screen and size.
     pub fn follow(&mut self, view: &View, area: Rect) {
         self.area = area;
         let old = self.screen.as_ref();
-        if self.draft.follow(view, old) {
+        if self.state.follow(view, old) {
             self.screen = Some(view.screen.clone());
         }
         self.measure(view);
@@ -56,7 +56,7 @@ impl Surface {
     fn page<'a>(&'a self, view: &'a View, strip: Option<&'a Strip>) -> Page<'a> {
         Page {
             view,
-            draft: &self.draft,
+            state: &self.state,
             strip,
             theme: self.theme,
         }
@@ -64,9 +64,9 @@ impl Surface {
 
     fn measure(&mut self, view: &View) {
         let room = self.page(view, None).room(self.area);
-        self.draft.set_room(room.most, room.page);
+        self.state.set_room(room.most, room.page);
         if let Some(columns) = room.columns {
-            self.draft.set_columns(columns);
+            self.state.set_columns(columns);
         }
     }
 
@@ -74,10 +74,10 @@ impl Surface {
     pub fn event(&mut self, event: &Event, view: &View) -> Vec<Input> {
         self.follow(view, self.area);
         if Page::too_small(self.area) {
-            return self.draft.blind(event, view);
+            return self.state.blind(event, view);
         }
         let Event::Mouse(mouse) = event else {
-            let inputs = self.draft.key(event, view);
+            let inputs = self.state.key(event, view);
             self.measure(view);
             return inputs;
         };
@@ -86,11 +86,11 @@ impl Surface {
                 let place = Position::new(mouse.column, mouse.row);
                 let hit = self.page(view, None).hit(self.area, place);
                 if let Some(target) = hit {
-                    self.draft.pick(target, view);
+                    self.state.pick(target, view);
                 }
             }
-            MouseEventKind::ScrollDown => self.draft.scroll(true),
-            MouseEventKind::ScrollUp => self.draft.scroll(false),
+            MouseEventKind::ScrollDown => self.state.scroll(true),
+            MouseEventKind::ScrollUp => self.state.scroll(false),
             _ => {}
         }
         self.measure(view);

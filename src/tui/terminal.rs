@@ -1,10 +1,22 @@
-//! The terminal itself: taken, and given back on every way out.
+//! The terminal: raw mode and alternate screen on opening, restored on every way out.
 //!
-//! It is given back when [`Terminal`] is dropped, by a hook when any thread
-//! panics, and around Ctrl-Z. Signals that end the program only raise a flag, so
-//! that the session can stop the device and close its journal first. Events are
-//! read on a thread of their own: reading never returns once a terminal has gone
-//! away, and the device must not wait for that.
+//! It is restored when [`Terminal`] is dropped, by a hook when any thread panics, and
+//! around Ctrl-Z. Terminating signals only set a flag, so that the session can stop
+//! the device and close its journal first. A thread of its own reads the events:
+//! reading never returns once a terminal is gone, and the device must not wait for
+//! that.
+
+#[cfg(not(unix))]
+mod other;
+#[cfg(unix)]
+mod unix;
+
+#[cfg(not(unix))]
+use other as platform;
+#[cfg(unix)]
+use unix as platform;
+
+pub(crate) use platform::survive_file_size_limit;
 
 use super::TuiError;
 use crossterm::event::{
@@ -15,59 +27,61 @@ use crossterm::terminal::{
     disable_raw_mode, enable_raw_mode,
 };
 use crossterm::{cursor, execute, queue, style};
+use platform::{Signals, hung_up};
 use ratatui::Frame;
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
-use rustix::event::{PollFd, PollFlags, Timespec};
-use rustix::process::{Signal, getpid, kill_process};
-use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 use std::cell::Cell;
 use std::io::{self, IsTerminal as _, Stdout};
 use std::mem::ManuallyDrop;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError, TryLockError};
 use std::time::Duration;
 
-/// Whether the terminal is ours: raw, on the alternate screen.
+/// Whether the terminal is in raw mode and on the alternate screen.
 static TAKEN: AtomicBool = AtomicBool::new(false);
-/// Whether the mouse was asked for.
+/// Whether mouse events were requested.
 static MOUSE: AtomicBool = AtomicBool::new(false);
-/// Whether the terminal was asked to mark what is pasted.
+/// Whether bracketed paste is on.
 static PASTE: AtomicBool = AtomicBool::new(false);
-/// Whether some thread has panicked: the terminal is given back for good.
+/// Whether a thread has panicked: the terminal is restored for good.
 static PANICKED: AtomicBool = AtomicBool::new(false);
 static HOOK: Once = Once::new();
-/// Whether no terminal is open, so that the ending signals do what they do in any
-/// other program. Their handlers stay for good once they are registered.
-static IDLE: OnceLock<Arc<AtomicBool>> = OnceLock::new();
-/// Held while a page is written, so that another thread's panic does not give the
-/// terminal back in the middle of it.
+/// Held while a page is written, so that another thread's panic does not restore the
+/// terminal in the middle of it.
 static WRITING: Mutex<()> = Mutex::new(());
 
 thread_local! {
-    /// Whether this thread is the one that holds [`WRITING`].
+    /// Whether this thread holds [`WRITING`].
     static WRITES: Cell<bool> = const { Cell::new(false) };
 }
 
-/// How long the reading thread waits before it looks whether it should end.
+/// How often the reading thread checks whether it should end.
 const READ_SLICE: Duration = Duration::from_millis(100);
 
-/// A terminal that is taken.
+/// An open terminal.
 pub(super) struct Terminal {
     /// Never dropped: its drop prints to a terminal that may be gone, and panics.
-    /// The cursor is shown again by [`give_back`].
+    /// [`restore`] shows the cursor again.
     screen: ManuallyDrop<ratatui::Terminal<CrosstermBackend<Stdout>>>,
     events: Receiver<io::Result<Event>>,
     ended: Arc<AtomicBool>,
-    signal: Arc<AtomicUsize>,
-    continued: Arc<AtomicBool>,
-    registered: Vec<signal_hook::SigId>,
+    signals: Signals,
+}
+
+/// Refuses a platform on which a session could not end in order.
+pub(super) fn check_platform() -> Result<(), TuiError> {
+    if platform::SUPPORTED {
+        Ok(())
+    } else {
+        Err(TuiError::Platform)
+    }
 }
 
 impl Terminal {
-    /// Takes the terminal.
     pub(super) fn open(mouse: bool) -> Result<Self, TuiError> {
+        check_platform()?;
         if !io::stdin().is_terminal() || !io::stdout().is_terminal() {
             return Err(TuiError::NoTerminal);
         }
@@ -79,57 +93,36 @@ impl Terminal {
             let before = std::panic::take_hook();
             std::panic::set_hook(Box::new(move |info| {
                 PANICKED.store(true, Ordering::SeqCst);
-                give_back();
+                restore();
                 before(info);
             }));
         });
         PANICKED.store(false, Ordering::SeqCst);
         MOUSE.store(mouse, Ordering::SeqCst);
-
-        let signal = Arc::new(AtomicUsize::new(0));
-        let continued = Arc::new(AtomicBool::new(false));
-        let mut registered = Vec::new();
-        let first = IDLE.get().is_none();
-        let idle = IDLE.get_or_init(Arc::default);
-        idle.store(false, Ordering::SeqCst);
-        for number in [SIGHUP, SIGINT, SIGQUIT, SIGTERM] {
-            if first {
-                signal_hook::flag::register_conditional_default(number, Arc::clone(idle))
-                    .map_err(TuiError::Terminal)?;
-            }
-            let value = usize::try_from(number).unwrap_or(0);
-            let id = signal_hook::flag::register_usize(number, Arc::clone(&signal), value);
-            registered.push(id.map_err(TuiError::Terminal)?);
-        }
-        let id = signal_hook::flag::register(SIGCONT, Arc::clone(&continued));
-        registered.push(id.map_err(TuiError::Terminal)?);
-
+        let signals = Signals::register().map_err(TuiError::Terminal)?;
         take().map_err(TuiError::Terminal)?;
-        let screen = ratatui::Terminal::new(CrosstermBackend::new(io::stdout())).map_err(|e| {
-            give_back();
-            TuiError::Terminal(e)
-        })?;
+        let failed = |error| {
+            restore();
+            TuiError::Terminal(error)
+        };
+        let backend = CrosstermBackend::new(io::stdout());
+        let screen = ratatui::Terminal::new(backend).map_err(failed)?;
         let ended = Arc::new(AtomicBool::new(false));
         let (send, events) = channel();
         let stop = Arc::clone(&ended);
         std::thread::Builder::new()
             .name("keys".to_owned())
             .spawn(move || read(&send, &stop))
-            .map_err(|e| {
-                give_back();
-                TuiError::Terminal(e)
-            })?;
+            .map_err(failed)?;
         Ok(Self {
             screen: ManuallyDrop::new(screen),
             events,
             ended,
-            signal,
-            continued,
-            registered,
+            signals,
         })
     }
 
-    /// Draws a page, unless the terminal was given back meanwhile.
+    /// Draws a page, unless the terminal has been restored in the meantime.
     pub(super) fn draw(&mut self, page: impl FnOnce(&mut Frame<'_>)) -> Result<(), String> {
         let one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         if TAKEN.load(Ordering::SeqCst) {
@@ -152,14 +145,14 @@ impl Terminal {
         execute!(io::stdout(), EndSynchronizedUpdate)
     }
 
-    /// Whether what is pasted comes as one event. A paste whose end is lost on the way
-    /// swallows every key after it, so there is none while a key has to stop the device.
+    /// Switches bracketed paste. A paste whose end marker is lost swallows every
+    /// later key, so it is off while a key has to stop the device.
     pub(super) fn allow_paste(&self, allowed: bool) {
         let _one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         if !TAKEN.load(Ordering::SeqCst) || PASTE.swap(allowed, Ordering::SeqCst) == allowed {
             return;
         }
-        // a terminal that cannot be written shows at the next page
+        // A terminal that cannot be written is reported when the next page is drawn.
         let _ = if allowed {
             execute!(io::stdout(), EnableBracketedPaste)
         } else {
@@ -167,19 +160,13 @@ impl Terminal {
         };
     }
 
-    /// The name of a signal that asked the program to end, once.
+    /// The name of a terminating signal that has arrived, once.
     pub(super) fn take_signal(&self) -> Option<&'static str> {
-        match i32::try_from(self.signal.swap(0, Ordering::SeqCst)) {
-            Ok(SIGHUP) => Some("SIGHUP"),
-            Ok(SIGINT) => Some("SIGINT"),
-            Ok(SIGQUIT) => Some("SIGQUIT"),
-            Ok(SIGTERM) => Some("SIGTERM"),
-            _ => None,
-        }
+        self.signals.take()
     }
 
-    /// Looks whether the terminal is still there and ours; says whether it was
-    /// emptied and has to be drawn again.
+    /// Checks that the terminal is still usable. True if it was cleared and has to be
+    /// drawn again.
     pub(super) fn check(&mut self) -> Result<bool, String> {
         if PANICKED.load(Ordering::SeqCst) {
             return Err("a part of the program failed; see the message above".to_owned());
@@ -187,10 +174,9 @@ impl Terminal {
         if hung_up() {
             return Err("the terminal is gone".to_owned());
         }
-        // Somebody stopped the program from outside and let it go on: the shell
-        // may have changed the terminal in between.
-        if self.continued.swap(false, Ordering::SeqCst) {
-            give_back();
+        // Stopped and continued from outside: the shell may have changed the terminal.
+        if self.signals.take_continued() {
+            restore();
             self.again()?;
             return Ok(true);
         }
@@ -209,9 +195,9 @@ impl Terminal {
 
     /// Goes to the background, as Ctrl-Z asks, and comes back with `fg`.
     pub(super) fn suspend(&mut self) -> Result<(), String> {
-        give_back();
-        let stopped = kill_process(getpid(), Signal::TSTP);
-        self.continued.store(false, Ordering::SeqCst);
+        restore();
+        let stopped = platform::suspend();
+        self.signals.take_continued();
         self.again()?;
         stopped.map_err(|error| format!("the program cannot be suspended: {error}"))
     }
@@ -230,17 +216,11 @@ impl Terminal {
 impl Drop for Terminal {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::SeqCst);
-        give_back();
-        for id in self.registered.drain(..) {
-            signal_hook::low_level::unregister(id);
-        }
-        if let Some(idle) = IDLE.get() {
-            idle.store(true, Ordering::SeqCst);
-        }
+        restore();
     }
 }
 
-/// Raw mode, alternate screen, pasting as one event.
+/// Enters raw mode and the alternate screen, with bracketed paste.
 fn take() -> io::Result<()> {
     enable_raw_mode()?;
     TAKEN.store(true, Ordering::SeqCst);
@@ -254,18 +234,18 @@ fn take() -> io::Result<()> {
         }
     });
     if entered.is_err() {
-        give_back();
+        restore();
     }
     entered
 }
 
-/// The terminal as it was. Every step is tried: a failed one hides no other.
-fn give_back() {
+/// Restores the terminal. Every step is tried, whatever became of those before.
+fn restore() {
     if !TAKEN.swap(false, Ordering::SeqCst) {
         return;
     }
     let _one = page_written();
-    // Raw mode first: it needs no room in the output, which may be blocked.
+    // Raw mode first: it needs no room in the output buffer, which may be full.
     let _ = disable_raw_mode();
     if hung_up() {
         return;
@@ -283,8 +263,8 @@ fn give_back() {
     );
 }
 
-/// Waits until no other thread writes a page; not for ever, since a terminal may
-/// have stopped reading.
+/// Waits until no other thread writes a page, at most half a second, since a terminal
+/// may have stopped reading.
 fn page_written() -> Option<MutexGuard<'static, ()>> {
     if WRITES.get() {
         return None;
@@ -299,31 +279,12 @@ fn page_written() -> Option<MutexGuard<'static, ()>> {
     None
 }
 
-/// Whether the terminal's other end is closed. SIGHUP may be ignored, and
-/// reading would not tell.
-fn hung_up() -> bool {
-    let (stdin, stdout) = (io::stdin(), io::stdout());
-    let gone = PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL;
-    let mut ends = [
-        PollFd::new(&stdin, PollFlags::empty()),
-        PollFd::new(&stdout, PollFlags::empty()),
-    ];
-    let now = Timespec {
-        tv_sec: 0,
-        tv_nsec: 0,
-    };
-    match rustix::event::poll(&mut ends, Some(&now)) {
-        Ok(_) => ends.iter().any(|end| end.revents().intersects(gone)),
-        Err(_) => false,
-    }
-}
-
-/// Sends events until it should end or nobody listens.
+/// Sends events until it is told to stop or the receiver is gone.
 fn read(send: &Sender<io::Result<Event>>, stop: &AtomicBool) {
     while !stop.load(Ordering::SeqCst) && !hung_up() {
         let event = match crossterm::event::poll(READ_SLICE) {
             Ok(false) => continue,
-            // it is there for whoever takes the terminal next
+            // leave the event to whoever opens the terminal next
             Ok(true) if stop.load(Ordering::SeqCst) => return,
             Ok(true) => crossterm::event::read(),
             Err(error) => Err(error),

@@ -2,7 +2,7 @@
 //!
 //! A view is borrowed data with `impl Widget for &…`: drawing changes nothing.
 //! Everything on the page comes from the `View`, which holds nothing that
-//! identifies a realization, from the `Draft` and from the strip. The
+//! identifies a realization, from the `UiState` and from the strip. The
 //! participant's part is in the middle and large; the experimenter's line is the
 //! last row.
 

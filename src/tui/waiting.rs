@@ -6,7 +6,7 @@ use super::theme::Theme;
 use super::views::prose::{Prose, ProseView};
 use super::widgets::{centre, hints, row, rows};
 use super::{Options, TuiError};
-use crate::tui::draft::Reading;
+use crate::tui::ui_state::Reading;
 use crossterm::event::Event;
 use ratatui::Frame;
 use ratatui::widgets::Widget as _;

@@ -2,9 +2,9 @@
 
 use super::choice::List;
 use super::scale::{self, Boxes, TRACK_ROWS, Track};
-use crate::tui::draft::Target;
-use crate::tui::draft::field::{self, Field};
 use crate::tui::theme::Theme;
+use crate::tui::ui_state::Target;
+use crate::tui::ui_state::field::{self, Field};
 use crate::tui::widgets::{TextField, left, middle, row};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;

@@ -1,9 +1,9 @@
 //! What opens above a screen.
 
 use super::answer::AnswerField;
-use crate::tui::draft::dialog::{Confirm, Correct, Dialog, Step};
 use crate::tui::editor::Editor;
 use crate::tui::theme::Theme;
+use crate::tui::ui_state::dialog::{Confirm, Correct, Dialog, Step};
 use crate::tui::widgets::{TextField, dialog, hints, left, left_all, middle, row, rows};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;

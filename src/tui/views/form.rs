@@ -4,8 +4,8 @@
 //! types what is said sees the question to ask, compact, with the answers so far.
 
 use super::answer::AnswerField;
-use crate::tui::draft::{Form, Target};
 use crate::tui::theme::Theme;
+use crate::tui::ui_state::{Form, Target};
 use crate::tui::widgets::{centre_all, left, left_all, middle, row, rows};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;

@@ -10,9 +10,9 @@ use super::status::{Status, Top};
 use super::trouble::Trouble;
 use super::who::WhoView;
 use crate::runner::Strip;
-use crate::tui::draft::dialog::{Confirm, Dialog};
-use crate::tui::draft::{Draft, Target};
 use crate::tui::theme::Theme;
+use crate::tui::ui_state::dialog::{Confirm, Dialog};
+use crate::tui::ui_state::{Target, UiState};
 use crate::tui::widgets::{centre, hints, middle, row, rows};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
@@ -34,7 +34,7 @@ pub struct Page<'a> {
     /// What the session shows.
     pub view: &'a View,
     /// What is typed.
-    pub draft: &'a Draft,
+    pub state: &'a UiState,
     /// The live strip, where it was asked for.
     pub strip: Option<&'a Strip>,
     /// Its look.
@@ -43,7 +43,7 @@ pub struct Page<'a> {
 
 /// What a page says about itself, for the draft to follow.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Room {
+pub struct TextRoom {
     /// Lines of a long text that can be scrolled away.
     pub most: usize,
     /// Lines of a long text that fit.
@@ -73,8 +73,8 @@ impl<'a> Page<'a> {
                 view: self.view,
                 questions,
                 to_experimenter: *to_experimenter,
-                form: self.draft.form()?,
-                focused: self.draft.dialog().is_none(),
+                form: self.state.form()?,
+                focused: self.state.dialog().is_none(),
                 theme: self.theme,
             }),
             _ => None,
@@ -84,9 +84,9 @@ impl<'a> Page<'a> {
     fn who(&self) -> Option<WhoView<'a>> {
         match &self.view.screen {
             Screen::Who { claiming, .. } => Some(WhoView {
-                who: self.draft.who()?,
+                who: self.state.who()?,
                 claiming: *claiming,
-                focused: self.draft.dialog().is_none(),
+                focused: self.state.dialog().is_none(),
                 theme: self.theme,
             }),
             _ => None,
@@ -95,7 +95,7 @@ impl<'a> Page<'a> {
 
     fn dialog(&self) -> Option<DialogView<'a>> {
         Some(DialogView {
-            dialog: self.draft.dialog()?,
+            dialog: self.state.dialog()?,
             armed: self.view.armed,
             theme: self.theme,
         })
@@ -103,7 +103,7 @@ impl<'a> Page<'a> {
 
     /// What the mouse hits at a place.
     pub fn hit(&self, area: Rect, place: Position) -> Option<Target> {
-        if Self::too_small(area) || self.draft.dialog().is_some() {
+        if Self::too_small(area) || self.state.dialog().is_some() {
             return None;
         }
         self.form()?.hit(Self::body(area), place)
@@ -125,9 +125,9 @@ impl<'a> Page<'a> {
     }
 
     /// How much fits.
-    pub fn room(&self, area: Rect) -> Room {
+    pub fn room(&self, area: Rect) -> TextRoom {
         if Self::too_small(area) {
-            return Room::default();
+            return TextRoom::default();
         }
         let body = Self::body(area);
         let (most, page) = match prose(self.view) {
@@ -139,7 +139,7 @@ impl<'a> Page<'a> {
             (None, Some(form)) => form.columns(body),
             (None, None) => None,
         };
-        Room {
+        TextRoom {
             most,
             page,
             columns,
@@ -149,7 +149,7 @@ impl<'a> Page<'a> {
     fn prose<'b>(&self, prose: &'b super::prose::Prose) -> ProseView<'b> {
         ProseView {
             prose,
-            reading: self.draft.reading(),
+            reading: self.state.reading(),
             theme: self.theme,
         }
     }
@@ -202,7 +202,7 @@ impl<'a> Page<'a> {
             Screen::DeviceTrouble { .. } => own(&[("F10", "leaves")]),
             Screen::SaveTrouble { .. } => own(&[("Enter", "tries again")]),
             _ => {
-                let reading = self.draft.reading();
+                let reading = self.state.reading();
                 match prose(self.view) {
                     Some(_) if reading.scrolled < reading.most => {
                         own(&[("Enter", "reads on"), ("↑ ↓", "scroll")])
@@ -220,7 +220,7 @@ impl<'a> Page<'a> {
         } else {
             "Esc stops the device."
         };
-        let leave = if self.draft.dialog() == Some(&Dialog::Confirm(Confirm::Quit)) {
+        let leave = if self.state.dialog() == Some(&Dialog::Confirm(Confirm::Quit)) {
             "Leave the session? y leaves, n does not."
         } else {
             ""
@@ -265,7 +265,7 @@ impl Widget for &Page<'_> {
         self.screen(body, buf);
         let keys = self.keys();
         let keys: Vec<(&str, &str)> = keys.iter().map(|(k, w)| (k.as_str(), *w)).collect();
-        if self.draft.dialog().is_none() {
+        if self.state.dialog().is_none() {
             let line = hints(self.theme, &keys);
             centre(buf, row(area, area.height - 3), &line);
             if self.view.entry == Entry::Experimenter
@@ -278,7 +278,7 @@ impl Widget for &Page<'_> {
         if let Some(dialog) = self.dialog() {
             dialog.render(body, buf);
         }
-        let notice = self.draft.notice().or(self.view.notice.as_deref());
+        let notice = self.state.notice().or(self.view.notice.as_deref());
         if let Some(notice) = notice {
             let columns = usize::from(area.width).saturating_sub(8);
             let lines = wrap::paragraph(notice, columns, NOTICE_ROWS);
@@ -291,7 +291,7 @@ impl Widget for &Page<'_> {
         }
         let status = Status {
             line: &self.view.line,
-            text: self.draft.is_text(),
+            text: self.state.is_text(),
             unsaved: matches!(self.view.screen, Screen::SaveTrouble { .. }),
             theme: self.theme,
         };

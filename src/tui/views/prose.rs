@@ -1,8 +1,8 @@
 //! Screens that are mainly words: texts to read, prompts, pauses, choices by a
 //! letter.
 
-use crate::tui::draft::Reading;
 use crate::tui::theme::Theme;
+use crate::tui::ui_state::Reading;
 use crate::tui::widgets::{centre, centre_all, clock, left_all, middle, right, row, rows};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;

@@ -1,7 +1,7 @@
 //! The first screen: who takes part, who runs the session.
 
-use crate::tui::draft::Who;
 use crate::tui::theme::Theme;
+use crate::tui::ui_state::Who;
 use crate::tui::widgets::{TextField, centre, left, middle, row};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};

@@ -1,5 +1,5 @@
 //! Nothing that identifies a realization is ever in a view; `rig` looks at every
-//! one. Here are the ways in from outside.
+//! one. Focus are the ways in from outside.
 
 use super::rig::Rig;
 use super::studies::{MODELS, plain};

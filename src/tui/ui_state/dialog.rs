@@ -2,7 +2,7 @@
 //! back. A dialog changes nothing until it is confirmed, and Esc closes it.
 
 use super::field::Field;
-use crate::tui::editor::{Editor, Taken};
+use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
 use study_core::outcome::{Author, Choice};
 use study_core::protocol::Answer;
@@ -81,9 +81,9 @@ pub enum Step {
 
 /// What a key did to a dialog.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
+pub enum DialogResult {
     /// It goes on.
-    Open(Taken),
+    Open(Handled),
     /// It is confirmed and closes; this is to be sent.
     Done(Vec<Input>),
     /// It closes and the form on the screen is sent with its question declined.
@@ -151,40 +151,40 @@ impl Dialog {
     }
 
     /// Works on the dialog. Esc is the caller's.
-    pub fn key(&mut self, key: Key, screen: &Screen) -> Outcome {
+    pub fn key(&mut self, key: Key, screen: &Screen) -> DialogResult {
         if self.own_key() == Some(key) {
             return match self.editor() {
                 Some(editor) if !editor.is_blank() => {
                     missing("Something is typed: Enter keeps it, Ctrl-U removes it.")
                 }
-                _ => Outcome::Closed,
+                _ => DialogResult::Closed,
             };
         }
         match self {
             Self::Help => match key {
-                Key::Enter | Key::Char('?' | 'q') => Outcome::Closed,
-                _ => Outcome::Open(Taken::No),
+                Key::Enter | Key::Char('?' | 'q') => DialogResult::Closed,
+                _ => DialogResult::Open(Handled::No),
             },
             Self::Remark { by, text } => match key {
                 Key::Enter if text.is_blank() => missing("Type the remark first, or Esc."),
-                Key::Enter => Outcome::Done(vec![Input::Remark {
+                Key::Enter => DialogResult::Done(vec![Input::Remark {
                     by: *by,
                     text: text.text().to_owned(),
                 }]),
                 Key::Tab | Key::BackTab => other(by),
-                key => Outcome::Open(text.key(key)),
+                key => DialogResult::Open(text.key(key)),
             },
             Self::MarkBad { reason, .. } => match key {
                 Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
-                Key::Enter => Outcome::Done(vec![Input::MarkBad {
+                Key::Enter => DialogResult::Done(vec![Input::MarkBad {
                     reason: reason.text().to_owned(),
                 }]),
-                key => Outcome::Open(reason.key(key)),
+                key => DialogResult::Open(reason.key(key)),
             },
             Self::Decline { reason } => match key {
                 Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
-                Key::Enter => Outcome::Declined(reason.text().to_owned()),
-                key => Outcome::Open(reason.key(key)),
+                Key::Enter => DialogResult::Declined(reason.text().to_owned()),
+                key => DialogResult::Open(reason.key(key)),
             },
             Self::Confirm(confirm) => confirm.key(key, screen),
             Self::Correct(correct) => correct.key(key),
@@ -193,9 +193,9 @@ impl Dialog {
 }
 
 impl Confirm {
-    fn key(self, key: Key, screen: &Screen) -> Outcome {
+    fn key(self, key: Key, screen: &Screen) -> DialogResult {
         match key {
-            Key::Char('y' | 'Y') => Outcome::Done(match (self, screen) {
+            Key::Char('y' | 'Y') => DialogResult::Done(match (self, screen) {
                 (Self::Quit, _) => vec![Input::Quit],
                 (Self::DropOut, Screen::ResumeChoice { .. }) => {
                     vec![Input::Resume(Choice::DropOut)]
@@ -204,7 +204,7 @@ impl Confirm {
                 // The screen that asked is gone.
                 _ => Vec::new(),
             }),
-            Key::Char('n' | 'N') => Outcome::Closed,
+            Key::Char('n' | 'N') => DialogResult::Closed,
             _ => missing("y or n"),
         }
     }
@@ -216,10 +216,10 @@ impl Correct {
         self.items.get(self.cursor)
     }
 
-    fn key(&mut self, key: Key) -> Outcome {
+    fn key(&mut self, key: Key) -> DialogResult {
         let last = self.items.len().saturating_sub(1);
         let Some(item) = self.items.get(self.cursor) else {
-            return Outcome::Closed;
+            return DialogResult::Closed;
         };
         match &mut self.step {
             Step::List => {
@@ -235,9 +235,9 @@ impl Correct {
                         self.step = Step::Answer(field);
                         self.cursor
                     }
-                    _ => return Outcome::Open(Taken::No),
+                    _ => return DialogResult::Open(Handled::No),
                 };
-                Outcome::Open(Taken::Yes)
+                DialogResult::Open(Handled::Yes)
             }
             Step::Answer(field) => match key {
                 Key::Enter => match field.answer(&item.question) {
@@ -254,9 +254,9 @@ impl Correct {
                 Key::Decline => self.ask_why(None),
                 Key::BackTab => {
                     self.step = Step::List;
-                    Outcome::Open(Taken::Yes)
+                    DialogResult::Open(Handled::Yes)
                 }
-                key => Outcome::Open(field.key(&item.question, key)),
+                key => DialogResult::Open(field.key(&item.question, key)),
             },
             Step::Reason { answer, by, reason } => match key {
                 Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
@@ -265,7 +265,7 @@ impl Correct {
                     let declined = Answer::Declined {
                         reason: reason.clone(),
                     };
-                    Outcome::Done(vec![Input::Correct {
+                    DialogResult::Done(vec![Input::Correct {
                         place: item.place,
                         question: item.question.id.clone(),
                         answer: answer.clone().unwrap_or(declined),
@@ -274,29 +274,29 @@ impl Correct {
                     }])
                 }
                 Key::Tab | Key::BackTab => other(by),
-                key => Outcome::Open(reason.key(key)),
+                key => DialogResult::Open(reason.key(key)),
             },
         }
     }
 
-    fn ask_why(&mut self, answer: Option<Answer>) -> Outcome {
+    fn ask_why(&mut self, answer: Option<Answer>) -> DialogResult {
         self.step = Step::Reason {
             answer,
             by: Author::Experimenter,
             reason: Editor::new(""),
         };
-        Outcome::Open(Taken::Yes)
+        DialogResult::Open(Handled::Yes)
     }
 }
 
-fn missing(what: &str) -> Outcome {
-    Outcome::Open(Taken::Notice(what.to_owned()))
+fn missing(what: &str) -> DialogResult {
+    DialogResult::Open(Handled::Notice(what.to_owned()))
 }
 
-fn other(by: &mut Author) -> Outcome {
+fn other(by: &mut Author) -> DialogResult {
     *by = match by {
         Author::Experimenter => Author::Participant,
         Author::Participant => Author::Experimenter,
     };
-    Outcome::Open(Taken::Yes)
+    DialogResult::Open(Handled::Yes)
 }

@@ -1,9 +1,9 @@
 //! What a key does: first the ones that work everywhere, then the dialog on top,
 //! then the screen.
 
-use super::dialog::{Confirm, Dialog, Outcome};
-use super::{Draft, Here};
-use crate::tui::editor::Taken;
+use super::dialog::{Confirm, Dialog, DialogResult};
+use super::{Focus, UiState};
+use crate::tui::editor::Handled;
 use crate::tui::keys::{self, Key};
 use crossterm::event::Event;
 use study_base::text::QuestionId;
@@ -11,7 +11,7 @@ use study_core::outcome::Choice;
 use study_core::protocol::{Answer, Question};
 use study_core::session::{Input, Screen, View};
 
-impl Draft {
+impl UiState {
     /// What a key means now.
     pub(super) fn press(&mut self, key: Key, view: &View) -> Vec<Input> {
         match key {
@@ -67,14 +67,14 @@ impl Draft {
 
     /// Whether a character is text now, Space included.
     pub fn is_text(&self) -> bool {
-        match (self.dialog(), self.here) {
+        match (self.dialog(), self.focus) {
             (Some(dialog), _) => dialog.is_text(),
-            (None, Here::Who) => true,
-            (None, Here::Form) => self
+            (None, Focus::Who) => true,
+            (None, Focus::Form) => self
                 .form()
                 .and_then(|form| form.fields.get(form.focus))
                 .is_some_and(super::Field::is_text),
-            (None, Here::Elsewhere) => false,
+            (None, Focus::None) => false,
         }
     }
 
@@ -113,19 +113,19 @@ impl Draft {
             return Vec::new();
         };
         match dialog.key(key, &view.screen) {
-            Outcome::Open(taken) => {
+            DialogResult::Open(taken) => {
                 self.say(taken);
                 Vec::new()
             }
-            Outcome::Done(inputs) => {
+            DialogResult::Done(inputs) => {
                 self.dialogs.pop();
                 inputs
             }
-            Outcome::Closed => {
+            DialogResult::Closed => {
                 self.dialogs.pop();
                 Vec::new()
             }
-            Outcome::Declined(reason) => {
+            DialogResult::Declined(reason) => {
                 self.dialogs.pop();
                 match &view.screen {
                     Screen::Form { questions, .. } => self.submit(questions, Some(reason)),
@@ -219,8 +219,8 @@ impl Draft {
                     return Vec::new();
                 };
                 match field.key(question, key) {
-                    Taken::No if key == Key::Down => form.focus = (at + 1).min(count - 1),
-                    Taken::No if key == Key::Up => form.focus = at.saturating_sub(1),
+                    Handled::No if key == Key::Down => form.focus = (at + 1).min(count - 1),
+                    Handled::No if key == Key::Up => form.focus = at.saturating_sub(1),
                     taken => self.say(taken),
                 }
             }

@@ -1,6 +1,6 @@
 //! What is typed and chosen but not yet sent, and what a key does to it.
 //!
-//! A [`Draft`] is the state of the screen's surface and nothing else: it has no
+//! A [`UiState`] is the state of the screen's surface and nothing else: it has no
 //! terminal, no clock and no knowledge of the study beyond the [`View`] it is
 //! given. Its only effects are the [`Input`]s that it returns.
 //!
@@ -11,9 +11,9 @@
 
 pub mod dialog;
 pub mod field;
-mod press;
+mod key_handling;
 
-use super::editor::{Editor, Taken};
+use super::editor::{Editor, Handled};
 use super::keys;
 use crossterm::event::Event;
 use dialog::Dialog;
@@ -24,10 +24,10 @@ use study_core::session::{Input, Screen, View};
 
 /// The surface's state.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Draft {
+pub struct UiState {
     form: Option<(FormKey, Form)>,
     who: Option<((String, String), Who)>,
-    here: Here,
+    focus: Focus,
     dialogs: Vec<Dialog>,
     /// Dialogs that a trouble has put aside.
     parked: Vec<Dialog>,
@@ -38,14 +38,14 @@ pub struct Draft {
 
 /// Where text without a dialog goes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-enum Here {
+enum Focus {
     /// Into the first screen.
     Who,
     /// Into the form.
     Form,
     /// Nowhere.
     #[default]
-    Elsewhere,
+    None,
 }
 
 /// Which form a draft belongs to.
@@ -93,7 +93,7 @@ pub enum Target {
     Field(usize),
 }
 
-impl Draft {
+impl UiState {
     /// The form on the screen, if there is one.
     pub fn form(&self) -> Option<&Form> {
         self.form.as_ref().map(|(_, form)| form)
@@ -140,7 +140,7 @@ impl Draft {
 
     /// Follows the view to another screen. Returns whether it was another one.
     pub fn follow(&mut self, view: &View, old: Option<&Screen>) -> bool {
-        self.here = Here::Elsewhere;
+        self.focus = Focus::None;
         match &view.screen {
             Screen::Form {
                 place,
@@ -157,7 +157,7 @@ impl Draft {
                     };
                     self.form = Some((key, form));
                 }
-                self.here = Here::Form;
+                self.focus = Focus::Form;
             }
             Screen::Who {
                 participant,
@@ -173,7 +173,7 @@ impl Draft {
                     };
                     self.who = Some((preset, who));
                 }
-                self.here = Here::Who;
+                self.focus = Focus::Who;
             }
             _ => {}
         }
@@ -195,7 +195,7 @@ impl Draft {
         other
     }
 
-    /// What an event means. Mouse clicks come through [`Draft::pick`].
+    /// What an event means. Mouse clicks come through [`UiState::pick`].
     pub fn key(&mut self, event: &Event, view: &View) -> Vec<Input> {
         match event {
             Event::Key(event) => {
@@ -209,7 +209,7 @@ impl Draft {
                 self.notice = None;
                 let taken = match self.editor() {
                     Some(editor) => editor.insert(text),
-                    None => Taken::Notice("There is no text field to paste into.".to_owned()),
+                    None => Handled::Notice("There is no text field to paste into.".to_owned()),
                 };
                 self.say(taken);
                 Vec::new()
@@ -252,8 +252,8 @@ impl Draft {
         };
     }
 
-    fn say(&mut self, taken: Taken) {
-        if let Taken::Notice(what) = taken {
+    fn say(&mut self, taken: Handled) {
+        if let Handled::Notice(what) = taken {
             self.notice = Some(what);
         }
     }
@@ -262,10 +262,10 @@ impl Draft {
         if let Some(dialog) = self.dialogs.last_mut() {
             return dialog.editor();
         }
-        match self.here {
-            Here::Form => self.form.as_mut()?.1.focused()?.editor(),
-            Here::Who => Some(self.who.as_mut()?.1.focused()),
-            Here::Elsewhere => None,
+        match self.focus {
+            Focus::Form => self.form.as_mut()?.1.focused()?.editor(),
+            Focus::Who => Some(self.who.as_mut()?.1.focused()),
+            Focus::None => None,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! An answer that is being made. None is preset: what nobody chose is not sent.
 
-use crate::tui::editor::{Editor, Taken};
+use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
 use std::collections::BTreeSet;
 use study_core::protocol::{Answer, Question, QuestionKind};
@@ -121,7 +121,7 @@ impl Field {
     }
 
     /// Works on the answer.
-    pub fn key(&mut self, question: &Question, key: Key) -> Taken {
+    pub fn key(&mut self, question: &Question, key: Key) -> Handled {
         match (self, &question.kind) {
             (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
                 rating(chosen, typed, *from, *to, key)
@@ -134,13 +134,13 @@ impl Field {
             }
             (Self::Number(editor), _) => match key {
                 Key::Char(c) if !matches!(c, '0'..='9' | '.' | ',' | '-' | '+' | 'e' | 'E') => {
-                    Taken::No
+                    Handled::No
                 }
-                Key::Up | Key::Down => Taken::No,
+                Key::Up | Key::Down => Handled::No,
                 key => editor.key(key),
             },
             (Self::Text(editor), _) => editor.key(key),
-            _ => Taken::No,
+            _ => Handled::No,
         }
     }
 
@@ -183,7 +183,7 @@ fn sentence(why: &str) -> String {
     format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }
 
-fn rating(chosen: &mut Option<i64>, typed: &mut String, from: i64, to: i64, key: Key) -> Taken {
+fn rating(chosen: &mut Option<i64>, typed: &mut String, from: i64, to: i64, key: Key) -> Handled {
     if let Key::Char(c @ ('0'..='9' | '-')) = key {
         for start in [format!("{typed}{c}"), c.to_string()] {
             let number = start.parse().ok().filter(|n| (from..=to).contains(n));
@@ -193,11 +193,11 @@ fn rating(chosen: &mut Option<i64>, typed: &mut String, from: i64, to: i64, key:
                     *chosen = number;
                 }
                 *typed = if more { start } else { String::new() };
-                return Taken::Yes;
+                return Handled::Yes;
             }
         }
         typed.clear();
-        return Taken::Notice(format!("The scale goes from {from} to {to}."));
+        return Handled::Notice(format!("The scale goes from {from} to {to}."));
     }
     let big = (to.saturating_sub(from) / 10).max(1);
     let next = match key {
@@ -207,11 +207,11 @@ fn rating(chosen: &mut Option<i64>, typed: &mut String, from: i64, to: i64, key:
         Key::PageUp => chosen.map_or(from, |n| n.saturating_add(big)),
         Key::Home => from,
         Key::End => to,
-        _ => return Taken::No,
+        _ => return Handled::No,
     };
     typed.clear();
     *chosen = Some(next.clamp(from, to));
-    Taken::Yes
+    Handled::Yes
 }
 
 /// Whether a longer number in the range starts with these digits.
@@ -249,7 +249,7 @@ fn slider(
     typed: &mut String,
     (from, to, step): (f64, f64, f64),
     key: Key,
-) -> Taken {
+) -> Handled {
     if let Key::Char(c @ ('0'..='9' | '.' | ',' | '-')) = key {
         for start in [format!("{typed}{c}"), c.to_string()] {
             let number = parse(&start).filter(|n| (from..=to).contains(n));
@@ -258,11 +258,11 @@ fn slider(
                     *value = number;
                 }
                 *typed = start;
-                return Taken::Yes;
+                return Handled::Yes;
             }
         }
         typed.clear();
-        return Taken::Notice(format!("The scale goes from {from} to {to}."));
+        return Handled::Notice(format!("The scale goes from {from} to {to}."));
     }
     // The first key puts the mark in the middle, which favours no end.
     let moved = |steps: f64| value.map_or((from + to) / 2.0, |v| v + steps * step);
@@ -273,11 +273,11 @@ fn slider(
         Key::PageUp => moved(10.0),
         Key::Home => from,
         Key::End => to,
-        _ => return Taken::No,
+        _ => return Handled::No,
     };
     typed.clear();
     *value = Some(on_grid(next, from, to, step));
-    Taken::Yes
+    Handled::Yes
 }
 
 /// The nearest whole number of steps from the left end, inside the scale, with
@@ -303,7 +303,7 @@ fn choice(
     count: usize,
     multiple: bool,
     key: Key,
-) -> Taken {
+) -> Handled {
     let last = count.saturating_sub(1);
     let at = match key {
         Key::Up => cursor.map_or(last, |c| c.saturating_sub(1)),
@@ -314,30 +314,30 @@ fn choice(
         Key::End => last,
         Key::Char(' ' | 'x') => {
             let Some(at) = *cursor else {
-                return Taken::Notice("Move to an entry first: ↑ and ↓.".to_owned());
+                return Handled::Notice("Move to an entry first: ↑ and ↓.".to_owned());
             };
             mark(marked, at, multiple);
-            return Taken::Yes;
+            return Handled::Yes;
         }
         Key::Char(c @ '1'..='9') => {
             let at = c as usize - '1' as usize;
             if at >= count {
-                return Taken::Notice(format!("The list has {count} entries."));
+                return Handled::Notice(format!("The list has {count} entries."));
             }
             *cursor = Some(at);
             mark(marked, at, multiple);
-            return Taken::Yes;
+            return Handled::Yes;
         }
-        _ => return Taken::No,
+        _ => return Handled::No,
     };
     if count == 0 {
-        return Taken::No;
+        return Handled::No;
     }
     *cursor = Some(at);
     if !multiple {
         mark(marked, at, false);
     }
-    Taken::Yes
+    Handled::Yes
 }
 
 fn mark(marked: &mut BTreeSet<usize>, at: usize, multiple: bool) {
@@ -487,7 +487,7 @@ mod tests {
             Err("A number from 0 to 120.".to_owned())
         );
         // Letters are no part of a number: "nan" and "inf" cannot be typed.
-        assert_eq!(field.key(&number, Key::Char('n')), Taken::No);
+        assert_eq!(field.key(&number, Key::Char('n')), Handled::No);
     }
 
     #[test]

@@ -1,0 +1,33 @@
+//! Platforms without Unix signals: a session is refused, since nothing would stop the
+//! device when its terminal closes.
+
+use std::io;
+
+/// Whether this platform can guarantee that a session ends in order.
+pub(super) const SUPPORTED: bool = false;
+
+pub(super) struct Signals;
+
+impl Signals {
+    pub(super) fn register() -> io::Result<Self> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
+
+    pub(super) fn take(&self) -> Option<&'static str> {
+        None
+    }
+
+    pub(super) fn take_continued(&self) -> bool {
+        false
+    }
+}
+
+pub(super) fn suspend() -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
+pub(super) fn hung_up() -> bool {
+    false
+}
+
+pub(crate) fn survive_file_size_limit() {}
