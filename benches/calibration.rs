@@ -196,7 +196,9 @@ impl Cells {
     fn of(r: &Ratings) -> Self {
         let mut sums = vec![[0.0; MODELS as usize]; SUBJECTS as usize];
         for i in 0..r.len() {
-            sums[r.subject[i] as usize][r.model[i] as usize] += r.rating[i];
+            if let (Some(model), Some(rating)) = (r.model[i], r.rating[i]) {
+                sums[r.subject[i] as usize][model as usize] += rating;
+            }
         }
         Self(sums)
     }

@@ -290,7 +290,7 @@ fn excluded(a: &Analysis) -> Vec<Vec<String>> {
                 a.subject(row).to_owned(),
                 a.model(row).to_owned(),
                 row.repetition.to_string(),
-                number(row.rating()),
+                number(row.rating),
                 reason.to_string(),
             ]);
         }
@@ -312,7 +312,7 @@ fn ratings_used(a: &Analysis) -> String {
         ]);
         for row in &a.rows {
             let excluded = row.excluded.as_ref().map(|r| r.to_string());
-            let reason = match (&excluded, row.rating()) {
+            let reason = match (&excluded, row.rating) {
                 (Some(reason), _) => reason,
                 (None, None) => "no rating",
                 (None, Some(_)) => "",
@@ -321,9 +321,9 @@ fn ratings_used(a: &Analysis) -> String {
                 a.subject(row),
                 a.model(row),
                 &row.repetition.to_string(),
-                &whole(row.trial_index()),
-                &number(row.rating()),
-                &number(row.vaf()),
+                &whole(row.trial_index),
+                &number(row.rating),
+                &number(row.vaf),
                 if reason.is_empty() { "true" } else { "false" },
                 reason,
             ]);

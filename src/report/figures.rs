@@ -134,7 +134,7 @@ impl<'a> Scene<'a> {
         let rows = a.rows.iter().filter(|r| few && r.excluded.is_none());
         for row in rows {
             let (subject, model) = (a.subject(row), a.model(row));
-            if let (Some(rating), false) = (row.rating(), model.is_empty()) {
+            if let (Some(rating), false) = (row.rating, model.is_empty()) {
                 let cell = (subject, model);
                 cells.entry(cell).or_default().push(rating);
             }

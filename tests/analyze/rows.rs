@@ -72,7 +72,7 @@ fn participant(who: &str, state: State, reason: &str) -> ParticipantRow {
         simulated: false,
         erased: false,
         consent_version: None,
-        protocol_version: 1,
+        protocol_version: Some(1),
         trials_done: 3,
         trials_planned: 3,
         started_at: DateTime::parse_from_rfc3339("2026-11-20T10:00:00+01:00").ok(),

@@ -151,32 +151,17 @@ pub struct Listed {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
     subject: u32,
-    model: u32,
-    /// The how-maniest time.
+    model: Option<u32>,
+    /// Repetition number, from 1.
     pub repetition: u32,
-    trial_index: u32,
-    /// NaN: none.
-    rating: f64,
-    vaf: f64,
+    /// Position in the subject's order, from 1, if it is known.
+    pub trial_index: Option<u32>,
+    /// The rating, if there is one.
+    pub rating: Option<f64>,
+    /// The VAF, if there is one.
+    pub vaf: Option<f64>,
     /// Why it does not count; `None`: it does.
     pub excluded: Option<Arc<Reason>>,
-}
-
-impl Judged {
-    /// The rating, if there is one.
-    pub fn rating(&self) -> Option<f64> {
-        Some(self.rating).filter(|v| v.is_finite())
-    }
-
-    /// Place in the subject's order, from 1, if it is known.
-    pub fn trial_index(&self) -> Option<u32> {
-        Some(self.trial_index).filter(|t| *t > 0)
-    }
-
-    /// The VAF, if there is one.
-    pub fn vaf(&self) -> Option<f64> {
-        Some(self.vaf).filter(|v| v.is_finite())
-    }
 }
 
 /// Everything that was computed.
@@ -227,9 +212,7 @@ impl Analysis {
 
     /// The row's realization, empty if there is none. Untrusted.
     pub fn model(&self, row: &Judged) -> &str {
-        self.models
-            .get(row.model as usize)
-            .map_or("", String::as_str)
+        row.model.map_or("", |m| &self.models[m as usize])
     }
 }
 
@@ -364,10 +347,7 @@ fn judged(ratings: &Ratings, decisions: &[select::Decision]) -> Vec<Judged> {
 }
 
 fn model_name(ratings: &Ratings, row: usize) -> String {
-    ratings
-        .models
-        .get(ratings.model[row] as usize)
-        .map_or_else(String::new, |m| m.id.clone())
+    ratings.model[row].map_or_else(String::new, |m| ratings.models[m as usize].id.clone())
 }
 
 fn comments(used: &Ratings) -> Vec<Said> {

@@ -32,7 +32,7 @@ mod telemetry;
 mod vanished;
 mod verify;
 
-pub use derive::{Columns, Derived, participants};
+pub use derive::{Derived, participants};
 pub use error::{StoreError, plain};
 pub use journal::Journal;
 pub use ledger::{ClaimRequest, Claimed, SeatKind, next_row};

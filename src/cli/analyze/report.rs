@@ -14,6 +14,7 @@ use std::path::Path;
 use study_base::text::counted;
 use study_core::analyze::Analysis;
 use study_core::outcome::{ParticipantRow, RatingRow, Status};
+use study_core::protocol::columns::SampleColumn;
 use study_core::protocol::{Order, Protocol, QuestionKind};
 use study_core::store::{StudyFolder, layout};
 
@@ -263,9 +264,10 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
 fn trace(path: &Path) -> Option<(Vec<(f64, f64)>, bool)> {
     let mut reader = csv::Reader::from_reader(BufReader::new(File::open(path).ok()?));
     let head = reader.headers().ok()?.clone();
-    let column = |name: &str| head.iter().position(|h| h == name);
-    let (x, command) = (column("x_mm")?, column("force_command_n")?);
-    let measured = column("force_measured_n");
+    let column = |column: SampleColumn| head.iter().position(|h| h == column.name());
+    let x = column(SampleColumn::XMm)?;
+    let command = column(SampleColumn::ForceCommandN)?;
+    let measured = column(SampleColumn::ForceMeasuredN);
     let mut points = Vec::new();
     let mut all_measured = measured.is_some();
     let mut record = csv::StringRecord::new();

@@ -182,7 +182,7 @@ pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
 pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     let mut by: BTreeMap<(&str, u32), Vec<f64>> = BTreeMap::new();
     for row in scene.a.rows.iter().filter(|r| r.excluded.is_none()) {
-        if let Some(x) = row.rating() {
+        if let Some(x) = row.rating {
             let key = (scene.a.model(row), row.repetition);
             by.entry(key).or_default().push(x);
         }

@@ -143,7 +143,7 @@ pub(super) fn exclusions(a: &Analysis, of_study: bool) -> Markup {
                                         td { (safe(a.subject(r))) }
                                         td { (safe(a.model(r))) }
                                         td { (r.repetition) }
-                                        td { (r.rating().map_or_else(|| "–".to_owned(), apa::plain)) }
+                                        td { (r.rating.map_or_else(|| "–".to_owned(), apa::plain)) }
                                         td.text { (safe(&r.excluded.as_ref().map(ToString::to_string).unwrap_or_default())) }
                                     }
                                 }

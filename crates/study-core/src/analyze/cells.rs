@@ -3,7 +3,7 @@
 //! Ratings are held as differences from a whole number near their mean, so that
 //! an offset costs no digits; what is a level (a mean, a quantile) adds it back.
 
-use crate::outcome::ratings::{NO_MODEL, Ratings};
+use crate::outcome::ratings::Ratings;
 use crate::protocol::Role;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -30,8 +30,8 @@ pub(super) struct Cells<'a> {
     pub(super) ratings: &'a Ratings,
     /// What was taken off every rating.
     pub(super) offset: f64,
-    /// Ratings less the offset, by row; NaN missing.
-    pub(super) centred: Vec<f64>,
+    /// Ratings less the offset, by row.
+    pub(super) centred: Vec<Option<f64>>,
     /// Every row, by subject and model (none comes last), otherwise as they stand.
     pub(super) all: Vec<usize>,
     /// Rows with a rating and a realization, by subject, model, repetition.
@@ -70,13 +70,11 @@ impl<'a> Cells<'a> {
     /// Linear in the rows, but for sorting the repetitions of cells that do not
     /// come in their order.
     pub(super) fn of(ratings: &'a Ratings) -> Self {
-        let offset = match mean_of(ratings.rating.iter().copied().filter(|v| v.is_finite())) {
-            Some(mean) => mean.round(),
-            None => 0.0,
-        };
-        let centred: Vec<f64> = ratings.rating.iter().map(|v| v - offset).collect();
+        let offset = mean_of(ratings.rating.iter().copied().flatten()).map_or(0.0, f64::round);
+        let less = |v: &Option<f64>| v.map(|v| v - offset).filter(|v| v.is_finite());
+        let centred: Vec<Option<f64>> = ratings.rating.iter().map(less).collect();
         let (all, vaf) = rayon::join(|| ratings.by_cell(), || vafs(ratings));
-        let counts = |i: &usize| centred[*i].is_finite() && ratings.model[*i] != NO_MODEL;
+        let counts = |i: &usize| centred[*i].is_some() && ratings.model[*i].is_some();
         let mut order: Vec<usize> = all.iter().copied().filter(counts).collect();
         let place = |i: usize| (ratings.subject[i], ratings.model[i]);
         let mut groups: Vec<Range<usize>> = Vec::new();
@@ -87,14 +85,14 @@ impl<'a> Cells<'a> {
             let start = groups.last().map_or(0, |g| g.end);
             groups.push(start..start + group.len());
         }
-        let sorted: Vec<f64> = order.par_iter().map(|&i| centred[i]).collect();
+        let sorted: Vec<f64> = order.par_iter().filter_map(|&i| centred[i]).collect();
         let cell = |rows: Range<usize>| {
             let numbers = &sorted[rows.clone()];
             let (subject, model) = place(order[rows.start]);
             let mean = mean(numbers)?;
             Some(Cell {
                 subject: subject as usize,
-                model: model as usize,
+                model: model? as usize,
                 rows,
                 mean,
                 squares: match numbers {
@@ -212,9 +210,9 @@ pub(super) fn within<'c>(cells: impl IntoIterator<Item = &'c Cell>) -> (f64, usi
 fn vafs(ratings: &Ratings) -> Vec<Option<f64>> {
     let mut found: Vec<Option<Option<f64>>> = vec![None; ratings.models.len()];
     for (&m, &v) in ratings.model.iter().zip(&ratings.vaf) {
-        if m == NO_MODEL || !v.is_finite() {
+        let (Some(m), Some(v)) = (m, v) else {
             continue;
-        }
+        };
         let slot = &mut found[m as usize];
         *slot = match *slot {
             None => Some(Some(v)),

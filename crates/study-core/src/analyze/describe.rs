@@ -3,7 +3,6 @@
 use super::Rules;
 use super::cells::{Cells, Table, within};
 use super::values::Values;
-use crate::outcome::ratings::NO_MODEL;
 use study_stats::describe::{counts, lag1_autocorrelation, mean, quantile, sd, sorted};
 use study_stats::distribution::t_quantile;
 use study_stats::regression::line;
@@ -28,7 +27,7 @@ pub(super) fn describe(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
 /// Smallest and largest rating, if all are whole and near enough.
 fn whole_scale(cells: &Cells<'_>) -> Option<(f64, f64)> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for &v in cells.ratings.rating.iter().filter(|v| v.is_finite()) {
+    for &v in cells.ratings.rating.iter().flatten() {
         if v.fract() != 0.0 {
             return None;
         }
@@ -52,8 +51,7 @@ fn ascending(x: &[f64], bins: Option<(f64, f64)>) -> Vec<f64> {
 }
 
 fn rated(cells: &Cells<'_>) -> Vec<f64> {
-    let all = cells.ratings.rating.iter();
-    all.copied().filter(|v| v.is_finite()).collect()
+    cells.ratings.rating.iter().copied().flatten().collect()
 }
 
 fn design(cells: &Cells<'_>, table: &Table, values: &mut Values) {
@@ -96,7 +94,9 @@ fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
     let r = cells.ratings;
     let mut by_model: Vec<Vec<f64>> = vec![Vec::new(); r.models.len()];
     for &i in &cells.order {
-        by_model[r.model[i] as usize].push(r.rating[i]);
+        if let (Some(m), Some(rating)) = (r.model[i], r.rating[i]) {
+            by_model[m as usize].push(rating);
+        }
     }
     let subject_means = cells.subject_means();
     for (m, x) in by_model.iter().enumerate() {
@@ -167,8 +167,7 @@ fn alone(cells: &Cells<'_>, values: &mut Values) {
     if r.subjects.len() != 1 {
         return;
     }
-    let rows: Vec<usize> = (0..r.len()).filter(|&i| r.rating[i].is_finite()).collect();
-    let x: Vec<f64> = rows.iter().map(|&i| r.rating[i]).collect();
+    let x = rated(cells);
     if r.models.len() <= 1 {
         let mut g = values.group("univariate", "all numbers are equal");
         g.put("n", x.len() as f64);
@@ -176,13 +175,13 @@ fn alone(cells: &Cells<'_>, values: &mut Values) {
         g.put_or("sd", sd(&x), ONE);
         g.maybe("lag1_autocorrelation", lag1_autocorrelation(&x));
     }
-    let once =
-        cells.cells.iter().all(|c| c.rows.len() == 1) || r.model.iter().all(|m| *m == NO_MODEL);
-    let vaf: Vec<f64> = rows.iter().map(|&i| r.vaf[i]).collect();
-    if !once || vaf.len() < 3 || !vaf.iter().all(|v| v.is_finite()) {
-        return;
-    }
-    let Some(l) = line(&vaf, &x) else {
+    let once = cells.cells.iter().all(|c| c.rows.len() == 1) || r.model.iter().all(Option::is_none);
+    let rows = (0..r.len()).filter(|&i| r.rating[i].is_some());
+    let vaf: Option<Vec<f64>> = rows.map(|i| r.vaf[i]).collect();
+    let Some(l) = vaf
+        .filter(|v| once && v.len() >= 3)
+        .and_then(|vaf| line(&vaf, &x))
+    else {
         return;
     };
     let mut g = values.group("regression", "the line fits without a residual");

@@ -220,7 +220,7 @@ fn agreement(cells: &Cells<'_>, table: &Table, values: &mut Values) {
     }
     let mut units = vec![Vec::new(); table.models.len() * labels.len()];
     for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
-        let j = place[r.model[i] as usize];
+        let j = r.model[i].map_or(usize::MAX, |m| place[m as usize]);
         if let (Ok(k), true) = (labels.binary_search(&r.repetition[i]), j != usize::MAX) {
             units[j * labels.len() + k].push(v);
         }

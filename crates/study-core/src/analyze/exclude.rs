@@ -6,7 +6,7 @@
 
 use super::Rules;
 use super::select::{Decision, Reason};
-use crate::outcome::ratings::{NO_MODEL, NO_STROKES, Ratings};
+use crate::outcome::ratings::Ratings;
 use crate::protocol::{ExclusionRule, Role};
 use std::fmt;
 use std::sync::Arc;
@@ -112,9 +112,11 @@ struct Judgement {
 }
 
 impl Judgement {
-    fn leaves_out(&self, subject: usize, strokes: u32) -> bool {
+    fn leaves_out(&self, subject: usize, strokes: Option<u32>) -> bool {
         self.subjects.get(subject) == Some(&true)
-            || (strokes != NO_STROKES && self.strokes.is_some_and(|s| f64::from(strokes) < s))
+            || strokes
+                .zip(self.strokes)
+                .is_some_and(|(n, least)| f64::from(n) < least)
     }
 
     fn of(subjects: Vec<bool>) -> Self {
@@ -137,41 +139,33 @@ fn judge(ratings: &Ratings, rules: &Rules, rule: Exclusion, decisions: &[Decisio
         return Judgement::none("it judges by the primary question, which this is not");
     }
     let rows = (0..ratings.len()).filter(|&i| decisions[i].is_none());
-    let rated = rows.clone().filter(|&i| ratings.rating[i].is_finite());
+    let rated = (rows.clone()).filter_map(|i| Some((i, ratings.rating[i]?)));
     match rule {
         Exclusion::ConstantRater => {
             // Number of ratings, smallest, largest.
             let none = (0u32, f64::INFINITY, f64::NEG_INFINITY);
             let mut seen = vec![none; ratings.subjects.len()];
-            for i in rated {
+            for (i, v) in rated {
                 let s = &mut seen[ratings.subject[i] as usize];
-                let v = ratings.rating[i];
                 *s = (s.0 + 1, s.1.min(v), s.2.max(v));
             }
             let constant = |(n, low, high): &(u32, f64, f64)| *n > 1 && low == high;
             Judgement::of(seen.iter().map(constant).collect())
         }
         Exclusion::HiddenReferenceBelow(least) => {
-            let is_reference = |i: &usize| {
-                let model = ratings.models.get(ratings.model[*i] as usize);
-                model.is_some_and(|m| m.role == Role::HiddenReference)
-            };
-            if !ratings
-                .models
-                .iter()
-                .any(|m| m.role == Role::HiddenReference)
-            {
+            let is_reference = |m: u32| ratings.models[m as usize].role == Role::HiddenReference;
+            if !(ratings.models.iter()).any(|m| m.role == Role::HiddenReference) {
                 return Judgement::none("the design has no hidden reference");
             }
             let mut sums = vec![(0.0, 0.0); ratings.subjects.len()];
-            for i in rated.filter(is_reference) {
-                add(&mut sums[ratings.subject[i] as usize], ratings.rating[i]);
+            for (i, v) in rated.filter(|(i, _)| ratings.model[*i].is_some_and(is_reference)) {
+                add(&mut sums[ratings.subject[i] as usize], v);
             }
             let below = |s: &(f64, f64)| average(*s).is_some_and(|mean| mean < least);
             Judgement::of(sums.iter().map(below).collect())
         }
         Exclusion::StrokesBelow(least) => {
-            let unknown = rows.clone().any(|i| ratings.strokes[i] == NO_STROKES);
+            let unknown = rows.clone().any(|i| ratings.strokes[i].is_none());
             Judgement {
                 strokes: Some(least),
                 problem: unknown.then_some("some trials have no count of strokes and stay"),
@@ -215,7 +209,7 @@ pub(super) fn pairs(ratings: &Ratings) -> Vec<(usize, usize)> {
 pub(super) fn distances(
     ratings: &Ratings,
     pairs: &[(usize, usize)],
-    rated: impl Iterator<Item = usize>,
+    rated: impl Iterator<Item = (usize, f64)>,
 ) -> Vec<Option<f64>> {
     let mut slot = vec![usize::MAX; ratings.models.len()];
     for (k, m) in pairs.iter().flat_map(|(d, o)| [*d, *o]).enumerate() {
@@ -226,13 +220,10 @@ pub(super) fn distances(
     }
     let width = 2 * pairs.len();
     let mut cells = vec![(0.0, 0.0); width * ratings.subjects.len()];
-    for i in rated.filter(|&i| ratings.model[i] != NO_MODEL) {
-        let k = slot[ratings.model[i] as usize];
+    for (i, v) in rated {
+        let k = ratings.model[i].map_or(usize::MAX, |m| slot[m as usize]);
         if k != usize::MAX {
-            add(
-                &mut cells[width * ratings.subject[i] as usize + k],
-                ratings.rating[i],
-            );
+            add(&mut cells[width * ratings.subject[i] as usize + k], v);
         }
     }
     (cells.chunks(width))

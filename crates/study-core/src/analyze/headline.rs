@@ -24,7 +24,10 @@ fn realistic(cells: &Cells<'_>, from: f64, values: &mut Values) {
     let mut clusters: Vec<Vec<(f64, f64)>> = vec![Vec::new(); r.models.len()];
     for cell in &cells.cells {
         let rows = &cells.order[cell.rows.clone()];
-        let hits = rows.iter().filter(|&&i| r.rating[i] >= from).count();
+        let hits = rows
+            .iter()
+            .filter(|&&i| r.rating[i].is_some_and(|v| v >= from))
+            .count();
         clusters[cell.model].push((hits as f64, rows.len() as f64));
     }
     for (m, clusters) in clusters.iter().enumerate() {

@@ -78,8 +78,7 @@ impl Data {
             for c in &own {
                 let mut rows: Vec<(f64, f64)> = cells.order[c.rows.clone()]
                     .iter()
-                    .map(|&i| (cells.ratings.vaf[i], cells.centred[i]))
-                    .filter(|r| r.0.is_finite())
+                    .filter_map(|&i| cells.ratings.vaf[i].zip(cells.centred[i]))
                     .collect();
                 rows.sort_by(|a, b| a.0.total_cmp(&b.0));
                 for same in rows.chunk_by(|a, b| a.0 == b.0) {

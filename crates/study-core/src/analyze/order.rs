@@ -11,22 +11,18 @@ use study_stats::describe::Sum;
 pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     let r = cells.ratings;
     // Rows of a subject stand together and stay so.
-    let known: Vec<usize> = cells
-        .order
-        .iter()
-        .copied()
-        .filter(|&i| r.trial_index[i] > 0)
+    let known: Vec<(usize, u32)> = (cells.order.iter())
+        .filter_map(|&i| Some((i, r.trial_index[i]?)))
         .collect();
-    let trial: Vec<f64> = known.iter().map(|&i| f64::from(r.trial_index[i])).collect();
     // The rating of the trial just before, and of no other.
     let (mut rows, mut previous) = (Vec::new(), Vec::new());
     let mut places: Vec<(u32, usize)> = Vec::new();
-    for own in known.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
+    for own in known.chunk_by(|a, b| r.subject[a.0] == r.subject[b.0]) {
         places.clear();
-        places.extend(own.iter().map(|&i| (r.trial_index[i], i)));
+        places.extend(own.iter().map(|&(i, trial)| (trial, i)));
         places.sort_by_key(|p| p.0);
-        for &i in own {
-            let before = r.trial_index[i] - 1;
+        for &(i, trial) in own {
+            let before = trial - 1;
             let first = places.partition_point(|p| p.0 < before);
             // Where several claim the place, which one was before is not known.
             if let [(place, j), after, ..] = &places[first..]
@@ -34,10 +30,12 @@ pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
                 && after.0 != before
             {
                 rows.push(i);
-                previous.push(cells.centred[*j]);
+                previous.extend(cells.centred[*j]);
             }
         }
     }
+    let (known, trial): (Vec<usize>, Vec<f64>) =
+        known.into_iter().map(|(i, t)| (i, f64::from(t))).unzip();
     let (by_trial, by_previous) = rayon::join(
         || slope(cells, &known, &trial),
         || slope(cells, &rows, &previous),
@@ -66,9 +64,9 @@ const MAX_REPETITIONS: usize = 10_000;
 /// The slope of the rating on x beside fixed subjects and realizations.
 fn slope(cells: &Cells<'_>, rows: &[usize], x: &[f64]) -> Option<Beside> {
     let r = cells.ratings;
-    let y: Vec<f64> = rows.iter().map(|&i| cells.centred[i]).collect();
+    let y: Vec<f64> = rows.iter().filter_map(|&i| cells.centred[i]).collect();
     let subjects: Vec<u32> = rows.iter().map(|&i| r.subject[i]).collect();
-    let models: Vec<u32> = rows.iter().map(|&i| r.model[i]).collect();
+    let models: Vec<u32> = rows.iter().filter_map(|&i| r.model[i]).collect();
     beside_factors(x, &y, &subjects, &models)
 }
 

@@ -33,7 +33,7 @@ pub(super) fn ordinal(cells: &Cells<'_>, values: &mut Values) {
     for m in cells.test_models() {
         test[m] = true;
     }
-    let of_test = |i: &usize| test[cells.ratings.model[*i] as usize];
+    let of_test = |i: &usize| cells.ratings.model[*i].is_some_and(|m| test[m as usize]);
     let rows: Vec<usize> = cells.order.iter().copied().filter(of_test).collect();
     let both: [Group; 2] = [by_model, by_vaf];
     let parts = both.par_iter().map(|group| {
@@ -59,7 +59,7 @@ fn many(cells: &Cells<'_>, rows: &[usize]) -> bool {
 
 fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     let model = |i: usize| cells.ratings.model[i];
-    let mut present: Vec<u32> = rows.iter().map(|&i| model(i)).collect();
+    let mut present: Vec<u32> = rows.iter().filter_map(|&i| model(i)).collect();
     present.sort_unstable();
     present.dedup();
     let names: Vec<&str> = present
@@ -88,7 +88,9 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     } else {
         categories(cells, rows).map(|ratings| {
             let n = predictors.len();
-            let counts = counts(cells, rows, &ratings, n, |i| place[model(i) as usize]);
+            let counts = counts(cells, rows, &ratings, n, |i| {
+                model(i).map_or(0, |m| place[m as usize])
+            });
             let table = Table::new(predictors, names.len(), ratings.len(), &counts);
             (table, ratings)
         })
@@ -98,12 +100,10 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
 
 fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     let vaf = |i: usize| cells.ratings.vaf[i];
-    let rows: Vec<usize> = rows
-        .iter()
-        .copied()
-        .filter(|&i| vaf(i).is_finite())
+    let rows: Vec<usize> = (rows.iter().copied())
+        .filter(|&i| vaf(i).is_some())
         .collect();
-    let mut levels: Vec<f64> = rows.iter().map(|&i| vaf(i)).collect();
+    let mut levels: Vec<f64> = rows.iter().filter_map(|&i| vaf(i)).collect();
     levels.sort_unstable_by(f64::total_cmp);
     levels.dedup_by(|a, b| a.total_cmp(b).is_eq());
     // From −1 to 1, so that the search sees no units.
@@ -132,10 +132,8 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
                     x: (v - origin) / unit,
                 })
                 .collect();
-            let index = |i: usize| {
-                let found = levels.binary_search_by(|v| v.total_cmp(&vaf(i)));
-                found.unwrap_or(0) as u32
-            };
+            let index =
+                |i: usize| vaf(i).map_or(0, |own| levels.partition_point(|v| *v < own)) as u32;
             let counts = counts(cells, &rows, &ratings, levels.len(), index);
             (Table::new(predictors, 1, ratings.len(), &counts), ratings)
         })
@@ -146,9 +144,9 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
 /// The ratings that occur, rising, or why they are no categories.
 fn categories(cells: &Cells<'_>, rows: &[usize]) -> Result<Vec<f64>, String> {
     let mut found: Vec<f64> = Vec::new();
-    for &i in rows {
+    for rating in rows.iter().filter_map(|&i| cells.ratings.rating[i]) {
         // Adding 0 makes one zero of two.
-        let rating = cells.ratings.rating[i] + 0.0;
+        let rating = rating + 0.0;
         if let Err(at) = found.binary_search_by(|v| v.total_cmp(&rating)) {
             if rating.fract() != 0.0 || rating.abs() > WHOLE {
                 return Err("the ratings are not whole numbers".to_owned());
@@ -174,8 +172,7 @@ fn counts(
     predictor: impl Fn(usize) -> u32,
 ) -> Vec<Count> {
     let category = |i: usize| {
-        let rating = cells.ratings.rating[i] + 0.0;
-        ratings.partition_point(|v| *v < rating) as u32
+        cells.ratings.rating[i].map_or(0, |rating| ratings.partition_point(|v| *v < rating)) as u32
     };
     if many(cells, rows) {
         let mut tally = vec![0u32; predictors * ratings.len()];

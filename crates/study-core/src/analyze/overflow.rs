@@ -23,15 +23,14 @@ pub(super) fn smaller(ratings: &Ratings) -> Option<Ratings> {
         return None;
     }
     let mut smaller = ratings.clone();
-    smaller.rating.iter_mut().for_each(|v| *v *= rating);
-    smaller.vaf.iter_mut().for_each(|v| *v *= vaf);
+    (smaller.rating.iter_mut().flatten()).for_each(|v| *v *= rating);
+    (smaller.vaf.iter_mut().flatten()).for_each(|v| *v *= vaf);
     Some(smaller)
 }
 
 /// A power of two that brings the largest to 1, or 1 if none is large.
-fn factor(numbers: &[f64]) -> f64 {
-    let finite = numbers.iter().filter(|v| v.is_finite());
-    let largest = finite.fold(0.0f64, |a, v| a.max(v.abs()));
+fn factor(numbers: &[Option<f64>]) -> f64 {
+    let largest = numbers.iter().flatten().fold(0.0f64, |a, v| a.max(v.abs()));
     if largest > LARGE {
         (-largest.log2().floor()).exp2()
     } else {

@@ -2,7 +2,7 @@
 
 use super::Rules;
 use super::exclude::{self, Applied, Exclusion};
-use crate::outcome::columns::Status;
+use crate::outcome::Status;
 use crate::outcome::event::State;
 use crate::outcome::ratings::{Origin, Ratings};
 use crate::protocol::Unfinished;
@@ -136,10 +136,10 @@ impl Counts {
     pub(super) fn of(all: &Ratings, used: &Ratings, decisions: &[Decision], rules: &Rules) -> Self {
         let with = |status: Status| {
             (0..used.len())
-                .filter(|&i| used.status[i] == status && used.rating[i].is_nan())
+                .filter(|&i| used.status[i] == status && used.rating[i].is_none())
                 .count()
         };
-        let rated = used.rating.iter().filter(|v| v.is_finite()).count();
+        let rated = used.rating.iter().flatten().count();
         let mut gone = vec![false; all.subjects.len()];
         // Rows share their reasons: each is put into words once.
         let mut by_reason: Vec<(&Arc<Reason>, usize)> = Vec::new();
@@ -176,7 +176,7 @@ impl Counts {
             declined: with(Status::Declined),
             missing: with(Status::Missing) + with(Status::Ok),
             corrected: used.corrected.iter().filter(|c| **c).count(),
-            repeated: used.attempt.iter().filter(|a| **a > 1).count(),
+            repeated: used.attempt.iter().flatten().filter(|a| **a > 1).count(),
             practice: all.practice.len(),
             excluded,
             participants: used.subjects.len(),

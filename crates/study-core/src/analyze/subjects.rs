@@ -29,17 +29,17 @@ pub(super) fn subjects(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
         let s = r.subject[rows[0]] as usize;
         let own = own_cells.next_if(|own| own[0].subject == s).unwrap_or(&[]);
         let mut rows = rows.to_vec();
-        rows.retain(|&i| r.rating[i].is_finite());
+        rows.retain(|&i| r.rating[i].is_some());
         rows.sort_unstable();
         x.clear();
-        x.extend(rows.iter().map(|&i| r.rating[i]));
+        x.extend(rows.iter().filter_map(|&i| r.rating[i]));
         if x.len() > 1 && x.iter().all(|v| *v == x[0]) {
             constant += 1.0;
         }
         if !listed {
             continue;
         }
-        let ordered = rows.iter().all(|&i| r.trial_index[i] > 0);
+        let ordered = rows.iter().all(|&i| r.trial_index[i].is_some());
         let mut g = values.group(format!("subject/{}", cells.subject_name(s)), "no ratings");
         g.put("n", x.len() as f64);
         g.maybe("mean", mean(&x));
@@ -89,7 +89,7 @@ impl Screens {
             has.then(|| means(cells, role))
         };
         let pairs = pairs(r);
-        let rated = (0..r.len()).filter(|&i| r.rating[i].is_finite());
+        let rated = (0..r.len()).filter_map(|i| Some((i, r.rating[i]?)));
         Self {
             reference: role(Role::HiddenReference),
             anchor: role(Role::LowAnchor),

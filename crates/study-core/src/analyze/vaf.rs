@@ -282,9 +282,8 @@ fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
             }
         }
     }
-    // Whether the trials of a realization count; the last place is for none.
-    let mut counts = vec![false; r.models.len() + 1];
-    counts[r.models.len()] = true;
+    // Whether the trials of a realization count; those without one do.
+    let mut counts = vec![false; r.models.len()];
     for m in cells.test_models() {
         counts[m] = true;
     }
@@ -292,9 +291,10 @@ fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
     for own in cells.all.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
         by_trial.next();
         for &i in own {
-            let known = cells.centred[i].is_finite() && r.vaf[i].is_finite();
-            if known && counts[(r.model[i] as usize).min(r.models.len())] {
-                by_trial.push(r.vaf[i], cells.centred[i]);
+            if let (Some(vaf), Some(rating)) = (r.vaf[i], cells.centred[i])
+                && r.model[i].is_none_or(|m| counts[m as usize])
+            {
+                by_trial.push(vaf, rating);
             }
         }
     }

@@ -7,7 +7,6 @@ use super::exclude::Applied;
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
 use super::values::Values;
-use crate::outcome::ratings::NO_MODEL;
 use study_stats::permutation::{DRAWS, MAX_EXACT};
 
 /// A warning: a short name that stays, and a sentence.
@@ -234,7 +233,7 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     let r = cells.ratings;
     let mut has_vaf = vec![false; r.models.len()];
     for (&m, v) in r.model.iter().zip(&r.vaf) {
-        if m != NO_MODEL && v.is_finite() {
+        if let (Some(m), Some(_)) = (m, v) {
             has_vaf[m as usize] = true;
         }
     }
@@ -271,7 +270,7 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
                 .to_owned(),
         );
     }
-    if r.model.contains(&NO_MODEL) {
+    if r.model.contains(&None) {
         warn("no-model", "some ratings name no realization".to_owned());
     }
 }

@@ -13,8 +13,8 @@
 
 mod trials;
 
-use super::columns::{AttemptRow, ParticipantRow, RatingRow};
 use super::event::{Choice, Entry, Event, Place, Start, State};
+use super::rows::{AttemptRow, ParticipantRow, RatingRow};
 use crate::protocol::{Answer, Protocol};
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId};
@@ -107,7 +107,7 @@ pub fn participant(id: &ParticipantId, session: u32, entries: &[Entry]) -> Parti
         simulated: start.is_some_and(|s| s.seat.is_simulated()),
         erased: false,
         consent_version: read.consent.clone(),
-        protocol_version: start.map_or(0, |s| s.protocol_version),
+        protocol_version: start.map(|s| s.protocol_version),
         trials_done: count(counted().filter(|t| read.is_closed(t.trial)).count()),
         trials_planned: count(counted().count()),
         started_at: entries
@@ -256,8 +256,8 @@ fn declined_reason(answer: &Answer) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::columns::Status;
     use super::super::event::{Failure, Moment, Playback};
+    use super::super::rows::Status;
     use super::*;
     use crate::protocol::fingerprint::Fingerprints;
     use crate::protocol::{DeviceKind, Seat, Trial, example};

@@ -1,9 +1,9 @@
 //! Ratings by column, for analysis.
 //!
-//! One row per presentation that counts. Subjects and realizations are sorted as
-//! strings (C locale) and named by their index; a missing number is NaN inside a
-//! column and never leaves this crate as a number. Practice rows stand beside the
-//! columns. What was excluded, and why, is decided in `analyze`.
+//! One row for each presentation that counts. Subjects and realizations are sorted
+//! by their bytes (C locale) and referred to by index. What is not known is `None`,
+//! and every number is finite. Practice rows are kept apart. Which rows are
+//! excluded, and why, is decided in `analyze`.
 
 mod build;
 mod error;
@@ -11,19 +11,13 @@ mod read;
 
 pub use error::RatingsError;
 
-use super::columns::{ParticipantRow, RatingRow, Status};
 use super::event::State;
+use super::rows::{ParticipantRow, RatingRow, Status};
 use crate::protocol::{Answer, Role};
 use build::{Builder, Row};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use study_base::text::QuestionId;
-
-/// What stands for strokes that nobody counted.
-pub const NO_STROKES: u32 = u32::MAX;
-
-/// The index of a row without a realization, as some foreign data have it.
-pub const NO_MODEL: u32 = u32::MAX;
 
 /// A realization as the ratings know it.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +42,16 @@ pub enum Origin {
     Pilot,
     /// Nobody.
     Simulated,
+}
+
+impl Origin {
+    fn of(simulated: bool, pilot: bool) -> Self {
+        match (simulated, pilot) {
+            (true, _) => Self::Simulated,
+            (false, true) => Self::Pilot,
+            (false, false) => Self::Real,
+        }
+    }
 }
 
 /// A subject as the ratings know it.
@@ -83,26 +87,26 @@ pub struct Ratings {
     pub models: Vec<Realization>,
     /// Index into `subjects`.
     pub subject: Vec<u32>,
-    /// Index into `models`, or [`NO_MODEL`].
-    pub model: Vec<u32>,
-    /// The how-maniest time, from 1; a foreign table may count from 0.
+    /// Index into `models`; a foreign table may leave it empty.
+    pub model: Vec<Option<u32>>,
+    /// Repetition number, from 1; a foreign table may count from 0.
     pub repetition: Vec<u32>,
-    /// NaN: none.
-    pub rating: Vec<f64>,
-    /// NaN: none.
-    pub vaf: Vec<f64>,
-    /// Place in the subject's order, from 1; 0 if it is not known.
-    pub trial_index: Vec<u32>,
+    /// The answer, if the trial has one that counts.
+    pub rating: Vec<Option<f64>>,
+    /// VAF of the realization.
+    pub vaf: Vec<Option<f64>>,
+    /// Position in the subject's order, from 1.
+    pub trial_index: Vec<Option<u32>>,
     /// Who the row is from.
     pub origin: Vec<Origin>,
     /// What became of the trial.
     pub status: Vec<Status>,
     /// Whether an answer was corrected.
     pub corrected: Vec<bool>,
-    /// The attempt that counts; above 1 the trial was repeated, 0 not known.
-    pub attempt: Vec<u32>,
-    /// Full strokes, or [`NO_STROKES`].
-    pub strokes: Vec<u32>,
+    /// The attempt that counts, from 1; above 1 the trial was repeated.
+    pub attempt: Vec<Option<u32>>,
+    /// Full strokes, where telemetry counted them.
+    pub strokes: Vec<Option<u32>>,
     /// Row of the source, from 1 (the line of a file, header not counted).
     pub source_row: Vec<u32>,
     /// Texts answered or remarked in trials.
@@ -124,9 +128,9 @@ struct Practised {
     subject: u32,
     model: u32,
     repetition: u32,
-    trial_index: u32,
-    rating: f64,
-    vaf: f64,
+    trial_index: Option<u32>,
+    rating: Option<f64>,
+    vaf: Option<f64>,
 }
 
 /// A practice row with its names, which are untrusted.
@@ -164,9 +168,9 @@ impl Practice {
             subject: name(row.subject),
             model: name(row.model),
             repetition: row.repetition,
-            trial_index: Some(row.trial_index).filter(|t| *t > 0),
-            rating: Some(row.rating).filter(|v| v.is_finite()),
-            vaf: Some(row.vaf).filter(|v| v.is_finite()),
+            trial_index: row.trial_index,
+            rating: row.rating,
+            vaf: row.vaf,
         })
     }
 }
@@ -176,36 +180,34 @@ impl Ratings {
     pub fn from_rows(rows: &[RatingRow], question: &QuestionId) -> Self {
         let mut builder = Builder::new(question.to_string());
         for (i, r) in rows.iter().enumerate() {
-            let origin = match (r.simulated, r.pilot) {
-                (true, _) => Origin::Simulated,
-                (false, true) => Origin::Pilot,
-                (false, false) => Origin::Real,
-            };
+            let origin = Origin::of(r.simulated, r.pilot);
+            let answer = r.answers.get(question);
             let mut row = Row {
                 subject: 0,
-                model: NO_MODEL,
-                repetition: r.repetition,
-                rating: rated(r, question),
-                vaf: r.vaf.filter(|v| v.is_finite()).unwrap_or(f64::NAN),
-                trial_index: r.position.unwrap_or(0),
+                model: None,
+                repetition: Some(r.repetition),
+                rating: answer.and_then(Answer::number).filter(|v| v.is_finite()),
+                vaf: r.vaf.filter(|v| v.is_finite()),
+                trial_index: r.position,
                 origin,
                 status: r.status,
                 corrected: r.corrected,
-                attempt: r.attempt.unwrap_or(0),
-                strokes: r.strokes.unwrap_or(NO_STROKES),
+                attempt: r.attempt,
+                strokes: r.strokes,
                 source_row: u32::try_from(i + 1).unwrap_or(u32::MAX),
             };
             if r.practice {
-                builder.practice(r.participant.as_str(), r.model.as_str(), &row);
+                builder.practice(r.participant.as_str(), r.model.as_str(), row);
                 continue;
             }
             row.subject = builder.subject(r.participant.as_str());
-            row.model = builder.model(r.model.as_str(), r.role, || r.covariates.clone());
+            let model = builder.model(r.model.as_str(), r.role, || r.covariates.clone());
+            row.model = Some(model);
             for (question, text) in comments(r) {
                 builder.comment(question, text);
             }
             if let (Some(energy), Status::Ok) = (r.least_energy_j, r.status) {
-                builder.least_energy(row.model, origin, energy);
+                builder.least_energy(model, origin, energy);
             }
             builder.push(row);
         }
@@ -257,27 +259,17 @@ impl Ratings {
     pub fn keep(&self, keep: impl Fn(usize) -> bool) -> Self {
         let rows: Vec<usize> = (0..self.len()).filter(|&i| keep(i)).collect();
         let (subject_map, subjects) = remap(&self.subjects, rows.iter().map(|&i| self.subject[i]));
-        let (model_map, models) = remap(
-            &self.models,
-            rows.iter()
-                .map(|&i| self.model[i])
-                .filter(|&m| m != NO_MODEL),
-        );
+        let (model_map, models) = remap(&self.models, rows.iter().filter_map(|&i| self.model[i]));
         fn pick<T: Copy>(rows: &[usize], column: &[T]) -> Vec<T> {
             rows.iter().map(|&i| column[i]).collect()
         }
         Self {
             question: self.question.clone(),
-            subject: rows
-                .iter()
+            subject: (rows.iter())
                 .map(|&i| subject_map[self.subject[i] as usize])
                 .collect(),
-            model: rows
-                .iter()
-                .map(|&i| match self.model[i] {
-                    NO_MODEL => NO_MODEL,
-                    m => model_map[m as usize],
-                })
+            model: (rows.iter())
+                .map(|&i| self.model[i].map(|m| model_map[m as usize]))
                 .collect(),
             repetition: pick(&rows, &self.repetition),
             rating: pick(&rows, &self.rating),
@@ -307,7 +299,7 @@ impl Ratings {
     /// as they stand. Linear: two passes of counting.
     pub fn by_cell(&self) -> Vec<usize> {
         let models = self.models.len();
-        let place = |i: usize| (self.model[i] as usize).min(models);
+        let place = |i: usize| self.model[i].map_or(models, |m| m as usize);
         let by_model = counted(0..self.len(), self.len(), models + 1, place);
         counted(
             by_model.iter().copied(),
@@ -315,6 +307,13 @@ impl Ratings {
             self.subjects.len(),
             |i| self.subject[i] as usize,
         )
+    }
+
+    /// The rows of each subject and realization, of rows in the order of
+    /// [`Ratings::by_cell`].
+    fn cells<'o>(&self, order: &'o [usize]) -> impl Iterator<Item = &'o [usize]> {
+        order
+            .chunk_by(|&a, &b| (self.subject[a], self.model[a]) == (self.subject[b], self.model[b]))
     }
 }
 
@@ -341,17 +340,6 @@ fn counted(
     sorted
 }
 
-/// The rating of a row, if the trial counts and it is a finite number.
-fn rated(row: &RatingRow, question: &QuestionId) -> f64 {
-    let answer = row.answers.get(question).and_then(Answer::number);
-    match row.status {
-        Status::Failed => f64::NAN,
-        Status::Ok | Status::Declined | Status::Missing => {
-            answer.filter(|v| v.is_finite()).unwrap_or(f64::NAN)
-        }
-    }
-}
-
 fn comments(row: &RatingRow) -> Vec<(String, String)> {
     let mut found: Vec<(String, String)> = row
         .answers
@@ -367,19 +355,20 @@ fn comments(row: &RatingRow) -> Vec<(String, String)> {
     found
 }
 
-/// Keeps the named items that are used; also tells where each of the old went.
+/// Keeps the items that are used; also returns the new index of each of these.
 fn remap<T: Clone>(items: &[T], used: impl Iterator<Item = u32>) -> (Vec<u32>, Vec<T>) {
     let mut is_used = vec![false; items.len()];
     for i in used {
         is_used[i as usize] = true;
     }
-    let mut map = vec![NO_MODEL; items.len()];
-    let mut kept = Vec::new();
-    for (old, item) in items.iter().enumerate().filter(|(old, _)| is_used[*old]) {
-        map[old] = u32::try_from(kept.len()).unwrap_or(NO_MODEL - 1);
-        kept.push(item.clone());
-    }
-    (map, kept)
+    // Where there is an item that is used: how many used ones come before it.
+    let new = is_used.iter().scan(0, |next, used| {
+        let at = *next;
+        *next += u32::from(*used);
+        Some(at)
+    });
+    let kept = items.iter().zip(&is_used).filter(|(_, used)| **used);
+    (new.collect(), kept.map(|(item, _)| item.clone()).collect())
 }
 
 #[cfg(test)]
@@ -398,8 +387,8 @@ mod tests {
         let subjects: Vec<&str> = r.subjects.iter().map(|s| s.id.as_str()).collect();
         assert_eq!(subjects, ["S1", "S2"]);
         assert_eq!(r.subject, [1, 0, 0, 1]);
-        assert_eq!(r.model, [1, 0, 1, 0]);
-        assert!(r.rating[2].is_nan());
+        assert_eq!(r.model, [1, 0, 1, 0].map(Some));
+        assert_eq!(r.rating, [Some(3.0), Some(4.0), None, Some(5.0)]);
     }
 
     #[test]
@@ -409,6 +398,7 @@ mod tests {
         assert_eq!(kept.subjects.len(), 1);
         assert_eq!(kept.subjects[0].id, "S2");
         assert_eq!(kept.subject, [0, 0]);
-        assert_eq!(kept.rating, [3.0, 5.0]);
+        assert_eq!(kept.model, [1, 0].map(Some));
+        assert_eq!(kept.rating, [3.0, 5.0].map(Some));
     }
 }

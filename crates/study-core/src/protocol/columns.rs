@@ -1,74 +1,406 @@
-//! The fixed columns of the derived tables: names that no question may take.
+//! The columns of the tables in a results folder, each declared once.
+//!
+//! Writers, readers, reserved names and the data dictionary in docs/results.md all
+//! take a column from here. `outcome` says how a row fills it: a column without a
+//! cell, and a field of a row without a column, do not compile.
 
-/// The columns of `ratings.csv` before the questions.
-pub const RATINGS_BEFORE: [&str; 20] = [
-    "study",
-    "participant",
-    "session",
-    "row",
-    "trial",
-    "block",
-    "position",
-    "planned_position",
-    "model",
-    "role",
-    "repetition",
-    "previous_model",
-    "practice",
-    "pilot",
-    "simulated",
-    "device_kind",
-    "device_id",
-    "operator",
-    "tool_version",
+/// What the cells of a column hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Text, as it was typed.
+    Text,
+    /// A whole number, not negative.
+    Whole,
+    /// A number.
+    Number,
+    /// `true` or `false`.
+    Flag,
+    /// Date and time with the offset from UTC, RFC 3339.
+    Time,
+    /// One of these words; each with its meaning.
+    Level(&'static [(&'static str, &'static str)]),
+    /// An answer: a number for a rating, slider or number, else text.
+    Answer,
+}
+
+/// How many columns a declaration stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Repeats {
+    /// One column of this name.
+    Once,
+    /// One for each question, named by its id.
+    Question,
+    /// One for each covariate of the realizations, by name.
+    Covariate,
+}
+
+/// A column, or several of one kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Column {
+    /// As in the header; for several columns which they are.
+    pub name: &'static str,
+    /// Of its cells.
+    pub kind: Kind,
+    /// Of its numbers, if they have one.
+    pub unit: Option<&'static str>,
+    /// What a cell says.
+    pub meaning: &'static str,
+    /// When a cell is empty; `None`: never.
+    pub empty: Option<&'static str>,
+    /// How many columns there are.
+    pub repeats: Repeats,
+}
+
+impl Column {
+    const fn new(kind: Kind, name: &'static str, meaning: &'static str) -> Self {
+        Self {
+            name,
+            kind,
+            unit: None,
+            meaning,
+            empty: None,
+            repeats: Repeats::Once,
+        }
+    }
+
+    const fn unit(mut self, unit: &'static str) -> Self {
+        self.unit = Some(unit);
+        self
+    }
+
+    const fn empty(mut self, when: &'static str) -> Self {
+        self.empty = Some(when);
+        self
+    }
+
+    const fn repeats(mut self, repeats: Repeats) -> Self {
+        self.repeats = repeats;
+        self
+    }
+
+    /// Whether another column of its table may not have this name, in any case.
+    fn reserves(&self, name: &str) -> bool {
+        self.repeats == Repeats::Once && self.name.eq_ignore_ascii_case(name)
+    }
+}
+
+const fn text(name: &'static str, meaning: &'static str) -> Column {
+    Column::new(Kind::Text, name, meaning)
+}
+
+const fn whole(name: &'static str, meaning: &'static str) -> Column {
+    Column::new(Kind::Whole, name, meaning)
+}
+
+const fn number(name: &'static str, meaning: &'static str) -> Column {
+    Column::new(Kind::Number, name, meaning)
+}
+
+const fn flag(name: &'static str, meaning: &'static str) -> Column {
+    Column::new(Kind::Flag, name, meaning)
+}
+
+const fn time(name: &'static str, meaning: &'static str) -> Column {
+    Column::new(Kind::Time, name, meaning)
+}
+
+const fn level(
+    name: &'static str,
+    levels: &'static [(&'static str, &'static str)],
+    meaning: &'static str,
+) -> Column {
+    Column::new(Kind::Level(levels), name, meaning)
+}
+
+const PARTICIPANT: Column = text("participant", "pseudonym");
+const PILOT: Column = flag("pilot", "whether the participant was a pilot");
+const SIMULATED: Column = flag("simulated", "whether the participant was simulated");
+const PROTOCOL_VERSION: Column = whole(
     "protocol_version",
-];
+    "version of the protocol that the session started with",
+);
+const NEVER_PRESENTED: &str = "the trial was never presented";
+const NO_TELEMETRY: &str = "the device sent no telemetry";
 
-/// The columns of `ratings.csv` after the questions; the covariates follow.
-pub const RATINGS_AFTER: [&str; 15] = [
-    "corrected",
-    "declined",
-    "remarks",
-    "reference_s",
-    "exploration_s",
-    "response_s",
-    "strokes",
-    "least_energy_j",
-    "switches_per_s",
-    "clamp_count",
-    "started_at",
-    "rated_at",
-    "attempt",
-    "status",
-    "vaf",
-];
+/// Declares the columns of a table, in the order of its header.
+macro_rules! table {
+    ($(#[$doc:meta])* $table:ident { $($column:ident: $declaration:expr,)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[allow(missing_docs, reason = "the declaration has the meaning")]
+        pub enum $table { $($column),* }
 
-/// The columns of `participants.csv` before the answers of setup, intake, outro.
-pub const PARTICIPANTS: [&str; 13] = [
-    "participant",
-    "session",
-    "state",
-    "reason",
-    "row",
-    "pilot",
-    "simulated",
-    "erased",
-    "consent_version",
-    "protocol_version",
-    "trials_done",
-    "trials_planned",
-    "started_at",
-];
+        impl $table {
+            /// All columns, in the order of the header.
+            pub const ALL: &[Self] = &[$(Self::$column),*];
+
+            /// The declaration of this column.
+            pub const fn column(self) -> Column {
+                match self { $(Self::$column => $declaration),* }
+            }
+
+            /// Its name in the header.
+            pub const fn name(self) -> &'static str {
+                self.column().name
+            }
+        }
+    };
+}
+
+table! {
+    /// The columns of `ratings.csv`: one row for each planned trial.
+    RatingColumn {
+        Study: text("study", "study id"),
+        Participant: PARTICIPANT,
+        Session: whole("session", "session of the participant, from 1"),
+        Row: whole("row", "row of the schedule")
+            .empty("the participant is a pilot or simulated"),
+        Trial: whole("trial", "trial of the session, from 1, practice included"),
+        Block: whole("block", "block, from 1; 0 for practice"),
+        Position: whole("position", "position among the trials that count, in the order of presentation")
+            .empty(NEVER_PRESENTED),
+        PlannedPosition: whole("planned_position", "position in the planned order"),
+        Model: text("model", "realization"),
+        Role: level("role", &[
+            ("test", "what the study asks about"),
+            ("practice", "for practice trials only"),
+            ("hidden-reference", "the target itself, unannounced among the others"),
+            ("low-anchor", "known to be poor"),
+            ("physical", "a physical sample"),
+        ], "role of the realization"),
+        Repetition: whole("repetition", "repetition of the realization, from 1; 0 for practice"),
+        PreviousModel: text(
+            "previous_model",
+            "realization presented just before this attempt, failed attempts and practice included",
+        ).empty("nothing was presented before, or the trial was never presented"),
+        Practice: flag("practice", "whether the trial is practice, which is not analyzed"),
+        Pilot: PILOT,
+        Simulated: SIMULATED,
+        DeviceKind: level("device_kind", &[
+            ("simulated", "the virtual device of this program"),
+            ("serial", "a device on a serial port"),
+            ("process", "a program of the laboratory"),
+            ("manual", "a sample mounted by hand"),
+        ], "kind of the device"),
+        DeviceId: text("device_id", "device that presented the attempt"),
+        Operator: text("operator", "who ran the session"),
+        ToolVersion: text("tool_version", "version of this program"),
+        ProtocolVersion: PROTOCOL_VERSION,
+        Questions: Column::new(
+            Kind::Answer,
+            "one for each question",
+            "last answer of the attempt that counts; several choices are joined by `; `",
+        ).empty("declined or not answered").repeats(Repeats::Question),
+        Corrected: flag("corrected", "whether an answer was corrected"),
+        Declined: flag("declined", "whether an answer was declined; attempts.csv has the reason"),
+        Remarks: text("remarks", "remarks made during the trial, in all attempts, joined by ` | `")
+            .empty("no remarks"),
+        ReferenceS: number("reference_s", "duration of the reference prompt").unit("s")
+            .empty(NEVER_PRESENTED),
+        ExplorationS: number(
+            "exploration_s",
+            "duration of the playback, from its confirmed start to its confirmed stop",
+        ).unit("s").empty("the playback did not end, or the device reported no duration"),
+        ResponseS: number("response_s", "time from the opening of the rating to its confirmation")
+            .unit("s").empty("the rating was not confirmed"),
+        Strokes: whole("strokes", "full strokes").empty(NO_TELEMETRY),
+        LeastEnergyJ: number(
+            "least_energy_j",
+            "smallest value of the energy put in by the hand since the start of the playback; \
+             negative: the device was active",
+        ).unit("J").empty(NO_TELEMETRY),
+        SwitchesPerS: number("switches_per_s", "changes of the direction state per second")
+            .unit("1/s").empty(NO_TELEMETRY),
+        ClampCount: whole("clamp_count", "how often the force was clamped to its limit")
+            .empty(NO_TELEMETRY),
+        StartedAt: time("started_at", "when the playback was requested").empty(NEVER_PRESENTED),
+        RatedAt: time(
+            "rated_at",
+            "when the primary question was first answered; if it was not, when the trial ended",
+        ).empty("the trial did not end, or failed"),
+        Attempt: whole("attempt", "attempt that counts, from 1; of a failed trial the last")
+            .empty(NEVER_PRESENTED),
+        Status: level("status", &[
+            ("ok", "the primary question is answered"),
+            ("declined", "the primary question was declined"),
+            ("failed", "abandoned after the last permitted attempt"),
+            ("missing", "not reached, or the primary question was left empty"),
+        ], "outcome of the trial"),
+        Vaf: number(
+            "vaf",
+            "variance accounted for (VAF) of the realization, from the protocol or its model file",
+        ).empty("neither states it"),
+        Covariates: number("one for each covariate", "covariate of the realization, sorted by name")
+            .empty("the realization does not have it").repeats(Repeats::Covariate),
+    }
+}
+
+const OUTSIDE_TRIALS: &str = "the event belongs to no trial";
+
+table! {
+    /// The columns of `attempts.csv`: one row for each event that concerns an attempt,
+    /// an answer or the participant's state, in the order in which they happened.
+    AttemptColumn {
+        Participant: PARTICIPANT,
+        Session: RatingColumn::Session.column(),
+        Pilot: PILOT,
+        Simulated: SIMULATED,
+        Trial: RatingColumn::Trial.column().empty(OUTSIDE_TRIALS),
+        Attempt: whole("attempt", "attempt at the trial, from 1")
+            .empty("the event belongs to no attempt"),
+        Model: RatingColumn::Model.column().empty(OUTSIDE_TRIALS),
+        What: level("what", &[
+            ("attempt", "an attempt started"),
+            ("answer", "a question was answered"),
+            ("correction", "an answer was corrected"),
+            ("failure", "an attempt failed"),
+            ("closed", "the trial was abandoned"),
+            ("remark", "a remark was made"),
+            ("resume", "an interrupted session was resumed"),
+            ("state", "the participant's state was set"),
+            ("reveal", "the order was revealed"),
+        ], "what happened"),
+        Question: text("question", "question that was answered or corrected")
+            .empty("the event is neither an answer nor a correction"),
+        From: Column::new(Kind::Answer, "from", "answer before the correction")
+            .empty("the event is no correction, or the question was declined"),
+        To: Column::new(Kind::Answer, "to", "answer that was given")
+            .empty("the event is neither an answer nor a correction, or the question was declined"),
+        Failure: level("failure", &[
+            ("device-fault", "the device reported a fault or refused"),
+            ("playback-lost", "the start or end of the playback was not confirmed"),
+            ("marked-bad", "marked as bad by a person"),
+            ("stopped", "stopped, and played again instead of rated"),
+            ("interrupted", "the program ended during the attempt"),
+        ], "why the attempt failed").empty("the event is no failure"),
+        By: level("by", &[
+            ("participant", "the participant"),
+            ("experimenter", "the experimenter"),
+        ], "who corrected or remarked").empty("the event is neither a correction nor a remark"),
+        Text: text("text", "reason, remark or detail").empty("none was given"),
+        At: time("at", "when it happened"),
+    }
+}
+
+table! {
+    /// The columns of `participants.csv`: one row for each participant, by the last
+    /// session.
+    ParticipantColumn {
+        Participant: PARTICIPANT,
+        Session: whole("session", "last session, from 1"),
+        State: level("state", &[
+            ("unfinished", "started and not finished"),
+            ("done", "all trials are done"),
+            ("void", "started by mistake; only before the first rating"),
+            ("no-show", "did not come"),
+            ("dropped-out", "ended the session early"),
+            ("excluded", "not analyzed"),
+            ("withdrawn", "withdrew consent"),
+        ], "state"),
+        Reason: text("reason", "why the state was set").empty("no reason was given"),
+        Row: whole("row", "row of the schedule")
+            .empty("the participant is a pilot, simulated or a no-show"),
+        Pilot: PILOT,
+        Simulated: SIMULATED,
+        Erased: flag("erased", "whether the participant's data were erased"),
+        ConsentVersion: text("consent_version", "version of the consent document that was accepted")
+            .empty("none was accepted, or the data were erased"),
+        ProtocolVersion: PROTOCOL_VERSION.empty("no session was started, or the data were erased"),
+        TrialsDone: whole("trials_done", "trials that count and have ended"),
+        TrialsPlanned: whole("trials_planned", "trials that count"),
+        StartedAt: time("started_at", "when the session was started")
+            .empty("no session was started, or the data were erased"),
+        Questions: Column::new(
+            Kind::Answer,
+            "one for each question",
+            "last answer to a question of setup, intake or outro",
+        ).empty("declined, not answered, withdrawn or erased").repeats(Repeats::Question),
+    }
+}
+
+table! {
+    /// The columns of a telemetry file: one row for each sample of an attempt.
+    SampleColumn {
+        TS: number("t_s", "time since the confirmed start, by the device's clock").unit("s"),
+        XMm: number("x_mm", "position").unit("mm"),
+        VMmS: number("v_mm_s", "velocity").unit("mm/s"),
+        ForceCommandN: number("force_command_n", "commanded force, after every limit").unit("N"),
+        ForceMeasuredN: number("force_measured_n", "measured force").unit("N")
+            .empty("the device has no force sensor"),
+    }
+}
 
 /// Whether `ratings.csv` has a fixed column of this name, in any case.
 pub fn is_ratings_column(name: &str) -> bool {
-    RATINGS_BEFORE
-        .iter()
-        .chain(&RATINGS_AFTER)
-        .any(|c| c.eq_ignore_ascii_case(name))
+    (RatingColumn::ALL.iter()).any(|c| c.column().reserves(name))
 }
 
 /// Whether `participants.csv` has a fixed column of this name, in any case.
 pub fn is_participants_column(name: &str) -> bool {
-    PARTICIPANTS.iter().any(|c| c.eq_ignore_ascii_case(name))
+    (ParticipantColumn::ALL.iter()).any(|c| c.column().reserves(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The declarations of every table.
+    fn tables() -> [Vec<Column>; 4] {
+        [
+            RatingColumn::ALL.iter().map(|c| c.column()).collect(),
+            AttemptColumn::ALL.iter().map(|c| c.column()).collect(),
+            ParticipantColumn::ALL.iter().map(|c| c.column()).collect(),
+            SampleColumn::ALL.iter().map(|c| c.column()).collect(),
+        ]
+    }
+
+    #[test]
+    fn every_column_has_a_name_of_its_own_and_a_meaning() {
+        for columns in tables() {
+            for (i, column) in columns.iter().enumerate() {
+                let name = column.name;
+                assert!(!column.meaning.is_empty(), "{name}");
+                assert!(column.empty.is_none_or(|when| !when.is_empty()), "{name}");
+                assert!(columns[..i].iter().all(|c| c.name != name), "{name}");
+                if let Kind::Level(levels) = column.kind {
+                    assert!(levels.len() > 1, "{name}");
+                    assert!(
+                        levels.iter().all(|(l, m)| !l.is_empty() && !m.is_empty()),
+                        "{name}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_name_ends_in_its_unit() {
+        let units = [
+            ("_mm", "mm"),
+            ("_mm_s", "mm/s"),
+            ("_per_s", "1/s"),
+            ("_s", "s"),
+            ("_j", "J"),
+            ("_n", "N"),
+        ];
+        for column in tables().concat() {
+            let of_name = units.iter().find(|(end, _)| {
+                let longer = |other: &str| other.len() > end.len() && column.name.ends_with(other);
+                column.name.ends_with(end) && !units.iter().any(|(other, _)| longer(other))
+            });
+            assert_eq!(
+                column.unit,
+                of_name.map(|(_, unit)| *unit),
+                "{}",
+                column.name
+            );
+        }
+    }
+
+    #[test]
+    fn names_of_fixed_columns_are_reserved_in_any_case() {
+        assert!(is_ratings_column("Status") && is_ratings_column("vaf"));
+        assert!(is_participants_column("reason") && !is_participants_column("vaf"));
+        assert!(!is_ratings_column("realism") && !is_ratings_column("one for each question"));
+    }
 }

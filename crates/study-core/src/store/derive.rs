@@ -5,12 +5,12 @@
 
 use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
-use super::{StudyFolder, atomic, layout, tables as csv};
+use super::{StudyFolder, atomic, layout, tables};
+use crate::outcome::cell::Header;
 use crate::outcome::{AttemptRow, ParticipantRow, RatingRow, State, fold};
 use crate::protocol::Protocol;
-use std::collections::BTreeSet;
+use crate::protocol::columns::{AttemptColumn, ParticipantColumn, RatingColumn};
 use std::io;
-use study_base::text::QuestionId;
 
 /// Every row of a study.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -22,54 +22,20 @@ pub struct Derived {
     pub attempts: Vec<AttemptRow>,
     /// One for each participant, by their last session.
     pub participants: Vec<ParticipantRow>,
-    /// The columns that depend on the protocol.
-    pub columns: Columns,
-}
-
-/// The columns of the tables that depend on the protocol.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Columns {
-    /// Of `ratings.csv`: the questions after each trial, in the protocol's order.
-    pub questions: Vec<QuestionId>,
-    /// Of `ratings.csv`: the models' covariates, sorted.
-    pub covariates: Vec<String>,
-    /// Of `participants.csv`: setup, intake, outro, in the protocol's order.
-    pub forms: Vec<QuestionId>,
-}
-
-impl Columns {
-    /// Those of a protocol.
-    pub fn of(protocol: &Protocol) -> Self {
-        let forms = [&protocol.setup, &protocol.intake, &protocol.outro];
-        let covariates: BTreeSet<&String> = protocol
-            .models
-            .iter()
-            .flat_map(|m| m.covariates.keys())
-            .collect();
-        Self {
-            questions: protocol.questions.iter().map(|q| q.id.clone()).collect(),
-            covariates: covariates.into_iter().cloned().collect(),
-            forms: forms.into_iter().flatten().map(|q| q.id.clone()).collect(),
-        }
-    }
+    /// The columns of `rows`.
+    pub rating_columns: Header<RatingColumn>,
+    /// The columns of `participants`.
+    pub participant_columns: Header<ParticipantColumn>,
 }
 
 impl StudyFolder {
-    /// Replaces the derived tables, each as a whole, unless they are the same.
-    ///
-    /// # Errors
-    /// [`StoreError`]; each table then is the old one or the new one.
-    pub fn write_derived(&self, derived: &Derived) -> Result<(), StoreError> {
-        let _lock = self.lock()?;
-        self.replace_tables(derived)
-    }
-
     /// Derives and writes under one lock, so that of two processes the later one
     /// has the last word.
     ///
     /// # Errors
-    /// As [`StudyFolder::sessions`] and [`StudyFolder::write_derived`], and if the
-    /// tables name a session that is not there: nobody is dropped unasked.
+    /// As [`StudyFolder::sessions`]; [`StoreError::Vanished`] if the tables name a
+    /// session that is not there; and those of writing, where each table is then the
+    /// old one or the new one.
     pub fn refresh(&self, protocol: &Protocol) -> Result<Derived, StoreError> {
         self.refresh_with(protocol, false)
     }
@@ -99,7 +65,7 @@ impl StudyFolder {
     }
 
     fn replace_tables(&self, derived: &Derived) -> Result<(), StoreError> {
-        for (name, bytes) in tables(derived).at(&self.path)? {
+        for (name, bytes) in derived.tables().at(&self.path)? {
             atomic::replace_if_new(self.disk.as_ref(), &self.path.join(name), &bytes)?;
         }
         Ok(())
@@ -112,7 +78,8 @@ impl Derived {
     pub fn of(sessions: &[SessionData], protocol: &Protocol) -> Self {
         let mut derived = Self {
             participants: participants(sessions),
-            columns: Columns::of(protocol),
+            rating_columns: RatingColumn::header(protocol),
+            participant_columns: ParticipantColumn::header(protocol),
             ..Self::default()
         };
         for session in sessions {
@@ -125,6 +92,18 @@ impl Derived {
             }
         }
         derived
+    }
+
+    /// File name and bytes of each table.
+    pub(super) fn tables(&self) -> io::Result<[(&'static str, Vec<u8>); 3]> {
+        let ratings = tables::csv(&self.rating_columns, &self.rows)?;
+        let attempts = tables::csv(&AttemptColumn::header(), &self.attempts)?;
+        let participants = tables::csv(&self.participant_columns, &self.participants)?;
+        Ok([
+            (layout::RATINGS, ratings),
+            (layout::ATTEMPTS, attempts),
+            (layout::PARTICIPANTS, participants),
+        ])
     }
 }
 
@@ -152,19 +131,4 @@ pub fn participants(sessions: &[SessionData]) -> Vec<ParticipantRow> {
         }
     }
     rows
-}
-
-/// File name and bytes of each table.
-pub(super) fn tables(derived: &Derived) -> io::Result<[(&'static str, Vec<u8>); 3]> {
-    Ok([
-        (
-            layout::RATINGS,
-            csv::ratings(&derived.rows, &derived.columns)?,
-        ),
-        (layout::ATTEMPTS, csv::attempts(&derived.attempts)?),
-        (
-            layout::PARTICIPANTS,
-            csv::participants(&derived.participants, &derived.columns)?,
-        ),
-    ])
 }

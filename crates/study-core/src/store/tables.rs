@@ -1,190 +1,294 @@
-//! The derived tables as CSV.
+//! Tables as CSV.
 //!
 //! RFC 4180: UTF-8, lines end in CR LF, a cell with a comma, quotation mark or
-//! line end is quoted. Cells hold what was typed; no formula is guarded here, that
-//! is for an export to spreadsheets.
+//! line end is quoted. Cells hold what was typed. None is guarded against being
+//! taken for a formula: that is for an export to spreadsheets.
 
-use super::derive::Columns;
-use crate::outcome::{AttemptRow, Author, Failure, ParticipantRow, RatingRow};
-use crate::protocol::{Answer, columns};
-use chrono::{DateTime, FixedOffset};
+use crate::outcome::cell::{Header, Row};
 use std::io;
-use study_base::text::QuestionId;
 
-const ATTEMPT_COLUMNS: [&str; 15] = [
-    "participant",
-    "session",
-    "pilot",
-    "simulated",
-    "trial",
-    "attempt",
-    "model",
-    "what",
-    "question",
-    "from",
-    "to",
-    "failure",
-    "by",
-    "text",
-    "at",
-];
-
-type Writer = csv::Writer<Vec<u8>>;
-
-fn writer() -> Writer {
-    csv::WriterBuilder::new()
+/// A table with its header.
+pub(super) fn csv<R: Row>(header: &Header<R::Column>, rows: &[R]) -> io::Result<Vec<u8>> {
+    let mut out = csv::WriterBuilder::new()
         .terminator(csv::Terminator::CRLF)
-        .from_writer(Vec::new())
-}
-
-fn bytes(writer: Writer) -> io::Result<Vec<u8>> {
-    writer
-        .into_inner()
-        .map_err(|e| io::Error::other(e.to_string()))
-}
-
-fn cell<T: ToString>(value: Option<T>) -> String {
-    value.map(|v| v.to_string()).unwrap_or_default()
-}
-
-fn number(value: Option<f64>) -> String {
-    cell(value.filter(|v| v.is_finite()))
-}
-
-fn time(at: Option<DateTime<FixedOffset>>) -> String {
-    at.map(|at| at.to_rfc3339()).unwrap_or_default()
-}
-
-fn answer(answer: Option<&Answer>) -> String {
-    answer.map(Answer::cell).unwrap_or_default()
-}
-
-/// `ratings.csv`.
-pub(super) fn ratings(rows: &[RatingRow], own: &Columns) -> io::Result<Vec<u8>> {
-    let mut out = writer();
-    let header = columns::RATINGS_BEFORE
-        .into_iter()
-        .chain(own.questions.iter().map(QuestionId::as_str))
-        .chain(columns::RATINGS_AFTER)
-        .chain(own.covariates.iter().map(String::as_str));
-    out.write_record(header)?;
+        .from_writer(Vec::new());
+    out.write_record(header.iter().map(|(_, name)| name))?;
     for row in rows {
-        let mut cells = vec![
-            row.study.clone(),
-            row.participant.to_string(),
-            row.session.to_string(),
-            cell(row.row),
-            row.trial.to_string(),
-            row.block.to_string(),
-            cell(row.position),
-            row.planned_position.to_string(),
-            row.model.to_string(),
-            row.role.as_str().to_owned(),
-            row.repetition.to_string(),
-            cell(row.previous_model.as_ref()),
-            row.practice.to_string(),
-            row.pilot.to_string(),
-            row.simulated.to_string(),
-            row.device_kind.as_str().to_owned(),
-            row.device_id.clone(),
-            row.operator.clone(),
-            row.tool_version.clone(),
-            row.protocol_version.to_string(),
+        let cells = header.iter().map(|(column, name)| row.cell(*column, name));
+        out.write_record(cells.map(|cell| cell.to_string()))?;
+    }
+    out.into_inner().map_err(|e| e.into_error())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::csv;
+    use crate::outcome::cell::{Cell, Header, Row};
+    use crate::outcome::ratings::Ratings;
+    use crate::outcome::{AttemptRow, Author, Failure, ParticipantRow, RatingRow, State, Status};
+    use crate::protocol::columns::{
+        AttemptColumn, Column, Kind, ParticipantColumn, RatingColumn, Repeats,
+    };
+    use crate::protocol::{Answer, DeviceKind, Role};
+    use chrono::{DateTime, FixedOffset};
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+    use study_base::text::{ModelId, ParticipantId, QuestionId};
+
+    /// Values for the fields of a row, drawn from a list.
+    struct Draws<'a>(std::iter::Cycle<std::slice::Iter<'a, u32>>);
+
+    impl Draws<'_> {
+        fn whole(&mut self) -> u32 {
+            *self.0.next().unwrap()
+        }
+
+        fn of<T: Copy>(&mut self, all: &[T]) -> T {
+            all[self.whole() as usize % all.len()]
+        }
+
+        fn maybe<T>(&mut self, value: impl FnOnce(&mut Self) -> T) -> Option<T> {
+            let some = self.whole() % 3 > 0;
+            some.then(|| value(self))
+        }
+
+        fn number(&mut self) -> f64 {
+            f64::from(self.whole()) / 7.0 - 1e8
+        }
+
+        fn flag(&mut self) -> bool {
+            self.whole() % 2 == 0
+        }
+
+        fn text(&mut self) -> String {
+            let hostile = [
+                "",
+                "a, b",
+                "=1+1",
+                "\"quoted\"\r\nsecond line",
+                "よかった",
+                " x ",
+            ];
+            self.of(&hostile).to_owned()
+        }
+
+        fn time(&mut self) -> DateTime<FixedOffset> {
+            let at =
+                DateTime::from_timestamp(i64::from(self.whole()), self.whole() % 1_000_000_000);
+            at.unwrap().fixed_offset()
+        }
+
+        fn participant(&mut self) -> ParticipantId {
+            ParticipantId::new(self.of(&["P01", "P02", "SIM001"])).unwrap()
+        }
+
+        fn model(&mut self) -> ModelId {
+            ModelId::new(self.of(&["A", "B", "lambda-0.9991"])).unwrap()
+        }
+    }
+
+    fn question(id: &str) -> QuestionId {
+        QuestionId::new(id).unwrap()
+    }
+
+    /// `number` makes the row the only one of its subject, realization, repetition.
+    fn rating_row(draws: &[u32], number: u32) -> RatingRow {
+        let mut d = Draws(draws.iter().cycle());
+        let declined = || Answer::Declined {
+            reason: "no".to_owned(),
+        };
+        let rating = d.maybe(|d| Answer::Rating(i64::from(d.whole() % 9) - 4));
+        let status = match rating {
+            Some(_) => d.of(&[Status::Ok, Status::Failed]),
+            None => d.of(&[Status::Failed, Status::Declined, Status::Missing]),
+        };
+        let rating = rating.or_else(|| d.maybe(|_| declined()));
+        let answers = [
+            ("realism", rating),
+            ("comment", d.maybe(|d| Answer::Text(d.text()))),
+            ("effort", d.maybe(|d| Answer::Number(d.number()))),
         ];
-        cells.extend(own.questions.iter().map(|q| answer(row.answers.get(q))));
-        cells.extend([
-            row.corrected.to_string(),
-            row.declined.to_string(),
-            row.remarks.clone(),
-            number(row.reference_s),
-            number(row.exploration_s),
-            number(row.response_s),
-            cell(row.strokes),
-            number(row.least_energy_j),
-            number(row.switches_per_s),
-            cell(row.clamp_count),
-            time(row.started_at),
-            time(row.rated_at),
-            cell(row.attempt),
-            row.status.as_str().to_owned(),
-            number(row.vaf),
-        ]);
-        let covariate = |name: &String| number(row.covariates.get(name).copied());
-        cells.extend(own.covariates.iter().map(covariate));
-        out.write_record(&cells)?;
+        RatingRow {
+            study: "a-study".to_owned(),
+            participant: d.participant(),
+            session: d.whole(),
+            row: d.maybe(Draws::whole),
+            trial: d.whole(),
+            block: d.whole(),
+            position: d.maybe(|d| d.whole() | 1),
+            planned_position: d.whole(),
+            model: d.model(),
+            role: d.of(&[
+                Role::Test,
+                Role::Practice,
+                Role::HiddenReference,
+                Role::LowAnchor,
+                Role::Physical,
+            ]),
+            repetition: number,
+            previous_model: d.maybe(Draws::model),
+            practice: d.whole() % 4 == 0,
+            pilot: d.flag(),
+            simulated: d.flag(),
+            device_kind: d.of(&[
+                DeviceKind::Simulated,
+                DeviceKind::Serial,
+                DeviceKind::Process,
+                DeviceKind::Manual,
+            ]),
+            device_id: "simulated-1".to_owned(),
+            operator: "AB, \"x\"".to_owned(),
+            tool_version: "0.1.0".to_owned(),
+            protocol_version: d.whole(),
+            answers: (answers.into_iter())
+                .filter_map(|(id, answer)| Some((question(id), answer?)))
+                .collect(),
+            corrected: d.flag(),
+            declined: d.flag(),
+            remarks: d.text(),
+            reference_s: d.maybe(Draws::number),
+            exploration_s: d.maybe(Draws::number),
+            response_s: d.maybe(Draws::number),
+            strokes: d.maybe(Draws::whole),
+            least_energy_j: d.maybe(Draws::number),
+            switches_per_s: d.maybe(Draws::number),
+            clamp_count: d.maybe(|d| u64::from(d.whole()) << 20),
+            started_at: d.maybe(Draws::time),
+            rated_at: d.maybe(Draws::time),
+            attempt: d.maybe(Draws::whole),
+            status,
+            vaf: d.maybe(Draws::number),
+            covariates: BTreeMap::from([("lambda".to_owned(), d.number())]),
+        }
     }
-    bytes(out)
-}
 
-/// `attempts.csv`.
-pub(super) fn attempts(rows: &[AttemptRow]) -> io::Result<Vec<u8>> {
-    let mut out = writer();
-    out.write_record(ATTEMPT_COLUMNS)?;
-    for row in rows {
-        out.write_record([
-            row.participant.to_string(),
-            row.session.to_string(),
-            row.pilot.to_string(),
-            row.simulated.to_string(),
-            cell(row.trial),
-            cell(row.attempt),
-            cell(row.model.as_ref()),
-            row.what.to_owned(),
-            cell(row.question.as_ref()),
-            answer(row.from.as_ref()),
-            answer(row.to.as_ref()),
-            row.failure.map(failure).unwrap_or_default().to_owned(),
-            row.by.map(author).unwrap_or_default().to_owned(),
-            row.text.clone(),
-            time(Some(row.at)),
-        ])?;
+    fn attempt_row(draws: &[u32]) -> AttemptRow {
+        let mut d = Draws(draws.iter().cycle());
+        let Kind::Level(levels) = AttemptColumn::What.column().kind else {
+            panic!("`what` has levels");
+        };
+        AttemptRow {
+            participant: d.participant(),
+            session: d.whole(),
+            simulated: d.flag(),
+            pilot: d.flag(),
+            trial: d.maybe(Draws::whole),
+            attempt: d.maybe(Draws::whole),
+            model: d.maybe(Draws::model),
+            what: d.of(levels).0,
+            question: d.maybe(|_| question("realism")),
+            from: d.maybe(|d| Answer::Choice(vec![d.text(), "b".to_owned()])),
+            to: d.maybe(|d| Answer::Rating(d.whole().into())),
+            failure: d.maybe(|d| {
+                d.of(&[
+                    Failure::DeviceFault,
+                    Failure::PlaybackLost,
+                    Failure::MarkedBad,
+                    Failure::Stopped,
+                    Failure::Interrupted,
+                ])
+            }),
+            by: d.maybe(|d| d.of(&[Author::Participant, Author::Experimenter])),
+            text: d.text(),
+            at: d.time(),
+        }
     }
-    bytes(out)
-}
 
-/// `participants.csv`.
-pub(super) fn participants(rows: &[ParticipantRow], own: &Columns) -> io::Result<Vec<u8>> {
-    let mut out = writer();
-    let header = columns::PARTICIPANTS
-        .into_iter()
-        .chain(own.forms.iter().map(QuestionId::as_str));
-    out.write_record(header)?;
-    for row in rows {
-        let mut cells = vec![
-            row.participant.to_string(),
-            row.session.to_string(),
-            row.state.as_str().to_owned(),
-            row.reason.clone(),
-            cell(row.row),
-            row.pilot.to_string(),
-            row.simulated.to_string(),
-            row.erased.to_string(),
-            cell(row.consent_version.as_ref()),
-            // No session was started: no version was used.
-            cell(Some(row.protocol_version).filter(|v| *v > 0)),
-            row.trials_done.to_string(),
-            row.trials_planned.to_string(),
-            time(row.started_at),
-        ];
-        cells.extend(own.forms.iter().map(|q| answer(row.answers.get(q))));
-        out.write_record(&cells)?;
+    fn participant_row(draws: &[u32]) -> ParticipantRow {
+        let mut d = Draws(draws.iter().cycle());
+        ParticipantRow {
+            participant: d.participant(),
+            session: d.whole(),
+            state: d.of(&[
+                State::Unfinished,
+                State::Done,
+                State::Void,
+                State::NoShow,
+                State::DroppedOut,
+                State::Excluded,
+                State::Withdrawn,
+            ]),
+            reason: d.text(),
+            row: d.maybe(Draws::whole),
+            pilot: d.flag(),
+            simulated: d.flag(),
+            erased: d.flag(),
+            consent_version: d.maybe(|_| "1.0".to_owned()),
+            protocol_version: d.maybe(Draws::whole),
+            trials_done: d.whole(),
+            trials_planned: d.whole(),
+            started_at: d.maybe(Draws::time),
+            answers: BTreeMap::from([(question("hand"), Answer::Text(d.text()))]),
+        }
     }
-    bytes(out)
-}
 
-fn failure(failure: Failure) -> &'static str {
-    match failure {
-        Failure::DeviceFault => "device-fault",
-        Failure::PlaybackLost => "playback-lost",
-        Failure::MarkedBad => "marked-bad",
-        Failure::Stopped => "stopped",
-        Failure::Interrupted => "interrupted",
+    /// The header of a study with these questions and the covariate `lambda`.
+    fn header<C: Copy>(all: &[C], declaration: fn(C) -> Column, questions: &[&str]) -> Header<C> {
+        (all.iter())
+            .flat_map(|c| match declaration(*c).repeats {
+                Repeats::Once => vec![(*c, declaration(*c).name.to_owned())],
+                Repeats::Question => questions.iter().map(|q| (*c, (*q).to_owned())).collect(),
+                Repeats::Covariate => vec![(*c, "lambda".to_owned())],
+            })
+            .collect()
     }
-}
 
-fn author(author: Author) -> &'static str {
-    match author {
-        Author::Participant => "participant",
-        Author::Experimenter => "experimenter",
+    /// Whether the cells of a row are what the declarations of their columns say, and
+    /// stand in the CSV as they are.
+    fn check<R: Row>(
+        row: &R,
+        header: &Header<R::Column>,
+        declaration: fn(R::Column) -> Column,
+    ) -> Result<(), TestCaseError> {
+        let table = csv(header, std::slice::from_ref(row)).unwrap();
+        let mut reader = csv::Reader::from_reader(&table[..]);
+        let names: Vec<String> = header.iter().map(|(_, name)| name.clone()).collect();
+        prop_assert_eq!(reader.headers().unwrap(), names);
+        let record = reader.records().next().unwrap().unwrap();
+        for (at, (column, name)) in header.iter().enumerate() {
+            let declared = declaration(*column);
+            let cell = row.cell(*column, name);
+            prop_assert_eq!(&record[at], cell.to_string());
+            let fits = match (&cell, declared.kind) {
+                (Cell::Empty, _) => declared.empty.is_some(),
+                (Cell::Text(text), Kind::Level(levels)) => levels.iter().any(|l| l.0 == text),
+                (Cell::Text(_), kind) => matches!(kind, Kind::Text | Kind::Answer),
+                (Cell::Whole(_), kind) => matches!(kind, Kind::Whole | Kind::Answer),
+                (Cell::Number(_), kind) => matches!(kind, Kind::Number | Kind::Answer),
+                (Cell::Flag(_), kind) => kind == Kind::Flag,
+                (Cell::Time(_), kind) => kind == Kind::Time,
+            };
+            prop_assert!(fits, "{}: {:?}", name, cell);
+        }
+        Ok(())
+    }
+
+    const QUESTIONS: [&str; 3] = ["realism", "comment", "effort"];
+
+    proptest! {
+        #[test]
+        fn cells_are_what_their_columns_declare(draws in prop::collection::vec(any::<u32>(), 97)) {
+            let columns = header(RatingColumn::ALL, RatingColumn::column, &QUESTIONS);
+            check(&rating_row(&draws, 1), &columns, RatingColumn::column)?;
+            check(&attempt_row(&draws), &AttemptColumn::header(), AttemptColumn::column)?;
+            let columns = header(ParticipantColumn::ALL, ParticipantColumn::column, &["hand"]);
+            check(&participant_row(&draws), &columns, ParticipantColumn::column)?;
+        }
+
+        /// What `ratings.csv` says is what the rows in memory say.
+        #[test]
+        fn a_written_table_reads_back_as_its_rows(
+            draws in prop::collection::vec(prop::collection::vec(any::<u32>(), 97), 1..8)
+        ) {
+            let rows: Vec<RatingRow> = (1..).zip(&draws).map(|(n, d)| rating_row(d, n)).collect();
+            prop_assume!(rows.iter().any(|r| !r.practice));
+            let columns = header(RatingColumn::ALL, RatingColumn::column, &QUESTIONS);
+            let table = csv(&columns, &rows).unwrap();
+            for asked in [None, Some("realism"), Some("effort")] {
+                let read = Ratings::read_csv("ratings.csv", &table[..], asked).unwrap();
+                let wanted = Ratings::from_rows(&rows, &question(asked.unwrap_or("realism")));
+                prop_assert_eq!(read, wanted);
+            }
+        }
     }
 }

@@ -8,6 +8,8 @@ use super::error::{At as _, StoreError};
 use super::layout;
 use super::session_folder::Held;
 use crate::outcome::Sample;
+use crate::outcome::cell::Row as _;
+use crate::protocol::columns::SampleColumn;
 use std::fmt;
 use std::io;
 use std::io::Write as _;
@@ -17,7 +19,11 @@ use std::sync::Arc;
 /// Bytes that are gathered before they are written.
 const BUFFER: usize = 32 << 10;
 
-pub(super) const HEADER: &str = "t_s,x_mm,v_mm_s,force_command_n,force_measured_n\r\n";
+/// The first line of a telemetry file.
+pub(super) fn header() -> String {
+    let names: Vec<&str> = SampleColumn::ALL.iter().map(|c| c.name()).collect();
+    names.join(",") + "\r\n"
+}
 
 /// Writes the telemetry of one attempt. It can be moved to a thread of its own.
 pub struct TelemetryWriter {
@@ -52,7 +58,7 @@ impl TelemetryWriter {
             }
         };
         let mut buffer = Vec::with_capacity(BUFFER + 1024);
-        buffer.extend_from_slice(HEADER.as_bytes());
+        buffer.extend_from_slice(header().as_bytes());
         Ok(Self {
             held,
             file,
@@ -68,19 +74,12 @@ impl TelemetryWriter {
     /// the session can go on.
     pub fn write(&mut self, samples: &[Sample]) -> Result<(), StoreError> {
         for sample in samples {
-            let Sample {
-                t_s,
-                x_mm,
-                v_mm_s,
-                force_command_n,
-                force_measured_n,
-            } = sample;
-            let written = write!(self.buffer, "{t_s},{x_mm},{v_mm_s},{force_command_n},");
-            let measured = match force_measured_n {
-                Some(force) => write!(self.buffer, "{force}\r\n"),
-                None => write!(self.buffer, "\r\n"),
-            };
-            written.and(measured).at(&self.path)?;
+            for (i, column) in SampleColumn::ALL.iter().enumerate() {
+                let comma = if i == 0 { "" } else { "," };
+                let cell = sample.cell(*column, "");
+                write!(self.buffer, "{comma}{cell}").at(&self.path)?;
+            }
+            self.buffer.extend_from_slice(b"\r\n");
             if self.buffer.len() >= BUFFER {
                 self.flush()?;
             }

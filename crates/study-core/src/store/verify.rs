@@ -2,7 +2,7 @@
 
 mod telemetry;
 
-use super::derive::{Derived, tables};
+use super::derive::Derived;
 use super::error::{At as _, StoreError, plain};
 use super::ledger::SeatKind;
 use super::line::sha256;
@@ -260,7 +260,7 @@ impl StudyFolder {
         found: &mut Vec<Finding>,
     ) -> Result<(), StoreError> {
         let derived = Derived::of(sessions, protocol);
-        for (name, bytes) in tables(&derived).at(&self.path)? {
+        for (name, bytes) in derived.tables().at(&self.path)? {
             match self.disk.read(&self.path.join(name)) {
                 Ok(old) if old == bytes => {}
                 Ok(_) => found.push(Finding::wrong(name, "it is not what the journals give")),

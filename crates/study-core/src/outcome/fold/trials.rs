@@ -1,7 +1,7 @@
 //! What became of each trial of a session.
 
-use crate::outcome::columns::{RatingRow, Status};
 use crate::outcome::event::{Choice, Entry, Event, Moment, Place, Playback, Start};
+use crate::outcome::rows::{RatingRow, Status};
 use crate::protocol::{Answer, Protocol, Role, Trial};
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, QuestionId};

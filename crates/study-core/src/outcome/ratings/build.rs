@@ -1,7 +1,7 @@
 //! Rows to columns: names become indices as they come, and are sorted at the end.
 
-use super::{Comment, NO_MODEL, Origin, Practice, Practised, Ratings, Realization, Subject};
-use crate::outcome::columns::Status;
+use super::{Comment, Origin, Practice, Practised, Ratings, Realization, Subject};
+use crate::outcome::rows::Status;
 use crate::protocol::Role;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -10,17 +10,34 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     pub(super) subject: u32,
-    pub(super) model: u32,
-    pub(super) repetition: u32,
-    pub(super) rating: f64,
-    pub(super) vaf: f64,
-    pub(super) trial_index: u32,
+    pub(super) model: Option<u32>,
+    /// `None`: to be numbered, from 1 within subject and realization.
+    pub(super) repetition: Option<u32>,
+    pub(super) rating: Option<f64>,
+    pub(super) vaf: Option<f64>,
+    pub(super) trial_index: Option<u32>,
     pub(super) origin: Origin,
     pub(super) status: Status,
     pub(super) corrected: bool,
-    pub(super) attempt: u32,
-    pub(super) strokes: u32,
+    pub(super) attempt: Option<u32>,
+    pub(super) strokes: Option<u32>,
     pub(super) source_row: u32,
+}
+
+impl Row {
+    /// A failed trial has no rating, and without a rating no trial is `ok`.
+    fn consistent(self) -> Self {
+        let rating = self.rating.filter(|_| self.status != Status::Failed);
+        let status = match (self.status, rating) {
+            (Status::Ok, None) => Status::Missing,
+            (status, _) => status,
+        };
+        Self {
+            rating,
+            status,
+            ..self
+        }
+    }
 }
 
 /// Names and the index of each, in the order in which they came.
@@ -38,7 +55,7 @@ impl Names {
         {
             return (*at, false);
         }
-        let next = u32::try_from(self.places.len()).unwrap_or(NO_MODEL - 1);
+        let next = u32::try_from(self.places.len()).unwrap_or(u32::MAX);
         let (at, new) = match self.places.get(name) {
             Some(at) => (*at, false),
             None => {
@@ -66,6 +83,8 @@ pub(super) struct Builder {
     /// Subjects and realizations of practice rows.
     practised: Names,
     practice: Practice,
+    /// Rows whose repetition is still to be numbered, rising.
+    unnumbered: Vec<usize>,
     /// Sum and number of the least energies, J, by realization: those of
     /// participants, and of pilots and simulated participants.
     energies: BTreeMap<u32, [(f64, f64); 2]>,
@@ -82,6 +101,7 @@ impl Builder {
             models: Names::default(),
             practised: Names::default(),
             practice: Practice::default(),
+            unnumbered: Vec::new(),
             energies: BTreeMap::new(),
         }
     }
@@ -101,7 +121,8 @@ impl Builder {
     }
 
     /// One more practice row, which is kept beside the others.
-    pub(super) fn practice(&mut self, subject: &str, model: &str, row: &Row) {
+    pub(super) fn practice(&mut self, subject: &str, model: &str, row: Row) {
+        let row = row.consistent();
         let mut place = |names: &mut Names, name: &str| {
             let (at, new) = names.place(name);
             if new {
@@ -114,7 +135,7 @@ impl Builder {
         self.practice.rows.push(Practised {
             subject,
             model,
-            repetition: row.repetition,
+            repetition: row.repetition.unwrap_or(0),
             trial_index: row.trial_index,
             rating: row.rating,
             vaf: row.vaf,
@@ -164,10 +185,14 @@ impl Builder {
     }
 
     pub(super) fn push(&mut self, row: Row) {
+        let row = row.consistent();
+        if row.repetition.is_none() {
+            self.unnumbered.push(self.len());
+        }
         let r = &mut self.ratings;
         r.subject.push(row.subject);
         r.model.push(row.model);
-        r.repetition.push(row.repetition);
+        r.repetition.push(row.repetition.unwrap_or(0));
         r.rating.push(row.rating);
         r.vaf.push(row.vaf);
         r.trial_index.push(row.trial_index);
@@ -179,7 +204,8 @@ impl Builder {
         r.source_row.push(row.source_row);
     }
 
-    /// Tells the realizations their mean least energy and sorts the names.
+    /// Gives the realizations their mean least energy, sorts the names and numbers the
+    /// repetitions that the table leaves empty.
     pub(super) fn finish(self) -> Ratings {
         let mut r = self.ratings;
         r.practice = Arc::new(self.practice);
@@ -196,8 +222,20 @@ impl Builder {
         for s in &mut r.subject {
             *s = subjects[*s as usize];
         }
-        for m in r.model.iter_mut().filter(|m| **m != NO_MODEL) {
+        for m in r.model.iter_mut().flatten() {
             *m = models[*m as usize];
+        }
+        if !self.unnumbered.is_empty() {
+            let order = r.by_cell();
+            let mut numbers = vec![0; r.len()];
+            for rows in r.cells(&order) {
+                for (number, &i) in (1u32..).zip(rows) {
+                    numbers[i] = number;
+                }
+            }
+            for i in self.unnumbered {
+                r.repetition[i] = numbers[i];
+            }
         }
         r
     }

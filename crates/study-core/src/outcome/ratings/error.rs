@@ -2,114 +2,76 @@
 
 use study_base::text::Untrusted;
 
-/// Why a CSV could not be read. Every message names the file and, where there
-/// is one, the line.
+/// Why a CSV could not be read. Every message names the file and, where there is
+/// one, the line: `line` is counted from 1, header included.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum RatingsError {
-    /// It could not be read, or is no CSV.
+    /// It could not be read, or is not a CSV.
     #[error("{name}: {source}")]
-    Csv {
-        /// The file.
-        name: String,
-        /// What went wrong.
-        #[source]
-        source: csv::Error,
-    },
+    Csv { name: String, source: csv::Error },
     /// It is in another encoding.
-    #[error("{name}, line {line}: this is no UTF-8; save it as CSV in UTF-8")]
-    Encoding {
-        /// The file.
-        name: String,
-        /// From 1, header included.
-        line: u64,
-    },
-    /// It has another separator than the comma.
+    #[error("{name}, line {line}: this is not UTF-8; save it as CSV in UTF-8")]
+    Encoding { name: String, line: u64 },
+    /// Its columns are not separated by commas.
     #[error(
         "{name}: the columns are separated by `{}`; save it with commas between the columns and \
          points in the numbers",
         Untrusted(&.separator.to_string())
     )]
-    Separator {
-        /// The file.
-        name: String,
-        /// What stands between the columns.
-        separator: char,
-    },
+    Separator { name: String, separator: char },
     /// The header lacks a column.
-    #[error("{name}: no column `{column}`; a table of ratings has the columns {expected}")]
+    #[error("{name}: no column `{}`; a table of ratings has the columns {expected}", Untrusted(.column))]
     NoColumn {
-        /// The file.
         name: String,
-        /// The column.
         column: String,
-        /// What there should be.
         expected: &'static str,
     },
+    /// A table with the columns of a study's has no answers.
+    #[error("{name}: no column with answers; the questions follow `protocol_version`")]
+    NoQuestion { name: String },
     /// The header has a column twice.
-    #[error("{name}: two columns are named `{column}`")]
-    TwoColumns {
-        /// The file.
-        name: String,
-        /// The column.
-        column: String,
-    },
+    #[error("{name}: two columns are named `{}`", Untrusted(.column))]
+    TwoColumns { name: String, column: String },
     /// A line is shorter or longer than the header.
     #[error("{name}, line {line}: {found} fields, but the header has {expected}")]
     Ragged {
-        /// The file.
         name: String,
-        /// From 1, header included.
         line: u64,
-        /// Fields there.
         found: usize,
-        /// Fields of the header.
         expected: usize,
     },
     /// A field holds something that its column cannot.
-    #[error("{name}, line {line}: `{}` in column `{column}` is no {wanted}", Untrusted(.field))]
+    #[error("{name}, line {line}: `{}` in column `{}` is not {wanted}", Untrusted(.field), Untrusted(.column))]
     Field {
-        /// The file.
         name: String,
-        /// From 1, header included.
         line: u64,
-        /// Which column.
         column: String,
-        /// What stands there.
         field: String,
-        /// What should.
-        wanted: &'static str,
+        wanted: String,
     },
-    /// The same subject, realization and repetition comes twice.
+    /// Two rows have the same subject, realization and repetition.
     #[error(
-        "{name}, line {line}: subject `{}`, model `{}`, repetition {repetition} came already on \
+        "{name}, line {line}: subject `{}`, model `{}`, repetition {repetition} is already on \
          line {first}",
         Untrusted(.subject), Untrusted(.model)
     )]
     Twice {
-        /// The file.
         name: String,
-        /// From 1, header included.
         line: u64,
-        /// Where it came first.
         first: u64,
-        /// Who.
         subject: String,
-        /// What.
         model: String,
-        /// The how-maniest time.
         repetition: u32,
     },
     /// There is no row.
     #[error("{name}: no ratings, only a header")]
-    Empty {
-        /// The file.
-        name: String,
-    },
+    Empty { name: String },
 }
 
 impl RatingsError {
-    /// What the reader of CSV says of the file `name`; it has `pending` lines yet
-    /// to count.
+    /// An error of the CSV reader in the file `name`, which has not yet counted
+    /// `pending` lines.
     pub(super) fn csv(name: &str, source: csv::Error, pending: u64) -> Self {
         let name = name.to_owned();
         match source.kind() {

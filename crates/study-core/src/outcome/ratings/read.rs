@@ -1,31 +1,27 @@
-//! Ratings from a CSV: somebody else's long form, or our own `ratings.csv`.
+//! Ratings from a CSV: a foreign table with one row for each rating, or a study's
+//! `ratings.csv`.
 
 use super::error::RatingsError;
-use super::{Builder, NO_MODEL, NO_STROKES, Origin, Ratings, Row};
-use crate::outcome::columns::Status;
+use super::{Builder, Origin, Ratings, Row};
+use crate::outcome::rows::Status;
 use crate::protocol::Role;
+use crate::protocol::columns::{Kind, RatingColumn as C};
+use serde::de::{DeserializeOwned, IntoDeserializer as _};
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
-/// Stands for a repetition that is not written, until it is counted up.
-const NOT_WRITTEN: u32 = u32::MAX;
-
 const FOREIGN: &str = "subject,model,rating[,repetition][,vaf][,trial_index]";
 
-/// Columns of our own table that stand before the questions.
-const BEFORE_QUESTIONS: &str = "protocol_version";
-
 impl Ratings {
-    /// Reads a CSV with the columns `subject,model,rating` and optionally
+    /// Reads a CSV with the columns `subject`, `model`, `rating` and optionally
     /// `repetition`, `vaf` and `trial_index`, in any order, or one with the columns of
-    /// our own `ratings.csv`. Empty fields of model, rating and vaf are missing, and so
-    /// are `NA` and `NaN`; a repetition that is empty or has no column is counted up
-    /// from 1; a written one is kept as it is, 0 too.
-    /// A byte order mark is skipped. In our own table `question` names the column (default: the
-    /// first after `protocol_version`).
+    /// a study's `ratings.csv`. Fields of model, rating and VAF may be empty, `NA` or
+    /// `NaN`. A repetition that is empty or has no column is numbered from 1; a written
+    /// one is kept, 0 too. A byte order mark is skipped. `question` names the column
+    /// with the ratings; default: `rating`, and in a study's table the first question.
     ///
     /// # Errors
-    /// [`RatingsError`], at the first line that is wrong.
+    /// [`RatingsError`] of the first line with an error.
     pub fn read_csv(
         name: &str,
         input: impl BufRead,
@@ -49,22 +45,21 @@ impl Ratings {
                 separator,
             });
         }
-        let columns = Columns::of(name, &header, question)?;
+        let columns = Positions::of(name, &header, question)?;
         let mut table = Reading {
             builder: Builder::new(columns.question.clone()),
             lines: Vec::new(),
         };
         let read = table.read(name, &header, &columns, &mut reader);
         let lines = table.lines;
-        let mut ratings = table.builder.finish();
-        // A repeated row above a line that cannot be read is the first fault.
-        number_repetitions(&mut ratings);
+        let ratings = table.builder.finish();
+        // A repeated row above a line that cannot be read is the first error.
         if let Some((first, second)) = repeated(&ratings) {
-            let model = ratings.models.get(ratings.model[second] as usize);
+            let model = ratings.model[second].map(|m| &ratings.models[m as usize]);
             return Err(RatingsError::Twice {
                 name: name.to_owned(),
-                line: lines[second].into(),
-                first: lines[first].into(),
+                line: lines[second],
+                first: lines[first],
                 subject: ratings.subjects[ratings.subject[second] as usize]
                     .id
                     .clone(),
@@ -86,7 +81,7 @@ impl Ratings {
 struct Reading {
     builder: Builder,
     /// Line of each row.
-    lines: Vec<u32>,
+    lines: Vec<u64>,
 }
 
 impl Reading {
@@ -94,7 +89,7 @@ impl Reading {
         &mut self,
         name: &str,
         header: &[String],
-        columns: &Columns,
+        columns: &Positions,
         reader: &mut csv::Reader<impl BufRead>,
     ) -> Result<(), RatingsError> {
         let mut record = csv::StringRecord::new();
@@ -133,45 +128,18 @@ impl Reading {
                 record: &record,
                 line,
             };
-            if let Some(row) = columns.row(&line, number, &mut self.builder)? {
-                self.builder.push(row);
-                self.lines
-                    .push(u32::try_from(line.line).unwrap_or(u32::MAX));
-            }
+            columns.row(&line, number, &mut self.builder)?;
+            // A practice row is not among the others.
+            self.lines.resize(self.builder.len(), line.line);
         }
     }
-}
-
-/// Counts up the repetitions that a table leaves empty, in the order of its rows.
-fn number_repetitions(ratings: &mut Ratings) {
-    if !ratings.repetition.contains(&NOT_WRITTEN) {
-        return;
-    }
-    let order = ratings.by_cell();
-    for rows in cells(ratings, &order)
-        .map(<[usize]>::to_vec)
-        .collect::<Vec<_>>()
-    {
-        for (n, i) in (1u32..).zip(rows) {
-            if ratings.repetition[i] == NOT_WRITTEN {
-                ratings.repetition[i] = n;
-            }
-        }
-    }
-}
-
-/// The rows of each subject and realization.
-fn cells<'o>(ratings: &'o Ratings, order: &'o [usize]) -> impl Iterator<Item = &'o [usize]> {
-    order.chunk_by(|&a, &b| {
-        (ratings.subject[a], ratings.model[a]) == (ratings.subject[b], ratings.model[b])
-    })
 }
 
 /// The first row that repeats another, after that other.
 fn repeated(ratings: &Ratings) -> Option<(usize, usize)> {
     let order = ratings.by_cell();
     let mut found: Option<(usize, usize)> = None;
-    for rows in cells(ratings, &order) {
+    for rows in ratings.cells(&order) {
         let of = |i: &usize| ratings.repetition[*i];
         if rows.windows(2).all(|w| of(&w[0]) < of(&w[1])) {
             continue;
@@ -187,25 +155,15 @@ fn repeated(ratings: &Ratings) -> Option<(usize, usize)> {
     found
 }
 
-/// Where the columns of interest stand.
-struct Columns {
+/// Where the columns are that the analysis needs; `None`: the table lacks it.
+struct Positions {
     question: String,
     subject: usize,
     model: usize,
-    repetition: Option<usize>,
     rating: usize,
+    repetition: Option<usize>,
     vaf: Option<usize>,
     trial_index: Option<usize>,
-    strokes: Option<usize>,
-    least_energy: Option<usize>,
-    /// Those after `vaf` in our own table; of somebody else's, what tells the
-    /// memory of a realization.
-    covariates: Vec<usize>,
-    ours: Option<Ours>,
-}
-
-/// What only our own table has.
-struct Ours {
     role: Option<usize>,
     practice: Option<usize>,
     pilot: Option<usize>,
@@ -213,21 +171,25 @@ struct Ours {
     status: Option<usize>,
     corrected: Option<usize>,
     attempt: Option<usize>,
+    strokes: Option<usize>,
+    least_energy: Option<usize>,
+    /// Remarks, and the questions that are not read.
     texts: Vec<usize>,
+    covariates: Vec<usize>,
 }
 
-impl Columns {
+impl Positions {
     fn of(name: &str, header: &[String], question: Option<&str>) -> Result<Self, RatingsError> {
-        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut positions: BTreeMap<&str, usize> = BTreeMap::new();
         for (i, h) in header.iter().enumerate() {
-            if places.insert(h, i).is_some() {
+            if positions.insert(h, i).is_some() {
                 return Err(RatingsError::TwoColumns {
                     name: name.to_owned(),
                     column: h.clone(),
                 });
             }
         }
-        let find = |column: &str| places.get(column).copied();
+        let find = |column: &str| positions.get(column).copied();
         let need = |column: &str| {
             find(column).ok_or_else(|| RatingsError::NoColumn {
                 name: name.to_owned(),
@@ -235,131 +197,124 @@ impl Columns {
                 expected: FOREIGN,
             })
         };
-        let ours = find("participant").zip(find("planned_position"));
-        let Some((subject, _)) = ours else {
+        let own = |column: C| find(column.name());
+        let (Some(subject), Some(_)) = (own(C::Participant), own(C::PlannedPosition)) else {
             return Ok(Self {
                 question: question.unwrap_or("rating").to_owned(),
                 subject: need("subject")?,
                 model: need("model")?,
-                repetition: find("repetition"),
                 rating: need(question.unwrap_or("rating"))?,
+                repetition: find("repetition"),
                 vaf: find("vaf"),
                 trial_index: find("trial_index"),
+                role: None,
+                practice: None,
+                pilot: None,
+                simulated: None,
+                status: None,
+                corrected: None,
+                attempt: None,
                 strokes: None,
                 least_energy: None,
+                texts: Vec::new(),
                 covariates: MEMORY.iter().filter_map(|c| find(c)).collect(),
-                ours: None,
             });
         };
-        let first = find(BEFORE_QUESTIONS).map_or(0, |i| i + 1);
-        let end = find("corrected").unwrap_or(first);
-        let rating = match question {
-            Some(q) => need(q)?,
-            None if first < end => first,
-            None => need("realism")?,
+        // A repeated column fills the space between its neighbours.
+        let repeated = |column: C| {
+            let mut before = C::ALL.iter().rev().skip_while(|c| **c != column).skip(1);
+            let mut after = C::ALL.iter().skip_while(|c| **c != column).skip(1);
+            let start = before.find_map(|c| own(*c)).map_or(0, |i| i + 1);
+            start..after.find_map(|c| own(*c)).unwrap_or(header.len())
         };
-        let texts = (first..end).filter(|&i| i != rating).chain(find("remarks"));
+        let questions = repeated(C::Questions);
+        let rating = match question {
+            Some(question) => need(question)?,
+            None if !questions.is_empty() => questions.start,
+            None => {
+                return Err(RatingsError::NoQuestion {
+                    name: name.to_owned(),
+                });
+            }
+        };
+        let texts = questions.filter(|&i| i != rating);
         Ok(Self {
             question: header[rating].clone(),
             subject,
-            model: need("model")?,
-            repetition: Some(need("repetition")?),
+            model: need(C::Model.name())?,
             rating,
-            vaf: find("vaf"),
-            trial_index: find("position"),
-            strokes: find("strokes"),
-            least_energy: find("least_energy_j"),
-            covariates: find("vaf").map_or(Vec::new(), |v| (v + 1..header.len()).collect()),
-            ours: Some(Ours {
-                role: find("role"),
-                practice: find("practice"),
-                pilot: find("pilot"),
-                simulated: find("simulated"),
-                status: find("status"),
-                corrected: find("corrected"),
-                attempt: find("attempt"),
-                texts: texts.collect(),
-            }),
+            repetition: Some(need(C::Repetition.name())?),
+            vaf: own(C::Vaf),
+            trial_index: own(C::Position),
+            role: own(C::Role),
+            practice: own(C::Practice),
+            pilot: own(C::Pilot),
+            simulated: own(C::Simulated),
+            status: own(C::Status),
+            corrected: own(C::Corrected),
+            attempt: own(C::Attempt),
+            strokes: own(C::Strokes),
+            least_energy: own(C::LeastEnergyJ),
+            texts: texts.chain(own(C::Remarks)).collect(),
+            covariates: repeated(C::Covariates).collect(),
         })
     }
 
-    /// `None`: a practice row.
-    fn row(
-        &self,
-        line: &Line<'_>,
-        number: u32,
-        builder: &mut Builder,
-    ) -> Result<Option<Row>, RatingsError> {
+    /// Adds the row of a line to the others.
+    fn row(&self, line: &Line<'_>, number: u32, builder: &mut Builder) -> Result<(), RatingsError> {
         let subject = line.text(self.subject);
         if subject.is_empty() {
-            return Err(line.fault(self.subject, "name of a subject"));
+            return Err(line.error(self.subject, "the name of a participant"));
         }
+        let simulated = line.flag(self.simulated)?;
+        let pilot = line.flag(self.pilot)?;
         let mut row = Row {
             subject: 0,
-            model: NO_MODEL,
-            repetition: line.repetition(self.repetition)?,
-            rating: line.number(self.rating)?,
-            vaf: self.vaf.map_or(Ok(f64::NAN), |i| line.number(i))?,
-            trial_index: self.trial_index.map_or(Ok(0), |i| line.whole(i))?,
-            origin: Origin::Real,
+            model: None,
+            repetition: line.whole(self.repetition)?,
+            rating: line.number(Some(self.rating))?,
+            vaf: line.number(self.vaf)?,
+            trial_index: line.whole(self.trial_index)?.filter(|t| *t > 0),
+            origin: Origin::of(simulated, pilot),
             status: Status::Ok,
-            corrected: false,
-            attempt: 0,
-            strokes: NO_STROKES,
+            corrected: line.flag(self.corrected)?,
+            attempt: line.whole(self.attempt)?,
+            strokes: line.whole(self.strokes)?,
             source_row: number,
         };
-        let mut role = Role::Test;
-        let mut energy = None;
-        if let Some(ours) = &self.ours {
-            let flag = |at: Option<usize>| at.map_or(Ok(false), |i| line.flag(i));
-            if flag(ours.practice)? {
-                row.repetition %= NOT_WRITTEN;
-                builder.practice(subject, line.text(self.model), &row);
-                return Ok(None);
-            }
-            role = ours.role.map_or(Ok(Role::Test), |i| {
-                line.word(i, &ROLES, "role of a realization")
-            })?;
-            row.status = ours.status.map_or(Ok(Status::Ok), |i| {
-                line.word(i, &STATUSES, "status (ok, failed, declined, missing)")
-            })?;
-            row.origin = match (flag(ours.simulated)?, flag(ours.pilot)?) {
-                (true, _) => Origin::Simulated,
-                (false, true) => Origin::Pilot,
-                (false, false) => Origin::Real,
-            };
-            row.corrected = flag(ours.corrected)?;
-            row.attempt = ours.attempt.map_or(Ok(0), |i| line.whole(i))?;
-            if let Some(i) = self.strokes.filter(|&i| !line.text(i).is_empty()) {
-                row.strokes = line.whole(i)?;
-            }
-            let telling = row.status == Status::Ok;
-            if let Some(i) = self.least_energy.filter(|_| telling) {
-                energy = Some(line.number(i)?);
-            }
-            if row.status == Status::Failed {
-                row.rating = f64::NAN;
-            }
-            for &i in &ours.texts {
-                let text = &line.record[i];
-                // Other numeric questions are not comments.
-                if !text.trim().is_empty() && text.trim().parse::<f64>().is_err() {
-                    builder.comment(line.header[i].clone(), text.to_owned());
-                }
-            }
+        if let Some(at) = self.status {
+            row.status = line.level(at, C::Status)?;
         }
-        if row.rating.is_nan() && row.status == Status::Ok {
-            row.status = Status::Missing;
+        let model = line.text(self.model);
+        if line.flag(self.practice)? {
+            builder.practice(subject, model, row);
+            return Ok(());
+        }
+        let energy = match row.status {
+            Status::Ok => line.number(self.least_energy)?,
+            Status::Failed | Status::Declined | Status::Missing => None,
+        };
+        for &i in &self.texts {
+            let text = &line.record[i];
+            // The answers to other numeric questions are not comments.
+            if !text.trim().is_empty() && text.trim().parse::<f64>().is_err() {
+                builder.comment(line.header[i].clone(), text.to_owned());
+            }
         }
         row.subject = builder.subject(subject);
-        let model = line.text(self.model);
+        let role = match self.role {
+            Some(at) => line.level(at, C::Role)?,
+            None => Role::Test,
+        };
         if !model.is_empty() {
-            row.model = builder.model(model, role, || self.covariates(line));
+            let model = builder.model(model, role, || self.covariates(line));
+            row.model = Some(model);
             if let Some(energy) = energy {
-                builder.least_energy(row.model, row.origin, energy);
+                builder.least_energy(model, row.origin, energy);
             }
         }
-        Ok(Some(row))
+        builder.push(row);
+        Ok(())
     }
 
     /// Those that are numbers.
@@ -371,24 +326,10 @@ impl Columns {
     }
 }
 
-/// Columns of somebody else's table that tell the memory of a realization.
+/// Columns of a foreign table that give the memory of a realization.
 const MEMORY: [&str; 2] = ["lambda", "memory_mm"];
 
-const ROLES: [(&str, Role); 5] = [
-    ("test", Role::Test),
-    ("practice", Role::Practice),
-    ("hidden-reference", Role::HiddenReference),
-    ("low-anchor", Role::LowAnchor),
-    ("physical", Role::Physical),
-];
-
-const STATUSES: [(&str, Status); 4] = [
-    ("ok", Status::Ok),
-    ("failed", Status::Failed),
-    ("declined", Status::Declined),
-    ("missing", Status::Missing),
-];
-
+/// A line of a table.
 struct Line<'a> {
     name: &'a str,
     header: &'a [String],
@@ -401,67 +342,61 @@ impl Line<'_> {
         self.record[at].trim()
     }
 
-    fn fault(&self, at: usize, wanted: &'static str) -> RatingsError {
+    fn error(&self, at: usize, wanted: impl Into<String>) -> RatingsError {
         RatingsError::Field {
             name: self.name.to_owned(),
             line: self.line,
             column: self.header[at].clone(),
             field: self.record[at].to_owned(),
-            wanted,
+            wanted: wanted.into(),
         }
     }
 
-    fn number(&self, at: usize) -> Result<f64, RatingsError> {
-        let text = self.text(at);
-        if text.is_empty() || text.eq_ignore_ascii_case("na") || text.eq_ignore_ascii_case("nan") {
-            return Ok(f64::NAN);
-        }
-        text.parse()
-            .ok()
-            .filter(|v: &f64| v.is_finite())
-            .ok_or_else(|| self.fault(at, "finite number"))
-    }
-
-    /// A written repetition, from whichever number the table counts.
-    fn repetition(&self, at: Option<usize>) -> Result<u32, RatingsError> {
-        match at.filter(|&i| !self.text(i).is_empty()) {
-            None => Ok(NOT_WRITTEN),
-            Some(i) => match self.whole(i)? {
-                NOT_WRITTEN => Err(self.fault(i, "number of a repetition")),
-                n => Ok(n),
-            },
+    /// A finite number; `None` without a column, and for `NA`, `NaN` and empty fields.
+    fn number(&self, at: Option<usize>) -> Result<Option<f64>, RatingsError> {
+        let missing = |text: &str| {
+            ["", "na", "nan"]
+                .iter()
+                .any(|m| text.eq_ignore_ascii_case(m))
+        };
+        let Some(at) = at.filter(|&at| !missing(self.text(at))) else {
+            return Ok(None);
+        };
+        match self.text(at).parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(Some(number)),
+            _ => Err(self.error(at, "a finite number")),
         }
     }
 
-    /// A whole number from 1; empty is 0.
-    fn whole(&self, at: usize) -> Result<u32, RatingsError> {
-        match self.text(at) {
-            "" => Ok(0),
-            text => text
-                .parse()
-                .map_err(|_| self.fault(at, "whole number from 0")),
+    /// A whole number from 0; `None` without a column and for empty fields.
+    fn whole(&self, at: Option<usize>) -> Result<Option<u32>, RatingsError> {
+        let Some(at) = at.filter(|&at| !self.text(at).is_empty()) else {
+            return Ok(None);
+        };
+        let number = self.text(at).parse().map(Some);
+        number.map_err(|_| self.error(at, "a whole number from 0"))
+    }
+
+    /// `false` without a column and for empty fields.
+    fn flag(&self, at: Option<usize>) -> Result<bool, RatingsError> {
+        match at.map(|at| (at, self.text(at))) {
+            Some((_, "true")) => Ok(true),
+            Some((_, "false" | "")) | None => Ok(false),
+            Some((at, _)) => Err(self.error(at, "`true` or `false`")),
         }
     }
 
-    fn flag(&self, at: usize) -> Result<bool, RatingsError> {
-        match self.text(at) {
-            "true" => Ok(true),
-            "false" | "" => Ok(false),
-            _ => Err(self.fault(at, "`true` or `false`")),
-        }
-    }
-
-    fn word<T: Copy>(
-        &self,
-        at: usize,
-        words: &[(&str, T)],
-        wanted: &'static str,
-    ) -> Result<T, RatingsError> {
-        words
-            .iter()
-            .find(|(word, _)| *word == self.text(at))
-            .map(|(_, value)| *value)
-            .ok_or_else(|| self.fault(at, wanted))
+    /// One of the words that a column has.
+    fn level<T: DeserializeOwned>(&self, at: usize, column: C) -> Result<T, RatingsError> {
+        let read: Result<T, serde::de::value::Error> =
+            T::deserialize(self.text(at).into_deserializer());
+        read.map_err(|_| {
+            let words: Vec<&str> = match column.column().kind {
+                Kind::Level(levels) => levels.iter().map(|(word, _)| *word).collect(),
+                _ => Vec::new(),
+            };
+            self.error(at, format!("one of {}", words.join(", ")))
+        })
     }
 }
 
@@ -480,9 +415,9 @@ mod tests {
     const HEAD: &str = "subject,model,repetition,rating,vaf\n";
 
     #[test]
-    fn a_byte_order_mark_and_empty_fields_are_no_fault() {
+    fn a_byte_order_mark_and_empty_fields_are_allowed() {
         let r = read(&format!("\u{feff}{HEAD}S1,,1,,\nS1,,2,4,0.5\n")).unwrap();
-        assert_eq!(r.model, [NO_MODEL; 2]);
+        assert_eq!(r.model, [None; 2]);
         assert_eq!((r.len(), r.models.len()), (2, 0));
         assert_eq!(r.status, [Status::Missing, Status::Ok]);
     }
@@ -491,7 +426,7 @@ mod tests {
     fn three_columns_are_a_table() {
         let r = read("subject,model,rating\nS1,A,4\nS1,B,2\nS1,A,5\n").unwrap();
         assert_eq!(r.repetition, [1, 1, 2]);
-        assert!(r.vaf.iter().all(|v| v.is_nan()));
+        assert!(r.vaf.iter().all(Option::is_none));
     }
 
     #[test]
@@ -506,28 +441,28 @@ mod tests {
         assert_eq!(r.repetition, [0, 2, 1, 2]);
         assert_eq!(
             says(&format!("{HEAD}S1,A,0,4,\nS1,A,0,5,\n")),
-            "r.csv, line 3: subject `S1`, model `A`, repetition 0 came already on line 2"
+            "r.csv, line 3: subject `S1`, model `A`, repetition 0 is already on line 2"
         );
-        assert!(says(&format!("{HEAD}S1,A,4294967295,4,\n")).contains("number of a repetition"));
+        assert!(says(&format!("{HEAD}S1,A,4294967296,4,\n")).contains("whole number from 0"));
     }
 
     #[test]
-    fn each_fault_names_its_line() {
+    fn each_error_names_its_line() {
         assert_eq!(
             says(&format!("{HEAD}S1,A,1,4,0.5\nS1,B,1,4\n")),
             "r.csv, line 3: 4 fields, but the header has 5"
         );
         assert_eq!(
             says(&format!("{HEAD}S1,A,1,four,0.5\n")),
-            "r.csv, line 2: `four` in column `rating` is no finite number"
+            "r.csv, line 2: `four` in column `rating` is not a finite number"
         );
         assert_eq!(
             says(&format!("{HEAD}S1,A,1,inf,0.5\n")),
-            "r.csv, line 2: `inf` in column `rating` is no finite number"
+            "r.csv, line 2: `inf` in column `rating` is not a finite number"
         );
         assert_eq!(
             says(&format!("{HEAD}S1,A,1,4,0.5\nS1,A,1,5,0.5\n")),
-            "r.csv, line 3: subject `S1`, model `A`, repetition 1 came already on line 2"
+            "r.csv, line 3: subject `S1`, model `A`, repetition 1 is already on line 2"
         );
         // Lines are those of an editor: also where they end in \r\n, where one is
         // empty and where a name goes on in the next.
@@ -561,7 +496,7 @@ mod tests {
             Ratings::read_csv("r.csv", latin.as_slice(), None)
                 .unwrap_err()
                 .to_string(),
-            "r.csv, line 3: this is no UTF-8; save it as CSV in UTF-8"
+            "r.csv, line 3: this is not UTF-8; save it as CSV in UTF-8"
         );
     }
 
@@ -572,7 +507,7 @@ mod tests {
     }
 
     #[test]
-    fn our_own_table_is_understood() {
+    fn the_table_of_a_study_is_read() {
         let csv = "study,participant,session,row,trial,block,position,planned_position,model,role,\
                    repetition,practice,pilot,simulated,protocol_version,realism,comment,corrected,\
                    remarks,attempt,status,vaf\n\
@@ -586,7 +521,7 @@ mod tests {
         );
         assert_eq!(r.models[1].role, Role::LowAnchor);
         assert_eq!(r.origin, [Origin::Simulated; 2]);
-        assert_eq!((r.attempt[0], r.corrected[0]), (2, true));
+        assert_eq!((r.attempt[0], r.corrected[0]), (Some(2), true));
         let texts: Vec<&str> = r.comments.iter().map(|c| c.text.as_str()).collect();
         assert_eq!(texts, ["a, b", "hm"]);
     }

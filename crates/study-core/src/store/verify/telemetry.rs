@@ -7,7 +7,7 @@
 use super::Finding;
 use crate::outcome::Event;
 use crate::store::sessions::SessionData;
-use crate::store::telemetry::HEADER;
+use crate::store::telemetry::header;
 use crate::store::{StoreError, StudyFolder, layout, plain};
 use std::collections::BTreeMap;
 use std::io;
@@ -81,7 +81,8 @@ impl StudyFolder {
 /// Samples in a file, without a last line that has no end; `None` if it does not
 /// begin as one of ours. An empty file is one whose buffer was never written.
 fn lines_of(bytes: &[u8]) -> Option<u64> {
-    let header = HEADER.as_bytes();
+    let header = header();
+    let header = header.as_bytes();
     if bytes.len() < header.len() {
         return header.starts_with(bytes).then_some(0);
     }
