@@ -109,7 +109,7 @@ const KNOWN_CIRCLES: [&str; 6] = [
     "study/cli: circle of results, verify",
     "study/report/html: circle of answers, methods, prose",
     "study-core/analyze: circle of exclude, select",
-    "study-core/store: circle of derive, journal, participant, session_folder, sessions, tables, telemetry",
+    "study-core/store: circle of journal, participant, session_folder, sessions, telemetry",
     "study-haptics/identify: circle of constrained, ewls, lanes, method, resample",
     "study-haptics/recording: circle of motion, swapped",
 ];

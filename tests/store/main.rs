@@ -4,6 +4,7 @@ mod commands;
 mod crash;
 #[path = "../support/designs.rs"]
 mod designs;
+mod dictionary;
 mod example_study;
 mod folder;
 mod journal;

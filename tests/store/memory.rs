@@ -415,8 +415,8 @@ impl Disk for MemoryDisk {
         Ok(new.then(|| -> Lock { Box::new(Guard(Arc::clone(&self.locks), path.to_owned())) }))
     }
 
-    fn free_bytes(&self, _path: &Path) -> io::Result<u64> {
+    fn free_bytes(&self, _path: &Path) -> io::Result<Option<u64>> {
         self.call(false)?;
-        Ok(1 << 30)
+        Ok(Some(1 << 30))
     }
 }

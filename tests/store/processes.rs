@@ -35,7 +35,7 @@ fn helper_claims() {
 
 fn claimer(results: &Path, id: &str) -> Child {
     std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "helper_claims", "--nocapture"])
+        .args(["--exact", "processes::helper_claims", "--nocapture"])
         .env("STUDY_TEST_RESULTS", results)
         .env("STUDY_TEST_ID", id)
         .stdin(Stdio::piped())

@@ -1,37 +1,48 @@
-//! The few things that the store asks of a file system.
+//! The calls to the file system that the store makes.
 //!
 //! Everything that changes a results folder goes through [`Disk`], so that a test
 //! can fail, cut or reorder each call; [`RealDisk`] is the only implementation in
-//! the program. Files are made 0600, folders 0700: what participants say is
-//! nobody else's business.
+//! the program. On Unix files are made 0600 and folders 0700, so that only their
+//! owner can read what participants said.
 
-use rustix::fs::{CWD, FlockOperation, Mode, OFlags};
+#[cfg(not(unix))]
+mod other;
+#[cfg(unix)]
+mod unix;
+
+#[cfg(not(unix))]
+use other as system;
+#[cfg(unix)]
+use unix as system;
+
 use std::any::Any;
 use std::fmt;
+use std::fs::{OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::path::Path;
 
-/// A journal or table that is larger than this is not read, bytes.
+/// Size of the largest file that is read, bytes.
 pub const MAX_FILE_BYTES: u64 = 256 << 20;
 
-/// Held while it lives; the kernel lets go of it when the process dies.
+/// A lock, held until it is dropped; the operating system releases it when the
+/// process dies.
 pub type Lock = Box<dyn Any + Send + Sync>;
 
-/// A file that only grows.
+/// A file that is only appended to.
 pub trait Appender: Send {
-    /// One write at the end; how many bytes were taken.
+    /// Makes one write at the end and returns how many bytes were written.
     ///
     /// # Errors
     /// Of the operating system.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
-    /// Returns when everything written is on the medium.
+    /// Returns when everything that was written is on the medium.
     ///
     /// # Errors
-    /// Of the operating system. What was written before is then in doubt.
+    /// Of the operating system. Data written before may then be lost.
     fn sync(&mut self) -> io::Result<()>;
 
-    /// Writes all of it; goes on after an interruption or a short write.
+    /// Writes all bytes, continuing after an interruption or a short write.
     ///
     /// # Errors
     /// Of the operating system. Part of it may then be in the file.
@@ -51,30 +62,30 @@ pub trait Appender: Send {
 /// One entry of a folder.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Item {
-    /// Its name; what is no UTF-8 in it is replaced.
+    /// Its name; bytes that are not UTF-8 are replaced.
     pub name: String,
     /// Whether it is a folder.
     pub is_folder: bool,
 }
 
-/// A file system. No file is opened, made, cut or removed through a symbolic link
-/// in the last part of its path.
+/// A file system. No file is opened, created, truncated or removed through a symbolic
+/// link in the last part of its path.
 ///
 /// # Errors
-/// Every method gives the error of the operating system.
+/// Every method returns the error of the operating system.
 #[allow(clippy::missing_errors_doc)]
 pub trait Disk: fmt::Debug + Send + Sync {
-    /// Makes one folder; an error if there is anything of that name.
+    /// Creates one folder; an error if the name exists.
     fn create_folder(&self, path: &Path) -> io::Result<()>;
     /// Returns when the names in a folder are on the medium.
     fn sync_folder(&self, path: &Path) -> io::Result<()>;
-    /// Makes a file and opens it; an error if there is anything of that name.
+    /// Creates a file and opens it; an error if the name exists.
     fn create(&self, path: &Path) -> io::Result<Box<dyn Appender>>;
-    /// Opens an existing file to write at its end.
+    /// Opens an existing file for appending.
     fn open(&self, path: &Path) -> io::Result<Box<dyn Appender>>;
-    /// Cuts a file to a length; returns when that is on the medium.
+    /// Truncates a file; returns when that is on the medium.
     fn truncate(&self, path: &Path, bytes: u64) -> io::Result<()>;
-    /// Renames a file, replacing what has the new name.
+    /// Renames a file, replacing a file of the new name.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
     /// Removes a file.
     fn remove_file(&self, path: &Path) -> io::Result<()>;
@@ -82,15 +93,16 @@ pub trait Disk: fmt::Debug + Send + Sync {
     fn remove_folder(&self, path: &Path) -> io::Result<()>;
     /// Reads a whole file.
     fn read(&self, path: &Path) -> io::Result<Vec<u8>>;
-    /// What is in a folder, sorted by name.
+    /// The entries of a folder, sorted by name.
     fn list(&self, path: &Path) -> io::Result<Vec<Item>>;
-    /// Locks a folder against other processes; `None` if one has it.
+    /// Locks a folder; `None` if another process holds the lock.
     fn lock(&self, path: &Path) -> io::Result<Option<Lock>>;
-    /// Bytes that can still be written near a path.
-    fn free_bytes(&self, path: &Path) -> io::Result<u64>;
+    /// Bytes that can still be written near a path; `None` where the system is not
+    /// asked.
+    fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>>;
 }
 
-/// The operating system's.
+/// The file system of the operating system.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RealDisk;
 
@@ -106,37 +118,27 @@ impl Appender for RealFile {
     }
 }
 
-fn open(path: &Path, flags: OFlags) -> io::Result<std::fs::File> {
-    let fd = rustix::fs::openat(
-        CWD,
-        path,
-        flags | OFlags::NOFOLLOW | OFlags::CLOEXEC,
-        Mode::RUSR | Mode::WUSR,
-    )?;
-    Ok(fd.into())
-}
-
 impl Disk for RealDisk {
     fn create_folder(&self, path: &Path) -> io::Result<()> {
-        Ok(rustix::fs::mkdir(path, Mode::RWXU)?)
+        system::create_folder(path)
     }
 
     fn sync_folder(&self, path: &Path) -> io::Result<()> {
-        std::fs::File::open(path)?.sync_all()
+        system::sync_folder(path)
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn Appender>> {
-        let flags = OFlags::WRONLY | OFlags::APPEND | OFlags::CREATE | OFlags::EXCL;
-        Ok(Box::new(RealFile(open(path, flags)?)))
+        let file = system::open(path, OpenOptions::new().append(true).create_new(true))?;
+        Ok(Box::new(RealFile(file)))
     }
 
     fn open(&self, path: &Path) -> io::Result<Box<dyn Appender>> {
-        let file = open(path, OFlags::WRONLY | OFlags::APPEND)?;
+        let file = system::open(path, OpenOptions::new().append(true))?;
         Ok(Box::new(RealFile(file)))
     }
 
     fn truncate(&self, path: &Path, bytes: u64) -> io::Result<()> {
-        let file = open(path, OFlags::WRONLY)?;
+        let file = system::open(path, OpenOptions::new().write(true))?;
         file.set_len(bytes)?;
         file.sync_all()
     }
@@ -154,7 +156,7 @@ impl Disk for RealDisk {
     }
 
     fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
-        let file = open(path, OFlags::RDONLY | OFlags::NONBLOCK)?;
+        let file = system::open(path, OpenOptions::new().read(true))?;
         let known = file.metadata()?;
         if !known.is_file() {
             return Err(io::Error::other("not a file"));
@@ -171,8 +173,12 @@ impl Disk for RealDisk {
         let mut items = Vec::new();
         for entry in std::fs::read_dir(path)? {
             let entry = entry?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if system::is_lock(&name) {
+                continue;
+            }
             items.push(Item {
-                name: entry.file_name().to_string_lossy().into_owned(),
+                name,
                 is_folder: entry.file_type()?.is_dir(),
             });
         }
@@ -181,16 +187,15 @@ impl Disk for RealDisk {
     }
 
     fn lock(&self, path: &Path) -> io::Result<Option<Lock>> {
-        let folder = std::fs::File::open(path)?;
-        match rustix::fs::flock(&folder, FlockOperation::NonBlockingLockExclusive) {
-            Ok(()) => Ok(Some(Box::new(folder))),
-            Err(rustix::io::Errno::WOULDBLOCK) => Ok(None),
-            Err(e) => Err(e.into()),
+        let file = system::lock_file(path)?;
+        match file.try_lock() {
+            Ok(()) => Ok(Some(Box::new(file))),
+            Err(TryLockError::WouldBlock) => Ok(None),
+            Err(TryLockError::Error(e)) => Err(e),
         }
     }
 
-    fn free_bytes(&self, path: &Path) -> io::Result<u64> {
-        let known = rustix::fs::statvfs(path)?;
-        Ok(known.f_bavail.saturating_mul(known.f_frsize))
+    fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>> {
+        system::free_bytes(path)
     }
 }

@@ -251,14 +251,14 @@ impl StudyFolder {
         }
         let free = disk.free_bytes(&self.path).at(&self.path)?;
         let needed = 2 * RESERVE_BYTES;
-        if free < needed {
+        if let Some(free) = free.filter(|free| *free < needed) {
             return Err(StoreError::Full {
                 path: self.path.clone(),
                 free,
                 needed,
             });
         }
-        if free < LITTLE_BYTES {
+        if let Some(free) = free.filter(|free| *free < LITTLE_BYTES) {
             notices.push(format!("only {} KiB are free on the disk", free >> 10));
         }
         let written = write_reserve(disk, &path);

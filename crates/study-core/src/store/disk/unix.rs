@@ -1,0 +1,40 @@
+//! What Unix has of its own: permissions, syncs and locks of folders, free space.
+
+use rustix::fs::{OFlags, statvfs};
+use std::fs::{DirBuilder, File, OpenOptions};
+use std::io;
+use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
+use std::path::Path;
+
+/// Opens a file: not through a symbolic link, and without waiting for the other end
+/// of a pipe. Only its owner can read a new one.
+pub(super) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits();
+    options.mode(0o600).custom_flags(flags as i32).open(path)
+}
+
+/// Only its owner can enter it.
+pub(super) fn create_folder(path: &Path) -> io::Result<()> {
+    DirBuilder::new().mode(0o700).create(path)
+}
+
+/// Returns when the names in a folder are on the medium.
+pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
+    File::open(path)?.sync_all()
+}
+
+/// The file whose lock is a folder's: the folder.
+pub(super) fn lock_file(path: &Path) -> io::Result<File> {
+    File::open(path)
+}
+
+/// Whether a name is that of a lock file.
+pub(super) fn is_lock(_name: &str) -> bool {
+    false
+}
+
+/// Bytes that can still be written near a path.
+pub(super) fn free_bytes(path: &Path) -> io::Result<Option<u64>> {
+    let known = statvfs(path)?;
+    Ok(Some(known.f_bavail.saturating_mul(known.f_frsize)))
+}
