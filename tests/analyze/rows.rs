@@ -1,4 +1,4 @@
-//! Walls: which rows of a study count, and what is said of the others.
+//! Which rows of a study are analyzed, and what is reported about the others.
 #![allow(clippy::unwrap_used)]
 
 use chrono::DateTime;
@@ -9,6 +9,7 @@ use study_base::text::{ModelId, ParticipantId, QuestionId};
 use study_core::analyze::{Analysis, Exclusion, Include, Rules, analyze};
 use study_core::outcome::ratings::Ratings;
 use study_core::outcome::{ParticipantRow, RatingRow, State, Status};
+use study_core::protocol::columns::UsedColumn;
 use study_core::protocol::{Answer, DeviceKind, Role, Unfinished};
 
 fn id(text: &str) -> QuestionId {
@@ -106,7 +107,7 @@ fn source() -> Source {
     }
 }
 
-fn shown(a: &Analysis) -> String {
+fn printed(a: &Analysis) -> String {
     let set = Page {
         width: 100,
         colour: false,
@@ -115,7 +116,7 @@ fn shown(a: &Analysis) -> String {
 }
 
 #[test]
-fn real_rows_are_analysed_alone_unless_others_are_asked_for() {
+fn only_real_participants_are_analyzed_unless_others_are_included() {
     let mut rows = two();
     for (who, pilot) in [("T01", true), ("SIM001", false)] {
         let mut other = row(who, "A", 1, 7);
@@ -139,23 +140,23 @@ fn real_rows_are_analysed_alone_unless_others_are_asked_for() {
     assert_eq!(n(with(true, false)), (3.0, 1));
     assert_eq!(n(with(true, true)), (4.0, 0));
     let a = analyze(&all, &Rules::default());
-    let text = shown(&a);
+    let text = printed(&a);
     assert!(text.contains("1 row left out (pilot)"), "{text}");
     assert!(text.contains("1 row left out (simulated)"), "{text}");
 }
 
 #[test]
-fn a_folder_without_participants_is_analysed_under_a_banner() {
+fn an_analysis_of_simulated_participants_alone_says_so_in_a_banner() {
     let mut rows = two();
     rows.iter_mut().for_each(|r| r.simulated = true);
     let a = analyze(&ratings(&rows, &[]), &Rules::default());
     assert_eq!(a.counts.rated, 6);
-    let text = shown(&a);
+    let text = printed(&a);
     assert!(text.contains("*** NO PARTICIPANTS: 2 simulated"), "{text}");
 }
 
 #[test]
-fn pilots_are_not_mixed_with_rehearsals() {
+fn pilots_and_simulated_participants_are_not_mixed() {
     let mut rows = two();
     for row in &mut rows {
         row.pilot = row.participant.as_str() == "P01";
@@ -177,7 +178,7 @@ fn pilots_are_not_mixed_with_rehearsals() {
 }
 
 #[test]
-fn states_decide_and_are_named() {
+fn participants_are_excluded_by_state_with_the_reason() {
     let people = [
         participant("P01", State::Excluded, "fell asleep"),
         participant("P02", State::Unfinished, ""),
@@ -185,7 +186,7 @@ fn states_decide_and_are_named() {
     let all = ratings(&two(), &people);
     let a = analyze(&all, &Rules::default());
     assert_eq!(a.counts.rated, 3);
-    assert!(shown(&a).contains("3 rows left out (excluded: fell asleep)"));
+    assert!(printed(&a).contains("3 rows left out (excluded: fell asleep)"));
     let files = csv::tables(&source(), &a);
     let excluded = files.iter().find(|f| f.name == "excluded.csv").unwrap();
     assert!(
@@ -200,12 +201,12 @@ fn states_decide_and_are_named() {
     let a = analyze(&all, &without);
     assert_eq!(a.counts.rated, 0);
     assert_eq!(a.counts.excluded["unfinished"], 3);
-    // Nothing is left, and that is no crash.
-    assert!(shown(&a).contains("0 ratings"));
+    // No rating is left: the page is printed all the same.
+    assert!(printed(&a).contains("0 ratings"));
 }
 
 #[test]
-fn before_the_planned_number_it_is_interim() {
+fn an_analysis_before_the_planned_number_of_participants_is_interim() {
     let people = [
         participant("P01", State::Done, ""),
         participant("P02", State::Done, ""),
@@ -223,9 +224,8 @@ fn before_the_planned_number_it_is_interim() {
     assert!(!code(2));
 }
 
-/// Those who were planned are no pilots: neither beside others nor alone.
 #[test]
-fn pilots_are_none_of_the_planned_participants() {
+fn pilots_do_not_count_as_planned_participants() {
     let mut rows = two();
     for row in &mut rows {
         row.pilot = row.participant.as_str() == "P01";
@@ -244,12 +244,13 @@ fn pilots_are_none_of_the_planned_participants() {
     };
     let a = analyze(&ratings(&rows, &people), &rules);
     assert_eq!((a.counts.participants, a.counts.finished), (2, 1));
-    let said = a.warnings.iter().find(|w| w.code == "interim").unwrap();
+    let interim = a.warnings.iter().find(|w| w.code == "interim").unwrap();
     assert!(
-        said.text
+        interim
+            .text
             .contains("1 of 2 planned participants has finished"),
         "{}",
-        said.text
+        interim.text
     );
     for row in &mut rows {
         row.pilot = true;
@@ -285,7 +286,7 @@ fn failed_declined_missing_corrected_and_repeated_trials_are_counted() {
     // A failed trial's rating does not count.
     assert_eq!(a.values.number("desc/A/n"), Some(1.0));
     assert!(a.values.get("desc/Z/n").is_none());
-    let text = shown(&a).replace('\n', " ");
+    let text = printed(&a).replace('\n', " ");
     for part in [
         "1 trial failed",
         "1 rating declined",
@@ -297,7 +298,7 @@ fn failed_declined_missing_corrected_and_repeated_trials_are_counted() {
 }
 
 #[test]
-fn references_anchors_and_repeats_stay_out_of_the_correlation() {
+fn references_anchors_and_repeats_are_not_in_the_correlation() {
     let mut rows = two();
     for who in ["P01", "P02"] {
         rows.push(row(who, "D", 1, 5));
@@ -318,13 +319,13 @@ fn references_anchors_and_repeats_stay_out_of_the_correlation() {
     // C was rated 6 and 7, its repeat 5 and 5.
     assert_eq!(a.values.number("duplicate/C2/mean_diff"), Some(-1.5));
     assert_eq!(a.values.number("realistic/C/share"), Some(1.0));
-    let text = shown(&a);
+    let text = printed(&a);
     assert!(text.contains("target (hidden-reference)"), "{text}");
     assert!(text.contains("C2 (repeats C)"), "{text}");
 }
 
 #[test]
-fn comments_stand_by_realization_and_stay_text() {
+fn comments_are_listed_by_realization_as_text() {
     let mut rows = two();
     let text = "=1+1 \u{1b}[2J\n\"crisp\" 👍🏽 よかった";
     rows[2]
@@ -353,18 +354,20 @@ fn comments_stand_by_realization_and_stay_text() {
 }
 
 #[test]
-fn practice_is_among_the_rows_and_counts_nowhere() {
-    let mut practised = two();
-    let mut warming_up = row("P09", "Z", 0, 7);
-    warming_up.practice = true;
-    warming_up.position = None;
-    practised.insert(2, warming_up);
-    let a = analyze(&ratings(&practised, &[]), &Rules::default());
+fn practice_is_listed_and_not_analyzed() {
+    let mut with_practice = two();
+    let mut practice = row("P09", "Z", 0, 7);
+    practice.practice = true;
+    practice.position = None;
+    with_practice.insert(2, practice);
+    let a = analyze(&ratings(&with_practice, &[]), &Rules::default());
     let without = analyze(&ratings(&two(), &[]), &Rules::default());
     assert_eq!(a.values, without.values);
     assert_eq!(a.counts.practice, 1);
     let files = csv::tables(&source(), &a);
     let used = files.iter().find(|f| f.name == "ratings_used.csv").unwrap();
+    let header: Vec<&str> = UsedColumn::ALL.iter().map(|c| c.name()).collect();
+    assert!(used.content.starts_with(&(header.join(",") + "\r\n")));
     assert_eq!(used.content.lines().count(), 1 + 6 + 1);
     assert!(
         used.content.contains("P01,A,1,1,2,0.7,true,\r\n"),
@@ -379,11 +382,11 @@ fn practice_is_among_the_rows_and_counts_nowhere() {
 }
 
 #[test]
-fn a_rule_that_cannot_be_judged_is_named() {
+fn a_rule_that_cannot_be_applied_is_reported() {
     let rules = Rules {
         exclude: vec![Exclusion::HiddenReferenceBelow(5.0)],
         ..Rules::default()
     };
     let a = analyze(&ratings(&two(), &[]), &rules);
-    assert!(shown(&a).contains("the design has no hidden reference"));
+    assert!(printed(&a).contains("the design has no hidden reference"));
 }

@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 use study_core::protocol::columns::{
-    AttemptColumn, Column, Kind, ParticipantColumn, RatingColumn, SampleColumn,
+    AttemptColumn, Column, Kind, ParticipantColumn, RatingColumn, SampleColumn, UsedColumn,
 };
 
 const START: &str = "<!-- columns -->\n";
@@ -71,6 +71,11 @@ fn dictionary() -> String {
             "telemetry/TRIAL-aATTEMPT.csv",
             "One row for each sample of an attempt.",
             SampleColumn::ALL.iter().map(|c| c.column()),
+        ),
+        table(
+            "analysis/ratings_used.csv",
+            "One row for each rating, whether the analysis used it or not.",
+            UsedColumn::ALL.iter().map(|c| c.column()),
         ),
     ]
     .concat()

@@ -1,5 +1,5 @@
-//! The example study of the repository: whole, marked as simulated, and what the
-//! program of today rehearses.
+//! The example study of the repository: complete, marked as simulated, and what the
+//! present program produces.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -25,7 +25,7 @@ fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
 }
 
 #[test]
-fn the_example_is_as_it_was_written_and_says_that_nobody_took_part() {
+fn the_example_verifies_and_is_marked_as_simulated() {
     let home = tempfile::tempdir().unwrap();
     let folder = copied(home.path());
     let (code, out, err) = study(&["verify", "results"], home.path());
@@ -46,12 +46,12 @@ fn the_example_is_as_it_was_written_and_says_that_nobody_took_part() {
         let claim = claim.lines().next().unwrap();
         assert!(claim.contains("simulated"), "{claim}");
     }
-    let said = fs::read_to_string(folder.join("README.md")).unwrap();
-    assert!(said.contains("no evidence"), "{said}");
+    let readme = fs::read_to_string(folder.join("README.md")).unwrap();
+    assert!(readme.contains("no evidence"), "{readme}");
 }
 
 #[test]
-fn the_program_of_today_rehearses_the_example() {
+fn a_rehearsal_reproduces_the_example() {
     let home = tempfile::tempdir().unwrap();
     let protocol = repository("protocols/turn-signal");
     let arguments = ["rehearse", &protocol, "--participants", "10"];
@@ -59,7 +59,7 @@ fn the_program_of_today_rehearses_the_example() {
     let (code, out, err) = study(&[&arguments[..], &options].concat(), home.path());
     assert_eq!(code, 0, "{out}{err}");
     let example = PathBuf::from(repository("results/turn-signal-example"));
-    let said = |folder: &Path| -> Vec<[String; 6]> {
+    let ratings = |folder: &Path| -> Vec<[String; 6]> {
         rows(&folder.join("ratings.csv"))
             .iter()
             .map(|row| {
@@ -75,5 +75,8 @@ fn the_program_of_today_rehearses_the_example() {
             })
             .collect()
     };
-    assert_eq!(said(&home.path().join("again/turn-signal")), said(&example));
+    assert_eq!(
+        ratings(&home.path().join("again/turn-signal")),
+        ratings(&example)
+    );
 }

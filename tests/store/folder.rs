@@ -46,7 +46,7 @@ fn set(
 }
 
 #[test]
-fn a_session_is_picked_up_where_it_stopped_with_its_seat() {
+fn an_unfinished_session_is_resumed_with_its_seat() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     assert_eq!(run(&study, &real("P01"), 8), Seat::Row(1));
@@ -65,7 +65,7 @@ fn a_session_is_picked_up_where_it_stopped_with_its_seat() {
 }
 
 #[test]
-fn a_claim_without_a_start_is_a_new_session_of_the_same_row() {
+fn a_session_that_was_claimed_and_not_started_keeps_its_row() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     drop(study.claim(&real("P01")).unwrap());
@@ -75,7 +75,7 @@ fn a_claim_without_a_start_is_a_new_session_of_the_same_row() {
 }
 
 #[test]
-fn the_row_of_a_drop_out_goes_to_the_next_and_no_other_does() {
+fn the_row_of_a_drop_out_is_assigned_again() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     for (id, row) in [("P01", 1), ("P02", 2), ("P03", 3)] {
@@ -94,7 +94,7 @@ fn the_row_of_a_drop_out_goes_to_the_next_and_no_other_does() {
 }
 
 #[test]
-fn a_rig_keeps_to_its_rows() {
+fn a_rig_assigns_only_its_own_rows() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     let rig = |id: &str| ClaimRequest {
@@ -109,7 +109,7 @@ fn a_rig_keeps_to_its_rows() {
 }
 
 #[test]
-fn pilots_and_simulated_participants_take_no_row() {
+fn pilots_and_simulated_participants_have_no_row() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     assert_eq!(
@@ -133,7 +133,7 @@ fn pilots_and_simulated_participants_take_no_row() {
 }
 
 #[test]
-fn ids_that_a_file_system_may_take_for_one_are_refused() {
+fn ids_that_differ_only_in_case_are_refused() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     run(&study, &real("P01"), 3);
@@ -145,7 +145,7 @@ fn ids_that_a_file_system_may_take_for_one_are_refused() {
 }
 
 #[test]
-fn void_is_only_before_the_first_rating_and_gives_a_new_session() {
+fn a_session_can_be_void_only_before_its_first_rating() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     run(&study, &real("P01"), 3);
@@ -171,7 +171,7 @@ fn void_is_only_before_the_first_rating_and_gives_a_new_session() {
 }
 
 #[test]
-fn a_no_show_is_on_record_without_a_row_and_can_come_after_all() {
+fn a_no_show_has_no_row_and_can_still_take_part() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     let unknown = set(&study, "P01", State::Excluded, false);
@@ -191,7 +191,7 @@ fn a_no_show_is_on_record_without_a_row_and_can_come_after_all() {
 }
 
 #[test]
-fn changed_stimuli_are_another_study_and_changed_words_an_amendment() {
+fn changed_stimuli_need_another_study_and_changed_wording_an_amendment() {
     let results = tempfile::tempdir().unwrap();
     let mut study = open(results.path());
     let mut kept = Kept::new();
@@ -239,7 +239,7 @@ fn changed_stimuli_are_another_study_and_changed_words_an_amendment() {
 }
 
 #[test]
-fn a_frozen_file_cannot_leave_the_folder() {
+fn a_frozen_file_outside_the_folder_is_refused() {
     let results = tempfile::tempdir().unwrap();
     let kept = Kept::new();
     let files = vec![("../../escaped".to_owned(), vec![1])];
@@ -256,7 +256,7 @@ fn a_frozen_file_cannot_leave_the_folder() {
 }
 
 #[test]
-fn a_frozen_file_that_was_changed_is_found() {
+fn a_changed_frozen_file_is_reported() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     let clean = study.verify(None).unwrap();
@@ -274,7 +274,7 @@ fn a_frozen_file_that_was_changed_is_found() {
 }
 
 #[test]
-fn what_participants_say_is_nobody_elses_business() {
+fn only_the_owner_can_read_the_files() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     run(&study, &real("P01"), 9);
@@ -290,12 +290,12 @@ fn what_participants_say_is_nobody_elses_business() {
     }
     assert!(
         !study.path().join("sessions/P01/1/reserve").exists(),
-        "given back"
+        "the reserve is freed"
     );
 }
 
 #[test]
-fn the_tables_say_what_happened() {
+fn the_tables_have_what_happened() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     run(&study, &real("P01"), 99);
@@ -304,14 +304,14 @@ fn the_tables_say_what_happened() {
     let [b, a, c] = &derived.rows[..] else {
         panic!("three trials");
     };
-    // Trial 1 failed, came back last and counts with its second attempt.
+    // Trial 1 failed, was repeated last and counts with its second attempt.
     assert_eq!(
         (b.status, b.attempt, b.position),
         (Status::Ok, Some(2), Some(3))
     );
     assert_eq!(b.answers[&question("realism")].number(), Some(4.0));
     assert_eq!(b.previous_model.as_ref().unwrap().as_str(), "C");
-    // The failed attempt was felt, so trial 2 came after B; its answer was corrected.
+    // The failed attempt was presented, so trial 2 followed B; its answer was corrected.
     assert_eq!(a.previous_model.as_ref().unwrap().as_str(), "B");
     assert_eq!(a.answers[&question("realism")].number(), Some(5.0));
     assert!(a.corrected && !b.corrected);
@@ -388,7 +388,7 @@ fn the_tables_are_the_same_bytes_from_the_same_journals() {
 }
 
 #[test]
-fn telemetry_is_written_beside_the_journal_and_never_over() {
+fn telemetry_files_are_never_overwritten() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     let claimed = study.claim(&real("P01")).unwrap();
@@ -437,7 +437,7 @@ fn all_bytes(folder: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn erasure_leaves_a_tombstone_and_nothing_that_was_given() {
+fn erasure_leaves_only_a_tombstone() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     run(&study, &real("P01"), 99);
@@ -464,7 +464,7 @@ fn erasure_leaves_a_tombstone_and_nothing_that_was_given() {
     );
     let again = study.claim(&real("P01"));
     assert!(matches!(again, Err(StoreError::Erased { .. })), "{again:?}");
-    // An erasure that was killed half way is completed by the same command.
+    // An interrupted erasure is completed by the same command.
     std::fs::create_dir(study.path().join("sessions/P01/1")).unwrap();
     std::fs::write(study.path().join("sessions/P01/1/journal.jsonl"), "left").unwrap();
     assert!(study.verify(None).unwrap().iter().any(|f| f.wrong));
@@ -473,7 +473,7 @@ fn erasure_leaves_a_tombstone_and_nothing_that_was_given() {
 }
 
 #[test]
-fn the_rating_in_hand_is_saved_on_a_full_disk() {
+fn an_unsaved_rating_is_saved_on_a_full_disk() {
     let mount = tempfile::tempdir().unwrap();
     let mounted = std::process::Command::new("mount")
         .args(["-t", "tmpfs", "-o", "size=512k", "tmpfs"])

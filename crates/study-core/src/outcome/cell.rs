@@ -1,4 +1,4 @@
-//! What a row has in a column, and the columns that a study's tables have.
+//! The cells of a row, and the header of each table of a study.
 
 use super::rows::{AttemptRow, ParticipantRow, RatingRow};
 use super::{Author, Failure, Sample};

@@ -19,28 +19,28 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use study_base::text::QuestionId;
 
-/// A realization as the ratings know it.
+/// A realization that was rated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Realization {
-    /// Its name. Untrusted: a foreign file may say anything.
+    /// Its name. Untrusted: a foreign file may hold any text.
     pub id: String,
-    /// What it is in the study.
+    /// Its role in the study.
     pub role: Role,
-    /// The realization that it repeats in secret.
+    /// The realization of which it is a hidden repeat.
     pub duplicate_of: Option<String>,
-    /// Numbers that may explain the ratings; `least_energy_j`, the mean over
-    /// playbacks, where telemetry tells it.
+    /// Covariates by name; with telemetry also `least_energy_j`, J, the mean over its
+    /// playbacks.
     pub covariates: BTreeMap<String, f64>,
 }
 
-/// Who a row is from.
+/// The kind of participant that a row is from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Origin {
-    /// A participant.
+    /// A real participant.
     Real,
-    /// Somebody who tried the study out.
+    /// A pilot participant.
     Pilot,
-    /// Nobody.
+    /// A simulated participant.
     Simulated,
 }
 
@@ -54,21 +54,21 @@ impl Origin {
     }
 }
 
-/// A subject as the ratings know it.
+/// A subject: a participant, or whoever a foreign table has ratings of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Subject {
-    /// The name. Untrusted.
+    /// Pseudonym. Untrusted.
     pub id: String,
-    /// The state, where the study keeps one.
+    /// The participant's state; `None` for a foreign table.
     pub state: Option<State>,
-    /// Why, where somebody set it.
+    /// Why the state was set; may be empty.
     pub reason: String,
 }
 
-/// A text that was answered in a trial.
+/// A text that was answered or remarked in a trial.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Comment {
-    /// Row of the ratings.
+    /// Index of the row.
     pub row: usize,
     /// Question, or `remarks`.
     pub question: String,
@@ -76,10 +76,10 @@ pub struct Comment {
     pub text: String,
 }
 
-/// Ratings by column. All columns are equally long.
+/// Ratings by column. All columns have the same length.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Ratings {
-    /// The question whose answers these are.
+    /// The question whose answers are the ratings.
     pub question: String,
     /// Sorted by name.
     pub subjects: Vec<Subject>,
@@ -97,9 +97,9 @@ pub struct Ratings {
     pub vaf: Vec<Option<f64>>,
     /// Position in the subject's order, from 1.
     pub trial_index: Vec<Option<u32>>,
-    /// Who the row is from.
+    /// The kind of participant.
     pub origin: Vec<Origin>,
-    /// What became of the trial.
+    /// The outcome of the trial.
     pub status: Vec<Status>,
     /// Whether an answer was corrected.
     pub corrected: Vec<bool>,
@@ -107,24 +107,25 @@ pub struct Ratings {
     pub attempt: Vec<Option<u32>>,
     /// Full strokes, where telemetry counted them.
     pub strokes: Vec<Option<u32>>,
-    /// Row of the source, from 1 (the line of a file, header not counted).
+    /// Row of the source, from 1; for a file without its header.
     pub source_row: Vec<u32>,
-    /// Texts answered or remarked in trials.
+    /// Texts that were answered or remarked in trials.
     pub comments: Vec<Comment>,
-    /// Practice rows, which are not among the columns.
+    /// Practice rows, which are not in the columns.
     pub practice: Arc<Practice>,
 }
 
-/// Practice rows, with names of their own: who only practised is no subject.
+/// Practice rows, with their own list of names: a participant who only practiced is
+/// not among the subjects.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Practice {
     names: Vec<String>,
-    rows: Vec<Practised>,
+    rows: Vec<IndexedPracticeRow>,
 }
 
-/// A practice row.
+/// A practice row; subject and realization are indices of names.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Practised {
+struct IndexedPracticeRow {
     subject: u32,
     model: u32,
     repetition: u32,
@@ -133,16 +134,16 @@ struct Practised {
     vaf: Option<f64>,
 }
 
-/// A practice row with its names, which are untrusted.
+/// A practice row. Its names are untrusted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PracticeRow<'a> {
-    /// Who practised.
+    /// Participant.
     pub subject: &'a str,
-    /// With what; empty if it is not known.
+    /// Realization; empty if the table names none.
     pub model: &'a str,
-    /// As the table has it; 0 unknown.
+    /// As in the table; 0 if the field is empty, as practice has no repetitions.
     pub repetition: u32,
-    /// Place in the subject's order, if it is known.
+    /// Position in the order, if it is known.
     pub trial_index: Option<u32>,
     /// The rating, if there is one.
     pub rating: Option<f64>,
@@ -151,12 +152,12 @@ pub struct PracticeRow<'a> {
 }
 
 impl Practice {
-    /// How many rows.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
@@ -176,7 +177,7 @@ impl Practice {
 }
 
 impl Ratings {
-    /// From the rows of a study, for one question.
+    /// The ratings in the rows of a study: the answers to one question.
     pub fn from_rows(rows: &[RatingRow], question: &QuestionId) -> Self {
         let mut builder = Builder::new(question.to_string());
         for (i, r) in rows.iter().enumerate() {
@@ -214,7 +215,7 @@ impl Ratings {
         builder.finish()
     }
 
-    /// Marks hidden repeats: (repeat, original) each.
+    /// Marks hidden repeats, given as (repeat, original).
     pub fn set_duplicates<'a>(&mut self, pairs: impl IntoIterator<Item = (&'a str, &'a str)>) {
         for (repeat, original) in pairs {
             if let Some(model) = self.models.iter_mut().find(|m| m.id == repeat) {
@@ -223,7 +224,7 @@ impl Ratings {
         }
     }
 
-    /// Tells a number about a realization, unless its rows told it already.
+    /// Adds a covariate of a realization, unless its rows have it.
     pub fn add_covariate(&mut self, model: &str, name: &str, value: f64) {
         if let Some(m) = self.models.iter_mut().find(|m| m.id == model)
             && value.is_finite()
@@ -232,7 +233,7 @@ impl Ratings {
         }
     }
 
-    /// Tells the states of participants, as the study's table has them.
+    /// Sets the states of the participants.
     pub fn set_states(&mut self, participants: &[ParticipantRow]) {
         for p in participants {
             let id = p.participant.as_str();
@@ -243,18 +244,18 @@ impl Ratings {
         }
     }
 
-    /// How many rows.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.rating.len()
     }
 
-    /// Whether there is no row.
+    /// Whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.rating.is_empty()
     }
 
-    /// The same with only some of the rows. Subjects and realizations without a
-    /// row are gone too.
+    /// A copy with some of the rows. Subjects and realizations without a row are
+    /// dropped.
     #[must_use]
     pub fn keep(&self, keep: impl Fn(usize) -> bool) -> Self {
         let rows: Vec<usize> = (0..self.len()).filter(|&i| keep(i)).collect();
@@ -295,13 +296,13 @@ impl Ratings {
         }
     }
 
-    /// The rows sorted by subject, then realization (none comes last), otherwise
-    /// as they stand. Linear: two passes of counting.
+    /// The rows sorted by subject, then realization (none comes last), otherwise in
+    /// their order: a counting sort, linear in the rows.
     pub fn by_cell(&self) -> Vec<usize> {
         let models = self.models.len();
         let place = |i: usize| self.model[i].map_or(models, |m| m as usize);
-        let by_model = counted(0..self.len(), self.len(), models + 1, place);
-        counted(
+        let by_model = counting_sort(0..self.len(), self.len(), models + 1, place);
+        counting_sort(
             by_model.iter().copied(),
             self.len(),
             self.subjects.len(),
@@ -317,8 +318,8 @@ impl Ratings {
     }
 }
 
-/// Some rows in the order of their keys, equal ones as they come.
-fn counted(
+/// Sorts `n` rows by their keys, which are below `keys`; equal ones keep their order.
+fn counting_sort(
     rows: impl IntoIterator<Item = usize> + Clone,
     n: usize,
     keys: usize,
@@ -361,7 +362,7 @@ fn remap<T: Clone>(items: &[T], used: impl Iterator<Item = u32>) -> (Vec<u32>, V
     for i in used {
         is_used[i as usize] = true;
     }
-    // Where there is an item that is used: how many used ones come before it.
+    // For an item that is used: the number of used items before it.
     let new = is_used.iter().scan(0, |next, used| {
         let at = *next;
         *next += u32::from(*used);
@@ -392,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn keeping_rows_forgets_who_is_gone() {
+    fn keeping_rows_drops_subjects_without_any() {
         let r = small();
         let kept = r.keep(|i| r.subject[i] == 1);
         assert_eq!(kept.subjects.len(), 1);

@@ -1,8 +1,9 @@
 //! The columns of the tables in a results folder, each declared once.
 //!
-//! Writers, readers, reserved names and the data dictionary in docs/results.md all
-//! take a column from here. `outcome` says how a row fills it: a column without a
-//! cell, and a field of a row without a column, do not compile.
+//! The writers, the readers, the list of reserved names and the data dictionary in
+//! docs/results.md use these declarations. `outcome::cell` gives the cell of a row in
+//! each column; a column without a cell does not compile, and a field of a row without
+//! a column is an unused variable.
 
 /// What the cells of a column hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +24,7 @@ pub enum Kind {
     Answer,
 }
 
-/// How many columns a declaration stands for.
+/// Whether a declaration stands for one column or several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Repeats {
     /// One column of this name.
@@ -34,20 +35,20 @@ pub enum Repeats {
     Covariate,
 }
 
-/// A column, or several of one kind.
+/// The declaration of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Column {
-    /// As in the header; for several columns which they are.
+    /// As in the header; a description if the column repeats.
     pub name: &'static str,
-    /// Of its cells.
+    /// What its cells hold.
     pub kind: Kind,
-    /// Of its numbers, if they have one.
+    /// Unit of its numbers; `None` if they have none.
     pub unit: Option<&'static str>,
-    /// What a cell says.
+    /// What a cell means.
     pub meaning: &'static str,
     /// When a cell is empty; `None`: never.
     pub empty: Option<&'static str>,
-    /// How many columns there are.
+    /// Whether there are several.
     pub repeats: Repeats,
 }
 
@@ -120,7 +121,7 @@ const PROTOCOL_VERSION: Column = whole(
     "version of the protocol that the session started with",
 );
 const NEVER_PRESENTED: &str = "the trial was never presented";
-const NO_TELEMETRY: &str = "the device sent no telemetry";
+const NO_TELEMETRY: &str = "no playback ended, or the device sent no telemetry";
 
 /// Declares the columns of a table, in the order of its header.
 macro_rules! table {
@@ -200,7 +201,7 @@ table! {
         ExplorationS: number(
             "exploration_s",
             "duration of the playback, from its confirmed start to its confirmed stop",
-        ).unit("s").empty("the playback did not end, or the device reported no duration"),
+        ).unit("s").empty("no playback ended, or the device reported no duration"),
         ResponseS: number("response_s", "time from the opening of the rating to its confirmation")
             .unit("s").empty("the rating was not confirmed"),
         Strokes: whole("strokes", "full strokes").empty(NO_TELEMETRY),
@@ -216,8 +217,8 @@ table! {
         StartedAt: time("started_at", "when the playback was requested").empty(NEVER_PRESENTED),
         RatedAt: time(
             "rated_at",
-            "when the primary question was first answered; if it was not, when the trial ended",
-        ).empty("the trial did not end, or failed"),
+            "when the primary question was first answered or declined; if it was not, when the trial ended",
+        ).empty("the trial has not ended, or failed"),
         Attempt: whole("attempt", "attempt that counts, from 1; of a failed trial the last")
             .empty(NEVER_PRESENTED),
         Status: level("status", &[
@@ -330,6 +331,22 @@ table! {
     }
 }
 
+table! {
+    /// The columns of `analysis/ratings_used.csv`: one row for each rating, whether it was
+    /// used or not. A foreign table of ratings has the first six, some of them optional.
+    UsedColumn {
+        Subject: text("subject", "participant"),
+        Model: text("model", "realization").empty("the table that was analyzed names none"),
+        Repetition: whole("repetition", "repetition of the realization, from 1; 0 for practice"),
+        TrialIndex: whole("trial_index", "position in the order of presentation, from 1")
+            .empty("not known"),
+        Rating: number("rating", "answer to the question that was analyzed").empty("no rating"),
+        Vaf: number("vaf", "VAF of the realization").empty("not known"),
+        Included: flag("included", "whether the analysis used the rating"),
+        Reason: text("reason", "why the rating was not used").empty("it was used"),
+    }
+}
+
 /// Whether `ratings.csv` has a fixed column of this name, in any case.
 pub fn is_ratings_column(name: &str) -> bool {
     (RatingColumn::ALL.iter()).any(|c| c.column().reserves(name))
@@ -345,12 +362,13 @@ mod tests {
     use super::*;
 
     /// The declarations of every table.
-    fn tables() -> [Vec<Column>; 4] {
+    fn tables() -> [Vec<Column>; 5] {
         [
             RatingColumn::ALL.iter().map(|c| c.column()).collect(),
             AttemptColumn::ALL.iter().map(|c| c.column()).collect(),
             ParticipantColumn::ALL.iter().map(|c| c.column()).collect(),
             SampleColumn::ALL.iter().map(|c| c.column()).collect(),
+            UsedColumn::ALL.iter().map(|c| c.column()).collect(),
         ]
     }
 

@@ -1,19 +1,19 @@
-//! Replacing a file as a whole.
+//! Atomic replacement of a file.
 //!
-//! A reader sees the old bytes or the new ones, after a crash too: the new bytes
-//! are on the medium before the name points at them, and the name is on the medium
-//! before this returns. A rename without a sync of its folder can come undone.
+//! A reader sees the old bytes or the new ones, also after a crash: the new bytes
+//! are on the medium before the file is renamed, and the rename is on the medium
+//! before this returns. Without a sync of the folder a crash can undo a rename.
 
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
 use std::io;
 use std::path::Path;
 
-/// Writes `bytes` to `path`, which may exist. The caller holds the lock of the
-/// study: the name of the temporary file is fixed, and a left-over one is replaced.
+/// Writes `bytes` to `path`, which may exist. The caller holds the study's lock,
+/// because the name of the temporary file is fixed; a left-over one is replaced.
 ///
 /// # Errors
-/// [`StoreError::Io`]; the old file is then untouched.
+/// [`StoreError::Io`]; the old file is then unchanged.
 pub(super) fn replace(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -27,7 +27,7 @@ pub(super) fn replace(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), 
         file.sync()
     });
     if let Err(e) = written {
-        // Gives the space back; the error that counts is the first.
+        // Frees the space; the first error is the one to report.
         let _ = disk.remove_file(&temporary);
         return Err(e).at(&temporary);
     }
@@ -35,7 +35,7 @@ pub(super) fn replace(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), 
     disk.sync_folder(folder).at(folder)
 }
 
-/// The same, unless the file already has these bytes.
+/// Calls [`replace`] unless the file already has these bytes.
 pub(super) fn replace_if_new(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     if disk.read(path).is_ok_and(|old| old == bytes) {
         return Ok(());
@@ -43,8 +43,8 @@ pub(super) fn replace_if_new(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Resu
     replace(disk, path, bytes)
 }
 
-/// Makes a folder if it is not there, and its name durable in any case: an
-/// earlier process may have died between the two.
+/// Creates a folder if it does not exist. Its name is made durable in any case: an
+/// earlier process may have died after creating it.
 pub(super) fn folder(disk: &dyn Disk, path: &Path) -> Result<(), StoreError> {
     match disk.create_folder(path) {
         Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e).at(path),

@@ -1,7 +1,7 @@
-//! The derived tables, from the journals: which rows there are.
+//! The rows of the derived tables, from the journals.
 //!
-//! Sorted by participant, session and trial, so the same journals give the same
-//! bytes. [`super::tables`] writes them.
+//! They are sorted by participant, session and trial, so that the same journals give
+//! the same bytes. [`super::tables`] writes them.
 
 use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
@@ -15,12 +15,12 @@ use std::io;
 /// Every row of a study.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Derived {
-    /// One for each planned trial of each session that was started. Not of void
-    /// sessions, nor of participants who took back what they gave.
+    /// One for each planned trial of each session that was started, except those of
+    /// void sessions and of participants who withdrew.
     pub rows: Vec<RatingRow>,
-    /// Every attempt, answer, correction, failure, remark and change of state.
+    /// One for each attempt, answer, correction, failure, remark and change of state.
     pub attempts: Vec<AttemptRow>,
-    /// One for each participant, by their last session.
+    /// One for each participant, by the last session.
     pub participants: Vec<ParticipantRow>,
     /// The columns of `rows`.
     pub rating_columns: Header<RatingColumn>,
@@ -29,18 +29,19 @@ pub struct Derived {
 }
 
 impl StudyFolder {
-    /// Derives and writes under one lock, so that of two processes the later one
-    /// has the last word.
+    /// Derives and writes the tables under one lock, so that of two processes the
+    /// later one also writes later.
     ///
     /// # Errors
     /// As [`StudyFolder::sessions`]; [`StoreError::Vanished`] if the tables name a
-    /// session that is not there; and those of writing, where each table is then the
-    /// old one or the new one.
+    /// session that does not exist; those of writing, after which each table is either
+    /// the old one or the new one.
     pub fn refresh(&self, protocol: &Protocol) -> Result<Derived, StoreError> {
         self.refresh_with(protocol, false)
     }
 
-    /// The same; with `drop_missing` sessions that are not there leave the tables.
+    /// As [`StudyFolder::refresh`]; with `drop_missing` sessions that do not exist are
+    /// dropped from the tables.
     ///
     /// # Errors
     /// As [`StudyFolder::refresh`].
@@ -73,8 +74,8 @@ impl StudyFolder {
 }
 
 impl Derived {
-    /// The rows of all sessions of a study, with a protocol whose models have their
-    /// VAF. Damaged lines are passed over; [`StudyFolder::verify`] tells of them.
+    /// The rows of all sessions of a study. `protocol` has the VAF of its realizations.
+    /// Damaged lines of a journal are skipped; [`StudyFolder::verify`] reports them.
     pub fn of(sessions: &[SessionData], protocol: &Protocol) -> Self {
         let mut derived = Self {
             participants: participants(sessions),
@@ -107,7 +108,7 @@ impl Derived {
     }
 }
 
-/// One row for each participant; needs no protocol.
+/// One row for each participant.
 pub fn participants(sessions: &[SessionData]) -> Vec<ParticipantRow> {
     let mut rows: Vec<ParticipantRow> = Vec::new();
     for session in sessions.iter().filter(|s| s.claimed) {
@@ -122,7 +123,7 @@ pub fn participants(sessions: &[SessionData]) -> Vec<ParticipantRow> {
             row.reason.clone_from(&stone.reason);
             row.erased = true;
         } else if row.state == State::Withdrawn {
-            // Taken back: only that they took part stays in the tables.
+            // The tables keep only that the participant took part.
             row.answers.clear();
         }
         match rows.last_mut() {

@@ -1,8 +1,8 @@
 //! Tables as CSV.
 //!
 //! RFC 4180: UTF-8, lines end in CR LF, a cell with a comma, quotation mark or
-//! line end is quoted. Cells hold what was typed. None is guarded against being
-//! taken for a formula: that is for an export to spreadsheets.
+//! line end is quoted. Text is written as typed, even where a spreadsheet would take
+//! it for a formula.
 
 use crate::outcome::cell::{Header, Row};
 use std::io;

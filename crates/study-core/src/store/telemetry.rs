@@ -1,7 +1,7 @@
-//! Telemetry of one attempt, as a CSV.
+//! Telemetry of one attempt, as CSV.
 //!
-//! Buffered: what a crash can lose of it is the last seconds of one playback, and
-//! no rating. A full disk ends it before it takes the journal's reserve.
+//! It is buffered: a crash can lose the last part of one playback, and no rating.
+//! When the disk is full it ends, so that the journal can use the reserve.
 
 use super::disk::Appender;
 use super::error::{At as _, StoreError};
@@ -16,7 +16,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Bytes that are gathered before they are written.
+/// Bytes that are buffered before a write.
 const BUFFER: usize = 32 << 10;
 
 /// The first line of a telemetry file.
@@ -25,7 +25,7 @@ pub(super) fn header() -> String {
     names.join(",") + "\r\n"
 }
 
-/// Writes the telemetry of one attempt. It can be moved to a thread of its own.
+/// Writes the telemetry of one attempt. It can be moved to another thread.
 pub struct TelemetryWriter {
     held: Arc<Held>,
     file: Box<dyn Appender>,
@@ -67,11 +67,11 @@ impl TelemetryWriter {
         })
     }
 
-    /// Takes samples; they reach the disk some time later.
+    /// Adds samples to the buffer, and writes the buffer when it is full.
     ///
     /// # Errors
-    /// [`StoreError`] if the disk does not take them. The file then ends here;
-    /// the session can go on.
+    /// [`StoreError`] of the write. The file then ends here; the session can
+    /// continue.
     pub fn write(&mut self, samples: &[Sample]) -> Result<(), StoreError> {
         for sample in samples {
             for (i, column) in SampleColumn::ALL.iter().enumerate() {
@@ -96,10 +96,10 @@ impl TelemetryWriter {
         Ok(())
     }
 
-    /// Writes what is left and returns when the file is on the medium.
+    /// Writes the rest and returns when the file is on the medium.
     ///
     /// # Errors
-    /// [`StoreError`] if the disk does not take it.
+    /// [`StoreError`] of the write or the sync.
     pub fn finish(mut self) -> Result<(), StoreError> {
         self.flush()?;
         self.file.sync().at(&self.path)?;
@@ -110,7 +110,7 @@ impl TelemetryWriter {
 
 impl Drop for TelemetryWriter {
     fn drop(&mut self) {
-        // Who drops it without `finish` has given up on it; what is here may help.
+        // Dropped without `finish`, such as after an error: the rest may still be useful.
         let _ = self.flush();
     }
 }

@@ -1,12 +1,13 @@
-//! Rows to columns: names become indices as they come, and are sorted at the end.
+//! From rows to columns: names get an index when they first occur, and are sorted at
+//! the end.
 
-use super::{Comment, Origin, Practice, Practised, Ratings, Realization, Subject};
+use super::{Comment, IndexedPracticeRow, Origin, Practice, Ratings, Realization, Subject};
 use crate::outcome::rows::Status;
 use crate::protocol::Role;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-/// One row, its names already indices.
+/// One row; subject and realization are indices of names.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     pub(super) subject: u32,
@@ -40,48 +41,49 @@ impl Row {
     }
 }
 
-/// Names and the index of each, in the order in which they came.
+/// The index of each name, in order of first occurrence.
 #[derive(Debug, Default)]
 struct Names {
-    places: HashMap<String, u32>,
+    indices: HashMap<String, u32>,
+    /// The name that was looked up last: neighboring rows often share it.
     last: Option<(String, u32)>,
 }
 
 impl Names {
-    /// The index of a name, and whether it is new. Neighbours often share it.
-    fn place(&mut self, name: &str) -> (u32, bool) {
+    /// The index of a name, and whether the name is new.
+    fn index(&mut self, name: &str) -> (u32, bool) {
         if let Some((last, at)) = &self.last
             && last == name
         {
             return (*at, false);
         }
-        let next = u32::try_from(self.places.len()).unwrap_or(u32::MAX);
-        let (at, new) = match self.places.get(name) {
+        let next = u32::try_from(self.indices.len()).unwrap_or(u32::MAX);
+        let (at, new) = match self.indices.get(name) {
             Some(at) => (*at, false),
             None => {
-                self.places.insert(name.to_owned(), next);
+                self.indices.insert(name.to_owned(), next);
                 (next, true)
             }
         };
-        let (last, place) = self.last.get_or_insert_with(|| (String::new(), at));
+        let (last, index) = self.last.get_or_insert_with(|| (String::new(), at));
         last.clear();
         last.push_str(name);
-        *place = at;
+        *index = at;
         (at, new)
     }
 }
 
-/// The covariate that telemetry gives: how active a realization was.
+/// The covariate that telemetry provides: how active a realization was.
 const LEAST_ENERGY: &str = "least_energy_j";
 
-/// Ratings in the making.
+/// Collects rows.
 #[derive(Debug)]
 pub(super) struct Builder {
     ratings: Ratings,
     subjects: Names,
     models: Names,
     /// Subjects and realizations of practice rows.
-    practised: Names,
+    practice_names: Names,
     practice: Practice,
     /// Rows whose repetition is still to be numbered, rising.
     unnumbered: Vec<usize>,
@@ -99,7 +101,7 @@ impl Builder {
             },
             subjects: Names::default(),
             models: Names::default(),
-            practised: Names::default(),
+            practice_names: Names::default(),
             practice: Practice::default(),
             unnumbered: Vec::new(),
             energies: BTreeMap::new(),
@@ -115,24 +117,24 @@ impl Builder {
         }
     }
 
-    /// Rows so far.
+    /// Number of rows so far.
     pub(super) fn len(&self) -> usize {
         self.ratings.len()
     }
 
-    /// One more practice row, which is kept beside the others.
+    /// Adds a practice row, which is kept apart from the others.
     pub(super) fn practice(&mut self, subject: &str, model: &str, row: Row) {
         let row = row.consistent();
-        let mut place = |names: &mut Names, name: &str| {
-            let (at, new) = names.place(name);
+        let mut index = |names: &mut Names, name: &str| {
+            let (at, new) = names.index(name);
             if new {
                 self.practice.names.push(name.to_owned());
             }
             at
         };
-        let subject = place(&mut self.practised, subject);
-        let model = place(&mut self.practised, model);
-        self.practice.rows.push(Practised {
+        let subject = index(&mut self.practice_names, subject);
+        let model = index(&mut self.practice_names, model);
+        self.practice.rows.push(IndexedPracticeRow {
             subject,
             model,
             repetition: row.repetition.unwrap_or(0),
@@ -144,7 +146,7 @@ impl Builder {
 
     /// The index of a subject.
     pub(super) fn subject(&mut self, id: &str) -> u32 {
-        let (at, new) = self.subjects.place(id);
+        let (at, new) = self.subjects.index(id);
         if new {
             self.ratings.subjects.push(Subject {
                 id: id.to_owned(),
@@ -155,14 +157,14 @@ impl Builder {
         at
     }
 
-    /// The index of a realization; its first row tells role and covariates.
+    /// The index of a realization; its first row gives role and covariates.
     pub(super) fn model(
         &mut self,
         id: &str,
         role: Role,
         covariates: impl FnOnce() -> BTreeMap<String, f64>,
     ) -> u32 {
-        let (at, new) = self.models.place(id);
+        let (at, new) = self.models.index(id);
         if new {
             self.ratings.models.push(Realization {
                 id: id.to_owned(),
@@ -174,7 +176,7 @@ impl Builder {
         at
     }
 
-    /// A text that belongs to the row pushed next.
+    /// Adds a text that belongs to the row pushed next.
     pub(super) fn comment(&mut self, question: String, text: String) {
         let row = self.len();
         self.ratings.comments.push(Comment {
@@ -184,6 +186,7 @@ impl Builder {
         });
     }
 
+    /// Adds a row.
     pub(super) fn push(&mut self, row: Row) {
         let row = row.consistent();
         if row.repetition.is_none() {
@@ -209,7 +212,7 @@ impl Builder {
     pub(super) fn finish(self) -> Ratings {
         let mut r = self.ratings;
         r.practice = Arc::new(self.practice);
-        // As in the analysis: the others where there is no participant.
+        // As in the analysis: the others only if there is no real participant.
         let others = usize::from(!r.origin.contains(&Origin::Real));
         for (model, both) in self.energies {
             let (sum, n) = both[others];
@@ -241,14 +244,14 @@ impl Builder {
     }
 }
 
-/// Sorts by name; tells where each item went.
+/// Sorts by name; returns the new index of each item.
 fn sort<T: Clone>(items: &mut Vec<T>, name: impl Fn(&T) -> &str) -> Vec<u32> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     order.sort_by(|&a, &b| name(&items[a]).cmp(name(&items[b])));
-    let mut went = vec![0; items.len()];
+    let mut new_index = vec![0; items.len()];
     for (new, &old) in (0u32..).zip(&order) {
-        went[old] = new;
+        new_index[old] = new;
     }
     *items = order.iter().map(|&i| items[i].clone()).collect();
-    went
+    new_index
 }

@@ -5,7 +5,7 @@ use super::error::RatingsError;
 use super::{Builder, Origin, Ratings, Row};
 use crate::outcome::rows::Status;
 use crate::protocol::Role;
-use crate::protocol::columns::{Kind, RatingColumn as C};
+use crate::protocol::columns::{Kind, RatingColumn as C, UsedColumn as Foreign};
 use serde::de::{DeserializeOwned, IntoDeserializer as _};
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -77,7 +77,7 @@ impl Ratings {
     }
 }
 
-/// A table that is being read.
+/// The rows of a table while it is read.
 struct Reading {
     builder: Builder,
     /// Line of each row.
@@ -135,7 +135,7 @@ impl Reading {
     }
 }
 
-/// The first row that repeats another, after that other.
+/// The first row that repeats another: first the other row, then this one.
 fn repeated(ratings: &Ratings) -> Option<(usize, usize)> {
     let order = ratings.by_cell();
     let mut found: Option<(usize, usize)> = None;
@@ -199,14 +199,15 @@ impl Positions {
         };
         let own = |column: C| find(column.name());
         let (Some(subject), Some(_)) = (own(C::Participant), own(C::PlannedPosition)) else {
+            let question = question.unwrap_or(Foreign::Rating.name());
             return Ok(Self {
-                question: question.unwrap_or("rating").to_owned(),
-                subject: need("subject")?,
-                model: need("model")?,
-                rating: need(question.unwrap_or("rating"))?,
-                repetition: find("repetition"),
-                vaf: find("vaf"),
-                trial_index: find("trial_index"),
+                question: question.to_owned(),
+                subject: need(Foreign::Subject.name())?,
+                model: need(Foreign::Model.name())?,
+                rating: need(question)?,
+                repetition: find(Foreign::Repetition.name()),
+                vaf: find(Foreign::Vaf.name()),
+                trial_index: find(Foreign::TrialIndex.name()),
                 role: None,
                 practice: None,
                 pilot: None,
