@@ -5,7 +5,7 @@
 //! the program. On Unix files are made 0600 and folders 0700, so that only their
 //! owner can read what participants said.
 
-#[cfg(not(unix))]
+#[cfg(any(not(unix), test))]
 mod other;
 #[cfg(unix)]
 mod unix;
@@ -197,5 +197,57 @@ impl Disk for RealDisk {
 
     fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>> {
         system::free_bytes(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs wherever the program does, so it asks for nothing of one system.
+    #[test]
+    fn the_real_disk_does_what_the_trait_says() {
+        let home = tempfile::tempdir().unwrap();
+        let (folder, file) = (home.path().join("P01"), home.path().join("P01/journal"));
+        let disk = RealDisk;
+        disk.create_folder(&folder).unwrap();
+        assert!(disk.create_folder(&folder).is_err());
+        let mut journal = disk.create(&file).unwrap();
+        assert!(disk.create(&file).is_err(), "it exists");
+        journal.write_all(b"one\n").unwrap();
+        journal.sync().unwrap();
+        disk.open(&file).unwrap().write_all(b"two\n").unwrap();
+        assert_eq!(disk.read(&file).unwrap(), b"one\ntwo\n");
+        disk.truncate(&file, 4).unwrap();
+        journal.write_all(b"end\n").unwrap();
+        drop(journal);
+        let new = folder.join("new");
+        disk.create(&new).unwrap().write_all(b"new").unwrap();
+        disk.rename(&file, &folder.join("old")).unwrap();
+        disk.rename(&new, &folder.join("old")).unwrap();
+        assert_eq!(disk.read(&folder.join("old")).unwrap(), b"new");
+        disk.sync_folder(&folder).unwrap();
+
+        let lock = disk.lock(&folder).unwrap();
+        assert!(lock.is_some() && disk.lock(&folder).unwrap().is_none());
+        drop(lock);
+        assert!(disk.lock(&folder).unwrap().is_some());
+        let names = |path: &Path| -> Vec<(String, bool)> {
+            let items = disk.list(path).unwrap().into_iter();
+            items.map(|i| (i.name, i.is_folder)).collect()
+        };
+        assert_eq!(names(&folder), [("old".to_owned(), false)]);
+        assert_eq!(names(home.path()), [("P01".to_owned(), true)]);
+
+        assert!(disk.read(&folder).is_err(), "a folder is not a file");
+        assert!(
+            disk.free_bytes(&folder)
+                .unwrap()
+                .is_none_or(|free| free > 0)
+        );
+        disk.remove_file(&folder.join("old")).unwrap();
+        disk.remove_folder(&folder).unwrap();
+        let gone = disk.read(&file).unwrap_err();
+        assert_eq!(gone.kind(), io::ErrorKind::NotFound);
     }
 }

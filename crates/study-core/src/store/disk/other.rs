@@ -44,3 +44,36 @@ pub(super) fn free_bytes(_path: &Path) -> io::Result<Option<u64>> {
 }
 
 const LOCK: &str = ".lock";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_locked_by_a_file_beside_it() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path().join("P01");
+        create_folder(&folder).unwrap();
+        sync_folder(&folder).unwrap();
+        let first = lock_file(&folder).unwrap();
+        let second = lock_file(&folder).unwrap();
+        first.try_lock().unwrap();
+        assert!(second.try_lock().is_err());
+        drop(first);
+        second.try_lock().unwrap();
+        assert!(is_lock(".P01.lock") && home.path().join(".P01.lock").is_file());
+        assert!(!is_lock("P01") && !is_lock(".study.json.tmp"));
+        assert_eq!(free_bytes(&folder).unwrap(), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_symbolic_link_is_not_opened() {
+        let home = tempfile::tempdir().unwrap();
+        let (file, link) = (home.path().join("file"), home.path().join("link"));
+        std::fs::write(&file, "x").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        assert!(open(&file, OpenOptions::new().read(true)).is_ok());
+        assert!(open(&link, OpenOptions::new().read(true)).is_err());
+    }
+}
