@@ -9,8 +9,8 @@ use super::finite;
 pub struct Coefficient {
     /// The estimate.
     pub value: f64,
-    /// Its interval; an end of ICC2k's can be infinite.
-    pub ci95: Option<(f64, f64)>,
+    /// Its interval; an end that is infinite is `None` (only of ICC2k).
+    pub ci95: Option<(Option<f64>, Option<f64>)>,
 }
 
 /// Shrout & Fleiss's six intraclass correlations (1979).
@@ -65,7 +65,10 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         }
     }
     let column_means: Vec<f64> = columns.iter().map(|sum| sum.get() / nf).collect();
-    let squares = |means: &[f64]| sum_by(means, |m| (m - grand).powi(2));
+    let squares = |means: &[f64]| {
+        let squares: Sum = means.iter().map(|m| (m - grand).powi(2)).collect();
+        squares.get()
+    };
     let targets = kf * squares(&row_means) / (nf - 1.0);
     let raters = nf * squares(&column_means) / (kf - 1.0);
     let (mut residual, mut size) = (Sum::default(), 0.0);
@@ -90,8 +93,8 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         ))
     };
     let icc2 = icc2(targets, raters, error, nf, kf);
-    // Has a pole at −1/(k − 1): an end there is infinite, the other is not.
-    let brown = |c: f64| kf * c / (1.0 + (kf - 1.0) * c);
+    // Spearman–Brown's formula has a pole at −1/(k − 1): an end there is infinite.
+    let brown = |c: f64| finite(kf * c / (1.0 + (kf - 1.0) * c));
     Some(Icc {
         ms_targets: targets,
         ms_raters: raters,
@@ -100,35 +103,29 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         p_3: f_3.and_then(|f| f_upper(f, df_t, df_e)),
         icc1: f_1.map(|f| Coefficient {
             value: single(f),
-            ci95: bounds(f, df_w).map(|(l, h)| (single(l), single(h))),
+            ci95: bounds(f, df_w).map(|(l, h)| (finite(single(l)), finite(single(h)))),
         }),
         icc1k: f_1.and_then(|f| finite(1.0 - 1.0 / f)),
         icc2k: icc2.and_then(|c| {
             Some(Coefficient {
                 value: finite((targets - error) / (targets + (raters - error) / nf))?,
-                ci95: c.ci95.map(|(l, h)| (brown(l), brown(h))),
+                ci95: c.ci95.map(|(l, h)| (l.and_then(brown), h.and_then(brown))),
             })
         }),
         icc2,
         icc3: f_3.map(|f| Coefficient {
             value: single(f),
-            ci95: bounds(f, df_e).map(|(l, h)| (single(l), single(h))),
+            ci95: bounds(f, df_e).map(|(l, h)| (finite(single(l)), finite(single(h)))),
         }),
         icc3k: f_3.and_then(|f| {
             Some(Coefficient {
                 value: finite(1.0 - 1.0 / f)?,
-                ci95: bounds(f, df_e).map(|(l, h)| (1.0 - 1.0 / l, 1.0 - 1.0 / h)),
+                ci95: bounds(f, df_e).map(|(l, h)| (finite(1.0 - 1.0 / l), finite(1.0 - 1.0 / h))),
             })
         }),
         f_1,
         f_3,
     })
-}
-
-fn sum_by(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
-    let mut sum = Sum::default();
-    x.iter().for_each(|v| sum.add(f(*v)));
-    sum.get()
 }
 
 /// ICC2 with Satterthwaite's degrees of freedom for its interval.
@@ -147,8 +144,8 @@ fn icc2(t: f64, r: f64, e: f64, n: f64, k: f64) -> Option<Coefficient> {
         let lower = f_quantile(0.975, df, n - 1.0)?;
         let raters = k * r + (k * n - k - n) * e;
         Some((
-            finite(n * (t - upper * e) / (upper * raters + n * t))?,
-            finite(n * (lower * t - e) / (raters + n * lower * t))?,
+            Some(finite(n * (t - upper * e) / (upper * raters + n * t))?),
+            Some(finite(n * (lower * t - e) / (raters + n * lower * t))?),
         ))
     };
     Some(Coefficient {
@@ -302,7 +299,7 @@ mod tests {
     fn an_end_of_icc2k_at_the_pole_leaves_the_other() {
         let i = icc(&[vec![5.0, 3.5], vec![4.5, 4.5]]).unwrap();
         let (lo, hi) = i.icc2k.unwrap().ci95.unwrap();
-        assert!(!lo.is_finite() && hi.is_finite(), "{lo} {hi}");
+        assert!(lo.is_none() && hi.is_some(), "{lo:?} {hi:?}");
     }
 
     #[test]

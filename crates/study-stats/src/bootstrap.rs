@@ -6,10 +6,10 @@
 //! about other realizations.
 
 use super::correlation::pearson;
-use super::describe::constant;
+use super::describe::is_constant;
 use super::distribution::{normal_cdf, normal_quantile};
 use super::finite;
-use crate::random::Random;
+use crate::random::RandomSource;
 
 /// Most subjects for which all compositions are visited.
 pub const MAX_EXACT: usize = 10;
@@ -55,7 +55,11 @@ pub struct Bootstrap {
 
 /// Resamples the rows (subjects) of a table and correlates the column sums with
 /// `x`. `None` below two subjects or where the correlation is not defined.
-pub fn correlation(rows: &[Vec<f64>], x: &[f64], random: &mut impl Random) -> Option<Bootstrap> {
+pub fn correlation(
+    rows: &[Vec<f64>],
+    x: &[f64],
+    random: &mut impl RandomSource,
+) -> Option<Bootstrap> {
     let exact = rows.len() <= MAX_EXACT;
     let normal_limit = !exact && (rows.len() > MAX_DRAWN || rows.len() * x.len() > MAX_TABLE);
     resample(rows, x, normal_limit, random)
@@ -65,7 +69,7 @@ fn resample(
     rows: &[Vec<f64>],
     x: &[f64],
     normal_limit: bool,
-    random: &mut impl Random,
+    random: &mut impl RandomSource,
 ) -> Option<Bootstrap> {
     if rows.len() < 2 || !(3..=MAX_COLUMNS).contains(&x.len()) {
         return None;
@@ -160,7 +164,7 @@ impl Limit {
             .then_some(Self { sums, lower })
     }
 
-    fn draw(&self, random: &mut impl Random) -> Vec<f64> {
+    fn draw(&self, random: &mut impl RandomSource) -> Vec<f64> {
         let z: Vec<f64> = self.sums.iter().map(|_| random.normal()).collect();
         (self.sums.iter().zip(&self.lower))
             .map(|(sum, row)| sum + row.iter().zip(&z).map(|(l, z)| l * z).sum::<f64>())
@@ -343,7 +347,7 @@ struct Score {
 
 impl Score {
     fn new(x: &[f64]) -> Option<Self> {
-        if constant(x) {
+        if is_constant(x) {
             return None;
         }
         let mean = x.iter().sum::<f64>() / x.len() as f64;

@@ -16,19 +16,19 @@
 //! likelihood of a table of counts n is Σ nₖaₖ − mₖs(aₖ) + Σ Nⱼκⱼ over the pairs
 //! k of a predictor and a threshold, m = nⱼ + nⱼ₊₁: logistic regressions side by
 //! side, and a term that keeps the thresholds apart. It is concave, and its
-//! derivatives are sums over k. The whole table is [`counts::Table`].
+//! derivatives are sums over k. The whole table is [`counts::CategoryCounts`].
 
-pub mod counts;
-pub mod newton;
+pub(crate) mod counts;
+pub(crate) mod newton;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use counts::Table;
-use newton::{Point, Square, maximise};
+pub use counts::{CategoryCount, CategoryCounts, Predictor};
+use newton::{Evaluation, SymmetricMatrix, maximise};
 
 /// Why a model has no estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Cause {
+pub enum ClmError {
     /// All ratings fall in one category.
     #[error("all ratings are equal")]
     OneCategory,
@@ -53,7 +53,7 @@ pub enum Cause {
 
 /// Estimates of a model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
+pub struct ClmFit {
     /// θ, rising.
     pub thresholds: Vec<f64>,
     /// β, by column.
@@ -65,37 +65,37 @@ pub struct Fit {
 }
 
 /// Maximum likelihood by Newton's method, subjects ignored.
-pub fn clm(table: &Table) -> Result<Fit, Cause> {
+pub fn clm(table: &CategoryCounts) -> Result<ClmFit, ClmError> {
     table.estimable()?;
-    let found = maximise(start(table), |at| point(table, at)).ok_or(Cause::NoMaximum)?;
+    let found = maximise(start(table), |at| point(table, at)).ok_or(ClmError::NoMaximum)?;
     fit_of(table, &found.at, found.value, &found.information)
 }
 
 /// The estimates at a maximum; parameters after β are not reported.
 pub(super) fn fit_of(
-    table: &Table,
+    table: &CategoryCounts,
     at: &[f64],
     loglik: f64,
-    information: &Square,
-) -> Result<Fit, Cause> {
+    information: &SymmetricMatrix,
+) -> Result<ClmFit, ClmError> {
     let t = table.thresholds();
     let end = table.parameters();
-    let variances = information.inverse_diagonal().ok_or(Cause::NoMaximum)?;
+    let variances = information.inverse_diagonal().ok_or(ClmError::NoMaximum)?;
     let se: Vec<f64> = variances[t..end].iter().map(|v| v.sqrt()).collect();
     if se.iter().chain(at).all(|v| v.is_finite()) {
-        Ok(Fit {
+        Ok(ClmFit {
             thresholds: at[..t].to_vec(),
             beta: at[t..end].to_vec(),
             se,
             loglik,
         })
     } else {
-        Err(Cause::NoMaximum)
+        Err(ClmError::NoMaximum)
     }
 }
 
 /// Thresholds at the logits of the cumulative shares, no effect.
-fn start(table: &Table) -> Vec<f64> {
+fn start(table: &CategoryCounts) -> Vec<f64> {
     let mut at = table.marginal_logits();
     at.resize(table.parameters(), 0.0);
     at
@@ -103,7 +103,7 @@ fn start(table: &Table) -> Vec<f64> {
 
 /// Value, gradient and Hessian at (θ, β); `None` where the thresholds do not
 /// rise.
-pub(super) fn point(table: &Table, at: &[f64]) -> Option<Point> {
+pub(super) fn point(table: &CategoryCounts, at: &[f64]) -> Option<Evaluation> {
     let mut point = table.spacing(at, table.parameters())?;
     let a = table.linear(at);
     let (mut first, mut second) = (Vec::new(), Vec::new());

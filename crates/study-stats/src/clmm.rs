@@ -18,16 +18,16 @@
 //! its slope in σ² is ½ Σᵢ (f₁² + f₂), f₁ and f₂ the derivatives in b at 0. If it
 //! falls there and no σ above does better, the standard deviation is 0.
 
-pub mod hermite;
+mod hermite;
 mod laplace;
 mod mode;
 mod quadrature;
 #[cfg(test)]
 mod tests;
 
-use super::clm::counts::Table;
-use super::clm::newton::{Maximum, Point, maximise};
-use super::clm::{Cause, Fit, clm, fit_of, logistic};
+use super::clm::counts::CategoryCounts;
+use super::clm::newton::{Evaluation, Maximum, maximise};
+use super::clm::{ClmError, ClmFit, clm, fit_of, logistic};
 use std::sync::LazyLock;
 
 /// Nodes of the quadrature that is reported.
@@ -48,9 +48,9 @@ const SMALLEST_SD: f64 = 1e-4;
 
 /// Estimates of a mixed model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mixed {
+pub struct ClmmFit {
     /// Of the fixed part. On the boundary those of the model without subjects.
-    pub fit: Fit,
+    pub fit: ClmFit,
     /// σ, logits; 0 on the boundary.
     pub sd: f64,
     /// Whether the likelihood is greatest at σ = 0.
@@ -59,23 +59,23 @@ pub struct Mixed {
 
 /// The estimates by Laplace's method, and by adaptive quadrature.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Both {
+pub struct ClmmFits {
     /// By Laplace's method.
-    pub laplace: Result<Mixed, Cause>,
+    pub laplace: Result<ClmmFit, ClmError>,
     /// With [`NODES`] nodes.
-    pub quadrature: Result<Mixed, Cause>,
+    pub quadrature: Result<ClmmFit, ClmError>,
 }
 
 /// Fits the mixed model both ways.
-pub fn clmm(table: &Table) -> Both {
+pub fn clmm(table: &CategoryCounts) -> ClmmFits {
     let fixed = match clm(table) {
-        Ok(_) if table.subjects() < 2 => Err(Cause::OneSubject),
+        Ok(_) if table.subjects() < 2 => Err(ClmError::OneSubject),
         other => other,
     };
     let fixed = match fixed {
         Ok(fixed) => fixed,
         Err(cause) => {
-            return Both {
+            return ClmmFits {
                 laplace: Err(cause),
                 quadrature: Err(cause),
             };
@@ -103,7 +103,7 @@ pub fn clmm(table: &Table) -> Both {
         let found = start.and_then(|at| integrate(table, at, &mut modes));
         judge(table, &fixed, slope, found.as_ref())
     });
-    Both {
+    ClmmFits {
         laplace,
         quadrature,
     }
@@ -111,7 +111,7 @@ pub fn clmm(table: &Table) -> Both {
 
 /// The maximum of the integral: with few nodes first, since each step costs as
 /// many passes as there are nodes.
-fn integrate(table: &Table, start: Vec<f64>, modes: &mut [f64]) -> Option<Maximum> {
+fn integrate(table: &CategoryCounts, start: Vec<f64>, modes: &mut [f64]) -> Option<Maximum> {
     let near = maximise(start.clone(), |at| {
         quadrature::point(table, at, &FEW, modes)
     });
@@ -122,13 +122,16 @@ fn integrate(table: &Table, start: Vec<f64>, modes: &mut [f64]) -> Option<Maximu
 
 /// Effects given a subject are larger than marginal ones by about √(1 + 0.346σ²)
 /// (Zeger, Liang & Albert 1988).
-fn marginal_to_conditional(fixed: &Fit, sd: f64) -> Vec<f64> {
+fn marginal_to_conditional(fixed: &ClmFit, sd: f64) -> Vec<f64> {
     let factor = (1.0 + 0.346 * sd * sd).sqrt();
     let fixed = fixed.thresholds.iter().chain(&fixed.beta);
     fixed.map(|v| v * factor).chain([sd.ln()]).collect()
 }
 
-fn best(starts: &[Vec<f64>], at: &mut impl FnMut(&[f64]) -> Option<Point>) -> Option<Vec<f64>> {
+fn best(
+    starts: &[Vec<f64>],
+    at: &mut impl FnMut(&[f64]) -> Option<Evaluation>,
+) -> Option<Vec<f64>> {
     starts
         .iter()
         .filter_map(|s| at(s).map(|p| (p.value, s)))
@@ -137,7 +140,7 @@ fn best(starts: &[Vec<f64>], at: &mut impl FnMut(&[f64]) -> Option<Point>) -> Op
 }
 
 /// The slope of the marginal log-likelihood in σ² at the fixed model.
-fn slope_at_zero(table: &Table, fixed: &Fit) -> f64 {
+fn slope_at_zero(table: &CategoryCounts, fixed: &ClmFit) -> f64 {
     let at: Vec<f64> = fixed
         .thresholds
         .iter()
@@ -157,22 +160,27 @@ fn slope_at_zero(table: &Table, fixed: &Fit) -> f64 {
     by_subject.sum()
 }
 
-fn judge(table: &Table, fixed: &Fit, slope: f64, found: Option<&Maximum>) -> Result<Mixed, Cause> {
+fn judge(
+    table: &CategoryCounts,
+    fixed: &ClmFit,
+    slope: f64,
+    found: Option<&Maximum>,
+) -> Result<ClmmFit, ClmError> {
     let sd = |found: &Maximum| found.at[table.parameters()].exp();
-    let zero = Mixed {
+    let zero = ClmmFit {
         fit: fixed.clone(),
         sd: 0.0,
         boundary: true,
     };
     match found {
-        Some(m) if sd(m) > INFINITE_SD => Err(Cause::SubjectsSeparated),
-        Some(m) if sd(m) > SMALLEST_SD && (slope > 0.0 || m.value > fixed.loglik) => Ok(Mixed {
+        Some(m) if sd(m) > INFINITE_SD => Err(ClmError::SubjectsSeparated),
+        Some(m) if sd(m) > SMALLEST_SD && (slope > 0.0 || m.value > fixed.loglik) => Ok(ClmmFit {
             fit: fit_of(table, &m.at, m.value, &m.information)?,
             sd: sd(m),
             boundary: false,
         }),
         _ if slope <= 0.0 => Ok(zero),
         Some(m) if sd(m) <= SMALLEST_SD => Ok(zero),
-        _ => Err(Cause::NoMaximum),
+        _ => Err(ClmError::NoMaximum),
     }
 }

@@ -1,6 +1,6 @@
 //! Correlation of two columns: Pearson, Spearman, Kendall, within subjects.
 
-use super::describe::{constant, mean, products_about, squares_about};
+use super::describe::{is_constant, mean, products_about, squares_about};
 use super::distribution::{normal_quantile, t_two_sided};
 use super::finite;
 use super::rank::{doubled_ranks, mid_ranks};
@@ -8,7 +8,7 @@ use super::rank::{doubled_ranks, mid_ranks};
 /// Pearson's r = Sxy/√(Sxx Syy). `None` if a column is constant or shorter
 /// than 2.
 pub fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
-    if x.len() < 2 || constant(x) || constant(y) {
+    if x.len() < 2 || is_constant(x) || is_constant(y) {
         return None;
     }
     let (mx, my) = (mean(x)?, mean(y)?);
@@ -93,7 +93,7 @@ pub fn within_subjects(x: &[f64], y: &[f64], lengths: &[usize]) -> Option<Within
         for (own, deviations) in [(own_x, &mut dx), (own_y, &mut dy)] {
             let m = mean(own)?;
             // Deviations of a constant are rounding, not data.
-            let same = constant(own);
+            let same = is_constant(own);
             deviations.extend(own.iter().map(|v| if same { 0.0 } else { v - m }));
         }
     }

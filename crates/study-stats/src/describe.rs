@@ -160,7 +160,7 @@ pub fn lag1_autocorrelation(x: &[f64]) -> Option<f64> {
 
 /// Rounded to 10⁻¹⁰, so that thirds which are equal on paper are equal here.
 /// Above 10⁵ a double has no such digits and the number stays.
-pub fn tidy(x: f64) -> f64 {
+pub fn rounded(x: f64) -> f64 {
     if x.abs() < 1e5 {
         // The addition turns −0 into 0.
         (x * 1e10).round() / 1e10 + 0.0
@@ -171,7 +171,7 @@ pub fn tidy(x: f64) -> f64 {
 
 /// Whether all numbers are the same, but for the rounding of thirds: within
 /// 10⁻¹² of the largest, or of 1.
-pub fn constant(x: &[f64]) -> bool {
+pub fn is_constant(x: &[f64]) -> bool {
     let low = x.iter().copied().fold(f64::INFINITY, f64::min);
     let high = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     x.is_empty() || high - low <= 1e-12 * low.abs().max(high.abs()).max(1.0)

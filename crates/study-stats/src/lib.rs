@@ -8,7 +8,7 @@
 pub mod agreement;
 pub mod anova;
 pub mod bayes;
-pub mod beside;
+
 pub mod bootstrap;
 pub mod clm;
 pub mod clmm;
@@ -16,14 +16,16 @@ pub mod correlation;
 pub mod describe;
 pub mod distribution;
 pub mod friedman;
+pub mod grim;
 pub mod lmm;
 pub mod paired;
 pub mod permutation;
-pub mod possible;
+
 pub mod proportion;
 pub mod random;
 pub mod rank;
 pub mod regression;
+pub mod two_way_slope;
 
 /// The number, if it is one that can be printed.
 pub(crate) fn finite(x: f64) -> Option<f64> {

@@ -5,7 +5,7 @@
 //! realization intercept, and an intercept of each subject × realization cell.
 //! Trials of one cell differ only by noise, so n, mean and sum of squares of
 //! each cell are all that the models need; subjects with the same pattern of
-//! cells share their algebra ([`Table`]). Subjects and cells are eliminated by
+//! cells share their algebra ([`LmmData`]). Subjects and cells are eliminated by
 //! the Woodbury identity, realizations, which are few, by a dense Cholesky
 //! factor. A variance on the boundary is 0 exactly.
 //!
@@ -28,18 +28,18 @@ mod start;
 #[cfg(test)]
 mod tests;
 
-pub use data::{Cell, Fixed, Table};
-pub use fit::{Criterion, Fit, Variances, fit};
+pub use data::{CellSummary, FixedEffects, LmmData};
+pub use fit::{Criterion, LmmFit, VarianceComponents, fit};
 pub use kenward_roger::kenward_roger;
 pub use satterthwaite::{ContrastF, ContrastT};
 
 /// The random effects of a model; every model has a subject intercept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Random {
+pub struct RandomEffects {
     /// A slope of the covariate for each subject, correlated with the intercept.
     pub slope: bool,
     /// An intercept for each realization.
-    pub model: bool,
+    pub realization: bool,
     /// An intercept for each subject × realization cell.
     pub cell: bool,
 }
@@ -55,10 +55,10 @@ pub enum LmmError {
     OneSubject,
     /// One realization.
     #[error("fewer than two realizations")]
-    OneModel,
+    OneRealization,
     /// The slope and the realization effects cannot be told apart.
     #[error("fewer than three realizations with a VAF")]
-    FewModels,
+    FewRealizations,
     /// The covariate does not vary, or overflows.
     #[error("VAF does not vary, or overflows")]
     ConstantCovariate,

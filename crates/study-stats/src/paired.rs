@@ -1,6 +1,6 @@
 //! Paired and one-sample comparisons: t, Wilcoxon's signed ranks, Holm.
 
-use super::describe::{constant, mean, sd, tidy};
+use super::describe::{is_constant, mean, rounded, sd};
 use super::distribution::{normal_upper, t_quantile, t_two_sided, t_upper};
 use super::finite;
 use super::rank::{doubled_ranks, tie_term_of};
@@ -22,14 +22,14 @@ pub struct OneSample {
     /// Two-sided.
     pub p: Option<f64>,
     /// mean ± t(.975, n−1)·sd/√n.
-    pub ci95: Option<(f64, f64)>,
+    pub ci95: (f64, f64),
 }
 
 /// The t test. `None` below two numbers.
 pub fn one_sample(x: &[f64]) -> Option<OneSample> {
     let n = x.len();
     let (m, s) = (mean(x)?, sd(x)?);
-    let s = if constant(x) { 0.0 } else { s };
+    let s = if is_constant(x) { 0.0 } else { s };
     let df = n as f64 - 1.0;
     let sem = s / (n as f64).sqrt();
     let t = if s > 0.0 { finite(m / sem) } else { None };
@@ -40,7 +40,7 @@ pub fn one_sample(x: &[f64]) -> Option<OneSample> {
         sd: s,
         t,
         p: t.and_then(|t| t_two_sided(t, df)),
-        ci95: Some((m - half, m + half)),
+        ci95: (m - half, m + half),
     })
 }
 
@@ -105,7 +105,7 @@ pub struct Paired {
 /// Compares two columns of the same subjects. Differences are rounded to 10⁻¹⁰,
 /// so that thirds cancel. `None` below two subjects.
 pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
-    let d: Vec<f64> = a.iter().zip(b).map(|(x, y)| tidy(x - y)).collect();
+    let d: Vec<f64> = a.iter().zip(b).map(|(x, y)| rounded(x - y)).collect();
     let test = one_sample(&d)?;
     let (sa, sb) = (sd(a)?, sd(b)?);
     let average = ((sa * sa + sb * sb) / 2.0).sqrt();
@@ -115,7 +115,7 @@ pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
         t: test.t,
         p_t: test.p,
         dz: test.t.and_then(|_| finite(test.mean / test.sd)),
-        d_av: if constant(a) && constant(b) {
+        d_av: if is_constant(a) && is_constant(b) {
             None
         } else {
             finite(test.mean / average)

@@ -8,7 +8,7 @@
 use super::correlation::{kendall, pearson, spearman};
 use super::describe::{mean, sum_of_squares};
 use super::rank::{doubled_ranks, mid_ranks};
-use crate::random::Random;
+use crate::random::RandomSource;
 
 /// Largest number of pairs whose M! pairings are all visited.
 pub const MAX_EXACT: usize = 9;
@@ -35,7 +35,7 @@ pub enum Statistic {
 
 /// A permutation test.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Permuted {
+pub struct PermutationTest {
     /// P(stat ≥ observed).
     pub greater: f64,
     /// P(|stat| ≥ |observed|).
@@ -53,8 +53,8 @@ pub fn test(
     statistic: Statistic,
     x: &[f64],
     y: &[f64],
-    random: &mut impl Random,
-) -> Option<Permuted> {
+    random: &mut impl RandomSource,
+) -> Option<PermutationTest> {
     let most = match statistic {
         Statistic::Pearson | Statistic::Spearman => MAX_DRAWN,
         Statistic::Kendall => MAX_DRAWN / 10,
@@ -73,7 +73,7 @@ pub fn test(
     if x.len() <= MAX_EXACT {
         visit(&mut order, |order| tally.count(kernel.value(order)));
         let all = tally.visited as f64;
-        return Some(Permuted {
+        return Some(PermutationTest {
             greater: tally.greater as f64 / all,
             two_sided: tally.two_sided as f64 / all,
             smallest: smallest(statistic, x, all),
@@ -85,7 +85,7 @@ pub fn test(
         tally.count(kernel.value(&order));
     }
     let all = (DRAWS + 1) as f64;
-    Some(Permuted {
+    Some(PermutationTest {
         greater: (tally.greater + 1) as f64 / all,
         two_sided: (tally.two_sided + 1) as f64 / all,
         smallest: 1.0 / all,

@@ -2,7 +2,7 @@
 
 /// A source of random numbers. Who calls decides which, and so whether a result can
 /// be reproduced.
-pub trait Random {
+pub trait RandomSource {
     /// A whole number in `0..n`, uniform; `n` is at least 1.
     fn below(&mut self, n: u64) -> u64;
     /// Puts `items` in a uniformly random order.
@@ -12,7 +12,7 @@ pub trait Random {
 }
 
 #[cfg(test)]
-impl Random for study_base::rng::Stream {
+impl RandomSource for study_base::rng::Stream {
     fn below(&mut self, n: u64) -> u64 {
         study_base::rng::Stream::below(self, n)
     }

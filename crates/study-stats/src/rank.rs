@@ -1,6 +1,6 @@
 //! Mid-ranks and ties.
 
-use super::describe::tidy;
+use super::describe::rounded;
 
 /// Ranks from 1; numbers that are equal to 10⁻¹⁰ share the mean of their ranks.
 pub fn mid_ranks(x: &[f64]) -> Vec<f64> {
@@ -9,7 +9,7 @@ pub fn mid_ranks(x: &[f64]) -> Vec<f64> {
 
 /// Twice the mid-ranks, which are whole numbers: sums of them are exact.
 pub fn doubled_ranks(x: &[f64]) -> Vec<i64> {
-    let mut order: Vec<(f64, usize)> = x.iter().map(|&v| tidy(v)).zip(0..).collect();
+    let mut order: Vec<(f64, usize)> = x.iter().map(|&v| rounded(v)).zip(0..).collect();
     order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut ranks = vec![0; x.len()];
     let mut start = 0;

@@ -1,7 +1,7 @@
 //! Least squares: a line, and a parabola beside it.
 
 use super::correlation::pearson;
-use super::describe::{Sum, constant, mean, sum_of_products, sum_of_squares};
+use super::describe::{Sum, is_constant, mean, sum_of_products, sum_of_squares};
 use super::distribution::{f_upper, t_two_sided};
 use super::finite;
 
@@ -29,7 +29,7 @@ pub struct Line {
 /// The line through three points or more; `None` if x or y is constant.
 pub fn line(x: &[f64], y: &[f64]) -> Option<Line> {
     let n = x.len() as f64;
-    if x.len() < 3 || constant(x) || constant(y) {
+    if x.len() < 3 || is_constant(x) || is_constant(y) {
         return None;
     }
     let (mx, my) = (mean(x)?, mean(y)?);
@@ -64,10 +64,10 @@ pub fn line(x: &[f64], y: &[f64]) -> Option<Line> {
 
 /// Slope of y on x where y does not vary: 0; `None` where x does not.
 pub fn slope(x: &[f64], y: &[f64]) -> Option<f64> {
-    if constant(x) || x.len() < 2 {
+    if is_constant(x) || x.len() < 2 {
         return None;
     }
-    if constant(y) {
+    if is_constant(y) {
         return Some(0.0);
     }
     finite(sum_of_products(x, y)? / sum_of_squares(x)?)
@@ -100,7 +100,7 @@ pub struct Parabola {
 /// the curvature. `None` if y is constant or x has fewer than three values.
 pub fn parabola(x: &[f64], y: &[f64]) -> Option<Parabola> {
     let n = x.len();
-    if n < 4 || constant(x) || constant(y) {
+    if n < 4 || is_constant(x) || is_constant(y) {
         return None;
     }
     let (mx, my) = (mean(x)?, mean(y)?);

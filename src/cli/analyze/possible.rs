@@ -4,25 +4,25 @@ use crate::cli::{Console, Failure};
 use serde_json::json;
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
-use study_stats::possible::{
-    Found, MAX_COUNTED, MAX_N, MAX_SCALE, Over, Printed, Question, possible, sums,
+use study_stats::grim::{
+    MAX_COUNTED, MAX_N, MAX_SCALE, PrintedNumber, Published, SdCheck, SdOver, check, possible_sums,
 };
 
 /// The name and version of the document.
 const FORMAT: &str = "study-possible/1";
 
 pub(super) fn run(given: &[String], as_json: bool, console: &mut Console) -> Result<(), Failure> {
-    let question = parse(given)
+    let published = parse(given)
         .map_err(|e| e.hint("for example: --possible mean=4.800 sd=0.997 n=30 scale=1..7"))?;
-    let found = possible(&question);
+    let found = check(&published);
     console.out(if as_json {
-        document(&question, &found)
+        document(&published, &found)
     } else {
-        page(&question, &found)
+        page(&published, &found)
     })
 }
 
-fn parse(given: &[String]) -> Result<Question, Failure> {
+fn parse(given: &[String]) -> Result<Published, Failure> {
     let (mut mean, mut sd, mut n, mut scale, mut each) = (None, None, None, None, None);
     for pair in given {
         let shown = Untrusted(pair);
@@ -30,7 +30,11 @@ fn parse(given: &[String]) -> Result<Question, Failure> {
             return Err(Failure::input(format!("`{shown}` is not KEY=VALUE")));
         };
         let bad = |what: &str| Failure::input(format!("`{shown}`: {what}"));
-        let printed = || value.parse::<Printed>().map_err(|e| bad(&e.to_string()));
+        let printed = || {
+            value
+                .parse::<PrintedNumber>()
+                .map_err(|e| bad(&e.to_string()))
+        };
         let count = |most: u32| {
             let n = value.parse().ok().filter(|n| (1..=most).contains(n));
             n.ok_or_else(|| bad(&format!("a whole number from 1 to {most} is wanted")))
@@ -58,7 +62,7 @@ fn parse(given: &[String]) -> Result<Question, Failure> {
         }
     }
     let need = |key: &str| Failure::input(format!("--possible needs {key}=…"));
-    let question = Question {
+    let published = Published {
         mean: mean.ok_or_else(|| need("mean"))?,
         sd: sd.ok_or_else(|| need("sd"))?,
         n: n.ok_or_else(|| need("n"))?,
@@ -66,19 +70,19 @@ fn parse(given: &[String]) -> Result<Question, Failure> {
         each,
     };
     if let Some(each) = each
-        && !question.n.is_multiple_of(each)
+        && !published.n.is_multiple_of(each)
     {
-        let odd = format!("{} ratings are not {each} of each subject", question.n);
+        let odd = format!("{} ratings are not {each} of each subject", published.n);
         return Err(Failure::input(odd));
     }
-    if question.sd.digits < 0 {
+    if published.sd.digits < 0 {
         return Err(Failure::input("a standard deviation is not below 0"));
     }
-    Ok(question)
+    Ok(published)
 }
 
 /// A printed number as it was given.
-fn as_given(x: Printed) -> String {
+fn as_given(x: PrintedNumber) -> String {
     let digits = usize::try_from(x.decimals).unwrap_or(0);
     let sign = if x.digits < 0 { "-" } else { "" };
     let all = format!("{:0>width$}", x.digits.abs(), width = digits + 1);
@@ -90,21 +94,21 @@ fn as_given(x: Printed) -> String {
     }
 }
 
-fn definition(f: &Found) -> String {
-    let divisor = if f.definition.less_one {
+fn definition(f: &SdCheck) -> String {
+    let divisor = if f.definition.n_minus_1 {
         format!("n − 1 = {}", f.n - 1)
     } else {
         format!("n = {}", f.n)
     };
     match f.definition.over {
-        Over::Ratings => format!("over the {} ratings, divisor {divisor}", f.n),
-        Over::SubjectMeans { each } => {
+        SdOver::Ratings => format!("over the {} ratings, divisor {divisor}", f.n),
+        SdOver::SubjectMeans { each } => {
             format!("over {} subject means of {each}, divisor {divisor}", f.n)
         }
     }
 }
 
-fn page(q: &Question, found: &[Found]) -> String {
+fn page(q: &Published, found: &[SdCheck]) -> String {
     let mut out = format!(
         "mean {} and SD {} of {} whole ratings from {} to {}\n\n",
         as_given(q.mean),
@@ -114,7 +118,7 @@ fn page(q: &Question, found: &[Found]) -> String {
         q.scale.1
     );
     // Writing to a String cannot fail.
-    let all = sums(q);
+    let all = possible_sums(q);
     let _ = match all[..] {
         [] => writeln!(
             out,
@@ -149,8 +153,8 @@ fn page(q: &Question, found: &[Found]) -> String {
         };
         let _ = writeln!(out, "{verdict}  SD {}", definition(f));
         let squares = match f.definition.over {
-            Over::Ratings => "squares",
-            Over::SubjectMeans { .. } => "squares of the subjects' sums",
+            SdOver::Ratings => "squares",
+            SdOver::SubjectMeans { .. } => "squares of the subjects' sums",
         };
         for s in &f.sums {
             let _ = writeln!(
@@ -169,7 +173,7 @@ fn page(q: &Question, found: &[Found]) -> String {
             let _ = writeln!(out, "            and {at_least}{more} more");
         }
         if f.count == 0 {
-            let why = match f.missed.first() {
+            let why = match f.unattainable.first() {
                 None => "no whole sum of squares gives it".to_owned(),
                 Some(s) if (s.squares - s.sum).rem_euclid(2) == 1 => format!(
                     "the {squares} would sum to {}, the ratings to {}: one is odd, the other even",
@@ -186,8 +190,8 @@ fn page(q: &Question, found: &[Found]) -> String {
     out
 }
 
-fn document(q: &Question, found: &[Found]) -> String {
-    let all = sums(q);
+fn document(q: &Published, found: &[SdCheck]) -> String {
+    let all = possible_sums(q);
     let definitions: Vec<_> = (found.iter())
         .map(|f| {
             let sums: Vec<_> = (f.sums.iter())
@@ -200,14 +204,14 @@ fn document(q: &Question, found: &[Found]) -> String {
                 .collect();
             json!({
                 "over": match f.definition.over {
-                    Over::Ratings => "ratings",
-                    Over::SubjectMeans { .. } => "subject-means",
+                    SdOver::Ratings => "ratings",
+                    SdOver::SubjectMeans { .. } => "subject-means",
                 },
                 "each": match f.definition.over {
-                    Over::Ratings => 1,
-                    Over::SubjectMeans { each } => each,
+                    SdOver::Ratings => 1,
+                    SdOver::SubjectMeans { each } => each,
                 },
-                "divisor": if f.definition.less_one { "n-1" } else { "n" },
+                "divisor": if f.definition.n_minus_1 { "n-1" } else { "n" },
                 "n": f.n,
                 "possible": f.count > 0,
                 "count": f.count,

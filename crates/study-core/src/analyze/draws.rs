@@ -1,7 +1,7 @@
 //! The random streams of the resampling methods.
 
 use study_base::rng::Stream;
-use study_stats::random::Random;
+use study_stats::random::RandomSource;
 
 /// A stream named after the method that draws from it.
 pub(super) struct Draws(Stream);
@@ -12,7 +12,7 @@ impl Draws {
     }
 }
 
-impl Random for Draws {
+impl RandomSource for Draws {
     fn below(&mut self, n: u64) -> u64 {
         self.0.below(n)
     }

@@ -304,9 +304,9 @@ fn put_icc(found: Option<&Icc>, prefix: &str, few: &str, values: &mut Values) {
         g.maybe(name, c.map(|c| c.value));
         let ends = c.and_then(|c| c.ci95);
         for (end, value) in [("lo", ends.map(|e| e.0)), ("hi", ends.map(|e| e.1))] {
-            match value.filter(|v| !v.is_finite()) {
-                Some(_) => g.put_or(&format!("{name}/{end}"), None, NO_END),
-                None => g.maybe(&format!("{name}/{end}"), value),
+            match value {
+                Some(None) => g.put_or(&format!("{name}/{end}"), None, NO_END),
+                value => g.maybe(&format!("{name}/{end}"), value.flatten()),
             }
         }
     }

@@ -236,7 +236,7 @@ pub(super) fn distances(
                 }
             }
             // Thirds that agree on paper agree here.
-            average(sum).map(study_stats::describe::tidy)
+            average(sum).map(study_stats::describe::rounded)
         })
         .collect()
 }

@@ -10,7 +10,7 @@ use super::cells::Cells;
 use super::values::{Group, Values};
 use std::collections::BTreeSet;
 use study_stats::correlation::pearson;
-use study_stats::describe::{constant, mean};
+use study_stats::describe::{is_constant, mean};
 use study_stats::distribution::t_two_sided;
 use study_stats::regression::{line, parabola};
 
@@ -80,7 +80,7 @@ fn reason(x: Option<&[f64]>) -> &'static str {
     match x {
         None => "not every test realization with a VAF has it",
         Some(x) if x.len() < 3 => "fewer than three realizations with a VAF",
-        Some(x) if constant(x) => "all realizations have the same",
+        Some(x) if is_constant(x) => "all realizations have the same",
         Some(_) => "all realizations have the same mean rating",
     }
 }

@@ -10,16 +10,17 @@ use super::values::{Group, Values};
 use study_stats::describe::{mean, sum_of_squares};
 use study_stats::distribution::chi2_upper;
 use study_stats::lmm::{
-    Cell, ContrastT, Criterion, Fit, Fixed, LmmError, Random, Table, fit, kenward_roger,
+    CellSummary, ContrastT, Criterion, FixedEffects, LmmData, LmmError, LmmFit, RandomEffects, fit,
+    kenward_roger,
 };
 
 /// The ratings as the models need them.
 struct Data {
     /// Of all test realizations.
-    all: Result<Table, LmmError>,
+    all: Result<LmmData, LmmError>,
     /// Of those with a VAF, with the VAF and without.
-    vaf: Result<Table, LmmError>,
-    vaf_null: Result<Table, LmmError>,
+    vaf: Result<LmmData, LmmError>,
+    vaf_null: Result<LmmData, LmmError>,
     /// Whether any has a VAF.
     has_vaf: bool,
     /// Whether a cell with a VAF has two ratings.
@@ -49,22 +50,22 @@ impl Data {
         let own: Vec<_> = (cells.cells.iter())
             .filter(|c| models.binary_search(&c.model).is_ok())
             .collect();
-        let of_rows = |subject, model, x, rows: &[f64]| -> Option<Cell> {
-            Some(Cell {
+        let of_rows = |subject, realization, x, rows: &[f64]| -> Option<CellSummary> {
+            Some(CellSummary {
                 subject,
-                model,
+                realization,
                 x,
                 n: rows.len(),
                 mean: mean(rows)?,
                 within: sum_of_squares(rows)?,
             })
         };
-        let all: Vec<Cell> = own
+        let all: Vec<CellSummary> = own
             .iter()
             .filter(|c| c.squares.is_finite())
-            .map(|c| Cell {
+            .map(|c| CellSummary {
                 subject: c.subject,
-                model: c.model,
+                realization: c.model,
                 x: 0.0,
                 n: c.rows.len(),
                 mean: c.mean,
@@ -73,7 +74,7 @@ impl Data {
             .collect();
         let vafs: Vec<f64> = models.iter().filter_map(|&m| cells.vaf[m]).collect();
         let by_row = vafs.is_empty();
-        let mut with_vaf: Vec<Cell> = Vec::new();
+        let mut with_vaf: Vec<CellSummary> = Vec::new();
         if by_row {
             for c in &own {
                 let mut rows: Vec<(f64, f64)> = cells.order[c.rows.clone()]
@@ -89,28 +90,29 @@ impl Data {
         } else {
             with_vaf.extend(
                 all.iter()
-                    .filter_map(|c| cells.vaf[c.model].map(|x| Cell { x, ..*c })),
+                    .filter_map(|c| cells.vaf[c.realization].map(|x| CellSummary { x, ..*c })),
             );
         }
         let centre = if by_row {
             let n: f64 = with_vaf.iter().map(|c| c.n as f64).sum();
             with_vaf.iter().map(|c| c.x * c.n as f64).sum::<f64>() / n
         } else {
-            let mut rated: Vec<usize> = with_vaf.iter().map(|c| c.model).collect();
+            let mut rated: Vec<usize> = with_vaf.iter().map(|c| c.realization).collect();
             rated.sort_unstable();
             rated.dedup();
             let rated: Vec<f64> = rated.iter().filter_map(|&m| cells.vaf[m]).collect();
             mean(&rated).unwrap_or(f64::NAN)
         };
-        let vaf_null = Table::new(&with_vaf, Fixed::Intercept);
+        let vaf_null = LmmData::new(&with_vaf, FixedEffects::Intercept);
         // Where every realization has its VAF the ratings are the same.
         let all = if all.len() == with_vaf.len() && !by_row {
             vaf_null.clone()
         } else {
-            Table::new(&all, Fixed::Intercept)
+            LmmData::new(&all, FixedEffects::Intercept)
         };
         Self {
-            vaf: (vaf_null.clone()).and_then(|t| t.with(Fixed::Covariate { centre })),
+            vaf: (vaf_null.clone())
+                .and_then(|t| t.with_fixed_effects(FixedEffects::Covariate { centre })),
             vaf_null,
             all,
             has_vaf: !with_vaf.is_empty(),
@@ -123,27 +125,30 @@ impl Data {
 }
 
 /// A table, or the reason why there is none.
-fn given(table: &Result<Table, LmmError>) -> Result<&Table, LmmError> {
+fn given(table: &Result<LmmData, LmmError>) -> Result<&LmmData, LmmError> {
     table.as_ref().map_err(|e| *e)
 }
 
 /// Why there is nothing about VAF.
 fn why_no_vaf(data: &Data, error: LmmError) -> String {
-    if !data.has_vaf {
-        "no test realization has a VAF".to_owned()
-    } else {
-        error.to_string()
-    }
+    let why = match error {
+        _ if !data.has_vaf => "no test realization has a VAF",
+        LmmError::ConstantCovariate => "VAF does not vary, or overflows",
+        LmmError::FewRealizations => "fewer than three realizations with a VAF",
+        LmmError::NoSlope => "no subject rated two realizations with different VAF",
+        other => return other.to_string(),
+    };
+    why.to_owned()
 }
 
 const NO_DF: &str = "the likelihood has no curvature to take degrees of freedom from";
 
 /// −2 log likelihood ratio; rounding below 0 is 0.
-fn ratio(null: &Fit<'_>, full: &Fit<'_>) -> f64 {
+fn ratio(null: &LmmFit<'_>, full: &LmmFit<'_>) -> f64 {
     (null.deviance - full.deviance).max(0.0)
 }
 
-fn likelihood(g: &mut Group<'_>, null: &Fit<'_>, full: &Fit<'_>, df: f64) {
+fn likelihood(g: &mut Group<'_>, null: &LmmFit<'_>, full: &LmmFit<'_>, df: f64) {
     let chi2 = ratio(null, full);
     g.put("ml_deviance", full.deviance);
     g.put("ml_aic", full.aic());
@@ -155,11 +160,11 @@ fn likelihood(g: &mut Group<'_>, null: &Fit<'_>, full: &Fit<'_>, df: f64) {
 fn model(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let found = (|| {
         let null = given(&data.all)?;
-        let table = &null.with(Fixed::Models)?;
-        if table.models().len() < 2 {
-            return Err(LmmError::OneModel);
+        let table = &null.with_fixed_effects(FixedEffects::Realizations)?;
+        if table.realizations().len() < 2 {
+            return Err(LmmError::OneRealization);
         }
-        let random = Random::default();
+        let random = RandomEffects::default();
         let reml = fit(table, random, Criterion::Reml)?;
         let ml = fit(table, random, Criterion::Ml)?;
         let null = fit(null, random, Criterion::Ml)?;
@@ -169,7 +174,7 @@ fn model(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         g.put("var_subject", v.intercept);
         g.put("sigma2", v.error);
         g.put("icc_subject", v.intercept / (v.intercept + v.error));
-        let df = table.models().len() as f64 - 1.0;
+        let df = table.realizations().len() as f64 - 1.0;
         likelihood(&mut g, &null, &ml, df);
         g.put("lrt_df", df);
         g.put("null_ml_deviance", null.deviance);
@@ -182,12 +187,12 @@ fn model(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         g.put_or("kenward_roger_F", f.map(|f| f.f), why);
         g.put_or("kenward_roger_df2", f.and_then(|f| f.df2), why);
         g.put_or("kenward_roger_p", f.and_then(|f| f.p), why);
-        let width = table.models().len();
+        let width = table.realizations().len();
         let contrasts: Vec<Vec<f64>> = (0..width)
             .map(|j| (0..width).map(|i| f64::from(u8::from(i == j))).collect())
             .collect();
         let means = reml.t_tests(&contrasts);
-        for (&m, t) in table.models().iter().zip(means) {
+        for (&m, t) in table.realizations().iter().zip(means) {
             let mut g = values.group(format!("lmm_model/emm/{}", cells.model_name(m)), NO_DF);
             g.put("estimate", t.estimate + cells.offset);
             g.put("se", t.se);
@@ -235,7 +240,7 @@ const COVARIATE: [&str; 11] = [
 ];
 
 /// Intercept at a VAF, slope with its test.
-fn coefficients(g: &mut Group<'_>, fit: &Fit<'_>, at: f64, offset: f64) -> ContrastT {
+fn coefficients(g: &mut Group<'_>, fit: &LmmFit<'_>, at: f64, offset: f64) -> ContrastT {
     let tests = fit.t_tests(&[vec![1.0, at], vec![0.0, 1.0]]);
     let (intercept, slope) = (tests[0], tests[1]);
     g.put("reml_deviance", fit.deviance);
@@ -254,7 +259,7 @@ fn coefficients(g: &mut Group<'_>, fit: &Fit<'_>, at: f64, offset: f64) -> Contr
 fn vaf(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let found = (|| {
         let table = given(&data.vaf)?;
-        let random = Random::default();
+        let random = RandomEffects::default();
         let reml = fit(table, random, Criterion::Reml)?;
         let ml = fit(table, random, Criterion::Ml)?;
         let null = fit(given(&data.vaf_null)?, random, Criterion::Ml)?;
@@ -289,11 +294,12 @@ fn vaf(cells: &Cells<'_>, data: &Data, values: &mut Values) {
 
 /// The slope beside fixed subjects, Σn(x − x̄ₛ)(y − ȳₛ)/Σn(x − x̄ₛ)²: the limit of
 /// the mixed model's as the subject variance grows.
-fn within_subjects(cells: &[Cell]) -> Option<f64> {
+fn within_subjects(cells: &[CellSummary]) -> Option<f64> {
     let (mut xx, mut xy, mut scale) = (0.0, 0.0, 0.0f64);
     for own in cells.chunk_by(|a, b| a.subject == b.subject) {
         let n: f64 = own.iter().map(|c| c.n as f64).sum();
-        let about = |f: fn(&Cell) -> f64| own.iter().map(|c| c.n as f64 * f(c)).sum::<f64>() / n;
+        let about =
+            |f: fn(&CellSummary) -> f64| own.iter().map(|c| c.n as f64 * f(c)).sum::<f64>() / n;
         let (mx, my) = (about(|c| c.x), about(|c| c.mean));
         for c in own {
             xx += c.n as f64 * (c.x - mx).powi(2);
@@ -309,9 +315,9 @@ fn within_subjects(cells: &[Cell]) -> Option<f64> {
 fn vaf_slope(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let found = (|| {
         let table = given(&data.vaf)?;
-        let random = Random {
+        let random = RandomEffects {
             slope: true,
-            ..Random::default()
+            ..RandomEffects::default()
         };
         let reml = fit(table, random, Criterion::Reml)?;
         let mut g = values.group("lmm_vaf_slope", NO_DF);
@@ -347,17 +353,17 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         }
         let why = |e| why_no_vaf(data, e);
         let table = given(&data.vaf).map_err(why)?;
-        let random = Random {
-            model: true,
+        let random = RandomEffects {
+            realization: true,
             cell,
-            ..Random::default()
+            ..RandomEffects::default()
         };
         let reml = fit(table, random, Criterion::Reml).map_err(why)?;
         let mut g = values.group("lmm_vaf_crossed", NO_DF);
         coefficients(&mut g, &reml, -data.centre, cells.offset);
         let v = reml.variances;
         g.put("var_subject", v.intercept);
-        g.put("var_model", v.model);
+        g.put("var_model", v.realization);
         g.put("singular", f64::from(u8::from(reml.singular)));
         if cell {
             g.put("var_subject_model", v.cell);
@@ -366,7 +372,7 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         // another model would put the interaction to VAF's account.
         let without = given(&data.vaf_null).and_then(|t| fit(t, random, Criterion::Reml));
         match without {
-            Ok(without) => g.put("var_model_without_vaf", without.variances.model),
+            Ok(without) => g.put("var_model_without_vaf", without.variances.realization),
             Err(error) => g.put_or("var_model_without_vaf", None, &error.to_string()),
         }
         Ok(())
@@ -388,9 +394,9 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
 
 fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let found = (|| {
-        let random = Random {
-            model: true,
-            ..Random::default()
+        let random = RandomEffects {
+            realization: true,
+            ..RandomEffects::default()
         };
         let reml = fit(given(&data.all)?, random, Criterion::Reml)?;
         let mean = reml.t_test(&[1.0]);
@@ -399,7 +405,7 @@ fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         g.put("intercept", mean.estimate + cells.offset);
         g.put("intercept_se", mean.se);
         g.put("var_subject", reml.variances.intercept);
-        g.put("var_model", reml.variances.model);
+        g.put("var_model", reml.variances.realization);
         g.put("sigma2", reml.variances.error);
         Ok::<(), LmmError>(())
     })();
@@ -418,18 +424,18 @@ fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
 /// How much of the variance of a rating is whose: ~ 1 + (1|subject) + (1|model)
 /// + (1|subject:model).
 fn variance(data: &Data, values: &mut Values) {
-    let random = Random {
-        model: true,
+    let random = RandomEffects {
+        realization: true,
         cell: true,
-        ..Random::default()
+        ..RandomEffects::default()
     };
-    let components = |table: &Result<Table, LmmError>| -> Result<_, LmmError> {
+    let components = |table: &Result<LmmData, LmmError>| -> Result<_, LmmError> {
         Ok(fit(given(table)?, random, Criterion::Reml)?.variances)
     };
     let names = ["subject", "model", "subject_model", "error"];
     match components(&data.all) {
         Ok(v) => {
-            let parts = [v.intercept, v.model, v.cell, v.error];
+            let parts = [v.intercept, v.realization, v.cell, v.error];
             let total: f64 = parts.iter().sum();
             let mut g = values.group("lmm_variance", "it overflows");
             for (name, part) in names.iter().zip(parts) {

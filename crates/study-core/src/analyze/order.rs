@@ -5,8 +5,8 @@ use super::Rules;
 use super::cells::Cells;
 use super::values::Values;
 use std::collections::BTreeMap;
-use study_stats::beside::{Beside, beside_factors};
 use study_stats::describe::Sum;
+use study_stats::two_way_slope::{TwoWaySlope, two_way_slope};
 
 pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     let r = cells.ratings;
@@ -62,15 +62,15 @@ pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
 const MAX_REPETITIONS: usize = 10_000;
 
 /// The slope of the rating on x beside fixed subjects and realizations.
-fn slope(cells: &Cells<'_>, rows: &[usize], x: &[f64]) -> Option<Beside> {
+fn slope(cells: &Cells<'_>, rows: &[usize], x: &[f64]) -> Option<TwoWaySlope> {
     let r = cells.ratings;
     let y: Vec<f64> = rows.iter().filter_map(|&i| cells.centred[i]).collect();
     let subjects: Vec<u32> = rows.iter().map(|&i| r.subject[i]).collect();
     let models: Vec<u32> = rows.iter().filter_map(|&i| r.model[i]).collect();
-    beside_factors(x, &y, &subjects, &models)
+    two_way_slope(x, &y, &subjects, &models)
 }
 
-fn put(id: &str, found: Option<Beside>, values: &mut Values) {
+fn put(id: &str, found: Option<TwoWaySlope>, values: &mut Values) {
     let why = "the order is not known, or is one with subjects and realizations";
     let mut g = values.group(id, why);
     g.maybe("slope", found.map(|f| f.slope));

@@ -9,9 +9,8 @@
 use super::cells::Cells;
 use super::values::{self, Values};
 use rayon::prelude::*;
-use study_stats::clm::counts::{Count, Predictor, Table};
-use study_stats::clm::{Cause, Fit, clm};
-use study_stats::clmm::{Mixed, clmm};
+use study_stats::clm::{CategoryCount, CategoryCounts, ClmError, ClmFit, Predictor, clm};
+use study_stats::clmm::{ClmmFit, clmm};
 
 /// More than these are no longer a rating scale: a slider.
 const MAX_CATEGORIES: usize = 20;
@@ -91,7 +90,7 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
             let counts = counts(cells, rows, &ratings, n, |i| {
                 model(i).map_or(0, |m| place[m as usize])
             });
-            let table = Table::new(predictors, names.len(), ratings.len(), &counts);
+            let table = CategoryCounts::new(predictors, names.len(), ratings.len(), &counts);
             (table, ratings)
         })
     };
@@ -135,7 +134,10 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
             let index =
                 |i: usize| vaf(i).map_or(0, |own| levels.partition_point(|v| *v < own)) as u32;
             let counts = counts(cells, &rows, &ratings, levels.len(), index);
-            (Table::new(predictors, 1, ratings.len(), &counts), ratings)
+            (
+                CategoryCounts::new(predictors, 1, ratings.len(), &counts),
+                ratings,
+            )
         })
     };
     put_all("vaf", made, many(cells, &rows), &scale, values);
@@ -170,7 +172,7 @@ fn counts(
     ratings: &[f64],
     predictors: usize,
     predictor: impl Fn(usize) -> u32,
-) -> Vec<Count> {
+) -> Vec<CategoryCount> {
     let category = |i: usize| {
         cells.ratings.rating[i].map_or(0, |rating| ratings.partition_point(|v| *v < rating)) as u32
     };
@@ -179,7 +181,7 @@ fn counts(
         for &i in rows {
             tally[predictor(i) as usize * ratings.len() + category(i) as usize] += 1;
         }
-        let of = |(at, n): (usize, u32)| Count {
+        let of = |(at, n): (usize, u32)| CategoryCount {
             subject: 0,
             predictor: (at / ratings.len()) as u32,
             category: (at % ratings.len()) as u32,
@@ -187,10 +189,10 @@ fn counts(
         };
         return tally.into_iter().enumerate().map(of).collect();
     }
-    let mut counts: Vec<Count> = Vec::new();
+    let mut counts: Vec<CategoryCount> = Vec::new();
     let mut from = 0;
     for &i in rows {
-        let new = Count {
+        let new = CategoryCount {
             subject: cells.ratings.subject[i],
             predictor: predictor(i),
             category: category(i),
@@ -199,7 +201,8 @@ fn counts(
         if counts.get(from).is_some_and(|c| c.subject != new.subject) {
             from = counts.len();
         }
-        let same = |c: &&mut Count| (c.predictor, c.category) == (new.predictor, new.category);
+        let same =
+            |c: &&mut CategoryCount| (c.predictor, c.category) == (new.predictor, new.category);
         // The last ones of the subject are of the same cell.
         match counts[from..].iter_mut().rev().find(same) {
             Some(c) => c.n += 1,
@@ -218,7 +221,7 @@ struct Scale<'a> {
 
 fn put_all(
     what: &str,
-    made: Result<(Table, Vec<f64>), String>,
+    made: Result<(CategoryCounts, Vec<f64>), String>,
     many: bool,
     scale: &Scale<'_>,
     values: &mut Values,
@@ -246,12 +249,12 @@ fn put_all(
         Ok(fit) => put(fit, &labels, scale, &mut values.group(&ids[0], "")),
         Err(cause) => none(&mut values.group(&ids[0], cause.to_string()), what),
     }
-    let mixed: [Result<Mixed, String>; 2] = if many {
+    let mixed: [Result<ClmmFit, String>; 2] = if many {
         let why = format!("more than {MAX_SUBJECTS} subjects");
         [Err(why.clone()), Err(why)]
     } else {
         let both = clmm(&table);
-        [both.laplace, both.quadrature].map(|m| m.map_err(|cause: Cause| cause.to_string()))
+        [both.laplace, both.quadrature].map(|m| m.map_err(|cause: ClmError| cause.to_string()))
     };
     for (id, mixed) in ids[1..].iter().zip(mixed) {
         match mixed {
@@ -278,7 +281,7 @@ fn none(g: &mut values::Group<'_>, what: &str) {
 }
 
 /// On the scale of the data: θ + β·origin/unit, β/unit.
-fn put(fit: &Fit, labels: &[String], scale: &Scale<'_>, g: &mut values::Group<'_>) {
+fn put(fit: &ClmFit, labels: &[String], scale: &Scale<'_>, g: &mut values::Group<'_>) {
     g.put("loglik", fit.loglik);
     for ((name, beta), se) in scale.names.iter().zip(&fit.beta).zip(&fit.se) {
         g.put(&format!("beta/{name}"), beta / scale.unit);

@@ -7,7 +7,7 @@ use super::cells::Cells;
 use super::exclude;
 use super::values::Values;
 use crate::protocol::Role;
-use study_stats::describe::{mean, tidy};
+use study_stats::describe::{mean, rounded};
 use study_stats::paired::{equivalence, holm, one_sample};
 
 pub(super) fn reference(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
@@ -28,7 +28,7 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
     let found: Vec<(usize, Vec<f64>)> = (tests.iter())
         .map(|&t| {
             let pair = cells.table(&[t, r]);
-            (t, pair.rows.iter().map(|p| tidy(p[0] - p[1])).collect())
+            (t, pair.rows.iter().map(|p| rounded(p[0] - p[1])).collect())
         })
         .collect();
     let p: Vec<Option<f64>> = (found.iter())
@@ -48,7 +48,7 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
         );
         g.put("n", differences.len() as f64);
         g.put_or("mean_diff", mean(differences), "nobody rated both");
-        g.interval("ci95", test.and_then(|t| t.ci95));
+        g.interval("ci95", test.map(|t| t.ci95));
         g.maybe("t", test.and_then(|t| t.t));
         g.maybe("p_t", test.and_then(|t| t.p));
         g.maybe("p_t_holm", p_holm);
@@ -74,14 +74,14 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
 fn duplicates(cells: &Cells<'_>, values: &mut Values) {
     for (d, o) in exclude::pairs(cells.ratings) {
         let pair = cells.table(&[d, o]);
-        let differences: Vec<f64> = pair.rows.iter().map(|r| tidy(r[0] - r[1])).collect();
+        let differences: Vec<f64> = pair.rows.iter().map(|r| rounded(r[0] - r[1])).collect();
         let sizes: Vec<f64> = differences.iter().map(|v| v.abs()).collect();
         let test = one_sample(&differences);
         let id = format!("duplicate/{}", cells.model_name(d));
         let mut g = values.group(id, "fewer than two subjects");
         g.put("n", differences.len() as f64);
         g.maybe("mean_diff", test.map(|t| t.mean));
-        g.interval("ci95", test.and_then(|t| t.ci95));
+        g.interval("ci95", test.map(|t| t.ci95));
         g.maybe("mean_absolute_diff", mean(&sizes));
     }
 }

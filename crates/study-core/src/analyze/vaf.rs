@@ -15,7 +15,7 @@ use study_stats::bootstrap;
 use study_stats::correlation::{
     fisher_interval, kendall, p_of_r, pearson, spearman, within_subjects,
 };
-use study_stats::describe::{constant, mean};
+use study_stats::describe::{is_constant, mean};
 use study_stats::friedman::page;
 use study_stats::paired::one_sample;
 use study_stats::permutation::{self, Statistic};
@@ -62,7 +62,7 @@ fn between_realizations(
     values.group("corr", "").put("n_models", n as f64);
     let why = if n < 3 {
         FEW
-    } else if constant(&x) {
+    } else if is_constant(&x) {
         "all realizations have the same VAF"
     } else {
         "all realizations have the same mean rating"
@@ -136,7 +136,11 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
     {
         let (x, y) = (without(i, x), without(i, y));
         let both = [pearson(&x, &y), spearman(&x, &y)];
-        let left = if constant(&x) { "VAF" } else { "mean ratings" };
+        let left = if is_constant(&x) {
+            "VAF"
+        } else {
+            "mean ratings"
+        };
         let mut g = values.group(
             format!("corr/leave_one_out/{name}"),
             format!("without it all {left} are equal"),
@@ -171,7 +175,7 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
 /// Correlations and slopes of each complete subject, then over them.
 fn by_subject(cells: &Cells<'_>, table: &Table, vaf: &[f64], values: &mut Values) {
     let (mut z, mut slopes, mut perfect) = (Vec::new(), Vec::new(), false);
-    let enough = vaf.len() >= 3 && !constant(vaf);
+    let enough = vaf.len() >= 3 && !is_constant(vaf);
     for (&s, row) in table.subjects.iter().zip(&table.rows).filter(|_| enough) {
         let r = pearson(vaf, row);
         let b = slope(vaf, row);
@@ -202,7 +206,7 @@ fn by_subject(cells: &Cells<'_>, table: &Table, vaf: &[f64], values: &mut Values
     g.maybe("r_back", test.map(|t| t.mean.tanh()));
     g.maybe("t", test.and_then(|t| t.t));
     g.maybe("p", test.and_then(|t| t.p));
-    let ends = test.and_then(|t| t.ci95);
+    let ends = test.map(|t| t.ci95);
     g.interval("r_ci95", ends.map(|(l, h)| (l.tanh(), h.tanh())));
     let test = one_sample(&slopes);
     let why = if enough {
@@ -215,7 +219,7 @@ fn by_subject(cells: &Cells<'_>, table: &Table, vaf: &[f64], values: &mut Values
     g.maybe("sd", test.map(|t| t.sd));
     g.maybe("t", test.and_then(|t| t.t));
     g.maybe("p", test.and_then(|t| t.p));
-    g.interval("ci95", test.and_then(|t| t.ci95));
+    g.interval("ci95", test.map(|t| t.ci95));
     let t = test.and_then(|t| t.t);
     g.maybe("jzs_bf10", t.and_then(|t| jzs_bf10(t, slopes.len(), 0.707)));
 }

@@ -2,8 +2,8 @@
 //! predictor, used each category. All else of the ratings is without effect on
 //! the likelihood, so a fit costs the same however many trials lie behind.
 
-use super::Cause;
-use super::newton::{Point, Square};
+use super::ClmError;
+use super::newton::{Evaluation, SymmetricMatrix};
 use std::ops::Range;
 
 /// The row of the design of one predictor. It has one column beside zeros: a
@@ -18,7 +18,7 @@ pub struct Predictor {
 
 /// A number of equal ratings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Count {
+pub struct CategoryCount {
     /// Any number.
     pub subject: u32,
     /// Index of a [`Predictor`].
@@ -42,7 +42,7 @@ pub(crate) struct Term {
 
 /// Counts, ready to be fitted.
 #[derive(Debug, Clone)]
-pub struct Table {
+pub struct CategoryCounts {
     thresholds: usize,
     columns: usize,
     predictors: Vec<Predictor>,
@@ -56,17 +56,17 @@ pub struct Table {
     extent: Vec<Option<(usize, usize)>>,
 }
 
-impl Table {
+impl CategoryCounts {
     /// Counts over predictors of `columns` columns and `categories` categories,
     /// in any order. Counts of places that are out of range are left out.
     pub fn new(
         predictors: Vec<Predictor>,
         columns: usize,
         categories: usize,
-        counts: &[Count],
+        counts: &[CategoryCount],
     ) -> Self {
         let t = categories.saturating_sub(1);
-        let mut counts: Vec<Count> = counts
+        let mut counts: Vec<CategoryCount> = counts
             .iter()
             .copied()
             .filter(|c| {
@@ -145,9 +145,9 @@ impl Table {
     /// all thresholds together and no predictor stands wholly in an outer
     /// category. With one column d = ±x: such a t exists if for every j the
     /// greatest d with low ≤ j is no more than the smallest with high > j.
-    pub fn estimable(&self) -> Result<(), Cause> {
+    pub fn estimable(&self) -> Result<(), ClmError> {
         if self.thresholds == 0 {
-            return Err(Cause::OneCategory);
+            return Err(ClmError::OneCategory);
         }
         let seen: Vec<(Predictor, (usize, usize))> = self
             .predictors
@@ -157,7 +157,7 @@ impl Table {
             .collect();
         let differ = seen.windows(2).any(|w| w[0].0 != w[1].0);
         if self.columns == 0 || !differ {
-            return Err(Cause::OnePredictor);
+            return Err(ClmError::OnePredictor);
         }
         let infinite = if self.columns > 1 {
             self.dummies_separate(&seen)
@@ -172,7 +172,7 @@ impl Table {
             })
         };
         if infinite {
-            Err(Cause::Separated)
+            Err(ClmError::Separated)
         } else {
             Ok(())
         }
@@ -225,8 +225,8 @@ impl Table {
 
     /// Σ Nⱼκ(θⱼ − θⱼ₋₁) with κ′ = 1/(e^δ − 1), κ″ = −κ′(1 + κ′), among `size`
     /// parameters; `None` where the thresholds do not rise.
-    pub(crate) fn spacing(&self, at: &[f64], size: usize) -> Option<Point> {
-        let mut point = Point::zero(size);
+    pub(crate) fn spacing(&self, at: &[f64], size: usize) -> Option<Evaluation> {
+        let mut point = Evaluation::zero(size);
         for j in 1..self.thresholds {
             let gap = at[j] - at[j - 1];
             if !(gap > 0.0 && gap.is_finite()) {
@@ -268,7 +268,7 @@ impl Table {
     }
 
     /// Adds Σ wₖ ∂aₖ∂aₖᵀ, the weights by place.
-    pub(crate) fn add_hessian(&self, weights: &[f64], to: &mut Square) {
+    pub(crate) fn add_hessian(&self, weights: &[f64], to: &mut SymmetricMatrix) {
         let t = self.thresholds;
         for (p, weights) in self.predictors.iter().zip(weights.chunks_exact(t)) {
             let column = t + p.column;

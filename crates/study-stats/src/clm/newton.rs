@@ -2,14 +2,14 @@
 
 /// A symmetric matrix: the lower triangle by rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Square {
+pub(crate) struct SymmetricMatrix {
     size: usize,
     lower: Vec<f64>,
 }
 
-impl Square {
+impl SymmetricMatrix {
     /// All zero.
-    pub fn zero(size: usize) -> Self {
+    pub(crate) fn zero(size: usize) -> Self {
         Self {
             size,
             lower: vec![0.0; size * (size + 1) / 2],
@@ -17,19 +17,19 @@ impl Square {
     }
 
     /// Element (i, j), which is also (j, i).
-    pub fn get(&self, i: usize, j: usize) -> f64 {
+    pub(crate) fn get(&self, i: usize, j: usize) -> f64 {
         let (i, j) = (i.max(j), i.min(j));
         self.lower[i * (i + 1) / 2 + j]
     }
 
     /// Adds to element (i, j), which is also (j, i).
-    pub fn add(&mut self, i: usize, j: usize, value: f64) {
+    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
         let (i, j) = (i.max(j), i.min(j));
         self.lower[i * (i + 1) / 2 + j] += value;
     }
 
     /// Adds c·vvᵀ.
-    pub fn add_outer(&mut self, c: f64, v: &[f64]) {
+    pub(crate) fn add_outer(&mut self, c: f64, v: &[f64]) {
         let mut rest = self.lower.as_mut_slice();
         for (i, vi) in v.iter().enumerate() {
             let (row, next) = rest.split_at_mut(i + 1);
@@ -42,7 +42,7 @@ impl Square {
     }
 
     /// Adds vyᵀ + yvᵀ.
-    pub fn add_mixed(&mut self, v: &[f64], y: &[f64]) {
+    pub(crate) fn add_mixed(&mut self, v: &[f64], y: &[f64]) {
         let mut rest = self.lower.as_mut_slice();
         for i in 0..v.len() {
             let (row, next) = rest.split_at_mut(i + 1);
@@ -54,7 +54,7 @@ impl Square {
     }
 
     /// The sum of two.
-    pub fn plus(&mut self, other: &Self) {
+    pub(crate) fn plus(&mut self, other: &Self) {
         for (a, b) in self.lower.iter_mut().zip(&other.lower) {
             *a += b;
         }
@@ -102,7 +102,7 @@ impl Square {
     }
 
     /// The diagonal of A⁻¹; `None` unless A is positive definite.
-    pub fn inverse_diagonal(&self) -> Option<Vec<f64>> {
+    pub(crate) fn inverse_diagonal(&self) -> Option<Vec<f64>> {
         let l = self.cholesky()?;
         let column = |i: usize| {
             let mut unit = vec![0.0; self.size];
@@ -115,35 +115,35 @@ impl Square {
 
 /// A log-likelihood with its derivatives at some parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub(crate) struct Evaluation {
     /// The log-likelihood.
-    pub value: f64,
+    pub(crate) value: f64,
     /// First derivatives.
-    pub gradient: Vec<f64>,
+    pub(crate) gradient: Vec<f64>,
     /// Second derivatives.
-    pub hessian: Square,
+    pub(crate) hessian: SymmetricMatrix,
 }
 
-impl Point {
+impl Evaluation {
     /// Nothing yet.
-    pub fn zero(size: usize) -> Self {
+    pub(crate) fn zero(size: usize) -> Self {
         Self {
             value: 0.0,
             gradient: vec![0.0; size],
-            hessian: Square::zero(size),
+            hessian: SymmetricMatrix::zero(size),
         }
     }
 }
 
 /// Where the search ended.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Maximum {
+pub(crate) struct Maximum {
     /// The parameters.
-    pub at: Vec<f64>,
+    pub(crate) at: Vec<f64>,
     /// The log-likelihood.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Less the second derivatives.
-    pub information: Square,
+    pub(crate) information: SymmetricMatrix,
 }
 
 /// No parameter moves further in one step: the scale is that of logits.
@@ -160,7 +160,10 @@ const PROMISE: f64 = 1e-9;
 /// that makes the matrix positive definite, and is halved until the value does
 /// not fall. `at` is `None` where the parameters are not admissible. The last
 /// step, once the promise ½gᵀδ is small, squares what is left of the error.
-pub fn maximise(start: Vec<f64>, mut at: impl FnMut(&[f64]) -> Option<Point>) -> Option<Maximum> {
+pub(crate) fn maximise(
+    start: Vec<f64>,
+    mut at: impl FnMut(&[f64]) -> Option<Evaluation>,
+) -> Option<Maximum> {
     let mut here = start;
     let mut point = at(&here)?;
     for _ in 0..MOST_STEPS {
@@ -205,7 +208,7 @@ pub fn maximise(start: Vec<f64>, mut at: impl FnMut(&[f64]) -> Option<Point>) ->
 }
 
 /// The step, and whether it is Newton's own.
-fn direction(point: &Point) -> Option<(Vec<f64>, bool)> {
+fn direction(point: &Evaluation) -> Option<(Vec<f64>, bool)> {
     let information = point.hessian.negated();
     let mut ridge = 0.0;
     while ridge < 1e9 {

@@ -1,13 +1,13 @@
 #![allow(clippy::unwrap_used)]
 
-use super::counts::{Count, Predictor, Table};
-use super::newton::Point;
+use super::counts::{CategoryCount, CategoryCounts, Predictor};
+use super::newton::Evaluation;
 use super::*;
 use proptest::prelude::*;
 
 /// A table of dummies against the first predictor: for each subject and
 /// predictor the ratings, from 0.
-pub(crate) fn dummies(categories: usize, cells: &[(u32, u32, &[u32])]) -> Table {
+pub(crate) fn dummies(categories: usize, cells: &[(u32, u32, &[u32])]) -> CategoryCounts {
     let groups = cells.iter().map(|c| c.1 as usize + 1).max().unwrap_or(0);
     let predictors = (0..groups)
         .map(|g| Predictor {
@@ -16,13 +16,13 @@ pub(crate) fn dummies(categories: usize, cells: &[(u32, u32, &[u32])]) -> Table 
         })
         .collect();
     let columns = groups.saturating_sub(1);
-    Table::new(predictors, columns, categories, &counts(cells))
+    CategoryCounts::new(predictors, columns, categories, &counts(cells))
 }
 
-pub(crate) fn counts(cells: &[(u32, u32, &[u32])]) -> Vec<Count> {
+pub(crate) fn counts(cells: &[(u32, u32, &[u32])]) -> Vec<CategoryCount> {
     let mut counts = Vec::new();
     for &(subject, predictor, ratings) in cells {
-        counts.extend(ratings.iter().map(|&category| Count {
+        counts.extend(ratings.iter().map(|&category| CategoryCount {
             subject,
             predictor,
             category,
@@ -33,9 +33,13 @@ pub(crate) fn counts(cells: &[(u32, u32, &[u32])]) -> Vec<Count> {
 }
 
 /// A table with one covariate.
-pub(crate) fn covariate(x: &[f64], categories: usize, cells: &[(u32, u32, &[u32])]) -> Table {
+pub(crate) fn covariate(
+    x: &[f64],
+    categories: usize,
+    cells: &[(u32, u32, &[u32])],
+) -> CategoryCounts {
     let predictors = x.iter().map(|&x| Predictor { column: 0, x }).collect();
-    Table::new(predictors, 1, categories, &counts(cells))
+    CategoryCounts::new(predictors, 1, categories, &counts(cells))
 }
 
 /// Gradient and Hessian against central differences of the value and of the
@@ -43,7 +47,7 @@ pub(crate) fn covariate(x: &[f64], categories: usize, cells: &[(u32, u32, &[u32]
 pub(crate) fn derivatives_hold(
     at: &[f64],
     tolerance: f64,
-    mut point: impl FnMut(&[f64]) -> Option<Point>,
+    mut point: impl FnMut(&[f64]) -> Option<Evaluation>,
 ) {
     let here = point(at).unwrap();
     let step = 1e-4;
@@ -56,7 +60,7 @@ pub(crate) fn derivatives_hold(
         // Fourth order: the truncation is far below the tolerance.
         let near = (moved(step), moved(-step));
         let far = (moved(2.0 * step), moved(-2.0 * step));
-        let slope = |v: &dyn Fn(&Point) -> f64| {
+        let slope = |v: &dyn Fn(&Evaluation) -> f64| {
             (8.0 * (v(&near.0) - v(&near.1)) - (v(&far.0) - v(&far.1))) / (12.0 * step)
         };
         let close = |a: f64, b: f64, what: String| {
@@ -129,8 +133,8 @@ fn a_table_of_four_has_the_log_odds_ratio() {
 
 #[test]
 fn separation_is_seen_and_overlap_is_not_called_so() {
-    let says = |table: Table| clm(&table).err();
-    let separated = Some(Cause::Separated);
+    let says = |table: CategoryCounts| clm(&table).err();
+    let separated = Some(ClmError::Separated);
     // A realization wholly in the highest category.
     assert_eq!(
         says(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[2, 2])])),
@@ -184,19 +188,19 @@ fn separation_is_seen_and_overlap_is_not_called_so() {
 fn what_does_not_vary_has_no_model() {
     assert_eq!(
         clm(&dummies(1, &[(0, 0, &[0]), (0, 1, &[0])])),
-        Err(Cause::OneCategory)
+        Err(ClmError::OneCategory)
     );
     assert_eq!(
         clm(&dummies(2, &[(0, 0, &[0, 1])])),
-        Err(Cause::OnePredictor)
+        Err(ClmError::OnePredictor)
     );
     let same = covariate(&[0.5, 0.5], 2, &[(0, 0, &[0, 1]), (0, 1, &[0, 1])]);
-    assert_eq!(clm(&same), Err(Cause::OnePredictor));
-    assert!(clm(&Table::new(Vec::new(), 0, 0, &[])).is_err());
+    assert_eq!(clm(&same), Err(ClmError::OnePredictor));
+    assert!(clm(&CategoryCounts::new(Vec::new(), 0, 0, &[])).is_err());
 }
 
 /// A small table in which every category occurs, and the first predictors.
-pub(crate) fn any_counts() -> impl Strategy<Value = (usize, Vec<Count>)> {
+pub(crate) fn any_counts() -> impl Strategy<Value = (usize, Vec<CategoryCount>)> {
     let count = (0u32..4, 0u32..3, 0u32..5, 1u32..4);
     prop::collection::vec(count, 1..16).prop_map(|list| {
         let mut used: Vec<u32> = list.iter().map(|c| c.2).collect();
@@ -209,7 +213,7 @@ pub(crate) fn any_counts() -> impl Strategy<Value = (usize, Vec<Count>)> {
         let place = |p: u32| asked.partition_point(|u| *u < p) as u32;
         let counts = list
             .iter()
-            .map(|&(subject, predictor, category, n)| Count {
+            .map(|&(subject, predictor, category, n)| CategoryCount {
                 subject,
                 predictor: place(predictor),
                 category: rank(category),
@@ -235,7 +239,7 @@ proptest! {
         };
         let dummies: Vec<Predictor> = (0..groups).map(dummy).collect();
         for (predictors, columns) in [(covariate.to_vec(), 1), (dummies, groups - 1)] {
-            let table = Table::new(predictors, columns, categories, &counts);
+            let table = CategoryCounts::new(predictors, columns, categories, &counts);
             match clm(&table) {
                 Ok(fit) => {
                     let at: Vec<f64> = fit.thresholds.iter().chain(&fit.beta).copied().collect();
@@ -244,7 +248,7 @@ proptest! {
                     prop_assert!(fit.thresholds.windows(2).all(|w| w[0] < w[1]));
                     prop_assert!(fit.se.iter().all(|s| s.is_finite() && *s > 0.0));
                 }
-                Err(cause) => prop_assert!(cause != Cause::NoMaximum, "{counts:?}"),
+                Err(cause) => prop_assert!(cause != ClmError::NoMaximum, "{counts:?}"),
             }
         }
     }
@@ -252,13 +256,13 @@ proptest! {
     #[test]
     fn a_scale_turned_round_changes_the_sign((categories, counts) in any_counts()) {
         let x = [-1.0, 0.1, 1.0].map(|x| Predictor { column: 0, x }).to_vec();
-        let turned: Vec<Count> = counts
+        let turned: Vec<CategoryCount> = counts
             .iter()
             .rev()
-            .map(|c| Count { category: categories as u32 - 1 - c.category, ..*c })
+            .map(|c| CategoryCount { category: categories as u32 - 1 - c.category, ..*c })
             .collect();
-        let a = clm(&Table::new(x.clone(), 1, categories, &counts));
-        let b = clm(&Table::new(x, 1, categories, &turned));
+        let a = clm(&CategoryCounts::new(x.clone(), 1, categories, &counts));
+        let b = clm(&CategoryCounts::new(x, 1, categories, &turned));
         match (a, b) {
             (Ok(a), Ok(b)) => {
                 prop_assert!((a.loglik - b.loglik).abs() < 1e-9);

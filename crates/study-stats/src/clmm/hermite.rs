@@ -10,15 +10,15 @@ use std::f64::consts::PI;
 
 /// A node with the logarithm of its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Node {
+pub(super) struct Node {
     /// Of ∫ e^(−z²) g(z) dz.
-    pub z: f64,
+    pub(super) z: f64,
     /// ln w + z²: of ∫ h(z) dz.
-    pub ln_weight: f64,
+    pub(super) ln_weight: f64,
 }
 
 /// The rule with n nodes, ascending; exact for polynomials up to degree 2n − 1.
-pub fn rule(n: usize) -> Vec<Node> {
+pub(super) fn rule(n: usize) -> Vec<Node> {
     let node = |z| Node {
         z,
         ln_weight: ln_weight(n, z),

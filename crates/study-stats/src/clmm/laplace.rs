@@ -15,8 +15,8 @@
 //! gathered by place over all subjects before a matrix is made of them.
 
 use super::mode::mode;
-use crate::clm::counts::{Table, Term};
-use crate::clm::newton::Point;
+use crate::clm::counts::{CategoryCounts, Term};
+use crate::clm::newton::Evaluation;
 use crate::clm::{logistic, softplus};
 
 /// Derivatives of one subject's f at its mode.
@@ -30,7 +30,7 @@ struct Weights {
 
 /// Value, gradient and Hessian of the approximate likelihood at (θ, β, ln σ);
 /// the modes are where the search for them starts, and ends.
-pub(super) fn point(table: &Table, at: &[f64], modes: &mut [f64]) -> Option<Point> {
+pub(super) fn point(table: &CategoryCounts, at: &[f64], modes: &mut [f64]) -> Option<Evaluation> {
     let size = table.parameters() + 1;
     let precision = (-2.0 * at[size - 1]).exp();
     if !(precision.is_finite() && precision > 0.0) {

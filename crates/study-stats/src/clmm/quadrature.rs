@@ -12,16 +12,21 @@
 
 use super::hermite::Node;
 use super::mode::mode;
-use crate::clm::counts::{Table, Term};
+use crate::clm::counts::{CategoryCounts, Term};
 use crate::clm::logistic;
-use crate::clm::newton::Point;
+use crate::clm::newton::Evaluation;
 use std::f64::consts::{PI, SQRT_2};
 
 /// A node whose share of the integral is smaller adds nothing to a derivative.
 const NEGLIGIBLE: f64 = 1e-17;
 
 /// Value, gradient and Hessian of the likelihood at (θ, β, ln σ).
-pub(super) fn point(table: &Table, at: &[f64], rule: &[Node], modes: &mut [f64]) -> Option<Point> {
+pub(super) fn point(
+    table: &CategoryCounts,
+    at: &[f64],
+    rule: &[Node],
+    modes: &mut [f64],
+) -> Option<Evaluation> {
     let size = table.parameters() + 1;
     let tau = size - 1;
     let precision = (-2.0 * at[tau]).exp();

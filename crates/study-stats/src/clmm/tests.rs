@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
-use crate::clm::counts::{Count, Predictor};
+use crate::clm::counts::{CategoryCount, Predictor};
 use crate::clm::tests::{any_counts, counts, covariate, derivatives_hold, dummies};
 use proptest::prelude::*;
 
@@ -96,8 +96,8 @@ fn alike_subjects_lie_on_the_boundary() {
 #[test]
 fn a_subject_alone_has_no_mixed_model() {
     let both = clmm(&dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[0, 1, 2])]));
-    assert_eq!(both.laplace, Err(Cause::OneSubject));
-    assert_eq!(both.quadrature, Err(Cause::OneSubject));
+    assert_eq!(both.laplace, Err(ClmError::OneSubject));
+    assert_eq!(both.quadrature, Err(ClmError::OneSubject));
 }
 
 /// Each always says the same, so that any standard deviation is too small.
@@ -110,15 +110,18 @@ fn subjects_that_never_overlap_have_no_standard_deviation() {
     let both = clmm(&dummies(2, &cells));
     for found in [both.laplace, both.quadrature] {
         assert!(
-            matches!(found, Err(Cause::SubjectsSeparated | Cause::NoMaximum)),
+            matches!(
+                found,
+                Err(ClmError::SubjectsSeparated | ClmError::NoMaximum)
+            ),
             "{found:?}"
         );
     }
 }
 
-fn of(categories: usize, counts: &[Count]) -> Both {
+fn of(categories: usize, counts: &[CategoryCount]) -> ClmmFits {
     let x = [-1.0, 0.1, 1.0].map(|x| Predictor { column: 0, x });
-    clmm(&Table::new(x.to_vec(), 1, categories, counts))
+    clmm(&CategoryCounts::new(x.to_vec(), 1, categories, counts))
 }
 
 proptest! {
@@ -139,10 +142,10 @@ proptest! {
     /// round turns the effect round.
     #[test]
     fn what_must_not_matter_does_not((categories, counts) in any_counts()) {
-        let turned: Vec<Count> = counts
+        let turned: Vec<CategoryCount> = counts
             .iter()
             .rev()
-            .map(|c| Count {
+            .map(|c| CategoryCount {
                 subject: 9 - c.subject,
                 category: categories as u32 - 1 - c.category,
                 ..*c
@@ -192,9 +195,9 @@ fn the_integral_is_searched_anew_where_laplace_leads_astray() {
 #[test]
 fn repeated_counts_add_up() {
     let cells = counts(&CELLS);
-    let mut added: Vec<Count> = Vec::new();
+    let mut added: Vec<CategoryCount> = Vec::new();
     for c in &cells {
-        let same = |a: &&mut Count| {
+        let same = |a: &&mut CategoryCount| {
             (a.subject, a.predictor, a.category) == (c.subject, c.predictor, c.category)
         };
         match added.iter_mut().find(same) {

@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 
 /// One subject's ratings of one realization (and one value of the covariate).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cell {
+pub struct CellSummary {
     /// Any number for the subject.
     pub subject: usize,
     /// Any number for the realization.
-    pub model: usize,
+    pub realization: usize,
     /// The covariate; 0 where the model has none.
     pub x: f64,
     /// Ratings, 1 or more.
@@ -27,7 +27,7 @@ pub struct Cell {
 
 /// The fixed effects of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Fixed {
+pub enum FixedEffects {
     /// One mean.
     Intercept,
     /// A mean at `centre`, and a slope of the covariate.
@@ -36,13 +36,13 @@ pub enum Fixed {
         centre: f64,
     },
     /// A mean for each realization.
-    Models,
+    Realizations,
 }
 
 /// A cell within a pattern, standardised.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unit {
-    pub(super) model: usize,
+    pub(super) realization: usize,
     /// The covariate as it came, and standardised.
     pub(super) raw: f64,
     pub(super) x: f64,
@@ -62,11 +62,11 @@ pub(super) struct Pattern {
 
 /// A table that models can be fitted to: standardised and aggregated.
 #[derive(Debug, Clone)]
-pub struct Table {
+pub struct LmmData {
     pub(super) patterns: Vec<Pattern>,
-    pub(super) fixed: Fixed,
+    pub(super) fixed: FixedEffects,
     /// The numbers of the realizations, sorted.
-    pub(super) models: Vec<usize>,
+    pub(super) realizations: Vec<usize>,
     pub(super) subjects: usize,
     /// Ratings.
     pub(super) n: f64,
@@ -85,28 +85,28 @@ pub struct Table {
 }
 
 /// Most realizations: the dense factor has so many columns.
-const MAX_MODELS: usize = 200;
+const MAX_REALIZATIONS: usize = 200;
 /// Most Σ patterns × realizations²: the work of one evaluation.
 const MAX_WORK: usize = 50_000_000;
 
-impl Table {
+impl LmmData {
     /// Aggregates cells, for a model with these fixed effects. One subject's
     /// cells may come in any order.
     ///
     /// # Errors
     /// Where no model of this kind is defined for them.
-    pub fn new(cells: &[Cell], fixed: Fixed) -> Result<Self, LmmError> {
+    pub fn new(cells: &[CellSummary], fixed: FixedEffects) -> Result<Self, LmmError> {
         if cells.is_empty() || cells.iter().any(|c| c.n == 0) {
             return Err(LmmError::NoData);
         }
-        let mut models: Vec<usize> = cells.iter().map(|c| c.model).collect();
-        models.sort_unstable();
-        models.dedup();
-        if models.len() > MAX_MODELS {
+        let mut realizations: Vec<usize> = cells.iter().map(|c| c.realization).collect();
+        realizations.sort_unstable();
+        realizations.dedup();
+        if realizations.len() > MAX_REALIZATIONS {
             return Err(LmmError::TooLarge);
         }
         let n: f64 = cells.iter().map(|c| c.n as f64).sum();
-        let about = |f: &dyn Fn(&Cell) -> f64| -> f64 {
+        let about = |f: &dyn Fn(&CellSummary) -> f64| -> f64 {
             cells.iter().map(|c| c.n as f64 * f(c)).sum::<f64>() / n
         };
         let y_centre = about(&|c| c.mean);
@@ -120,7 +120,7 @@ impl Table {
         }
         let mut table = Self {
             patterns: Vec::new(),
-            fixed: Fixed::Intercept,
+            fixed: FixedEffects::Intercept,
             subjects: 0,
             n,
             cells: cells.len(),
@@ -130,29 +130,29 @@ impl Table {
             x_scale: 1.0,
             x_variance: 0.0,
             x_within: false,
-            models,
+            realizations,
         };
         table.aggregate(cells);
         if table.subjects < 2 {
             return Err(LmmError::OneSubject);
         }
-        let width = table.models.len();
+        let width = table.realizations.len();
         if table.patterns.len().saturating_mul(width * width) > MAX_WORK {
             return Err(LmmError::TooLarge);
         }
         table.patterns.iter_mut().for_each(shorten);
-        table.with(fixed)
+        table.with_fixed_effects(fixed)
     }
 
     /// The same ratings for other fixed effects; the cells are not visited again.
     ///
     /// # Errors
     /// Where no model of this kind is defined for them.
-    pub fn with(&self, fixed: Fixed) -> Result<Self, LmmError> {
+    pub fn with_fixed_effects(&self, fixed: FixedEffects) -> Result<Self, LmmError> {
         let mut table = self.clone();
         table.fixed = fixed;
         let (mut centre, mut scale, mut variance) = (0.0, 1.0, 0.0);
-        if let Fixed::Covariate { centre: at } = fixed {
+        if let FixedEffects::Covariate { centre: at } = fixed {
             centre = at;
             let about = |f: &dyn Fn(f64) -> f64| -> f64 {
                 let patterns = self.patterns.iter();
@@ -176,11 +176,11 @@ impl Table {
         Ok(table)
     }
 
-    fn aggregate(&mut self, cells: &[Cell]) {
-        let mut sorted: Vec<&Cell> = cells.iter().collect();
+    fn aggregate(&mut self, cells: &[CellSummary]) {
+        let mut sorted: Vec<&CellSummary> = cells.iter().collect();
         sorted.sort_by(|a, b| {
-            (a.subject, a.model)
-                .cmp(&(b.subject, b.model))
+            (a.subject, a.realization)
+                .cmp(&(b.subject, b.realization))
                 .then(a.x.total_cmp(&b.x))
         });
         type Key = Vec<(usize, u64, usize)>;
@@ -188,7 +188,10 @@ impl Table {
         for own in sorted.chunk_by(|a, b| a.subject == b.subject) {
             self.subjects += 1;
             self.x_within |= own.iter().any(|c| c.x != own[0].x);
-            let key: Key = own.iter().map(|c| (c.model, c.x.to_bits(), c.n)).collect();
+            let key: Key = own
+                .iter()
+                .map(|c| (c.realization, c.x.to_bits(), c.n))
+                .collect();
             let next = self.patterns.len();
             let place = *places.entry(key).or_insert(next);
             if place == next {
@@ -197,7 +200,7 @@ impl Table {
                     units: own
                         .iter()
                         .map(|c| Unit {
-                            model: self.models.partition_point(|&m| m < c.model),
+                            realization: self.realizations.partition_point(|&m| m < c.realization),
                             raw: c.x,
                             x: 0.0,
                             n: c.n as f64,
@@ -227,23 +230,23 @@ impl Table {
     /// Number of fixed effects.
     pub(super) fn columns(&self) -> usize {
         match self.fixed {
-            Fixed::Intercept => 1,
-            Fixed::Covariate { .. } => 2,
-            Fixed::Models => self.models.len(),
+            FixedEffects::Intercept => 1,
+            FixedEffects::Covariate { .. } => 2,
+            FixedEffects::Realizations => self.realizations.len(),
         }
     }
 
     /// The numbers of the realizations, sorted: the order of their means.
-    pub fn models(&self) -> &[usize] {
-        &self.models
+    pub fn realizations(&self) -> &[usize] {
+        &self.realizations
     }
 
     /// Number of ratings of each realization, in that order.
-    pub(super) fn ratings_by_model(&self) -> Vec<f64> {
-        let mut ratings = vec![0.0; self.models.len()];
+    pub(super) fn ratings_by_realization(&self) -> Vec<f64> {
+        let mut ratings = vec![0.0; self.realizations.len()];
         for pattern in &self.patterns {
             for unit in &pattern.units {
-                ratings[unit.model] += pattern.subjects * unit.n;
+                ratings[unit.realization] += pattern.subjects * unit.n;
             }
         }
         ratings

@@ -3,11 +3,11 @@
 //! ML: d = log|Z part| + N(1 + log 2πr²/N); REML: d = log|Z part| + log|A| +
 //! (N − p)(1 + log 2πr²/(N − p)) (Bates et al. 2015, eqs 34 and 41).
 
-use super::data::{Fixed, Table};
+use super::data::{FixedEffects, LmmData};
 use super::optimize::minimize;
 use super::profile::{Profile, Ratios, profile};
 use super::start::Coordinates;
-use super::{LmmError, Random};
+use super::{LmmError, RandomEffects};
 use std::f64::consts::PI;
 
 /// What is maximised.
@@ -21,7 +21,7 @@ pub enum Criterion {
 
 /// Variances, in squared units of the rating.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Variances {
+pub struct VarianceComponents {
     /// Subject intercept.
     pub intercept: f64,
     /// Subject slope, per squared unit of the covariate.
@@ -29,7 +29,7 @@ pub struct Variances {
     /// Of intercept and slope.
     pub covariance: f64,
     /// Realization intercept.
-    pub model: f64,
+    pub realization: f64,
     /// Cell intercept.
     pub cell: f64,
     /// Error.
@@ -38,8 +38,8 @@ pub struct Variances {
 
 /// A fitted model.
 #[derive(Debug, Clone)]
-pub struct Fit<'a> {
-    pub(super) table: &'a Table,
+pub struct LmmFit<'a> {
+    pub(super) table: &'a LmmData,
     pub(super) criterion: Criterion,
     pub(super) coordinates: Coordinates,
     pub(super) at: Vec<f64>,
@@ -53,13 +53,13 @@ pub struct Fit<'a> {
     /// Fixed effects, variances and σ².
     pub parameters: usize,
     /// In squared units of the rating.
-    pub variances: Variances,
+    pub variances: VarianceComponents,
     /// Whether a variance is 0 or a correlation ±1.
     pub singular: bool,
 }
 
 /// Residual degrees of freedom of the criterion.
-pub(super) fn weight(table: &Table, criterion: Criterion) -> f64 {
+pub(super) fn weight(table: &LmmData, criterion: Criterion) -> f64 {
     match criterion {
         Criterion::Ml => table.n,
         Criterion::Reml => table.n - table.columns() as f64,
@@ -81,13 +81,13 @@ fn deviance(p: &Profile, criterion: Criterion, weight: f64) -> Option<f64> {
 const NO_ERROR: f64 = 1e-13;
 
 /// What the table must have for these effects to be told apart.
-fn identified(table: &Table, random: Random) -> Result<(), LmmError> {
-    let covariate = matches!(table.fixed, Fixed::Covariate { .. });
-    if random.model && table.models.len() < 2 {
-        return Err(LmmError::OneModel);
+fn identified(table: &LmmData, random: RandomEffects) -> Result<(), LmmError> {
+    let covariate = matches!(table.fixed, FixedEffects::Covariate { .. });
+    if random.realization && table.realizations.len() < 2 {
+        return Err(LmmError::OneRealization);
     }
-    if random.model && covariate && table.models.len() < 3 {
-        return Err(LmmError::FewModels);
+    if random.realization && covariate && table.realizations.len() < 3 {
+        return Err(LmmError::FewRealizations);
     }
     if random.slope && !table.x_within {
         return Err(LmmError::NoSlope);
@@ -101,7 +101,7 @@ fn identified(table: &Table, random: Random) -> Result<(), LmmError> {
         let ratios = Ratios {
             intercept: all,
             slope: if random.slope { all } else { 0.0 },
-            model: if random.model { all } else { 0.0 },
+            realization: if random.realization { all } else { 0.0 },
             ..Ratios::default()
         };
         profile(table, random, &ratios).map(|p| p.rss)
@@ -121,7 +121,11 @@ fn identified(table: &Table, random: Random) -> Result<(), LmmError> {
 ///
 /// # Errors
 /// Where the effects cannot be told apart, or nothing is left for the error.
-pub fn fit(table: &Table, random: Random, criterion: Criterion) -> Result<Fit<'_>, LmmError> {
+pub fn fit(
+    table: &LmmData,
+    random: RandomEffects,
+    criterion: Criterion,
+) -> Result<LmmFit<'_>, LmmError> {
     identified(table, random)?;
     let coordinates = Coordinates::of(table, random);
     let weight = weight(table, criterion);
@@ -145,19 +149,19 @@ pub fn fit(table: &Table, random: Random, criterion: Criterion) -> Result<Fit<'_
     let profile = profile(table, random, &ratios).ok_or(LmmError::NotConverged)?;
     let sigma2 = profile.rss / weight;
     let mut scale = 2.0 * weight * table.y_scale.ln();
-    if let (Criterion::Reml, Fixed::Covariate { .. }) = (criterion, table.fixed) {
+    if let (Criterion::Reml, FixedEffects::Covariate { .. }) = (criterion, table.fixed) {
         scale += 2.0 * table.x_scale.ln();
     }
     let error = sigma2 * table.y_scale.powi(2);
-    let variances = Variances {
+    let variances = VarianceComponents {
         intercept: ratios.intercept * error,
         slope: ratios.slope * error / table.x_scale.powi(2),
         covariance: ratios.covariance * error / table.x_scale,
-        model: ratios.model * error,
+        realization: ratios.realization * error,
         cell: ratios.cell * error,
         error,
     };
-    Ok(Fit {
+    Ok(LmmFit {
         deviance: found.value + scale,
         parameters: table.columns() + found.at.len() + 1,
         singular: found.free.len() < found.at.len() || random.slope && found.at[0].abs() < 1e-4,
@@ -172,7 +176,7 @@ pub fn fit(table: &Table, random: Random, criterion: Criterion) -> Result<Fit<'_
     })
 }
 
-impl Fit<'_> {
+impl LmmFit<'_> {
     /// −2 log L + 2k.
     pub fn aic(&self) -> f64 {
         self.deviance + 2.0 * self.parameters as f64
@@ -187,15 +191,15 @@ impl Fit<'_> {
     pub(super) fn units(&self) -> Vec<(f64, f64)> {
         let t = self.table;
         match t.fixed {
-            Fixed::Intercept => vec![(t.y_scale, t.y_centre)],
-            Fixed::Covariate { .. } => {
+            FixedEffects::Intercept => vec![(t.y_scale, t.y_centre)],
+            FixedEffects::Covariate { .. } => {
                 vec![(t.y_scale, t.y_centre), (t.y_scale / t.x_scale, 0.0)]
             }
-            Fixed::Models => vec![(t.y_scale, t.y_centre); t.models.len()],
+            FixedEffects::Realizations => vec![(t.y_scale, t.y_centre); t.realizations.len()],
         }
     }
 
-    /// Σ lᵢβᵢ of the fixed effects: the means of [`Fixed::Models`], or the mean
+    /// Σ lᵢβᵢ of the fixed effects: the means of [`FixedEffects::Realizations`], or the mean
     /// at the centre and the slope.
     pub fn estimate(&self, l: &[f64]) -> f64 {
         self.units()

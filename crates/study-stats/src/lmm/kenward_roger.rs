@@ -13,9 +13,9 @@
 //!   E = 1/(1 − A₂/q), V = (2/q)(1 + c₁B)/((1 − c₂B)²(1 − c₃B)), ρ = V/2E²,
 //!   m = 4 + (q + 2)/(qρ − 1), λ = m/(E(m − 2)), F = (λ/q) β'L'(LΦ_AL')⁻¹Lβ.
 
-use super::Random;
-use super::data::Fixed;
-use super::fit::{Criterion, Fit};
+use super::RandomEffects;
+use super::data::FixedEffects;
+use super::fit::{Criterion, LmmFit};
 use super::satterthwaite::ContrastF;
 use crate::distribution::f_upper;
 use crate::finite;
@@ -23,10 +23,10 @@ use nalgebra::{Cholesky, DMatrix};
 
 /// Tests that all realizations have the same mean. `None` for any other model
 /// than means with a subject intercept by REML, and where it is not defined.
-pub fn kenward_roger(fit: &Fit<'_>) -> Option<ContrastF> {
+pub fn kenward_roger(fit: &LmmFit<'_>) -> Option<ContrastF> {
     let table = fit.table;
-    let wanted = table.fixed == Fixed::Models
-        && fit.coordinates.random == Random::default()
+    let wanted = table.fixed == FixedEffects::Realizations
+        && fit.coordinates.random == RandomEffects::default()
         && fit.criterion == Criterion::Reml;
     let p = table.columns();
     let q = p.checked_sub(1).filter(|q| *q > 0 && wanted)?;
@@ -46,12 +46,12 @@ pub fn kenward_roger(fit: &Fit<'_>) -> Option<ContrastF> {
         traces[1] += k * n * e * e;
         traces[2] += k * (n - 1.0 + e * e);
         for a in &pattern.units {
-            let i = a.model;
+            let i = a.realization;
             information[(i, i)] += k * a.n;
             p_of[1][(i, i)] -= k * a.n;
             q_of[2][(i, i)] += k * a.n;
             for b in &pattern.units {
-                let j = b.model;
+                let j = b.realization;
                 let both = k * a.n * b.n;
                 information[(i, j)] -= both * less(1);
                 p_of[0][(i, j)] -= both * e * e;

@@ -10,8 +10,8 @@
 //! Then A = X'ΩX, β = A⁻¹X'Ωy, r² = y'Ωy − β'X'Ωy + within. No root of a variance
 //! is taken, so that the criterion is smooth through the boundary 0.
 
-use super::Random;
-use super::data::{Fixed, Table};
+use super::RandomEffects;
+use super::data::{FixedEffects, LmmData};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Variances relative to σ², on the standardised scales.
@@ -20,7 +20,7 @@ pub(super) struct Ratios {
     pub(super) intercept: f64,
     pub(super) covariance: f64,
     pub(super) slope: f64,
-    pub(super) model: f64,
+    pub(super) realization: f64,
     pub(super) cell: f64,
 }
 
@@ -55,25 +55,32 @@ struct Sums {
 }
 
 /// Evaluates; `None` where a determinant is not positive or something overflows.
-pub(super) fn profile(table: &Table, random: Random, ratios: &Ratios) -> Option<Profile> {
-    let models = if random.model { table.models.len() } else { 0 };
+pub(super) fn profile(table: &LmmData, random: RandomEffects, ratios: &Ratios) -> Option<Profile> {
+    let realizations = if random.realization {
+        table.realizations.len()
+    } else {
+        0
+    };
     let p = table.columns();
-    let mut sums = sums(table, random, ratios, models)?;
-    if models > 0 && ratios.model != 0.0 {
-        let g = ratios.model;
-        let mut inner = sums.matrix.view((0, 0), (models, models)).into_owned();
+    let mut sums = sums(table, random, ratios, realizations)?;
+    if realizations > 0 && ratios.realization != 0.0 {
+        let g = ratios.realization;
+        let mut inner = sums
+            .matrix
+            .view((0, 0), (realizations, realizations))
+            .into_owned();
         inner.fill_upper_triangle_with_lower_triangle();
         inner *= g;
-        for i in 0..models {
+        for i in 0..realizations {
             inner[(i, i)] += 1.0;
         }
         let factor = Cholesky::new(inner)?;
         sums.log_det += log_det(&factor);
         // Columns: the cross products of the realizations with X and with y.
-        let mut cross = DMatrix::<f64>::zeros(models, p + 1);
-        for m in 0..models {
+        let mut cross = DMatrix::<f64>::zeros(realizations, p + 1);
+        for m in 0..realizations {
             for j in 0..p {
-                cross[(m, j)] = sums.matrix[(models + j, m)];
+                cross[(m, j)] = sums.matrix[(realizations + j, m)];
             }
             cross[(m, p)] = sums.y[m];
         }
@@ -82,15 +89,18 @@ pub(super) fn profile(table: &Table, random: Random, ratios: &Ratios) -> Option<
         let less = cross.transpose() * solved * g;
         for i in 0..p {
             for j in 0..=i {
-                sums.matrix[(models + i, models + j)] -= less[(i, j)];
+                sums.matrix[(realizations + i, realizations + j)] -= less[(i, j)];
             }
-            sums.y[models + i] -= less[(i, p)];
+            sums.y[realizations + i] -= less[(i, p)];
         }
         sums.yy -= less[(p, p)];
     }
-    let mut a = sums.matrix.view((models, models), (p, p)).into_owned();
+    let mut a = sums
+        .matrix
+        .view((realizations, realizations), (p, p))
+        .into_owned();
     a.fill_upper_triangle_with_lower_triangle();
-    let b = sums.y.rows(models, p).into_owned();
+    let b = sums.y.rows(realizations, p).into_owned();
     let factor = Cholesky::new(a)?;
     let beta = factor.solve(&b);
     let rss = sums.yy - beta.dot(&b) + table.within;
@@ -113,8 +123,13 @@ fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
         .sum::<f64>()
 }
 
-fn sums(table: &Table, random: Random, ratios: &Ratios, models: usize) -> Option<Sums> {
-    let width = models + table.columns();
+fn sums(
+    table: &LmmData,
+    random: RandomEffects,
+    ratios: &Ratios,
+    realizations: usize,
+) -> Option<Sums> {
+    let width = realizations + table.columns();
     let mut sums = Sums {
         matrix: DMatrix::zeros(width, width),
         y: DVector::zeros(width),
@@ -146,13 +161,15 @@ fn sums(table: &Table, random: Random, ratios: &Ratios, models: usize) -> Option
             sum2 += w * unit.x * sum;
             // The design row has at most three entries.
             let fixed: [(usize, f64); 2] = match table.fixed {
-                Fixed::Intercept => [(models, 1.0), (models, 0.0)],
-                Fixed::Covariate { .. } => [(models, 1.0), (models + 1, unit.x)],
-                Fixed::Models => [(models + unit.model, 1.0), (models, 0.0)],
+                FixedEffects::Intercept => [(realizations, 1.0), (realizations, 0.0)],
+                FixedEffects::Covariate { .. } => [(realizations, 1.0), (realizations + 1, unit.x)],
+                FixedEffects::Realizations => {
+                    [(realizations + unit.realization, 1.0), (realizations, 0.0)]
+                }
             };
             let entries = [
-                if models > 0 {
-                    (unit.model, 1.0)
+                if realizations > 0 {
+                    (unit.realization, 1.0)
                 } else {
                     (0, 0.0)
                 },
@@ -207,7 +224,7 @@ struct Inner {
     log_det: f64,
 }
 
-fn inner(ratios: &Ratios, random: Random, s11: f64, s12: f64, s22: f64) -> Option<Inner> {
+fn inner(ratios: &Ratios, random: RandomEffects, s11: f64, s12: f64, s22: f64) -> Option<Inner> {
     let (a, b, c) = (ratios.intercept, ratios.slope, ratios.covariance);
     if !random.slope {
         let det = 1.0 + a * s11;

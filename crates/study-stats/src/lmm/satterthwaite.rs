@@ -7,9 +7,9 @@
 //! contrasts, rotated to independent ones (Kuznetsova et al. 2017, §2.3): tₘ² = (l̃ₘ'β)²/dₘ,
 //! F = mean tₘ², E = Σ νₘ/(νₘ − 2), ν = 2E/(E − q).
 
-use super::data::Fixed;
+use super::data::FixedEffects;
 use super::differences::{first, second};
-use super::fit::{Fit, weight};
+use super::fit::{LmmFit, weight};
 use super::profile::profile;
 use crate::distribution::{f_upper, t_quantile, t_two_sided};
 use crate::finite;
@@ -66,7 +66,7 @@ impl Uncertainty {
     }
 }
 
-impl Fit<'_> {
+impl LmmFit<'_> {
     /// Tests Σ lᵢβᵢ = 0.
     pub fn t_test(&self, l: &[f64]) -> ContrastT {
         let u = self.uncertainty();
@@ -109,12 +109,12 @@ impl Fit<'_> {
     }
 
     /// Tests that the means of all realizations are equal; for a table of
-    /// [`super::Fixed::Models`] with two or more.
+    /// [`super::FixedEffects::Realizations`] with two or more.
     pub fn f_test(&self) -> Option<ContrastF> {
         let p = self.table.columns();
-        let of_models = matches!(self.table.fixed, Fixed::Models);
-        let q = p.checked_sub(1).filter(|q| of_models && *q > 0)?;
-        let l = sequential(&self.table.ratings_by_model());
+        let of_realizations = matches!(self.table.fixed, FixedEffects::Realizations);
+        let q = p.checked_sub(1).filter(|q| of_realizations && *q > 0)?;
+        let l = sequential(&self.table.ratings_by_realization());
         let covariance = self.profile.inverse() * self.sigma2;
         let eigen = SymmetricEigen::new(&l * covariance * l.transpose());
         let rotated = eigen.eigenvectors.transpose() * l;

@@ -5,8 +5,8 @@
 //! and slope are Γ = θθ' + diag(0, δ), θ = (θ₁, θ₂) free, δ ≥ 0 the variance of
 //! the slope given the intercept; |correlation| = 1 is δ = 0.
 
-use super::Random;
-use super::data::Table;
+use super::RandomEffects;
+use super::data::LmmData;
 use super::profile::Ratios;
 
 /// Most points that are started from.
@@ -15,17 +15,17 @@ const MAX_STARTS: usize = 4;
 /// Maps the coordinates to variance ratios.
 #[derive(Debug, Clone)]
 pub(super) struct Coordinates {
-    pub(super) random: Random,
+    pub(super) random: RandomEffects,
     intercept: f64,
     slope: f64,
-    model: f64,
+    realization: f64,
     cell: f64,
 }
 
 impl Coordinates {
-    pub(super) fn of(table: &Table, random: Random) -> Self {
+    pub(super) fn of(table: &LmmData, random: RandomEffects) -> Self {
         let (mut intercept, mut slope, mut cell) = (1.0f64, 0.0f64, 1.0f64);
-        let mut by_model = vec![0.0; table.models.len()];
+        let mut by_realization = vec![0.0; table.realizations.len()];
         for pattern in &table.patterns {
             let n: f64 = pattern.units.iter().map(|u| u.n).sum();
             let xx: f64 = pattern.units.iter().map(|u| u.n * u.x * u.x).sum();
@@ -33,14 +33,14 @@ impl Coordinates {
             slope = slope.max(xx);
             for unit in &pattern.units {
                 cell = cell.max(unit.n);
-                by_model[unit.model] += pattern.subjects * unit.n;
+                by_realization[unit.realization] += pattern.subjects * unit.n;
             }
         }
         Self {
             random,
             intercept,
             slope: if slope > 0.0 { slope } else { 1.0 },
-            model: by_model.iter().copied().fold(1.0, f64::max),
+            realization: by_realization.iter().copied().fold(1.0, f64::max),
             cell,
         }
     }
@@ -52,7 +52,11 @@ impl Coordinates {
         } else {
             vec![true]
         };
-        bounded.extend([self.random.model, self.random.cell].iter().filter(|r| **r));
+        bounded.extend(
+            [self.random.realization, self.random.cell]
+                .iter()
+                .filter(|r| **r),
+        );
         bounded
     }
 
@@ -69,8 +73,8 @@ impl Coordinates {
             &at[1..]
         };
         let mut rest = rest.iter();
-        if self.random.model {
-            ratios.model = rest.next().map_or(0.0, |u| u.exp_m1() / self.model);
+        if self.random.realization {
+            ratios.realization = rest.next().map_or(0.0, |u| u.exp_m1() / self.realization);
         }
         if self.random.cell {
             ratios.cell = rest.next().map_or(0.0, |u| u.exp_m1() / self.cell);

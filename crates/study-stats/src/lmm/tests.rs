@@ -5,20 +5,20 @@ use crate::correlation::{p_of_r, pearson};
 use study_base::rng::Stream;
 
 /// Balanced complete cells: subject + model + cell + noise.
-fn balanced(seed: u64, subjects: usize, x: &[f64], n: usize, spread: [f64; 4]) -> Vec<Cell> {
+fn balanced(seed: u64, subjects: usize, x: &[f64], n: usize, spread: [f64; 4]) -> Vec<CellSummary> {
     let mut noise = Stream::new(seed, &["lmm"]);
-    let of_model: Vec<f64> = x.iter().map(|x| x + spread[1] * noise.normal()).collect();
+    let of_realization: Vec<f64> = x.iter().map(|x| x + spread[1] * noise.normal()).collect();
     let mut cells = Vec::new();
     for subject in 0..subjects {
         let bias = spread[0] * noise.normal();
-        for (model, level) in of_model.iter().enumerate() {
+        for (realization, level) in of_realization.iter().enumerate() {
             let here = level + bias + spread[2] * noise.normal();
             let rows: Vec<f64> = (0..n).map(|_| here + spread[3] * noise.normal()).collect();
             let mean = rows.iter().sum::<f64>() / n as f64;
-            cells.push(Cell {
+            cells.push(CellSummary {
                 subject,
-                model,
-                x: x[model],
+                realization,
+                x: x[realization],
                 n,
                 mean,
                 within: rows.iter().map(|r| (r - mean).powi(2)).sum(),
@@ -29,14 +29,14 @@ fn balanced(seed: u64, subjects: usize, x: &[f64], n: usize, spread: [f64; 4]) -
 }
 
 const X: [f64; 6] = [0.1, 0.5, 0.55, 0.9, 1.3, 2.0];
-const CROSSED: Random = Random {
+const CROSSED: RandomEffects = RandomEffects {
     slope: false,
-    model: true,
+    realization: true,
     cell: true,
 };
 
-fn table(cells: &[Cell]) -> Table {
-    Table::new(cells, Fixed::Covariate { centre: 0.9 }).unwrap()
+fn table(cells: &[CellSummary]) -> LmmData {
+    LmmData::new(cells, FixedEffects::Covariate { centre: 0.9 }).unwrap()
 }
 
 fn close(a: f64, b: f64, relative: f64) {
@@ -61,7 +61,7 @@ fn the_crossed_models_p_is_pearsons_over_realization_means() {
         off_the_boundary += 1;
         let means: Vec<f64> = (0..X.len())
             .map(|m| {
-                let own = cells.iter().filter(|c| c.model == m);
+                let own = cells.iter().filter(|c| c.realization == m);
                 own.map(|c| c.mean).sum::<f64>() / 8.0
             })
             .collect();
@@ -78,15 +78,15 @@ fn the_crossed_models_p_is_pearsons_over_realization_means() {
 fn a_balanced_random_intercept_has_its_closed_form() {
     let (subjects, n) = (7usize, 2usize);
     let cells = balanced(3, subjects, &X, n, [1.0, 0.5, 0.0, 1.0]);
-    let table = Table::new(&cells, Fixed::Models).unwrap();
-    let fit = fit(&table, Random::default(), Criterion::Reml).unwrap();
+    let table = LmmData::new(&cells, FixedEffects::Realizations).unwrap();
+    let fit = fit(&table, RandomEffects::default(), Criterion::Reml).unwrap();
     let per_subject = (X.len() * n) as f64;
     let of_subject = |s: usize| {
         let own = cells.iter().filter(|c| c.subject == s);
         own.map(|c| c.mean).sum::<f64>() / X.len() as f64
     };
-    let of_model = |m: usize| {
-        let own = cells.iter().filter(|c| c.model == m);
+    let of_realization = |m: usize| {
+        let own = cells.iter().filter(|c| c.realization == m);
         own.map(|c| c.mean).sum::<f64>() / subjects as f64
     };
     let grand = (0..subjects).map(of_subject).sum::<f64>() / subjects as f64;
@@ -97,7 +97,7 @@ fn a_balanced_random_intercept_has_its_closed_form() {
     let ss_error: f64 = cells
         .iter()
         .map(|c| {
-            let e = c.mean - of_subject(c.subject) - of_model(c.model) + grand;
+            let e = c.mean - of_subject(c.subject) - of_realization(c.realization) + grand;
             c.within + n as f64 * e * e
         })
         .sum();
@@ -134,9 +134,9 @@ fn f_over_unequal_numbers_takes_the_contrasts_of_lmertest() {
     for (subject, own) in ratings.iter().enumerate() {
         for cell in own.chunk_by(|a, b| a.0 == b.0) {
             let mean = cell.iter().map(|c| c.1).sum::<f64>() / cell.len() as f64;
-            cells.push(Cell {
+            cells.push(CellSummary {
                 subject,
-                model: cell[0].0,
+                realization: cell[0].0,
                 x: 0.0,
                 n: cell.len(),
                 mean,
@@ -144,8 +144,8 @@ fn f_over_unequal_numbers_takes_the_contrasts_of_lmertest() {
             });
         }
     }
-    let table = Table::new(&cells, Fixed::Models).unwrap();
-    let found = fit(&table, Random::default(), Criterion::Reml)
+    let table = LmmData::new(&cells, FixedEffects::Realizations).unwrap();
+    let found = fit(&table, RandomEffects::default(), Criterion::Reml)
         .unwrap()
         .f_test()
         .unwrap();
@@ -162,22 +162,22 @@ fn a_variance_on_the_boundary_is_zero_exactly() {
         let mean = own.iter().map(|c| c.mean).sum::<f64>() / X.len() as f64;
         own.iter_mut().for_each(|c| c.mean -= mean);
     }
-    let table = Table::new(&cells, Fixed::Models).unwrap();
-    let fit = fit(&table, Random::default(), Criterion::Reml).unwrap();
+    let table = LmmData::new(&cells, FixedEffects::Realizations).unwrap();
+    let fit = fit(&table, RandomEffects::default(), Criterion::Reml).unwrap();
     assert_eq!(fit.variances.intercept, 0.0);
     assert!(fit.singular);
 }
 
 /// Every n, mean and covariate another: each subject a pattern of its own.
-fn ragged(seed: u64) -> Vec<Cell> {
+fn ragged(seed: u64) -> Vec<CellSummary> {
     let mut noise = Stream::new(seed, &["ragged"]);
     balanced(seed, 9, &X, 3, [0.8, 0.4, 0.3, 1.0])
         .into_iter()
         .filter_map(|c| {
             let n = (noise.normal().abs() * 2.0) as usize;
-            (n > 0).then_some(Cell { n, ..c })
+            (n > 0).then_some(CellSummary { n, ..c })
         })
-        .map(|c| Cell {
+        .map(|c| CellSummary {
             within: if c.n == 1 { 0.0 } else { c.within },
             ..c
         })
@@ -187,21 +187,21 @@ fn ragged(seed: u64) -> Vec<Cell> {
 #[test]
 fn shift_scale_names_and_order_do_not_matter() {
     for random in [
-        Random::default(),
-        Random {
+        RandomEffects::default(),
+        RandomEffects {
             slope: true,
-            ..Random::default()
+            ..RandomEffects::default()
         },
         CROSSED,
     ] {
         let cells = ragged(11);
         let table = table(&cells);
         let a = fit(&table, random, Criterion::Reml).unwrap();
-        let mut moved: Vec<Cell> = cells
+        let mut moved: Vec<CellSummary> = cells
             .iter()
-            .map(|c| Cell {
+            .map(|c| CellSummary {
                 subject: 100 - c.subject,
-                model: 50 - c.model,
+                realization: 50 - c.realization,
                 x: 10.0 * c.x - 3.0,
                 n: c.n,
                 mean: 4.0 * c.mean + 1000.0,
@@ -209,13 +209,13 @@ fn shift_scale_names_and_order_do_not_matter() {
             })
             .collect();
         moved.reverse();
-        let moved = Table::new(&moved, Fixed::Covariate { centre: 6.0 }).unwrap();
+        let moved = LmmData::new(&moved, FixedEffects::Covariate { centre: 6.0 }).unwrap();
         let b = fit(&moved, random, Criterion::Reml).unwrap();
         let (v, w) = (a.variances, b.variances);
         close(16.0 * v.error, w.error, 1e-6);
         assert!((16.0 * v.intercept - w.intercept).abs() < 1e-5 * w.error);
         assert!((0.16 * v.slope - w.slope).abs() < 1e-5 * w.error);
-        assert!((16.0 * v.model - w.model).abs() < 1e-5 * w.error);
+        assert!((16.0 * v.realization - w.realization).abs() < 1e-5 * w.error);
         assert!((16.0 * v.cell - w.cell).abs() < 1e-5 * w.error);
         let (s, t) = (a.t_test(&[0.0, 1.0]), b.t_test(&[0.0, 1.0]));
         close(0.4 * s.estimate, t.estimate, 1e-6);
@@ -250,55 +250,61 @@ fn many_subjects_of_one_pattern_are_as_each_alone() {
     let a = fit(&shared, CROSSED, Criterion::Reml).unwrap();
     let b = fit(&apart, CROSSED, Criterion::Reml).unwrap();
     close(a.deviance, b.deviance, 1e-12);
-    close(a.variances.model, b.variances.model, 1e-7);
+    close(a.variances.realization, b.variances.realization, 1e-7);
 }
 
 #[test]
 fn what_is_not_defined_says_why() {
     let cells = balanced(1, 4, &X, 1, [1.0, 1.0, 1.0, 1.0]);
     let table = table(&cells);
-    let why = |r: Result<Fit<'_>, LmmError>| r.unwrap_err();
+    let why = |r: Result<LmmFit<'_>, LmmError>| r.unwrap_err();
     assert_eq!(
         why(fit(&table, CROSSED, Criterion::Reml)),
         LmmError::NoRepetition
     );
-    let new = |cells: &[Cell]| Table::new(cells, Fixed::Covariate { centre: 0.0 }).unwrap_err();
+    let new = |cells: &[CellSummary]| {
+        LmmData::new(cells, FixedEffects::Covariate { centre: 0.0 }).unwrap_err()
+    };
     assert_eq!(new(&[]), LmmError::NoData);
     assert_eq!(new(&cells[..6]), LmmError::OneSubject);
-    let change = |f: &dyn Fn(&Cell) -> Cell| cells.iter().map(f).collect::<Vec<_>>();
+    let change = |f: &dyn Fn(&CellSummary) -> CellSummary| cells.iter().map(f).collect::<Vec<_>>();
     assert_eq!(
-        new(&change(&|c| Cell { x: 0.7, ..*c })),
+        new(&change(&|c| CellSummary { x: 0.7, ..*c })),
         LmmError::ConstantCovariate
     );
     assert_eq!(
-        new(&change(&|c| Cell { mean: 4.0, ..*c })),
+        new(&change(&|c| CellSummary { mean: 4.0, ..*c })),
         LmmError::ConstantRatings
     );
     assert_eq!(
-        new(&change(&|c| Cell {
+        new(&change(&|c| CellSummary {
             mean: f64::INFINITY,
             ..*c
         })),
         LmmError::NoData
     );
-    let additive = change(&|c| Cell {
+    let additive = change(&|c| CellSummary {
         mean: c.x + c.subject as f64,
         ..*c
     });
-    let additive = Table::new(&additive, Fixed::Models).unwrap();
+    let additive = LmmData::new(&additive, FixedEffects::Realizations).unwrap();
     assert_eq!(
-        why(fit(&additive, Random::default(), Criterion::Ml)),
+        why(fit(&additive, RandomEffects::default(), Criterion::Ml)),
         LmmError::NoError
     );
-    let two: Vec<Cell> = cells.iter().filter(|c| c.model < 2).copied().collect();
-    let two = Table::new(&two, Fixed::Covariate { centre: 0.3 }).unwrap();
-    let crossed = Random {
+    let two: Vec<CellSummary> = cells
+        .iter()
+        .filter(|c| c.realization < 2)
+        .copied()
+        .collect();
+    let two = LmmData::new(&two, FixedEffects::Covariate { centre: 0.3 }).unwrap();
+    let crossed = RandomEffects {
         cell: false,
         ..CROSSED
     };
     assert_eq!(
         why(fit(&two, crossed, Criterion::Reml)),
-        LmmError::FewModels
+        LmmError::FewRealizations
     );
 }
 
@@ -309,15 +315,15 @@ fn random_small_tables_give_numbers_or_reasons() {
     let mut fits = 0;
     for _ in 0..60 {
         let mut below = |n: f64| ((draws.normal().abs() * 7.0) % n) as usize;
-        let (subjects, models) = (1 + below(5.0), 1 + below(5.0));
+        let (subjects, realizations) = (1 + below(5.0), 1 + below(5.0));
         let mut cells = Vec::new();
         for subject in 0..subjects {
-            for model in 0..models {
+            for realization in 0..realizations {
                 let n = below(4.0);
                 if n > 0 {
-                    cells.push(Cell {
+                    cells.push(CellSummary {
                         subject,
-                        model,
+                        realization,
                         x: below(3.0) as f64,
                         n,
                         mean: below(7.0) as f64,
@@ -327,17 +333,17 @@ fn random_small_tables_give_numbers_or_reasons() {
             }
         }
         for fixed in [
-            Fixed::Intercept,
-            Fixed::Models,
-            Fixed::Covariate { centre: 1.0 },
+            FixedEffects::Intercept,
+            FixedEffects::Realizations,
+            FixedEffects::Covariate { centre: 1.0 },
         ] {
-            let Ok(table) = Table::new(&cells, fixed) else {
+            let Ok(table) = LmmData::new(&cells, fixed) else {
                 continue;
             };
             for bits in 0..8 {
-                let random = Random {
-                    slope: bits & 1 > 0 && matches!(fixed, Fixed::Covariate { .. }),
-                    model: bits & 2 > 0 && fixed != Fixed::Models,
+                let random = RandomEffects {
+                    slope: bits & 1 > 0 && matches!(fixed, FixedEffects::Covariate { .. }),
+                    realization: bits & 2 > 0 && fixed != FixedEffects::Realizations,
                     cell: bits & 4 > 0,
                 };
                 let Ok(found) = fit(&table, random, Criterion::Reml) else {
@@ -349,13 +355,15 @@ fn random_small_tables_give_numbers_or_reasons() {
                     found.deviance,
                     v.intercept,
                     v.slope,
-                    v.model,
+                    v.realization,
                     v.cell,
                     v.error,
                 ] {
                     assert!(x.is_finite(), "{random:?} {found:?}");
                 }
-                assert!(v.intercept >= 0.0 && v.slope >= 0.0 && v.model >= 0.0 && v.cell >= 0.0);
+                assert!(
+                    v.intercept >= 0.0 && v.slope >= 0.0 && v.realization >= 0.0 && v.cell >= 0.0
+                );
                 let mut l = vec![0.0; table.columns()];
                 l[0] = 1.0;
                 let t = found.t_test(&l);

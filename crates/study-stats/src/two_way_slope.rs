@@ -6,7 +6,7 @@ use super::finite;
 
 /// A slope beside fixed subjects and realizations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beside {
+pub struct TwoWaySlope {
     /// Per unit of x.
     pub slope: f64,
     /// Its standard error.
@@ -30,7 +30,7 @@ const MAX_LEVELS: usize = 300;
 /// as the largest. What rounding costs, one step of iterative refinement gives back: the
 /// residuals are taken row by row and fitted again. `None` if the factors leave
 /// nothing of x, or no degree of freedom.
-pub fn beside_factors(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<Beside> {
+pub fn two_way_slope(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<TwoWaySlope> {
     let n = x.len();
     let (level_of, levels) = numbered(b);
     if n < 3 || levels > MAX_LEVELS {
@@ -73,7 +73,7 @@ pub fn beside_factors(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<Besi
     } else {
         None
     };
-    Some(Beside {
+    Some(TwoWaySlope {
         slope,
         se,
         t,
@@ -291,7 +291,7 @@ mod tests {
         let y: Vec<f64> = (0..8)
             .map(|i| 10.0 * f64::from(a[i]) - 3.0 * f64::from(b[i]) + 0.5 * x[i])
             .collect();
-        let found = beside_factors(&x, &y, &a, &b).unwrap();
+        let found = two_way_slope(&x, &y, &a, &b).unwrap();
         assert!((found.slope - 0.5).abs() < 1e-12);
         assert_eq!((found.df, found.t), (2.0, None));
     }
@@ -301,6 +301,6 @@ mod tests {
         let b = [0, 1, 2, 0, 1, 2];
         let x = b.map(f64::from);
         let y = [1.0, 2.0, 2.0, 3.0, 4.0, 4.5];
-        assert_eq!(beside_factors(&x, &y, &[0, 0, 0, 1, 1, 1], &b), None);
+        assert_eq!(two_way_slope(&x, &y, &[0, 0, 0, 1, 1, 1], &b), None);
     }
 }

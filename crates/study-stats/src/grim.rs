@@ -12,7 +12,7 @@
 
 /// A printed number: all it says is that the true one rounds to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Printed {
+pub struct PrintedNumber {
     /// Its digits as a whole number, 4.800 as 4800.
     pub digits: i128,
     /// Digits after the point.
@@ -25,13 +25,13 @@ const MAX_DIGITS: usize = 12;
 /// Why a text is no printed number.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("not a plain decimal number, such as 4.80")]
-pub struct NotPrinted;
+pub struct NotADecimal;
 
-impl std::str::FromStr for Printed {
-    type Err = NotPrinted;
+impl std::str::FromStr for PrintedNumber {
+    type Err = NotADecimal;
 
-    fn from_str(text: &str) -> Result<Self, NotPrinted> {
-        let wrong = || NotPrinted;
+    fn from_str(text: &str) -> Result<Self, NotADecimal> {
+        let wrong = || NotADecimal;
         let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
         let unsigned = whole.strip_prefix('-').unwrap_or(whole);
         let plain = |t: &str| t.bytes().all(|b| b.is_ascii_digit());
@@ -47,7 +47,7 @@ impl std::str::FromStr for Printed {
     }
 }
 
-impl Printed {
+impl PrintedNumber {
     /// The scale: 10 to the decimals.
     fn unit(self) -> i128 {
         10i128.pow(self.decimals)
@@ -70,7 +70,7 @@ impl Printed {
 
 /// What the standard deviation may have been taken over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Over {
+pub enum SdOver {
     /// All ratings.
     Ratings,
     /// The means of the subjects, each of so many ratings.
@@ -82,16 +82,16 @@ pub enum Over {
 
 /// A definition of the standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Definition {
+pub struct SdDefinition {
     /// Over what.
-    pub over: Over,
+    pub over: SdOver,
     /// Whether the divisor is one less than their number.
-    pub less_one: bool,
+    pub n_minus_1: bool,
 }
 
 /// A pair of sums that prints as asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sums {
+pub struct PossibleSums {
     /// Of the ratings.
     pub sum: i128,
     /// Of the squares: of the ratings, or of the subjects' sums.
@@ -102,18 +102,18 @@ pub struct Sums {
 
 /// What a definition can give.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
+pub struct SdCheck {
     /// Which definition.
-    pub definition: Definition,
+    pub definition: SdDefinition,
     /// How many numbers it goes over: ratings, or subjects.
     pub n: u32,
     /// Sums that print as asked, up to [`MAX_SHOWN`].
-    pub sums: Vec<Sums>,
+    pub sums: Vec<PossibleSums>,
     /// How many there are; at [`MAX_COUNTED`] the count stops.
     pub count: usize,
     /// Sums that would print as asked, but that no ratings have, up to
     /// [`MAX_SHOWN`].
-    pub missed: Vec<Sums>,
+    pub unattainable: Vec<PossibleSums>,
 }
 
 /// Most sums that are kept for showing.
@@ -129,11 +129,11 @@ pub const MAX_SCALE: i128 = 10_000;
 
 /// What was printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Question {
+pub struct Published {
     /// The mean.
-    pub mean: Printed,
+    pub mean: PrintedNumber,
     /// The standard deviation.
-    pub sd: Printed,
+    pub sd: PrintedNumber,
     /// Ratings.
     pub n: u32,
     /// Ratings of each subject; not known: every divisor of n is tried.
@@ -143,7 +143,7 @@ pub struct Question {
 }
 
 /// Sums whose mean rounds to what was printed.
-pub fn sums(q: &Question) -> Vec<i128> {
+pub fn possible_sums(q: &Published) -> Vec<i128> {
     let n = i128::from(q.n);
     let near = q.mean.digits * n / q.mean.unit();
     let slack = n / (2 * q.mean.unit()) + 2;
@@ -156,18 +156,18 @@ pub fn sums(q: &Question) -> Vec<i128> {
 /// Every definition with what it can give. Subject means come in where the
 /// ratings of each divide n and leave two subjects or more. n has to be from 1 to
 /// [`MAX_N`], the scale within ±[`MAX_SCALE`].
-pub fn possible(q: &Question) -> Vec<Found> {
-    let sums = sums(q);
-    let mut overs = vec![Over::Ratings];
+pub fn check(q: &Published) -> Vec<SdCheck> {
+    let sums = possible_sums(q);
+    let mut overs = vec![SdOver::Ratings];
     for each in 2..=q.n / 2 {
         if q.n.is_multiple_of(each) && q.each.is_none_or(|known| known == each) {
-            overs.push(Over::SubjectMeans { each });
+            overs.push(SdOver::SubjectMeans { each });
         }
     }
     let mut all = Vec::new();
     for over in overs {
-        for less_one in [true, false] {
-            all.push(find(q, &sums, Definition { over, less_one }));
+        for n_minus_1 in [true, false] {
+            all.push(find(q, &sums, SdDefinition { over, n_minus_1 }));
         }
     }
     all
@@ -175,21 +175,21 @@ pub fn possible(q: &Question) -> Vec<Found> {
 
 /// Over subject means the numbers are the subjects' sums, whole again, on a scale
 /// `each` times as wide; the SD is that of the sums over `each`.
-fn find(q: &Question, sums: &[i128], definition: Definition) -> Found {
+fn find(q: &Published, sums: &[i128], definition: SdDefinition) -> SdCheck {
     let each = match definition.over {
-        Over::Ratings => 1,
-        Over::SubjectMeans { each } => i128::from(each),
+        SdOver::Ratings => 1,
+        SdOver::SubjectMeans { each } => i128::from(each),
     };
     let n = i128::from(q.n) / each;
     let (low, high) = (q.scale.0 * each, q.scale.1 * each);
-    let divisor = if definition.less_one { n - 1 } else { n };
-    let mut found = Found {
+    let divisor = if definition.n_minus_1 { n - 1 } else { n };
+    let mut found = SdCheck {
         definition,
         // n was a u32 and became no larger.
         n: n as u32,
         sums: Vec::new(),
         count: 0,
-        missed: Vec::new(),
+        unattainable: Vec::new(),
     };
     if divisor < 1 {
         return found;
@@ -208,7 +208,7 @@ fn find(q: &Question, sums: &[i128], definition: Definition) -> Found {
             if wide(squares) < 0 || !q.sd.rounds_from_root(wide(squares), below) {
                 continue;
             }
-            let sums = Sums {
+            let sums = PossibleSums {
                 sum,
                 squares,
                 deviations: wide(squares),
@@ -221,8 +221,8 @@ fn find(q: &Question, sums: &[i128], definition: Definition) -> Found {
                 if found.count == MAX_COUNTED {
                     return found;
                 }
-            } else if found.missed.len() < MAX_SHOWN {
-                found.missed.push(sums);
+            } else if found.unattainable.len() < MAX_SHOWN {
+                found.unattainable.push(sums);
             }
         }
     }
@@ -289,8 +289,8 @@ fn search(n: i128, sum: i128, squares: i128, low: i128, high: i128, budget: &mut
 mod tests {
     use super::*;
 
-    fn question(mean: &str, sd: &str, n: u32, each: Option<u32>) -> Question {
-        Question {
+    fn question(mean: &str, sd: &str, n: u32, each: Option<u32>) -> Published {
+        Published {
             mean: mean.parse().unwrap(),
             sd: sd.parse().unwrap(),
             n,
@@ -303,31 +303,31 @@ mod tests {
     #[test]
     fn only_the_sd_over_all_ratings_with_n_less_one_gives_the_papers_numbers() {
         let q = question("4.800", "0.997", 30, Some(3));
-        assert_eq!(sums(&q), [144]);
-        let found = possible(&q);
+        assert_eq!(possible_sums(&q), [144]);
+        let found = check(&q);
         let counts: Vec<usize> = found.iter().map(|f| f.count).collect();
         assert_eq!(counts, [1, 0, 0, 0]);
         let s = found[0].sums[0];
         // Q = 720: 720 − 144²/30 = 28.8, here times n.
         assert_eq!((s.sum, s.squares, s.deviations), (144, 720, 864));
         // With n = 30 in the denominator it would have to be 721, which is odd.
-        assert_eq!(found[1].missed[0].squares, 721);
+        assert_eq!(found[1].unattainable[0].squares, 721);
     }
 
     #[test]
     fn a_mean_that_no_whole_ratings_have_is_impossible() {
         // 3.45 · 28 = 96.6; 96/28 = 3.43, 97/28 = 3.46.
         let q = question("3.45", "1.00", 28, None);
-        assert_eq!(sums(&q), [] as [i128; 0]);
-        assert!(possible(&q).iter().all(|f| f.count == 0));
+        assert_eq!(possible_sums(&q), [] as [i128; 0]);
+        assert!(check(&q).iter().all(|f| f.count == 0));
     }
 
     #[test]
     fn an_sd_beyond_the_ends_of_the_scale_is_impossible() {
         // Mean 6.9 of ten on 1…7: the widest is nine 7 and one 6.
         let q = question("6.9", "1.5", 10, None);
-        assert_eq!(sums(&q), [69]);
-        assert_eq!(possible(&q)[0].count, 0);
+        assert_eq!(possible_sums(&q), [69]);
+        assert_eq!(check(&q)[0].count, 0);
     }
 
     /// Every multiset of four ratings on 1…4 against the search.
@@ -351,11 +351,11 @@ mod tests {
 
     #[test]
     fn halves_may_have_been_rounded_either_way() {
-        let printed: Printed = "0.13".parse().unwrap();
+        let printed: PrintedNumber = "0.13".parse().unwrap();
         assert!(printed.rounds_from(1, 8));
-        let printed: Printed = "0.12".parse().unwrap();
+        let printed: PrintedNumber = "0.12".parse().unwrap();
         assert!(printed.rounds_from(1, 8));
-        assert!("4,8".parse::<Printed>().is_err() && "nan".parse::<Printed>().is_err());
-        assert!("-".parse::<Printed>().is_err() && "1e3".parse::<Printed>().is_err());
+        assert!("4,8".parse::<PrintedNumber>().is_err() && "nan".parse::<PrintedNumber>().is_err());
+        assert!("-".parse::<PrintedNumber>().is_err() && "1e3".parse::<PrintedNumber>().is_err());
     }
 }
