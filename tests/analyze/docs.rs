@@ -8,17 +8,17 @@ use std::path::Path;
 use study_core::analyze::{Rules, analyze};
 use study_core::outcome::ratings::Ratings;
 
-/// The words of the documents' code, `a_{b,c}` and `a/{b,c}` written out, on both
-/// sides of every `/`. A word that ends in `*` stands for all that begin like it.
+/// The words in the documents' code spans, split at `/`, with `a_{b,c}` and `a/{b,c}`
+/// expanded. A word that ends in `*` stands for all words with that prefix.
 fn explained() -> BTreeSet<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     let mut words = BTreeSet::new();
     for name in ["statistics", "statistics-mixed", "statistics-ordinal"] {
         let text = fs::read_to_string(root.join(format!("{name}.md"))).unwrap();
-        // Every second piece is code; a line may break in it.
+        // Every second piece is code, which may contain a line break.
         for code in text.split('`').skip(1).step_by(2) {
             let code: String = code.split_whitespace().collect();
-            for whole in written_out(&code) {
+            for whole in expanded(&code) {
                 words.extend(whole.split(['/', ',']).map(str::to_owned));
             }
         }
@@ -26,18 +26,19 @@ fn explained() -> BTreeSet<String> {
     words
 }
 
-fn written_out(code: &str) -> Vec<String> {
+fn expanded(code: &str) -> Vec<String> {
     let Some((before, rest)) = code.split_once('{') else {
         return vec![code.to_owned()];
     };
     let Some((inside, after)) = rest.split_once('}') else {
         return vec![code.to_owned()];
     };
-    let one = |part: &str| written_out(&format!("{before}{part}{after}"));
+    let one = |part: &str| expanded(&format!("{before}{part}{after}"));
     inside.split(',').flat_map(one).collect()
 }
 
-/// Names from the data: realizations, subjects, pairs, thresholds, repetitions.
+/// Whether a word is a name from the data: a realization, subject, pair, threshold or
+/// repetition.
 fn is_from_the_data(word: &str, ratings: &Ratings) -> bool {
     ratings.models.iter().any(|m| m.id == word)
         || ratings.subjects.iter().any(|s| s.id == word)
@@ -65,7 +66,7 @@ fn every_identifier_is_in_the_documents() {
             ..Rules::default()
         };
         for (id, _) in analyze(&ratings, &rules).values.iter() {
-            // A realization's own name may hold a slash; these sets have none.
+            // A realization's name may contain a slash; those of these data sets do not.
             let words = id.split('/').filter(|w| !is_from_the_data(w, &ratings));
             unknown.extend(words.filter(|w| !known(w)).map(|w| format!("{w} in {id}")));
         }

@@ -1,9 +1,8 @@
-//! Walls: every statistic against two independent implementations.
+//! Every statistic is compared with two independent implementations.
 //!
 //! `tests/golden/data/NAME/expected.json` holds value, tolerance, class and
-//! source of each identifier; all sets there are free (own simulations, CC0, and
-//! NIST's StRD). What is left out on purpose is listed here, so that nothing can
-//! vanish unseen.
+//! source of each identifier; all data sets are freely usable (own simulations, CC0,
+//! and NIST's StRD). Values that are deliberately not compared are listed here.
 #![allow(clippy::unwrap_used)]
 
 use serde_json::Value as Json;
@@ -13,9 +12,9 @@ use std::path::PathBuf;
 use study_core::analyze::{Rules, Value, Values, analyze};
 use study_core::outcome::ratings::Ratings;
 
-/// Left out on purpose: where F is not defined, the reference has 0 for its
-/// corrected p and its eta squared. An invented 0 is no result.
-const NOT_A_RESULT: [(&str, &str); 6] = [
+/// Not compared: where F is undefined, the reference has 0 for its corrected p and
+/// its eta squared; this program reports them as undefined.
+const NOT_COMPARED: [(&str, &str); 6] = [
     ("sim_all_equal", "rmanova2/inter/ges"),
     ("sim_all_equal", "rmanova2/inter/p_gg"),
     ("sim_all_equal", "rmanova2/model/ges"),
@@ -72,14 +71,14 @@ fn every_statistic_agrees_with_its_reference() {
     let mut wrong = Vec::new();
     let mut passed = 0;
     let sets = sets();
-    assert!(sets.len() >= 15, "the sets are there: {sets:?}");
+    assert!(sets.len() >= 15, "data sets are missing: {sets:?}");
     for set in sets {
         let name = set.file_name().unwrap().to_string_lossy().into_owned();
         let text = fs::read_to_string(set.join("expected.json")).unwrap();
         let expected: Json = serde_json::from_str(&text).unwrap();
         let values = values(&set);
         for (id, want) in expected["expected"].as_object().unwrap() {
-            if NOT_A_RESULT.contains(&(&name, id)) {
+            if NOT_COMPARED.contains(&(&name, id)) {
                 continue;
             }
             match values.get(id) {
@@ -98,7 +97,7 @@ fn every_statistic_agrees_with_its_reference() {
 }
 
 #[test]
-fn thirty_ratings_with_sum_144_and_squares_720_have_the_papers_mean_and_sd() {
+fn thirty_ratings_with_sum_144_and_sum_of_squares_720_have_the_papers_mean_and_sd() {
     let mut csv = String::from("subject,model,repetition,rating,vaf\n");
     let ratings = [(3, 3), (4, 9), (5, 9), (6, 9)];
     let mut all = ratings.iter().flat_map(|&(v, n)| std::iter::repeat_n(v, n));

@@ -1,16 +1,17 @@
-//! Walls: mixed models where the table does not allow them, or barely.
+//! Mixed models on tables that do not permit them, or barely.
 #![allow(clippy::unwrap_used)]
 
 use study_core::analyze::{Rules, Values, analyze};
 use study_core::outcome::ratings::Ratings;
 
-fn of(rows: &str) -> Values {
+fn analyzed(rows: &str) -> Values {
     let csv = format!("subject,model,repetition,rating,vaf\n{rows}");
     let ratings = Ratings::read_csv("a.csv", csv.as_bytes(), None).unwrap();
     analyze(&ratings, &Rules::default()).values
 }
 
-/// Subjects × realizations × repetitions; rating and VAF by the three numbers.
+/// Analyses subjects × realizations × repetitions, with rating and VAF as functions of
+/// the three indices.
 fn table(
     [subjects, models, repetitions]: [u32; 3],
     rating: impl Fn(u32, u32, u32) -> f64,
@@ -25,10 +26,10 @@ fn table(
             }
         }
     }
-    of(&rows)
+    analyzed(&rows)
 }
 
-/// Ratings without a pattern, the same each time.
+/// Ratings without a pattern, reproducible.
 fn scattered(s: u32, m: u32, r: u32) -> f64 {
     f64::from((s * 7 + m * 5 + r * 11 + s * m * 3 + m * r) % 7 + 1)
 }
@@ -70,7 +71,7 @@ fn one_realization_has_no_realization_effect() {
 }
 
 #[test]
-fn equal_ratings_have_no_variance_to_divide() {
+fn equal_ratings_have_no_mixed_model() {
     let v = table([4, 5, 3], |_, _, _| 4.0, by_model);
     undefined(&v, "lmm_model/sigma2", "all ratings are equal");
     undefined(&v, "lmm_vaf_crossed/slope", "all ratings are equal");
@@ -84,7 +85,7 @@ fn repeated_ratings_that_agree_leave_no_error_beside_a_cell_effect() {
 }
 
 #[test]
-fn a_missing_or_constant_vaf_is_said() {
+fn a_missing_or_constant_vaf_has_a_reason() {
     let v = table([5, 4, 2], scattered, |_, _, _| String::new());
     undefined(&v, "lmm_vaf/slope", "no test realization has a VAF");
     undefined(&v, "lmm_vaf_crossed/slope", "no test realization has a VAF");
@@ -94,7 +95,7 @@ fn a_missing_or_constant_vaf_is_said() {
 }
 
 #[test]
-fn two_realizations_cannot_tell_a_slope_from_themselves() {
+fn two_realizations_have_no_crossed_slope() {
     let v = table([6, 2, 2], scattered, by_model);
     undefined(&v, "lmm_vaf_crossed/slope", "three realizations");
     assert!(v.number("lmm_vaf/slope").is_some());
@@ -110,7 +111,7 @@ fn a_vaf_of_each_trial_has_a_slope_but_no_crossed_model() {
 }
 
 #[test]
-fn shares_of_the_variance_add_up() {
+fn shares_of_the_variance_sum_to_one() {
     let csv = include_str!("../golden/data/sim_paper/data.csv");
     let ratings = Ratings::read_csv("a.csv", csv.as_bytes(), None).unwrap();
     let v = analyze(&ratings, &Rules::default()).values;
@@ -120,7 +121,7 @@ fn shares_of_the_variance_add_up() {
         .iter()
         .sum();
     assert!((sum - 1.0).abs() < 1e-12);
-    // Balanced: beside VAF the error is that of the repetitions, with it or without.
+    // In balanced data the error variance is that of the repetitions, with or without VAF.
     let (a, b) = (
         v.number("lmm_variance/var_error").unwrap(),
         v.number("lmm_vaf_crossed/sigma2").unwrap(),
@@ -128,22 +129,22 @@ fn shares_of_the_variance_add_up() {
     assert!((a - b).abs() < 1e-7, "{a} and {b}");
 }
 
-/// Realizations that do not differ on average, but by subject, and strongly.
+/// Ratings with a strong interaction of realization and subject.
 fn interacting(s: u32, m: u32, r: u32) -> f64 {
     let own = f64::from((s * 5 + m * 3 + s * m * 2) % 7);
     10.0 * own + 20.0 * f64::from(m % 3) + f64::from((s + 2 * m + 3 * r + m * r) % 3)
 }
 
-/// The share that VAF has compares two fits with the same random terms on the same
-/// ratings: interaction is nothing that VAF explains.
+/// The share of VAF compares two fits with the same random effects on the same
+/// ratings, so that it does not depend on the interaction variance.
 #[test]
-fn the_share_of_vaf_is_the_fall_between_models_with_the_same_terms() {
+fn the_share_of_vaf_compares_models_with_the_same_random_effects() {
     let scattered_vaf =
         |_, m: u32, _| ["0.2", "0.9", "0.5", "0.7", "0.35", "0.6"][m as usize].to_owned();
     let v = table([5, 6, 8], interacting, scattered_vaf);
     let number = |id: &str| v.number(id).unwrap();
     let share = number("corr/share/var_model_crossed");
-    // Every realization has its VAF, so that the model without it is `lmm_variance`.
+    // Every realization has a VAF, so the model without VAF is that of `lmm_variance`.
     let without = number("lmm_variance/var_model");
     let with = number("lmm_vaf_crossed/var_model");
     assert!(
@@ -152,13 +153,13 @@ fn the_share_of_vaf_is_the_fall_between_models_with_the_same_terms() {
     );
     assert!((number("lmm_vaf_crossed/var_model_without_vaf") - without).abs() < 1e-6 * without);
     assert_eq!(share, number("lmm_variance/model_share_of_vaf"));
-    // The model without the interaction has another variance.
+    // The model without the interaction has a different variance.
     let other = 1.0 - with / number("lmm_crossed/var_model");
     assert!((share - other).abs() > 0.01, "{share} {other}");
 }
 
 #[test]
-fn the_share_of_vaf_is_of_the_realizations_that_have_one() {
+fn the_share_of_vaf_uses_only_realizations_with_a_vaf() {
     let vaf = |s, m, r| {
         if m == 6 {
             String::new()
@@ -183,7 +184,7 @@ fn the_share_of_vaf_is_of_the_realizations_that_have_one() {
 }
 
 #[test]
-fn without_variance_between_realizations_nothing_can_be_explained() {
+fn the_share_of_vaf_is_undefined_without_variance_between_realizations() {
     let v = table(
         [6, 5, 2],
         |s, m, r| f64::from((s + m + 3 * r * (s + 1)) % 5),

@@ -1,22 +1,24 @@
-//! NIST's certified analyses of variance (StRD, public domain) through the whole
-//! analysis, as far as a double can hold their data.
+//! NIST's certified analyses of variance (StRD, public domain), computed by the whole
+//! analysis.
 //!
 //! A number such as 1000000000000.4 is off by up to 6·10⁻⁵ as a double, 0.06 % of the
-//! steps of 0.1 between the ratings. No program that reads doubles gets past that:
-//! the least numbers of digits here are what the sums can reach, not what they happen to.
+//! steps of 0.1 between the ratings. No program that reads doubles can avoid this
+//! error: the required numbers of digits are what doubles permit.
 #![allow(clippy::unwrap_used)]
 
 use study_core::analyze::{Rules, analyze};
 use study_core::outcome::ratings::Ratings;
 
-/// What NIST certifies: mean square between, F, residual standard deviation.
+/// Values certified by NIST.
 struct Certified {
-    between: f64,
+    /// Mean square between treatments.
+    ms_between: f64,
     f: f64,
     residual_sd: f64,
 }
 
-/// Treatments as realizations, replicates as repetitions of one subject.
+/// Analyses treatments as realizations and replicates as repetitions of one subject,
+/// and requires this many correct digits.
 fn compare(name: &str, treatments: &[Vec<String>], certified: &Certified, digits: f64) {
     let mut csv = String::from("subject,model,repetition,rating,vaf\n");
     for (t, responses) in treatments.iter().enumerate() {
@@ -27,7 +29,7 @@ fn compare(name: &str, treatments: &[Vec<String>], certified: &Certified, digits
     let ratings = Ratings::read_csv(name, csv.as_bytes(), None).unwrap();
     let v = analyze(&ratings, &Rules::default()).values;
     for (id, wanted) in [
-        ("icc_repetitions/ms_targets", certified.between),
+        ("icc_repetitions/ms_targets", certified.ms_between),
         ("icc_repetitions/F_1", certified.f),
         ("desc_all/within_cell_sd", certified.residual_sd),
     ] {
@@ -41,8 +43,8 @@ fn compare(name: &str, treatments: &[Vec<String>], certified: &Certified, digits
     }
 }
 
-/// Simon & Lesage's: nine treatments of `n` replicates at levels of 1.4, 1.3, 1.5,
-/// 1.3 …, each a tenth down and up, moved by `offset`.
+/// Simon & Lesage's data: nine treatments of `n` replicates at levels of 1.4, 1.3, 1.5,
+/// 1.3 …, alternating a tenth below and above their level, plus `offset`.
 fn simon_lesage(offset: u64, n: usize) -> Vec<Vec<String>> {
     let tenths = [4, 3, 5, 3, 5, 3, 5, 3, 5];
     let one = |level: i32| {
@@ -57,7 +59,7 @@ fn simon_lesage(offset: u64, n: usize) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn simon_and_lesages_sets() {
+fn simon_and_lesages_sets_agree_with_nist() {
     for (first, offset, digits) in [
         (1, 1, 14.0),
         (4, 1_000_000, 9.9),
@@ -65,7 +67,7 @@ fn simon_and_lesages_sets() {
     ] {
         for (i, n) in [21usize, 201, 2001].into_iter().enumerate() {
             let certified = Certified {
-                between: n as f64 / 100.0,
+                ms_between: n as f64 / 100.0,
                 f: n as f64,
                 residual_sd: 0.1,
             };
@@ -80,9 +82,9 @@ fn split(columns: &[&str]) -> Vec<Vec<String>> {
     columns.iter().map(words).collect()
 }
 
-/// Silicon resistivity: five instruments.
+/// Five instruments.
 #[test]
-fn silicon_resistivity() {
+fn silicon_resistivity_agrees_with_nist() {
     let data = split(&[
         "196.3052 196.1240 196.1890 196.2569 196.3403",
         "196.3042 196.3825 196.1669 196.3257 196.0422",
@@ -91,16 +93,16 @@ fn silicon_resistivity() {
         "196.2119 196.1051 196.1850 196.0052 196.2090",
     ]);
     let certified = Certified {
-        between: 1.278_656_54e-2,
+        ms_between: 1.278_656_54e-2,
         f: 1.180_462_374_402_55,
         residual_sd: 1.040_760_683_346_56e-1,
     };
     compare("SiRstv", &data, &certified, 12.9);
 }
 
-/// The atomic weight of silver: two instruments, differences in the eighth digit.
+/// Two instruments, with differences in the eighth digit.
 #[test]
-fn atomic_weight_of_silver() {
+fn the_atomic_weight_of_silver_agrees_with_nist() {
     let data = split(&[
         "107.8681568 107.8681465 107.8681572 107.8681785 107.8681446 107.8681903 107.8681526 107.8681494 \
          107.8681616 107.8681587 107.8681519 107.8681486 107.8681419 107.8681569 107.8681508 107.8681672 \
@@ -110,7 +112,7 @@ fn atomic_weight_of_silver() {
          107.8681101 107.8681512 107.8681469 107.8681360 107.8681254 107.8681261 107.8681450 107.8681368",
     ]);
     let certified = Certified {
-        between: 3.638_341_875e-9,
+        ms_between: 3.638_341_875e-9,
         f: 15.946_733_567_793,
         residual_sd: 1.510_483_144_464_1e-5,
     };

@@ -2,7 +2,7 @@
 
 use super::describe::{Sum, sum};
 use super::distribution::{f_quantile, f_upper};
-use super::finite;
+use super::{finite, rectangular};
 
 /// A coefficient with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,17 +50,17 @@ pub struct Icc {
 /// ICC3 = (T − E)/(T + (k−1)E). Intervals as in Shrout & Fleiss (1979).
 /// `None` below two of either.
 pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
-    let (n, k) = (rows.len(), rows.first()?.as_ref().len());
+    let rows = rectangular(rows)?;
+    let (n, k) = (rows.len(), rows[0].len());
     if n < 2 || k < 2 {
         return None;
     }
     let (nf, kf) = (n as f64, k as f64);
-    let rows = || rows.iter().map(AsRef::as_ref);
-    let row_means: Vec<f64> = rows().map(|r| sum(r) / kf).collect();
+    let row_means: Vec<f64> = rows.iter().map(|r| sum(r) / kf).collect();
     let grand = sum(&row_means) / nf;
     let mut columns = vec![Sum::default(); k];
-    for row in rows() {
-        for (sum, x) in columns.iter_mut().zip(row) {
+    for row in &rows {
+        for (sum, x) in columns.iter_mut().zip(*row) {
             sum.add(*x);
         }
     }
@@ -72,7 +72,7 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
     let targets = kf * squares(&row_means) / (nf - 1.0);
     let raters = nf * squares(&column_means) / (kf - 1.0);
     let (mut residual, mut size) = (Sum::default(), 0.0);
-    for (row, rm) in rows().zip(&row_means) {
+    for (row, rm) in rows.iter().zip(&row_means) {
         for (x, cm) in row.iter().zip(&column_means) {
             residual.add((x - rm - cm + grand).powi(2));
             size += (x - grand).powi(2);

@@ -6,7 +6,8 @@
 //! mean should be taken off the numbers beforehand, to keep their digits.
 
 use super::distribution::{chi2_upper, f_upper};
-use super::finite;
+use super::matrix::{Cholesky, SymmetricMatrix, dot};
+use super::{finite, rectangular};
 
 /// One effect and its error.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,8 +70,9 @@ pub struct TwoWay {
 }
 
 /// One-way analysis. `None` below two subjects or realizations.
-pub fn one_way(rows: &[Vec<f64>]) -> Option<OneWay> {
-    let k = rows.first()?.len();
+pub fn one_way<R: AsRef<[f64]>>(rows: &[R]) -> Option<OneWay> {
+    let rows = &rectangular(rows)?;
+    let k = rows[0].len();
     if rows.len() < 2 || k < 2 {
         return None;
     }
@@ -87,9 +89,11 @@ pub fn one_way(rows: &[Vec<f64>]) -> Option<OneWay> {
 
 /// Two-way analysis; each row holds a subject's ratings, realization by
 /// realization, `repetitions` each. `None` below two of anything.
-pub fn two_way(rows: &[Vec<f64>], repetitions: usize) -> Option<TwoWay> {
-    let width = rows.first()?.len();
-    if rows.len() < 2 || repetitions < 2 || width < 2 * repetitions {
+pub fn two_way<R: AsRef<[f64]>>(rows: &[R], repetitions: usize) -> Option<TwoWay> {
+    let rows = &rectangular(rows)?;
+    let width = rows[0].len();
+    let whole = repetitions >= 2 && width.is_multiple_of(repetitions);
+    if rows.len() < 2 || !whole || width < 2 * repetitions {
         return None;
     }
     let models = width / repetitions;
@@ -143,12 +147,8 @@ fn kronecker(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 /// Sum of squares, that of its error, and the centred contrasts by subject.
-fn effect_sums(rows: &[Vec<f64>], contrasts: &[Vec<f64>]) -> (f64, f64, Vec<Vec<f64>>) {
+fn effect_sums(rows: &[&[f64]], contrasts: &[Vec<f64>]) -> (f64, f64, Vec<Vec<f64>>) {
     let n = rows.len() as f64;
     let mut y: Vec<Vec<f64>> = rows
         .iter()
@@ -166,7 +166,7 @@ fn effect_sums(rows: &[Vec<f64>], contrasts: &[Vec<f64>]) -> (f64, f64, Vec<Vec<
     (ss, error, y)
 }
 
-fn effect(rows: &[Vec<f64>], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect {
+fn effect(rows: &[&[f64]], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect {
     let n = rows.len() as f64;
     let q = contrasts.len() as f64;
     let (ss, ss_error, y) = effect_sums(rows, contrasts);
@@ -181,8 +181,9 @@ fn effect(rows: &[Vec<f64>], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effe
     };
     let covariance = defined.then(|| covariance(&y));
     let eps_gg = covariance.as_ref().and_then(|s| {
-        let trace: f64 = (0..s.len()).map(|i| s[i][i]).sum();
-        let squares: f64 = s.iter().map(|r| dot(r, r)).sum();
+        let size = s.size();
+        let squares = |i: usize| (0..size).map(|j| s.get(i, j) * s.get(i, j)).sum::<f64>();
+        let (trace, squares) = (trace(s), (0..size).map(squares).sum::<f64>());
         finite(trace * trace / (q * squares))
     });
     let eps_hf = eps_gg.and_then(|e| {
@@ -210,27 +211,32 @@ fn effect(rows: &[Vec<f64>], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effe
     }
 }
 
-fn covariance(y: &[Vec<f64>]) -> Vec<Vec<f64>> {
+/// Covariance matrix of centred columns.
+fn covariance(y: &[Vec<f64>]) -> SymmetricMatrix {
     let q = y.first().map_or(0, Vec::len);
     let df = y.len() as f64 - 1.0;
-    let mut s = vec![vec![0.0; q]; q];
+    let mut s = SymmetricMatrix::zero(q);
     for v in y {
-        for (i, row) in s.iter_mut().enumerate() {
-            for (j, cell) in row.iter_mut().enumerate() {
-                *cell += v[i] * v[j] / df;
+        for i in 0..q {
+            for j in 0..=i {
+                s.add(i, j, v[i] * v[j] / df);
             }
         }
     }
     s
 }
 
-fn mauchly(s: &[Vec<f64>], df: f64) -> Option<Mauchly> {
-    let q = s.len() as f64;
-    if df < q || s.len() < 2 {
+fn trace(s: &SymmetricMatrix) -> f64 {
+    (0..s.size()).map(|i| s.get(i, i)).sum()
+}
+
+fn mauchly(s: &SymmetricMatrix, df: f64) -> Option<Mauchly> {
+    let q = s.size() as f64;
+    if df < q || s.size() < 2 {
         return None;
     }
-    let trace: f64 = (0..s.len()).map(|i| s[i][i]).sum();
-    let log_w = log_determinant(s)? - q * (trace / q).ln();
+    let log_determinant = finite(Cholesky::definite(s)?.log_determinant())?;
+    let log_w = log_determinant - q * (trace(s) / q).ln();
     let w = finite(log_w.exp())?;
     let rho = 1.0 - (2.0 * q * q + q + 2.0) / (6.0 * df * q);
     let z = -df * rho * log_w;
@@ -248,28 +254,6 @@ fn mauchly(s: &[Vec<f64>], df: f64) -> Option<Mauchly> {
         p: p(3.0 * q),
         p_as_r: p(3.0 * (q + 1.0)),
     })
-}
-
-/// ln det by Cholesky's decomposition; `None` if the matrix is singular.
-fn log_determinant(s: &[Vec<f64>]) -> Option<f64> {
-    let n = s.len();
-    let mut l = vec![vec![0.0; n]; n];
-    let mut log = 0.0;
-    for i in 0..n {
-        for j in 0..=i {
-            let rest = s[i][j] - dot(&l[i][..j], &l[j][..j]);
-            if i == j {
-                if rest <= 1e-13 * s[i][i] {
-                    return None;
-                }
-                l[i][i] = rest.sqrt();
-                log += rest.ln();
-            } else {
-                l[i][j] = rest / l[j][j];
-            }
-        }
-    }
-    finite(log)
 }
 
 #[cfg(test)]

@@ -8,8 +8,9 @@
 use super::correlation::pearson;
 use super::describe::is_constant;
 use super::distribution::{normal_cdf, normal_quantile};
-use super::finite;
-use crate::random::RandomSource;
+use super::matrix::{Cholesky, SymmetricMatrix};
+use super::random::RandomSource;
+use super::{finite, rectangular};
 
 /// Most subjects for which all compositions are visited.
 pub const MAX_EXACT: usize = 10;
@@ -55,18 +56,19 @@ pub struct Bootstrap {
 
 /// Resamples the rows (subjects) of a table and correlates the column sums with
 /// `x`. `None` below two subjects or where the correlation is not defined.
-pub fn correlation(
-    rows: &[Vec<f64>],
+pub fn correlation<R: AsRef<[f64]>>(
+    rows: &[R],
     x: &[f64],
     random: &mut impl RandomSource,
 ) -> Option<Bootstrap> {
+    let rows = &rectangular(rows).filter(|rows| rows[0].len() == x.len())?;
     let exact = rows.len() <= MAX_EXACT;
     let normal_limit = !exact && (rows.len() > MAX_DRAWN || rows.len() * x.len() > MAX_TABLE);
     resample(rows, x, normal_limit, random)
 }
 
 fn resample(
-    rows: &[Vec<f64>],
+    rows: &[&[f64]],
     x: &[f64],
     normal_limit: bool,
     random: &mut impl RandomSource,
@@ -117,63 +119,38 @@ fn resample(
 /// The normal distribution that the column sums of resamples tend to.
 struct Limit {
     sums: Vec<f64>,
-    /// Cholesky's factor of their covariance.
-    lower: Vec<Vec<f64>>,
+    /// Cholesky's factor of their covariance; a column that the others determine
+    /// contributes nothing of its own.
+    factor: Cholesky,
 }
 
 impl Limit {
-    fn of(rows: &[Vec<f64>]) -> Option<Self> {
+    fn of(rows: &[&[f64]]) -> Option<Self> {
         let k = rows.first()?.len();
         let n = rows.len() as f64;
         let sums = weighted(rows, &vec![1; rows.len()]);
-        let mut s = vec![vec![0.0; k]; k];
+        let mut squares = SymmetricMatrix::zero(k);
         let mut d = vec![0.0; k];
         for row in rows {
-            for ((d, v), sum) in d.iter_mut().zip(row).zip(&sums) {
+            for ((d, v), sum) in d.iter_mut().zip(*row).zip(&sums) {
                 *d = v - sum / n;
             }
-            for i in 0..k {
-                for j in 0..=i {
-                    s[i][j] += d[i] * d[j];
-                }
-            }
+            squares.add_outer(1.0, &d);
         }
-        let mut lower = vec![vec![0.0; k]; k];
-        for i in 0..k {
-            for j in 0..=i {
-                let known: f64 = (0..j).map(|m| lower[i][m] * lower[j][m]).sum();
-                let rest = s[i][j] - known;
-                lower[i][j] = if i == j {
-                    // A column that the others determine adds nothing of its own.
-                    if rest > 1e-12 * s[i][i] {
-                        rest.sqrt()
-                    } else {
-                        0.0
-                    }
-                } else if lower[j][j] > 0.0 {
-                    rest / lower[j][j]
-                } else {
-                    0.0
-                };
-            }
-        }
-        lower
-            .iter()
-            .flatten()
-            .all(|v| v.is_finite())
-            .then_some(Self { sums, lower })
+        let factor = Cholesky::semidefinite(&squares, |_| 1e-12)?;
+        Some(Self { sums, factor })
     }
 
     fn draw(&self, random: &mut impl RandomSource) -> Vec<f64> {
         let z: Vec<f64> = self.sums.iter().map(|_| random.normal()).collect();
-        (self.sums.iter().zip(&self.lower))
-            .map(|(sum, row)| sum + row.iter().zip(&z).map(|(l, z)| l * z).sum::<f64>())
-            .collect()
+        let deviations = self.factor.times(&z);
+        let sums = self.sums.iter().zip(deviations);
+        sums.map(|(sum, deviation)| sum + deviation).collect()
     }
 }
 
 fn summary(
-    rows: &[Vec<f64>],
+    rows: &[&[f64]],
     score: &Score,
     observed: f64,
     resamples: &[(f64, u64)],
@@ -272,11 +249,11 @@ impl<'a> Quantiles<'a> {
 }
 
 /// Σ(m − mᵢ)³/(6(Σ(m − mᵢ)²)^1.5) over the correlations mᵢ without subject i.
-fn acceleration(rows: &[Vec<f64>], score: &Score) -> Option<f64> {
+fn acceleration(rows: &[&[f64]], score: &Score) -> Option<f64> {
     let mut without = Vec::with_capacity(rows.len());
     let all = weighted(rows, &vec![1; rows.len()]);
     for row in rows {
-        let rest: Vec<f64> = all.iter().zip(row).map(|(sum, v)| sum - v).collect();
+        let rest: Vec<f64> = all.iter().zip(*row).map(|(sum, v)| sum - v).collect();
         without.push(score.of(&rest)?);
     }
     let mean = without.iter().sum::<f64>() / without.len() as f64;
@@ -292,11 +269,11 @@ fn acceleration(rows: &[Vec<f64>], score: &Score) -> Option<f64> {
     finite(cubes / (6.0 * squares.powf(1.5)))
 }
 
-fn weighted(rows: &[Vec<f64>], draws: &[u32]) -> Vec<f64> {
-    let mut sums = vec![0.0; rows.first().map_or(0, Vec::len)];
+fn weighted(rows: &[&[f64]], draws: &[u32]) -> Vec<f64> {
+    let mut sums = vec![0.0; rows.first().map_or(0, |row| row.len())];
     for (row, &n) in rows.iter().zip(draws) {
         if n > 0 {
-            for (s, v) in sums.iter_mut().zip(row) {
+            for (s, v) in sums.iter_mut().zip(*row) {
                 *s += f64::from(n) * v;
             }
         }
@@ -307,7 +284,7 @@ fn weighted(rows: &[Vec<f64>], draws: &[u32]) -> Vec<f64> {
 /// Every way to draw `left` times from the rows from `row` on; `weight` counts
 /// the sequences that give it (S! / Π kᵢ!, at most 10¹⁰, exact).
 fn compose(
-    rows: &[Vec<f64>],
+    rows: &[&[f64]],
     row: usize,
     left: usize,
     weight: u64,
@@ -329,7 +306,7 @@ fn compose(
             continue;
         }
         let (done, next) = sums.split_at_mut(row + 1);
-        for ((n, s), v) in next[0].iter_mut().zip(&done[row]).zip(&rows[row]) {
+        for ((n, s), v) in next[0].iter_mut().zip(&done[row]).zip(rows[row]) {
             *n = s + k as f64 * v;
         }
         if last {
@@ -379,10 +356,14 @@ impl Score {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use study_base::rng::Stream;
+    use crate::random::SplitMix64;
 
-    fn seeded() -> Stream {
-        Stream::new(1, &["bootstrap"])
+    fn slices(rows: &[Vec<f64>]) -> Vec<&[f64]> {
+        rows.iter().map(Vec::as_slice).collect()
+    }
+
+    fn seeded() -> SplitMix64 {
+        SplitMix64::new(1)
     }
 
     #[test]
@@ -390,7 +371,7 @@ mod tests {
         let rows: Vec<Vec<f64>> = (0..4).map(|i| vec![f64::from(i), 1.0, 2.0]).collect();
         let (mut visited, mut weights) = (0, 0);
         let mut sums = vec![vec![0.0; 3]; 5];
-        compose(&rows, 0, 4, 1, &mut sums, &mut |s, w| {
+        compose(&slices(&rows), 0, 4, 1, &mut sums, &mut |s, w| {
             // Every composition draws four rows, so the constant columns are fixed.
             assert_eq!((s[1], s[2]), (4.0, 8.0));
             visited += 1;
@@ -413,7 +394,7 @@ mod tests {
         let (mut not_above, mut zero, mut all) = (0, 0, 0);
         let mut sums = vec![vec![0.0; 4]; 6];
         let rows: Vec<Vec<f64>> = rows.iter().map(|r| r.to_vec()).collect();
-        compose(&rows, 0, 5, 1, &mut sums, &mut |s, w| {
+        compose(&slices(&rows), 0, 5, 1, &mut sums, &mut |s, w| {
             not_above += if trend(s) <= 0.0 { w } else { 0 };
             zero += if trend(s) == 0.0 { w } else { 0 };
             all += w;
@@ -426,12 +407,12 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_the_sorted_resamples() {
-        let mut stream = Stream::new(5, &["quantiles"]);
+        let mut random = SplitMix64::new(5);
         let resamples: Vec<(f64, u64)> = (0..3000)
             // Many ties, and a class with hundreds of members.
             .map(|_| {
-                let r = (stream.normal().sin() * 300.0).round() / 300.0;
-                (r * r * r, 1 + stream.below(50))
+                let r = (random.normal().sin() * 300.0).round() / 300.0;
+                (r * r * r, 1 + random.below(50))
             })
             .collect();
         let mut sorted = resamples.clone();
@@ -452,13 +433,13 @@ mod tests {
 
     #[test]
     fn the_normal_limit_agrees_with_drawing_subjects_one_by_one() {
-        let mut noise = Stream::new(3, &["rows"]);
+        let mut noise = SplitMix64::new(3);
         let x = [0.1, 0.2, 0.4, 0.5];
         let rows: Vec<Vec<f64>> = (0..400)
             .map(|_| x.map(|v| (4.0 + v + noise.normal()).round()).to_vec())
             .collect();
-        let drawn = resample(&rows, &x, false, &mut seeded()).unwrap();
-        let limit = resample(&rows, &x, true, &mut seeded()).unwrap();
+        let drawn = resample(&slices(&rows), &x, false, &mut seeded()).unwrap();
+        let limit = resample(&slices(&rows), &x, true, &mut seeded()).unwrap();
         assert!(limit.normal_limit && !drawn.normal_limit && !drawn.exact);
         // Each end has a Monte Carlo error of about 1 % of the width.
         let width = drawn.percentile.1 - drawn.percentile.0;

@@ -23,8 +23,9 @@ pub(crate) mod newton;
 #[cfg(test)]
 pub(crate) mod tests;
 
+use crate::matrix::{Cholesky, SymmetricMatrix};
 pub use counts::{CategoryCount, CategoryCounts, Predictor};
-use newton::{Evaluation, SymmetricMatrix, maximise};
+use newton::{Evaluation, maximise};
 
 /// Why a model has no estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -80,7 +81,8 @@ pub(super) fn fit_of(
 ) -> Result<ClmFit, ClmError> {
     let t = table.thresholds();
     let end = table.parameters();
-    let variances = information.inverse_diagonal().ok_or(ClmError::NoMaximum)?;
+    let factor = Cholesky::definite(information).ok_or(ClmError::NoMaximum)?;
+    let variances = factor.inverse_diagonal();
     let se: Vec<f64> = variances[t..end].iter().map(|v| v.sqrt()).collect();
     if se.iter().chain(at).all(|v| v.is_finite()) {
         Ok(ClmFit {

@@ -151,7 +151,7 @@ fn slope_at_zero(table: &CategoryCounts, fixed: &ClmFit) -> f64 {
     let by_subject = table.by_subject().map(|terms| {
         let (mut first, mut second) = (0.0, 0.0);
         for term in terms {
-            let f = logistic(a[term.place as usize]);
+            let f = logistic(a[term.place]);
             first -= term.n - term.m * f;
             second -= term.m * f * (1.0 - f);
         }

@@ -8,7 +8,7 @@ use super::rank::{doubled_ranks, mid_ranks};
 /// Pearson's r = Sxy/√(Sxx Syy). `None` if a column is constant or shorter
 /// than 2.
 pub fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
-    if x.len() < 2 || is_constant(x) || is_constant(y) {
+    if x.len() < 2 || x.len() != y.len() || is_constant(x) || is_constant(y) {
         return None;
     }
     let (mx, my) = (mean(x)?, mean(y)?);
@@ -29,7 +29,7 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
 /// `None` if a column is constant, or above 5000 pairs: the work goes with the
 /// square.
 pub fn kendall(x: &[f64], y: &[f64]) -> Option<f64> {
-    if x.len() > 5000 {
+    if x.len() > 5000 || x.len() != y.len() {
         return None;
     }
     let (rx, ry) = (doubled_ranks(x), doubled_ranks(y));

@@ -3,8 +3,8 @@
 mod exact;
 
 use super::distribution::{chi2_upper, f_upper, normal_upper};
-use super::finite;
 use super::rank::{doubled_ranks, mid_ranks};
+use super::{finite, rectangular};
 
 /// Friedman's test.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,9 +30,9 @@ pub struct Friedman {
 /// χ² = (k−1) Σⱼ(Rⱼ − n(k+1)/2)² / (Σᵢⱼ rᵢⱼ² − nk(k+1)²/4), which is Friedman's
 /// with the correction for ties (Conover 1999, §5.8). `None` below two rows or
 /// columns.
-pub fn friedman(rows: &[Vec<f64>]) -> Option<Friedman> {
-    let n = rows.len();
-    let k = rows.first()?.len();
+pub fn friedman<R: AsRef<[f64]>>(rows: &[R]) -> Option<Friedman> {
+    let rows = rectangular(rows)?;
+    let (n, k) = (rows.len(), rows[0].len());
     if n < 2 || k < 2 {
         return None;
     }
@@ -80,9 +80,9 @@ pub struct Page {
 /// L = Σⱼ Yⱼ Rⱼ, Y the mid-ranks of `order`; E = nk(k+1)²/4;
 /// V = Σᵢ Σⱼ(Yⱼ − Ȳ)² Σⱼ(rᵢⱼ − r̄)²/(k − 1). `None` below two rows or columns, or
 /// where all scores are equal.
-pub fn page(rows: &[Vec<f64>], order: &[f64]) -> Option<Page> {
-    let n = rows.len();
-    let k = order.len();
+pub fn page<R: AsRef<[f64]>>(rows: &[R], order: &[f64]) -> Option<Page> {
+    let rows = rectangular(rows).filter(|rows| rows[0].len() == order.len())?;
+    let (n, k) = (rows.len(), order.len());
     if n < 2 || k < 2 {
         return None;
     }

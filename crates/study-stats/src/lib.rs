@@ -18,6 +18,7 @@ pub mod distribution;
 pub mod friedman;
 pub mod grim;
 pub mod lmm;
+mod matrix;
 pub mod paired;
 pub mod permutation;
 
@@ -30,4 +31,12 @@ pub mod two_way_slope;
 /// The number, if it is one that can be printed.
 pub(crate) fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
+}
+
+/// The rows of a table; `None` if there are none, or if they are empty or differ in
+/// length.
+pub(crate) fn rectangular<R: AsRef<[f64]>>(rows: &[R]) -> Option<Vec<&[f64]>> {
+    let width = rows.first()?.as_ref().len();
+    let rows: Vec<&[f64]> = rows.iter().map(AsRef::as_ref).collect();
+    (width > 0 && rows.iter().all(|row| row.len() == width)).then_some(rows)
 }

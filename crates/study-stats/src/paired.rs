@@ -105,6 +105,9 @@ pub struct Paired {
 /// Compares two columns of the same subjects. Differences are rounded to 10⁻¹⁰,
 /// so that thirds cancel. `None` below two subjects.
 pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
+    if a.len() != b.len() {
+        return None;
+    }
     let d: Vec<f64> = a.iter().zip(b).map(|(x, y)| rounded(x - y)).collect();
     let test = one_sample(&d)?;
     let (sa, sb) = (sd(a)?, sd(b)?);

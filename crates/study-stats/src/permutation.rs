@@ -59,7 +59,7 @@ pub fn test(
         Statistic::Pearson | Statistic::Spearman => MAX_DRAWN,
         Statistic::Kendall => MAX_DRAWN / 10,
     };
-    if !(3..=most).contains(&x.len()) {
+    if x.len() != y.len() || !(3..=most).contains(&x.len()) {
         return None;
     }
     let observed = match statistic {
@@ -228,11 +228,11 @@ fn visit(order: &mut [usize], mut each: impl FnMut(&[usize])) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::SplitMix64;
     use std::collections::BTreeSet;
-    use study_base::rng::Stream;
 
-    fn seeded(seed: u64) -> Stream {
-        Stream::new(seed, &["permutation"])
+    fn seeded(seed: u64) -> SplitMix64 {
+        SplitMix64::new(seed)
     }
 
     #[test]

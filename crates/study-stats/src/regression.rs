@@ -29,7 +29,7 @@ pub struct Line {
 /// The line through three points or more; `None` if x or y is constant.
 pub fn line(x: &[f64], y: &[f64]) -> Option<Line> {
     let n = x.len() as f64;
-    if x.len() < 3 || is_constant(x) || is_constant(y) {
+    if x.len() < 3 || x.len() != y.len() || is_constant(x) || is_constant(y) {
         return None;
     }
     let (mx, my) = (mean(x)?, mean(y)?);
@@ -64,7 +64,7 @@ pub fn line(x: &[f64], y: &[f64]) -> Option<Line> {
 
 /// Slope of y on x where y does not vary: 0; `None` where x does not.
 pub fn slope(x: &[f64], y: &[f64]) -> Option<f64> {
-    if is_constant(x) || x.len() < 2 {
+    if x.len() < 2 || x.len() != y.len() || is_constant(x) {
         return None;
     }
     if is_constant(y) {
@@ -100,7 +100,7 @@ pub struct Parabola {
 /// the curvature. `None` if y is constant or x has fewer than three values.
 pub fn parabola(x: &[f64], y: &[f64]) -> Option<Parabola> {
     let n = x.len();
-    if n < 4 || is_constant(x) || is_constant(y) {
+    if n < 4 || n != y.len() || is_constant(x) || is_constant(y) {
         return None;
     }
     let (mx, my) = (mean(x)?, mean(y)?);

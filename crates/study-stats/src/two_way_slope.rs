@@ -1,39 +1,47 @@
-//! A slope beside two fixed factors, by sums.
+//! The slope on a covariate beside two fixed factors.
 
 use super::describe::mean;
 use super::distribution::t_two_sided;
 use super::finite;
+use super::matrix::{Cholesky, SymmetricMatrix};
 
-/// A slope beside fixed subjects and realizations.
+/// The slope on a covariate, adjusted for two fixed factors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoWaySlope {
-    /// Per unit of x.
+    /// Change of y per unit of x.
     pub slope: f64,
-    /// Its standard error.
+    /// Standard error of the slope.
     pub se: f64,
-    /// slope/se; undefined if nothing is left to explain.
+    /// slope/se; `None` if the residuals are 0.
     pub t: Option<f64>,
-    /// Two-sided.
+    /// Two-sided p of t.
     pub p: Option<f64>,
-    /// n − rank of the design.
+    /// Residual degrees of freedom: n less the rank of the design.
     pub df: f64,
 }
 
-/// Most levels of the second factor: the work goes with the square.
+/// Most levels of the second factor: the work grows with their square.
 const MAX_LEVELS: usize = 300;
 
-/// Slope of y on x with two fixed factors, by Frisch, Waugh and Lovell: the
-/// first factor is swept out by centring within it, which leaves normal equations
-/// of the second factor's indicators and x. Their sums go over the levels of the
-/// first factor, whose rows have to stand together, so that no column is ever
-/// stored. The levels of the second, `b`, are small numbers: a table is as long
-/// as the largest. What rounding costs, one step of iterative refinement gives back: the
-/// residuals are taken row by row and fitted again. `None` if the factors leave
-/// nothing of x, or no degree of freedom.
+/// The least-squares slope of y on x in y ~ x + a + b, with a and b as factors.
+///
+/// The four slices are as long as there are observations. Those of one level of `a`
+/// have to be adjacent. The levels of `b` should be small numbers: a table as long as
+/// the largest is allocated.
+///
+/// The first factor is removed by centring within its levels (Frisch & Waugh 1933;
+/// Lovell 1963). This leaves normal equations for the levels of the second factor and
+/// x, whose sums are collected over the levels of the first. Three rounds of iterative
+/// refinement, with residuals taken row by row, restore the digits that are lost to
+/// rounding.
+///
+/// `None` if the slices differ in length, there are fewer than three observations or
+/// more than 300 levels of `b`, the factors determine x, or no degree of freedom is
+/// left.
 pub fn two_way_slope(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<TwoWaySlope> {
     let n = x.len();
     let (level_of, levels) = numbered(b);
-    if n < 3 || levels > MAX_LEVELS {
+    if n < 3 || [y.len(), a.len(), b.len()] != [n; 3] || levels > MAX_LEVELS {
         return None;
     }
     let (mx, my) = (mean(x)?, mean(y)?);
@@ -52,21 +60,25 @@ pub fn two_way_slope(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<TwoWa
     let size: f64 = groups.rows.iter().map(|r| r.x * r.x).sum();
     groups.centre();
     let (normal, mut right, yy) = groups.normal_equations();
-    let factor = Factor::new(normal);
-    let spread = factor.pivots[0];
+    // The slope is the last unknown, so that its pivot is what the factors leave of x;
+    // that is compared with the size of x below.
+    let last = levels - 1;
+    let tolerance = |i: usize| if i == last { 0.0 } else { 1e-11 };
+    let factor = Cholesky::semidefinite(&normal, tolerance)?;
+    let spread = factor.pivots[last];
     let df = n as f64 - groups.ends.len() as f64 - (factor.rank() as f64 - 1.0) - 1.0;
     if !(spread > 1e-12 * size && df >= 1.0) {
         return None;
     }
-    let mut found = vec![0.0; right.len()];
+    let mut effects = vec![0.0; right.len()];
     let mut residual = 0.0;
     for _ in 0..3 {
-        for (f, step) in found.iter_mut().zip(factor.solve(&right)) {
-            *f += step;
+        for (effect, step) in effects.iter_mut().zip(factor.solve(&right)) {
+            *effect += step;
         }
-        (residual, right) = groups.residuals(&found);
+        (residual, right) = groups.residuals(&effects);
     }
-    let slope = finite(found[0])?;
+    let slope = finite(effects[last])?;
     let se = finite((residual / df / spread).sqrt())?;
     let t = if residual > 1e-24 * yy {
         finite(slope / se)
@@ -96,22 +108,31 @@ fn ends(a: &[u32]) -> Vec<usize> {
 struct Row {
     x: f64,
     y: f64,
-    level: u32,
+    /// Level of the second factor.
+    level: usize,
 }
 
 impl Row {
-    fn level(&self) -> usize {
-        self.level as usize
+    /// The unknown of this row's level; the first level is the reference.
+    fn unknown(&self) -> Option<usize> {
+        self.level.checked_sub(1)
     }
 }
 
-/// Rows, the levels of the first factor one after another. Unknowns are the slope
-/// (the first) and the levels of the second factor but its first, which is the
-/// reference.
+/// The observations by level of the first factor. The unknowns are the levels of the
+/// second factor except its first, and then the slope.
 struct Groups {
     rows: Vec<Row>,
     ends: Vec<usize>,
     levels: usize,
+}
+
+/// Number of rows, sum of x and sum of y of one level.
+#[derive(Clone, Copy, Default)]
+struct LevelSums {
+    n: f64,
+    x: f64,
+    y: f64,
 }
 
 impl Groups {
@@ -120,7 +141,7 @@ impl Groups {
         starts.zip(&self.ends).map(|(s, e)| &self.rows[s..*e])
     }
 
-    /// Takes the mean of its group off every x and y.
+    /// Subtracts the mean of its group from every x and y.
     fn centre(&mut self) {
         let mut start = 0;
         for &end in &self.ends {
@@ -136,135 +157,69 @@ impl Groups {
         }
     }
 
-    /// Matrix, right side, and the sum of squares of y within the groups.
-    fn normal_equations(&self) -> (Vec<Vec<f64>>, Vec<f64>, f64) {
-        let p = self.levels;
-        let mut normal = vec![vec![0.0; p]; p];
-        let mut right = vec![0.0; p];
+    /// Matrix, right-hand side, and the sum of squares of y within the groups.
+    fn normal_equations(&self) -> (SymmetricMatrix, Vec<f64>, f64) {
+        let slope = self.levels - 1;
+        let mut normal = SymmetricMatrix::zero(self.levels);
+        let mut right = vec![0.0; self.levels];
         let mut yy = 0.0;
-        // By level: rows, sum of x, sum of y.
-        let mut sums = vec![(0.0, 0.0, 0.0); p];
+        let mut sums = vec![LevelSums::default(); slope];
         let mut seen: Vec<usize> = Vec::new();
         for rows in self.each() {
             let n = rows.len() as f64;
             for r in rows {
-                let s = &mut sums[r.level()];
-                if s.0 == 0.0 {
-                    seen.push(r.level());
-                }
-                *s = (s.0 + 1.0, s.1 + r.x, s.2 + r.y);
-                normal[0][0] += r.x * r.x;
-                right[0] += r.x * r.y;
+                normal.add(slope, slope, r.x * r.x);
+                right[slope] += r.x * r.y;
                 yy += r.y * r.y;
+                if let Some(j) = r.unknown() {
+                    if sums[j].n == 0.0 {
+                        seen.push(j);
+                    }
+                    sums[j].n += 1.0;
+                    sums[j].x += r.x;
+                    sums[j].y += r.y;
+                }
             }
-            for &j in seen.iter().filter(|j| **j > 0) {
-                normal[j][0] += sums[j].1;
-                right[j] += sums[j].2;
-                normal[j][j] += sums[j].0;
-                for &k in seen.iter().filter(|k| **k > 0) {
-                    normal[j][k] -= sums[j].0 * sums[k].0 / n;
+            for &j in &seen {
+                normal.add(slope, j, sums[j].x);
+                right[j] += sums[j].y;
+                normal.add(j, j, sums[j].n);
+                for &k in seen.iter().filter(|k| **k <= j) {
+                    normal.add(j, k, -sums[j].n * sums[k].n / n);
                 }
             }
             for j in seen.drain(..) {
-                sums[j] = (0.0, 0.0, 0.0);
+                sums[j] = LevelSums::default();
             }
-        }
-        let (slope, levels) = normal.split_at_mut(1);
-        for (cell, row) in slope[0][1..].iter_mut().zip(levels) {
-            *cell = row[0];
         }
         (normal, right, yy)
     }
 
-    /// Sum of squares of the residuals, and the right side that they make.
-    fn residuals(&self, found: &[f64]) -> (f64, Vec<f64>) {
-        let effect = |level: usize| if level == 0 { 0.0 } else { found[level] };
+    /// Sum of squares of the residuals, and the right-hand side that they make.
+    fn residuals(&self, effects: &[f64]) -> (f64, Vec<f64>) {
+        let slope = self.levels - 1;
+        let effect = |row: &Row| row.unknown().map_or(0.0, |j| effects[j]);
         let (mut squares, mut right) = (0.0, vec![0.0; self.levels]);
-        let mut own: Vec<f64> = Vec::new();
         for rows in self.each() {
             let n = rows.len() as f64;
-            own.clear();
-            own.extend(
-                rows.iter()
-                    .map(|r| r.y - effect(r.level()) - found[0] * r.x),
-            );
-            let m = own.iter().sum::<f64>() / n;
-            for (r, e) in rows.iter().zip(&own) {
-                let e = e - m;
+            let left = |r: &Row| r.y - effect(r) - effects[slope] * r.x;
+            let mean = rows.iter().map(left).sum::<f64>() / n;
+            for r in rows {
+                let e = left(r) - mean;
                 squares += e * e;
-                right[0] += r.x * e;
-                right[r.level()] += if r.level == 0 { 0.0 } else { e };
+                right[slope] += r.x * e;
+                if let Some(j) = r.unknown() {
+                    right[j] += e;
+                }
             }
         }
         (squares, right)
     }
 }
 
-/// Cholesky's factor of a matrix whose first unknown is eliminated last, so that
-/// its pivot is what the others leave of it. Unknowns that the ones before
-/// determine are left at 0.
-struct Factor {
-    lower: Vec<Vec<f64>>,
-    /// Squares of the diagonal, in the order of the unknowns; 0: left out.
-    pivots: Vec<f64>,
-}
-
-impl Factor {
-    fn new(matrix: Vec<Vec<f64>>) -> Self {
-        let p = matrix.len();
-        let mut lower = vec![vec![0.0; p]; p];
-        let mut pivots = vec![0.0; p];
-        let order = || (1..p).chain([0]);
-        for i in order() {
-            for j in order() {
-                let before = order().take_while(|k| *k != j);
-                let rest = matrix[i][j] - before.map(|k| lower[i][k] * lower[j][k]).sum::<f64>();
-                if i == j {
-                    // The slope's own pivot is judged by the caller.
-                    let free = rest > if i == 0 { 0.0 } else { 1e-11 * matrix[i][i] };
-                    pivots[i] = if free { rest } else { 0.0 };
-                    lower[i][i] = pivots[i].sqrt();
-                    break;
-                }
-                lower[i][j] = if pivots[j] > 0.0 {
-                    rest / lower[j][j]
-                } else {
-                    0.0
-                };
-            }
-        }
-        Self { lower, pivots }
-    }
-
-    fn rank(&self) -> usize {
-        self.pivots.iter().filter(|p| **p > 0.0).count()
-    }
-
-    fn solve(&self, right: &[f64]) -> Vec<f64> {
-        let p = right.len();
-        let order: Vec<usize> = (1..p).chain([0]).collect();
-        let mut z = vec![0.0; p];
-        for (at, &i) in order.iter().enumerate() {
-            if self.pivots[i] > 0.0 {
-                let known: f64 = order[..at].iter().map(|&k| self.lower[i][k] * z[k]).sum();
-                z[i] = (right[i] - known) / self.lower[i][i];
-            }
-        }
-        let mut solution = vec![0.0; p];
-        for (at, &i) in order.iter().enumerate().rev() {
-            if self.pivots[i] > 0.0 {
-                let later = &order[at + 1..];
-                let known: f64 = later.iter().map(|&k| self.lower[k][i] * solution[k]).sum();
-                solution[i] = (z[i] - known) / self.lower[i][i];
-            }
-        }
-        solution
-    }
-}
-
 /// Numbers the levels that occur, in ascending order: the number of each, and how
 /// many there are.
-fn numbered(b: &[u32]) -> (Vec<u32>, usize) {
+fn numbered(b: &[u32]) -> (Vec<usize>, usize) {
     let largest = b.iter().max().map_or(0, |m| *m as usize);
     let mut numbers = vec![0; largest + 1];
     for level in b {
@@ -276,7 +231,7 @@ fn numbered(b: &[u32]) -> (Vec<u32>, usize) {
         *number = next;
         next += used;
     }
-    (numbers, next as usize)
+    (numbers, next)
 }
 
 #[cfg(test)]
@@ -297,10 +252,17 @@ mod tests {
     }
 
     #[test]
-    fn an_x_that_is_the_realization_leaves_nothing() {
+    fn a_covariate_that_is_the_factor_has_no_slope() {
         let b = [0, 1, 2, 0, 1, 2];
         let x = b.map(f64::from);
         let y = [1.0, 2.0, 2.0, 3.0, 4.0, 4.5];
         assert_eq!(two_way_slope(&x, &y, &[0, 0, 0, 1, 1, 1], &b), None);
+    }
+
+    #[test]
+    fn slices_of_different_lengths_have_no_slope() {
+        let x = [1.0, 2.0, 4.0, 3.0];
+        assert_eq!(two_way_slope(&x, &x, &[0; 4], &[0; 3]), None);
+        assert_eq!(two_way_slope(&[], &[], &[], &[]), None);
     }
 }

@@ -3,7 +3,8 @@
 //! the likelihood, so a fit costs the same however many trials lie behind.
 
 use super::ClmError;
-use super::newton::{Evaluation, SymmetricMatrix};
+use super::newton::Evaluation;
+use crate::matrix::SymmetricMatrix;
 use std::ops::Range;
 
 /// The row of the design of one predictor. It has one column beside zeros: a
@@ -33,7 +34,7 @@ pub struct CategoryCount {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Term {
     /// predictor · (J − 1) + threshold.
-    pub(crate) place: u32,
+    pub(crate) place: usize,
     /// Ratings in the category below the threshold.
     pub(crate) n: f64,
     /// Ratings in the two categories beside it.
@@ -98,7 +99,6 @@ impl CategoryCounts {
                     let place = g * t + j;
                     table.pooled[place].0 += n;
                     table.pooled[place].1 += m;
-                    let place = u32::try_from(place).unwrap_or(u32::MAX);
                     table.terms.push(Term { place, n, m });
                 }
             }
@@ -260,9 +260,8 @@ impl CategoryCounts {
     pub(crate) fn add_terms(&self, terms: &[Term], weights: &[f64], to: &mut [f64]) {
         let t = self.thresholds;
         for (term, w) in terms.iter().zip(weights) {
-            let place = term.place as usize;
-            let p = self.predictors[place / t];
-            to[place % t] += w;
+            let p = self.predictors[term.place / t];
+            to[term.place % t] += w;
             to[t + p.column] -= p.x * w;
         }
     }

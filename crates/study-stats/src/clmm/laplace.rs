@@ -68,7 +68,7 @@ pub(super) fn point(table: &CategoryCounts, at: &[f64], modes: &mut [f64]) -> Op
         }
         point.gradient[tau] += q - 1.0;
         for (i, term) in terms.iter().enumerate() {
-            let place = term.place as usize;
+            let place = term.place;
             flat[place] += k.first[i];
             curved[place] += k.second[i] + 0.5 / h * (k.fourth[i] - bbb / h * k.third[i]);
         }
@@ -96,7 +96,7 @@ impl Weights {
         }
         let (mut value, mut sums) = (0.0, [0.0; 3]);
         for term in terms {
-            let x = a[term.place as usize] - b;
+            let x = a[term.place] - b;
             let f = logistic(x);
             let spread = f * (1.0 - f);
             value += term.n * x - term.m * softplus(x);

@@ -25,7 +25,7 @@ pub(super) fn mode(terms: &[Term], a: &[f64], precision: f64, guess: f64) -> Opt
     for _ in 0..200 {
         let (mut first, mut second) = (-b * precision, -precision);
         for t in terms {
-            let f = logistic(a[t.place as usize] - b);
+            let f = logistic(a[t.place] - b);
             first -= t.n - t.m * f;
             second -= t.m * f * (1.0 - f);
         }

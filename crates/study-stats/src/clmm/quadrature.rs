@@ -48,11 +48,11 @@ pub(super) fn point(
         *start = centre;
         let mut h = precision;
         for t in terms {
-            let f = logistic(a[t.place as usize] - centre);
+            let f = logistic(a[t.place] - centre);
             h += t.m * f * (1.0 - f);
         }
         let width = SQRT_2 / h.sqrt();
-        let linear: f64 = terms.iter().map(|t| t.n * a[t.place as usize]).sum();
+        let linear: f64 = terms.iter().map(|t| t.n * a[t.place]).sum();
         let successes: f64 = terms.iter().map(|t| t.n).sum();
         below_all.clear();
         for (share, node) in ln_share.iter_mut().zip(rule) {
@@ -76,7 +76,7 @@ pub(super) fn point(
             residual.clear();
             let below = &below_all[r * terms.len()..];
             for (i, (t, &f)) in terms.iter().zip(below).enumerate() {
-                let place = t.place as usize;
+                let place = t.place;
                 let r = t.n - t.m * f;
                 residual.push(r);
                 mean_residual[i] += share * r;
@@ -93,7 +93,7 @@ pub(super) fn point(
             point.hessian.add(tau, tau, -2.0 * share * q);
         }
         for (t, r) in terms.iter().zip(&mean_residual) {
-            flat[t.place as usize] += r;
+            flat[t.place] += r;
         }
         point.gradient[tau] += mean[tau];
         point.hessian.add_outer(-1.0, &mean);
@@ -128,7 +128,7 @@ impl<'a> Odds<'a> {
         let shared = (self.moderate && b.abs() < MODERATE).then(|| (-b).exp());
         let (mut sum, mut product) = (0.0, 1.0);
         for t in terms {
-            let place = t.place as usize;
+            let place = t.place;
             let x = self.a[place] - b;
             let f = match shared {
                 Some(e) => {

@@ -2,11 +2,11 @@
 
 use super::*;
 use crate::correlation::{p_of_r, pearson};
-use study_base::rng::Stream;
+use crate::random::{RandomSource, SplitMix64};
 
 /// Balanced complete cells: subject + model + cell + noise.
 fn balanced(seed: u64, subjects: usize, x: &[f64], n: usize, spread: [f64; 4]) -> Vec<CellSummary> {
-    let mut noise = Stream::new(seed, &["lmm"]);
+    let mut noise = SplitMix64::new(seed);
     let of_realization: Vec<f64> = x.iter().map(|x| x + spread[1] * noise.normal()).collect();
     let mut cells = Vec::new();
     for subject in 0..subjects {
@@ -170,7 +170,7 @@ fn a_variance_on_the_boundary_is_zero_exactly() {
 
 /// Every n, mean and covariate another: each subject a pattern of its own.
 fn ragged(seed: u64) -> Vec<CellSummary> {
-    let mut noise = Stream::new(seed, &["ragged"]);
+    let mut noise = SplitMix64::new(seed);
     balanced(seed, 9, &X, 3, [0.8, 0.4, 0.3, 1.0])
         .into_iter()
         .filter_map(|c| {
@@ -311,7 +311,7 @@ fn what_is_not_defined_says_why() {
 /// Small tables of small whole numbers: the worst for boundaries and ties.
 #[test]
 fn random_small_tables_give_numbers_or_reasons() {
-    let mut draws = Stream::new(9, &["small"]);
+    let mut draws = SplitMix64::new(9);
     let mut fits = 0;
     for _ in 0..60 {
         let mut below = |n: f64| ((draws.normal().abs() * 7.0) % n) as usize;
