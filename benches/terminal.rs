@@ -60,10 +60,10 @@ fn session(folder: &Path) {
     let mut memory_kib = 0;
     loop {
         let screen = terminal.screen();
-        if screen.contains("Enter closes") {
+        if screen.contains("Enter: close") {
             break;
         }
-        if screen.contains("Tab comment") {
+        if screen.contains("Tab: comment") {
             terminal.keys("5");
             until(&terminal, |s| s.contains("┃  5  ┃"));
             let count = saved.len() + 1;

@@ -1,5 +1,5 @@
-//! Arguments, dispatch, exit codes; opens files, joins protocol and models,
-//! builds the device. One file per command.
+//! The command line: arguments, dispatch and exit codes. Opens files, combines protocol
+//! and models, and opens the device. One file for each command.
 
 pub mod console;
 pub mod failure;
@@ -30,7 +30,7 @@ pub use failure::{Failure, Kind, guard};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// From probe recordings of a haptic device to a defended result.
+/// Haptic experiments: identify realizations, play them back, collect ratings, analyze
 #[derive(Debug, Parser)]
 #[command(name = "study", version, about, max_term_width = 100)]
 pub struct Cli {
@@ -40,46 +40,46 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run a session with a participant, in this terminal
+    /// Run a session with a participant in this terminal
     Run(run::Args),
-    /// Run a whole study with simulated participants, on a virtual clock
+    /// Run a whole study with simulated participants
     Rehearse(rehearse::Args),
-    /// What came of a study: statistics, figures and a report
+    /// Analyze a study: statistics, figures, report
     Analyze(analyze::Args),
-    /// Show every fault of a protocol and its models
+    /// Check a protocol and its models
     Check(check::Args),
-    /// Show the reproducible orders and their balance
+    /// Show the presentation orders and their balance
     Schedule(schedule::Args),
-    /// Show who is done, who is unfinished and which row is next
+    /// Show the state of each participant and the next row
     Status(status::Args),
-    /// Set the state of a participant
+    /// Change the state of a participant
     Participant(participant::Args),
-    /// Change wording or analysis of a running study
+    /// Change the wording or the analysis of a running study
     Amend(amend::Args),
-    /// Re-read every journal and compare the derived files
+    /// Verify all journals and the files derived from them
     Verify(verify::Args),
-    /// Draw an excitation and check it against the limits of probe and target
+    /// Generate an excitation trajectory and check it against the limits
     Trajectory(trajectory::Args),
-    /// Impose an excitation on a target, simulated or real: a recording
+    /// Move the probe along a trajectory and record the response
     Record(record::Args),
-    /// From a recording to model files and their VAF
+    /// Identify realizations from recordings: model files and their VAF
     Identify(Box<identify::Args>),
-    /// Write a commented protocol to start from
+    /// Write a commented protocol as a starting point
     New(new::Args),
     /// Print the JSON Schema of the protocol file, for editors
     Schema(schema::Args),
     /// Find, check and simulate playback devices
     Device(device::Args),
-    /// Print completions for a shell
+    /// Print shell completions
     Completions(completions::Args),
     /// Write manual pages
     Man(completions::ManArgs),
 }
 
-/// Does what was asked.
+/// Runs a command.
 ///
 /// # Errors
-/// [`Failure`], with what to tell the user and the exit code.
+/// [`Failure`]: the message for the user and the exit code.
 pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
     match cli.command {
         Command::Run(args) => run::run(&args, console),
@@ -102,12 +102,12 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
     }
 }
 
-/// Prints what clap says of the arguments (help and version included) and gives
-/// the exit code: 0 for help and version, 2 for wrong usage.
-pub fn usage(said: &clap::Error) -> ExitCode {
-    // A closed pipe is not worth a message.
-    let _ = said.print();
-    if said.use_stderr() {
+/// Prints a message of the argument parser, such as help or a usage error. Returns the
+/// exit code: 0 for help and version, 2 for wrong usage.
+pub fn usage(message: &clap::Error) -> ExitCode {
+    // A closed pipe needs no message.
+    let _ = message.print();
+    if message.use_stderr() {
         ExitCode::from(Kind::Usage as u8)
     } else {
         ExitCode::SUCCESS

@@ -7,7 +7,7 @@ use study::cli::{Cli, Console, Failure, guard};
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(said) => return study::cli::usage(&said),
+        Err(error) => return study::cli::usage(&error),
     };
     let mut console = Console::of_process();
     match guard(|| study::cli::run(cli, &mut console)) {

@@ -1,13 +1,12 @@
-//! Effects of a session to device, store and operator; the only place with a
-//! clock.
+//! Runs a session: connects it with device, store, operator and clock.
 //!
-//! One turn of the loop: show the view, take the operator's inputs, feed the
-//! session, do what it wants, hear the device and the saver, tick. Nothing in the
-//! loop waits for the disk or the device: saving is a thread of its own
-//! ([`saver`]), the device reports when it is polled. Whatever ends the loop, an
-//! error and a panic included, the device goes limp.
+//! One turn of the loop shows the view, takes the operator's inputs, feeds them to the
+//! session, performs the session's effects, polls the device and the saver, and ticks.
+//! Nothing in the loop waits for the disk or the device: a thread saves ([`saver`]), and
+//! the device reports when it is polled. Whatever ends the loop, including an error or a
+//! panic, the device goes limp (produces no force).
 //!
-//! [`rehearsal`] turns the same loop on a virtual clock.
+//! [`rehearsal`] runs the same loop on a virtual clock.
 
 pub mod clock;
 pub mod rehearsal;
@@ -29,25 +28,24 @@ use study_core::session::{Effect, Ending, Input, Session, View, input::Claim};
 use study_core::store::{ClaimRequest, SeatKind, StudyFolder};
 use study_haptics::model::Realization;
 
-/// Longest wait for an input while nothing is expected: clocks move on screen.
+/// Longest wait for an input while nothing else is expected: clocks on the screen move.
 const IDLE: Duration = Duration::from_millis(100);
-/// Longest wait while the device plays: strip and strokes move.
+/// Longest wait during playback: the live strip and the stroke count move.
 const PLAYING: Duration = Duration::from_millis(20);
-/// Longest wait while something is on its way to the disk.
+/// Longest wait while an event is being saved.
 const SAVING: Duration = Duration::from_millis(2);
-/// A device with telemetry that is silent for so long while it plays has lost the
-/// playback.
+/// A playback is lost if a device with telemetry reports nothing for this time.
 const SILENCE: Duration = Duration::from_secs(1);
-/// How much of the telemetry the live strip shows, samples.
+/// Telemetry samples in the live strip.
 const STRIP_SAMPLES: usize = 3000;
 
-/// Who operates a session: sees the view, gives inputs.
+/// Operates a session: sees the view and gives inputs.
 pub trait Operator {
     /// Shows `view` and waits at most `timeout` for inputs (possibly none).
     ///
     /// # Errors
-    /// [`OperatorError`] if nobody can see or type any more; the session is left
-    /// as after a quit.
+    /// [`OperatorError`] if the operator can no longer see or type; the session then
+    /// ends as after a quit.
     fn next(
         &mut self,
         view: &View,
@@ -56,50 +54,50 @@ pub trait Operator {
     ) -> Result<Vec<Input>, OperatorError>;
 }
 
-/// The operator is gone, and why.
+/// The reason why the operator is gone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct OperatorError(pub String);
 
-/// The live strip: force over position, only shown when asked for.
+/// The live strip: force over position, shown only on request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Strip {
     /// Position in mm and commanded force in N, oldest first.
     pub samples: Vec<(f64, f64)>,
-    /// Largest force, N: the strip's upper edge.
+    /// Largest force, N: the upper edge of the strip.
     pub force_limit_n: f64,
-    /// Range of the realizations, mm.
+    /// Position range of the realizations, mm.
     pub x_range_mm: [f64; 2],
 }
 
-/// Everything that a session needs from outside.
+/// Everything that a session needs.
 pub struct Setup {
-    /// The study file.
+    /// The protocol.
     pub protocol: Arc<Protocol>,
-    /// Its orders, where they come from a file.
+    /// Presentation orders, if they come from a file.
     pub orders: Option<Arc<FileOrders>>,
-    /// Its tables, by the id in the protocol.
+    /// Realizations by their id in the protocol.
     pub models: BTreeMap<ModelId, Realization>,
-    /// Its fingerprints.
+    /// Fingerprints of the protocol.
     pub fingerprints: Fingerprints,
-    /// Where outcomes go.
+    /// The folder of the study.
     pub study: StudyFolder,
-    /// Real, pilot or simulated.
+    /// Whether data are real, pilot or simulated.
     pub kind: SeatKind,
-    /// The rows that may be handed out.
+    /// The rows that may be assigned; `None`: all.
     pub rows: Option<RangeInclusive<u32>>,
-    /// What kind of device `device` is.
+    /// The kind of `device`.
     pub device_kind: DeviceKind,
-    /// What plays.
+    /// The playback device.
     pub device: Box<dyn Device>,
-    /// What its last commissioning came to: stands in the session's first event.
+    /// Result of its last commissioning, recorded in the session's first event.
     pub device_check: Option<String>,
-    /// Time.
+    /// The clock.
     pub clock: Box<dyn Clock>,
     /// Whether telemetry is kept for the live strip.
     pub live: bool,
-    /// Whether saving has a thread of its own; without one every event is on disk
-    /// before the next input, as a rehearsal on a virtual clock needs it.
+    /// Whether a thread saves. Without it every event is on disk before the next input,
+    /// as a rehearsal on a virtual clock requires.
     pub threaded: bool,
 }
 
@@ -112,18 +110,18 @@ pub struct Runner {
     pending: u64,
     strip: Option<Strip>,
     ended: Option<Ending>,
-    /// Events that were recorded before a journal was there to take them.
+    /// Events recorded before the journal was opened.
     early: Vec<(Moment, Event)>,
-    /// When the device last said something of the playback under way.
-    heard: Option<Duration>,
-    /// What each realization is called on a sample.
+    /// When the device last reported about the current playback.
+    last_report: Option<Duration>,
+    /// The code on the physical sample of each realization.
     codes: BTreeMap<ModelId, String>,
-    /// Whether what plays reports samples.
-    speaks: bool,
+    /// Whether the current playback reports telemetry.
+    has_telemetry: bool,
 }
 
 impl Runner {
-    /// Opens a session; nothing is claimed yet.
+    /// Opens a session; no participant is claimed yet.
     pub fn new(setup: Setup, config: study_core::session::Config) -> Self {
         let at = setup.clock.now();
         let (session, effects) =
@@ -143,16 +141,16 @@ impl Runner {
             strip,
             ended: None,
             early: Vec::new(),
-            heard: None,
+            last_report: None,
             codes,
-            speaks: false,
+            has_telemetry: false,
         };
         runner.device_limp();
         runner.perform(effects);
         runner
     }
 
-    /// Runs to the end with an operator.
+    /// Runs the session to its end with an operator.
     pub fn run(&mut self, operator: &mut dyn Operator) -> Ending {
         loop {
             let view = self.view();
@@ -172,14 +170,14 @@ impl Runner {
         }
     }
 
-    /// One turn: feeds the inputs, hears device and saver, ticks. `Some` when the
-    /// session is over.
+    /// One turn: feeds the inputs, polls device and saver, ticks. `Some` when the session
+    /// has ended.
     pub fn step(&mut self, inputs: Vec<Input>) -> Option<Ending> {
         for input in inputs {
             self.feed(input);
         }
-        self.hear_device();
-        self.hear_saver();
+        self.poll_device();
+        self.poll_saver();
         self.feed(Input::Tick);
         if self.ended.is_some() {
             self.close();
@@ -187,18 +185,18 @@ impl Runner {
         self.ended.clone()
     }
 
-    /// What may be seen now.
+    /// The present view.
     pub fn view(&self) -> View {
         self.session.view(self.setup.clock.now())
     }
 
-    /// The realization that plays or was just felt: for a simulated rater, never
+    /// The realization that plays or was just played: for a simulated rater only, never
     /// for a screen.
     pub fn felt(&self) -> Option<&ModelId> {
         self.session.playing_model()
     }
 
-    /// The study's folder.
+    /// The folder of the study.
     pub fn study(&self) -> &StudyFolder {
         &self.setup.study
     }
@@ -214,18 +212,17 @@ impl Runner {
     fn perform(&mut self, effects: Vec<Effect>) {
         let mut queue: VecDeque<Effect> = effects.into();
         while let Some(effect) = queue.pop_front() {
-            let answer = self.perform_one(effect);
-            // What the session says to the answer comes before what is left of
-            // its earlier wishes only if those are about something else; the
-            // session never relies on it.
-            if let Some(input) = answer {
+            let response = self.perform_one(effect);
+            // Effects of the response are performed after the remaining effects; the
+            // session does not depend on their order.
+            if let Some(input) = response {
                 let more = self.session.handle(input, self.setup.clock.now());
                 queue.extend(more);
             }
         }
     }
 
-    /// Does one thing; gives the input that tells the session at once how it went.
+    /// Performs one effect; returns the input that reports an immediate result.
     fn perform_one(&mut self, effect: Effect) -> Option<Input> {
         match effect {
             Effect::Claim {
@@ -331,7 +328,7 @@ impl Runner {
             ));
         }
         let limits = playback_limits(protocol, table);
-        self.speaks = !by_hand && self.setup.device.identity().telemetry;
+        self.has_telemetry = !by_hand && self.setup.device.identity().telemetry;
         let stimulus = Stimulus {
             model: model.as_str(),
             table,
@@ -352,12 +349,12 @@ impl Runner {
         }
     }
 
-    fn hear_device(&mut self) {
+    fn poll_device(&mut self) {
         let at = self.device_time();
         for report in self.setup.device.poll(at) {
-            self.heard = match &report {
-                Report::Started if self.speaks => Some(at),
-                Report::Telemetry(_) | Report::Progress { .. } => self.heard.map(|_| at),
+            self.last_report = match &report {
+                Report::Started if self.has_telemetry => Some(at),
+                Report::Telemetry(_) | Report::Progress { .. } => self.last_report.map(|_| at),
                 _ => None,
             };
             let input = match report {
@@ -392,17 +389,17 @@ impl Runner {
             self.feed(input);
         }
         if self
-            .heard
+            .last_report
             .is_some_and(|last| at.saturating_sub(last) > SILENCE)
         {
-            self.heard = None;
+            self.last_report = None;
             self.send(Job::TelemetryEnd);
             let what = format!("the device has sent nothing for {} s", SILENCE.as_secs());
             self.feed(Input::PlaybackLost(what));
         }
     }
 
-    fn hear_saver(&mut self) {
+    fn poll_saver(&mut self) {
         let events = self.saver.as_mut().map(Saver::drain).unwrap_or_default();
         for event in events {
             let input = match event {
@@ -436,29 +433,29 @@ impl Runner {
     }
 
     fn device_limp(&mut self) {
-        self.heard = None;
+        self.last_report = None;
         let at = self.device_time();
         self.setup.device.limp(at);
     }
 }
 
 impl Drop for Runner {
-    /// Also runs while a panic unwinds: no path out of a session leaves force on.
+    /// Also runs while a panic unwinds: the device never keeps its force after a session.
     fn drop(&mut self) {
         self.close();
     }
 }
 
-/// What stands on the samples of a study: for whoever labels them, and for the
-/// experimenter's prompt, which shows nothing else of what is mounted.
+/// The codes on the physical samples of a study: for labelling them, and for the
+/// experimenter's prompt, which identifies a sample by its code only.
 pub fn sample_codes(protocol: &Protocol) -> BTreeMap<ModelId, String> {
     let ids: Vec<&ModelId> = protocol.models.iter().map(|m| &m.id).collect();
     manual::codes(protocol.study.seed, &ids)
 }
 
-/// The limits for a table: the protocol's, and under its `uncertified` permission
-/// the lower force of that for a table that fails its certificate, which can put
-/// energy into the hand.
+/// The playback limits for a table: those of the protocol. A table that fails its
+/// certificate can put energy into a hand; its force is also limited by the
+/// protocol's `uncertified` permission.
 pub fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limits {
     let mut limits = protocol.device.limits;
     if let Some(uncertified) = &protocol.device.uncertified
@@ -469,7 +466,7 @@ pub fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limi
     limits
 }
 
-/// The range that all tables span together, mm.
+/// The position range of all realizations together, mm.
 fn x_range(models: &BTreeMap<ModelId, Realization>) -> [f64; 2] {
     let ends = models
         .values()

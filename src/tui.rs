@@ -1,14 +1,13 @@
-//! An operator on a terminal.
+//! The terminal interface of a session.
 //!
 //! [`Tui`] shows a session's [`View`] and turns keys, clicks and pasted text into
-//! its [`Input`]s. It knows neither device nor store, decides nothing about the
-//! study, and shows nothing that is not in the view or was typed here. It is two
-//! halves: the [`Surface`], which is pure and holds everything that is shown and
-//! typed, and the terminal, which is taken at [`Tui::open`] and given back on
-//! every way out: drop, panic in any thread, a signal, Ctrl-Z, a terminal that
-//! has gone away.
+//! its [`Input`]s. It knows neither device nor store, decides nothing about the study,
+//! and shows nothing but the view and what was typed. It has two parts: the
+//! [`Surface`], which has no side effects and holds everything that is shown and typed,
+//! and the terminal, which [`Tui::open`] opens and which is restored on every way out:
+//! drop, panic in any thread, signal, Ctrl-Z, a closed terminal.
 //!
-//! Text of others (protocol, comments, the device's words) passes through
+//! Untrusted text (protocol, comments, messages of a device) passes through
 //! [`study_base::text::Untrusted`] in [`wrap`] before it reaches a cell.
 
 pub mod editor;
@@ -32,25 +31,24 @@ use study_core::session::{Input, Screen, View};
 use terminal::Terminal;
 pub(crate) use terminal::survive_file_size_limit;
 
-/// How a terminal is used.
+/// Options of the terminal interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Whether clicks choose. The terminal's own marking of text then needs
-    /// Shift.
+    /// Whether the mouse can choose. Selecting text in the terminal then needs Shift.
     pub mouse: bool,
-    /// Whether the live strip is drawn when there is one.
+    /// Whether the live strip is drawn.
     pub live: bool,
-    /// Its colours.
+    /// The colours to use.
     pub colour: Colour,
 }
 
-/// Why there is no session on this terminal.
+/// Why a terminal cannot be used for a session.
 #[derive(Debug, thiserror::Error)]
 pub enum TuiError {
     /// Input or output is a file or a pipe.
-    #[error("a session needs a terminal, and input or output is none")]
+    #[error("a session needs a terminal, and standard input or output is not one")]
     NoTerminal,
-    /// It can show nothing at a place.
+    /// The terminal cannot position text.
     #[error("the terminal (TERM={0:?}) cannot show a page")]
     DumbTerminal(String),
     /// The platform has no signals that would end a session in order.
@@ -58,21 +56,21 @@ pub enum TuiError {
         "a session cannot run on this platform: nothing would stop the device when the terminal closes"
     )]
     Platform,
-    /// It cannot be used.
+    /// Another error of the terminal.
     #[error("the terminal cannot be used: {0}")]
     Terminal(#[source] std::io::Error),
 }
 
 impl TuiError {
-    /// What to do about it.
+    /// What the user can do.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::NoTerminal => {
-                "start it in a terminal window, without pipes; `study rehearse` needs none"
+                "start it in a terminal window, without pipes; `study rehearse` needs no terminal"
             }
             Self::DumbTerminal(_) => {
-                "use a terminal such as xterm, or set TERM to what it really is; \
-                 `study rehearse` needs none"
+                "use a terminal such as xterm, or set TERM to its actual type; \
+                 `study rehearse` needs no terminal"
             }
             Self::Platform => "run it on Linux or macOS, or in the Windows Subsystem for Linux",
             Self::Terminal(_) => "try another terminal window",
@@ -88,12 +86,12 @@ pub fn check_platform() -> Result<(), TuiError> {
     terminal::check_platform()
 }
 
-/// How often the terminal is looked after while nothing happens.
+/// How often the terminal is checked while nothing happens.
 const SLICE: Duration = Duration::from_millis(50);
 /// How long Ctrl-Z waits for the device to stop before the program stops.
 const SUSPEND_WAIT: Duration = Duration::from_secs(2);
 
-/// An operator on a terminal.
+/// An [`Operator`] at a terminal.
 pub struct Tui {
     terminal: Terminal,
     surface: Surface,
@@ -103,7 +101,7 @@ pub struct Tui {
 }
 
 impl Tui {
-    /// Takes the terminal.
+    /// Opens the terminal.
     ///
     /// # Errors
     /// [`TuiError`] if there is none or it cannot be used.
@@ -117,7 +115,7 @@ impl Tui {
         })
     }
 
-    /// Draws, if something that is shown has changed.
+    /// Draws the view if anything visible has changed.
     fn draw(&mut self, view: &View, strip: Option<&Strip>) -> Result<(), OperatorError> {
         let now = (as_shown(view), strip.cloned());
         if self.drawn.as_ref() == Some(&now) {
@@ -166,7 +164,7 @@ impl Operator for Tui {
         self.suspend_if_asked(view)?;
         loop {
             if let Some(signal) = self.terminal.take_signal() {
-                return Ok(vec![Input::Abort(format!("the program got {signal}"))]);
+                return Ok(vec![Input::Abort(format!("the program received {signal}"))]);
             }
             if self.terminal.check().map_err(OperatorError)? {
                 self.drawn = None;
@@ -193,8 +191,8 @@ impl Operator for Tui {
     }
 }
 
-/// The view with its times as coarse as they are drawn, so that equal pictures
-/// are not drawn again.
+/// The view with its times rounded as they are drawn, so that equal pages are not
+/// drawn again.
 fn as_shown(view: &View) -> View {
     let mut view = view.clone();
     view.line.elapsed_s = view.line.elapsed_s.floor();

@@ -1,4 +1,4 @@
-//! `study completions` and `study man`: for the shell and the manual.
+//! `study completions` and `study man`: shell completions and manual pages.
 
 use super::{Cli, Console, Failure, Kind};
 use clap::CommandFactory as _;
@@ -14,11 +14,11 @@ pub(super) struct Args {
 /// Arguments of `study man`.
 #[derive(Debug, clap::Args)]
 pub(super) struct ManArgs {
-    /// Folder for the pages: study.1 and one for each command
+    /// Folder for the pages: study.1 and one page for each command
     dir: PathBuf,
 }
 
-/// Prints the completions of a shell.
+/// Prints the completions for a shell.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "study", &mut script);

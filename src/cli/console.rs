@@ -1,12 +1,12 @@
-//! Standard output and standard error, and what they can show.
+//! Standard output and standard error.
 
 use super::failure::Failure;
 use std::io::{self, IsTerminal as _, Write};
 use study_base::diagnostic::{Findings, Severity};
 use study_base::text::Untrusted;
 
-/// Where a command prints. Output goes through [`Console::out`], everything for
-/// the person at the terminal through [`Console::say`].
+/// Where a command prints: results with [`Console::out`], messages for the user with
+/// [`Console::say`].
 pub struct Console {
     out: Box<dyn Write>,
     err: Box<dyn Write>,
@@ -30,7 +30,7 @@ impl std::fmt::Debug for Console {
     }
 }
 
-/// Nobody wants a bar for work that takes less.
+/// Work that takes less time shows no progress bar.
 pub(super) const PATIENCE: std::time::Duration = std::time::Duration::from_secs(1);
 
 /// A progress bar on standard error, only on a terminal and only for work that
@@ -51,13 +51,13 @@ pub(super) fn progress(length: u64, unit: &'static str) -> indicatif::ProgressBa
     bar
 }
 
-/// Words as a line that a shell takes for them.
+/// Joins words to a command line, quoted for a shell.
 pub(super) fn shell_command(words: &[String]) -> String {
     let quoted: Vec<String> = words.iter().map(|word| quoted(word)).collect();
     quoted.join(" ")
 }
 
-/// A word as a shell takes it for one.
+/// Quotes a word for a shell if necessary.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./:=@%+,".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -68,12 +68,12 @@ fn quoted(word: &str) -> String {
 }
 
 impl Console {
-    /// The process's own.
+    /// The console of the process.
     pub fn of_process() -> Self {
         let plain = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty())
             || std::env::var_os("TERM").is_some_and(|t| t == "dumb");
         let terminal = io::stdout().is_terminal();
-        // Asked only where there is one: without it, crossterm asks `tput`.
+        // Only with a terminal: without one, crossterm runs `tput`.
         let columns = terminal.then(crossterm::terminal::size);
         let width = match columns {
             Some(Ok((columns, _))) if columns > 0 => usize::from(columns),
@@ -89,7 +89,7 @@ impl Console {
         }
     }
 
-    /// One that writes to `out` and `err`, without colour, 100 columns wide.
+    /// A console that writes to `out` and `err`, without colour, 100 columns wide.
     pub fn to(out: impl Write + 'static, err: impl Write + 'static) -> Self {
         Self {
             out: Box::new(out),
@@ -101,8 +101,7 @@ impl Console {
         }
     }
 
-    /// Prints a document to standard output. A closed pipe is a success: the
-    /// reader has what it wanted.
+    /// Prints to standard output. A closed pipe is no error: the reader has ended.
     ///
     /// # Errors
     /// [`Failure`] if it cannot be written for another reason.
@@ -119,13 +118,13 @@ impl Console {
         }
     }
 
-    /// Tells the person something, on standard error, one line.
+    /// Prints a message of one line to standard error.
     pub fn say(&mut self, text: impl AsRef<str>) {
-        // Nobody is left to tell if this fails.
+        // A failure cannot be reported anywhere.
         let _ = writeln!(self.err, "{}", Untrusted(text.as_ref()));
     }
 
-    /// Prints findings to standard error: the errors of all files, then the warnings.
+    /// Prints findings to standard error: first the errors of all files, then the warnings.
     pub fn findings(&mut self, findings: &[Findings]) {
         for severity in [Severity::Error, Severity::Warning] {
             for f in findings {
@@ -135,7 +134,7 @@ impl Console {
         }
     }
 
-    /// Says how many warnings there are and where they are shown; nothing if none.
+    /// Prints the number of warnings and the command that shows them; nothing if none.
     pub fn warnings_in_short(&mut self, findings: &[Findings], protocol: &std::path::Path) {
         let count: usize = findings.iter().map(|f| f.faults.len()).sum();
         let path = protocol.display();
@@ -164,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_command_is_one_that_a_shell_understands() {
-        let said = ["results/P-01", "my study", "it's", ""].map(quoted);
-        assert_eq!(said, ["results/P-01", "'my study'", r"'it'\''s'", "''"]);
+        let words = ["results/P-01", "my study", "it's", ""].map(quoted);
+        assert_eq!(words, ["results/P-01", "'my study'", r"'it'\''s'", "''"]);
     }
 }

@@ -1,35 +1,35 @@
-//! Why a command failed: decides the exit code and what the user reads.
+//! Failures of commands: exit code and message.
 
 use std::fmt;
 use study_base::diagnostic::Findings;
 
-/// What kind of failure; the number is the exit code.
+/// Kind of a failure; the value is the exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
-    /// The user's input is at fault.
+    /// Invalid input.
     Input = 1,
-    /// The arguments are.
+    /// Wrong usage.
     Usage = 2,
-    /// The device.
+    /// A problem of the device.
     Device = 3,
-    /// The results folder.
+    /// A problem of the results folder.
     Results = 4,
-    /// We are.
+    /// A bug in this program.
     Bug = 70,
 }
 
-/// A failed command.
+/// Why a command failed.
 #[derive(Debug)]
 pub struct Failure {
-    /// Decides the exit code.
+    /// Determines the exit code.
     pub kind: Kind,
-    /// What went wrong and where; one sentence. Text from outside is escaped by
-    /// whoever prints it. Empty if `findings` say everything.
+    /// What went wrong and where, in one sentence. Untrusted text is escaped when it is
+    /// printed. Empty if `findings` say everything.
     pub message: String,
     /// What to do next.
     pub hint: Option<String>,
-    /// Faults of files, with places.
+    /// Errors in files, with positions.
     pub findings: Vec<Findings>,
 }
 
@@ -44,17 +44,17 @@ impl Failure {
         }
     }
 
-    /// The user's input is at fault.
+    /// A failure because of invalid input.
     pub fn input(message: impl fmt::Display) -> Self {
         Self::new(Kind::Input, message)
     }
 
-    /// The results folder is.
+    /// A failure because of the results folder.
     pub fn results(message: impl fmt::Display) -> Self {
         Self::new(Kind::Results, message)
     }
 
-    /// Faults in files.
+    /// A failure because of errors in files.
     pub fn faults(findings: Vec<Findings>) -> Self {
         Self {
             findings,
@@ -68,14 +68,14 @@ impl Failure {
         Self::input(format!("{}: {why}", path.display()))
     }
 
-    /// The same, with advice.
+    /// The same failure with a hint.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());
         self
     }
 
-    /// The process's exit code.
+    /// The exit code of the process.
     pub fn exit_code(&self) -> u8 {
         self.kind as u8
     }
@@ -89,6 +89,6 @@ pub fn guard(f: impl FnOnce() -> Result<(), Failure>) -> Result<(), Failure> {
     // The hook has already printed where it happened.
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(f)).unwrap_or_else(|_| {
         Err(Failure::new(Kind::Bug, "this is a bug in study")
-            .hint("what was shown as saved is saved; please report the lines above"))
+            .hint("answers shown as saved are saved; please report the lines above"))
     })
 }

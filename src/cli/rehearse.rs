@@ -17,43 +17,43 @@ use study_core::outcome::{State, Status};
 use study_core::protocol::{DeviceKind, Seat};
 use study_core::store::{Frozen, SeatKind, StudyFolder};
 
-/// How likely a playback meets a fault with `--faults`.
+/// Probability of a fault in a playback with `--faults`.
 const FAULT_PROBABILITY: f64 = 0.08;
 
 /// Arguments of `study rehearse`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A protocol.toml or the folder that holds one
+    /// A protocol.toml or the folder that contains it
     protocol: PathBuf,
-    /// How many simulated participants
+    /// Number of simulated participants
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=9999))]
     participants: u32,
-    /// Seed of the raters; the orders always follow the protocol's own
+    /// Seed of the raters; the orders always use the seed of the protocol
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "rehearsal")]
     out: PathBuf,
-    /// Let the device fail now and then
+    /// Let the device fail at random
     #[arg(long)]
     faults: bool,
     /// Whether ratings depend on the realization
     #[arg(long, value_enum, default_value_t = EffectArg::BuiltIn)]
     effect: EffectArg,
-    /// Telemetry samples a second
+    /// Telemetry samples per second
     #[arg(long, value_name = "HZ", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=4000))]
     telemetry: u32,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum EffectArg {
-    /// Realizations nearer to the target and less active are rated higher
+    /// Realizations that are closer to the target and less active are rated higher
     BuiltIn,
-    /// A study in which there is nothing to find
+    /// Ratings do not depend on the realization
     None,
 }
 
-/// Does it.
+/// Runs the command.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = load::load(&args.protocol)?;
     let clock = VirtualClock::starting_at(first_day());
@@ -62,8 +62,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
-    // Samples are mounted by simulated hands; all else is played by the simulated
-    // device.
+    // Samples are mounted by simulated hands; everything else is played by the
+    // simulated device.
     let kind = match loaded.protocol.device.kind {
         DeviceKind::Manual => DeviceKind::Manual,
         _ => DeviceKind::Simulated,
@@ -101,7 +101,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             },
             ..Options::default()
         };
-        let here = match study.take() {
+        let folder_of_study = match study.take() {
             Some(first) => first,
             None => StudyFolder::open(&folder)?,
         };
@@ -110,7 +110,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             orders: orders.clone(),
             models: loaded.models.clone(),
             fingerprints: loaded.fingerprints.clone(),
-            study: here,
+            study: folder_of_study,
             kind: SeatKind::Simulated,
             rows: None,
             device_kind: kind,
@@ -144,11 +144,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         .count();
     let shown = folder.display();
     console.out(format!(
-        "{done} simulated participants, {rated} rated trials in {shown}.\nSimulated: their liking is built in (docs/simulation.md) and is no evidence of anything.\nNext: study analyze {shown}\n"
+        "{done} simulated participants, {rated} rated trials in {shown}.\nSimulated: the effects are built in (docs/simulation.md) and are no evidence.\nNext: study analyze {shown}\n"
     ))
 }
 
-/// A rehearsal never mixes with anything that is there already.
+/// Refuses a folder that already holds sessions.
 fn refuse_occupied(study: &StudyFolder, folder: &Path) -> Result<(), Failure> {
     let sessions = study.sessions()?;
     if sessions.is_empty() {
@@ -162,7 +162,7 @@ fn refuse_occupied(study: &StudyFolder, folder: &Path) -> Result<(), Failure> {
         let plural = if simulated == 1 { "" } else { "s" };
         format!("already holds {simulated} rehearsed session{plural}")
     } else {
-        "holds sessions with people".to_owned()
+        "holds sessions of real participants".to_owned()
     };
     Err(Failure::results(format!("{} {what}", folder.display()))
         .hint("name another folder with --out"))

@@ -1,4 +1,4 @@
-//! `study run`: the session, in the terminal.
+//! `study run`: a session in the terminal.
 
 use super::console::shell_command;
 use super::playback::{self, PlaybackArgs, Waiting};
@@ -16,42 +16,42 @@ use study_core::store::{Frozen, SeatKind, StoreError, StudyFolder, layout};
 /// Arguments of `study run`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A protocol.toml or the folder that holds one
+    /// A protocol.toml or the folder that contains it
     protocol: PathBuf,
-    /// Participant's pseudonym; asked on the first screen if left out
+    /// Pseudonym of the participant; asked on the first screen if omitted
     #[arg(long, value_name = "ID")]
     participant: Option<String>,
-    /// Operator's initials or code; asked on the first screen if left out
+    /// Initials or code of the operator; asked on the first screen if omitted
     #[arg(long, value_name = "NAME")]
     operator: Option<String>,
     #[command(flatten)]
     playback: PlaybackArgs,
-    /// Try the study out: kept apart from real data, takes no row
+    /// Mark the session as a pilot: stored separately from real data, uses no row
     #[arg(long)]
     pilot: bool,
-    /// Rows that may be handed out, such as 1-40: give each of two rigs its own
+    /// Rows that may be assigned, such as 1-40: give each of two rigs its own range
     #[arg(long, value_name = "A-B", value_parser = super::schedule::parse_rows)]
     rows: Option<std::ops::RangeInclusive<u32>>,
-    /// Folder that holds the results of all studies
+    /// Folder for the results of all studies
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
-    /// Show the live strip of force and position
+    /// Show a live strip of force over position
     #[arg(long)]
     live: bool,
-    /// Leave the mouse to the terminal
+    /// Do not use the mouse
     #[arg(long)]
     no_mouse: bool,
 }
 
-/// Does it.
+/// Runs the command.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     tui::check_platform().map_err(unusable)?;
     let loaded = load::load(&args.protocol)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
     let kind = args.playback.device.unwrap_or(loaded.protocol.device.kind);
-    // Everything that can be checked before the device, and the device before the
-    // terminal: what is wrong is read in peace.
-    let participant = refuse_ids(args)?;
+    // Checks come before the device, and the device before the terminal, so that an
+    // error message stays on the screen.
+    let participant = check_ids(args)?;
     refuse_unplayable(kind, &loaded)?;
     let clock = RealClock::default();
     let at = clock.now();
@@ -62,10 +62,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     if args.results.exists() && !args.results.is_dir() {
         let shown = args.results.display();
-        return Err(
-            Failure::input(format!("{shown}: it is a file, not a folder"))
-                .hint("--results names the folder that holds the results of all studies"),
-        );
+        return Err(Failure::input(format!("{shown} is a file, not a folder"))
+            .hint("--results names the folder for the results of all studies"));
     }
     let begun = args.results.join(loaded.protocol.study.id.as_str());
     let begun = match begun.join(layout::MANIFEST).exists() {
@@ -87,7 +85,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let Some(device) = opened? else {
         return console.out("Nothing was recorded.\n");
     };
-    // A person on the simulated device feels nothing: that is never real data.
+    // A person feels nothing on the simulated device: such data are never real.
     let overridden = kind != loaded.protocol.device.kind;
     let seats = if args.pilot || overridden || device.identity().simulated {
         SeatKind::Pilot
@@ -95,14 +93,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         SeatKind::Real
     };
     tui::survive_file_size_limit();
-    // The terminal before the folder: without one, nothing is created.
+    // The terminal comes before the folder: without a terminal nothing is created.
     let mut tui = Tui::open(options).map_err(unusable)?;
     let study = match begun {
         Some(study) => study,
         None => StudyFolder::open_or_create(&args.results, &frozen, at)?,
     };
     let folder = study.path().to_owned();
-    // After a kill the tables are behind the journals: bring them up first.
+    // After a kill the tables may be older than the journals: update them first.
     study.refresh(&loaded.protocol)?;
     let protocol = Arc::new(loaded.protocol);
     let setup = Setup {
@@ -135,7 +133,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         &folder,
         &protocol,
         &ending,
-        &again(args, &participant),
+        &resume_command(args, &participant),
     )
 }
 
@@ -143,8 +141,8 @@ fn unusable(error: tui::TuiError) -> Failure {
     Failure::new(Kind::Usage, &error).hint(error.hint())
 }
 
-/// What is typed on the first screen, if it stands in the arguments.
-fn refuse_ids(args: &Args) -> Result<Option<ParticipantId>, Failure> {
+/// Checks the participant and the operator given as arguments.
+fn check_ids(args: &Args) -> Result<Option<ParticipantId>, Failure> {
     if let Some(operator) = &args.operator
         && operator.chars().count() > MAX_OPERATOR
     {
@@ -154,11 +152,11 @@ fn refuse_ids(args: &Args) -> Result<Option<ParticipantId>, Failure> {
     }
     let id = args.participant.as_deref().map(str::trim);
     let id = id.map(ParticipantId::new).transpose();
-    id.map_err(|why| Failure::input(why).hint("a pseudonym, such as P01"))
+    id.map_err(|why| Failure::input(why).hint("use a pseudonym, such as P01"))
 }
 
-/// Tables that the device cannot do without, or may not play. What is mounted by hand
-/// needs none.
+/// Refuses realizations that the device cannot play or must not play. Samples mounted by
+/// hand need no table.
 pub(super) fn refuse_unplayable(kind: DeviceKind, loaded: &load::Loaded) -> Result<(), Failure> {
     if kind == DeviceKind::Manual {
         return Ok(());
@@ -172,15 +170,17 @@ pub(super) fn refuse_unplayable(kind: DeviceKind, loaded: &load::Loaded) -> Resu
         match loaded.models.get(&model.id) {
             None if kind != DeviceKind::Process => {
                 return Err(Failure::input(format!(
-                    "model `{}` has no table for a {} device",
+                    "realization `{}` has no table for a {} device",
                     model.id,
                     kind.as_str()
                 ))
-                .hint("add its `file`; without one only a program or a hand can present it"));
+                .hint(
+                    "add its `file`; only a child program or a sample mounted by hand needs none",
+                ));
             }
             Some(table) if !permitted && !table.certificate().passes() => {
                 return Err(Failure::input(format!(
-                    "the table of `{}` can put energy into a hand, and the protocol, which mounts it by hand, does not permit that",
+                    "the table of `{}` can put energy into a hand, which the protocol, made for samples mounted by hand, does not permit",
                     model.id,
                 ))
                 .hint(load::PERMIT));
@@ -191,8 +191,8 @@ pub(super) fn refuse_unplayable(kind: DeviceKind, loaded: &load::Loaded) -> Resu
     Ok(())
 }
 
-/// The command that goes on with a session, to be typed as it is.
-fn again(args: &Args, participant: &str) -> String {
+/// The command line that resumes the session.
+fn resume_command(args: &Args, participant: &str) -> String {
     let mut command = vec!["study".to_owned(), "run".to_owned()];
     let path = |path: &std::path::Path| path.display().to_string();
     command.push(path(&args.protocol));
@@ -236,14 +236,14 @@ fn again(args: &Args, participant: &str) -> String {
     shell_command(&command)
 }
 
-/// Writes the derived tables and says what comes next, also where they cannot be
-/// written: the journals hold everything.
+/// Writes the derived tables and prints the next step, even if the tables cannot be
+/// written: the journals hold all data.
 fn finish(
     console: &mut Console,
     folder: &std::path::Path,
     protocol: &study_core::protocol::Protocol,
     ending: &Ending,
-    again: &str,
+    resume: &str,
 ) -> Result<(), Failure> {
     let written = match ending {
         Ending::Nothing => Ok(()),
@@ -255,27 +255,27 @@ fn finish(
             "The session is finished and saved in {shown}.\nNext: study status {shown} · study analyze {shown}\n"
         )),
         Ending::Interrupted => console.out(format!(
-            "The session is not finished; everything answered is saved in {shown}.\nIt goes on with: {again}\n"
+            "The session is not finished; all answers are saved in {shown}.\nResume it with: {resume}\n"
         )),
         Ending::DroppedOut => console.out(format!(
-            "The participant has left the study; what was given is kept in {shown}.\n"
+            "The participant has dropped out; the answers are kept in {shown}.\n"
         )),
         Ending::Nothing => console.out("Nothing was recorded.\n"),
     }?;
     written.map_err(|e| unwritten(&e, folder))
 }
 
-/// What is said of tables that could not be written after a session.
+/// The failure to report if the tables could not be written after a session.
 fn unwritten(why: &StoreError, folder: &std::path::Path) -> Failure {
     let rebuild = format!("`study verify {} --rebuild`", folder.display());
     let failure = Failure::results(format!(
         "the answers are safe in the journals; the tables could not be written: {why}"
     ));
     failure.hint(match why {
-        e if e.is_full() => format!("make room, then {rebuild}"),
+        e if e.is_full() => format!("free some disk space, then run {rebuild}"),
         e => match e.hint() {
             Some(hint) => hint,
-            None => format!("put that right, then {rebuild}"),
+            None => format!("resolve this, then run {rebuild}"),
         },
     })
 }
@@ -288,9 +288,9 @@ mod tests {
     use std::rc::Rc;
 
     #[derive(Clone, Default)]
-    struct Said(Rc<RefCell<Vec<u8>>>);
+    struct Written(Rc<RefCell<Vec<u8>>>);
 
-    impl std::io::Write for Said {
+    impl std::io::Write for Written {
         fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
             self.0.borrow_mut().extend_from_slice(bytes);
             Ok(bytes.len())
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn a_session_whose_tables_cannot_be_written_still_says_how_it_goes_on() {
+    fn a_session_whose_tables_cannot_be_written_still_says_how_to_resume() {
         let results = tempfile::tempdir().unwrap();
         let loaded = load::load(Path::new("protocols/turn-signal")).unwrap();
         let frozen = Frozen {
@@ -313,7 +313,7 @@ mod tests {
         let at = RealClock::default().now();
         let study = StudyFolder::open_or_create(results.path(), &frozen, at).unwrap();
         std::fs::create_dir(study.path().join("ratings.csv")).unwrap();
-        let (out, err) = (Said::default(), Said::default());
+        let (out, err) = (Written::default(), Written::default());
         let mut console = Console::to(out.clone(), err);
         let ending = Ending::Interrupted;
         let failure = finish(
@@ -333,17 +333,20 @@ mod tests {
             failure.message
         );
         assert!(failure.hint.unwrap().contains("--rebuild"));
-        let said = String::from_utf8(out.0.borrow().clone()).unwrap();
-        assert!(said.contains("It goes on with: study run X"), "{said}");
+        let text = String::from_utf8(out.0.borrow().clone()).unwrap();
+        assert!(text.contains("Resume it with: study run X"), "{text}");
     }
 
     #[test]
-    fn a_full_disk_is_told_to_make_room() {
+    fn a_full_disk_gets_a_hint_to_free_space() {
         let full = StoreError::Io {
             path: "results/x/.ratings.csv.tmp".into(),
             source: std::io::ErrorKind::StorageFull.into(),
         };
         let hint = unwritten(&full, Path::new("results/x")).hint.unwrap();
-        assert_eq!(hint, "make room, then `study verify results/x --rebuild`");
+        assert_eq!(
+            hint,
+            "free some disk space, then run `study verify results/x --rebuild`"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Time for a runner: the machine's, or a virtual one.
+//! The clock of a runner: real or virtual.
 
 use chrono::{DateTime, FixedOffset, Local};
 use std::cell::Cell;
@@ -6,13 +6,13 @@ use std::rc::Rc;
 use std::time::{Duration, Instant};
 use study_core::outcome::Moment;
 
-/// Tells both clocks at once.
+/// Reads wall clock and monotonic clock together.
 pub trait Clock {
-    /// Now. The monotonic part never goes back.
+    /// The present moment. The monotonic part never decreases.
     fn now(&self) -> Moment;
 }
 
-/// The machine's clocks.
+/// The clocks of the machine.
 #[derive(Debug, Clone)]
 pub struct RealClock {
     origin: Instant,
@@ -36,7 +36,7 @@ impl Clock for RealClock {
     }
 }
 
-/// A clock that only moves when told. Clones show the same time.
+/// A clock that moves only by [`VirtualClock::advance`]. Clones share their time.
 #[derive(Debug, Clone)]
 pub struct VirtualClock {
     start: DateTime<FixedOffset>,
@@ -52,7 +52,7 @@ impl VirtualClock {
         }
     }
 
-    /// Lets time pass.
+    /// Advances the clock.
     pub fn advance(&self, by: Duration) {
         self.elapsed.set(self.elapsed.get() + by);
     }

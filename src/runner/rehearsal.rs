@@ -1,10 +1,9 @@
-//! A study without people: the same runner, store, device and session on a
-//! virtual clock, with simulated participants who answer.
+//! Sessions with raters (simulated participants): the same runner, store, device and
+//! session on a virtual clock.
 //!
-//! The rater sees what a person would (the view) and additionally feels: the
-//! runner tells it which realization played. It never changes what the session
-//! does. Dates are virtual and start at [`first_day`], one day a participant, so
-//! that the same protocol and seed give the same bytes.
+//! The rater sees the view, as a person does, and is told which realization was played,
+//! which stands for feeling it. Dates are virtual and start at [`first_day`], one day
+//! per participant, so that the same protocol and seed give the same bytes.
 
 use super::clock::VirtualClock;
 use super::{Runner, Setup};
@@ -16,41 +15,41 @@ use study_base::text::{ModelId, QuestionId};
 use study_core::protocol::{Answer, Question};
 use study_core::session::{Config, Ending, Input, Screen, View};
 
-/// How long a rater looks at a screen that asks nothing of it, s.
+/// Time that a rater spends on a screen without a question, s.
 const GLANCE_S: f64 = 2.0;
-/// Turns after which a session that does not end is given up: a bug, not a wait.
+/// Maximum number of turns; a session that does not end by then has a bug.
 const MAX_TURNS: u32 = 5_000_000;
 
-/// When the first simulated participant comes.
+/// Date of the first simulated session.
 pub fn first_day() -> DateTime<FixedOffset> {
     DateTime::parse_from_rfc3339("2007-03-22T09:00:00+00:00").expect("a valid date")
 }
 
-/// Why a rehearsal went wrong.
+/// Why a rehearsal failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RehearsalError {
     /// The session could not be opened.
     #[error("the session of {participant} could not be opened: {why}")]
     Refused {
-        /// Whose.
+        /// The participant.
         participant: String,
-        /// The store's words.
+        /// The reason given by the store.
         why: String,
     },
     /// An event could not be written.
     #[error("the session of {participant} could not be saved: {why}")]
     NotSaved {
-        /// Whose.
+        /// The participant.
         participant: String,
-        /// The store's words.
+        /// The reason given by the store.
         why: String,
     },
-    /// It does not end.
+    /// The session does not end.
     #[error("the session of {participant} does not end: it stays at {screen}")]
     Stuck {
-        /// Whose.
+        /// The participant.
         participant: String,
-        /// Where.
+        /// The screen at which it stays.
         screen: String,
     },
 }
@@ -106,15 +105,15 @@ pub fn run_one(
     })
 }
 
-/// What the rater is doing.
+/// State of a rater during a session.
 #[derive(Debug, Default)]
 struct Plan {
-    /// Seconds that it still explores; `None`: not decided for this playback.
+    /// Remaining exploration time, s; `None`: not drawn yet for this playback.
     exploring_s: Option<f64>,
 }
 
 impl Plan {
-    /// Lets the time pass that a person would take, then says what they would.
+    /// Advances the clock by the time that a person would take; returns the inputs.
     fn turn(
         &mut self,
         view: &View,
@@ -156,7 +155,7 @@ impl Plan {
             Screen::Playing {
                 strokes_missing, ..
             } => {
-                // In pieces, so that telemetry flows as it would.
+                // In small steps, so that telemetry arrives as in a real session.
                 const PIECE_S: f64 = 0.25;
                 let left = self
                     .exploring_s
@@ -194,7 +193,7 @@ impl Plan {
     }
 }
 
-/// An answer to each question of a page; an empty optional text is none.
+/// The answers to the questions of a page; an empty optional text is omitted.
 fn answers(
     questions: &[Question],
     rater: &mut Rater,
@@ -210,19 +209,19 @@ fn answers(
 fn screen_name(screen: &Screen) -> &'static str {
     match screen {
         Screen::Who { .. } => "the first screen",
-        Screen::ResumeChoice { .. } => "the choice to resume",
+        Screen::ResumeChoice { .. } => "the choice how to resume",
         Screen::Consent { .. } => "the consent",
         Screen::Message { .. } => "a message",
         Screen::Form { .. } => "a form",
         Screen::Reference { .. } => "the reference prompt",
         Screen::Loading => "loading",
-        Screen::Mount { .. } => "a sample to be mounted",
+        Screen::Mount { .. } => "mounting a sample",
         Screen::Playing { .. } => "playing",
         Screen::Stopping => "stopping",
         Screen::Stopped { .. } => "a stopped playback",
         Screen::DeviceTrouble { .. } => "a device fault",
         Screen::Saving => "saving",
-        Screen::SaveTrouble { .. } => "a failure to save",
+        Screen::SaveTrouble { .. } => "a save failure",
         Screen::Break { .. } => "a break",
         Screen::Paused { .. } => "a pause",
         Screen::End { .. } => "the end",

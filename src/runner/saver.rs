@@ -1,10 +1,10 @@
-//! Saving, away from the loop: journal and telemetry of one session.
+//! Saves journal and telemetry of one session outside the session loop.
 //!
-//! Jobs are done in order. An event is acknowledged by [`SaveEvent::Saved`] after its
-//! line is on disk, in the order of the events. After a failed write nothing is
-//! acknowledged, and nothing is forgotten, until [`Job::Retry`] has put every
-//! event in doubt into a new segment of the journal. Telemetry that cannot be
-//! written is dropped and reported of: no answer waits for it.
+//! Jobs are done in order. [`SaveEvent::Saved`] acknowledges an event after its line is
+//! on disk, in the order of the events. After a failed write nothing is acknowledged
+//! and nothing is lost until [`Job::Retry`] has written every unsaved event into a new
+//! segment of the journal. Telemetry that cannot be written is dropped and reported: no
+//! answer waits for it.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -12,38 +12,38 @@ use std::thread::JoinHandle;
 use study_core::outcome::{Event, Moment, Sample};
 use study_core::store::{Journal, SessionFolder, TelemetryWriter};
 
-/// Something to write.
+/// A job for the saver.
 #[derive(Debug)]
 pub enum Job {
-    /// An event, with the moment it happened.
+    /// Append an event with its time.
     Append(Moment, Event),
-    /// The telemetry of this attempt begins.
+    /// Begin the telemetry file of an attempt.
     TelemetryBegin {
-        /// Names the file.
+        /// Trial number, part of the file name.
         trial: u32,
-        /// Names the file.
+        /// Attempt number, part of the file name.
         attempt: u32,
     },
-    /// Samples of the attempt that has begun.
+    /// Write samples of that attempt.
     Telemetry(Vec<Sample>),
-    /// It is over.
+    /// Finish the telemetry file.
     TelemetryEnd,
-    /// Put what is in doubt into a new segment.
+    /// Write all unsaved events into a new segment.
     Retry,
 }
 
-/// What the saver says.
+/// What the saver reports.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SaveEvent {
     /// The next event in order is on disk.
     Saved,
-    /// An event is not; why, and what to do.
+    /// An event could not be saved; reason and advice.
     Failed(String),
-    /// The telemetry of the attempt is not; the answers are.
+    /// The telemetry of the attempt could not be saved; answers are not affected.
     TelemetryLost(String),
 }
 
-/// The saver of one session; holds its folder, and so its lock.
+/// The saver of one session; holds the lock of its folder.
 pub struct Saver {
     mode: Mode,
 }
@@ -57,7 +57,7 @@ enum Mode {
         jobs: Sender<Job>,
         events: Receiver<SaveEvent>,
         handle: JoinHandle<()>,
-        /// Whether its early end has been reported.
+        /// Whether the premature end of the thread has been reported.
         reported: bool,
     },
 }
@@ -71,7 +71,7 @@ struct Worker {
 }
 
 impl Saver {
-    /// A saver for a claimed folder, on a thread of its own or in the caller's.
+    /// A saver for a claimed folder, on its own thread or on that of the caller.
     pub fn new(folder: SessionFolder, journal: Journal, threaded: bool) -> Self {
         let mut worker = Box::new(Worker {
             folder,
@@ -81,16 +81,16 @@ impl Saver {
             broken: false,
         });
         let mode = if threaded {
-            let (jobs, todo) = channel();
-            let (say, events) = channel();
+            let (jobs, queue) = channel();
+            let (send, events) = channel();
             let handle = std::thread::spawn(move || {
-                while let Ok(job) = todo.recv() {
+                while let Ok(job) = queue.recv() {
                     for event in worker.work(job) {
-                        // A loop that is gone needs no events; the work goes on.
-                        let _ = say.send(event);
+                        // The work goes on even if the session loop has ended.
+                        let _ = send.send(event);
                     }
                 }
-                // Nobody is left to tell.
+                // The session has ended: there is nobody to report to.
                 let _ = worker.end_telemetry();
             });
             Mode::Thread {
@@ -108,19 +108,19 @@ impl Saver {
         Self { mode }
     }
 
-    /// Hands over a job.
+    /// Queues a job.
     pub fn send(&mut self, job: Job) {
         match &mut self.mode {
             Mode::Inline { worker, events } => events.extend(worker.work(job)),
             Mode::Thread { jobs, .. } => {
-                // The thread only ends before us by a panic; then no event comes
-                // back, and nothing is shown as saved.
+                // The thread ends early only by a panic; then no event comes back, and
+                // nothing is shown as saved.
                 let _ = jobs.send(job);
             }
         }
     }
 
-    /// What has been said since the last call.
+    /// Returns the events since the last call.
     pub fn drain(&mut self) -> Vec<SaveEvent> {
         match &mut self.mode {
             Mode::Inline { events, .. } => std::mem::take(events),
@@ -130,23 +130,21 @@ impl Saver {
                 reported,
                 ..
             } => {
-                let mut said: Vec<SaveEvent> = events.try_iter().collect();
+                let mut new: Vec<SaveEvent> = events.try_iter().collect();
                 if handle.is_finished() && !*reported {
                     *reported = true;
-                    said.push(SaveEvent::Failed(
-                        "the thread that saves has ended".to_owned(),
-                    ));
+                    new.push(SaveEvent::Failed("the saving thread has ended".to_owned()));
                 }
-                said
+                new
             }
         }
     }
 
-    /// Does what is left and closes the folder.
+    /// Finishes all queued jobs and closes the folder.
     pub fn finish(self) {
         match self.mode {
             Mode::Inline { mut worker, .. } => {
-                // Nobody is left to tell.
+                // The session has ended: there is nobody to report to.
                 let _ = worker.end_telemetry();
             }
             Mode::Thread { jobs, handle, .. } => {
@@ -224,8 +222,8 @@ impl Worker {
         events
     }
 
-    /// Telemetry is evidence, not an answer: no answer waits for it, and a file cut
-    /// short shows beside the number of samples in the journal.
+    /// Finishes the telemetry file. A truncated one is recognised by the number of
+    /// samples in the journal.
     fn end_telemetry(&mut self) -> Vec<SaveEvent> {
         match self.telemetry.take().map(TelemetryWriter::finish) {
             Some(Err(error)) => vec![SaveEvent::TelemetryLost(error.to_string())],

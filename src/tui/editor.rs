@@ -1,40 +1,39 @@
-//! A field for text of any language.
+//! A text editor for any language.
 //!
-//! The cursor moves by what a reader sees as one character. Text is stored as it
-//! was typed or pasted, with two exceptions: line ends become `\n`, and NUL is
-//! left out, which no keyboard types and which ends the line for many readers of
-//! CSV. What exceeds [`MAX_TEXT_BYTES`] is left out with a notice.
+//! The cursor moves by graphemes. Text is stored as typed or pasted, with two
+//! exceptions: line ends become `\n`, and NUL is removed, since it ends the text for many
+//! readers of CSV. What exceeds [`MAX_TEXT_BYTES`] is removed with a notice.
 //!
-//! Invariant: the cursor stands between two graphemes.
+//! Invariant: the cursor is at a boundary between graphemes.
 
 use super::keys::Key;
 use super::wrap::{self, Line};
 use study_core::protocol::question::{MAX_TEXT_BYTES, cut_to_fit};
 use unicode_segmentation::{GraphemeCursor, UnicodeSegmentation as _};
 
-/// A text and the place in it.
+/// A text with a cursor.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Editor {
     text: String,
     cursor: usize,
     one_line: bool,
-    /// The width that Up and Down move in; what was drawn last.
+    /// Width of the text as last drawn, in cells: Up and Down move in it.
     columns: usize,
 }
 
-/// What came of a key.
+/// The effect of a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Handled {
-    /// Nothing: somebody else may want it.
+    /// None: the key may mean something else.
     No,
-    /// It was used.
+    /// The key was used.
     Yes,
-    /// It was used, and this has to be said.
+    /// The key was used, with a notice to show.
     Notice(String),
 }
 
 impl Editor {
-    /// With several lines, holding `text`, the cursor at its end.
+    /// A multi-line editor that holds `text`, with the cursor at its end.
     pub fn new(text: &str) -> Self {
         Self {
             text: text.to_owned(),
@@ -44,7 +43,7 @@ impl Editor {
         }
     }
 
-    /// With one line.
+    /// A single-line editor.
     pub fn line(text: &str) -> Self {
         Self {
             one_line: true,
@@ -52,22 +51,22 @@ impl Editor {
         }
     }
 
-    /// As typed.
+    /// The text as typed.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Whether there is nothing but space.
+    /// Whether the text is empty or white space.
     pub fn is_blank(&self) -> bool {
         self.text.trim().is_empty()
     }
 
-    /// Tells how wide the text is drawn.
-    pub fn drawn_in(&mut self, columns: usize) {
+    /// Sets the width in which the text is drawn, in cells.
+    pub fn set_width(&mut self, columns: usize) {
         self.columns = columns.max(1);
     }
 
-    /// Puts typed or pasted text at the cursor.
+    /// Inserts typed or pasted text at the cursor.
     pub fn insert(&mut self, piece: &str) -> Handled {
         let (piece, mut cut) = cut_to_fit(piece);
         let mut clean = piece.replace("\r\n", "\n").replace('\r', "\n");
@@ -89,16 +88,16 @@ impl Editor {
         if cut {
             let kib = MAX_TEXT_BYTES / 1024;
             Handled::Notice(format!(
-                "That was too long: a text holds {kib} KiB, the rest was left out."
+                "The text is too long: at most {kib} KiB are stored, the rest was removed."
             ))
         } else if nul {
-            Handled::Notice("Characters that no file can hold were left out.".to_owned())
+            Handled::Notice("NUL characters were removed.".to_owned())
         } else {
             Handled::Yes
         }
     }
 
-    /// Edits or moves.
+    /// Handles a key: edits the text or moves the cursor.
     pub fn key(&mut self, key: Key) -> Handled {
         match key {
             Key::Char(c) => return self.insert(c.encode_utf8(&mut [0; 4])),
@@ -120,7 +119,7 @@ impl Editor {
         Handled::Yes
     }
 
-    /// The lines at a width, and the cursor's line and column among them.
+    /// The lines at a width in cells, and the cursor's line and column.
     pub fn layout(&self, columns: usize) -> (Vec<Line>, usize, usize) {
         let lines = wrap::wrap(&self.text, columns);
         let row = lines
@@ -150,8 +149,8 @@ impl Editor {
         at + next.map_or(0, str::len)
     }
 
-    /// `at`, or the next place between two graphemes: a mark typed after a
-    /// letter joins it.
+    /// `at`, or the next boundary between graphemes: a combining mark joins the letter
+    /// before it.
     fn boundary_from(&self, at: usize) -> usize {
         let mut cursor = GraphemeCursor::new(at, self.text.len(), true);
         match cursor.is_boundary(&self.text, 0) {
@@ -176,7 +175,7 @@ impl Editor {
         self.boundary_from(end.unwrap_or(self.text.len()))
     }
 
-    /// First and last place of the cursor's line as drawn.
+    /// First and last cursor position in the cursor's line as drawn.
     fn row_range(&self) -> (usize, usize) {
         let (lines, row, _) = self.layout(self.columns);
         let range = &lines[row].range;
@@ -261,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pasted_megabyte_is_cut_between_characters_and_said() {
+    fn a_pasted_megabyte_is_cut_between_characters_with_a_notice() {
         let mut editor = typed("start ");
         let taken = editor.insert(&"日👍🏽".repeat(100_000));
         assert!(matches!(taken, Handled::Notice(_)));
@@ -321,7 +320,7 @@ mod tests {
                 Key::Char('x'), Key::Char('\u{301}'), Key::Char('\u{1f1e9}'),
             ];
             let mut editor = Editor::new(&start);
-            editor.drawn_in(columns);
+            editor.set_width(columns);
             for key in keys {
                 editor.key(all[key]);
                 let mut cursor = GraphemeCursor::new(editor.cursor, editor.text.len(), true);

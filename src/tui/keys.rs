@@ -1,8 +1,8 @@
-//! What a key press means, before anybody knows on which screen.
+//! The meaning of a key press, independent of the screen.
 //!
 //! A terminal sends Alt as an Esc before the key, so that Esc and a key pressed
 //! right after it may arrive as one. An Alt with a character therefore counts as
-//! Esc: a needless stop of the device is harmless, a missed one is not.
+//! Esc: an unnecessary stop of the device is harmless, a missed one is not.
 
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
@@ -19,13 +19,13 @@ pub enum Key {
     Tab,
     /// Shift-Tab.
     BackTab,
-    /// Arrow.
+    /// Left arrow.
     Left,
-    /// Arrow.
+    /// Right arrow.
     Right,
-    /// Arrow.
+    /// Up arrow.
     Up,
-    /// Arrow.
+    /// Down arrow.
     Down,
     /// Ctrl-Left.
     WordLeft,
@@ -67,7 +67,7 @@ pub enum Key {
     Suspend,
 }
 
-/// What a key event means; nothing for releases and for keys without a meaning.
+/// The key of an event; `None` for releases and for keys without a function.
 pub fn read(event: &KeyEvent) -> Option<Key> {
     if event.kind == KeyEventKind::Release {
         return None;
@@ -102,7 +102,7 @@ pub fn read(event: &KeyEvent) -> Option<Key> {
         KeyCode::F(5) => Key::Pause,
         KeyCode::F(6) => Key::Decline,
         KeyCode::F(10) => Key::Quit,
-        // AltGr arrives as both on some systems: a character.
+        // AltGr arrives as Ctrl and Alt on some systems: a character.
         KeyCode::Char(c) if control && alt => Key::Char(c),
         KeyCode::Char(c) if control => return with_control(c.to_ascii_lowercase()),
         KeyCode::Char(_) if alt => Key::Esc,

@@ -1,7 +1,7 @@
-//! The operator's surface without a terminal: events in, inputs and cells out.
+//! The user interface without a terminal: events in, inputs and cells out.
 //!
-//! Everything that the terminal shows and does is here, so that whole sessions
-//! can be driven by keys in a test.
+//! Everything that the terminal shows and does is here, so that a test can drive whole
+//! sessions by keys.
 
 use super::theme::{Colour, Theme};
 use super::ui_state::UiState;
@@ -13,7 +13,7 @@ use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget as _;
 use study_core::session::{Input, Screen, View};
 
-/// A draft, its look and its size.
+/// The state of the interface, its styles and its size.
 #[derive(Debug, Clone)]
 pub struct Surface {
     state: UiState,
@@ -23,7 +23,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// An empty surface of no size yet.
+    /// An empty interface of size 0.
     pub fn new(colour: Colour) -> Self {
         Self {
             state: UiState::default(),
@@ -33,7 +33,7 @@ impl Surface {
         }
     }
 
-    /// What is typed and not yet sent.
+    /// The state of the interface.
     pub fn state(&self) -> &UiState {
         &self.state
     }
@@ -43,7 +43,7 @@ impl Surface {
         self.state.take_suspend()
     }
 
-    /// Follows the view to another screen and size.
+    /// Adapts to the screen of a view and to a size.
     pub fn follow(&mut self, view: &View, area: Rect) {
         self.area = area;
         let old = self.screen.as_ref();
@@ -70,7 +70,7 @@ impl Surface {
         }
     }
 
-    /// What an event means.
+    /// The inputs that an event causes.
     pub fn event(&mut self, event: &Event, view: &View) -> Vec<Input> {
         self.follow(view, self.area);
         if Page::too_small(self.area) {
@@ -97,7 +97,7 @@ impl Surface {
         Vec::new()
     }
 
-    /// Draws everything; returns where the terminal's cursor belongs.
+    /// Draws everything; returns the position of the terminal's cursor.
     pub fn draw(
         &self,
         view: &View,

@@ -1,24 +1,24 @@
-//! Every colour and emphasis of the terminal, in one place.
+//! All colours and text styles of the terminal.
 //!
-//! Colour supports and never carries: a page drawn with any [`Colour`] has the
-//! same characters in the same cells. The terminal's own background stays.
+//! No information depends on colour: a page has the same characters in the same cells
+//! with every [`Colour`]. The terminal's own background is kept.
 
 use ratatui::style::{Color, Modifier, Style};
 
-/// How many colours the terminal can show.
+/// The colours that the terminal can show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colour {
-    /// The palette of 256.
+    /// 256 colours.
     Full,
-    /// The sixteen of the terminal's own scheme.
+    /// The 16 colours of the terminal's scheme.
     Sixteen,
-    /// None: bold, dim and reversed only.
+    /// No colour: bold, dim and reversed only.
     None,
 }
 
 impl Colour {
     /// From the environment: `NO_COLOR` (any value that is not empty), `TERM`
-    /// and `COLORTERM`. The variables come through `var`.
+    /// and `COLORTERM`, read with `var`.
     pub fn detect(var: impl Fn(&str) -> Option<String>) -> Self {
         let set = |name| var(name).filter(|value: &String| !value.is_empty());
         if set("NO_COLOR").is_some() {
@@ -35,14 +35,14 @@ impl Colour {
     }
 }
 
-/// The styles of everything that is drawn.
+/// The styles of everything on the terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Theme {
     colour: Colour,
 }
 
 impl Theme {
-    /// For a terminal with so many colours.
+    /// The styles for a terminal.
     pub fn new(colour: Colour) -> Self {
         Self { colour }
     }
@@ -60,12 +60,12 @@ impl Theme {
         Style::new()
     }
 
-    /// What the eye should find first.
+    /// Emphasized text.
     pub fn strong(self) -> Style {
         Style::new().add_modifier(Modifier::BOLD)
     }
 
-    /// What can be overlooked: the experimenter's line, explanations.
+    /// Secondary text: the experimenter's status line, explanations.
     pub fn quiet(self) -> Style {
         match self.colour {
             Colour::Full => Style::new().fg(Color::Indexed(244)),
@@ -78,27 +78,27 @@ impl Theme {
         self.tint(73, Color::Cyan).add_modifier(Modifier::BOLD)
     }
 
-    /// What is chosen.
+    /// A chosen answer.
     pub fn chosen(self) -> Style {
         self.tint(73, Color::Cyan).add_modifier(Modifier::BOLD)
     }
 
-    /// The outline of what can be chosen.
+    /// The outline of an answer that can be chosen.
     pub fn outline(self) -> Style {
         self.quiet()
     }
 
-    /// The mark of the field that has the focus.
+    /// The bar of the field with the focus.
     pub fn focus(self) -> Style {
         self.tint(73, Color::Cyan)
     }
 
-    /// The device plays.
+    /// The playback indicator.
     pub fn playing(self) -> Style {
         self.tint(71, Color::Green).add_modifier(Modifier::BOLD)
     }
 
-    /// On disk.
+    /// The check mark of saved answers.
     pub fn saved(self) -> Style {
         self.tint(71, Color::Green)
     }
@@ -108,13 +108,13 @@ impl Theme {
         self.tint(172, Color::Yellow)
     }
 
-    /// What has to be seen: faults and losses.
+    /// The title of a fault.
     pub fn trouble(self) -> Style {
         self.tint(167, Color::Red)
             .add_modifier(Modifier::BOLD | Modifier::REVERSED)
     }
 
-    /// The frame around a trouble.
+    /// The frame around a fault.
     pub fn trouble_frame(self) -> Style {
         self.tint(167, Color::Red).add_modifier(Modifier::BOLD)
     }

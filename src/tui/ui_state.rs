@@ -1,13 +1,12 @@
-//! What is typed and chosen but not yet sent, and what a key does to it.
+//! What is typed and chosen but not yet sent, and how keys change it.
 //!
-//! A [`UiState`] is the state of the screen's surface and nothing else: it has no
-//! terminal, no clock and no knowledge of the study beyond the [`View`] it is
-//! given. Its only effects are the [`Input`]s that it returns.
+//! A [`UiState`] has no terminal, no clock and no knowledge of the study beyond the
+//! [`View`] it is given. Its only effects are the [`Input`]s that it returns.
 //!
 //! Invariants: Esc always sends [`Input::Stop`]; Space sends it while a table is
-//! loaded or playing unless a text has the focus, and never advances; nothing is
-//! preset, and without a choice Enter sends nothing. What was typed into a form
-//! survives pauses, troubles and dialogs until another form is shown.
+//! loaded or playing unless a text field has the focus, and never advances; no answer is
+//! preset, and without a choice Enter sends nothing. What was typed into a form is kept
+//! during pauses, faults and dialogs until another form is shown.
 
 pub mod dialog;
 pub mod field;
@@ -22,67 +21,67 @@ use study_base::text::QuestionId;
 use study_core::outcome::Place;
 use study_core::session::{Input, Screen, View};
 
-/// The surface's state.
+/// The state of the interface.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct UiState {
     form: Option<(FormKey, Form)>,
     who: Option<((String, String), Who)>,
     focus: Focus,
     dialogs: Vec<Dialog>,
-    /// Dialogs that a trouble has put aside.
+    /// Dialogs that are hidden while a fault is shown.
     parked: Vec<Dialog>,
     notice: Option<String>,
     reading: Reading,
     suspend: bool,
 }
 
-/// Where text without a dialog goes.
+/// Where typed text goes while no dialog is open.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Focus {
-    /// Into the first screen.
+    /// The first screen.
     Who,
-    /// Into the form.
+    /// The form.
     Form,
     /// Nowhere.
     #[default]
     None,
 }
 
-/// Which form a draft belongs to.
+/// Identifies the form that the answers belong to.
 type FormKey = (Place, u32, Vec<QuestionId>);
 
 /// The answers to a form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Form {
-    /// One for each question.
+    /// One field for each question.
     pub fields: Vec<Field>,
-    /// Which has the focus.
+    /// Index of the field with the focus.
     pub focus: usize,
 }
 
 /// The first screen's two fields.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Who {
-    /// Pseudonym.
+    /// The pseudonym.
     pub participant: Editor,
-    /// Initials or code.
+    /// The initials or code of the operator.
     pub operator: Editor,
     /// Whether the operator's field has the focus.
     pub on_operator: bool,
 }
 
-/// How far a long text is read.
+/// The scroll position of a long text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Reading {
-    /// Lines that are scrolled away.
+    /// Lines above the visible part.
     pub scrolled: usize,
-    /// Most lines that can be.
+    /// Largest value of `scrolled`.
     pub most: usize,
-    /// Lines that fit on the page.
+    /// Visible lines.
     pub page: usize,
 }
 
-/// What the mouse can hit.
+/// Targets of the mouse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Target {
     /// A number on the scale of a question.
@@ -104,41 +103,41 @@ impl UiState {
         self.who.as_ref().map(|(_, who)| who)
     }
 
-    /// The dialog that is on top.
+    /// The topmost dialog.
     pub fn dialog(&self) -> Option<&Dialog> {
         self.dialogs.last()
     }
 
-    /// Something to say about the last key.
+    /// A notice about the last key.
     pub fn notice(&self) -> Option<&str> {
         self.notice.as_deref()
     }
 
-    /// How far a long text is read.
+    /// The scroll position of a long text.
     pub fn reading(&self) -> Reading {
         self.reading
     }
 
-    /// Tells how much of the text on the screen fits.
+    /// Sets the largest scroll position and the visible lines.
     pub fn set_room(&mut self, most: usize, page: usize) {
         self.reading.most = most;
         self.reading.page = page;
         self.reading.scrolled = self.reading.scrolled.min(most);
     }
 
-    /// Tells how wide the text with the focus is drawn.
+    /// Sets the width of the text field with the focus, in cells.
     pub fn set_columns(&mut self, columns: usize) {
         if let Some(editor) = self.editor() {
-            editor.drawn_in(columns);
+            editor.set_width(columns);
         }
     }
 
-    /// Whether the program was asked to go to the background, once.
+    /// Whether Ctrl-Z was pressed since the last call.
     pub fn take_suspend(&mut self) -> bool {
         std::mem::take(&mut self.suspend)
     }
 
-    /// Follows the view to another screen. Returns whether it was another one.
+    /// Adapts to the screen of a view. Returns whether it differs from the last one.
     pub fn follow(&mut self, view: &View, old: Option<&Screen>) -> bool {
         self.focus = Focus::None;
         match &view.screen {
@@ -177,9 +176,9 @@ impl UiState {
             }
             _ => {}
         }
-        // A trouble must not hide behind a dialog, nor what is typed be lost.
-        if is_trouble(&view.screen) {
-            if !old.is_some_and(is_trouble) {
+        // A dialog must not cover a fault, and typed text must not be lost.
+        if is_fault(&view.screen) {
+            if !old.is_some_and(is_fault) {
                 self.parked.append(&mut self.dialogs);
             }
         } else {
@@ -187,15 +186,15 @@ impl UiState {
             back.append(&mut self.dialogs);
             self.dialogs = back;
         }
-        let other = old.is_none_or(|old| !same_page(old, &view.screen));
-        if other {
+        let changed = old.is_none_or(|old| !same_page(old, &view.screen));
+        if changed {
             self.reading = Reading::default();
             self.notice = None;
         }
-        other
+        changed
     }
 
-    /// What an event means. Mouse clicks come through [`UiState::pick`].
+    /// The inputs that an event causes. Mouse clicks are handled by [`UiState::pick`].
     pub fn key(&mut self, event: &Event, view: &View) -> Vec<Input> {
         match event {
             Event::Key(event) => {
@@ -207,18 +206,18 @@ impl UiState {
             }
             Event::Paste(text) => {
                 self.notice = None;
-                let taken = match self.editor() {
+                let handled = match self.editor() {
                     Some(editor) => editor.insert(text),
                     None => Handled::Notice("There is no text field to paste into.".to_owned()),
                 };
-                self.say(taken);
+                self.show_notice(handled);
                 Vec::new()
             }
             _ => Vec::new(),
         }
     }
 
-    /// Takes a click.
+    /// Handles a click on a target.
     pub fn pick(&mut self, target: Target, view: &View) {
         let Screen::Form { questions, .. } = &view.screen else {
             return;
@@ -242,7 +241,7 @@ impl UiState {
         }
     }
 
-    /// Scrolls a long text with the wheel.
+    /// Scrolls a long text with the mouse wheel.
     pub fn scroll(&mut self, down: bool) {
         let Reading { scrolled, most, .. } = self.reading;
         self.reading.scrolled = if down {
@@ -252,8 +251,8 @@ impl UiState {
         };
     }
 
-    fn say(&mut self, taken: Handled) {
-        if let Handled::Notice(what) = taken {
+    fn show_notice(&mut self, handled: Handled) {
+        if let Handled::Notice(what) = handled {
             self.notice = Some(what);
         }
     }
@@ -286,7 +285,7 @@ impl Who {
     }
 }
 
-/// Whether two screens are the same one with other numbers on it.
+/// Whether two screens are the same page, apart from numbers on it.
 fn same_page(a: &Screen, b: &Screen) -> bool {
     match (a, b) {
         (
@@ -308,8 +307,8 @@ fn same_page(a: &Screen, b: &Screen) -> bool {
     }
 }
 
-/// Whether the screen reports something that must not be overlooked.
-fn is_trouble(screen: &Screen) -> bool {
+/// Whether the screen reports a fault.
+fn is_fault(screen: &Screen) -> bool {
     matches!(
         screen,
         Screen::DeviceTrouble { .. } | Screen::SaveTrouble { .. }

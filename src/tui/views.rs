@@ -1,10 +1,9 @@
-//! What is drawn: one file for each screen, and the page around them.
+//! Widgets: one file for each kind of screen, and the page around them.
 //!
-//! A view is borrowed data with `impl Widget for &…`: drawing changes nothing.
-//! Everything on the page comes from the `View`, which holds nothing that
-//! identifies a realization, from the `UiState` and from the strip. The
-//! participant's part is in the middle and large; the experimenter's line is the
-//! last row.
+//! A widget borrows its data and implements `Widget for &…`: drawing changes nothing.
+//! Everything on the page comes from the `View`, which holds nothing that identifies a
+//! realization, from the `UiState` and from the live strip. The participant's part is
+//! large and centred; the experimenter's status line is the last row.
 
 pub mod answer;
 pub mod choice;
@@ -20,5 +19,5 @@ pub mod who;
 
 pub use page::Page;
 
-/// Smallest size that is drawn for, columns and rows.
+/// Smallest supported size: columns and rows.
 pub const MINIMUM: (u16, u16) = (80, 24);

@@ -1,4 +1,4 @@
-//! Something is waited for before a session: what, since when, and how to leave.
+//! The page before a session that is shown while a child program starts.
 
 use super::keys::{self, Key};
 use super::terminal::Terminal;
@@ -12,17 +12,17 @@ use ratatui::Frame;
 use ratatui::widgets::Widget as _;
 use std::time::Duration;
 
-/// How long one look at the keys takes.
+/// How long one check for a key takes.
 const SLICE: Duration = Duration::from_millis(20);
 
-/// A terminal that shows what is waited for.
+/// A terminal that shows a waiting page.
 pub struct Waiting {
     terminal: Terminal,
     theme: Theme,
 }
 
 impl Waiting {
-    /// Takes the terminal.
+    /// Opens the terminal.
     ///
     /// # Errors
     /// [`TuiError`] if there is none or it cannot be used.
@@ -33,8 +33,8 @@ impl Waiting {
         })
     }
 
-    /// Shows that a program has not said hello since then; whether somebody wants to
-    /// leave, or cannot be asked any more.
+    /// Shows that a program has not sent its hello yet. True if the user cancels or the
+    /// terminal is gone.
     pub fn leaves(&mut self, program: &str, since: Duration, at_most: Duration) -> bool {
         if self.terminal.take_signal().is_some() || self.terminal.check().is_err() {
             return true;
@@ -74,6 +74,6 @@ fn draw(frame: &mut Frame<'_>, prose: &Prose, theme: Theme) {
     };
     let buf = frame.buffer_mut();
     view.render(rows(area, 1, area.height.saturating_sub(5)), buf);
-    let keys = hints(theme, &[("Esc", "leaves")]);
+    let keys = hints(theme, &[("Esc", "quit")]);
     centre(buf, row(area, area.height.saturating_sub(3)), &keys);
 }

@@ -1,4 +1,4 @@
-//! Small pieces that several views share. Every one keeps inside its area.
+//! Building blocks of several screens. Each draws inside its area only.
 
 use super::editor::Editor;
 use super::theme::Theme;
@@ -10,7 +10,7 @@ use ratatui::symbols::border;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Widget};
 
-/// The middle of `area`: `width` cells wide and `height` tall, or less.
+/// A centred part of `area`, at most `width` by `height` cells.
 pub fn middle(area: Rect, width: u16, height: u16) -> Rect {
     let width = width.min(area.width);
     let height = height.min(area.height);
@@ -36,7 +36,7 @@ pub fn rows(area: Rect, y: u16, height: u16) -> Rect {
     Rect::new(area.x, area.y + y, area.width, height.min(area.height - y))
 }
 
-/// Draws a line at the left of a row. The text has to be safe already.
+/// Draws a left-aligned line. The text must already be safe.
 pub fn left(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
     let area = area.intersection(buf.area);
     if !area.is_empty() {
@@ -44,13 +44,13 @@ pub fn left(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
     }
 }
 
-/// Draws a line in the middle of a row.
+/// Draws a centred line.
 pub fn centre(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
     let width = u16::try_from(line.width()).unwrap_or(u16::MAX);
     left(buf, middle(area, width, area.height), line);
 }
 
-/// Draws a line at the right of a row.
+/// Draws a right-aligned line.
 pub fn right(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
     let width = u16::try_from(line.width())
         .unwrap_or(u16::MAX)
@@ -59,7 +59,7 @@ pub fn right(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
     left(buf, Rect { x, width, ..area }, line);
 }
 
-/// Draws wrapped lines, each in the middle.
+/// Draws wrapped lines, each centred.
 pub fn centre_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
     for (y, line) in (0..area.height).zip(lines) {
         let line = Line::from(Span::styled(line.as_str(), style));
@@ -67,7 +67,7 @@ pub fn centre_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) 
     }
 }
 
-/// Draws wrapped lines from the left.
+/// Draws wrapped lines, left-aligned.
 pub fn left_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
     for (y, line) in (0..area.height).zip(lines) {
         let line = Line::from(Span::styled(line.as_str(), style));
@@ -75,7 +75,7 @@ pub fn left_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
     }
 }
 
-/// Keys and what they do: `Enter save  ·  Tab comment`.
+/// Keys and their actions: `Enter: save   ·   Tab: comment`.
 pub fn hints(theme: Theme, keys: &[(&str, &str)]) -> Line<'static> {
     let mut spans = Vec::new();
     for (key, what) in keys {
@@ -83,13 +83,12 @@ pub fn hints(theme: Theme, keys: &[(&str, &str)]) -> Line<'static> {
             spans.push(Span::styled("   ·   ", theme.quiet()));
         }
         spans.push(Span::styled((*key).to_owned(), theme.key()));
-        spans.push(Span::styled(format!(" {what}"), theme.quiet()));
+        spans.push(Span::styled(format!(": {what}"), theme.quiet()));
     }
     Line::from(spans)
 }
 
-/// Minutes and seconds, hours only when there are some. `0:00` for what is no
-/// number.
+/// A duration in s as `m:ss` or `h:mm:ss`; `0:00` if it is not finite.
 pub fn clock(seconds: f64) -> String {
     let s = if seconds.is_finite() {
         seconds.clamp(0.0, 1e9) as u64
@@ -103,7 +102,7 @@ pub fn clock(seconds: f64) -> String {
     }
 }
 
-/// A frame; thick where it is chosen or urgent, so that no colour is needed.
+/// Draws a frame; a thick one marks what is chosen or urgent without colour.
 pub fn frame(buf: &mut Buffer, area: Rect, thick: bool, style: Style) {
     let area = area.intersection(buf.area);
     if area.is_empty() {
@@ -116,7 +115,7 @@ pub fn frame(buf: &mut Buffer, area: Rect, thick: bool, style: Style) {
         .render(area, buf);
 }
 
-/// Empties an area and frames it, for a dialog. Returns the inside.
+/// Clears and frames the area of a dialog. Returns the inner area.
 pub fn dialog(buf: &mut Buffer, area: Rect, title: &str, theme: Theme) -> Rect {
     let area = area.intersection(buf.area);
     if area.is_empty() {
@@ -136,24 +135,24 @@ pub fn dialog(buf: &mut Buffer, area: Rect, title: &str, theme: Theme) -> Rect {
     }
 }
 
-/// A field for text: a bar at its left, thick with the focus, and the text.
+/// A text field: a bar at its left, thick if it has the focus, and the text.
 #[derive(Debug)]
 pub struct TextField<'a> {
-    /// What is typed.
+    /// The text.
     pub editor: &'a Editor,
-    /// Whether keys go here.
+    /// Whether it has the focus.
     pub focused: bool,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
 impl TextField<'_> {
-    /// The cells for text in an area.
+    /// Width of the text in an area, in cells.
     pub fn columns(area: Rect) -> usize {
         usize::from(area.width.saturating_sub(3)).max(1)
     }
 
-    /// The first line that is shown, and the cursor's line and column.
+    /// The lines, the first visible one, and the cursor's line and column.
     fn window(&self, area: Rect) -> (Vec<wrap::Line>, usize, usize, usize) {
         let (lines, line, column) = self.editor.layout(Self::columns(area));
         let height = usize::from(area.height);
@@ -161,7 +160,7 @@ impl TextField<'_> {
         (lines, first, line, column)
     }
 
-    /// Where the terminal's cursor belongs.
+    /// The position of the terminal's cursor.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
         if !self.focused || area.width < 3 || area.height == 0 {
             return None;

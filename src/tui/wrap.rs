@@ -1,9 +1,9 @@
 //! Text of any language laid out in terminal cells.
 //!
 //! Lines are ranges of the source text, so that prompts and editors share one
-//! way of breaking. What is shown is safe: whatever could steer the terminal or
-//! disguise the order is escaped by [`Untrusted`]. Right-to-left text stays in
-//! the order it is stored in; the terminal turns it round, or not.
+//! way of breaking. What is shown is safe: characters that control the terminal or
+//! hide the order of the text are escaped by [`Untrusted`]. Right-to-left text is drawn
+//! in its stored order; reordering is left to the terminal.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -14,19 +14,18 @@ use unicode_width::UnicodeWidthStr as _;
 /// One line of laid-out text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
-    /// The bytes of the source, without the line break.
+    /// Byte range in the source, without the line break.
     pub range: Range<usize>,
-    /// What is drawn.
+    /// The text as drawn.
     pub shown: String,
 }
 
-/// The cells that a string takes, summed over what a reader sees as characters:
-/// how a terminal buffer counts.
+/// Width of a string in cells, summed over its graphemes, as a terminal buffer counts.
 pub fn width(text: &str) -> usize {
     text.graphemes(true).map(|g| g.width()).sum()
 }
 
-/// A grapheme as it can be drawn: never empty, never able to steer.
+/// A grapheme as it is drawn: never of zero width, never a control sequence.
 pub fn shown(grapheme: &str) -> Cow<'_, str> {
     if grapheme == "\t" {
         return Cow::Borrowed("    ");
@@ -37,8 +36,8 @@ pub fn shown(grapheme: &str) -> Cow<'_, str> {
     if grapheme.width() > 0 {
         return Cow::Borrowed(grapheme);
     }
-    // A mark without its letter gets the circle that stands for one; what is
-    // still invisible is spelled out.
+    // A combining mark without a letter is drawn on a circle; what is still
+    // invisible is spelled out.
     let circled = format!("◌{grapheme}");
     if width(&circled) > 0 && grapheme.chars().all(is_mark) {
         Cow::Owned(circled)
@@ -75,7 +74,7 @@ pub fn wrap(text: &str, columns: usize) -> Vec<Line> {
         let space = grapheme.chars().all(char::is_whitespace);
         if line.cells + cells > columns && line.cells > 0 {
             if space {
-                // Spaces hang over the edge and start no line.
+                // Spaces at the edge belong to the line they end.
                 line.hangs = true;
                 line.break_after = Some((end, line.shown.len(), line.cells));
                 continue;

@@ -116,7 +116,7 @@ fn arguments_are_looked_at_before_the_terminal() {
     fs::write(folder.path().join("file"), "x").unwrap();
     let (terminal, err) = run(&["--results", "file"]);
     assert!(
-        !terminal && err.contains("file: it is a file, not a folder"),
+        !terminal && err.contains("file is a file, not a folder"),
         "{err}"
     );
     assert!(run(&["--participant", "P01", "--operator", "lw"]).0);
@@ -129,7 +129,7 @@ fn an_id_that_differs_only_in_case_has_one_hint() {
     let path = repository("protocols/turn-signal");
     let state = ["--state", "no-show", "--reason", "x"];
     let mut terminal = Terminal::start(&["run", &path], folder.path(), 24, 80);
-    terminal.wait_for("Enter begin");
+    terminal.wait_for("Enter: begin");
     terminal.keys("P01\tlw\r");
     terminal.wait_for("Operate the real switch");
     drop(terminal);
@@ -148,7 +148,7 @@ fn an_id_that_differs_only_in_case_has_one_hint() {
         assert_eq!(lines, [format!("error: {told}"), format!("  hint: {hint}")]);
     }
     let mut terminal = Terminal::start(&["run", &path], folder.path(), 24, 80);
-    terminal.wait_for("Enter begin");
+    terminal.wait_for("Enter: begin");
     terminal.keys("p01\tlw\r");
     terminal.wait_for("differ only in upper and lower case");
     terminal.wait_for("if it is the same person");
@@ -161,7 +161,7 @@ fn an_id_that_leaves_the_folder_is_refused_on_the_screen_and_on_the_command_line
     fs::create_dir_all(&inner).unwrap();
     let path = repository("protocols/turn-signal");
     let mut terminal = Terminal::start(&["run", &path], &inner, 24, 80);
-    terminal.wait_for("Enter begin");
+    terminal.wait_for("Enter: begin");
     terminal.keys("../../x\tlw\r");
     terminal.wait_for("no participant id");
     terminal.keys("\u{3}");
@@ -193,7 +193,7 @@ fn a_hostile_comment_is_stored_as_typed_and_shown_escaped() {
     let path = repository("protocols/turn-signal");
     let arguments = ["run", &path, "--participant", "P01", "--operator", "x"];
     let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
-    play_until(&mut terminal, "P01", "Tab comment");
+    play_until(&mut terminal, "P01", "Tab: comment");
     let comment = "=1+1, \"quoted\"\r\nsecond\u{1b}[2J line 👍🏽 \u{202e}abc";
     // the keys choose, a paste brings the rest as it is
     terminal.keys(&format!("4\t\u{1b}[200~{comment}\u{1b}[201~"));

@@ -37,26 +37,31 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     let mut terminal = start(folder.path(), protocol);
     // a remark while the first trial that counts plays
     play_until(&mut terminal, "trial 1 of");
-    play_until(&mut terminal, "Enter to rate");
-    dialog(&mut terminal, F2, "Tab who", "motor hums\r");
+    play_until(&mut terminal, "Enter: rate");
+    dialog(&mut terminal, F2, "Tab: author", "motor hums\r");
     // a busy machine may lose the playback, the remark does not end it
     terminal.wait_until("the playback to go on", |s| {
         s.contains("Feel the device") || s.contains("DEVICE TROUBLE")
     });
     play_until(&mut terminal, "trial 2 of");
     // a bad one
-    play_until(&mut terminal, "Enter to rate");
-    dialog(&mut terminal, F4, "Enter marks it", "somebody came in\r");
+    play_until(&mut terminal, "Enter: rate");
+    dialog(
+        &mut terminal,
+        F4,
+        "Enter: mark as bad",
+        "somebody came in\r",
+    );
     play_until(&mut terminal, "trial 3 of");
     // a correction: the newest answer
     terminal.keys(F3);
     terminal.wait_for("Correct");
     terminal.keys("\r");
-    terminal.wait_until("the new answer", |s| s.contains("Enter goes on"));
+    terminal.wait_until("the new answer", |s| s.contains("Enter: continue"));
     terminal.keys("3\r");
-    terminal.wait_until("the reason", |s| s.contains("Enter corrects"));
+    terminal.wait_until("the reason", |s| s.contains("Enter: correct"));
     terminal.keys("mistyped\r");
-    terminal.wait_until("the dialog to close", |s| !s.contains("Enter corrects"));
+    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: correct"));
     // leave in the middle, and come back
     terminal.keys(F10);
     terminal.wait_for("Are you sure?");

@@ -341,7 +341,7 @@ fn a_session_over_a_port_with_telemetry_that_is_whole() {
     let folder = rig.folder.path().to_owned();
     // the files are looked at before the folder goes with the rig
     let mut rig = rig;
-    rig.to("Enter closes");
+    rig.to("Enter: close");
     let files: Vec<PathBuf> = fs::read_dir(&telemetry)
         .unwrap()
         .map(|f| f.unwrap().path())
@@ -435,25 +435,25 @@ fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
     });
     rig.device.control("plug");
     // while it plays
-    rig.to("Enter to rate");
+    rig.to("Enter: rate");
     rig.device.control("unplug");
     rig.terminal.wait_for("DEVICE TROUBLE");
     rig.device.control("plug");
     // while the rating is typed: it is not disturbed
-    rig.to("1–7 choose");
+    rig.to("1–7: choose");
     rig.device.control("unplug");
     rig.terminal.keys("6\r");
     rig.terminal
-        .wait_until("the rating to be taken", |s| !s.contains("1–7 choose"));
+        .wait_until("the rating to be taken", |s| !s.contains("1–7: choose"));
     // the next trial has to wait for the device
     rig.to("DEVICE TROUBLE");
     rig.device.control("plug");
     // power, while it plays
-    rig.to("Enter to rate");
+    rig.to("Enter: rate");
     rig.device.control("reset");
     rig.terminal.wait_for("DEVICE TROUBLE");
     // the stop button of the device
-    rig.to("Enter to rate");
+    rig.to("Enter: rate");
     rig.device.control("trip");
     rig.terminal.wait_for("DEVICE TROUBLE");
     let (rows, events) = rig.finish();

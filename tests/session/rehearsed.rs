@@ -44,7 +44,7 @@ fn a_study_of_samples_can_be_rehearsed() {
     let (code, _, err) = study(&arguments, folder.path());
     assert_eq!(code, 1, "{err}");
     assert!(
-        err.contains("model `soft` has no table for a simulated device"),
+        err.contains("realization `soft` has no table for a simulated device"),
         "{err}"
     );
     assert!(!folder.path().join("other").exists());

@@ -59,7 +59,10 @@ fn a_smaller_terminal_says_what_is_needed() {
         strokes_missing: 0,
     });
     insta::assert_snapshot!("small_40x10", fresh(&playing, 40, 10));
-    assert!(fresh(&view(Screen::Saving), 60, 20).contains("80 × 24 is needed, this is 60 × 20."));
+    assert!(
+        fresh(&view(Screen::Saving), 60, 20)
+            .contains("This window has 60 × 20 cells; 80 × 24 are needed.")
+    );
 }
 
 #[test]

@@ -223,7 +223,7 @@ fn signals_end_the_session_in_order() {
         let mut desk = Desk::start(None, &[]);
         desk.shows("Feel the device.");
         desk.signal(signal);
-        assert_eq!(desk.report(), format!("abort: the program got {name}"));
+        assert_eq!(desk.report(), format!("abort: the program received {name}"));
         desk.is_given_back();
     }
 }
@@ -353,7 +353,7 @@ fn a_size_change_is_followed() {
         desk.master.as_ref().unwrap().resize(size).unwrap();
     };
     resize(&mut desk, 20, 60);
-    desk.shows("80 × 24 is needed, this is 60 × 20.");
+    desk.shows("This window has 60 × 20 cells; 80 × 24 are needed.");
     resize(&mut desk, 0, 0);
     resize(&mut desk, 24, 80);
     desk.shows("Feel the device.");

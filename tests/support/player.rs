@@ -91,33 +91,27 @@ fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<I
     let shows = |text: &str| page.text.contains(text);
     let answer = rating(&page.text);
     // What is typed first, how the page shows that it has been read, and the key.
-    let (typed, look, key, did) = if shows("Who takes part?") && shows("Enter begin") {
+    let (typed, look, key, did) = if shows("Who takes part?") && shows("Enter: begin") {
         let look = format!("┃ {participant}");
         (participant.to_owned(), look, "\r", Did::Who)
     } else if shows("yes, I agree") {
         (String::new(), String::new(), "y", Did::WentOn)
-    } else if shows("Enter to rate") {
+    } else if shows("Enter: rate") {
         (String::new(), String::new(), "\r", Did::Felt)
     } else if shows("Feel the device") || shows("aving …") {
         return Did::Waited;
     } else if shows("Are you sure?") {
         (String::new(), String::new(), "n", Did::WentOn)
-    } else if shows("1–7 choose") {
+    } else if shows("1–7: choose") {
         let look = format!("┃  {answer}  ┃");
         (answer.to_string(), look, "\r", Did::Answered)
-    } else if shows("↑ ↓ choose") {
+    } else if shows("↑ ↓: choose") {
         ("1".to_owned(), "(●)".to_owned(), "\r", Did::Answered)
-    } else if shows("Enter save") {
+    } else if shows("Enter: save") {
         ("33".to_owned(), "33".to_owned(), "\r", Did::Answered)
-    } else if [
-        "when ready",
-        "it is mounted",
-        "goes on",
-        "reads on",
-        "closes",
-    ]
-    .iter()
-    .any(|word| shows(&format!("Enter {word}")))
+    } else if ["when ready", "mounted", "continue", "read on", "close"]
+        .iter()
+        .any(|word| shows(&format!("Enter: {word}")))
     {
         (String::new(), String::new(), "\r", Did::WentOn)
     } else {

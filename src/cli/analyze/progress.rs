@@ -1,4 +1,4 @@
-//! An analysis with a bar once it has taken a second.
+//! A progress bar for analyses that take longer than a second.
 
 use super::super::console::{PATIENCE, progress};
 use std::io::IsTerminal as _;
@@ -8,10 +8,10 @@ use std::time::Duration;
 use study_core::analyze::{Analysis, Progress, Rules, analyze_watched};
 use study_core::outcome::ratings::Ratings;
 
-/// Between two looks at how far it is.
+/// Interval between two updates of the bar.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Analyses; who waits at a terminal sees how far it is.
+/// Runs the analysis, with a progress bar on a terminal.
 pub(super) fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
     let made = Progress::default();
     if !std::io::stderr().is_terminal() {
@@ -23,7 +23,7 @@ pub(super) fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
         scope.spawn(move || {
             let mut bar = None;
             let mut patience = PATIENCE;
-            // Nothing is ever sent: the sender goes when the analysis is there.
+            // Nothing is ever sent: the sender is dropped when the analysis has finished.
             while let Err(RecvTimeoutError::Timeout) = wait.recv_timeout(patience) {
                 patience = LOOK;
                 let groups = made.groups.load(Ordering::Relaxed);

@@ -1,5 +1,5 @@
-//! What opens above a screen: help, a remark, a correction, a reason, a question
-//! back. A dialog changes nothing until it is confirmed, and Esc closes it.
+//! Dialogs: help, remark, correction, reason, confirmation. A dialog changes nothing
+//! until it is confirmed; Esc closes it.
 
 use super::field::Field;
 use crate::tui::editor::{Editor, Handled};
@@ -9,91 +9,91 @@ use study_core::protocol::Answer;
 use study_core::session::view::{Correctable, View};
 use study_core::session::{Input, Screen};
 
-/// What is open above the screen.
+/// A dialog.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Dialog {
-    /// The keys.
+    /// The list of keys.
     Help,
-    /// Something to remark.
+    /// A remark.
     Remark {
-        /// Who says it.
+        /// Its author.
         by: Author,
-        /// What.
+        /// Its text.
         text: Editor,
     },
     /// A correction of an earlier answer.
     Correct(Box<Correct>),
-    /// Why a trial is bad.
+    /// Marks a trial as bad.
     MarkBad {
-        /// "trial 7".
+        /// Title of the trial, such as "trial 7".
         trial: String,
-        /// Why.
+        /// The reason.
         reason: Editor,
     },
-    /// Why the question on the screen is declined.
+    /// Declines the question on the screen.
     Decline {
-        /// Why.
+        /// The reason.
         reason: Editor,
     },
-    /// A question back before something that cannot be undone.
+    /// Asks for confirmation.
     Confirm(Confirm),
 }
 
-/// What has to be confirmed.
+/// An action that needs confirmation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Confirm {
-    /// Leaving the program.
+    /// Quit the program.
     Quit,
-    /// The participant does not come back.
+    /// The participant drops out.
     DropOut,
-    /// Consent is refused.
+    /// Refuse consent.
     Refuse,
 }
 
-/// A correction, step by step.
+/// A correction of an earlier answer, in steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correct {
-    /// What can be corrected, newest first, as it was when this opened.
+    /// Answers that can be corrected, newest first, as of the opening of the dialog.
     pub items: Vec<Correctable>,
-    /// Which one.
+    /// Index of the selected answer.
     pub cursor: usize,
-    /// How far it is.
+    /// The current step.
     pub step: Step,
 }
 
-/// How far a correction is.
+/// Steps of a correction.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
-    /// Which answer.
+    /// Select an answer.
     List,
-    /// The new answer.
+    /// Enter the new answer.
     Answer(Field),
-    /// Why.
+    /// Enter the reason.
     Reason {
-        /// The new answer; `None`: declined, for the same reason.
+        /// The new answer; `None`: declined, with the same reason.
         answer: Option<Answer>,
-        /// Who wants it.
+        /// Who asks for it.
         by: Author,
-        /// Why.
+        /// The reason.
         reason: Editor,
     },
 }
 
-/// What a key did to a dialog.
+/// The effect of a key on a dialog.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DialogResult {
-    /// It goes on.
+    /// It stays open.
     Open(Handled),
-    /// It is confirmed and closes; this is to be sent.
+    /// It is confirmed and closes; the inputs are sent.
     Done(Vec<Input>),
-    /// It closes and the form on the screen is sent with its question declined.
+    /// It closes, and the form on the screen is sent with its question declined.
     Declined(String),
     /// It closes.
     Closed,
 }
 
 impl Dialog {
-    /// A remark; who says it can be changed.
+    /// A remark by the experimenter; the author can be changed.
     pub fn remark() -> Self {
         Self::Remark {
             by: Author::Experimenter,
@@ -101,7 +101,7 @@ impl Dialog {
         }
     }
 
-    /// A correction of one of the view's earlier answers.
+    /// A correction of one of the earlier answers of the view.
     pub fn correct(view: &View) -> Self {
         Self::Correct(Box::new(Correct {
             items: view.correctable.clone(),
@@ -110,7 +110,7 @@ impl Dialog {
         }))
     }
 
-    /// Whether a character is text here, Space included.
+    /// Whether a character, including Space, is text in this dialog.
     pub fn is_text(&self) -> bool {
         match self {
             Self::Help | Self::Confirm(_) => false,
@@ -123,7 +123,7 @@ impl Dialog {
         }
     }
 
-    /// Where text is typed.
+    /// The text field, if there is one.
     pub fn editor(&mut self) -> Option<&mut Editor> {
         match self {
             Self::Help | Self::Confirm(_) => None,
@@ -137,8 +137,8 @@ impl Dialog {
         }
     }
 
-    /// The key that opened it. It closes it too, without stopping a device that
-    /// plays, unless something is typed.
+    /// The key that opens the dialog. It also closes an empty one, without stopping a
+    /// playing device.
     fn own_key(&self) -> Option<Key> {
         Some(match self {
             Self::Help => Key::Help,
@@ -150,12 +150,12 @@ impl Dialog {
         })
     }
 
-    /// Works on the dialog. Esc is the caller's.
+    /// Handles a key. Esc is handled by the caller.
     pub fn key(&mut self, key: Key, screen: &Screen) -> DialogResult {
         if self.own_key() == Some(key) {
             return match self.editor() {
                 Some(editor) if !editor.is_blank() => {
-                    missing("Something is typed: Enter keeps it, Ctrl-U removes it.")
+                    missing("The text is not saved yet: Enter saves it, Ctrl-U deletes it.")
                 }
                 _ => DialogResult::Closed,
             };
@@ -166,7 +166,7 @@ impl Dialog {
                 _ => DialogResult::Open(Handled::No),
             },
             Self::Remark { by, text } => match key {
-                Key::Enter if text.is_blank() => missing("Type the remark first, or Esc."),
+                Key::Enter if text.is_blank() => missing("Type a remark first, or press Esc."),
                 Key::Enter => DialogResult::Done(vec![Input::Remark {
                     by: *by,
                     text: text.text().to_owned(),
@@ -175,14 +175,14 @@ impl Dialog {
                 key => DialogResult::Open(text.key(key)),
             },
             Self::MarkBad { reason, .. } => match key {
-                Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
+                Key::Enter if reason.is_blank() => missing("Type a reason first, or press Esc."),
                 Key::Enter => DialogResult::Done(vec![Input::MarkBad {
                     reason: reason.text().to_owned(),
                 }]),
                 key => DialogResult::Open(reason.key(key)),
             },
             Self::Decline { reason } => match key {
-                Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
+                Key::Enter if reason.is_blank() => missing("Type a reason first, or press Esc."),
                 Key::Enter => DialogResult::Declined(reason.text().to_owned()),
                 key => DialogResult::Open(reason.key(key)),
             },
@@ -201,17 +201,17 @@ impl Confirm {
                     vec![Input::Resume(Choice::DropOut)]
                 }
                 (Self::Refuse, Screen::Consent { .. }) => vec![Input::Consent(false)],
-                // The screen that asked is gone.
+                // The screen has changed in the meantime.
                 _ => Vec::new(),
             }),
             Key::Char('n' | 'N') => DialogResult::Closed,
-            _ => missing("y or n"),
+            _ => missing("Press y or n."),
         }
     }
 }
 
 impl Correct {
-    /// The answer that is corrected.
+    /// The selected answer.
     pub fn item(&self) -> Option<&Correctable> {
         self.items.get(self.cursor)
     }
@@ -242,13 +242,13 @@ impl Correct {
             Step::Answer(field) => match key {
                 Key::Enter => match field.answer(&item.question) {
                     Ok(Some(answer)) if answer == item.answer => {
-                        missing("That is the answer as it stands.")
+                        missing("That is already the answer.")
                     }
                     Ok(Some(answer)) => self.ask_why(Some(answer)),
                     Ok(None) if matches!(field, Field::Text(_)) => {
                         self.ask_why(Some(Answer::Text(String::new())))
                     }
-                    Ok(None) => missing("Give the new answer first, or Esc."),
+                    Ok(None) => missing("Enter the new answer first, or press Esc."),
                     Err(why) => missing(&why),
                 },
                 Key::Decline => self.ask_why(None),
@@ -259,7 +259,7 @@ impl Correct {
                 key => DialogResult::Open(field.key(&item.question, key)),
             },
             Step::Reason { answer, by, reason } => match key {
-                Key::Enter if reason.is_blank() => missing("Say why first, or Esc."),
+                Key::Enter if reason.is_blank() => missing("Type a reason first, or press Esc."),
                 Key::Enter => {
                     let reason = reason.text().to_owned();
                     let declined = Answer::Declined {

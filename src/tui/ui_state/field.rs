@@ -1,42 +1,42 @@
-//! An answer that is being made. None is preset: what nobody chose is not sent.
+//! The field of one question. No answer is preset: what was not chosen is not sent.
 
 use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
 use std::collections::BTreeSet;
 use study_core::protocol::{Answer, Question, QuestionKind};
 
-/// The answer to one question, as far as it goes.
+/// The answer to one question, as entered so far.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Field {
-    /// To a rating.
+    /// A rating.
     Rating {
-        /// What is chosen.
+        /// The chosen number.
         chosen: Option<i64>,
-        /// Digits that may go on: the 1 of 10.
+        /// Digits that may be continued, such as the 1 of 10.
         typed: String,
     },
-    /// To a slider.
+    /// A slider.
     Slider {
-        /// Where the mark is.
+        /// The value at the marker.
         value: Option<f64>,
-        /// Digits so far.
+        /// Digits typed so far.
         typed: String,
     },
-    /// To a choice.
+    /// A choice.
     Choice {
-        /// Where the keys are; nothing is chosen by that.
+        /// Index of the option that the keys act on; it is not chosen thereby.
         cursor: Option<usize>,
-        /// What is chosen.
+        /// Indices of the chosen options.
         marked: BTreeSet<usize>,
     },
-    /// To a number.
+    /// A number.
     Number(Editor),
-    /// To a text.
+    /// A text.
     Text(Editor),
 }
 
 impl Field {
-    /// Empty, for a question.
+    /// An empty field for a question.
     pub fn new(question: &Question) -> Self {
         match &question.kind {
             QuestionKind::Rating { .. } => Self::Rating {
@@ -56,7 +56,7 @@ impl Field {
         }
     }
 
-    /// For the correction of `old`: a text starts from it, the rest empty.
+    /// A field for the correction of `old`: a text field starts with it, others are empty.
     pub fn correcting(question: &Question, old: &Answer) -> Self {
         match (&question.kind, old) {
             (QuestionKind::Text, Answer::Text(text)) => Self::Text(Editor::new(text)),
@@ -64,12 +64,12 @@ impl Field {
         }
     }
 
-    /// Whether a character is text here, Space included.
+    /// Whether a character, including Space, is text in this field.
     pub fn is_text(&self) -> bool {
         matches!(self, Self::Text(_))
     }
 
-    /// Its editor, if text is typed.
+    /// Its text editor, if it has one.
     pub fn editor(&mut self) -> Option<&mut Editor> {
         match self {
             Self::Number(editor) | Self::Text(editor) => Some(editor),
@@ -77,10 +77,10 @@ impl Field {
         }
     }
 
-    /// The answer so far; `None` if there is none yet.
+    /// The answer entered so far; `None` if there is none.
     ///
     /// # Errors
-    /// What to do, if what was typed is no answer.
+    /// What to do, if the entry is not a valid answer.
     pub fn answer(&self, question: &Question) -> Result<Option<Answer>, String> {
         let answer = match (self, &question.kind) {
             (Self::Rating { chosen, .. }, _) => chosen.map(Answer::Rating),
@@ -113,14 +113,14 @@ impl Field {
             QuestionKind::Rating { from, to, .. } => {
                 format!("Choose a number from {from} to {to} first.")
             }
-            QuestionKind::Slider { .. } => "Set the mark first: ← and →.".to_owned(),
+            QuestionKind::Slider { .. } => "Set the slider first, with ← and →.".to_owned(),
             QuestionKind::Choice { .. } => "Choose from the list first.".to_owned(),
             QuestionKind::Number { .. } => "Type a number first.".to_owned(),
             QuestionKind::Text => "Type an answer first.".to_owned(),
         }
     }
 
-    /// Works on the answer.
+    /// Handles a key.
     pub fn key(&mut self, question: &Question, key: Key) -> Handled {
         match (self, &question.kind) {
             (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
@@ -144,7 +144,7 @@ impl Field {
         }
     }
 
-    /// Takes a click on a number of a scale.
+    /// Handles a click on a number of a scale.
     pub fn set_number(&mut self, question: &Question, number: f64) {
         match (self, &question.kind) {
             (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
@@ -159,7 +159,7 @@ impl Field {
         }
     }
 
-    /// Takes a click on an option of a list.
+    /// Handles a click on an option of a list.
     pub fn toggle(&mut self, question: &Question, at: usize) {
         if let (Self::Choice { cursor, marked }, QuestionKind::Choice { options, multiple }) =
             (self, &question.kind)
@@ -171,7 +171,7 @@ impl Field {
     }
 }
 
-/// What was typed as a number; a comma may stand for the point.
+/// Parses a number; a comma is accepted as decimal separator.
 pub fn parse(text: &str) -> Option<f64> {
     let number: f64 = text.trim().replace(',', ".").parse().ok()?;
     number.is_finite().then_some(number)
@@ -222,7 +222,7 @@ fn begins_another(start: &str, from: i64, to: i64) -> bool {
     let Ok(n) = start.parse::<i64>() else {
         return false;
     };
-    // Numbers that begin so: [10 n, 10 n + 9], then a hundred of them, and so on.
+    // Numbers with this prefix: [10 n, 10 n + 9], then [100 n, 100 n + 99], and so on.
     let (mut near, mut far) = (n, n);
     loop {
         let tens = (near.checked_mul(10), far.checked_mul(10));
@@ -264,7 +264,7 @@ fn slider(
         typed.clear();
         return Handled::Notice(format!("The scale goes from {from} to {to}."));
     }
-    // The first key puts the mark in the middle, which favours no end.
+    // The first key sets the marker to the middle, which favours neither end.
     let moved = |steps: f64| value.map_or((from + to) / 2.0, |v| v + steps * step);
     let next = match key {
         Key::Left => moved(-1.0),
@@ -280,8 +280,8 @@ fn slider(
     Handled::Yes
 }
 
-/// The nearest whole number of steps from the left end, inside the scale, with
-/// no more decimals than the scale has.
+/// The value rounded to whole steps from the left end, clamped to the scale, with no
+/// more decimals than the scale has.
 fn on_grid(value: f64, from: f64, to: f64, step: f64) -> f64 {
     let steps = ((value - from) / step).round();
     if !steps.is_finite() {
@@ -314,7 +314,7 @@ fn choice(
         Key::End => last,
         Key::Char(' ' | 'x') => {
             let Some(at) = *cursor else {
-                return Handled::Notice("Move to an entry first: ↑ and ↓.".to_owned());
+                return Handled::Notice("Select an entry first, with ↑ and ↓.".to_owned());
             };
             mark(marked, at, multiple);
             return Handled::Yes;

@@ -1,5 +1,5 @@
-//! What a key does: first the ones that work everywhere, then the dialog on top,
-//! then the screen.
+//! Key handling: first keys that work everywhere, then the topmost dialog, then the
+//! screen.
 
 use super::dialog::{Confirm, Dialog, DialogResult};
 use super::{Focus, UiState};
@@ -12,7 +12,7 @@ use study_core::protocol::{Answer, Question};
 use study_core::session::{Input, Screen, View};
 
 impl UiState {
-    /// What a key means now.
+    /// The inputs that a key causes.
     pub(super) fn press(&mut self, key: Key, view: &View) -> Vec<Input> {
         match key {
             Key::Esc => {
@@ -50,8 +50,8 @@ impl UiState {
         self.press_on_screen(key, view)
     }
 
-    /// What a key means where nothing can be drawn: stop, or leave after a
-    /// question back. Nobody answers what they cannot see.
+    /// The inputs that a key causes in a terminal that is too small to draw a page: stop,
+    /// or quit after confirmation. Nothing can be answered there.
     pub fn blind(&mut self, event: &Event, view: &View) -> Vec<Input> {
         let Event::Key(event) = event else {
             return Vec::new();
@@ -65,7 +65,7 @@ impl UiState {
         }
     }
 
-    /// Whether a character is text now, Space included.
+    /// Whether a character, including Space, is text at the moment.
     pub fn is_text(&self) -> bool {
         match (self.dialog(), self.focus) {
             (Some(dialog), _) => dialog.is_text(),
@@ -78,12 +78,12 @@ impl UiState {
         }
     }
 
-    /// The dialog that a key opens, or why it cannot be opened.
+    /// The dialog that a key opens, or why it cannot be opened; `None` for other keys.
     fn command(&self, key: Key, view: &View) -> Option<Result<Dialog, String>> {
-        let unknown = matches!(view.screen, Screen::Who { .. });
+        let not_begun = matches!(view.screen, Screen::Who { .. });
         Some(match key {
             Key::Char('?') if !self.is_text() => Ok(Dialog::Help),
-            Key::Remark | Key::Correct | Key::MarkBad if unknown => {
+            Key::Remark | Key::Correct | Key::MarkBad if not_begun => {
                 Err("That is possible once the session has begun.".to_owned())
             }
             Key::Remark => Ok(Dialog::remark()),
@@ -113,8 +113,8 @@ impl UiState {
             return Vec::new();
         };
         match dialog.key(key, &view.screen) {
-            DialogResult::Open(taken) => {
-                self.say(taken);
+            DialogResult::Open(handled) => {
+                self.show_notice(handled);
                 Vec::new()
             }
             DialogResult::Done(inputs) => {
@@ -142,13 +142,13 @@ impl UiState {
                 Key::Char('b' | 'B') => vec![Input::Resume(Choice::RestartBlock)],
                 Key::Char('c' | 'C') => vec![Input::Resume(Choice::Continue)],
                 Key::Char('d' | 'D') => self.confirm(Confirm::DropOut),
-                Key::Enter => self.tell("Choose b, c or d."),
+                Key::Enter => self.notify("Choose b, c or d."),
                 _ => Vec::new(),
             },
             Screen::Consent { .. } => match key {
                 Key::Char('y' | 'Y') => vec![Input::Consent(true)],
                 Key::Char('n' | 'N') => self.confirm(Confirm::Refuse),
-                Key::Enter => self.tell("Choose y or n."),
+                Key::Enter => self.notify("Choose y or n."),
                 _ => Vec::new(),
             },
             Screen::Form { questions, .. } => self.press_form(key, questions),
@@ -186,7 +186,7 @@ impl UiState {
             Key::Tab | Key::BackTab | Key::Up | Key::Down => who.on_operator = !who.on_operator,
             Key::Enter if who.participant.is_blank() => {
                 who.on_operator = false;
-                return self.tell("Type the participant's id first.");
+                return self.notify("Type the participant's id first.");
             }
             Key::Enter if !who.on_operator && who.operator.is_blank() => who.on_operator = true,
             Key::Enter => {
@@ -196,8 +196,8 @@ impl UiState {
                 }];
             }
             key => {
-                let taken = who.focused().key(key);
-                self.say(taken);
+                let handled = who.focused().key(key);
+                self.show_notice(handled);
             }
         }
         Vec::new()
@@ -221,15 +221,15 @@ impl UiState {
                 match field.key(question, key) {
                     Handled::No if key == Key::Down => form.focus = (at + 1).min(count - 1),
                     Handled::No if key == Key::Up => form.focus = at.saturating_sub(1),
-                    taken => self.say(taken),
+                    handled => self.show_notice(handled),
                 }
             }
         }
         Vec::new()
     }
 
-    /// Sends the form, or says what is missing. With a reason, the first question
-    /// is declined and the others go with it.
+    /// Sends the form, or shows what is missing. With a reason, the first question is
+    /// declined and the other answers are sent with it.
     fn submit(&mut self, questions: &[Question], declined: Option<String>) -> Vec<Input> {
         let Some((_, form)) = &mut self.form else {
             return Vec::new();
@@ -247,14 +247,14 @@ impl UiState {
                 Ok(None) => {}
                 Err(why) => {
                     form.focus = at;
-                    return self.tell(&why);
+                    return self.notify(&why);
                 }
             }
         }
         vec![Input::Answer(answers)]
     }
 
-    /// A text that is longer than the page is read to its end first.
+    /// Keys of a long text: it must be scrolled to its end before Enter advances.
     fn press_reading(&mut self, key: Key, view: &View) -> Vec<Input> {
         let super::Reading {
             scrolled,
@@ -280,7 +280,7 @@ impl UiState {
         Vec::new()
     }
 
-    fn tell(&mut self, what: &str) -> Vec<Input> {
+    fn notify(&mut self, what: &str) -> Vec<Input> {
         self.notice = Some(what.to_owned());
         Vec::new()
     }

@@ -1,4 +1,4 @@
-//! The place where one question is answered, whatever its kind.
+//! The field in which a question of any kind is answered.
 
 use super::choice::List;
 use super::scale::{self, Boxes, TRACK_ROWS, Track};
@@ -14,20 +14,20 @@ use ratatui::widgets::Widget;
 use std::collections::BTreeMap;
 use study_core::protocol::{Question, QuestionKind};
 
-/// A question's answer, as far as it goes.
+/// The field of a question.
 #[derive(Debug)]
 pub struct AnswerField<'a> {
     /// The question.
     pub question: &'a Question,
-    /// The answer.
+    /// The answer entered so far.
     pub field: &'a Field,
-    /// Whether keys go here.
+    /// Whether it has the focus.
     pub focused: bool,
-    /// Rows of a rating's boxes.
+    /// Height of the boxes of a rating, in rows.
     pub tall: u16,
-    /// Whether it stands in the middle or at the left.
+    /// Whether it is centred; else left-aligned.
     pub centred: bool,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
@@ -106,7 +106,7 @@ impl<'a> AnswerField<'a> {
         }
     }
 
-    /// From the first box to the last, if it is a scale of boxes.
+    /// The area from the first box to the last, if it is a scale of boxes.
     pub fn edges(&self, area: Rect) -> Option<Rect> {
         let at = Rect { height: 3, ..area };
         let places = self.boxes(area.width)?.places(at);
@@ -118,7 +118,7 @@ impl<'a> AnswerField<'a> {
         })
     }
 
-    /// Rows that it takes in so many columns; at most `most`.
+    /// Its height in rows for a width in columns; at most `most`.
     pub fn rows(&self, columns: u16, most: u16) -> u16 {
         let rows = if let Some(boxes) = self.boxes(columns) {
             self.tall + boxes.caption_rows(columns)
@@ -127,7 +127,7 @@ impl<'a> AnswerField<'a> {
         } else if let Some(list) = self.list() {
             list.rows(self.inner(Rect::new(0, 0, columns, 1)).width)
         } else if self.field.is_text() {
-            // The same from the first letter on, so that nothing moves.
+            // A constant height, so that nothing moves while text is typed.
             8
         } else {
             2
@@ -135,7 +135,7 @@ impl<'a> AnswerField<'a> {
         rows.min(most)
     }
 
-    /// The part of the area that lists and texts use.
+    /// The part of the area that lists and text fields use.
     fn inner(&self, area: Rect) -> Rect {
         let width = if let Some(list) = self.list() {
             list.columns().clamp(20, area.width.max(20))
@@ -154,7 +154,7 @@ impl<'a> AnswerField<'a> {
         }
     }
 
-    /// What the mouse hits at a place.
+    /// The target at a position.
     pub fn hit(&self, area: Rect, at: usize, place: Position) -> Option<Target> {
         if !area.contains(place) {
             return None;
@@ -177,7 +177,7 @@ impl<'a> AnswerField<'a> {
         Some(Target::Field(at))
     }
 
-    /// Where the terminal's cursor belongs.
+    /// The position of the terminal's cursor.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
         let mut inner = self.inner(area);
         if matches!(self.field, Field::Number(_)) {
@@ -186,7 +186,7 @@ impl<'a> AnswerField<'a> {
         self.text()?.cursor(inner)
     }
 
-    /// Columns for text, where text is typed.
+    /// Width of a text field, in columns.
     pub fn columns(&self, area: Rect) -> usize {
         TextField::columns(self.inner(area))
     }
@@ -206,7 +206,7 @@ impl Widget for &AnswerField<'_> {
             let inner = self.inner(area);
             text.render(row(inner, 0), buf);
             let unit = unit.as_deref().unwrap_or_default();
-            // What was understood: a comma may have been meant otherwise.
+            // The number as it was read: a comma may have been meant otherwise.
             let read = match field::parse(text.editor.text()) {
                 Some(number) => format!("= {number} {}", wrap::one_line(unit, 20)),
                 None => wrap::one_line(unit, 24),
@@ -219,7 +219,7 @@ impl Widget for &AnswerField<'_> {
     }
 }
 
-/// The words at an end of a slider, whose keys are the ends as text.
+/// The label at an end of a slider. The keys of `labels` are the ends as text.
 fn end_label(labels: &BTreeMap<String, String>, end: f64) -> &str {
     let found = labels
         .iter()

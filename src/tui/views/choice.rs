@@ -1,4 +1,4 @@
-//! A list to choose from; it scrolls where it is longer than its place.
+//! A list of options; it scrolls if it is taller than its area.
 
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{left, row};
@@ -9,41 +9,41 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use std::collections::BTreeSet;
 
-/// Options with a mark before each.
+/// A list of options, each with a check mark.
 #[derive(Debug)]
 pub struct List<'a> {
-    /// What there is to choose from.
+    /// The options.
     pub options: &'a [String],
-    /// Whether several can be chosen.
+    /// Whether several options can be chosen.
     pub multiple: bool,
-    /// Where the keys are.
+    /// The option that the keys act on.
     pub cursor: Option<usize>,
-    /// What is chosen.
+    /// The chosen options.
     pub marked: &'a BTreeSet<usize>,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
-/// Cells before an option's words: digit, cursor and mark.
+/// Cells before the text of an option: digit, cursor and mark.
 const MARGIN: u16 = 8;
-/// Most lines of one option.
+/// Maximum number of lines of one option.
 const LINES: usize = 3;
 
 impl List<'_> {
-    /// The words of each option, laid out.
+    /// The wrapped text of each option.
     fn lines(&self, columns: u16) -> Vec<Vec<String>> {
         let columns = usize::from(columns.saturating_sub(MARGIN)).max(1);
         let lay = |option: &String| wrap::paragraph(option, columns, LINES);
         self.options.iter().map(lay).collect()
     }
 
-    /// Rows of the whole list.
+    /// Height of the whole list, in rows.
     pub fn rows(&self, columns: u16) -> u16 {
         let all: usize = self.lines(columns).iter().map(Vec::len).sum();
         u16::try_from(all).unwrap_or(u16::MAX)
     }
 
-    /// Columns that the widest option takes.
+    /// Width of the widest option, in columns.
     pub fn columns(&self) -> u16 {
         let widest = self
             .options
@@ -52,17 +52,17 @@ impl List<'_> {
         u16::try_from(widest.max().unwrap_or(0)).unwrap_or(400) + MARGIN
     }
 
-    /// The first row of the list that is shown: the cursor stays in sight.
+    /// The first visible row of the list; the cursor stays visible.
     fn scrolled(&self, lines: &[Vec<String>], height: u16) -> usize {
         let height = usize::from(height);
         let until = self.cursor.unwrap_or(0) + 1;
         let end: usize = lines.iter().take(until).map(Vec::len).sum();
         let all: usize = lines.iter().map(Vec::len).sum();
-        // One more line of context, where there is one.
+        // Show one line below the cursor, if there is one.
         (end + 1).min(all).saturating_sub(height)
     }
 
-    /// Each option that is in sight, and where.
+    /// The visible rows: option and area.
     pub fn places(&self, area: Rect) -> Vec<(usize, Rect)> {
         let lines = self.lines(area.width);
         let first = self.scrolled(&lines, area.height);
@@ -128,7 +128,7 @@ impl Widget for &List<'_> {
                 left(buf, row(area, y), &Line::from(spans));
             }
         }
-        // More above or below, said in the last column.
+        // Arrows in the last column show that there is more above or below.
         let more = |y: u16, arrow: &'static str, buf: &mut Buffer| {
             let line = Line::from(Span::styled(arrow, self.theme.key()));
             crate::tui::widgets::right(buf, row(area, y), &line);

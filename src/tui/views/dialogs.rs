@@ -1,4 +1,4 @@
-//! What opens above a screen.
+//! Dialogs: drawn above a screen.
 
 use super::answer::AnswerField;
 use crate::tui::editor::Editor;
@@ -16,32 +16,32 @@ use study_core::protocol::Answer;
 /// A dialog above a page.
 #[derive(Debug)]
 pub struct DialogView<'a> {
-    /// What is open.
+    /// The dialog.
     pub dialog: &'a Dialog,
-    /// Whether Esc also stops a device that is loaded or plays.
+    /// Whether Esc also stops a loaded or playing device.
     pub armed: bool,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
-/// The keys that help lists.
+/// The keys listed by the help dialog: key, alternative, action.
 pub const KEYS: [(&str, &str, &str); 13] = [
-    ("Enter", "", "goes on, confirms, saves"),
-    ("Esc", "", "stops the device, always; closes a dialog"),
-    ("Space", "", "stops the device while it is loaded or plays"),
+    ("Enter", "", "continue, confirm, save"),
+    ("Esc", "", "stop the device, always; close a dialog"),
+    ("Space", "", "stop the device while it is loaded or playing"),
     ("1–9  ← →  mouse", "", "choose"),
-    ("Tab", "", "to the comment and back"),
-    ("Alt-Enter", "Ctrl-J", "a new line in a text"),
-    ("F2", "Ctrl-R", "a remark, at any time"),
+    ("Tab", "", "switch between rating and comment"),
+    ("Alt-Enter", "Ctrl-J", "new line in a text"),
+    ("F2", "Ctrl-R", "add a remark, at any time"),
     ("F3", "Ctrl-E", "correct an earlier answer"),
     ("F4", "Ctrl-B", "mark the trial as bad"),
     ("F5", "Ctrl-P", "pause"),
     ("F6", "Ctrl-D", "decline the question, with a reason"),
-    ("F10", "Ctrl-Q", "leave; the session can be picked up later"),
-    ("F1", "?", "this page"),
+    ("F10", "Ctrl-Q", "quit; the session can be resumed later"),
+    ("F1", "?", "show this help"),
 ];
 
-/// An answer in a few words, safe to show.
+/// An answer as one line of safe text, at most `columns` cells wide.
 pub fn answer_words(answer: &Answer, columns: usize) -> String {
     match answer {
         Answer::Declined { reason } => wrap::one_line(&format!("declined: {reason}"), columns),
@@ -51,7 +51,7 @@ pub fn answer_words(answer: &Answer, columns: usize) -> String {
 }
 
 impl DialogView<'_> {
-    /// The frame, and what is inside it.
+    /// The title and the area of the dialog.
     fn place(&self, area: Rect) -> (&'static str, Rect) {
         let (title, width, height) = match self.dialog {
             Dialog::Help => ("Keys", 72, 19),
@@ -78,7 +78,7 @@ impl DialogView<'_> {
         }
     }
 
-    /// The text field, and where it is.
+    /// The text field and its area.
     fn field(&self, area: Rect) -> Option<(&Editor, Rect)> {
         let inside = self.inside(area);
         let at = |from: u16| rows(inside, from, inside.height.saturating_sub(from + 2));
@@ -112,7 +112,7 @@ impl DialogView<'_> {
         Some((answer, rows(inside, 6, inside.height.saturating_sub(8))))
     }
 
-    /// Where the terminal's cursor belongs.
+    /// The position of the terminal's cursor.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
         if let Some((editor, at)) = self.field(area) {
             let field = TextField {
@@ -126,7 +126,7 @@ impl DialogView<'_> {
         answer.cursor(at)
     }
 
-    /// Columns of the text that is typed.
+    /// Width of the text field with the focus.
     pub fn columns(&self, area: Rect) -> Option<usize> {
         if let Some((_, at)) = self.field(area) {
             return Some(TextField::columns(at));
@@ -138,9 +138,9 @@ impl DialogView<'_> {
     fn keys(&self, buf: &mut Buffer, inside: Rect, keys: &[(&str, &str)]) {
         let last = row(inside, inside.height.saturating_sub(1));
         let esc = if self.armed {
-            ("Esc", "closes and STOPS")
+            ("Esc", "close and STOP")
         } else {
-            ("Esc", "closes")
+            ("Esc", "close")
         };
         let mut keys = keys.to_vec();
         match self.dialog {
@@ -163,7 +163,7 @@ impl DialogView<'_> {
         let one =
             |author, name: &str| Span::styled(format!("{} {name}   ", mark(author)), style(author));
         Line::from(vec![
-            Span::styled("Says  ", self.theme.quiet()),
+            Span::styled("By    ", self.theme.quiet()),
             one(Author::Experimenter, "experimenter"),
             one(Author::Participant, "participant"),
         ])
@@ -182,7 +182,7 @@ impl DialogView<'_> {
             ]);
             left(buf, row(inside, y), &line);
         }
-        self.keys(buf, inside, &[("Enter", "closes")]);
+        self.keys(buf, inside, &[("Enter", "close")]);
     }
 
     fn correct(&self, buf: &mut Buffer, inside: Rect, correct: &Correct) {
@@ -208,7 +208,7 @@ impl DialogView<'_> {
                 );
                 left(buf, row(inside, y), &Line::from(Span::styled(words, style)));
             }
-            let keys = [("↑ ↓", "which"), ("Enter", "correct it")];
+            let keys = [("↑ ↓", "select"), ("Enter", "correct")];
             self.keys(buf, inside, &keys);
             return;
         }
@@ -241,13 +241,13 @@ impl DialogView<'_> {
                 left(buf, row(inside, 3), &self.by(*by));
                 let why = Line::from(Span::styled("Why? Both answers are kept.", quiet));
                 left(buf, row(inside, 4), &why);
-                let keys = [("Enter", "corrects"), ("Tab", "who")];
+                let keys = [("Enter", "correct"), ("Tab", "author")];
                 self.keys(buf, inside, &keys);
             }
             _ => {
                 let new = Line::from(Span::styled("The new answer:", quiet));
                 left(buf, row(inside, 4), &new);
-                let keys = [("Enter", "goes on"), ("F6", "declined")];
+                let keys = [("Enter", "continue"), ("F6", "decline")];
                 self.keys(buf, inside, &keys);
             }
         }
@@ -268,31 +268,31 @@ impl Widget for &DialogView<'_> {
             Dialog::Help => self.help(buf, inside),
             Dialog::Remark { by, .. } => {
                 left(buf, row(inside, 1), &self.by(*by));
-                let keys = [("Enter", "saves"), ("Tab", "who")];
+                let keys = [("Enter", "save"), ("Tab", "author")];
                 self.keys(buf, inside, &keys);
             }
             Dialog::Correct(correct) => self.correct(buf, inside, correct),
             Dialog::MarkBad { trial, .. } => {
                 let trial = wrap::one_line(trial, 20);
-                let words = format!("Why is {trial} bad? It does not count and comes back later.");
-                self.ask(buf, inside, &words, &[("Enter", "marks it")]);
+                let words = format!("Why is {trial} bad? It does not count and is repeated later.");
+                self.ask(buf, inside, &words, &[("Enter", "mark as bad")]);
             }
             Dialog::Decline { .. } => {
-                let words = "Why is there no answer? The reason is kept.";
-                self.ask(buf, inside, words, &[("Enter", "declines")]);
+                let words = "Why is the question declined? The reason is stored.";
+                self.ask(buf, inside, words, &[("Enter", "decline")]);
             }
             Dialog::Confirm(confirm) => {
                 let (words, yes) = match confirm {
                     Confirm::Quit => (
-                        "Leave the session? What was answered is kept, and it can be picked up where it stops.",
-                        "leave",
+                        "Quit the session? All answers are kept, and it can be resumed later.",
+                        "quit",
                     ),
                     Confirm::DropOut => (
-                        "The participant does not come back? This ends their part in the study.",
+                        "Does the participant drop out? This ends their part in the study.",
                         "drop out",
                     ),
                     Confirm::Refuse => (
-                        "You do not agree? Then the session ends here, and nothing more is asked.",
+                        "You do not agree to take part? The session then ends, and nothing more is asked.",
                         "I do not agree",
                     ),
                 };

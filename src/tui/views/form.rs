@@ -1,7 +1,7 @@
-//! A page of questions: the first in full, an optional text below it.
+//! A page of questions: the first in full, optional text fields below it.
 //!
-//! The participant sees it in the middle, at arm's length; an experimenter who
-//! types what is said sees the question to ask, compact, with the answers so far.
+//! A participant sees it large and centred; an experimenter who enters the answers
+//! sees a compact page with the earlier answers.
 
 use super::answer::AnswerField;
 use crate::tui::theme::Theme;
@@ -18,21 +18,21 @@ use study_core::session::View;
 /// The form on the screen.
 #[derive(Debug)]
 pub struct FormView<'a> {
-    /// For the mode of entry and the earlier answers.
+    /// The view: mode of entry and earlier answers.
     pub view: &'a View,
     /// The questions.
     pub questions: &'a [Question],
     /// Whether the experimenter is asked.
     pub to_experimenter: bool,
-    /// Their answers.
+    /// The answers entered so far.
     pub form: &'a Form,
-    /// Whether keys go here.
+    /// Whether the form has the focus.
     pub focused: bool,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
-/// Where everything of a form is.
+/// The areas of the parts of a form.
 struct Placed {
     prompt: Rect,
     words: Vec<String>,
@@ -57,7 +57,7 @@ impl FormView<'_> {
         })
     }
 
-    /// The part of the body that is used.
+    /// The column of the body that the form uses.
     fn column(&self, area: Rect) -> Rect {
         if self.compact() {
             let left = 4.min(area.width);
@@ -72,7 +72,7 @@ impl FormView<'_> {
         }
     }
 
-    /// Rows of a box, by the rows that the question leaves.
+    /// Height of a rating box, in rows, for the rows that are free.
     fn tall(&self, rows: u16) -> u16 {
         match rows {
             _ if self.compact() => 3,
@@ -85,7 +85,7 @@ impl FormView<'_> {
     fn place(&self, body: Rect) -> Placed {
         let area = self.column(body);
         let later = u16::try_from(self.questions.len().saturating_sub(1)).unwrap_or(0);
-        // A question is never cut while there is room for it and an answer.
+        // A prompt is not cut while there is room for it and an answer.
         let most = usize::from(area.height.saturating_sub(5 + later * 4)).max(3);
         let prompt = self.questions.first().map_or("", |q| q.prompt.as_str());
         let label = if self.compact() { 8 } else { 0 };
@@ -95,7 +95,7 @@ impl FormView<'_> {
         let mut space = area.height.saturating_sub(prompt_rows);
         let tall = self.tall(space);
 
-        // What each answer would like, then less where the page is full.
+        // The preferred height of each answer, reduced where the page is full.
         let reserved = later * 3;
         let mut heights: Vec<u16> = Vec::new();
         for at in 0..self.questions.len() {
@@ -125,7 +125,7 @@ impl FormView<'_> {
         let prompt = rows(area, y, prompt_rows);
         y += prompt_rows + gap;
         let mut answers = Vec::new();
-        // What comes after a scale of boxes keeps to their edges.
+        // Fields below a scale of boxes are aligned with its edges.
         let boxes = self.answer(0, tall).and_then(|a| a.edges(area));
         let below = boxes.filter(|edges| edges.width >= 48).unwrap_or(area);
         for (at, height) in heights.iter().enumerate() {
@@ -147,7 +147,7 @@ impl FormView<'_> {
         }
     }
 
-    /// What the mouse hits at a place.
+    /// The target at a position.
     pub fn hit(&self, body: Rect, place: Position) -> Option<Target> {
         let placed = self.place(body);
         placed.answers.into_iter().find_map(|(at, title, area)| {
@@ -158,21 +158,21 @@ impl FormView<'_> {
         })
     }
 
-    /// Where the terminal's cursor belongs.
+    /// The position of the terminal's cursor.
     pub fn cursor(&self, body: Rect) -> Option<Position> {
         let placed = self.place(body);
         let (at, _, area) = placed.answers.get(self.form.focus)?;
         self.answer(*at, placed.tall)?.cursor(*area)
     }
 
-    /// Columns of the text that has the focus.
+    /// Width of the text field with the focus.
     pub fn columns(&self, body: Rect) -> Option<usize> {
         let placed = self.place(body);
         let (at, _, area) = placed.answers.get(self.form.focus)?;
         Some(self.answer(*at, 3)?.columns(*area))
     }
 
-    /// The keys that work here.
+    /// The keys of this page and their actions.
     pub fn hints(&self) -> Vec<(String, &'static str)> {
         let mut keys = Vec::new();
         let at = self.form.focus;
@@ -211,7 +211,7 @@ impl FormView<'_> {
         if area.height < 3 || self.view.correctable.is_empty() {
             return;
         }
-        let title = Line::from(Span::styled("Before", self.theme.quiet()));
+        let title = Line::from(Span::styled("Earlier answers", self.theme.quiet()));
         left(buf, row(area, 0), &title);
         for (y, earlier) in (1..area.height).zip(&self.view.correctable) {
             let columns = usize::from(area.width).saturating_sub(30);

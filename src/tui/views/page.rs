@@ -1,5 +1,5 @@
-//! The page: banner and progress, the screen, a notice, the keys, the
-//! experimenter's line; a dialog above them; a few words where it is too small.
+//! The page: banner and progress, the screen, a notice, the keys, the experimenter's
+//! status line, and a dialog above them. A terminal that is too small shows a message.
 
 use super::MINIMUM;
 use super::dialogs::DialogView;
@@ -23,32 +23,32 @@ use study_core::protocol::Entry;
 use study_core::session::view::DeviceState;
 use study_core::session::{Screen, View};
 
-/// A notice that is longer is cut: it has its most important words first.
+/// Rows of a notice. A longer one is cut, so the most important words come first.
 const NOTICE_ROWS: usize = 3;
-/// Where the experimenter types, these keys are in sight always.
-const COMMANDS: &str = "F2 remark  ·  F3 correct  ·  F4 bad trial  ·  F5 pause  ·  F6 declined";
+/// Keys that are always shown where the experimenter enters the answers.
+const COMMANDS: &str = "F2: remark  ·  F3: correct  ·  F4: bad trial  ·  F5: pause  ·  F6: decline";
 
-/// Everything that is on the terminal.
+/// Everything that the terminal shows.
 #[derive(Debug)]
 pub struct Page<'a> {
     /// What the session shows.
     pub view: &'a View,
-    /// What is typed.
+    /// What has been entered.
     pub state: &'a UiState,
-    /// The live strip, where it was asked for.
+    /// The live strip, if requested.
     pub strip: Option<&'a Strip>,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
-/// What a page says about itself, for the draft to follow.
+/// Sizes of a page that scrolling and text editing need.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TextRoom {
-    /// Lines of a long text that can be scrolled away.
+    /// Largest scroll position, in lines.
     pub most: usize,
-    /// Lines of a long text that fit.
+    /// Lines of a long text that fit on the page.
     pub page: usize,
-    /// Columns of the text that is typed.
+    /// Width of the text field with the focus.
     pub columns: Option<usize>,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Page<'a> {
         area.width < MINIMUM.0 || area.height < MINIMUM.1
     }
 
-    /// Where the screen is.
+    /// The area of the screen.
     fn body(area: Rect) -> Rect {
         rows(area, 1, area.height.saturating_sub(5))
     }
@@ -101,7 +101,7 @@ impl<'a> Page<'a> {
         })
     }
 
-    /// What the mouse hits at a place.
+    /// The target at a position.
     pub fn hit(&self, area: Rect, place: Position) -> Option<Target> {
         if Self::too_small(area) || self.state.dialog().is_some() {
             return None;
@@ -109,7 +109,7 @@ impl<'a> Page<'a> {
         self.form()?.hit(Self::body(area), place)
     }
 
-    /// Where the terminal's cursor belongs.
+    /// The position of the terminal's cursor.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
         if Self::too_small(area) {
             return None;
@@ -124,7 +124,7 @@ impl<'a> Page<'a> {
         self.who()?.cursor(body)
     }
 
-    /// How much fits.
+    /// The sizes of this page in an area.
     pub fn room(&self, area: Rect) -> TextRoom {
         if Self::too_small(area) {
             return TextRoom::default();
@@ -193,19 +193,19 @@ impl<'a> Page<'a> {
                 claiming: false, ..
             } => own(&[("Tab", "other field"), ("Enter", "begin")]),
             Screen::Playing { .. } if self.view.can_advance => {
-                own(&[("Enter", "to rate"), ("Esc", "stops")])
+                own(&[("Enter", "rate"), ("Esc", "stop")])
             }
-            Screen::Playing { .. } | Screen::Loading => own(&[("Esc", "stops")]),
+            Screen::Playing { .. } | Screen::Loading => own(&[("Esc", "stop")]),
             Screen::DeviceTrouble {
                 can_go_on: true, ..
-            } => own(&[("Enter", "goes on"), ("F10", "leaves")]),
-            Screen::DeviceTrouble { .. } => own(&[("F10", "leaves")]),
-            Screen::SaveTrouble { .. } => own(&[("Enter", "tries again")]),
+            } => own(&[("Enter", "continue"), ("F10", "quit")]),
+            Screen::DeviceTrouble { .. } => own(&[("F10", "quit")]),
+            Screen::SaveTrouble { .. } => own(&[("Enter", "try again")]),
             _ => {
                 let reading = self.state.reading();
                 match prose(self.view) {
                     Some(_) if reading.scrolled < reading.most => {
-                        own(&[("Enter", "reads on"), ("↑ ↓", "scroll")])
+                        own(&[("Enter", "read on"), ("↑ ↓", "scroll")])
                     }
                     Some(prose) => own(&prose.keys),
                     None => Vec::new(),
@@ -221,14 +221,14 @@ impl<'a> Page<'a> {
             "Esc stops the device."
         };
         let leave = if self.state.dialog() == Some(&Dialog::Confirm(Confirm::Quit)) {
-            "Leave the session? y leaves, n does not."
+            "Quit the session? y: yes, n: no."
         } else {
             ""
         };
         let (w, h) = MINIMUM;
         let lines = [
             format!(
-                "{w} × {h} is needed, this is {} × {}.",
+                "This window has {} × {} cells; {w} × {h} are needed.",
                 area.width, area.height
             ),
             "Make the window larger.".to_owned(),

@@ -1,4 +1,5 @@
-//! The device plays: what to do, for how long already, and the strip if asked.
+//! The screen during playback: the prompt, the elapsed time, and the live strip if
+//! requested.
 
 use crate::runner::Strip;
 use crate::tui::theme::Theme;
@@ -16,22 +17,22 @@ use study_core::session::View;
 /// The screen while the device plays.
 #[derive(Debug)]
 pub struct Playing<'a> {
-    /// For what gives the force.
+    /// The view.
     pub view: &'a View,
-    /// Since the confirmed start, s.
+    /// Time since the confirmed start, s.
     pub since_s: f64,
-    /// Full strokes still needed.
+    /// Full strokes that are still required.
     pub strokes_missing: u32,
-    /// The last seconds of telemetry.
+    /// Recent telemetry.
     pub strip: Option<&'a Strip>,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
 impl Widget for &Playing<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let by_hand = self.view.device == DeviceKind::Manual;
-        // a sample has no force that could be drawn
+        // a mounted sample has no force to draw
         let strip_rows = match self.strip.filter(|_| !by_hand) {
             Some(_) if area.height >= 14 => (area.height / 2).min(14),
             _ => 0,
@@ -52,10 +53,10 @@ impl Widget for &Playing<'_> {
         centre(buf, row(words, y + 2), &playing);
         if self.strokes_missing > 0 {
             let strokes = if self.strokes_missing == 1 {
-                "1 full stroke more, from end to end".to_owned()
+                "1 more full stroke, from end to end".to_owned()
             } else {
                 format!(
-                    "{} full strokes more, from end to end",
+                    "{} more full strokes, from end to end",
                     self.strokes_missing
                 )
             };

@@ -1,5 +1,4 @@
-//! Screens that are mainly words: texts to read, prompts, pauses, choices by a
-//! letter.
+//! Screens that consist of text: instructions, prompts, pauses, choices by a letter.
 
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Reading;
@@ -13,31 +12,31 @@ use study_core::protocol::{DeviceKind, Entry};
 use study_core::session::view::MessageKind;
 use study_core::session::{Screen, View};
 
-/// Widest column that is easy to read.
+/// Width of the widest text column, in cells.
 const COLUMN: u16 = 84;
 
-/// Words in the middle of the page.
+/// Text in the middle of the page.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Prose {
-    /// One dim line above.
+    /// A dim line above the title.
     pub above: String,
-    /// The large line or lines.
+    /// The title.
     pub title: String,
-    /// What comes below, already in the words of the screen.
+    /// The text below the title.
     pub body: String,
-    /// Whether the body is a text to read: from the left, and scrolled.
+    /// Whether the body is a long text: left-aligned and scrollable.
     pub long: bool,
-    /// Keys in a column, each with what it does and a second line.
+    /// Keys in a column: the key, its action, an explanation.
     pub choices: Vec<(&'static str, &'static str, &'static str)>,
-    /// The keys at the foot.
+    /// The keys at the foot of the page and their actions.
     pub keys: Vec<(&'static str, &'static str)>,
 }
 
-/// The words of a screen; `None` for the screens that are more than words.
+/// The text of a screen; `None` for screens that show more than text.
 pub fn prose(view: &View) -> Option<Prose> {
-    let aloud = view.entry == Entry::Experimenter;
+    let read_by_experimenter = view.entry == Entry::Experimenter;
     let read_out = |text: &str| {
-        if aloud {
+        if read_by_experimenter {
             text.to_owned()
         } else {
             String::new()
@@ -76,10 +75,10 @@ pub fn prose(view: &View) -> Option<Prose> {
                 (
                     "b",
                     "restart the block",
-                    "what was felt in it is felt again",
+                    "the trials of the block are repeated",
                 ),
-                ("c", "continue where it stopped", "what follows is marked"),
-                ("d", "drop out", "the participant does not come back"),
+                ("c", "continue where it stopped", "later trials are flagged"),
+                ("d", "drop out", "the participant does not return"),
             ],
             ..Prose::default()
         },
@@ -102,14 +101,14 @@ pub fn prose(view: &View) -> Option<Prose> {
             },
             body: wrap::flow(text),
             long: true,
-            keys: vec![("Enter", "goes on")],
+            keys: vec![("Enter", "continue")],
             ..Prose::default()
         },
         Screen::Reference { prompt, wait_s } => Prose {
             above: read_out("Tell the participant"),
             title: prompt.clone(),
             body: if *wait_s > 0.0 {
-                format!("You can go on {}.", wait(*wait_s))
+                format!("You can continue {}.", wait(*wait_s))
             } else {
                 "Take as long as you like.".to_owned()
             },
@@ -118,14 +117,14 @@ pub fn prose(view: &View) -> Option<Prose> {
         },
         Screen::Loading => Prose {
             title: "One moment.".to_owned(),
-            body: "The device gets ready.".to_owned(),
+            body: "Preparing the device.".to_owned(),
             ..Prose::default()
         },
         Screen::Mount { code } => Prose {
             above: "For the experimenter".to_owned(),
             title: format!("Mount sample {code}."),
-            body: "Press Enter when it can be felt.".to_owned(),
-            keys: vec![("Enter", "it is mounted"), ("Esc", "stops")],
+            body: "Press Enter when the sample is mounted.".to_owned(),
+            keys: vec![("Enter", "mounted"), ("Esc", "stop")],
             ..Prose::default()
         },
         Screen::Stopping => Prose {
@@ -142,11 +141,11 @@ pub fn prose(view: &View) -> Option<Prose> {
             body: if by_hand {
                 "Let go of the sample. This trial is not lost."
             } else {
-                "It gives no force. This trial is not lost."
+                "It produces no force. This trial is not lost."
             }
             .to_owned(),
             choices: if *can_rate {
-                vec![("Enter", again, ""), ("r", "rate what was felt", "")]
+                vec![("Enter", again, ""), ("r", "rate what you felt", "")]
             } else {
                 vec![("Enter", again, "")]
             },
@@ -159,13 +158,13 @@ pub fn prose(view: &View) -> Option<Prose> {
         Screen::Break { text, wait_s } => Prose {
             above: "Break".to_owned(),
             body: if text.trim().is_empty() {
-                "Take a rest. Let go of the device, look away from the screen.".to_owned()
+                "Take a break. Let go of the device and look away from the screen.".to_owned()
             } else {
                 wrap::flow(text)
             },
             long: true,
             title: if *wait_s > 0.0 {
-                format!("It goes on {} at the earliest.", wait(*wait_s))
+                format!("You can continue {}.", wait(*wait_s))
             } else {
                 String::new()
             },
@@ -177,19 +176,19 @@ pub fn prose(view: &View) -> Option<Prose> {
             body: if by_hand {
                 format!("for {}.", clock(*since_s))
             } else {
-                format!("for {}. The device gives no force.", clock(*since_s))
+                format!("for {}. The device produces no force.", clock(*since_s))
             },
-            keys: vec![("Enter", "goes on"), ("F10", "leaves")],
+            keys: vec![("Enter", "continue"), ("F10", "quit")],
             ..Prose::default()
         },
         Screen::End { text } => Prose {
             body: if text.trim().is_empty() {
-                "That was all. Thank you!".to_owned()
+                "The session is complete. Thank you!".to_owned()
             } else {
                 wrap::flow(text)
             },
             long: true,
-            keys: vec![("Enter", "closes")],
+            keys: vec![("Enter", "close")],
             ..Prose::default()
         },
         Screen::Who { .. }
@@ -216,19 +215,19 @@ fn ago(gap_h: f64) -> String {
     }
 }
 
-/// The words of a screen, in its look.
+/// The widget that draws a [`Prose`].
 #[derive(Debug)]
 pub struct ProseView<'a> {
-    /// The words.
+    /// The text.
     pub prose: &'a Prose,
-    /// How far a long text is read.
+    /// How far a long text is scrolled.
     pub reading: Reading,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
 impl ProseView<'_> {
-    /// The lines of a long text, and the place for them.
+    /// The lines of a long text and their area.
     fn text(&self, area: Rect) -> (Vec<String>, Rect) {
         let column = middle(area, COLUMN.min(area.width.saturating_sub(8)), area.height);
         let lines = wrap::paragraph(&self.prose.body, usize::from(column.width), usize::MAX);
@@ -243,7 +242,7 @@ impl ProseView<'_> {
         (lines, middle(rows(column, top, height), narrow, height))
     }
 
-    /// Lines that can be scrolled away, and lines of a page.
+    /// The largest scroll position and the number of lines on a page.
     pub fn room(&self, area: Rect) -> (usize, usize) {
         if !self.prose.long {
             return (0, 0);

@@ -1,4 +1,4 @@
-//! Scales: numbers in boxes, or a line with a mark.
+//! Scales: numbers in boxes, or a line with a marker.
 
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, frame, left, right, row, rows};
@@ -9,32 +9,32 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use std::collections::BTreeMap;
 
-/// Most numbers that get a box each; a longer scale is a line.
+/// Maximum number of boxes; a longer scale is drawn as a line.
 pub const MOST_BOXES: i64 = 11;
 
-/// Narrowest box.
+/// Width of the narrowest box, in cells.
 const NARROW: u16 = 5;
-/// Widest box.
+/// Width of the widest box, in cells.
 const WIDE: u16 = 15;
 
-/// A labelled scale of whole numbers.
+/// A labelled scale of integers.
 #[derive(Debug)]
 pub struct Boxes<'a> {
-    /// Smallest.
+    /// Smallest number.
     pub from: i64,
-    /// Largest.
+    /// Largest number.
     pub to: i64,
-    /// Words at some numbers.
+    /// Labels of some numbers.
     pub labels: &'a BTreeMap<i64, String>,
-    /// What is chosen.
+    /// The chosen number.
     pub chosen: Option<i64>,
-    /// How tall a box is.
+    /// Height of a box, in rows.
     pub tall: u16,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
-/// Whether a scale can be boxes in so many columns.
+/// Whether a scale can be drawn as boxes in this width.
 pub fn fits(from: i64, to: i64, columns: u16) -> bool {
     let Some(count) = to.checked_sub(from).map(|n| n.saturating_add(1)) else {
         return false;
@@ -44,13 +44,13 @@ pub fn fits(from: i64, to: i64, columns: u16) -> bool {
         && [from, to].iter().all(|n| n.to_string().len() <= 3)
 }
 
-/// A minus of the right length.
+/// A number with a typographic minus sign.
 fn number(n: i64) -> String {
     n.to_string().replace('-', "−")
 }
 
 impl Boxes<'_> {
-    /// Where each number's box is.
+    /// The box of each number.
     pub fn places(&self, area: Rect) -> Vec<(i64, Rect)> {
         if !fits(self.from, self.to, area.width) || area.height < 3 {
             return Vec::new();
@@ -77,7 +77,7 @@ impl Boxes<'_> {
             .collect()
     }
 
-    /// Each label's number, columns and lines.
+    /// The number, columns and lines of each label.
     fn captions(&self, area: Rect) -> Vec<(i64, Rect, Vec<String>)> {
         let places = self.places(area);
         let below = self.tall.min(area.height);
@@ -94,7 +94,7 @@ impl Boxes<'_> {
         let centre_of = |r: Rect| r.x + r.width / 2;
         let mut captions = Vec::new();
         for (i, (n, place)) in labelled.iter().enumerate() {
-            // A label may reach half way to the next one.
+            // A label may extend halfway to the next one.
             let lower = match i.checked_sub(1).and_then(|j| labelled.get(j)) {
                 Some((_, before)) => u16::midpoint(centre_of(*before), centre_of(*place)) + 1,
                 None => first.1.x,
@@ -121,7 +121,7 @@ impl Boxes<'_> {
         captions
     }
 
-    /// Rows that the labels take in so many columns.
+    /// Height of the labels in rows, for a width in columns.
     pub fn caption_rows(&self, columns: u16) -> u16 {
         let area = Rect::new(0, 0, columns, 3);
         let most = self
@@ -170,7 +170,7 @@ impl Widget for &Boxes<'_> {
     }
 }
 
-/// A digit in three columns and three rows of half blocks.
+/// A digit of three by three half blocks.
 fn glyph(c: char) -> [&'static str; 3] {
     match c {
         '0' => ["█▀█", "█ █", "▀▀▀"],
@@ -196,28 +196,28 @@ fn big(buf: &mut Buffer, area: Rect, text: &str, style: ratatui::style::Style) {
     }
 }
 
-/// A scale as a line, with a mark where the value is.
+/// A scale drawn as a line, with a marker at the value.
 #[derive(Debug)]
 pub struct Track<'a> {
     /// Left end.
     pub from: f64,
     /// Right end.
     pub to: f64,
-    /// Words at the left end.
+    /// Label of the left end.
     pub low: &'a str,
-    /// Words at the right end.
+    /// Label of the right end.
     pub high: &'a str,
-    /// Where the mark is.
+    /// The value.
     pub value: Option<f64>,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
-/// Rows of a track without its labels: value, line, ends.
+/// Height of a track without its labels, in rows: value, line, ends.
 pub const TRACK_ROWS: u16 = 3;
 
 impl Track<'_> {
-    /// The row and columns of the line itself.
+    /// The area of the line itself.
     pub fn line(area: Rect) -> Rect {
         let all = row(area, 1);
         let margin = (all.width / 12).min(6);
@@ -228,7 +228,7 @@ impl Track<'_> {
         }
     }
 
-    /// The value at a column of the line.
+    /// The value at a column.
     pub fn value_at(&self, area: Rect, x: u16) -> f64 {
         let line = Self::line(area);
         let steps = f64::from(line.width.saturating_sub(1).max(1));
@@ -236,7 +236,7 @@ impl Track<'_> {
         self.from + part.clamp(0.0, 1.0) * (self.to - self.from)
     }
 
-    /// Rows that the labels take.
+    /// Height of the labels, in rows.
     pub fn caption_rows(&self, columns: u16) -> u16 {
         let (low, high) = self.captions(columns);
         u16::try_from(low.len().max(high.len())).unwrap_or(4)

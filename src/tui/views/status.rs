@@ -1,4 +1,4 @@
-//! The experimenter's line, the banner and the progress.
+//! The experimenter's status line, the banner and the progress.
 
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, clock, left, right};
@@ -10,16 +10,16 @@ use ratatui::widgets::Widget;
 use study_core::session::view::{Banner, Counts, DeviceState, StatusLine};
 use study_core::session::{Screen, View};
 
-/// The last row.
+/// The status line, in the last row.
 #[derive(Debug)]
 pub struct Status<'a> {
-    /// What it says.
+    /// Its content.
     pub line: &'a StatusLine,
-    /// Whether `?` is a character now.
+    /// Whether `?` is text at the moment.
     pub text: bool,
     /// Whether saving has failed.
     pub unsaved: bool,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
@@ -96,12 +96,12 @@ impl Widget for &Status<'_> {
     }
 }
 
-/// The first row: why this is no real data, and how far it is.
+/// The first row: the banner of pilots and simulations, and the progress.
 #[derive(Debug)]
 pub struct Top<'a> {
-    /// What it says.
+    /// The view.
     pub view: &'a View,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 

@@ -1,4 +1,4 @@
-//! Troubles: what happened, what it means, what to do.
+//! Faults of the device or the disk: what happened, what it means, what to do.
 
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, frame, left_all, middle, row, rows};
@@ -10,7 +10,7 @@ use ratatui::widgets::Widget;
 use study_core::protocol::DeviceKind;
 use study_core::session::{Screen, View};
 
-/// A framed message that cannot be overlooked.
+/// A framed message about a fault.
 #[derive(Debug)]
 pub struct Trouble<'a> {
     title: &'static str,
@@ -20,33 +20,32 @@ pub struct Trouble<'a> {
 }
 
 impl<'a> Trouble<'a> {
-    /// For a view; `None` if its screen is none of these.
+    /// The message for a view; `None` if its screen reports no fault.
     pub fn new(view: &'a View, theme: Theme) -> Option<Self> {
         let (title, what, then) = match &view.screen {
             Screen::DeviceTrouble { what, can_go_on } => (
                 "DEVICE TROUBLE",
                 what,
                 if *can_go_on {
-                    "The device gives no force. Look after the device, then press Enter: \
-                     a trial that was under way comes back later. Nothing that was \
-                     answered is lost."
+                    "The device produces no force. Check the device, then press Enter: an \
+                     interrupted trial is repeated later. No answer is lost."
                 } else if view.device == DeviceKind::Process {
-                    "Let go of the device: nothing says what its motor does without its \
-                     program. A new one is started every second, and this page goes on by \
-                     itself when it has said hello. If it never does, start it by hand to \
-                     see why. F10 leaves: the session can be picked up later, and nothing \
-                     that was answered is lost."
+                    "Let go of the device: the state of its motor is unknown while its \
+                     program does not run. The program is restarted every second, and the \
+                     session continues when it answers. If it never does, start it by hand \
+                     to see why. F10 quits: the session can be resumed later, and no answer \
+                     is lost."
                 } else {
-                    "The device gives no force. Check its power and its cable; this page \
-                     goes on by itself when it answers again. F10 leaves: the session can \
-                     be picked up later, and nothing that was answered is lost."
+                    "The device produces no force. Check its power and its cable; the \
+                     session continues when it answers again. F10 quits: the session can \
+                     be resumed later, and no answer is lost."
                 },
             ),
             Screen::SaveTrouble { what } => (
                 "NOT SAVED",
                 what,
-                "The last answer is in memory only. Do not close this window. Make room on \
-                 the disk or plug it in again, then press Enter to try once more.",
+                "The last answer is in memory only. Do not close this window. Free space on \
+                 the disk or reconnect it, then press Enter to try again.",
             ),
             _ => return None,
         };

@@ -1,4 +1,4 @@
-//! The first screen: who takes part, who runs the session.
+//! The first screen: participant and operator.
 
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Who;
@@ -8,22 +8,22 @@ use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
-/// Two fields.
+/// The widget of the first screen.
 #[derive(Debug)]
 pub struct WhoView<'a> {
-    /// What is typed.
+    /// What has been entered.
     pub who: &'a Who,
     /// Whether the session folder is being claimed.
     pub claiming: bool,
-    /// Whether keys go here.
+    /// Whether it has the focus.
     pub focused: bool,
-    /// Its look.
+    /// The styles.
     pub theme: Theme,
 }
 
-/// Columns of both fields with their labels.
+/// Width of the fields with their labels, in cells.
 const WIDE: u16 = 56;
-/// Columns of the labels.
+/// Width of the labels, in cells.
 const LABEL: u16 = 14;
 
 impl WhoView<'_> {
@@ -60,7 +60,7 @@ impl WhoView<'_> {
         ]
     }
 
-    /// Where the terminal's cursor belongs.
+    /// The position of the terminal's cursor.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
         let fields = self.fields(area);
         fields
