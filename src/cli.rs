@@ -16,11 +16,11 @@ mod participant;
 mod playback;
 mod record;
 mod rehearse;
-mod results;
 mod run;
 mod schedule;
 mod schema;
 mod status;
+mod study_folder;
 mod trajectory;
 mod verify;
 

@@ -1,6 +1,6 @@
 //! `study amend`
 
-use super::{Console, Failure, load, results};
+use super::{Console, Failure, load, study_folder};
 use std::path::PathBuf;
 use study_core::store::Frozen;
 
@@ -18,11 +18,11 @@ pub(super) struct Args {
 
 /// Freezes a new version of wording or analysis.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let reason = results::reason(&args.reason)?;
+    let reason = study_folder::reason(&args.reason)?;
     let loaded = load::load(&args.protocol)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
     let id = &loaded.protocol.study.id;
-    let mut studies = results::studies(&args.results)?;
+    let mut studies = study_folder::studies(&args.results)?;
     studies.retain(|s| s.manifest().study == *id);
     let Some(mut study) = studies.pop() else {
         let none = format!("{}: no study `{id}` there", args.results.display());
@@ -33,9 +33,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
-    let version = study.amend(&frozen, reason, results::now())?;
+    let version = study.amend(&frozen, reason, study_folder::now())?;
     console.out(format!(
         "{id}: version {version} of the protocol is frozen. Sessions that start from now on record it.\n"
     ))?;
-    results::refresh(&study, console)
+    study_folder::refresh(&study, console)
 }

@@ -6,7 +6,7 @@ mod reading;
 mod report;
 
 use super::load::Loaded;
-use super::{Console, Failure, results};
+use super::{Console, Failure, study_folder};
 use crate::report::figures::Trace;
 use crate::report::html::Details;
 use crate::report::text::{Page, comments, page};
@@ -67,7 +67,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let input = of_csv(results, args)?;
         return show(args, &input, args.out.as_deref(), console);
     }
-    let studies = results::studies(results)?;
+    let studies = study_folder::studies(results)?;
     if args.json && studies.len() > 1 {
         return Err(Failure::input(format!(
             "{}: {} studies, and --json prints one",
@@ -82,16 +82,16 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
         }
         let sessions = study.sessions()?;
-        let loaded = results::frozen(study)?;
+        let loaded = study_folder::frozen(study)?;
         let (input, damage) = rayon::join(
             || of_study(study, &sessions, &loaded, args),
-            || results::warnings(study, &sessions, Some(&loaded)),
+            || study_folder::warnings(study, &sessions, Some(&loaded)),
         );
         let (mut input, damage) = (input?, damage?);
         // On a terminal the page tells of it; who keeps or pipes the page, or asked
         // for something else, is told on standard error as well.
         if !console.terminal || args.json || args.comments {
-            results::warn(study, &damage, console);
+            study_folder::warn(study, &damage, console);
         }
         let damage = damage.into_iter().map(|text| Warning {
             code: "damaged-results",
@@ -150,7 +150,7 @@ fn show(
         Some((dir, Ok(()))) => {
             console.say(format!("report: {}", dir.join("report.html").display()));
         }
-        Some((_, Err(failure))) => results::tables_unwritten(&failure, console),
+        Some((_, Err(failure))) => study_folder::tables_unwritten(&failure, console),
         None => {}
     }
     Ok(())
@@ -308,7 +308,7 @@ fn deviations(study: &StudyFolder) -> Result<Vec<Deviation>, Failure> {
     let mut before: Option<Protocol> = None;
     let versions = &study.manifest().versions;
     for version in versions.iter().filter(|_| versions.len() > 1) {
-        let after = results::frozen_version(study, version.version)?.protocol;
+        let after = study_folder::frozen_version(study, version.version)?.protocol;
         if let Some(before) = &before {
             let changes = analyze::deviations(before, &after);
             said.extend(changes.into_iter().map(|change| Deviation {

@@ -1,6 +1,6 @@
 //! `study participant`
 
-use super::{Console, Failure, results};
+use super::{Console, Failure, study_folder};
 use clap::ValueEnum;
 use std::path::PathBuf;
 use study_base::text::{ParticipantId, counted};
@@ -65,16 +65,16 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let request = StateRequest {
         participant,
         state: args.state.into(),
-        reason: results::reason(&args.reason)?.to_owned(),
+        reason: study_folder::reason(&args.reason)?.to_owned(),
         erase: args.erase,
     };
-    let study = results::one_study(&args.results)?;
-    let change = study.set_state(&request, results::now())?;
+    let study = study_folder::one_study(&args.results)?;
+    let change = study.set_state(&request, study_folder::now())?;
     for notice in &change.notices {
         console.say(notice);
     }
     console.out(told(&request, &change))?;
-    results::refresh(&study, console)
+    study_folder::refresh(&study, console)
 }
 
 /// What became of the participant, their data and their row.

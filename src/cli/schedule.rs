@@ -2,7 +2,7 @@
 
 mod table;
 
-use super::{Console, Failure, Kind, results};
+use super::{Console, Failure, Kind, study_folder};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use study_core::protocol::{FileOrders, Protocol, Seat, Trial};
@@ -68,8 +68,8 @@ fn reveal(
              --reveal REASON shows it all the same and logs that",
         ));
     };
-    let reason = results::reason(reason)?;
-    study.log_reveal(rows, reason, results::now())?;
+    let reason = study_folder::reason(reason)?;
+    study.log_reveal(rows, reason, study_folder::now())?;
     console.say(format!(
         "logged in {folder}: orders of rows {}-{} were shown",
         rows.start(),

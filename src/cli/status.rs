@@ -1,6 +1,6 @@
 //! `study status`
 
-use super::{Console, Failure, results};
+use super::{Console, Failure, study_folder};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use study_base::text::Untrusted;
@@ -16,12 +16,16 @@ pub(super) struct Args {
 
 /// Prints who has taken part, and never an order.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    for (n, study) in results::studies(&args.results)?.iter().enumerate() {
+    for (n, study) in study_folder::studies(&args.results)?.iter().enumerate() {
         if n > 0 {
             console.out("\n")?;
         }
         let sessions = study.sessions()?;
-        results::warn(study, &results::warnings(study, &sessions, None)?, console);
+        study_folder::warn(
+            study,
+            &study_folder::warnings(study, &sessions, None)?,
+            console,
+        );
         console.out(of_study(study, &sessions))?;
     }
     Ok(())
@@ -128,7 +132,7 @@ fn summary(study: &StudyFolder, real: &[&ParticipantRow]) -> String {
         n => format!("{n} participants: {}", counts.join(", ")),
     };
     // A damaged frozen protocol is told in the warnings.
-    match results::frozen(study) {
+    match study_folder::frozen(study) {
         Ok(loaded) => format!("{people}; {} planned", loaded.protocol.design.participants),
         Err(_) => people,
     }

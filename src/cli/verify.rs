@@ -1,7 +1,6 @@
 //! `study verify`
 
-use super::{Console, Failure, results};
-use crate::cli::load::{self, Loaded};
+use super::{Console, Failure, study_folder};
 use std::path::PathBuf;
 use study_base::text::{Untrusted, counted};
 use study_core::store::{Finding, SessionData, StudyFolder, layout};
@@ -22,13 +21,13 @@ pub(super) struct Args {
 /// Prints what was found and fails if anything of it is wrong.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut wrong = 0;
-    for study in results::studies(&args.results)? {
-        let protocol = results::frozen(&study);
+    for study in study_folder::studies(&args.results)? {
+        let protocol = study_folder::frozen(&study);
         if let (true, Ok(loaded)) = (args.rebuild, &protocol) {
             study.refresh_with(&loaded.protocol, args.drop_missing)?;
         }
         let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
-        found.extend(frozen_versions(&study, None));
+        found.extend(study_folder::frozen_versions(&study, None));
         console.out(of_study(&study, &study.sessions()?, &found))?;
         wrong += found.iter().filter(|f| f.wrong).count();
     }
@@ -72,29 +71,4 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) ->
         out.push_str("the tables are made again with --rebuild\n");
     }
     out
-}
-
-/// Reads each frozen protocol, but the newest if it is there already, and compares
-/// its fingerprints with study.json.
-pub(super) fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> Vec<Finding> {
-    let mut found = Vec::new();
-    for version in &study.manifest().versions {
-        let number = version.version;
-        let path = layout::protocol(study.path(), number).join(layout::PROTOCOL);
-        let prints = match newest {
-            Some(loaded) if number == study.version() => Ok(loaded.fingerprints.clone()),
-            _ => load::load_frozen(&path).map(|loaded| loaded.fingerprints),
-        };
-        let what = match prints {
-            Ok(prints) if prints == version.fingerprints => continue,
-            Ok(_) => "its fingerprints are not those in study.json".to_owned(),
-            Err(_) => format!("it cannot be read; see `study check {}`", path.display()),
-        };
-        found.push(Finding {
-            wrong: true,
-            place: format!("{}/{number}/{}", layout::PROTOCOLS, layout::PROTOCOL),
-            what,
-        });
-    }
-    found
 }

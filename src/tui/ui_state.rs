@@ -18,7 +18,7 @@ use crossterm::event::Event;
 use dialog::Dialog;
 use field::Field;
 use study_base::text::QuestionId;
-use study_core::outcome::Place;
+use study_core::outcome::FormId;
 use study_core::session::{Input, Screen, View};
 
 /// The state of the interface.
@@ -48,7 +48,7 @@ enum Focus {
 }
 
 /// Identifies the form that the answers belong to.
-type FormKey = (Place, u32, Vec<QuestionId>);
+type FormKey = (FormId, u32, Vec<QuestionId>);
 
 /// The answers to a form.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,13 +142,13 @@ impl UiState {
         self.focus = Focus::None;
         match &view.screen {
             Screen::Form {
-                place,
+                form,
                 questions,
                 page,
                 ..
             } => {
                 let ids = questions.iter().map(|q| q.id.clone()).collect();
-                let key = (*place, *page, ids);
+                let key = (*form, *page, ids);
                 if self.form.as_ref().is_none_or(|(old, _)| *old != key) {
                     let form = Form {
                         fields: questions.iter().map(Field::new).collect(),
@@ -290,13 +290,13 @@ fn same_page(a: &Screen, b: &Screen) -> bool {
     match (a, b) {
         (
             Screen::Form {
-                place: p1,
+                form: p1,
                 page: n1,
                 questions: q1,
                 ..
             },
             Screen::Form {
-                place: p2,
+                form: p2,
                 page: n2,
                 questions: q2,
                 ..

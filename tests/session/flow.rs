@@ -1,6 +1,7 @@
 //! A session from the first screen to the last, with a device and a store that
 //! the tests play. Every step of every test also passes the walls in `rig`.
 
+mod agreement;
 mod blinding;
 mod device;
 mod forms;

@@ -8,7 +8,7 @@ use crossterm::event::{
     Event, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
 };
 use study::tui::{Colour, Surface};
-use study_core::outcome::{Author, Choice, Place};
+use study_core::outcome::{Author, Choice, FormId};
 use study_core::protocol::question::MAX_TEXT_BYTES;
 use study_core::protocol::{Answer, Entry, QuestionKind};
 use study_core::session::view::{Counts, DeviceState, View};
@@ -253,7 +253,7 @@ fn the_next_trial_starts_without_a_choice() {
     desk.types("6");
     desk.enter();
     desk.goes_to(Screen::Form {
-        place: Place::Trial {
+        form: FormId::Trial {
             trial: 8,
             attempt: 1,
         },
@@ -278,7 +278,7 @@ fn an_earlier_answer_is_corrected_with_a_reason() {
     assert_eq!(desk.enter(), []);
     desk.types("typed wrong");
     let want = Input::Correct {
-        place: Place::Trial {
+        form: FormId::Trial {
             trial: 6,
             attempt: 1,
         },

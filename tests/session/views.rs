@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use study::runner::Strip;
 use study::tui::{Colour, Surface};
 use study_base::text::QuestionId;
-use study_core::outcome::Place;
+use study_core::outcome::FormId;
 use study_core::protocol::{Answer, DeviceKind, Entry, Question, QuestionKind};
 use study_core::session::view::{
     Banner, Correctable, Counts, DeviceState, MessageKind, Progress, Screen, StatusLine, View,
@@ -88,14 +88,14 @@ pub(crate) fn number() -> Question {
     )
 }
 
-pub(crate) const TRIAL: Place = Place::Trial {
+pub(crate) const TRIAL: FormId = FormId::Trial {
     trial: 7,
     attempt: 1,
 };
 
 pub(crate) fn form(questions: Vec<Question>) -> Screen {
     Screen::Form {
-        place: TRIAL,
+        form: TRIAL,
         questions,
         page: 1,
         pages: 1,
@@ -169,7 +169,7 @@ pub(crate) fn view(screen: Screen) -> View {
         device: DeviceKind::Simulated,
         correctable: vec![
             Correctable {
-                place: Place::Trial {
+                form: FormId::Trial {
                     trial: 6,
                     attempt: 1,
                 },
@@ -178,7 +178,7 @@ pub(crate) fn view(screen: Screen) -> View {
                 answer: Answer::Rating(3),
             },
             Correctable {
-                place: Place::Trial {
+                form: FormId::Trial {
                     trial: 6,
                     attempt: 1,
                 },
@@ -187,7 +187,7 @@ pub(crate) fn view(screen: Screen) -> View {
                 answer: Answer::Text("crisp, but the middle detent comes late".to_owned()),
             },
             Correctable {
-                place: Place::Intake,
+                form: FormId::Intake,
                 title: "intake".to_owned(),
                 question: choice(false),
                 answer: Answer::Choice(vec!["left-handed".to_owned()]),
@@ -446,7 +446,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             View {
                 progress: None,
                 ..view(Screen::Form {
-                    place: Place::Setup,
+                    form: FormId::Setup,
                     questions: vec![question(
                         "room",
                         "Temperature of the room",

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use study_core::outcome::Event;
 use study_core::protocol::Seat;
 use study_core::store::disk::Disk as _;
-use study_core::store::line::{self, Claim, Record};
+use study_core::store::journal_record::{self, Claim, Record};
 use study_core::store::replay::{Replay, Segment, replay};
 use study_core::store::{DamageKind, StudyFolder};
 
@@ -27,14 +27,14 @@ fn lines() -> Vec<Vec<u8>> {
         .into_iter()
         .zip(0..)
         .map(|(e, n)| Record::Event(at(n), e));
-    let mut prev = line::NO_LINE.to_owned();
+    let mut prev = journal_record::NO_LINE.to_owned();
     [claim]
         .into_iter()
         .chain(events)
         .zip(0..)
         .map(|(record, seq)| {
-            let mut bytes = line::encode(seq, &prev, &record).unwrap();
-            prev = line::hash(&bytes);
+            let mut bytes = journal_record::encode(seq, &prev, &record).unwrap();
+            prev = journal_record::hash(&bytes);
             bytes.push(b'\n');
             bytes
         })
@@ -139,10 +139,11 @@ fn a_missing_a_doubled_and_a_changed_line_are_told_apart() {
     // Somebody changed an answer and put the checksum right.
     let mut forged = lines.clone();
     let text = String::from_utf8(lines[12].clone()).unwrap();
-    let Ok(old) = line::decode(text.trim_end().as_bytes()) else {
+    let Ok(old) = journal_record::decode(text.trim_end().as_bytes()) else {
         panic!("line 12 is whole");
     };
-    let mut new = line::encode(old.seq, &old.prev, &Record::Event(at(99), Event::Paused)).unwrap();
+    let mut new =
+        journal_record::encode(old.seq, &old.prev, &Record::Event(at(99), Event::Paused)).unwrap();
     new.push(b'\n');
     forged[12] = new;
     assert_eq!(kinds(&forged), [DamageKind::Chain(13)]);

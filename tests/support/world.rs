@@ -4,7 +4,7 @@
 use crate::designs::design;
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId, QuestionId};
-use study_core::outcome::{Author, Event, Failure, Moment, Place, Playback, Start};
+use study_core::outcome::{Author, Event, Failure, FormId, Moment, Playback, Start};
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::*;
 use study_core::store::{ClaimRequest, Frozen, SeatKind};
@@ -163,7 +163,7 @@ pub fn started(id: &str, session: u32, seat: Seat) -> Event {
 
 pub fn answered(trial: u32, attempt: u32, id: &str, answer: Answer) -> Event {
     Event::Answered {
-        place: Place::Trial { trial, attempt },
+        form: FormId::Trial { trial, attempt },
         question: question(id),
         answer,
     }
@@ -220,7 +220,7 @@ pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
         text: text.to_owned(),
     };
     let intake = Event::Answered {
-        place: Place::Intake,
+        form: FormId::Intake,
         question: question("age"),
         answer: Answer::Text("41".to_owned()),
     };
@@ -254,7 +254,7 @@ pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
     ));
     events.push(done(3, 1));
     events.push(Event::Corrected {
-        place: Place::Trial {
+        form: FormId::Trial {
             trial: 2,
             attempt: 1,
         },

@@ -1,9 +1,10 @@
 //! What happened, as it is stored: events, trials, telemetry, ratings.
 //!
-//! An [`Event`] is one line of a journal, the only truth. [`fold`] turns the
-//! events of a session into rows, whose columns `protocol::columns` declares;
-//! [`cell`] says what a row has in each. [`ratings`] holds the same rows by column,
-//! for analysis.
+//! An [`Event`] is one line of a journal. [`fold::History`] is what the events of
+//! a session add up to; the derived tables and the memory of a running session
+//! both come from it. `protocol::columns` declares the columns of the tables and
+//! [`cell`] gives the content of each. [`ratings`] holds the rows by column, for
+//! analysis.
 
 pub mod cell;
 pub mod event;
@@ -11,7 +12,7 @@ pub mod fold;
 pub mod ratings;
 pub mod rows;
 
-pub use event::{Author, Choice, Entry, Event, Failure, Moment, Place, Playback, Start, State};
+pub use event::{Author, Choice, Entry, Event, Failure, FormId, Moment, Playback, Start, State};
 pub use rows::{AttemptRow, ParticipantRow, RatingRow, Status};
 
 /// A row says what its realization is; readers of rows need no protocol for it.

@@ -1,33 +1,36 @@
-//! The running study as a pure state machine.
+//! The running session as a pure state machine.
 //!
-//! `handle(Input, at) → effects; view()`. No clock, no device, no store, no
-//! randomness: time comes in as an argument, everything it wants done goes out as
-//! an [`Effect`], and what the operator may see is a [`View`], which never holds
-//! anything that identifies a realization.
+//! [`Session::handle`] takes an [`Input`] and the time and returns [`Effect`]s;
+//! [`Session::view`] returns what the screen shows. The session itself uses no
+//! clock, device, store or random numbers. A [`View`] never contains anything that
+//! identifies a realization.
 //!
-//! What a session knows is the fold of its own events (`history`); beside it
-//! stand only where it is on the screen (`phase`) and three things that can lie
-//! over it: a disk that fails, a pause, a device in trouble. A session that is
-//! resumed folds the journal and goes on from there.
+//! The memory of a session is the [`History`] of its own events. In addition it
+//! holds the current phase and up to three overlays that can hide the phase: a
+//! failed save, a pause, a device problem. A resumed session builds its history
+//! from the journal and continues from there.
 //!
-//! Invariants: an answer shows as saved only after [`Input::Saved`] came back for
-//! its event; a rating opens only after the device confirmed start and end of the
-//! playback; every path out of playing sends [`Effect::Stop`] or
-//! [`Effect::Limp`] first; after a stop, a pause or a fault nothing is loaded or
-//! started until somebody asks for it again.
+//! Invariants:
 //!
-//! Effects are carried out in their order. [`Effect::Limp`] also cancels a load:
-//! no [`Input::DeviceLoaded`] for it may follow.
+//! * An answer is shown as saved only after [`Input::Saved`] has acknowledged it.
+//! * A rating opens only after the device has confirmed the start and the end of
+//!   the playback.
+//! * Every transition out of playing first sends [`Effect::Stop`] or
+//!   [`Effect::Limp`].
+//! * After a stop, a pause or a fault nothing is loaded or started until somebody
+//!   requests it again.
+//!
+//! Effects must be carried out in order. [`Effect::Limp`] also cancels a load: no
+//! [`Input::DeviceLoaded`] for it may follow.
 
-mod course;
-mod failing;
+mod failures;
+mod flow;
 mod forms;
-mod history;
 pub mod input;
 mod opening;
 mod phase;
+mod project_view;
 mod saving;
-mod show;
 mod trial;
 pub mod view;
 
@@ -35,57 +38,56 @@ pub use input::{Claim, Effect, Ending, Input};
 pub use opening::MAX_OPERATOR;
 pub use view::{Screen, View};
 
+use crate::outcome::fold::History;
 use crate::outcome::{Event, Moment};
 use crate::protocol::{DeviceKind, FileOrders, Protocol, Seat};
-use history::History;
-use phase::{Phase, Trouble};
-use saving::Ledger;
+use phase::{DeviceProblem, Phase};
+use saving::SaveState;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use study_base::text::ModelId;
 
-/// What is known before anybody typed anything.
+/// Presets from the command line.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Config {
-    /// Preset on the first screen.
+    /// Participant id shown on the first screen; may be empty.
     pub participant: String,
-    /// Preset on the first screen.
+    /// Operator code shown on the first screen; may be empty.
     pub operator: String,
-    /// Whether the presets are taken as they are, without the first screen.
+    /// Use the presets without showing the first screen.
     pub auto_identify: bool,
 }
 
-/// A session, from the first screen to the last.
+/// A session from the first screen to the last.
 pub struct Session {
     protocol: Arc<Protocol>,
     orders: Option<Arc<FileOrders>>,
-    /// As typed so far.
+    /// As typed on the first screen.
     participant: String,
     operator: String,
-    /// What the store said of the folder.
+    /// Seat and device; `None` until the session's folder is claimed.
     claim: Option<ClaimFacts>,
     history: History,
     phase: Phase,
-    /// Since when it is paused.
+    /// Start of the pause.
     paused: Option<Moment>,
-    trouble: Option<Trouble>,
-    /// Whether the device does not answer.
+    device_problem: Option<DeviceProblem>,
+    /// The device does not respond.
     device_lost: bool,
-    ledger: Ledger,
-    /// Forms and messages that are behind us in this process, beside what the
-    /// history tells.
-    behind: BTreeSet<course::Step>,
+    saves: SaveState,
+    /// Forms and messages completed in this process, in addition to the history.
+    passed: BTreeSet<flow::Step>,
     notice: Option<String>,
-    /// When the folder was claimed.
+    /// When the session's folder was claimed.
     opened: Option<Moment>,
-    /// Both clocks when they last agreed.
+    /// Both clocks at the last comparison that showed no step.
     clock: Moment,
-    /// Since when something lies over the phase.
-    covered: Option<Moment>,
+    /// Since when an overlay hides the phase.
+    overlaid_since: Option<Moment>,
     out: Vec<Effect>,
 }
 
-/// What a claim says beside the journal.
+/// Facts of a claim that are not in the journal.
 struct ClaimFacts {
     seat: Seat,
     device_kind: DeviceKind,
@@ -94,7 +96,8 @@ struct ClaimFacts {
 }
 
 impl Session {
-    /// A session on its first screen, or asking for its claim.
+    /// A session on its first screen, or waiting for its claim, and its first
+    /// effects.
     pub fn new(
         protocol: Arc<Protocol>,
         orders: Option<Arc<FileOrders>>,
@@ -108,16 +111,16 @@ impl Session {
             operator: config.operator.clone(),
             claim: None,
             history: History::default(),
-            phase: Phase::Who,
+            phase: Phase::Identify,
             paused: None,
-            trouble: None,
+            device_problem: None,
             device_lost: false,
-            ledger: Ledger::default(),
-            behind: BTreeSet::new(),
+            saves: SaveState::default(),
+            passed: BTreeSet::new(),
             notice: None,
             opened: None,
             clock: at,
-            covered: None,
+            overlaid_since: None,
             out: Vec::new(),
         };
         if config.auto_identify {
@@ -127,20 +130,25 @@ impl Session {
         (session, effects)
     }
 
-    /// Takes in one input at a moment; says what is to be done, in order.
+    /// Processes one input; returns the effects to carry out, in order.
     pub fn handle(&mut self, input: Input, at: Moment) -> Vec<Effect> {
         if is_deliberate(&input) {
             self.notice = None;
         }
         self.dispatch(input, at);
-        self.note_cover(at);
+        self.track_overlay(at);
         std::mem::take(&mut self.out)
     }
 
-    /// What is being felt or rated now. For the simulated rater only; nothing
-    /// that a person sees or reads may come from here.
+    /// The realization being felt or rated. For the simulated rater only: it must
+    /// never reach a screen or a log.
     pub fn playing_model(&self) -> Option<&ModelId> {
-        self.history.open.as_ref().map(|open| &open.trial.model)
+        self.history.open().map(|open| &open.trial.model)
+    }
+
+    /// The events so far; equal to the history of the journal.
+    pub fn history(&self) -> &History {
+        &self.history
     }
 
     fn dispatch(&mut self, input: Input, at: Moment) {
@@ -164,25 +172,25 @@ impl Session {
                 participant,
                 operator,
             } => {
-                if matches!(self.phase, Phase::Who) {
+                if matches!(self.phase, Phase::Identify) {
                     self.identify(&participant, &operator);
                 }
             }
             Input::Claimed(claim) => self.claimed(*claim, at),
             Input::ClaimRefused(why) => self.claim_refused(&why),
-            Input::Notice(what) => self.say(what),
+            Input::Notice(what) => self.notify(what),
             Input::RetrySave => self.retry_save(),
-            Input::Advance => self.advance_or_uncover(at),
+            Input::Advance => self.advance_or_dismiss(at),
             _ if !self.phase.under_way() => {}
             Input::Remark { by, text } => self.remark(by, text, at),
             Input::Correct {
-                place,
+                form,
                 question,
                 answer,
                 reason,
                 by,
-            } => self.correct(place, &question, answer, reason, by, at),
-            _ if self.cover().is_some() => self.say("first go on from this screen"),
+            } => self.correct(form, &question, answer, reason, by, at),
+            _ if self.overlay().is_some() => self.notify("continue from this screen first"),
             Input::Resume(choice) => self.resume(choice, at),
             Input::Consent(accepted) => self.consent(accepted, at),
             Input::Answer(answers) => self.answer(answers, at),
@@ -193,22 +201,22 @@ impl Session {
         }
     }
 
-    /// Sends an event to the store and takes it into the history.
+    /// Sends an event to the store and adds it to the history.
     fn record(&mut self, event: Event, at: Moment) {
         self.history.apply(&event, at);
-        self.ledger.sent += 1;
+        self.saves.sent += 1;
         if let Event::TrialDone { trial, .. } = &event {
-            self.ledger.done.insert(*trial, self.ledger.sent);
+            self.saves.done.insert(*trial, self.saves.sent);
         }
         self.out.push(Effect::Record(event));
     }
 
-    fn say(&mut self, notice: impl Into<String>) {
+    fn notify(&mut self, notice: impl Into<String>) {
         self.notice = Some(notice.into());
     }
 }
 
-/// Whether somebody did it, so that the last notice has been seen.
+/// Whether the input shows that somebody has seen the last notice.
 fn is_deliberate(input: &Input) -> bool {
     !matches!(
         input,

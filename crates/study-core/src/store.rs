@@ -13,8 +13,8 @@
 //! Every change goes through [`disk::Disk`], so that tests can fail each call.
 
 pub mod disk;
+pub mod journal_record;
 pub mod layout;
-pub mod line;
 pub mod manifest;
 pub mod replay;
 mod reveals;
@@ -22,26 +22,30 @@ mod reveals;
 mod atomic;
 mod derive;
 mod error;
+mod held;
 mod journal;
 mod ledger;
+mod missing_sessions;
 mod participant;
 mod session_folder;
 mod sessions;
 mod tables;
 mod telemetry;
-mod vanished;
+mod tombstone;
 mod verify;
 
 pub use derive::{Derived, participants};
 pub use error::{StoreError, plain};
+pub use held::RESERVE_BYTES;
 pub use journal::Journal;
 pub use ledger::{ClaimRequest, Claimed, SeatKind, next_row};
 pub use manifest::Manifest;
-pub use participant::{StateChange, StateRequest, Tombstone};
+pub use participant::{StateChange, StateRequest};
 pub use replay::{Damage, DamageKind};
-pub use session_folder::{RESERVE_BYTES, SessionFolder};
+pub use session_folder::SessionFolder;
 pub use sessions::SessionData;
 pub use telemetry::TelemetryWriter;
+pub use tombstone::Tombstone;
 pub use verify::Finding;
 
 use crate::outcome::Moment;
@@ -173,11 +177,6 @@ impl StudyFolder {
     /// The newest version of the protocol.
     pub fn version(&self) -> u32 {
         self.manifest.newest().version
-    }
-
-    /// The frozen protocol file of the newest version.
-    pub fn frozen_protocol(&self) -> PathBuf {
-        layout::protocol(&self.path, self.version()).join(layout::PROTOCOL)
     }
 
     /// Freezes a new version of wording or analysis and returns its number.

@@ -266,7 +266,7 @@ impl Correct {
                         reason: reason.clone(),
                     };
                     DialogResult::Done(vec![Input::Correct {
-                        place: item.place,
+                        form: item.form,
                         question: item.question.id.clone(),
                         answer: answer.clone().unwrap_or(declined),
                         reason,

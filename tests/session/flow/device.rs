@@ -300,7 +300,7 @@ fn a_stopped_playback_can_be_played_again_at_once() {
     rig.finish();
     rig.assert_whole();
     assert_eq!(rig.count(|e| matches!(e, Event::TrialClosed { .. })), 0);
-    assert_eq!(rig.positions(), [1, 2, 3, 4, 5, 6], "it keeps its place");
+    assert_eq!(rig.positions(), [1, 2, 3, 4, 5, 6], "it keeps its form");
 }
 
 trait LastAttempt {

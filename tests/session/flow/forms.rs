@@ -2,7 +2,7 @@
 
 use super::rig::{Rig, name};
 use super::studies::{plain, qid, rich};
-use study_core::outcome::{Author, Event, Failure, Place};
+use study_core::outcome::{Author, Event, Failure, FormId};
 use study_core::protocol::Answer;
 use study_core::session::{Effect, Input, Screen};
 
@@ -10,9 +10,9 @@ fn screen(rig: &Rig) -> &'static str {
     name(&rig.view().screen)
 }
 
-fn correct(place: Place, question: &str, answer: Answer, reason: &str) -> Input {
+fn correct(form: FormId, question: &str, answer: Answer, reason: &str) -> Input {
     Input::Correct {
-        place,
+        form,
         question: qid(question),
         answer,
         reason: reason.to_owned(),
@@ -81,13 +81,13 @@ fn declined_is_an_answer_and_a_comment_can_be_anything() {
         ),
         (qid("comment"), Answer::Text(comment.to_owned())),
     ]));
-    let place = Place::Trial {
+    let form = FormId::Trial {
         trial: 1,
         attempt: 1,
     };
-    assert!(rig.answer(place, &qid("realism")).unwrap().is_declined());
+    assert!(rig.answer(form, &qid("realism")).unwrap().is_declined());
     assert_eq!(
-        rig.answer(place, &qid("comment")),
+        rig.answer(form, &qid("comment")),
         Some(Answer::Text(comment.to_owned()))
     );
     assert_eq!(screen(&rig), "Reference");
@@ -121,7 +121,7 @@ fn an_earlier_answer_is_corrected_with_a_reason_and_both_are_kept() {
     rig.until_reference(2);
     let before = rig.journal.len();
     rig.send(correct(
-        Place::Intake,
+        FormId::Intake,
         "experience",
         Answer::Rating(7),
         "misheard",
@@ -130,7 +130,7 @@ fn an_earlier_answer_is_corrected_with_a_reason_and_both_are_kept() {
     assert_eq!(
         *event,
         Event::Corrected {
-            place: Place::Intake,
+            form: FormId::Intake,
             question: qid("experience"),
             from: Some(Answer::Rating(4)),
             to: Answer::Rating(7),
@@ -142,7 +142,7 @@ fn an_earlier_answer_is_corrected_with_a_reason_and_both_are_kept() {
     let shown = rig.view().correctable;
     let now = shown.iter().find(|c| c.id() == &qid("experience")).unwrap();
     assert_eq!(now.answer, Answer::Rating(7));
-    let again = correct(Place::Intake, "experience", Answer::Rating(4), "after all");
+    let again = correct(FormId::Intake, "experience", Answer::Rating(4), "after all");
     rig.send(again);
     assert!(matches!(
         &rig.journal[before + 1].event,
@@ -161,11 +161,11 @@ fn a_correction_needs_a_reason_an_earlier_answer_and_a_valid_new_one() {
     rig.until_reference(2);
     let before = rig.journal.len();
     for input in [
-        correct(Place::Intake, "experience", Answer::Rating(7), "  "),
-        correct(Place::Intake, "experience", Answer::Rating(8), "misheard"),
-        correct(Place::Intake, "experience", Answer::Rating(4), "the same"),
-        correct(Place::Intake, "nothing", Answer::Rating(4), "misheard"),
-        correct(Place::Outro, "effort", Answer::Rating(4), "too early"),
+        correct(FormId::Intake, "experience", Answer::Rating(7), "  "),
+        correct(FormId::Intake, "experience", Answer::Rating(8), "misheard"),
+        correct(FormId::Intake, "experience", Answer::Rating(4), "the same"),
+        correct(FormId::Intake, "nothing", Answer::Rating(4), "misheard"),
+        correct(FormId::Outro, "effort", Answer::Rating(4), "too early"),
     ] {
         rig.send(input);
         assert!(rig.view().notice.is_some());
@@ -197,7 +197,7 @@ fn a_page_already_confirmed_can_be_corrected_during_the_same_rating() {
     let first = rig.view().correctable.remove(1);
     assert_eq!(first.title, "trial 1");
     rig.send(correct(
-        first.place,
+        first.form,
         "realism",
         Answer::Rating(1),
         "wrong key",

@@ -3,13 +3,13 @@
 use super::rig::{DeviceMood, Rig, StoreMood};
 use super::studies::{qid, rich};
 use proptest::prelude::*;
-use study_core::outcome::{Author, Choice, Place, Playback};
+use study_core::outcome::{Author, Choice, FormId, Playback};
 use study_core::protocol::Answer;
 use study_core::session::{Effect, Input, Screen};
 
 /// What may happen next.
 #[derive(Debug, Clone)]
-enum Act {
+pub(super) enum Act {
     /// The sensible thing.
     Step,
     Wait(f64),
@@ -22,11 +22,11 @@ enum Act {
 
 fn input() -> impl Strategy<Value = Input> {
     let words = || prop_oneof![Just(String::new()), Just("why".to_owned()), ".{0,20}"];
-    let place = prop_oneof![
-        Just(Place::Setup),
-        Just(Place::Intake),
-        Just(Place::Outro),
-        (0..9u32, 1..4u32).prop_map(|(trial, attempt)| Place::Trial { trial, attempt }),
+    let form = prop_oneof![
+        Just(FormId::Setup),
+        Just(FormId::Intake),
+        Just(FormId::Outro),
+        (0..9u32, 1..4u32).prop_map(|(trial, attempt)| FormId::Trial { trial, attempt }),
     ];
     let question = prop_oneof![
         Just(qid("realism")),
@@ -39,9 +39,9 @@ fn input() -> impl Strategy<Value = Input> {
         words().prop_map(Answer::Text),
         words().prop_map(|reason| Answer::Declined { reason }),
     ];
-    let correction = (place, question.clone(), answer.clone(), words()).prop_map(
-        |(place, question, answer, reason)| Input::Correct {
-            place,
+    let correction = (form, question.clone(), answer.clone(), words()).prop_map(
+        |(form, question, answer, reason)| Input::Correct {
+            form,
             question,
             answer,
             reason,
@@ -83,7 +83,7 @@ fn input() -> impl Strategy<Value = Input> {
     ]
 }
 
-fn act() -> impl Strategy<Value = Act> {
+pub(super) fn act() -> impl Strategy<Value = Act> {
     let mood = prop_oneof![Just(DeviceMood::Willing), Just(DeviceMood::Silent)];
     let store = prop_oneof![
         4 => Just(StoreMood::Prompt),
@@ -122,6 +122,32 @@ fn assert_unloaded(input: &Input, effects: &[Effect]) {
     }
 }
 
+pub(super) fn perform(mut rig: Rig, act: Act) -> Rig {
+    match act {
+        Act::Step => {
+            rig.step();
+        }
+        Act::Wait(seconds) => {
+            rig.effects.clear();
+            rig.wait(seconds);
+            assert_unloaded(&Input::Tick, &rig.effects);
+        }
+        Act::Send(input) => {
+            rig.effects.clear();
+            rig.send(input.clone());
+            assert_unloaded(&input, &rig.effects);
+        }
+        Act::Device(mood) => rig.device = mood,
+        Act::Store(mood) => rig.store = mood,
+        Act::Crash(gap_s) => {
+            // What was not acknowledged may be lost.
+            let kept = rig.before + usize::try_from(rig.on_disk).unwrap();
+            rig = Rig::back(rich(), rig.journal[..kept].to_vec(), gap_s);
+        }
+    }
+    rig
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 100,
@@ -139,28 +165,7 @@ proptest! {
             if rig.ending.is_some() {
                 break;
             }
-            match act {
-                Act::Step => {
-                    rig.step();
-                }
-                Act::Wait(seconds) => {
-                    rig.effects.clear();
-                    rig.wait(seconds);
-                    assert_unloaded(&Input::Tick, &rig.effects);
-                }
-                Act::Send(input) => {
-                    rig.effects.clear();
-                    rig.send(input.clone());
-                    assert_unloaded(&input, &rig.effects);
-                }
-                Act::Device(mood) => rig.device = mood,
-                Act::Store(mood) => rig.store = mood,
-                Act::Crash(gap_s) => {
-                    // What was not acknowledged may be lost.
-                    let kept = rig.before + usize::try_from(rig.on_disk).unwrap();
-                    rig = Rig::back(rich(), rig.journal[..kept].to_vec(), gap_s);
-                }
-            }
+            rig = perform(rig, act);
             if matches!(rig.view().screen, Screen::Loading | Screen::Stopping) {
                 prop_assert!(rig.view().armed);
             }

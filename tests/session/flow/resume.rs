@@ -3,7 +3,7 @@
 use super::rig::{Rig, name};
 use super::studies::{plain, qid, rich};
 use std::collections::BTreeSet;
-use study_core::outcome::{Author, Choice, Entry, Event, Failure, Place, State};
+use study_core::outcome::{Author, Choice, Entry, Event, Failure, FormId, State};
 use study_core::protocol::{Answer, Protocol};
 use study_core::session::{Ending, Input, Screen};
 
@@ -28,7 +28,7 @@ fn eventful() -> Rig {
         reason: "misunderstood".to_owned(),
     });
     rig.send(Input::Correct {
-        place: Place::Intake,
+        form: FormId::Intake,
         question: qid("fatigue"),
         answer: Answer::Rating(6),
         reason: "misheard".to_owned(),
@@ -49,15 +49,15 @@ fn eventful() -> Rig {
 }
 
 /// The answer that is there at the end, by place and question.
-fn answers(journal: &[Entry]) -> Vec<(Place, String, Answer)> {
+fn answers(journal: &[Entry]) -> Vec<(FormId, String, Answer)> {
     journal
         .iter()
         .filter_map(|e| match &e.event {
             Event::Answered {
-                place,
+                form,
                 question,
                 answer,
-            } => Some((*place, question.to_string(), answer.clone())),
+            } => Some((*form, question.to_string(), answer.clone())),
             _ => None,
         })
         .collect()
@@ -175,7 +175,7 @@ fn a_rating_goes_on_at_the_first_question_that_was_not_answered() {
         questions,
         page: 2,
         pages: 2,
-        place,
+        form,
         ..
     } = rig.view().screen
     else {
@@ -186,7 +186,7 @@ fn a_rating_goes_on_at_the_first_question_that_was_not_answered() {
     let response = rig.events().find_map(|e| match e {
         Event::TrialDone {
             trial, response_s, ..
-        } if matches!(place, Place::Trial { trial: t, .. } if t == *trial) => Some(*response_s),
+        } if matches!(form, FormId::Trial { trial: t, .. } if t == *trial) => Some(*response_s),
         _ => None,
     });
     assert!((response.unwrap() - 14.0).abs() < 1e-6, "{response:?}");
@@ -346,7 +346,12 @@ fn a_journal_without_a_beginning_is_not_picked_up() {
     rig.until_reference(2);
     let mut back = Rig::back(plain(), rig.journal[1..].to_vec(), 60.0);
     back.identify();
-    assert!(back.view().notice.unwrap().contains("no beginning"));
+    assert!(
+        back.view()
+            .notice
+            .unwrap()
+            .contains("start of this session is missing")
+    );
     assert_eq!(screen(&back), "Who");
     assert_eq!(back.journal.len(), rig.journal.len() - 1);
 }

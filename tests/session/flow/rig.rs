@@ -5,7 +5,7 @@ use chrono::{DateTime, FixedOffset, TimeDelta};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use study_base::text::{ParticipantId, QuestionId};
-use study_core::outcome::{Entry, Event, Moment, Place, Playback};
+use study_core::outcome::{Entry, Event, FormId, Moment, Playback};
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::*;
 use study_core::session::{Claim, Config, Effect, Ending, Input, Screen, Session, View};
@@ -151,21 +151,9 @@ impl Rig {
 
     fn claim(&self, participant: ParticipantId) -> Claim {
         Claim {
-            participant,
-            session: 1,
             seat: self.seat,
-            entries: self.journal.clone(),
-            protocol_version: 1,
-            fingerprints: Fingerprints {
-                stimulus: "s".to_owned(),
-                wording: "w".to_owned(),
-                analysis: "a".to_owned(),
-            },
-            device_kind: self.protocol.device.kind,
-            device_id: "simulated-1".to_owned(),
-            device_check: None,
             device_telemetry: self.telemetry,
-            notices: Vec::new(),
+            ..claim(&self.protocol, participant, self.journal.clone())
         }
     }
 
@@ -254,14 +242,12 @@ impl Rig {
             return;
         }
         match event {
-            Event::Answered {
-                place, question, ..
-            } => {
+            Event::Answered { form, question, .. } => {
                 assert!(
-                    self.answer(*place, question).is_none(),
-                    "{question} is asked twice at {place:?}"
+                    self.answer(*form, question).is_none(),
+                    "{question} is asked twice at {form:?}"
                 );
-                if let Place::Trial { trial, attempt } = place {
+                if let FormId::Trial { trial, attempt } = form {
                     assert!(self.ended(*trial, *attempt), "rated without a playback");
                 }
             }
@@ -287,7 +273,7 @@ impl Rig {
         assert_eq!(view.line.all_saved, self.on_disk >= sent);
         assert!(view.line.trials_saved <= view.line.trials_answered);
         if let Screen::Form {
-            place: Place::Trial { trial, attempt },
+            form: FormId::Trial { trial, attempt },
             ..
         } = view.screen
         {
@@ -309,13 +295,13 @@ impl Rig {
         })
     }
 
-    pub(crate) fn answer(&self, place: Place, question: &QuestionId) -> Option<Answer> {
+    pub(crate) fn answer(&self, form: FormId, question: &QuestionId) -> Option<Answer> {
         self.journal.iter().find_map(|e| match &e.event {
             Event::Answered {
-                place: p,
+                form: p,
                 question: q,
                 answer,
-            } if *p == place && q == question => Some(answer.clone()),
+            } if *p == form && q == question => Some(answer.clone()),
             _ => None,
         })
     }
@@ -467,17 +453,17 @@ impl Rig {
         let closed = self.closed();
         let planned: BTreeSet<u32> = self.schedule().iter().map(|t| t.trial).collect();
         assert_eq!(closed.keys().copied().collect::<BTreeSet<_>>(), planned);
-        let ask = |place, questions: &[Question]| {
+        let ask = |form, questions: &[Question]| {
             for q in questions {
-                assert!(self.answer(place, &q.id).is_some(), "{} {place:?}", q.id);
+                assert!(self.answer(form, &q.id).is_some(), "{} {form:?}", q.id);
             }
         };
-        ask(Place::Setup, &self.protocol.setup);
-        ask(Place::Intake, &self.protocol.intake);
-        ask(Place::Outro, &self.protocol.outro);
+        ask(FormId::Setup, &self.protocol.setup);
+        ask(FormId::Intake, &self.protocol.intake);
+        ask(FormId::Outro, &self.protocol.outro);
         for (trial, attempt) in closed {
             if let Some(attempt) = attempt {
-                ask(Place::Trial { trial, attempt }, &self.protocol.questions);
+                ask(FormId::Trial { trial, attempt }, &self.protocol.questions);
             }
         }
     }
@@ -499,6 +485,27 @@ impl Rig {
                 _ => None,
             })
             .collect()
+    }
+}
+
+/// What the store and the device say of a session with these entries.
+pub(crate) fn claim(protocol: &Protocol, participant: ParticipantId, entries: Vec<Entry>) -> Claim {
+    Claim {
+        participant,
+        session: 1,
+        seat: Seat::Row(1),
+        entries,
+        protocol_version: 1,
+        fingerprints: Fingerprints {
+            stimulus: "s".to_owned(),
+            wording: "w".to_owned(),
+            analysis: "a".to_owned(),
+        },
+        device_kind: protocol.device.kind,
+        device_id: "simulated-1".to_owned(),
+        device_check: None,
+        device_telemetry: true,
+        notices: Vec::new(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::rig::{Rig, start};
 use super::studies::{MODELS, plain, rating, rich};
-use study_core::outcome::{Author, Event, Place, State};
+use study_core::outcome::{Author, Event, FormId, State};
 use study_core::protocol::{Breaks, Entry, Seat};
 use study_core::session::view::{Banner, Counts, DeviceState, MessageKind};
 use study_core::session::{Config, Effect, Ending, Input, Screen};
@@ -66,15 +66,15 @@ fn a_rich_session_asks_everything_in_its_order() {
             "End"
         ]
     );
-    let places: Vec<Place> = rig
+    let places: Vec<FormId> = rig
         .events()
         .filter_map(|e| match e {
-            Event::Answered { place, .. } => Some(*place),
+            Event::Answered { form, .. } => Some(*form),
             _ => None,
         })
         .collect();
-    assert_eq!(places.first(), Some(&Place::Setup));
-    assert_eq!(places.last(), Some(&Place::Outro));
+    assert_eq!(places.first(), Some(&FormId::Setup));
+    assert_eq!(places.last(), Some(&FormId::Outro));
     assert_eq!(rig.positions(), [1, 2, 3, 4, 5, 6]);
 }
 
@@ -138,12 +138,12 @@ fn setup_is_asked_of_the_experimenter_and_the_rest_of_the_participant() {
             let view = rig.view();
             assert_eq!(view.entry, entry);
             if let Screen::Form {
-                place,
+                form,
                 to_experimenter,
                 ..
             } = view.screen
             {
-                assert_eq!(to_experimenter, place == Place::Setup);
+                assert_eq!(to_experimenter, form == FormId::Setup);
             }
             rig.step();
         }
@@ -271,7 +271,10 @@ fn the_reference_stays_at_least_as_long_as_asked() {
     protocol.trial.reference_min_s = 5.0;
     let mut rig = Rig::new(protocol);
     rig.until("Reference").send(Input::Advance);
-    assert_eq!(rig.view().notice.as_deref(), Some("not yet"));
+    assert_eq!(
+        rig.view().notice.as_deref(),
+        Some("wait for the prompt to end")
+    );
     assert!(!rig.view().can_advance);
     rig.wait(4.0).send(Input::Advance);
     assert!(
@@ -376,7 +379,12 @@ fn without_an_order_the_claim_is_given_back() {
     }
     let mut rig = Rig::new(protocol);
     rig.identify();
-    assert!(rig.view().notice.unwrap().starts_with("there is no order"));
+    assert!(
+        rig.view()
+            .notice
+            .unwrap()
+            .starts_with("the order cannot be made")
+    );
     assert!(rig.journal.is_empty());
     rig.send(Input::Quit);
     assert_eq!(rig.ending, Some(Ending::Nothing));

@@ -1,8 +1,8 @@
-//! The events of a session, one line of its journal each.
+//! The events of a session; each is one line of its journal.
 //!
-//! The names and fields are a file format: a later version may add events and
-//! optional fields, never change these. `store` wraps each event with a sequence
-//! number, checksums and clocks.
+//! The serialized names and fields are a file format: a later version may add
+//! events and optional fields but must not change these. `store` adds a sequence
+//! number, checksums and clocks to each event.
 
 use crate::protocol::fingerprint::Fingerprints;
 use crate::protocol::{Answer, DeviceKind, Seat, Trial};
@@ -10,60 +10,60 @@ use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 
-/// Both clocks at once: durations come from the monotonic one, dates from the
-/// wall clock, which may step.
+/// A point in time by both clocks. Durations come from the monotonic clock; the
+/// wall clock, which gives the date, may step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// Date and time with the offset from UTC.
     pub wall: DateTime<FixedOffset>,
-    /// Monotonic nanoseconds since the process started its clock.
+    /// Monotonic clock of the process, ns.
     pub mono_ns: u64,
 }
 
 impl Moment {
-    /// Seconds from an earlier moment of the same process; 0 if it is later.
+    /// Time since an earlier moment of the same process, s; 0 if that moment is later.
     pub fn seconds_since(&self, earlier: &Self) -> f64 {
         self.mono_ns.saturating_sub(earlier.mono_ns) as f64 * 1e-9
     }
 }
 
-/// An event with its place in the journal.
+/// An event with its sequence number and time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// From 1, without gaps; line 0 of a journal is the claim of its folder.
+    /// Sequence number from 1, without gaps; line 0 of a journal is the claim.
     pub seq: u64,
-    /// When.
+    /// When it happened.
     pub at: Moment,
-    /// What.
+    /// Event.
     pub event: Event,
 }
 
-/// Who said or did something.
+/// Who entered something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Author {
-    /// The subject.
+    /// Participant.
     Participant,
-    /// The operator.
+    /// Operator.
     Experimenter,
 }
 
-/// Where a question was asked.
+/// The form in which a question is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Place {
-    /// Of the experimenter, before.
+pub enum FormId {
+    /// Questions to the experimenter before the first trial.
     Setup,
-    /// Of the participant, before.
+    /// Questions to the participant before the first trial.
     Intake,
-    /// After an attempt at a trial.
+    /// The rating after an attempt at a trial.
     Trial {
         /// [`Trial::trial`].
         trial: u32,
-        /// From 1.
+        /// Attempt, from 1.
         attempt: u32,
     },
-    /// Of the participant, at the end.
+    /// Questions to the participant at the end.
     Outro,
 }
 
@@ -73,25 +73,25 @@ pub enum Place {
 pub enum Failure {
     /// The device reported a fault or refused.
     DeviceFault,
-    /// The playback's start or end was never confirmed.
+    /// The start or end of the playback was not confirmed.
     PlaybackLost,
-    /// Somebody marked it as bad.
+    /// The operator marked it as bad.
     MarkedBad,
-    /// Stopped by Esc or a pause, and played again instead of rated.
+    /// Stopped by Esc or a pause and played again instead of rated.
     Stopped,
-    /// The program ended during it.
+    /// The program ended during the attempt.
     Interrupted,
 }
 
-/// What the operator chose on coming back to an old unfinished session.
+/// The operator's choice on resuming a session after a long gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Choice {
-    /// All trials of the block that was under way are felt again.
+    /// Repeat all trials of the block that was under way.
     RestartBlock,
-    /// It goes on where it stopped; every later row is flagged.
+    /// Continue where it stopped. The log of attempts notes it.
     Continue,
-    /// The participant does not come back.
+    /// The participant drops out.
     DropOut,
 }
 
@@ -99,24 +99,24 @@ pub enum Choice {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum State {
-    /// Started and not finished.
+    /// Started, not finished.
     Unfinished,
-    /// All trials are done.
+    /// All trials and forms are completed.
     Done,
-    /// Started by mistake; only before the first rating.
+    /// Started by mistake, before the first rating.
     Void,
     /// Did not come.
     NoShow,
-    /// Broke off.
+    /// Dropped out during the session.
     DroppedOut,
-    /// Not analysed.
+    /// Excluded from the analysis.
     Excluded,
-    /// Took back what was given.
+    /// Withdrew consent.
     Withdrawn,
 }
 
 impl State {
-    /// As on the command line and in `participants.csv`.
+    /// The value on the command line and in `participants.csv`.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Unfinished => "unfinished",
@@ -129,37 +129,37 @@ impl State {
         }
     }
 
-    /// Whether a participant in this state keeps their row; if not, the next
-    /// participant gets it.
+    /// Whether a participant in this state keeps their row of the schedule; otherwise
+    /// the next participant gets it.
     pub fn keeps_row(self) -> bool {
         matches!(self, Self::Unfinished | Self::Done)
     }
 }
 
-/// What a playback came to, by the device's account.
+/// The device's report of a playback.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Playback {
     /// From confirmed start to confirmed stop, s.
     #[serde(deserialize_with = "null_as_nan")]
     pub exploration_s: f64,
-    /// Full strokes, each from one end of the range to the other.
+    /// Full strokes from one end of the range to the other.
     pub strokes: u32,
-    /// Least value of the energy that the hand had put in, J; negative: active.
+    /// Minimum of the energy that the hand had put in, J; negative if the device was
+    /// active.
     #[serde(deserialize_with = "null_as_nan")]
     pub least_energy_j: f64,
     /// Changes of the direction state per second.
     #[serde(deserialize_with = "null_as_nan")]
     pub switches_per_s: f64,
-    /// How often the force was clamped.
+    /// Number of times the force was clamped.
     pub clamp_count: u64,
     /// Telemetry samples received.
     pub samples: u64,
-    /// Telemetry samples known to be lost.
+    /// Telemetry samples known to have been lost.
     pub samples_lost: u64,
 }
 
-/// JSON has no NaN: the writer puts null, and a device's nonsense must not make a
-/// line unreadable.
+/// JSON has no NaN: it is written as null, which must not make a line unreadable.
 fn null_as_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
 }
@@ -167,30 +167,30 @@ fn null_as_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Erro
 /// The first event of every session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Start {
-    /// Of the protocol.
+    /// Study id.
     pub study: String,
-    /// Whose session.
+    /// Participant.
     pub participant: ParticipantId,
-    /// From 1.
+    /// Session of the participant, from 1.
     pub session: u32,
-    /// Where the order comes from; also tells pilots and simulations apart.
+    /// Source of the order; also distinguishes pilots and simulated participants.
     pub seat: Seat,
     /// The operator's initials or code.
     pub operator: String,
-    /// What plays.
+    /// Kind of the device.
     pub device_kind: DeviceKind,
-    /// Which one.
+    /// Identity of the device.
     pub device_id: String,
-    /// What its last commissioning came to, if it is known.
+    /// Result of the device's last commissioning test, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub device_check: Option<String>,
-    /// Of this program.
+    /// Version of this program.
     pub tool_version: String,
-    /// Which frozen version of the protocol.
+    /// Frozen version of the protocol.
     pub protocol_version: u32,
-    /// Of that version.
+    /// Fingerprints of that version.
     pub fingerprints: Fingerprints,
-    /// The whole order, frozen.
+    /// Every planned trial, in order.
     pub schedule: Vec<Trial>,
 }
 
@@ -198,85 +198,88 @@ pub struct Start {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
-    /// Always the first, and only once.
+    /// The session started: the first event, exactly once.
     SessionStarted(Box<Start>),
-    /// The program came back to an unfinished session.
+    /// An unfinished session was resumed.
     Reopened {
-        /// The operator now.
+        /// Operator from now on.
         operator: String,
-        /// The program now.
+        /// Version of this program from now on.
         tool_version: String,
-        /// The device now.
+        /// Device from now on.
         device_id: String,
-        /// Wall-clock seconds since the event before.
+        /// Wall-clock time since the last activity, s.
         gap_s: f64,
-        /// What the operator chose, if the gap was too long to simply go on.
+        /// The operator's choice; `None` if the gap was short enough to continue
+        /// without one.
         choice: Option<Choice>,
-        /// Trials still to come, first the next, as [`Trial::trial`].
+        /// Trials still to come, the next one first.
         queue: Vec<u32>,
     },
-    /// The participant agreed, or not, to the consent document.
+    /// The participant decided on the consent document.
     Consented {
-        /// Its title.
+        /// Title of the document.
         document: String,
-        /// Its version.
+        /// Version of the document.
         version: String,
         /// Whether they agreed.
         accepted: bool,
-        /// Who typed it.
+        /// Who entered it.
         by: Author,
     },
     /// A question was answered for the first time.
     Answered {
-        /// Where it was asked.
-        place: Place,
-        /// Which.
+        /// Form.
+        #[serde(rename = "place")]
+        form: FormId,
+        /// Question.
         question: QuestionId,
-        /// What.
+        /// Answer.
         answer: Answer,
     },
-    /// An earlier answer was changed. The old one stays in the journal.
+    /// An earlier answer was changed.
     Corrected {
-        /// Where it was asked.
-        place: Place,
-        /// Which.
+        /// Form.
+        #[serde(rename = "place")]
+        form: FormId,
+        /// Question.
         question: QuestionId,
-        /// The answer until now.
+        /// Answer before.
         from: Option<Answer>,
-        /// The answer from now on.
+        /// Answer after.
         to: Answer,
-        /// Why.
+        /// Reason.
         reason: String,
-        /// By whom.
+        /// Who corrected it.
         by: Author,
     },
-    /// A realization was asked of the device.
+    /// A realization was requested from the device.
     AttemptStarted {
         /// [`Trial::trial`].
         trial: u32,
-        /// From 1.
+        /// Attempt, from 1.
         attempt: u32,
-        /// Its real place among the trials that count so far, from 1.
+        /// Its position in the order as felt, from 1.
         position: u32,
-        /// What is played.
+        /// Realization.
         model: ModelId,
-        /// How long the reference prompt was shown, s.
+        /// Duration of the reference prompt, s.
         reference_s: f64,
     },
     /// The device confirmed that it plays.
     PlaybackStarted {
         /// [`Trial::trial`].
         trial: u32,
-        /// From 1.
+        /// Attempt, from 1.
         attempt: u32,
     },
-    /// The device confirmed that it has stopped. Only now can it be rated.
+    /// The device confirmed that it has stopped. Only now can the trial be rated.
     PlaybackEnded {
         /// [`Trial::trial`].
         trial: u32,
-        /// From 1.
+        /// Attempt, from 1.
         attempt: u32,
-        /// What it came to.
+        /// The device's report.
         playback: Playback,
         /// Whether it was stopped by Esc, Space or a pause.
         stopped: bool,
@@ -285,83 +288,83 @@ pub enum Event {
     AttemptFailed {
         /// [`Trial::trial`].
         trial: u32,
-        /// From 1.
+        /// Attempt, from 1.
         attempt: u32,
-        /// Why.
+        /// Cause.
         failure: Failure,
-        /// The device's or the operator's words.
+        /// The device's message or the operator's reason.
         detail: String,
-        /// Trials still to come after this, first the next.
+        /// Trials still to come, the next one first.
         queue: Vec<u32>,
-        /// Whether the trial's new place breaks `max_run` or `min_distance`.
+        /// Whether the trial's new place violates `max_run` or `min_distance`.
         constraint_broken: bool,
     },
-    /// All questions of an attempt are answered: the trial is done.
+    /// All questions of an attempt are answered: the trial is completed.
     TrialDone {
         /// [`Trial::trial`].
         trial: u32,
-        /// From 1.
+        /// Attempt, from 1.
         attempt: u32,
         /// From the opening of the rating to its confirmation, s.
         response_s: f64,
     },
-    /// Given up after `max_attempts` failures.
+    /// The trial was closed after `max_attempts` failures.
     TrialClosed {
         /// [`Trial::trial`].
         trial: u32,
-        /// The last attempt.
+        /// Last attempt.
         attempt: u32,
     },
-    /// Something was remarked.
+    /// A remark was entered.
     Remark {
-        /// By whom.
+        /// Who entered it.
         by: Author,
-        /// During which trial, if any.
+        /// Trial during which it was entered, if any.
         trial: Option<u32>,
-        /// What, as typed.
+        /// Text as typed.
         text: String,
     },
-    /// The instructions were read, up to the first trial.
+    /// The instructions were read.
     InstructionsRead,
-    /// The operator or participant asked for a pause.
+    /// A pause began.
     Paused,
-    /// It goes on.
+    /// The pause ended.
     Unpaused {
-        /// How long it was, s.
+        /// Its duration, s.
         paused_s: f64,
     },
-    /// A break of the design began.
+    /// A scheduled break began.
     BreakStarted {
-        /// After how many trials that count.
+        /// Number of closed trials before it, without practice.
         after: u32,
     },
-    /// It ended.
+    /// The break ended.
     BreakEnded {
-        /// How long it was, s.
+        /// Its duration, s.
         rested_s: f64,
     },
-    /// The wall clock stepped against the monotonic one.
+    /// The wall clock stepped relative to the monotonic clock.
     ClockStepped {
-        /// Forward positive, s.
+        /// Size of the step, s; positive forward.
         by_s: f64,
     },
-    /// The program was left before the end.
+    /// The program was left before the end of the session.
     Interrupted {
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// Every trial is closed and every closing question answered.
+    /// Every trial is closed and every form answered.
     Finished,
     /// The operator set the participant's state from outside a session.
     StateSet {
         /// New state.
         state: State,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// The order was revealed to somebody while the study ran.
+    /// The order was shown to somebody during the study.
     Revealed {
-        /// Why, if it was said.
+        /// Reason; may be empty.
         reason: String,
     },
 }

@@ -1,34 +1,57 @@
-//! Questions, answers, corrections and remarks.
+//! Forms, answers, corrections and remarks.
 
 use super::Session;
-use super::course::Step;
+use super::flow::Step;
 use super::phase::{Form, Phase};
-use crate::outcome::{Author, Event, Moment, Place};
+use crate::outcome::{Author, Event, FormId, Moment};
 use crate::protocol::question::MAX_TEXT_BYTES;
 use crate::protocol::{Answer, Question, QuestionKind};
 use study_base::text::QuestionId;
 
+/// Why an input was not accepted; shown to the operator.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum InputRefused {
+    #[error("the session is over")]
+    SessionOver,
+    #[error("this answer cannot be corrected")]
+    NothingToCorrect,
+    #[error("that is already the answer")]
+    Unchanged,
+    #[error("type a few words")]
+    NoText,
+    #[error("at most {MAX_TEXT_BYTES} bytes")]
+    TextTooLong,
+    #[error("reason: {0}")]
+    Reason(Box<InputRefused>),
+    #[error("{0}")]
+    Answer(String),
+    #[error("an answer is needed")]
+    AnswerMissing,
+    #[error("`{0}` is not asked here")]
+    NotAsked(QuestionId),
+}
+
 impl Session {
-    /// The questions that are asked in a place.
-    pub(super) fn questions(&self, place: Place) -> &[Question] {
-        match place {
-            Place::Setup => &self.protocol.setup,
-            Place::Intake => &self.protocol.intake,
-            Place::Trial { .. } => &self.protocol.questions,
-            Place::Outro => &self.protocol.outro,
+    /// The questions of a form.
+    pub(super) fn questions(&self, form: FormId) -> &[Question] {
+        match form {
+            FormId::Setup => &self.protocol.setup,
+            FormId::Intake => &self.protocol.intake,
+            FormId::Trial { .. } => &self.protocol.questions,
+            FormId::Outro => &self.protocol.outro,
         }
     }
 
-    /// Opens a form at the first question that was not reached; says whether
-    /// there is one.
-    pub(super) fn open_form(&mut self, place: Place, at: Moment) -> bool {
-        if step_of(place).is_some_and(|step| self.behind.contains(&step)) {
+    /// Opens a form at the first question after the last answered one; returns
+    /// whether there is one.
+    pub(super) fn open_form(&mut self, form: FormId, at: Moment) -> bool {
+        if step_of(form).is_some_and(|step| self.passed.contains(&step)) {
             return false;
         }
-        let questions = self.questions(place);
+        let questions = self.questions(form);
         let reached = questions
             .iter()
-            .rposition(|q| self.history.answer(place, &q.id).is_some())
+            .rposition(|q| self.history.answer(form, &q.id).is_some())
             .map_or(0, |last| last + 1);
         let total = pages(questions).len();
         let mut left = pages(questions);
@@ -44,40 +67,40 @@ impl Session {
             return false;
         }
         self.phase = Phase::Form(Form {
-            place,
+            id: form,
             pages: left,
             total,
             opened: at,
-            covered_s: 0.0,
+            overlaid_s: 0.0,
         });
         true
     }
 
-    /// The rating of the attempt under way; closes the trial if every question
-    /// is answered already.
+    /// Opens the rating of the attempt under way; completes the trial if every
+    /// question is answered already.
     pub(super) fn open_trial_form(&mut self, at: Moment) {
-        let Some(place) = self.history.open.as_ref().map(|o| o.place()) else {
+        let Some(form) = self.history.open().map(|o| o.form()) else {
             return;
         };
-        if !self.open_form(place, at) {
-            self.complete(place, 0.0, at);
+        if !self.open_form(form, at) {
+            self.complete(form, 0.0, at);
         }
     }
 
     pub(super) fn answer(&mut self, answers: Vec<(QuestionId, Answer)>, at: Moment) {
-        let Phase::Form(form) = &self.phase else {
+        let Phase::Form(open) = &self.phase else {
             return;
         };
-        let Some(page) = form.pages.first() else {
+        let Some(page) = open.pages.first() else {
             return;
         };
         match check(page, answers) {
-            Err(why) => self.say(why),
+            Err(why) => self.notify(why.to_string()),
             Ok(answers) => {
-                let place = form.place;
+                let form = open.id;
                 for (question, answer) in answers {
                     let answered = Event::Answered {
-                        place,
+                        form,
                         question,
                         answer,
                     };
@@ -89,23 +112,23 @@ impl Session {
     }
 
     fn turn_page(&mut self, at: Moment) {
-        if let Phase::Form(form) = &mut self.phase {
-            form.pages.remove(0);
-            if form.pages.is_empty() {
-                let place = form.place;
-                let spent_s = at.seconds_since(&form.opened) - form.covered_s;
-                self.complete(place, spent_s.max(0.0), at);
+        if let Phase::Form(open) = &mut self.phase {
+            open.pages.remove(0);
+            if open.pages.is_empty() {
+                let form = open.id;
+                let spent_s = at.seconds_since(&open.opened) - open.overlaid_s;
+                self.complete(form, spent_s.max(0.0), at);
             }
         }
     }
 
-    /// Everything is answered there; on once it is on disk.
-    fn complete(&mut self, place: Place, spent_s: f64, at: Moment) {
-        if let Some(step) = step_of(place) {
-            self.behind.insert(step);
+    /// Every question of the form is answered: proceed once that is on disk.
+    fn complete(&mut self, form: FormId, spent_s: f64, at: Moment) {
+        if let Some(step) = step_of(form) {
+            self.passed.insert(step);
         }
-        if let Place::Trial { trial, attempt } = place {
-            let earlier = self.history.open.as_ref().map(|o| o.rated_earlier_s);
+        if let FormId::Trial { trial, attempt } = form {
+            let earlier = self.history.open().map(|o| o.attempt.rated_earlier_s);
             let done = Event::TrialDone {
                 trial,
                 attempt,
@@ -114,31 +137,31 @@ impl Session {
             self.record(done, at);
         }
         self.phase = Phase::Saving;
-        self.go_on_if_saved(at);
+        self.proceed_if_saved(at);
     }
 
     pub(super) fn remark(&mut self, by: Author, text: String, at: Moment) {
-        if let Err(why) = self.still_open().and_then(|()| check_words(&text)) {
-            return self.say(why);
+        if let Err(why) = self.accepts_records().and_then(|()| check_free_text(&text)) {
+            return self.notify(why.to_string());
         }
-        let trial = self.history.open.as_ref().map(|o| o.trial.trial);
+        let trial = self.history.open().map(|o| o.trial.trial);
         self.record(Event::Remark { by, trial, text }, at);
     }
 
     pub(super) fn correct(
         &mut self,
-        place: Place,
+        form: FormId,
         question: &QuestionId,
         answer: Answer,
         reason: String,
         by: Author,
         at: Moment,
     ) {
-        match self.check_correction(place, question, &answer, &reason) {
-            Err(why) => self.say(why),
+        match self.check_correction(form, question, &answer, &reason) {
+            Err(why) => self.notify(why.to_string()),
             Ok(from) => {
                 let corrected = Event::Corrected {
-                    place,
+                    form,
                     question: question.clone(),
                     from: Some(from),
                     to: answer,
@@ -152,56 +175,60 @@ impl Session {
 
     fn check_correction(
         &self,
-        place: Place,
+        form: FormId,
         question: &QuestionId,
         answer: &Answer,
         reason: &str,
-    ) -> Result<Answer, String> {
-        self.still_open()?;
-        let asked = self.questions(place).iter().find(|q| q.id == *question);
-        let given = self.history.answer(place, question);
-        let (Some(asked), Some(from), true) = (asked, given, self.history.is_current(place)) else {
-            return Err("there is no such answer to correct".to_owned());
+    ) -> Result<Answer, InputRefused> {
+        self.accepts_records()?;
+        let asked = self.questions(form).iter().find(|q| q.id == *question);
+        let given = self.history.answer(form, question);
+        let (Some(asked), Some(from), true) = (asked, given, self.history.is_current(form)) else {
+            return Err(InputRefused::NothingToCorrect);
         };
-        asked.accepts(answer)?;
+        asked
+            .accepts(answer)
+            .map_err(|why| InputRefused::Answer(why.to_string()))?;
         if from == answer {
-            return Err("that is the answer already".to_owned());
+            return Err(InputRefused::Unchanged);
         }
-        check_words(reason).map_err(|why| format!("reason: {why}"))?;
+        check_free_text(reason).map_err(|why| InputRefused::Reason(Box::new(why)))?;
         Ok(from.clone())
     }
 
-    /// Of somebody who dropped out or did not agree, nothing more is taken.
-    fn still_open(&self) -> Result<(), String> {
-        if self.history.over() && !self.history.finished {
-            Err("the session is over".to_owned())
+    /// Nothing more is recorded of a participant who dropped out or did not
+    /// consent.
+    fn accepts_records(&self) -> Result<(), InputRefused> {
+        if self.history.over() && !self.history.finished() {
+            Err(InputRefused::SessionOver)
         } else {
             Ok(())
         }
     }
 }
 
-/// Free text of a remark or reason: some, and not too much.
-pub(super) fn check_words(words: &str) -> Result<(), String> {
-    if words.trim().is_empty() {
-        Err("write a few words".to_owned())
-    } else if words.len() > MAX_TEXT_BYTES {
-        Err(format!("at most {MAX_TEXT_BYTES} bytes"))
+/// Checks the text of a remark or reason: neither empty nor too long.
+pub(super) fn check_free_text(text: &str) -> Result<(), InputRefused> {
+    if text.trim().is_empty() {
+        Err(InputRefused::NoText)
+    } else if text.len() > MAX_TEXT_BYTES {
+        Err(InputRefused::TextTooLong)
     } else {
         Ok(())
     }
 }
 
-fn step_of(place: Place) -> Option<Step> {
-    match place {
-        Place::Setup => Some(Step::Setup),
-        Place::Intake => Some(Step::Intake),
-        Place::Outro => Some(Step::Outro),
-        Place::Trial { .. } => None,
+fn step_of(form: FormId) -> Option<Step> {
+    match form {
+        FormId::Setup => Some(Step::Setup),
+        FormId::Intake => Some(Step::Intake),
+        FormId::Outro => Some(Step::Outro),
+        FormId::Trial { .. } => None,
     }
 }
 
-/// One question a page, with the optional text that directly follows it.
+/// The pages of a form: one question each, with an optional text that directly
+/// follows it.
 fn pages(questions: &[Question]) -> Vec<Vec<Question>> {
     let mut pages: Vec<Vec<Question>> = Vec::new();
     for question in questions {
@@ -214,12 +241,12 @@ fn pages(questions: &[Question]) -> Vec<Vec<Question>> {
     pages
 }
 
-/// The answers of a page in its order, or what is wrong with them. A text or
-/// choice that was left empty is an empty answer, so that it is not asked again.
+/// Checks the answers to a page and returns them in the page's order. A text or
+/// choice left empty becomes an empty answer, so that it is not asked again.
 fn check(
     page: &[Question],
     mut given: Vec<(QuestionId, Answer)>,
-) -> Result<Vec<(QuestionId, Answer)>, String> {
+) -> Result<Vec<(QuestionId, Answer)>, InputRefused> {
     let mut checked = Vec::new();
     for question in page {
         let at = given.iter().position(|(id, _)| *id == question.id);
@@ -231,15 +258,17 @@ fn check(
         });
         match answer {
             Some(answer) => {
-                question.accepts(&answer)?;
+                question
+                    .accepts(&answer)
+                    .map_err(|why| InputRefused::Answer(why.to_string()))?;
                 checked.push((question.id.clone(), answer));
             }
-            None if question.required => return Err("an answer is needed".to_owned()),
+            None if question.required => return Err(InputRefused::AnswerMissing),
             None => {}
         }
     }
     match given.first() {
-        Some((id, _)) => Err(format!("`{id}` is not asked here")),
+        Some((id, _)) => Err(InputRefused::NotAsked(id.clone())),
         None => Ok(checked),
     }
 }

@@ -1,6 +1,6 @@
 //! What comes into a session and what goes out.
 
-use crate::outcome::{Author, Choice, Entry, Event, Place, Playback};
+use crate::outcome::{Author, Choice, Entry, Event, FormId, Playback};
 use crate::protocol::fingerprint::Fingerprints;
 use crate::protocol::{Answer, DeviceKind, Seat};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
@@ -39,7 +39,7 @@ pub enum Input {
     /// A correction of an earlier answer, at any time.
     Correct {
         /// Where it was asked.
-        place: Place,
+        form: FormId,
         /// Which.
         question: QuestionId,
         /// The new answer.

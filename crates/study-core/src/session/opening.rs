@@ -1,12 +1,13 @@
-//! Who it is, the claim, and how a session is begun or picked up.
+//! Identification, the claim, and the start or resumption of a session.
 
 use super::phase::Phase;
 use super::{Claim, ClaimFacts, Effect, Session};
+use crate::outcome::fold::History;
 use crate::outcome::{Choice, Entry, Event, Failure, Moment, Start, State};
 use crate::schedule;
 use study_base::text::ParticipantId;
 
-/// Longest operator code, characters.
+/// Longest operator code, in characters.
 pub const MAX_OPERATOR: usize = 64;
 
 impl Session {
@@ -14,11 +15,11 @@ impl Session {
         self.participant = participant.trim().to_owned();
         self.operator = operator.trim().to_owned();
         if self.operator.chars().count() > MAX_OPERATOR {
-            return self.say(format!("operator: at most {MAX_OPERATOR} characters"));
+            return self.notify(format!("operator: at most {MAX_OPERATOR} characters"));
         }
         match ParticipantId::new(self.participant.as_str()) {
-            Err(_) if self.participant.is_empty() => self.say("who takes part? type an id"),
-            Err(why) => self.say(why.to_string()),
+            Err(_) if self.participant.is_empty() => self.notify("type the participant's id"),
+            Err(why) => self.notify(why.to_string()),
             Ok(participant) => {
                 self.phase = Phase::Claiming;
                 self.out.push(Effect::Claim {
@@ -31,11 +32,11 @@ impl Session {
 
     pub(super) fn claim_refused(&mut self, why: &str) {
         if matches!(self.phase, Phase::Claiming) {
-            self.phase = Phase::Who;
+            self.phase = Phase::Identify;
             self.claim = None;
             self.opened = None;
-            let why = self.safe(why);
-            self.say(why);
+            let why = self.sanitized(why);
+            self.notify(why);
         }
     }
 
@@ -53,13 +54,13 @@ impl Session {
             device_telemetry: claim.device_telemetry,
         });
         if !claim.notices.is_empty() {
-            let notices = self.safe(&claim.notices.join(" · "));
-            self.say(notices);
+            let notices = self.sanitized(&claim.notices.join(" · "));
+            self.notify(notices);
         }
         if claim.entries.is_empty() {
             self.start(claim, at);
         } else {
-            self.pick_up(&claim.entries, at);
+            self.resume_from(&claim.entries, at);
         }
     }
 
@@ -67,7 +68,7 @@ impl Session {
         let planned = schedule::plan(&self.protocol, self.orders.as_deref(), claim.seat);
         match planned {
             Err(why) => {
-                self.claim_refused(&format!("there is no order: {why}"));
+                self.claim_refused(&format!("the order cannot be made: {why}"));
             }
             Ok(schedule) => {
                 let start = Start {
@@ -90,14 +91,12 @@ impl Session {
         }
     }
 
-    fn pick_up(&mut self, entries: &[Entry], at: Moment) {
-        for entry in entries {
-            self.history.apply(&entry.event, entry.at);
-        }
-        if !self.history.started {
-            self.history = Default::default();
+    fn resume_from(&mut self, entries: &[Entry], at: Moment) {
+        self.history = History::of(entries);
+        if self.history.start().is_none() {
+            self.history = History::default();
             return self.claim_refused(
-                "the journal of this session has no beginning; `study verify` says more",
+                "the start of this session is missing from its journal; run `study verify`",
             );
         }
         if self.history.over() {
@@ -112,11 +111,10 @@ impl Session {
         }
     }
 
-    /// Wall-clock seconds since somebody last took part. Remarks and what was
-    /// done from outside are no part of it.
+    /// Wall-clock time since the last activity, s.
     fn gap_s(&self, at: Moment) -> f64 {
         self.history
-            .last_activity
+            .last_activity()
             .map_or(0.0, |last| (at.wall - last.wall).as_seconds_f64().max(0.0))
     }
 
@@ -126,12 +124,13 @@ impl Session {
         }
     }
 
-    /// An attempt that had not ended is given up and comes next; one that waits
-    /// for its rating waits on, unless its block starts again.
+    /// Records the resumption. An attempt whose playback had not ended fails and its
+    /// trial comes next; one that waits for its rating stays open unless its block
+    /// is restarted.
     fn reopen(&mut self, gap_s: f64, choice: Option<Choice>, at: Moment) {
         let restart = choice == Some(Choice::RestartBlock);
-        if let Some(open) = &self.history.open
-            && (restart || open.ended.is_none())
+        if let Some(open) = self.history.open()
+            && (restart || open.attempt.ended.is_none())
         {
             let why = if restart {
                 "the block starts again"
@@ -140,14 +139,13 @@ impl Session {
             };
             self.fail(Failure::Interrupted, why, at);
         }
-        let max = self.protocol.design.max_attempts.max(1);
-        for (trial, attempt) in self.history.owed_closings(max) {
+        for (trial, attempt) in self.unrecorded_closings() {
             self.record(Event::TrialClosed { trial, attempt }, at);
         }
         let queue = if restart {
-            self.history.restarted_queue()
+            self.restarted_queue()
         } else {
-            self.history.queue.clone()
+            self.history.queue().to_vec()
         };
         let device_id = self.claim.as_ref().map(|c| c.device_id.clone());
         let reopened = Event::Reopened {
@@ -163,6 +161,38 @@ impl Session {
             self.drop_out("did not come back", at);
         }
         self.phase = Phase::Saving;
+    }
+
+    /// Trials, each with its last attempt, that failed too often although their
+    /// closing is not in the journal: the program ended between the two events.
+    fn unrecorded_closings(&self) -> Vec<(u32, u32)> {
+        let history = &self.history;
+        let max = self.protocol.design.max_attempts.max(1);
+        let given_up = |trial: &u32| {
+            !history.is_closed(*trial)
+                && history.failures(*trial) >= max
+                && !history.queue().contains(trial)
+        };
+        let trials = history.schedule().iter().map(|t| t.trial);
+        trials
+            .filter(given_up)
+            .map(|trial| (trial, history.attempts(trial)))
+            .collect()
+    }
+
+    /// The queue after a restart of the block under way: all its trials as planned,
+    /// then the others that are still to come.
+    fn restarted_queue(&self) -> Vec<u32> {
+        let history = &self.history;
+        let Some(block) = history.next_trial().map(|t| t.block) else {
+            return Vec::new();
+        };
+        let in_block = |trial: &u32| history.planned(*trial).is_some_and(|t| t.block == block);
+        let again = history.schedule().iter().filter(|t| t.block == block);
+        again
+            .map(|t| t.trial)
+            .chain(history.queue().iter().copied().filter(|t| !in_block(t)))
+            .collect()
     }
 
     pub(super) fn drop_out(&mut self, reason: &str, at: Moment) {

@@ -1,38 +1,38 @@
-//! Where a session is, beyond what its events tell.
+//! The current phase of a session: what its events do not determine.
 
 use super::Ending;
 use super::view::{Counts, MessageKind};
-use crate::outcome::{Moment, Place};
+use crate::outcome::{FormId, Moment};
 use crate::protocol::Question;
 
-/// Seconds in which the device has to confirm a stop.
+/// Time within which the device must confirm a stop, s.
 pub(super) const STOP_WITHIN_S: f64 = 2.0;
-/// Seconds in which the device has to confirm a table, and then its start.
+/// Time within which the device must confirm a table, and then its start, s.
 pub(super) const LOAD_WITHIN_S: f64 = 5.0;
-/// Seconds that a forced leave waits for the last event to be on disk.
+/// How long a forced exit waits for the last event to be on disk, s.
 pub(super) const LEAVE_WITHIN_S: f64 = 5.0;
-/// A step of the wall clock from here up is recorded, s.
+/// Smallest step of the wall clock that is recorded, s.
 pub(super) const CLOCK_STEP_S: f64 = 2.0;
 
-/// The one thing that is going on.
+/// The current phase.
 #[derive(Debug)]
 pub(super) enum Phase {
-    /// Nobody is known yet.
-    Who,
-    /// The store was asked for the folder.
+    /// The operator types participant and operator.
+    Identify,
+    /// Waiting for the store to claim the session's folder.
     Claiming,
-    /// The operator chooses how to go on after so many seconds.
+    /// The operator chooses how to resume after a long gap.
     ResumeChoice {
         gap_s: f64,
     },
     Consent,
     Message(MessageKind),
     Form(Form),
-    /// The reference prompt since then.
+    /// The reference prompt.
     Reference {
         since: Moment,
     },
-    /// The table was sent then.
+    /// The table was sent to the device.
     Loading {
         since: Moment,
     },
@@ -40,48 +40,48 @@ pub(super) enum Phase {
     Mounting {
         code: String,
     },
-    /// The start was asked for then.
+    /// The start was requested.
     Ready {
         since: Moment,
     },
     Playing {
         since: Moment,
-        /// What the device has counted, if it counts.
+        /// Strokes and clamps so far, if the device reports them.
         counts: Option<Counts>,
     },
-    /// The stop was asked for then.
+    /// The stop was requested.
     Stopping {
         since: Moment,
-        /// By Esc, Space, a pause or a disk that fails, not in order to rate.
-        broken_off: bool,
-        /// Limp was sent as well: a confirmation may never come.
+        /// By Esc, Space, a pause or a failed save, not in order to rate.
+        aborted: bool,
+        /// Limp was sent as well: the confirmation may never come.
         limped: bool,
         /// A pause follows.
         pause: bool,
     },
-    /// Broken off: play again or rate.
+    /// Stopped: play again or rate.
     Stopped,
-    /// A break of the design since then, after so much rest before.
+    /// A scheduled break; `rested_s` is the part of it before a resume.
     Break {
         since: Moment,
         rested_s: f64,
     },
-    /// Everything recorded has to be on disk before it goes on.
+    /// Waiting until every recorded event is on disk.
     Saving,
     End,
-    /// The last events are on their way to the disk.
+    /// Waiting for the last events to be on disk, then exit.
     Leaving {
         since: Moment,
         ending: Ending,
-        /// Whether nobody is there who could help if it fails, or would.
+        /// Whether to exit after a time limit even if saving fails.
         forced: bool,
     },
-    /// The program was told to end.
+    /// The exit was requested.
     Over(Ending),
 }
 
 impl Phase {
-    /// Whether a table is loaded or playing, or may be.
+    /// Whether a table is, or may be, loaded or playing.
     pub(super) fn armed(&self) -> bool {
         matches!(
             self,
@@ -93,11 +93,11 @@ impl Phase {
         )
     }
 
-    /// Whether a session is claimed and not yet left.
+    /// Whether the session is claimed and not being left.
     pub(super) fn under_way(&self) -> bool {
         !matches!(
             self,
-            Self::Who | Self::Claiming | Self::Leaving { .. } | Self::Over(_)
+            Self::Identify | Self::Claiming | Self::Leaving { .. } | Self::Over(_)
         )
     }
 }
@@ -105,20 +105,20 @@ impl Phase {
 /// Questions being answered.
 #[derive(Debug)]
 pub(super) struct Form {
-    pub(super) place: Place,
-    /// What is still to be asked, page by page; the first is on the screen.
+    pub(super) id: FormId,
+    /// The pages still to be answered; the first is on the screen.
     pub(super) pages: Vec<Vec<Question>>,
-    /// Pages that the whole form has.
+    /// Number of pages of the whole form.
     pub(super) total: usize,
-    /// When it was opened.
+    /// When the form was opened.
     pub(super) opened: Moment,
-    /// For how long something else was on the screen, s.
-    pub(super) covered_s: f64,
+    /// Time under an overlay since then, s.
+    pub(super) overlaid_s: f64,
 }
 
-/// What is wrong with the device.
+/// A problem of the device.
 #[derive(Debug)]
-pub(super) struct Trouble {
+pub(super) struct DeviceProblem {
     pub(super) what: String,
     pub(super) fault: bool,
 }

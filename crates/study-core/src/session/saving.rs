@@ -1,29 +1,30 @@
-//! What is on disk, what is not, and leaving: no way out before the disk has it.
+//! Saving and leaving: the session ends only after its events are on disk.
 
 use super::phase::{CLOCK_STEP_S, LEAVE_WITHIN_S, Phase};
 use super::{Effect, Ending, Session};
 use crate::outcome::{Event, Failure, Moment};
 use std::collections::BTreeMap;
 
-/// The account of events sent to the store by this process.
+/// How many events of this process are sent to the store and how many are on disk.
 #[derive(Debug, Default)]
-pub(super) struct Ledger {
+pub(super) struct SaveState {
     pub(super) sent: u64,
     pub(super) saved: u64,
-    /// Trial → how many events were sent when it was done.
+    /// Trial → number of events sent when it was completed.
     pub(super) done: BTreeMap<u32, u64>,
-    /// Why it cannot be saved.
+    /// Why saving failed.
     pub(super) trouble: Option<String>,
-    /// Whether saving again is under way.
+    /// A retry is under way.
     pub(super) retrying: bool,
 }
 
-impl Ledger {
+impl SaveState {
     pub(super) fn all_saved(&self) -> bool {
         self.saved >= self.sent
     }
 
-    /// Whether the end of a trial is on disk; what was read from there is.
+    /// Whether the completion of a trial is on disk. Trials read from the journal
+    /// are.
     pub(super) fn has_trial(&self, trial: u32) -> bool {
         self.done.get(&trial).is_none_or(|n| *n <= self.saved)
     }
@@ -31,21 +32,21 @@ impl Ledger {
 
 impl Session {
     pub(super) fn saved(&mut self, count: u64, at: Moment) {
-        self.ledger.saved = self.ledger.saved.max(count.min(self.ledger.sent));
-        if self.ledger.all_saved() {
-            self.ledger.trouble = None;
-            self.ledger.retrying = false;
+        self.saves.saved = self.saves.saved.max(count.min(self.saves.sent));
+        if self.saves.all_saved() {
+            self.saves.trouble = None;
+            self.saves.retrying = false;
         }
-        self.go_on_if_saved(at);
+        self.proceed_if_saved(at);
     }
 
     /// Leaves [`Phase::Saving`] and [`Phase::Leaving`] once everything is on disk.
-    pub(super) fn go_on_if_saved(&mut self, at: Moment) {
-        if !self.ledger.all_saved() {
+    pub(super) fn proceed_if_saved(&mut self, at: Moment) {
+        if !self.saves.all_saved() {
             return;
         }
         match &self.phase {
-            Phase::Saving => self.go_on(at),
+            Phase::Saving => self.proceed(at),
             Phase::Leaving { ending, .. } => self.end(ending.clone()),
             _ => {}
         }
@@ -53,8 +54,8 @@ impl Session {
 
     pub(super) fn save_failed(&mut self, what: String, at: Moment) {
         self.out.push(Effect::Limp);
-        self.ledger.trouble = Some(what);
-        let again = std::mem::take(&mut self.ledger.retrying);
+        self.saves.trouble = Some(what);
+        let again = std::mem::take(&mut self.saves.retrying);
         match &mut self.phase {
             Phase::Leaving {
                 ending,
@@ -70,12 +71,12 @@ impl Session {
             }
             Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
                 self.fail(Failure::Stopped, "the journal could not be written", at);
-                self.go_on(at);
+                self.proceed(at);
             }
             Phase::Playing { .. } => {
                 self.phase = Phase::Stopping {
                     since: at,
-                    broken_off: true,
+                    aborted: true,
                     limped: true,
                     pause: false,
                 };
@@ -86,19 +87,19 @@ impl Session {
     }
 
     pub(super) fn retry_save(&mut self) {
-        if self.ledger.trouble.is_some() && !self.ledger.retrying {
-            self.ledger.retrying = true;
+        if self.saves.trouble.is_some() && !self.saves.retrying {
+            self.saves.retrying = true;
             self.out.push(Effect::RetrySave);
         }
     }
 
-    /// Limp, then out as soon as the last event is on disk. Where nobody can help
-    /// (an abort) or somebody knows (the disk had failed already), the disk gets
-    /// one more chance; else a failure is shown. Asked again, it waits no longer.
+    /// Makes the device limp and exits as soon as the last event is on disk. After
+    /// an abort, or if saving had already failed, saving is retried once; otherwise
+    /// a failure is shown. A second request exits at once.
     pub(super) fn quit(&mut self, reason: &str, aborted: bool, at: Moment) {
         match &self.phase {
             Phase::Over(_) => return,
-            Phase::Who | Phase::Claiming => return self.end(Ending::Nothing),
+            Phase::Identify | Phase::Claiming => return self.end(Ending::Nothing),
             Phase::Leaving { ending, .. } => {
                 let ending = ending.clone();
                 return self.end(ending);
@@ -111,9 +112,8 @@ impl Session {
         if !matches!(self.phase, Phase::ResumeChoice { .. }) {
             if self
                 .history
-                .open
-                .as_ref()
-                .is_some_and(|o| o.ended.is_none())
+                .open()
+                .is_some_and(|o| o.attempt.ended.is_none())
             {
                 self.fail(Failure::Interrupted, reason, at);
             }
@@ -123,10 +123,10 @@ impl Session {
         self.leave(aborted, at);
     }
 
-    /// Ends the program as soon as everything is on disk.
+    /// Exits as soon as everything is on disk.
     pub(super) fn leave(&mut self, aborted: bool, at: Moment) {
-        let forced = aborted || self.ledger.trouble.is_some();
-        let ending = if self.history.finished {
+        let forced = aborted || self.saves.trouble.is_some();
+        let ending = if self.history.finished() {
             Ending::Finished
         } else if self.history.over() {
             Ending::DroppedOut
@@ -139,7 +139,7 @@ impl Session {
             forced,
         };
         self.retry_save();
-        self.go_on_if_saved(at);
+        self.proceed_if_saved(at);
     }
 
     fn end(&mut self, ending: Ending) {
@@ -163,7 +163,7 @@ impl Session {
     }
 
     fn watch_clock(&mut self, at: Moment) {
-        if !self.history.started || self.history.over() || !self.phase.under_way() {
+        if self.history.start().is_none() || self.history.over() || !self.phase.under_way() {
             return;
         }
         let wall_s = (at.wall - self.clock.wall).as_seconds_f64();

@@ -1,4 +1,4 @@
-//! One attempt at a trial: load, play, stop, and the way to its rating.
+//! One attempt at a trial: load, play, stop, rate.
 
 use super::phase::Phase;
 use super::view::Counts;
@@ -7,17 +7,17 @@ use crate::outcome::{Event, Failure, Moment, Playback};
 use crate::protocol::{DeviceKind, Trial};
 
 impl Session {
-    /// Asks the device for the next trial: the event first, so that the journal
-    /// never knows less than the hand.
+    /// Requests the next trial from the device. The event comes first, so that
+    /// nothing is felt that is not in the journal.
     pub(super) fn begin_attempt(&mut self, reference_s: f64, at: Moment) {
         let Some(trial) = self.history.next_trial().cloned() else {
-            return self.go_on(at);
+            return self.proceed(at);
         };
         let attempt = self.history.attempts(trial.trial) + 1;
         let started = Event::AttemptStarted {
             trial: trial.trial,
             attempt,
-            position: self.history.position(&trial),
+            position: self.position(&trial),
             model: trial.model.clone(),
             reference_s,
         };
@@ -30,6 +30,18 @@ impl Session {
         self.phase = Phase::Loading { since: at };
     }
 
+    /// Where a trial would stand if it were felt now: one more than the trials of
+    /// its kind (practice or not) felt so far, each as often as the hand came back
+    /// to it from another one. Felt again at once, it keeps its position.
+    fn position(&self, trial: &Trial) -> u32 {
+        let same_kind = |t: &&Trial| t.practice == trial.practice;
+        let before = self.history.felt().filter(same_kind).count();
+        let last = self.history.last_felt();
+        let again = last.is_some_and(|t| t.trial == trial.trial);
+        let before = u32::try_from(before).unwrap_or(u32::MAX);
+        before.saturating_add(u32::from(!again))
+    }
+
     pub(super) fn device_loaded(&mut self, at: Moment) {
         if matches!(self.phase, Phase::Loading { .. }) {
             self.out.push(Effect::Start);
@@ -37,27 +49,28 @@ impl Session {
         }
     }
 
-    /// A sample is mounted by a person, who says when it is done.
+    /// A person must mount a sample and confirm it.
     pub(super) fn device_mount(&mut self, code: String) {
         if matches!(self.phase, Phase::Loading { .. }) {
             self.phase = Phase::Mounting { code };
         }
     }
 
-    /// It is mounted: what is felt from here on counts.
+    /// The sample is mounted: what is felt from here on counts.
     pub(super) fn mounted(&mut self, at: Moment) {
         self.out.push(Effect::Start);
         self.phase = Phase::Ready { since: at };
     }
 
-    /// A device that starts unasked is made limp, and with it what was on its way.
+    /// A device that starts without a request is made limp, which also cancels a
+    /// load.
     pub(super) fn device_started(&mut self, at: Moment) {
-        match (&mut self.phase, &self.history.open) {
+        match (&mut self.phase, self.history.open()) {
             (Phase::Ready { .. }, Some(open)) => {
-                let counts = self.counted(&open.trial).then(Counts::default);
+                let counts = self.counted(open.trial).then(Counts::default);
                 let started = Event::PlaybackStarted {
                     trial: open.trial.trial,
-                    attempt: open.attempt,
+                    attempt: open.attempt.number,
                 };
                 self.record(started, at);
                 self.phase = Phase::Playing { since: at, counts };
@@ -81,19 +94,17 @@ impl Session {
         }
     }
 
-    /// The confirmed end. Only from here does a way lead to the rating.
+    /// The confirmed end of the playback. Only after it can the trial be rated.
     pub(super) fn device_stopped(&mut self, playback: Playback, at: Moment) {
-        let (broken_off, pause) = match self.phase {
+        let (aborted, pause) = match self.phase {
             Phase::Playing { .. } => (false, false),
-            Phase::Stopping {
-                broken_off, pause, ..
-            } => (broken_off, pause),
+            Phase::Stopping { aborted, pause, .. } => (aborted, pause),
             _ => return,
         };
-        let Some(open) = &self.history.open else {
+        let Some(open) = self.history.open() else {
             return;
         };
-        if !is_sound(&playback) {
+        if !is_finite(&playback) {
             self.out.push(Effect::Limp);
             return self.lose_attempt(
                 Failure::PlaybackLost,
@@ -103,9 +114,9 @@ impl Session {
         }
         let ended = Event::PlaybackEnded {
             trial: open.trial.trial,
-            attempt: open.attempt,
+            attempt: open.attempt.number,
             playback,
-            stopped: broken_off,
+            stopped: aborted,
         };
         self.record(ended, at);
         self.after_playback(at);
@@ -114,30 +125,31 @@ impl Session {
         }
     }
 
-    /// To the rating, or to the choice if it was broken off or too short.
+    /// Enters the rating, or the choice if the playback was stopped or too short.
     pub(super) fn after_playback(&mut self, at: Moment) {
-        let Some(open) = &self.history.open else {
-            return self.go_on(at);
+        let Some(open) = self.history.open() else {
+            return self.proceed(at);
         };
-        let begun = self.history.any_answer(open.place());
-        let broken_off = open.ended.is_none_or(|(_, stopped)| stopped);
-        if begun || (!broken_off && self.can_rate()) {
+        let begun = self.history.any_answer(open.form());
+        let aborted = open.attempt.ended.is_none_or(|e| e.stopped);
+        if begun || (!aborted && self.can_rate()) {
             self.open_trial_form(at);
         } else {
             self.phase = Phase::Stopped;
         }
     }
 
-    /// Whether the attempt under way has a confirmed end and strokes enough.
+    /// Whether the attempt under way has a confirmed end and enough strokes.
     pub(super) fn can_rate(&self) -> bool {
-        let Some(open) = &self.history.open else {
+        let Some(open) = self.history.open() else {
             return false;
         };
-        open.ended
-            .is_some_and(|(playback, _)| playback.strokes >= self.minimum_strokes(&open.trial))
+        open.attempt
+            .ended
+            .is_some_and(|e| e.playback.strokes >= self.minimum_strokes(open.trial))
     }
 
-    /// Strokes that a rating needs; none where nobody counts them.
+    /// Strokes required before a rating; 0 where they are not counted.
     pub(super) fn minimum_strokes(&self, trial: &Trial) -> u32 {
         if self.counted(trial) {
             self.protocol.trial.minimum_strokes
@@ -146,12 +158,12 @@ impl Session {
         }
     }
 
-    /// Whether strokes and clamps of this trial are known.
+    /// Whether the device reports strokes and clamps for this trial.
     fn counted(&self, trial: &Trial) -> bool {
         self.claim.as_ref().is_some_and(|c| c.device_telemetry) && !self.by_hand(trial)
     }
 
-    /// Whether the realization is mounted by a person, who may take their time.
+    /// Whether the sample is mounted by a person, so that no deadline applies.
     pub(super) fn by_hand(&self, trial: &Trial) -> bool {
         let own = self.protocol.model(&trial.model).and_then(|m| m.device);
         let kind = own.or(self.claim.as_ref().map(|c| c.device_kind));
@@ -163,7 +175,7 @@ impl Session {
         } else if self.can_rate() {
             self.open_trial_form(at);
         } else {
-            self.say("too little was felt to be rated");
+            self.notify("not enough was felt for a rating");
         }
     }
 
@@ -173,52 +185,52 @@ impl Session {
         }
         self.fail(Failure::Stopped, "played again", at);
         if self.device_lost {
-            self.go_on(at);
-            self.show_trouble_again();
+            self.proceed(at);
+            self.show_device_lost();
         } else {
             self.begin_attempt(0.0, at);
         }
     }
 
-    /// Stops playing in order to rate.
+    /// Requests the stop that precedes the rating.
     pub(super) fn finish_playing(&mut self, strokes: u32, at: Moment) {
-        let Some(open) = &self.history.open else {
+        let Some(open) = self.history.open() else {
             return;
         };
-        let missing = self.minimum_strokes(&open.trial).saturating_sub(strokes);
+        let missing = self.minimum_strokes(open.trial).saturating_sub(strokes);
         if missing > 0 {
-            return self.say(format!("{missing} more full strokes first"));
+            return self.notify(format!("{missing} more full strokes are needed"));
         }
-        self.ask_to_stop(false, false, at);
+        self.request_stop(false, false, at);
     }
 
-    fn ask_to_stop(&mut self, broken_off: bool, pause: bool, at: Moment) {
+    fn request_stop(&mut self, aborted: bool, pause: bool, at: Moment) {
         self.out.push(Effect::Stop);
         self.phase = Phase::Stopping {
             since: at,
-            broken_off,
+            aborted,
             limped: false,
             pause,
         };
     }
 
-    /// Esc. A stop keeps the device's account of what was felt; asked twice, or
-    /// where nothing plays, the device is simply made limp.
+    /// Esc: the device reports what was felt before it stops. A second request, or
+    /// one while nothing plays, makes the device limp.
     pub(super) fn stop(&mut self, at: Moment) {
         match &mut self.phase {
-            Phase::Playing { .. } => self.ask_to_stop(true, false, at),
+            Phase::Playing { .. } => self.request_stop(true, false, at),
             Phase::Stopping {
-                broken_off, limped, ..
+                aborted, limped, ..
             } => {
-                *broken_off = true;
+                *aborted = true;
                 *limped = true;
                 self.out.push(Effect::Limp);
             }
             Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
                 self.out.push(Effect::Limp);
                 self.fail(Failure::Stopped, "stopped before it played", at);
-                self.go_on(at);
-                self.say("stopped");
+                self.proceed(at);
+                self.notify("stopped");
             }
             _ => self.out.push(Effect::Limp),
         }
@@ -226,13 +238,13 @@ impl Session {
 
     pub(super) fn pause(&mut self, at: Moment) {
         match &mut self.phase {
-            Phase::Playing { .. } => self.ask_to_stop(true, true, at),
+            Phase::Playing { .. } => self.request_stop(true, true, at),
             Phase::Stopping { pause, .. } => *pause = true,
             Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
                 self.stop(at);
                 self.start_pause(at);
             }
-            Phase::ResumeChoice { .. } | Phase::End => self.say("there is nothing to pause"),
+            Phase::ResumeChoice { .. } | Phase::End => self.notify("nothing can be paused now"),
             _ => self.start_pause(at),
         }
     }
@@ -243,7 +255,7 @@ impl Session {
     }
 }
 
-fn is_sound(playback: &Playback) -> bool {
+fn is_finite(playback: &Playback) -> bool {
     [
         playback.exploration_s,
         playback.least_energy_j,

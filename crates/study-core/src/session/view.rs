@@ -1,6 +1,6 @@
 //! What may be seen of a session. Nothing here identifies a realization.
 
-use crate::outcome::Place;
+use crate::outcome::FormId;
 use crate::protocol::{Answer, DeviceKind, Entry, Question};
 use study_base::text::QuestionId;
 
@@ -143,7 +143,7 @@ pub enum Screen {
     /// Questions on one page: the first in full, an optional text below it.
     Form {
         /// Where the answers belong.
-        place: Place,
+        form: FormId,
         /// One or two; the second is an optional text.
         questions: Vec<Question>,
         /// Page from 1.
@@ -234,7 +234,7 @@ pub enum MessageKind {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correctable {
     /// Where it was asked.
-    pub place: Place,
+    pub form: FormId,
     /// "trial 6", "practice 1", "set-up", "intake", "closing questions". The number
     /// is the one that was on the screen.
     pub title: String,

@@ -7,7 +7,8 @@ use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
 use super::{StudyFolder, atomic, layout, tables};
 use crate::outcome::cell::Header;
-use crate::outcome::{AttemptRow, ParticipantRow, RatingRow, State, fold};
+use crate::outcome::fold::attempt_rows;
+use crate::outcome::{AttemptRow, ParticipantRow, RatingRow, State};
 use crate::protocol::Protocol;
 use crate::protocol::columns::{AttemptColumn, ParticipantColumn, RatingColumn};
 use std::io;
@@ -84,12 +85,17 @@ impl Derived {
             ..Self::default()
         };
         for session in sessions {
-            let (id, number, entries) = (&session.participant, session.session, &session.entries);
             if !matches!(session.standing().state, State::Void | State::Withdrawn) {
-                derived.rows.extend(fold::ratings(entries, protocol));
+                derived.rows.extend(session.history.rating_rows(protocol));
             }
             if session.standing().state != State::Withdrawn {
-                derived.attempts.extend(fold::attempts(id, number, entries));
+                let rows = attempt_rows(
+                    &session.history,
+                    &session.participant,
+                    session.session,
+                    &session.entries,
+                );
+                derived.attempts.extend(rows);
             }
         }
         derived
@@ -112,7 +118,8 @@ impl Derived {
 pub fn participants(sessions: &[SessionData]) -> Vec<ParticipantRow> {
     let mut rows: Vec<ParticipantRow> = Vec::new();
     for session in sessions.iter().filter(|s| s.claimed) {
-        let mut row = fold::participant(&session.participant, session.session, &session.entries);
+        let history = &session.history;
+        let mut row = history.participant_row(&session.participant, session.session);
         if let Some(seat) = session.seat {
             row.row = seat.row();
             row.pilot = seat.is_pilot();

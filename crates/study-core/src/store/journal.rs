@@ -7,10 +7,10 @@
 
 use super::disk::{Appender, Disk};
 use super::error::{At as _, StoreError};
+use super::held::Held;
+use super::journal_record::{self, Record};
 use super::layout;
-use super::line::{self, Record};
 use super::replay::{Replay, Segment, replay};
-use super::session_folder::Held;
 use crate::outcome::{Event, Moment};
 use std::fmt;
 use std::io;
@@ -78,14 +78,15 @@ impl Journal {
                 path: self.path.clone(),
             });
         }
-        let unstorable = |e: line::BadLine| StoreError::Unstorable {
+        let unstorable = |e: journal_record::BadLine| StoreError::Unstorable {
             path: self.path.clone(),
             what: e.to_string(),
         };
-        let mut bytes = line::encode(self.next_seq, &self.prev, record).map_err(unstorable)?;
+        let mut bytes =
+            journal_record::encode(self.next_seq, &self.prev, record).map_err(unstorable)?;
         // What does not read back now would be lost later, in silence.
-        line::decode(&bytes).map_err(unstorable)?;
-        let hash = line::hash(&bytes);
+        journal_record::decode(&bytes).map_err(unstorable)?;
+        let hash = journal_record::hash(&bytes);
         bytes.push(b'\n');
         let written = self.file.write_all(&bytes).and_then(|()| self.file.sync());
         if let Err(e) = written {

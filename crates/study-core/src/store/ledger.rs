@@ -7,13 +7,13 @@
 
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
+use super::held::{Held, RESERVE_BYTES};
 use super::journal::{self, Journal};
-use super::line::{Claim, Record};
+use super::journal_record::{Claim, Record};
 use super::manifest::Manifest;
-use super::session_folder::{Held, RESERVE_BYTES};
 use super::sessions::SessionData;
 use super::{SessionFolder, StudyFolder, atomic, layout};
-use crate::outcome::fold::{Standing, standing};
+use crate::outcome::fold::Standing;
 use crate::outcome::{Entry, State};
 use crate::protocol::Seat;
 use std::collections::BTreeSet;
@@ -141,7 +141,7 @@ impl StudyFolder {
                 found,
             });
         }
-        check_standing(request, number, standing(&replay.entries))?;
+        check_standing(request, number, replay.history.standing())?;
         if replay.records == 0 {
             let seat = next_seat(request, &all)?;
             let claim = Claim {
@@ -168,6 +168,7 @@ impl StudyFolder {
             .last()
             .and_then(|s| layout::segment_number(&s.name));
         let protocol_version = replay
+            .history
             .start()
             .map_or(self.version(), |start| start.protocol_version);
         let entries = replay.entries.clone();
@@ -218,7 +219,7 @@ impl StudyFolder {
         if standing.state == State::Void || (empty && last.damage.is_empty()) {
             return Ok(last.session + 1);
         }
-        check_standing(request, last.session, standing)?;
+        check_standing(request, last.session, &standing)?;
         Ok(last.session)
     }
 
@@ -289,7 +290,7 @@ fn write_reserve(disk: &dyn Disk, path: &Path) -> io::Result<()> {
 fn check_standing(
     request: &ClaimRequest,
     session: u32,
-    standing: Standing,
+    standing: &Standing,
 ) -> Result<(), StoreError> {
     let participant = request.participant.clone();
     match standing.state {
@@ -301,7 +302,7 @@ fn check_standing(
         state => Err(StoreError::InState {
             participant,
             state,
-            reason: standing.reason,
+            reason: standing.reason.clone(),
         }),
     }
 }

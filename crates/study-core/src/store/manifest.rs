@@ -6,8 +6,8 @@
 use super::atomic;
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
+use super::journal_record::sha256;
 use super::layout;
-use super::line::sha256;
 use crate::outcome::Moment;
 use crate::protocol::fingerprint::Fingerprints;
 use chrono::{DateTime, FixedOffset};

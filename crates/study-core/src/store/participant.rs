@@ -5,84 +5,17 @@
 
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
+use super::held::Held;
 use super::journal::{self, Journal};
-use super::line::{Claim, Record};
-use super::session_folder::Held;
+use super::journal_record::{Claim, Record};
 use super::sessions::SessionData;
-use super::{StudyFolder, atomic, layout};
-use crate::outcome::fold::has_rating;
+use super::tombstone::{ErasedSession, Tombstone};
+use super::{StudyFolder, layout};
 use crate::outcome::{Event, Moment, State};
-use crate::protocol::Seat;
 use chrono::{DateTime, FixedOffset};
-use serde::{Deserialize, Serialize};
-use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use study_base::text::ParticipantId;
-
-/// The version of the tombstone's format.
-const FORMAT: &str = "study-tombstone/1";
-
-/// What is left of a participant whose data were erased: nothing that they gave.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Tombstone {
-    format: String,
-    /// Whose.
-    pub participant: ParticipantId,
-    /// State that was set with it.
-    pub state: State,
-    /// Why.
-    pub reason: String,
-    /// When.
-    pub erased_at: DateTime<FixedOffset>,
-    /// The sessions that were erased.
-    pub sessions: Vec<ErasedSession>,
-}
-
-/// A session that was erased.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ErasedSession {
-    /// Which, from 1.
-    pub session: u32,
-    /// The seat that it had.
-    pub seat: Option<Seat>,
-    /// Records that its journal had.
-    pub lines: u64,
-    /// Hash of the last, as the next line would have had it in `prev`.
-    pub last_hash: String,
-}
-
-impl Tombstone {
-    /// The last session that was erased.
-    pub fn last_session(&self) -> u32 {
-        self.sessions.last().map_or(1, |s| s.session)
-    }
-
-    /// The seat of the last session that had one.
-    pub fn seat(&self) -> Option<Seat> {
-        self.sessions.iter().rev().find_map(|s| s.seat)
-    }
-
-    /// The one in a participant's folder, if there is one.
-    pub(super) fn read(disk: &dyn Disk, folder: &Path) -> Result<Option<Self>, StoreError> {
-        let path = folder.join(layout::TOMBSTONE);
-        let bytes = match disk.read(&path) {
-            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-            read => read.at(&path)?,
-        };
-        let stone: Self = serde_json::from_slice(&bytes).map_err(|e| StoreError::Damaged {
-            path: path.clone(),
-            what: e.to_string(),
-        })?;
-        if stone.format != FORMAT {
-            return Err(StoreError::Newer {
-                path,
-                found: stone.format,
-            });
-        }
-        Ok(Some(stone))
-    }
-}
 
 /// A state that an operator sets.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -186,10 +119,10 @@ impl StudyFolder {
                 near: self.near(&request.participant)?,
             });
         };
-        let started = crate::outcome::fold::start(&last.entries).is_some();
+        let started = last.history.start().is_some();
         match request.state {
             State::Unfinished | State::Done => refused("only a session itself says that"),
-            State::Void if has_rating(&last.entries) => {
+            State::Void if last.history.has_rating() => {
                 refused("a trial has been rated; use dropped-out or excluded")
             }
             State::NoShow if started => refused("the session was started; use dropped-out or void"),
@@ -288,23 +221,9 @@ impl StudyFolder {
                 last_hash: replay.prev,
             });
         }
-        let stone = Tombstone {
-            format: FORMAT.to_owned(),
-            participant: id.clone(),
-            state: request.state,
-            reason: request.reason.clone(),
-            erased_at: at.wall,
-            sessions,
-        };
+        let stone = Tombstone::new(id, request.state, &request.reason, at, sessions);
         let folder = layout::participant(&self.path, id);
-        let path = folder.join(layout::TOMBSTONE);
-        let mut text =
-            serde_json::to_string_pretty(&stone).map_err(|e| StoreError::Unstorable {
-                path: path.clone(),
-                what: e.to_string(),
-            })?;
-        text.push('\n');
-        atomic::replace(self.disk.as_ref(), &path, text.as_bytes())?;
+        stone.write(self.disk.as_ref(), &folder)?;
         let erased = self.remove_sessions(id);
         drop(held);
         erased

@@ -4,8 +4,9 @@
 //! read costs itself and nothing else: every other whole line is used, wherever
 //! it stands. What is wrong is listed in [`Damage`], never passed over.
 
-use super::line::{self, BadLine, Claim, Line, PREFIX, Record};
-use crate::outcome::{Entry, Event};
+use super::journal_record::{self, BadLine, Claim, Line, PREFIX, Record};
+use crate::outcome::Entry;
+use crate::outcome::fold::History;
 use crate::protocol::Seat;
 use serde::de::IgnoredAny;
 use std::fmt;
@@ -95,6 +96,8 @@ pub struct Replay {
     pub claim: Option<Claim>,
     /// Every event that could be read, by sequence number.
     pub entries: Vec<Entry>,
+    /// What these events add up to.
+    pub history: History,
     /// Everything that is wrong, in the order of the files.
     pub damage: Vec<Damage>,
     /// Records that could be read, the claim included.
@@ -110,19 +113,11 @@ pub struct Replay {
 impl Replay {
     /// The seat, from the claim or, where that is damaged, the first event.
     pub fn seat(&self) -> Option<Seat> {
-        match (&self.claim, self.start()) {
+        match (&self.claim, self.history.start()) {
             (Some(claim), _) => claim.seat,
             (None, Some(start)) => Some(start.seat),
             (None, None) => None,
         }
-    }
-
-    /// The first event, if it could be read.
-    pub fn start(&self) -> Option<&crate::outcome::Start> {
-        self.entries.iter().find_map(|e| match &e.event {
-            Event::SessionStarted(start) => Some(start.as_ref()),
-            _ => None,
-        })
     }
 
     /// Whether a later version of the program wrote into it.
@@ -139,7 +134,7 @@ impl Replay {
 pub fn replay(segments: &[Segment]) -> Replay {
     let mut reader = Reader {
         out: Replay {
-            prev: line::NO_LINE.to_owned(),
+            prev: journal_record::NO_LINE.to_owned(),
             ..Replay::default()
         },
         seen: Vec::new(),
@@ -182,7 +177,7 @@ impl Reader {
     }
 
     fn ended_line(&mut self, segment: &Segment, number: usize, bytes: &[u8]) {
-        let why = match line::decode(bytes) {
+        let why = match journal_record::decode(bytes) {
             Ok(line) => return self.record(segment, number, bytes, line),
             Err(why) => why,
         };
@@ -197,7 +192,7 @@ impl Reader {
         }
         if lost > 0 {
             self.lost += lost;
-            self.out.prev = line::hash(bytes);
+            self.out.prev = journal_record::hash(bytes);
         }
     }
 
@@ -222,7 +217,7 @@ impl Reader {
     }
 
     fn record(&mut self, segment: &Segment, number: usize, raw: &[u8], line: Line) {
-        let hash = line::hash(raw);
+        let hash = journal_record::hash(raw);
         let due = self.out.next_seq;
         if line.seq < due {
             // After a failed write the record in doubt is written once more.
@@ -274,6 +269,7 @@ impl Reader {
     fn finish(mut self, segments: &[Segment]) -> Replay {
         self.out.next_seq += self.lost;
         self.out.entries.sort_by_key(|e| e.seq);
+        self.out.history = History::of(&self.out.entries);
         if let (None, Some(first), true) = (&self.out.claim, segments.first(), self.out.records > 0)
         {
             self.damage(&first.clone(), 1, DamageKind::NoClaim);
@@ -311,5 +307,5 @@ fn whole(piece: &[u8]) -> Option<(&[u8], Line)> {
     let mut values = serde_json::Deserializer::from_slice(piece).into_iter::<IgnoredAny>();
     values.next()?.ok()?;
     let raw = &piece[..values.byte_offset()];
-    Some((raw, line::decode(raw).ok()?))
+    Some((raw, journal_record::decode(raw).ok()?))
 }

@@ -1,11 +1,11 @@
 //! Every session of a study, read and not changed.
 
 use super::error::{At as _, StoreError};
-use super::line::Claim;
-use super::participant::Tombstone;
+use super::journal_record::Claim;
 use super::replay::{Damage, replay};
+use super::tombstone::Tombstone;
 use super::{StudyFolder, journal, layout};
-use crate::outcome::fold::{Standing, standing};
+use crate::outcome::fold::{History, Standing};
 use crate::outcome::{Entry, State};
 use crate::protocol::Seat;
 use rayon::prelude::*;
@@ -27,6 +27,8 @@ pub struct SessionData {
     pub seat: Option<Seat>,
     /// Every event that could be read; empty if the data were erased.
     pub entries: Vec<Entry>,
+    /// What these events add up to.
+    pub history: History,
     /// Whatever is wrong with the journal.
     pub damage: Vec<Damage>,
     /// What is left if the data were erased.
@@ -47,7 +49,7 @@ impl SessionData {
                 state: tombstone.state,
                 reason: tombstone.reason.clone(),
             },
-            None => standing(&self.entries),
+            None => self.history.standing().clone(),
         }
     }
 
@@ -107,6 +109,7 @@ impl StudyFolder {
                 path: folder,
                 seat: tombstone.seat(),
                 entries: Vec::new(),
+                history: History::default(),
                 damage: Vec::new(),
                 tombstone: Some(tombstone),
                 claimed: true,
@@ -149,6 +152,7 @@ impl StudyFolder {
             seat: replay.seat(),
             claimed: replay.records > 0,
             path,
+            history: replay.history,
             entries: replay.entries,
             damage: replay.damage,
             tombstone: None,

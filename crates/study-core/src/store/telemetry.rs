@@ -5,8 +5,8 @@
 
 use super::disk::Appender;
 use super::error::{At as _, StoreError};
+use super::held::Held;
 use super::layout;
-use super::session_folder::Held;
 use crate::outcome::Sample;
 use crate::outcome::cell::Row as _;
 use crate::protocol::columns::SampleColumn;

@@ -4,13 +4,13 @@ mod telemetry;
 
 use super::derive::Derived;
 use super::error::{At as _, StoreError, plain};
+use super::journal_record::sha256;
 use super::ledger::SeatKind;
-use super::line::sha256;
 use super::manifest::Manifest;
 use super::replay::DamageKind;
 use super::sessions::SessionData;
 use super::{StudyFolder, layout};
-use crate::outcome::{Event, State, fold};
+use crate::outcome::{Event, State};
 use crate::protocol::{Protocol, Seat};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{ParticipantId, Untrusted};
@@ -222,7 +222,7 @@ impl StudyFolder {
     }
 
     fn verify_start(&self, session: &SessionData, place: &str, found: &mut Vec<Finding>) {
-        let Some(start) = fold::start(&session.entries) else {
+        let Some(start) = session.history.start() else {
             let only_state = |e: &Event| matches!(e, Event::StateSet { .. });
             if !session.entries.iter().all(|e| only_state(&e.event)) {
                 found.push(Finding::wrong(

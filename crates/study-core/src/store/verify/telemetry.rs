@@ -5,7 +5,6 @@
 //! full disk ends one early.
 
 use super::Finding;
-use crate::outcome::Event;
 use crate::store::sessions::SessionData;
 use crate::store::telemetry::header;
 use crate::store::{StoreError, StudyFolder, layout, plain};
@@ -22,16 +21,10 @@ impl StudyFolder {
         found: &mut Vec<Finding>,
     ) -> Result<(), StoreError> {
         let mut counted: BTreeMap<(u32, u32), u64> = BTreeMap::new();
-        for entry in &session.entries {
-            if let Event::PlaybackEnded {
-                trial,
-                attempt,
-                playback,
-                ..
-            } = &entry.event
-                && playback.samples > 0
-            {
-                *counted.entry((*trial, *attempt)).or_default() += playback.samples;
+        for (trial, attempt) in session.history.all_attempts() {
+            let samples = attempt.ended.map_or(0, |e| e.playback.samples);
+            if samples > 0 {
+                *counted.entry((trial, attempt.number)).or_default() += samples;
             }
         }
         let folder = session.path.join(layout::TELEMETRY);

@@ -1,12 +1,12 @@
-//! The course of a session: what comes next, and everything between the trials.
+//! The flow of a session: what comes next, and everything between the trials.
 
 use super::Session;
 use super::phase::{Form, Phase};
 use super::view::MessageKind;
-use crate::outcome::{Author, Event, Moment, Place};
+use crate::outcome::{Author, Event, FormId, Moment};
 use crate::protocol::Entry;
 
-/// Something that is passed once in a session.
+/// A form or message that appears once in a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Step {
     Welcome,
@@ -30,14 +30,12 @@ impl From<MessageKind> for Step {
 }
 
 impl Session {
-    /// Goes to whatever the history says is next.
-    pub(super) fn go_on(&mut self, at: Moment) {
+    /// Enters the phase that is next according to the history.
+    pub(super) fn proceed(&mut self, at: Moment) {
         if self.history.over() {
             self.phase = Phase::End;
         } else if self.consent_is_missing() {
             self.phase = Phase::Consent;
-        } else if self.history.consent == Some(false) {
-            self.refused(at);
         } else if !self.before_trials(at) && !self.trials(at) && !self.after_trials(at) {
             self.record(Event::Finished, at);
             self.phase = Phase::Saving;
@@ -45,7 +43,7 @@ impl Session {
     }
 
     fn consent_is_missing(&self) -> bool {
-        self.protocol.consent.is_some() && self.history.consent.is_none()
+        self.protocol.consent.is_some() && self.history.consent().is_none()
     }
 
     pub(super) fn consent(&mut self, accepted: bool, at: Moment) {
@@ -56,41 +54,36 @@ impl Session {
             document: consent.document.clone(),
             version: consent.version.clone(),
             accepted,
-            by: self.typist(),
+            by: self.entered_by(),
         };
         self.record(consented, at);
-        if accepted {
-            self.phase = Phase::Saving;
-        } else {
-            self.refused(at);
+        if !accepted {
+            self.drop_out("no consent", at);
         }
-    }
-
-    fn refused(&mut self, at: Moment) {
-        self.drop_out("no consent", at);
         self.phase = Phase::Saving;
     }
 
-    /// Who types what the participant says.
-    fn typist(&self) -> Author {
+    /// Who enters the participant's answers.
+    fn entered_by(&self) -> Author {
         match self.protocol.session.entry {
             Entry::Participant => Author::Participant,
             Entry::Experimenter => Author::Experimenter,
         }
     }
 
-    /// Set-up, welcome, intake and instructions, whichever is first to do.
+    /// Enters the first of set-up, welcome, intake and instructions that is not
+    /// completed; returns whether there was one.
     fn before_trials(&mut self, at: Moment) -> bool {
-        let begun = self.history.any_attempt(false) || self.history.instructions_read;
-        let intake_begun = begun || self.history.any_answer(Place::Intake);
-        let setup = !intake_begun && self.open_form(Place::Setup, at);
+        let begun = self.history.any_attempt(false) || self.history.instructions_read();
+        let intake_begun = begun || self.history.any_answer(FormId::Intake);
+        let setup = !intake_begun && self.open_form(FormId::Setup, at);
         if setup || (!intake_begun && self.show_message(MessageKind::Welcome)) {
             return true;
         }
         if begun {
             return false;
         }
-        if self.open_form(Place::Intake, at)
+        if self.open_form(FormId::Intake, at)
             || self.show_message(MessageKind::Instructions)
             || self.show_message(MessageKind::Practice)
         {
@@ -103,13 +96,14 @@ impl Session {
         false
     }
 
-    /// A rating that is owed, a break, or the next trial.
+    /// Enters an unfinished rating, a break or the next trial; returns whether there
+    /// was one.
     fn trials(&mut self, at: Moment) -> bool {
-        if self.history.open.is_some() {
+        if self.history.open().is_some() {
             self.after_playback(at);
             return true;
         }
-        if let Some(began) = self.history.open_break {
+        if let Some(began) = self.history.open_break() {
             let rested_s = (at.wall - began.wall).as_seconds_f64().max(0.0);
             self.phase = Phase::Break {
                 since: at,
@@ -117,8 +111,7 @@ impl Session {
             };
             return true;
         }
-        let breaks = self.protocol.design.breaks;
-        if let Some(after) = breaks.and_then(|b| self.history.break_due(b.every)) {
+        if let Some(after) = self.break_due() {
             self.record(Event::BreakStarted { after }, at);
             self.phase = Phase::Break {
                 since: at,
@@ -136,8 +129,17 @@ impl Session {
         true
     }
 
+    /// The number of closed trials if a break is due now.
+    fn break_due(&self) -> Option<u32> {
+        let every = self.protocol.design.breaks?.every;
+        let closed = self.history.closed(false);
+        let due = every > 0 && closed > 0 && closed.is_multiple_of(every);
+        let more = self.history.next_trial().is_some_and(|t| !t.practice);
+        (due && more && !self.history.had_break(closed)).then_some(closed)
+    }
+
     fn after_trials(&mut self, at: Moment) -> bool {
-        self.open_form(Place::Outro, at)
+        self.open_form(FormId::Outro, at)
     }
 
     fn has_practice(&self) -> bool {
@@ -145,7 +147,7 @@ impl Session {
     }
 
     fn show_message(&mut self, kind: MessageKind) -> bool {
-        let shown = self.behind.contains(&Step::from(kind));
+        let shown = self.passed.contains(&Step::from(kind));
         if !shown && self.message(kind).is_some() {
             self.phase = Phase::Message(kind);
             return true;
@@ -153,7 +155,7 @@ impl Session {
         false
     }
 
-    /// The words of a message, if there are any.
+    /// The text of a message, if it is to be shown.
     pub(super) fn message(&self, kind: MessageKind) -> Option<&str> {
         let text = &self.protocol.text;
         match kind {
@@ -166,18 +168,18 @@ impl Session {
         }
     }
 
-    /// Enter: takes away what lies over the phase, or else goes on in it.
-    pub(super) fn advance_or_uncover(&mut self, at: Moment) {
-        if self.ledger.trouble.is_some() {
+    /// Enter: dismisses the overlay, or else advances the phase.
+    pub(super) fn advance_or_dismiss(&mut self, at: Moment) {
+        if self.saves.trouble.is_some() {
             self.retry_save();
         } else if let Some(since) = self.paused.take_if(|_| self.phase.under_way()) {
             let paused_s = at.seconds_since(&since);
             self.record(Event::Unpaused { paused_s }, at);
-        } else if self.trouble.is_some() && !self.in_form() {
-            if self.can_go_on() {
-                self.trouble = None;
+        } else if self.device_problem.is_some() && !self.in_form() {
+            if self.can_continue() {
+                self.device_problem = None;
             } else {
-                self.say("the device does not answer yet");
+                self.notify("the device does not respond yet");
             }
         } else {
             self.advance(at);
@@ -187,15 +189,15 @@ impl Session {
     fn advance(&mut self, at: Moment) {
         match &self.phase {
             Phase::Message(kind) => {
-                self.behind.insert((*kind).into());
-                self.go_on(at);
+                self.passed.insert((*kind).into());
+                self.proceed(at);
             }
             Phase::Reference { since } => {
                 let shown_s = at.seconds_since(since);
                 if self.reference_wait_s(at) > 0.0 {
-                    self.say("not yet");
+                    self.notify("wait for the prompt to end");
                 } else if self.device_lost {
-                    self.show_trouble_again();
+                    self.show_device_lost();
                 } else {
                     self.begin_attempt(shown_s, at);
                 }
@@ -204,14 +206,14 @@ impl Session {
             Phase::Playing { counts, .. } => {
                 self.finish_playing(counts.unwrap_or_default().strokes, at);
             }
-            Phase::Stopped => self.say("choose: play it again, or rate it"),
+            Phase::Stopped => self.notify("choose: play it again or rate it"),
             Phase::Break { since, rested_s } => {
                 let rested_s = rested_s + at.seconds_since(since);
                 if self.break_wait_s(at) > 0.0 {
-                    self.say("rest a little longer");
+                    self.notify("rest a little longer");
                 } else {
                     self.record(Event::BreakEnded { rested_s }, at);
-                    self.go_on(at);
+                    self.proceed(at);
                 }
             }
             Phase::End => self.leave(false, at),
@@ -219,7 +221,7 @@ impl Session {
         }
     }
 
-    /// Seconds until Enter works on the reference prompt.
+    /// Time until Enter works on the reference prompt, s.
     pub(super) fn reference_wait_s(&self, at: Moment) -> f64 {
         match &self.phase {
             Phase::Reference { since } => {
@@ -230,7 +232,7 @@ impl Session {
         }
     }
 
-    /// Seconds until Enter works in a break.
+    /// Time until Enter works in a break, s.
     pub(super) fn break_wait_s(&self, at: Moment) -> f64 {
         match (&self.phase, self.protocol.design.breaks) {
             (Phase::Break { since, rested_s }, Some(breaks)) => {
@@ -240,9 +242,9 @@ impl Session {
         }
     }
 
-    /// Whether Enter takes device trouble away: the device is back, or is not
+    /// Whether Enter dismisses a device problem: the device is back, or is not
     /// needed now.
-    pub(super) fn can_go_on(&self) -> bool {
+    pub(super) fn can_continue(&self) -> bool {
         !self.device_lost || !matches!(self.phase, Phase::Reference { .. })
     }
 
@@ -250,36 +252,36 @@ impl Session {
         matches!(self.phase, Phase::Form(_))
     }
 
-    /// What lies over the phase, the topmost.
-    pub(super) fn cover(&self) -> Option<Cover> {
-        if self.ledger.trouble.is_some() {
-            Some(Cover::Disk)
+    /// The topmost overlay.
+    pub(super) fn overlay(&self) -> Option<Overlay> {
+        if self.saves.trouble.is_some() {
+            Some(Overlay::Disk)
         } else if self.paused.is_some() {
-            Some(Cover::Pause)
-        } else if self.trouble.is_some() && !self.in_form() {
-            Some(Cover::Device)
+            Some(Overlay::Pause)
+        } else if self.device_problem.is_some() && !self.in_form() {
+            Some(Overlay::Device)
         } else {
             None
         }
     }
 
-    /// Keeps time under a cover out of what is measured: a rating stands still,
-    /// a reference prompt begins anew.
-    pub(super) fn note_cover(&mut self, at: Moment) {
-        match (self.cover(), self.covered) {
-            (Some(_), None) => self.covered = Some(at),
+    /// Excludes the time under an overlay from what is measured: the rating time
+    /// pauses, a reference prompt starts again.
+    pub(super) fn track_overlay(&mut self, at: Moment) {
+        match (self.overlay(), self.overlaid_since) {
+            (Some(_), None) => self.overlaid_since = Some(at),
             (None, Some(since)) => {
-                self.covered = None;
+                self.overlaid_since = None;
                 match &mut self.phase {
                     Phase::Form(Form {
-                        opened, covered_s, ..
+                        opened, overlaid_s, ..
                     }) => {
                         let from = if since.mono_ns > opened.mono_ns {
                             since
                         } else {
                             *opened
                         };
-                        *covered_s += at.seconds_since(&from);
+                        *overlaid_s += at.seconds_since(&from);
                     }
                     Phase::Reference { since } => *since = at,
                     _ => {}
@@ -290,9 +292,9 @@ impl Session {
     }
 }
 
-/// What can lie over the phase.
+/// A screen that hides the phase until it is dismissed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Cover {
+pub(super) enum Overlay {
     Disk,
     Pause,
     Device,

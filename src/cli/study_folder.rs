@@ -6,7 +6,7 @@ use super::{Console, Failure};
 use std::path::Path;
 use study_core::outcome::Moment;
 use study_core::protocol::question::MAX_TEXT_BYTES;
-use study_core::store::{SessionData, StoreError, StudyFolder, layout, plain};
+use study_core::store::{Finding, SessionData, StoreError, StudyFolder, layout, plain};
 
 impl From<StoreError> for Failure {
     fn from(error: StoreError) -> Self {
@@ -82,12 +82,37 @@ pub(super) fn warnings(
     newest: Option<&Loaded>,
 ) -> Result<Vec<String>, Failure> {
     let mut found = study.faults(sessions)?;
-    found.extend(super::verify::frozen_versions(study, newest));
+    found.extend(frozen_versions(study, newest));
     let path = study.path().display();
     Ok(found
         .iter()
         .map(|f| format!("{path}/{}: {}", f.place, f.what))
         .collect())
+}
+
+/// Reads each frozen protocol, but the newest if it is there already, and compares
+/// its fingerprints with study.json.
+pub(super) fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for version in &study.manifest().versions {
+        let number = version.version;
+        let path = layout::protocol(study.path(), number).join(layout::PROTOCOL);
+        let prints = match newest {
+            Some(loaded) if number == study.version() => Ok(loaded.fingerprints.clone()),
+            _ => load::load_frozen(&path).map(|loaded| loaded.fingerprints),
+        };
+        let what = match prints {
+            Ok(prints) if prints == version.fingerprints => continue,
+            Ok(_) => "its fingerprints are not those in study.json".to_owned(),
+            Err(_) => format!("it cannot be read; see `study check {}`", path.display()),
+        };
+        found.push(Finding {
+            wrong: true,
+            place: format!("{}/{number}/{}", layout::PROTOCOLS, layout::PROTOCOL),
+            what,
+        });
+    }
+    found
 }
 
 /// Tells of [`warnings`] on standard error.

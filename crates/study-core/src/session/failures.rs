@@ -1,7 +1,6 @@
-//! How an attempt fails, and what becomes of its trial.
+//! Failed attempts and the new places of their trials.
 
-use super::history::counts;
-use super::phase::{LOAD_WITHIN_S, Phase, STOP_WITHIN_S, Trouble};
+use super::phase::{DeviceProblem, LOAD_WITHIN_S, Phase, STOP_WITHIN_S};
 use super::{Effect, Session};
 use crate::outcome::{Event, Failure, Moment};
 use crate::protocol::Trial;
@@ -9,15 +8,16 @@ use crate::schedule;
 
 impl Session {
     pub(super) fn device_fault(&mut self, what: &str, at: Moment) {
-        self.trouble_with(what, Failure::DeviceFault, at);
+        self.report_problem(what, Failure::DeviceFault, at);
     }
 
     pub(super) fn device_gone(&mut self, what: &str, at: Moment) {
         self.device_lost = true;
-        self.trouble_with(what, Failure::PlaybackLost, at);
+        self.report_problem(what, Failure::PlaybackLost, at);
     }
 
-    /// A device that has gone mute while it plays: nobody waits for it.
+    /// The device sends no more telemetry while it plays: its end will not be
+    /// confirmed.
     pub(super) fn playback_lost(&mut self, what: &str, at: Moment) {
         self.out.push(Effect::Limp);
         if self.phase.armed() {
@@ -28,11 +28,11 @@ impl Session {
     pub(super) fn device_ready(&mut self) {
         self.device_lost = false;
         if self.in_form() {
-            self.trouble = None;
+            self.device_problem = None;
         }
     }
 
-    fn trouble_with(&mut self, what: &str, failure: Failure, at: Moment) {
+    fn report_problem(&mut self, what: &str, failure: Failure, at: Moment) {
         self.out.push(Effect::Limp);
         if !self.phase.under_way() || matches!(self.phase, Phase::End) {
             return;
@@ -40,26 +40,26 @@ impl Session {
         if self.phase.armed() {
             return self.lose_attempt(failure, what, at);
         }
-        self.set_trouble(what, failure);
+        self.set_problem(what, failure);
     }
 
-    /// The attempt under way is lost through nobody's wish.
+    /// Fails the attempt under way because of the device.
     pub(super) fn lose_attempt(&mut self, failure: Failure, what: &str, at: Moment) {
         self.fail(failure, what, at);
-        self.go_on(at);
-        self.set_trouble(what, failure);
+        self.proceed(at);
+        self.set_problem(what, failure);
     }
 
-    fn set_trouble(&mut self, what: &str, failure: Failure) {
-        self.trouble = Some(Trouble {
-            what: self.safe(what),
+    fn set_problem(&mut self, what: &str, failure: Failure) {
+        self.device_problem = Some(DeviceProblem {
+            what: self.sanitized(what),
             fault: failure == Failure::DeviceFault,
         });
     }
 
-    pub(super) fn show_trouble_again(&mut self) {
-        self.trouble = Some(Trouble {
-            what: "the device does not answer".to_owned(),
+    pub(super) fn show_device_lost(&mut self) {
+        self.device_problem = Some(DeviceProblem {
+            what: "the device does not respond".to_owned(),
             fault: false,
         });
     }
@@ -71,7 +71,7 @@ impl Session {
             Phase::Stopping { since, limped, .. } => (since, STOP_WITHIN_S, *limped, "the stop"),
             _ => return,
         };
-        let by_hand = |s: &Self| s.history.open.as_ref().is_some_and(|o| s.by_hand(&o.trial));
+        let by_hand = |s: &Self| s.history.open().is_some_and(|o| s.by_hand(o.trial));
         if at.seconds_since(since) < within_s || by_hand(self) {
             return;
         }
@@ -90,49 +90,53 @@ impl Session {
 
     pub(super) fn mark_bad(&mut self, reason: String, at: Moment) {
         let Some((trial, attempt, number)) = self.markable() else {
-            return self.say("there is no trial to mark");
+            return self.notify("no trial can be marked now");
         };
-        if let Err(why) = super::forms::check_words(&reason) {
-            return self.say(why);
+        if let Err(why) = super::forms::check_free_text(&reason) {
+            return self.notify(why.to_string());
         }
         if self.phase.armed() {
             self.out.push(Effect::Limp);
         }
-        let under_way = self.history.open.is_some();
+        let under_way = self.history.open().is_some();
         self.fail_trial(trial, attempt, Failure::MarkedBad, &reason, at);
         if under_way || matches!(self.phase, Phase::Reference { .. } | Phase::Form(_)) {
-            self.go_on(at);
+            self.proceed(at);
         }
-        self.say(format!("{number} is marked as bad"));
+        self.notify(format!("{number} is marked as bad"));
     }
 
-    /// The trial that could be marked as bad now: the one under way, or else the
-    /// last finished one.
+    /// The trial that can be marked as bad now (the one under way, or else the last
+    /// completed one), its attempt and its title.
     pub(super) fn markable(&self) -> Option<(u32, u32, String)> {
-        if let Some(open) = &self.history.open {
+        if let Some(open) = self.history.open() {
             let practice = open.trial.practice;
             let number = self.history.closed(practice) + 1;
-            return Some((open.trial.trial, open.attempt, title(practice, number)));
+            return Some((
+                open.trial.trial,
+                open.attempt.number,
+                title(practice, number),
+            ));
         }
         let between = matches!(
             self.phase,
             Phase::Reference { .. } | Phase::Break { .. } | Phase::Saving | Phase::Form(_)
         );
-        let trial = self.history.last_done.filter(|_| between)?;
-        let (attempt, number) = self.history.done_as(trial)?;
-        (!self.history.over()).then(|| (trial, attempt, title(false, number)))
+        let trial = self.history.last_done().filter(|_| between)?;
+        let (attempt, done) = self.history.completion(trial)?;
+        (!self.history.over()).then(|| (trial, attempt, title(false, done.number)))
     }
 
-    /// Closes the attempt under way as failed.
+    /// Records the attempt under way as failed.
     pub(super) fn fail(&mut self, failure: Failure, detail: &str, at: Moment) {
-        if let Some(open) = &self.history.open {
-            let (trial, attempt) = (open.trial.trial, open.attempt);
+        if let Some(open) = self.history.open() {
+            let (trial, attempt) = (open.trial.trial, open.attempt.number);
             self.fail_trial(trial, attempt, failure, detail, at);
         }
     }
 
-    /// A failure that was somebody's wish puts the trial first again; any other
-    /// sends it to the end of its block, until it has failed too often.
+    /// After a failure that does not count the trial comes next again. Any other
+    /// moves it to the end of its block, or closes it after `max_attempts`.
     fn fail_trial(
         &mut self,
         number: u32,
@@ -145,18 +149,18 @@ impl Session {
             return;
         };
         let planned = |n: &u32| self.history.planned(*n).cloned();
-        let mut rest: Vec<Trial> = self.history.queue.iter().filter_map(planned).collect();
+        let mut rest: Vec<Trial> = self.history.queue().iter().filter_map(planned).collect();
         rest.retain(|t| t.trial != number);
         let mut constraint_broken = false;
         let mut given_up = false;
-        let queue = if !counts(failure) {
+        let queue = if !failure.counts() {
             rest.insert(0, trial);
             rest
         } else if self.history.failures(number) + 1 >= self.protocol.design.max_attempts {
             given_up = true;
             rest
         } else {
-            let felt = self.history.felt();
+            let felt: Vec<&Trial> = self.history.felt().collect();
             let again = schedule::requeue(&felt, &rest, &trial, &self.protocol.design);
             constraint_broken = again.constraint_broken;
             again.queue
@@ -177,7 +181,7 @@ impl Session {
     }
 }
 
-/// "trial 7", "practice 1": as on the screen, which is not the planned number.
+/// "trial 7", "practice 1". `number` is that on the screen, not the planned one.
 pub(super) fn title(practice: bool, number: u32) -> String {
     let what = if practice { "practice" } else { "trial" };
     format!("{what} {number}")

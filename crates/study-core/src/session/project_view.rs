@@ -1,35 +1,35 @@
-//! What may be seen: the view of a session. Nothing here identifies a realization.
+//! The view of a session. Nothing in it identifies a realization.
 
-use super::course::Cover;
-use super::failing::title;
+use super::failures::title;
+use super::flow::Overlay;
 use super::phase::{Form, Phase};
 use super::view::{Banner, Correctable, DeviceState, Progress, Screen, StatusLine, View};
 use super::{Ending, Session};
-use crate::outcome::{Moment, Place};
+use crate::outcome::{FormId, Moment};
 use crate::protocol::{DeviceKind, Seat};
 use study_base::text::Untrusted;
 
-/// Where the protocol has no words of its own.
+/// Texts for which the protocol has none.
 const REFERENCE: &str = "Ready for the next one?";
 const REST: &str = "Time for a break.";
 const THANKS: &str = "That was all. Thank you.";
 const NO_MORE: &str = "Nothing more is asked. Thank you.";
 
 impl Session {
-    /// What the screen shows at a moment.
+    /// What the screen shows at this moment.
     pub fn view(&self, at: Moment) -> View {
         let screen = self.screen(at);
         View {
             progress: self.progress(),
             line: self.line(at),
-            device: self.plays_now(),
+            device: self.current_device(),
             banner: self.claim.as_ref().and_then(|c| banner(c.seat)),
-            notice: self.notice.clone().or_else(|| self.trouble_in_form()),
+            notice: self.notice.clone().or_else(|| self.problem_in_form()),
             entry: self.protocol.session.entry,
             correctable: self.correctable(),
             can_mark_bad: self
                 .markable()
-                .filter(|_| self.cover().is_none())
+                .filter(|_| self.overlay().is_none())
                 .map(|(_, _, title)| title),
             armed: self.phase.armed(),
             can_advance: can_advance(&screen),
@@ -39,20 +39,20 @@ impl Session {
 
     fn screen(&self, at: Moment) -> Screen {
         let ended = matches!(self.phase, Phase::Over(_));
-        match self.cover().filter(|_| !ended) {
-            Some(Cover::Disk) if self.ledger.retrying => Screen::Saving,
-            Some(Cover::Disk) => Screen::SaveTrouble {
-                what: self.safe(self.ledger.trouble.as_deref().unwrap_or_default()),
+        match self.overlay().filter(|_| !ended) {
+            Some(Overlay::Disk) if self.saves.retrying => Screen::Saving,
+            Some(Overlay::Disk) => Screen::SaveTrouble {
+                what: self.sanitized(self.saves.trouble.as_deref().unwrap_or_default()),
             },
-            Some(Cover::Pause) if self.phase.under_way() => Screen::Paused {
+            Some(Overlay::Pause) if self.phase.under_way() => Screen::Paused {
                 since_s: self.paused.map_or(0.0, |since| at.seconds_since(&since)),
             },
-            Some(Cover::Device) if self.phase.under_way() => Screen::DeviceTrouble {
+            Some(Overlay::Device) if self.phase.under_way() => Screen::DeviceTrouble {
                 what: self
-                    .trouble
+                    .device_problem
                     .as_ref()
                     .map_or(String::new(), |t| t.what.clone()),
-                can_go_on: self.can_go_on(),
+                can_go_on: self.can_continue(),
             },
             _ => self.phase_screen(at),
         }
@@ -60,7 +60,7 @@ impl Session {
 
     fn phase_screen(&self, at: Moment) -> Screen {
         match &self.phase {
-            Phase::Who | Phase::Claiming => Screen::Who {
+            Phase::Identify | Phase::Claiming => Screen::Who {
                 participant: self.participant.clone(),
                 operator: self.operator.clone(),
                 claiming: matches!(self.phase, Phase::Claiming),
@@ -109,32 +109,32 @@ impl Session {
             },
             Phase::Saving | Phase::Leaving { .. } => Screen::Saving,
             Phase::End | Phase::Over(_) => Screen::End {
-                text: self.last_words(),
+                text: self.end_text(),
             },
         }
     }
 
-    fn last_words(&self) -> String {
-        let finished = self.history.finished && !matches!(self.phase, Phase::Over(Ending::Nothing));
+    fn end_text(&self) -> String {
+        let finished =
+            self.history.finished() && !matches!(self.phase, Phase::Over(Ending::Nothing));
         let own = self.protocol.text.end.clone().filter(|_| finished);
         own.unwrap_or_else(|| if finished { THANKS } else { NO_MORE }.to_owned())
     }
 
     fn strokes_needed(&self) -> u32 {
-        let open = self.history.open.as_ref();
-        open.map_or(0, |open| self.minimum_strokes(&open.trial))
+        let open = self.history.open();
+        open.map_or(0, |open| self.minimum_strokes(open.trial))
     }
 
-    /// Counted by trials closed, so that one that came back looks like any other.
+    /// Counts closed trials, so that a repeated trial looks like any other.
     fn progress(&self) -> Option<Progress> {
-        let rating =
-            matches!(&self.phase, Phase::Form(f) if matches!(f.place, Place::Trial { .. }));
+        let rating = matches!(&self.phase, Phase::Form(f) if matches!(f.id, FormId::Trial { .. }));
         let prompt = matches!(self.phase, Phase::Reference { .. } | Phase::Stopped);
         if !(rating || prompt || self.phase.armed()) {
             return None;
         }
-        let trial = match &self.history.open {
-            Some(open) => &open.trial,
+        let trial = match self.history.open() {
+            Some(open) => open.trial,
             None => self.history.next_trial()?,
         };
         let total = self.history.planned_total(trial.practice);
@@ -151,9 +151,13 @@ impl Session {
             operator: self.operator.clone(),
             device: self.device_state(),
             elapsed_s: self.opened.map_or(0.0, |opened| at.seconds_since(&opened)),
-            trials_saved: self.history.answered(|trial| self.ledger.has_trial(trial)),
-            trials_answered: self.history.answered(|_| true),
-            all_saved: self.ledger.all_saved(),
+            trials_saved: count(
+                self.history
+                    .completed()
+                    .filter(|t| self.saves.has_trial(*t)),
+            ),
+            trials_answered: count(self.history.completed()),
+            all_saved: self.saves.all_saved(),
         }
     }
 
@@ -164,14 +168,16 @@ impl Session {
         if self.device_lost {
             return DeviceState::Lost;
         }
-        if self.trouble.as_ref().is_some_and(|t| t.fault) {
+        if self.device_problem.as_ref().is_some_and(|t| t.fault) {
             return DeviceState::Fault;
         }
         let none = self.claim.as_ref().map(|c| c.device_kind) == Some(DeviceKind::Manual);
         match self.phase {
-            Phase::Playing { .. } if self.plays_now() == DeviceKind::Manual => DeviceState::Felt,
+            Phase::Playing { .. } if self.current_device() == DeviceKind::Manual => {
+                DeviceState::Felt
+            }
             _ if none => DeviceState::ByHand,
-            _ if self.plays_now() == DeviceKind::Manual => DeviceState::Limp,
+            _ if self.current_device() == DeviceKind::Manual => DeviceState::Limp,
             Phase::Loading { .. } => DeviceState::Loading,
             Phase::Ready { .. } => DeviceState::Ready,
             Phase::Playing { counts, .. } => DeviceState::Running(counts),
@@ -180,35 +186,33 @@ impl Session {
         }
     }
 
-    /// What gives the force in the trial under way; between trials, in the study.
-    fn plays_now(&self) -> DeviceKind {
+    /// The device of the trial under way; between trials, that of the study.
+    fn current_device(&self) -> DeviceKind {
         let under_way = self
             .history
-            .open
-            .as_ref()
+            .open()
             .filter(|_| self.phase.armed() || matches!(self.phase, Phase::Stopped));
         let own = under_way.and_then(|open| self.protocol.model(&open.trial.model)?.device);
         let claimed = self.claim.as_ref().map(|c| c.device_kind);
         own.or(claimed).unwrap_or(self.protocol.device.kind)
     }
 
-    /// A form is not covered by the device's trouble: it is told below it, as long
-    /// as it lasts.
-    fn trouble_in_form(&self) -> Option<String> {
-        let trouble = self.trouble.as_ref().filter(|_| self.in_form())?;
-        Some(format!("device: {}", trouble.what))
+    /// A device problem does not hide a form; it is shown as a notice while it lasts.
+    fn problem_in_form(&self) -> Option<String> {
+        let problem = self.device_problem.as_ref().filter(|_| self.in_form())?;
+        Some(format!("device: {}", problem.what))
     }
 
     fn correctable(&self) -> Vec<Correctable> {
-        let given = self.history.answers.iter().rev();
+        let given = self.history.answers().iter().rev();
         given
-            .filter(|g| self.history.is_current(g.place))
+            .filter(|g| self.history.is_current(g.form))
             .filter_map(|g| {
-                let asked = self.questions(g.place).iter();
+                let asked = self.questions(g.form).iter();
                 let question = asked.clone().find(|q| q.id == g.question)?.clone();
                 Some(Correctable {
-                    place: g.place,
-                    title: self.place_title(g.place),
+                    form: g.form,
+                    title: self.form_title(g.form),
                     question,
                     answer: g.answer.clone(),
                 })
@@ -216,27 +220,28 @@ impl Session {
             .collect()
     }
 
-    fn place_title(&self, place: Place) -> String {
-        match place {
-            Place::Setup => "set-up".to_owned(),
-            Place::Intake => "intake".to_owned(),
-            Place::Outro => "closing questions".to_owned(),
-            Place::Trial { trial, .. } => {
+    fn form_title(&self, form: FormId) -> String {
+        match form {
+            FormId::Setup => "set-up".to_owned(),
+            FormId::Intake => "intake".to_owned(),
+            FormId::Outro => "closing questions".to_owned(),
+            FormId::Trial { trial, .. } => {
                 let practice = self.history.planned(trial).is_some_and(|t| t.practice);
                 let now = || self.history.closed(practice) + 1;
-                let number = self.history.done_as(trial).map_or_else(now, |(_, n)| n);
+                let done = self.history.completion(trial);
+                let number = done.map_or_else(now, |(_, done)| done.number);
                 title(practice, number)
             }
         }
     }
 
-    /// Foreign words, blinded and harmless to a terminal.
-    pub(super) fn safe(&self, foreign: &str) -> String {
-        Untrusted(&self.blind(foreign)).to_string()
+    /// Text of a device or store, blinded and safe to print on a terminal.
+    pub(super) fn sanitized(&self, foreign: &str) -> String {
+        Untrusted(&self.blinded(foreign)).to_string()
     }
 
-    /// Foreign words (a device's, a store's) without what names a realization.
-    pub(super) fn blind(&self, foreign: &str) -> String {
+    /// The text with every word that names a realization replaced by "…".
+    pub(super) fn blinded(&self, foreign: &str) -> String {
         let mut blinded = String::with_capacity(foreign.len());
         let in_name = |c: char| c.is_ascii_alphanumeric() || "._-/\\".contains(c);
         let mut rest = foreign;
@@ -269,15 +274,22 @@ impl Session {
     }
 }
 
+fn count<T>(items: impl Iterator<Item = T>) -> u32 {
+    number(items.count())
+}
+
+fn number(n: usize) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
+}
+
 fn form_screen(form: &Form) -> Screen {
     let page = form.total - form.pages.len() + 1;
-    let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     Screen::Form {
-        place: form.place,
+        form: form.id,
         questions: form.pages.first().cloned().unwrap_or_default(),
         page: number(page),
         pages: number(form.total),
-        to_experimenter: form.place == Place::Setup,
+        to_experimenter: form.id == FormId::Setup,
     }
 }
 
