@@ -175,7 +175,7 @@ fn no_pairs(a: &study_core::analyze::Analysis, first: &str, second: &str) -> Str
 fn no_equivalence(a: &study_core::analyze::Analysis, contrast: &str) -> Option<String> {
     let why = a.values.reason(&format!("{contrast}/p_tost"))?;
     let margin = a.values.number(&format!("{contrast}/margin"));
-    let changed = a.changed(study_core::analyze::Stated::Margin);
+    let changed = a.changed(study_core::analyze::PreregisteredRule::Margin);
     Some(match margin {
         None if changed => {
             "the margin of equivalence was taken back after the study began: see Deviations"

@@ -105,9 +105,8 @@ const IMPORTS: [(&str, &[&str]); 21] = [
 ];
 
 /// Circles that stand and have to go: this list only gets shorter.
-const KNOWN_CIRCLES: [&str; 4] = [
+const KNOWN_CIRCLES: [&str; 3] = [
     "study/report/html: circle of answers, methods, prose",
-    "study-core/analyze: circle of exclude, select",
     "study-haptics/identify: circle of constrained, ewls, lanes, method, resample",
     "study-haptics/recording: circle of motion, swapped",
 ];

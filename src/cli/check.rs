@@ -1,4 +1,4 @@
-//! `study check`: every fault of a protocol and of what it names.
+//! `study check`: every fault of a protocol and of the files that it names.
 
 use super::{Console, Failure, load};
 use serde::Serialize;
@@ -33,7 +33,7 @@ struct Report<'a> {
     certificates: Vec<Certified<'a>>,
 }
 
-/// The certificate of one model. A margin that nothing can mend is null.
+/// The certificate of one realization. A margin that is not finite is null.
 #[derive(Debug, Serialize)]
 struct Certified<'a> {
     model: &'a str,
@@ -64,7 +64,7 @@ struct Item<'a> {
     hint: Option<&'a str>,
 }
 
-/// Does it.
+/// Runs `study check`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let (loaded, findings) = load::examine(&args.protocol);
     let count = |severity| findings.iter().map(|f| f.count(severity)).sum::<usize>();
@@ -87,7 +87,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let document = serde_json::to_string_pretty(&report)
             .map_err(|e| Failure::new(super::Kind::Bug, format!("the report: {e}")))?;
         console.out(document + "\n")?;
-        // everything has been said on standard output
+        // standard output holds the whole report
         return match loaded {
             Some(_) => Ok(()),
             None => Err(Failure::faults(Vec::new())),
@@ -113,11 +113,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         plural(trials, "trial"),
         plural(warnings, "warning"),
     ))?;
-    console.out(what_is_felt(&loaded))
+    console.out(certificates(&loaded))
 }
 
-/// The tables that a device plays: what is mounted by hand has none, whatever file
-/// the protocol names.
+/// The tables that a device plays. A sample mounted by hand has none, even if the
+/// protocol names a file.
 fn played(loaded: &load::Loaded) -> impl Iterator<Item = (&ModelId, &Realization)> {
     let protocol = &loaded.protocol;
     loaded.models.iter().filter(|(id, _)| {
@@ -152,9 +152,9 @@ fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
         .collect()
 }
 
-/// A line for each certificate of a table that is played, what those that fail mean,
-/// and what is not played but mounted.
-fn what_is_felt(loaded: &load::Loaded) -> String {
+/// A line for each table that is played, with its certificate; notes about tables
+/// that fail theirs and about samples mounted by hand.
+fn certificates(loaded: &load::Loaded) -> String {
     let mut out = String::new();
     let (mut failing, mut tables) = (0, 0);
     for (id, realization) in played(loaded) {
@@ -166,7 +166,7 @@ fn what_is_felt(loaded: &load::Loaded) -> String {
     }
     if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {
         out += &format!(
-            "note: {failing} of {} fail their certificate; `uncertified` has them played up to {} N: {}\n",
+            "note: {failing} of {} fail their certificate; `uncertified` permits playback at up to {} N: {}\n",
             plural(tables, "table"),
             permission.force_n.get(),
             Untrusted(&permission.reason),

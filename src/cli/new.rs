@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
 use study_core::protocol::file;
 
-/// What a new study starts from: three realizations of the paper's.
+/// The files of a new study: a commented protocol and three of the paper's realizations.
 const PROTOCOL: &str = include_str!("new/protocol.toml");
 const MODELS: [(&str, &str); 3] = [
     (
@@ -27,14 +27,14 @@ const MODELS: [(&str, &str); 3] = [
 /// Arguments of `study new`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A folder that is not there yet, or empty
+    /// The folder to create; it must not exist or be empty
     dir: PathBuf,
-    /// Replicate the study of a results folder
+    /// Start a replication of the study in this results folder
     #[arg(long, value_name = "RESULTS")]
     from: Option<PathBuf>,
 }
 
-/// Does it.
+/// Runs `study new`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let dir = &args.dir;
     refuse_unless_empty(dir)?;
@@ -68,8 +68,8 @@ fn starter(dir: &Path, seed: u64) -> Result<Files, Failure> {
     Ok(files)
 }
 
-/// The newest frozen protocol of a study, with an id and a seed of its own: under
-/// the old ones it would be the same study.
+/// The newest frozen protocol of a study, with a new id and a new seed, which make it
+/// another study.
 fn replication(results: &Path, today: &str, seed: u64) -> Result<Files, Failure> {
     let (folder, version) = frozen(results)?;
     let loaded = load::load_frozen(&folder)?;
@@ -153,7 +153,7 @@ fn with_values(text: &str, id: &str, seed: u64) -> Result<String, Failure> {
             .ok_or_else(|| Failure::input(format!("the protocol has no `{key}`")))?;
         edits.push((span.clone(), value));
     }
-    // from the end, so that the earlier span stays where it is
+    // from the end, so that the earlier span stays valid
     edits.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
     let mut text = text.to_owned();
     for (span, value) in edits {

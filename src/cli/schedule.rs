@@ -9,10 +9,10 @@ use study_core::protocol::{FileOrders, Protocol, Seat, Trial};
 use study_core::schedule::{Planner, ScheduleError};
 use study_core::store::{StudyFolder, layout};
 
-/// More rows than this at once are taken for a slip of the finger.
+/// Most rows that are shown at once; more are probably a typing error.
 const MAX_ROWS: u32 = 100_000;
 
-/// Rows of CSV that are written at once.
+/// Rows of the schedule that are written to the CSV at once.
 const CHUNK: usize = 1000;
 
 /// Arguments of `study schedule`.
@@ -26,15 +26,15 @@ pub(super) struct Args {
     /// Print row,trial,block,position,model,repetition,practice as CSV
     #[arg(long)]
     csv: bool,
-    /// Where results are; the orders of a started study are not shown
+    /// Folder of the results; the orders of a started study are not shown
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
-    /// Show orders of a started study all the same; the reason is logged in it
+    /// Show the orders of a started study; the reason is logged in its folder
     #[arg(long, value_name = "REASON")]
     reveal: Option<String>,
 }
 
-/// Does it.
+/// Runs `study schedule`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = super::load::load(&args.protocol)?;
     let protocol = &loaded.protocol;
@@ -50,8 +50,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     show(protocol, loaded.orders.as_ref(), rows, args.csv, console)
 }
 
-/// An order that is seen could steer a session: shown only with a reason, which is
-/// on disk before the order is on the screen.
+/// Refuses to show the orders of a started study without a reason: an experimenter
+/// who knows an order could influence a session. The reason is on disk before the
+/// order is on the screen.
 fn reveal(
     study: &StudyFolder,
     rows: &RangeInclusive<u32>,
@@ -61,11 +62,11 @@ fn reveal(
     let folder = study.path().display();
     let Some(reason) = reason else {
         return Err(Failure::results(format!(
-            "the study has started in {folder}: an order that is seen could steer a session"
+            "the study has started in {folder}: an experimenter who knows an order could influence a session"
         ))
         .hint(
             "`study status` shows who is done and which row is next, without any order; \
-             --reveal REASON shows it all the same and logs that",
+             --reveal REASON shows the order and logs that",
         ));
     };
     let reason = study_folder::reason(reason)?;
@@ -161,25 +162,36 @@ fn csv(header: bool, plans: &[(u32, Vec<Trial>)]) -> Result<String, Failure> {
     String::from_utf8(bytes).map_err(|e| broken(&e))
 }
 
+/// Why a text is not a range of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(super) enum RowsError {
+    #[error("rows count from 1")]
+    Zero,
+    #[error("there are at most {} rows", u32::MAX)]
+    TooLarge,
+    #[error("give a row such as 7 or a range such as 1-40")]
+    NoNumber,
+    #[error("the range is reversed: did you mean {0}-{1}?")]
+    Reversed(u32, u32),
+}
+
 /// Reads `7` or `1-40`.
-pub(super) fn parse_rows(given: &str) -> Result<RangeInclusive<u32>, String> {
+pub(super) fn parse_rows(given: &str) -> Result<RangeInclusive<u32>, RowsError> {
     let number = |text: &str| {
         let text = text.trim();
         match text.parse::<u32>() {
-            Ok(0) => Err("rows count from 1".to_owned()),
+            Ok(0) => Err(RowsError::Zero),
             Ok(row) => Ok(row),
             Err(_) if !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit()) => {
-                Err(format!("there are at most {} rows", u32::MAX))
+                Err(RowsError::TooLarge)
             }
-            Err(_) => Err("give a row such as 7 or a range such as 1-40".to_owned()),
+            Err(_) => Err(RowsError::NoNumber),
         }
     };
-    let (first, last) = match given.split_once('-') {
-        Some((first, last)) => (number(first)?, number(last)?),
-        None => (number(given)?, number(given)?),
-    };
+    let (first, last) = given.split_once('-').unwrap_or((given, given));
+    let (first, last) = (number(first)?, number(last)?);
     if first > last {
-        return Err(format!("the range goes down: did you mean {last}-{first}?"));
+        return Err(RowsError::Reversed(last, first));
     }
     Ok(first..=last)
 }
@@ -268,8 +280,8 @@ mod tests {
             ("1..4", "1-40"),
             ("all", "1-40"),
         ] {
-            let said = parse_rows(bad).unwrap_err();
-            assert!(said.contains(says), "{bad}: {said}");
+            let error = parse_rows(bad).unwrap_err().to_string();
+            assert!(error.contains(says), "{bad}: {error}");
         }
     }
 

@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use study::report::Source;
 use study::report::figures::{self, Trace};
 use study::report::html::{Details, document};
-use study_core::analyze::{Analysis, Deviation, Exclusion, Rules, Said, Stated, analyze};
+use study_core::analyze::{
+    Analysis, Deviation, Exclusion, PreregisteredRule, Rules, Said, analyze,
+};
 use study_core::outcome::ratings::Ratings;
 
 const EVIL: &str = "</p><script>alert(1)</script>\"' onerror=\u{202e}x]]>&amp;\u{0}";
@@ -155,7 +157,7 @@ fn what_was_stated_beforehand_and_what_was_changed_is_told() {
         exclude: vec![Exclusion::ConstantRater, Exclusion::Inconsistent(1.0)],
         deviations: vec![Deviation {
             text: "protocol 2 of 2026-01-02, because \"typo\": vaf: a → b".to_owned(),
-            of: &[],
+            affects: &[],
         }],
         ..Rules::default()
     };
@@ -163,7 +165,7 @@ fn what_was_stated_beforehand_and_what_was_changed_is_told() {
     let row = "<td><code>constant-rater</code></td>\
                <td class=\"text\">participants whose ratings never change</td><td>3</td><td>1</td>";
     assert!(page.contains(row), "{page}");
-    assert!(page.contains("the design has no hidden repeat"));
+    assert!(page.contains("the design has no hidden duplicate"));
     assert!(page.contains("Deviations from what was stated beforehand"));
     assert!(page.contains("because &quot;typo&quot;: vaf: a → b"));
     let neither = report(&analyze(&ratings, &Rules::default()), &[]);
@@ -209,7 +211,7 @@ fn hostile_names_and_comments_stay_text() {
     };
     a.deviations.push(Deviation {
         text: EVIL.to_owned(),
-        of: &[],
+        affects: &[],
     });
     let figures = figures::all(&a, &[trace]);
     assert!(figures.iter().any(|f| f.name == "telemetry"));
@@ -291,11 +293,11 @@ fn what_was_changed_after_the_study_began_is_not_called_stated_beforehand() {
         deviations: vec![
             Deviation {
                 text: format!("{because}exclusion rules: none → constant-rater"),
-                of: &[Stated::Exclusions],
+                affects: &[PreregisteredRule::Exclusions],
             },
             Deviation {
                 text: format!("{because}realistic_from: 5 → 4"),
-                of: &[Stated::RealisticFrom],
+                affects: &[PreregisteredRule::RealisticFrom],
             },
         ],
         ..Rules::default()

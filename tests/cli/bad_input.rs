@@ -47,7 +47,7 @@ fn an_unknown_key_is_shown_with_what_was_probably_meant() {
 fn a_limit_that_is_no_number_is_no_limit() {
     let shown = fault("force_n = 12.0", "force_n = nan");
     assert!(
-        shown.contains("force_n") && shown.contains("above zero"),
+        shown.contains("force_n") && shown.contains("above 0"),
         "{shown}"
     );
 }
@@ -107,7 +107,7 @@ fn arguments_are_looked_at_before_the_terminal() {
     };
     let (terminal, err) = run(&["--participant", "../../x"]);
     assert!(
-        !terminal && err.contains("`../../x` is no participant id"),
+        !terminal && err.contains("`../../x` is not a participant id"),
         "{err}"
     );
     let long = "o".repeat(65);
@@ -163,7 +163,7 @@ fn an_id_that_leaves_the_folder_is_refused_on_the_screen_and_on_the_command_line
     let mut terminal = Terminal::start(&["run", &path], &inner, 24, 80);
     terminal.wait_for("Enter: begin");
     terminal.keys("../../x\tlw\r");
-    terminal.wait_for("no participant id");
+    terminal.wait_for("is not a participant");
     terminal.keys("\u{3}");
     terminal.wait_for("Are you sure?");
     terminal.keys("y");

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod protocol_check;
+mod protocol_docs;
 mod protocol_schema;
 #[path = "../support/mod.rs"]
 mod support;

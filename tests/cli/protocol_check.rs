@@ -77,7 +77,7 @@ fn the_shipped_protocols_are_in_order() {
     assert!(out.contains("lambda-0.9995: FAIL: least m -"), "{out}");
     assert!(
         out.contains(
-            "5 of 5 tables fail their certificate; `uncertified` has them played up to 9 N"
+            "5 of 5 tables fail their certificate; `uncertified` permits playback at up to 9 N"
         ),
         "{out}"
     );

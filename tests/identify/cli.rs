@@ -161,7 +161,7 @@ fn ids_that_collide_or_leave_the_folder_are_refused() {
         );
     };
     with("same", "two cells would be called same");
-    with("../{dx}", "is no model id");
+    with("../{dx}", "is not a model id");
     assert_eq!(fs::read_dir(out).unwrap().count(), 0);
 }
 

@@ -145,7 +145,7 @@ fn participant_sets_a_state_and_refuses_what_is_no_id() {
     set("../../x", "excluded")
         .assert()
         .code(1)
-        .stderr(predicate::str::contains("is no participant id"));
+        .stderr(predicate::str::contains("is not a participant id"));
     set("P03", "excluded")
         .assert()
         .code(1)

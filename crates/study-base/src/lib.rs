@@ -1,5 +1,15 @@
-//! What every crate of `study` needs: untrusted text and identifiers, limits,
-//! diagnostics with line and caret, and reproducible random streams.
+//! Foundations of `study`, without any knowledge of studies.
+//!
+//! * [`text`]: text of unknown origin, safe to print ([`text::Untrusted`]), and
+//!   identifiers that are safe in file names.
+//! * [`limits`]: bounds that are finite and positive by construction.
+//! * [`diagnostic`]: faults of a file with line, caret and suggestion, and a TOML
+//!   reader that reports every fault rather than the first.
+//! * [`rng`]: random streams that are named, independent and the same on every
+//!   machine.
+//!
+//! Nothing here opens a file or knows the time. Begin with
+//! `examples/streams.rs`.
 
 pub mod diagnostic;
 pub mod limits;

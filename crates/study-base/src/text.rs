@@ -1,16 +1,16 @@
 //! Untrusted text and the identifiers that may stand in a path.
 //!
-//! Text from protocols, comments, devices and foreign files is data. It is
-//! stored as typed; on its way to a terminal or a message it passes through
-//! [`Untrusted`], whose `Display` escapes whatever could steer the terminal or
-//! disguise what is written. Identifiers are checked once, at the door, and are
-//! safe as part of a file name from then on.
+//! Text from protocols, comments, devices and other programs' files is data. It is
+//! stored as typed. Where it is printed, it passes through [`Untrusted`], whose
+//! `Display` escapes every character that could control the terminal or disguise
+//! the text. Identifiers are checked once, when they are read, and are then safe as
+//! part of a file name.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Borrowed text whose `Display` is safe to print on one line: control, C1, line
-/// separator, bidirectional formatting and zero-width characters come out as `\u{…}`.
+/// Borrowed text whose `Display` is safe to print on one line: characters that
+/// [`is_unsafe`] are printed as `\u{…}`, line breaks and tabs as `\n`, `\r`, `\t`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Untrusted<'a>(pub &'a str);
 
@@ -33,14 +33,15 @@ impl fmt::Display for Untrusted<'_> {
     }
 }
 
-/// "1 session", "2 sessions": a number with the word for what is counted.
+/// A number and the noun for it: "1 session", "2 sessions".
 pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
-/// Whether a character can steer a terminal or hide the order of what is read:
-/// C0, DEL, C1, line and paragraph separators, bidirectional controls, tags, and
-/// what has no width but for the joiners, which emoji and Indic scripts need.
+/// Whether a character can control a terminal or disguise the text around it: C0,
+/// DEL, C1, line and paragraph separators, bidirectional controls, interlinear
+/// annotations, tags and invisible characters. The zero-width joiner and non-joiner
+/// are safe: emoji and several scripts need them.
 pub fn is_unsafe(c: char) -> bool {
     matches!(c,
         '\u{0}'..='\u{1f}'
@@ -56,11 +57,11 @@ pub fn is_unsafe(c: char) -> bool {
         | '\u{e0000}'..='\u{e007f}')
 }
 
-/// Why a string is no identifier.
+/// A string that is not an identifier.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{}` is no {what}: use 1 to 32 of {allowed}", Untrusted(.given))]
+#[error("`{}` is not a {what}: use 1 to 32 of {allowed}", Untrusted(.given))]
 pub struct BadId {
-    /// What was given.
+    /// The string.
     pub given: String,
     what: &'static str,
     allowed: &'static str,
@@ -110,8 +111,8 @@ macro_rules! identifier {
                 &self.0
             }
 
-            /// Whether two identifiers would collide on a file system that
-            /// does not tell upper from lower case.
+            /// Whether two identifiers are equal on a case-insensitive file
+            /// system.
             pub fn collides_with(&self, other: &Self) -> bool {
                 self.0.eq_ignore_ascii_case(&other.0)
             }
@@ -150,7 +151,7 @@ identifier!(
     ParticipantId, "participant id", "A-Z a-z 0-9 _ -", &['_', '-']
 );
 identifier!(
-    /// A realization's id: `[A-Za-z0-9._-]{1,32}`. Names a file, with its ending.
+    /// A realization's id: `[A-Za-z0-9._-]{1,32}`. Names a file, without its extension.
     ModelId, "model id", "A-Z a-z 0-9 . _ -", &['.', '_', '-']
 );
 identifier!(
@@ -163,10 +164,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn escape_sequences_never_reach_the_terminal() {
+    fn escape_sequences_do_not_reach_the_terminal() {
         let hostile = "a\u{1b}[2Jb\u{9b}c\u{202e}d\n=1";
         let shown = Untrusted(hostile).to_string();
         assert_eq!(shown, "a\\u{1b}[2Jb\\u{9b}c\\u{202e}d\\n=1");
+    }
+
+    #[test]
+    fn every_unsafe_character_is_escaped() {
+        // One range a line, with its first and last character.
+        for (first, last) in [
+            ('\u{0}', '\u{1f}'),
+            ('\u{7f}', '\u{9f}'),
+            ('\u{61c}', '\u{61c}'), // Arabic letter mark
+            ('\u{200b}', '\u{200b}'),
+            ('\u{200e}', '\u{200f}'), // left-to-right and right-to-left marks
+            ('\u{2028}', '\u{202e}'), // separators, embeddings and overrides
+            ('\u{2060}', '\u{2060}'),
+            ('\u{2066}', '\u{2069}'), // isolates
+            ('\u{feff}', '\u{feff}'),
+            ('\u{fff9}', '\u{fffb}'),   // interlinear annotation
+            ('\u{e0000}', '\u{e007f}'), // tags
+        ] {
+            for c in first..=last {
+                let code = format!("\\u{{{:x}}}", u32::from(c));
+                let shown = Untrusted(&format!("a{c}b")).to_string();
+                let short = matches!(c, '\n' | '\r' | '\t').then(|| format!("{c:?}"));
+                let expected = short.map_or(code, |quoted| quoted.trim_matches('\'').to_owned());
+                assert_eq!(shown, format!("a{expected}b"));
+            }
+        }
     }
 
     #[test]
@@ -177,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_look_alike_are_told_apart_and_joiners_stay() {
+    fn zero_width_characters_are_escaped_and_joiners_are_not() {
         assert_eq!(Untrusted("P\u{200b}1").to_string(), "P\\u{200b}1");
         assert_eq!(
             Untrusted("\u{feff}P\u{2060}1").to_string(),
@@ -209,11 +236,11 @@ mod tests {
     }
 
     #[test]
-    fn the_message_says_what_is_allowed() {
+    fn the_error_says_which_characters_are_allowed() {
         let message = ParticipantId::new("../../x").unwrap_err().to_string();
         assert_eq!(
             message,
-            "`../../x` is no participant id: use 1 to 32 of A-Z a-z 0-9 _ -"
+            "`../../x` is not a participant id: use 1 to 32 of A-Z a-z 0-9 _ -"
         );
     }
 }

@@ -29,8 +29,9 @@ mod vaf;
 mod values;
 mod warnings;
 
-pub use deviation::{Deviation, Stated, deviations};
-pub use exclude::{Applied, Exclusion};
+pub use crate::protocol::Exclusion;
+pub use deviation::{Deviation, PreregisteredRule, deviations};
+pub use exclude::Applied;
 pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
 pub use warnings::Warning;
@@ -109,9 +110,7 @@ impl Rules {
             include,
             seed: protocol.study.seed,
             primary,
-            exclude: (protocol.analysis.exclude.iter())
-                .filter_map(Exclusion::of)
-                .collect(),
+            exclude: protocol.analysis.exclude.clone(),
             equivalence_margin: protocol.analysis.equivalence_margin.filter(|_| primary),
             deviations: Vec::new(),
         }
@@ -206,8 +205,8 @@ impl Analysis {
 
     /// Whether a rule was changed after the study began: what was, is not called
     /// stated beforehand.
-    pub fn changed(&self, rule: Stated) -> bool {
-        self.deviations.iter().any(|d| d.of.contains(&rule))
+    pub fn changed(&self, rule: PreregisteredRule) -> bool {
+        self.deviations.iter().any(|d| d.affects.contains(&rule))
     }
 
     /// The row's realization, empty if there is none. Untrusted.

@@ -1,27 +1,34 @@
-//! What the study file says, checked for itself.
+//! The study file, checked for itself.
 //!
-//! A [`Protocol`] is the content of a `protocol.toml`: plain data, complete, and
-//! true in itself (ids do not collide, scales go up, limits are limits). It knows
-//! nothing of the models' contents; whoever opens files joins the two.
-//! Reading is in [`mod@file`], what can be doubted about a readable file in [`check`].
+//! A [`Protocol`] is the content of a `protocol.toml` as plain data. It is complete
+//! and consistent: ids do not collide, scales go up, limits are finite and
+//! positive. It holds the names of model files, not their contents; `study`'s
+//! `load` joins the two. [`mod@file`] reads it, [`check`] warns of doubtful designs,
+//! [`keys`] declares what a file can hold, and `docs/protocol.md` documents every
+//! key.
 
 pub mod check;
 pub mod columns;
 pub mod example;
+mod exclusion;
 pub mod file;
 pub mod fingerprint;
+pub mod keys;
 pub mod plan;
 pub mod question;
+pub mod schema;
 
+pub use exclusion::Exclusion;
 pub use plan::{Seat, Trial};
-pub use question::{Answer, Question, QuestionKind};
+pub use question::{Answer, AnswerError, Question, QuestionKind};
 
-use serde::{Deserialize, Serialize};
+use keys::words;
+use serde::Serialize;
 use std::collections::BTreeMap;
 use study_base::limits::{Limit, Limits};
 use study_base::text::{ModelId, QuestionId};
 
-/// The version of the file format that this program writes and reads.
+/// The file format, with its version, that this program reads.
 pub const FORMAT: &str = "study-protocol/1";
 
 /// A whole study file.
@@ -55,26 +62,26 @@ pub struct Protocol {
     pub analysis: AnalysisRules,
 }
 
-/// `[study]`: what the study is.
+/// `[study]`: identity and provenance of the study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Study {
-    /// Names the results folder: `[a-z0-9-]`, 1 to 64 characters.
+    /// The name of the results folder: `[a-z0-9-]`, 1 to 64 characters.
     pub id: String,
-    /// For people.
+    /// The title for people.
     pub title: String,
-    /// The whole study's randomness.
+    /// The seed of all randomness of the study.
     pub seed: u64,
-    /// Who made it.
+    /// Authors of the study.
     pub authors: Vec<String>,
-    /// Of the data.
+    /// License of the data.
     pub license: Option<String>,
-    /// Approval number or statement.
+    /// Ethics approval: its number or a statement.
     pub ethics: Option<String>,
-    /// Whom to ask.
+    /// Whom to contact about the study.
     pub contact: Option<String>,
-    /// Who paid.
+    /// Who funded the study.
     pub funding: Option<String>,
-    /// Of the study or its paper.
+    /// DOI of the study or its paper.
     pub doi: Option<String>,
 }
 
@@ -91,35 +98,35 @@ pub struct Text {
     pub rest: Option<String>,
     /// Last screen.
     pub end: Option<String>,
-    /// BCP 47 tag of the texts.
+    /// BCP 47 tag of the texts' language.
     pub lang: Option<String>,
 }
 
 /// `[consent]`: the document that the participant agrees to. No name is stored.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Consent {
-    /// Its title or file name.
+    /// Title or file name of the document.
     pub document: String,
-    /// Its version.
+    /// Version of the document.
     pub version: String,
 }
 
-/// `[design]`: who feels what, how often, in which order.
+/// `[design]`: the trials of a participant and their order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Design {
-    /// Planned participants; analysis before that many says "interim".
+    /// Planned participants; an analysis with fewer is interim.
     pub participants: u32,
-    /// How often each realization that is no practice is felt.
+    /// Trials of each realization that is not for practice.
     pub repetitions: u32,
     /// How orders are made.
     pub order: Order,
-    /// At most so many trials in a row with the same realization.
+    /// Largest number of consecutive trials with the same realization.
     pub max_run: Option<u32>,
-    /// Positions of the same realization differ by at least this.
+    /// Least distance between two positions of the same realization.
     pub min_distance: Option<u32>,
-    /// Practice trials, in this order, before all others.
+    /// Realizations of the practice trials, in this order, before all others.
     pub practice: Vec<ModelId>,
-    /// Rests.
+    /// Breaks between trials.
     pub breaks: Option<Breaks>,
     /// Failed attempts after which a trial is closed as failed.
     pub max_attempts: u32,
@@ -129,7 +136,7 @@ pub struct Design {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// A fresh random permutation of the realizations in each repetition.
+    /// A new random permutation of the realizations in each repetition.
     Blocked,
     /// One random order of all trials.
     Shuffled,
@@ -146,12 +153,12 @@ pub enum Order {
 /// The orders of an `orders.csv`: row → realizations by position.
 pub type FileOrders = BTreeMap<u32, Vec<ModelId>>;
 
-/// A rest after every so many trials.
+/// A break after every so many trials.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Breaks {
-    /// After every so many trials (practice not counted).
+    /// Trials between two breaks, practice not counted.
     pub every: u32,
-    /// Seconds before the session can go on.
+    /// Least duration of a break, s.
     pub at_least_s: f64,
 }
 
@@ -160,172 +167,138 @@ pub struct Breaks {
 pub struct SessionRules {
     /// Who types the answers.
     pub entry: Entry,
-    /// Hours after which an unfinished session does not simply go on.
+    /// Longest interruption, h, after which a session resumes without a question.
     pub resume_within_h: f64,
 }
 
-/// Who types the participant's answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Entry {
-    /// The participant, on a screen of their own.
-    Participant,
-    /// The experimenter, who hears them.
-    Experimenter,
+words! {
+    /// Who types the participant's answers.
+    Entry {
+        /// The participant, on a screen of their own.
+        Participant = "participant",
+        /// The experimenter, as the participant says them.
+        Experimenter = "experimenter",
+    }
 }
 
-/// `[device]`: what plays the realizations. Port and baud are never here.
+/// `[device]`: what plays the realizations. Port and baud rate are never here.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceRules {
-    /// Which kind.
+    /// The kind of device.
     pub kind: DeviceKind,
-    /// What a playback may never exceed.
+    /// Limits that no playback exceeds.
     pub limits: Limits,
     /// Permission to play tables that fail their passivity certificate.
     pub uncertified: Option<Uncertified>,
 }
 
-/// What kind of device plays a realization.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DeviceKind {
-    /// The one in this program.
-    Simulated,
-    /// A device on a serial port.
-    Serial,
-    /// A child program of the lab's.
-    Process,
-    /// A sample mounted by hand.
-    Manual,
-}
-
-impl DeviceKind {
-    /// As in the protocol file.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Simulated => "simulated",
-            Self::Serial => "serial",
-            Self::Process => "process",
-            Self::Manual => "manual",
-        }
+words! {
+    /// The kind of device that plays a realization.
+    DeviceKind {
+        /// The simulated device of this program.
+        Simulated = "simulated",
+        /// A device on a serial port.
+        Serial = "serial",
+        /// A program of the laboratory, started as a child process.
+        Process = "process",
+        /// A physical sample that the experimenter mounts by hand.
+        Manual = "manual",
     }
 }
 
-/// Permission to play tables that fail their certificate, under a lower force.
+/// Permission to play tables that fail their certificate, at a lower force.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Uncertified {
     /// Whether they are played at all.
     pub play: bool,
     /// Largest force for them, N.
     pub force_n: Limit,
-    /// Why; stands in every session.
+    /// Why; recorded in every session.
     pub reason: String,
 }
 
 /// `[trial]`
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrialRules {
-    /// Shown before each trial.
+    /// Instruction about the reference, shown before each trial.
     pub reference: Option<String>,
-    /// Seconds that it stays at least.
+    /// Least time that it is shown, s.
     pub reference_min_s: f64,
-    /// Full strokes before the rating opens.
+    /// Full strokes before the questions open.
     pub minimum_strokes: u32,
 }
 
-/// One of `[[models]]`.
+/// One of `[[models]]`: a realization.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelEntry {
     /// Its name in every file.
     pub id: ModelId,
-    /// Its table, relative to the protocol, inside the protocol's folder.
+    /// Its model file, relative to the protocol, inside the protocol's folder.
     pub file: Option<String>,
-    /// Variance accounted for, (−∞, 1]; absent: the model file's.
+    /// Variance accounted for, (−∞, 1]; `None`: the model file's.
     pub vaf: Option<f64>,
-    /// What it is in the study.
+    /// Its role in the study.
     pub role: Role,
-    /// The id that this one repeats in secret.
+    /// The realization of which it is a hidden duplicate.
     pub duplicate_of: Option<ModelId>,
-    /// A device of its own, such as a sample mounted by hand.
+    /// Its own kind of device, such as a sample mounted by hand.
     pub device: Option<DeviceKind>,
     /// Numbers that may explain the ratings; each becomes a column.
     pub covariates: BTreeMap<String, f64>,
 }
 
-/// What a realization is in the study.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Role {
-    /// What the study asks about.
-    Test,
-    /// Only for practice trials.
-    Practice,
-    /// The target itself, among the others.
-    HiddenReference,
-    /// Known to be bad.
-    LowAnchor,
-    /// A physical sample.
-    Physical,
-}
-
-impl Role {
-    /// As in the protocol file.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Test => "test",
-            Self::Practice => "practice",
-            Self::HiddenReference => "hidden-reference",
-            Self::LowAnchor => "low-anchor",
-            Self::Physical => "physical",
-        }
+words! {
+    /// The role of a realization in the study.
+    Role {
+        /// A realization under study.
+        Test = "test",
+        /// For practice trials only; never analyzed.
+        Practice = "practice",
+        /// The reference itself, presented unlabelled among the others.
+        HiddenReference = "hidden-reference",
+        /// A realization that is known to be bad.
+        LowAnchor = "low-anchor",
+        /// A physical sample.
+        Physical = "physical",
     }
 }
 
-/// `[analysis]`: what was decided before the data.
+/// `[analysis]`: decisions that were made before the data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AnalysisRules {
     /// The question that the analysis is about.
     pub primary: QuestionId,
     /// The recording whose VAF counts, by its name in the model files.
     pub vaf: Option<String>,
-    /// Ratings from here up count as realistic.
+    /// Least rating that counts as realistic.
     pub realistic_from: Option<f64>,
-    /// Differences from a hidden reference below this, in points of the primary
-    /// scale, count as none; above 0. Left out of the fingerprint where absent.
+    /// Margin of the equivalence test against a hidden reference, in points of the
+    /// primary scale, above 0. Not part of the fingerprint if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equivalence_margin: Option<f64>,
-    /// Whether unfinished sessions are analysed.
+    /// Whether unfinished sessions are analyzed.
     pub unfinished: Unfinished,
-    /// Pre-stated exclusions.
-    pub exclude: Vec<ExclusionRule>,
+    /// Exclusion rules stated before the data.
+    pub exclude: Vec<Exclusion>,
 }
 
-/// Whether unfinished sessions enter the analysis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Unfinished {
-    /// They do.
-    Include,
-    /// They do not.
-    Exclude,
-}
-
-/// One of `[[analysis.exclude]]`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ExclusionRule {
-    /// Its name, such as `constant-rater`.
-    pub rule: String,
-    /// Its parameters.
-    pub parameters: BTreeMap<String, f64>,
+words! {
+    /// Whether unfinished sessions are analyzed.
+    Unfinished {
+        /// Their ratings count.
+        Include = "include",
+        /// Their ratings do not count.
+        Exclude = "exclude",
+    }
 }
 
 impl Protocol {
-    /// The entry with an id.
+    /// The realization with an id.
     pub fn model(&self, id: &ModelId) -> Option<&ModelEntry> {
         self.models.iter().find(|m| m.id == *id)
     }
 
-    /// The realizations that each repetition contains: all but practice ones.
+    /// The realizations of each repetition: all that are not for practice.
     pub fn scheduled_models(&self) -> impl Iterator<Item = &ModelEntry> {
         self.models.iter().filter(|m| m.role != Role::Practice)
     }

@@ -5,7 +5,7 @@ mod between;
 use super::{safe, typeset};
 use crate::report::{MAX_PAIRED, apa};
 use maud::{Markup, html};
-use study_core::analyze::{Analysis, Listed, Stated};
+use study_core::analyze::{Analysis, Listed, PreregisteredRule};
 use study_core::outcome::Role;
 
 /// One question.
@@ -102,7 +102,7 @@ fn real(a: &Analysis) -> Option<Answer> {
             two(mean),
             apa::percent(s)
         ),
-        None if a.changed(Stated::RealisticFrom) => format!(
+        None if a.changed(PreregisteredRule::RealisticFrom) => format!(
             "{who}, mean {}{scale}; from which rating on one counts as realistic was changed after \
              the study began: see Deviations.",
             two(mean)
@@ -166,7 +166,7 @@ fn against_references(a: &Analysis, best: &str) -> Vec<String> {
             let p = get("p_t_holm").map_or_else(String::new, |p| {
                 format!(", paired t test p {} (Holm)", apa::equals_p(p))
             });
-            let later = match a.changed(Stated::Margin) {
+            let later = match a.changed(PreregisteredRule::Margin) {
                 true => ", a margin changed after the study began,",
                 false => "",
             };

@@ -3,7 +3,7 @@
 
 use super::Details;
 use crate::report::apa;
-use study_core::analyze::{Analysis, Exclusion, Listed, Stated, Value};
+use study_core::analyze::{Analysis, Exclusion, Listed, PreregisteredRule, Value};
 use study_stats::permutation::DRAWS;
 
 /// The paragraph.
@@ -147,7 +147,7 @@ fn conduct(d: &Details, a: &Analysis) -> Vec<String> {
         ));
     }
     if let Some(from) = a.realistic_from {
-        said.push(if a.changed(Stated::RealisticFrom) {
+        said.push(if a.changed(PreregisteredRule::RealisticFrom) {
             format!(
                 "A rating of {from} or higher counts as realistic; this was changed after the study \
                  began (see Deviations)."
@@ -198,7 +198,7 @@ fn left_out(a: &Analysis) -> Vec<String> {
             })
             .collect();
         let rules = apa::listing(&rules);
-        said.push(if a.changed(Stated::Exclusions) {
+        said.push(if a.changed(PreregisteredRule::Exclusions) {
             format!(
                 "The rules of exclusion were changed after the study began (see Deviations); now \
                  they leave out {rules}."
@@ -308,7 +308,7 @@ fn tests_done(a: &Analysis) -> Vec<String> {
     if v.iter().any(|(id, value)| {
         id.starts_with("reference/") && id.ends_with("/p_tost") && matches!(value, Value::Number(_))
     }) {
-        let margin = if a.changed(Stated::Margin) {
+        let margin = if a.changed(PreregisteredRule::Margin) {
             "a margin that was changed after the study began (see Deviations)"
         } else {
             "the margin stated beforehand"

@@ -5,7 +5,7 @@ use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
 use crate::report::{Source, apa};
 use maud::{Markup, html};
-use study_core::analyze::{Analysis, Said, Stated, Warning};
+use study_core::analyze::{Analysis, PreregisteredRule, Said, Warning};
 
 /// Warnings that stand at the top.
 const AT_THE_TOP: [&str; 3] = ["no-participants", "mixed", "interim"];
@@ -50,7 +50,7 @@ fn sentence(w: &Warning) -> String {
 /// what was changed afterwards.
 fn stated(a: &Analysis) -> Markup {
     let r = |id: &str| a.values.number(id).map(apa::r);
-    let changed = a.changed(Stated::Exclusions);
+    let changed = a.changed(PreregisteredRule::Exclusions);
     let caption = if changed {
         "Exclusions, changed after the study began: see Deviations"
     } else {

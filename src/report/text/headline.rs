@@ -6,7 +6,7 @@ use super::answers::{p, r};
 use super::layout::{Paint, number, wrap};
 use super::listed;
 use study_base::text::Untrusted;
-use study_core::analyze::{Analysis, Stated};
+use study_core::analyze::{Analysis, PreregisteredRule};
 use study_core::outcome::Role;
 
 pub(super) fn headline(a: &Analysis, width: usize, paint: Paint) -> String {
@@ -55,7 +55,7 @@ fn target(a: &Analysis) -> Vec<String> {
             "{}: {}{ends} of its ratings are {from} or higher{}.",
             Untrusted(best),
             percent(share),
-            if a.changed(Stated::RealisticFrom) {
+            if a.changed(PreregisteredRule::RealisticFrom) {
                 ", a bound changed after the study began"
             } else {
                 ""
@@ -77,7 +77,7 @@ fn target(a: &Analysis) -> Vec<String> {
         });
         let within = match (get("margin"), get("p_tost")) {
             (Some(margin), Some(tost)) => {
-                let later = match a.changed(Stated::Margin) {
+                let later = match a.changed(PreregisteredRule::Margin) {
                     true => ", a margin changed after the study began",
                     false => "",
                 };

@@ -101,7 +101,9 @@ impl Field {
             _ => None,
         };
         match &answer {
-            Some(answer) => question.accepts(answer).map_err(|why| sentence(&why))?,
+            Some(answer) => question
+                .accepts(answer)
+                .map_err(|why| sentence(&why.to_string()))?,
             None if question.required => return Err(self.ask_for(question)),
             None => {}
         }

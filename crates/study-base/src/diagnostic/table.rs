@@ -269,36 +269,46 @@ impl<'d, 't> Table<'d, 't> {
         self.document.fault(fault.at(span));
     }
 
-    /// Reports every key that nobody asked for.
+    /// Reports every key that was never asked for.
     pub fn finish(self) {
+        let known: Vec<&str> = self.known.iter().map(AsRef::as_ref).collect();
+        for near in self.refuse_unknown(&known) {
+            // It is not missing but misspelt.
+            let missing = self.missing_message(&near);
+            let mut notes = self.document.notes.borrow_mut();
+            notes.faults.retain(|f| f.message != missing);
+        }
+    }
+
+    /// Reports every key that is not among the `known` ones; returns the known keys
+    /// that the unknown ones are probably misspellings of.
+    pub fn refuse_unknown(&self, known: &[&str]) -> Vec<String> {
         let place = if self.path.is_empty() {
             "at the top level".to_owned()
         } else {
             format!("in [{}]", self.path)
         };
+        let mut misspelt = Vec::new();
         for (key, span) in self.keys() {
-            if self.known.iter().any(|k| *k == key) {
+            if known.contains(&key.as_str()) {
                 continue;
             }
-            let mut fault =
-                Fault::error(format!("unknown key `{}` {place}", Untrusted(&key))).at(span);
-            fault = match did_you_mean(&key, self.known.iter().map(AsRef::as_ref)) {
-                Some(near) => {
-                    // Then it is there, only misspelled.
-                    let missing = self.missing_message(near);
-                    let mut notes = self.document.notes.borrow_mut();
-                    notes.faults.retain(|f| f.message != missing);
-                    fault.label(format!("did you mean `{near}`?"))
-                }
-                None => {
-                    let mut known: Vec<&str> = self.known.iter().map(AsRef::as_ref).collect();
-                    known.sort_unstable();
-                    known.dedup();
-                    fault.hint(format!("known keys are {}", known.join(", ")))
-                }
-            };
-            self.document.fault(fault);
+            let fault = Fault::error(format!("unknown key `{}` {place}", Untrusted(&key))).at(span);
+            self.document
+                .fault(match did_you_mean(&key, known.iter().copied()) {
+                    Some(near) => {
+                        misspelt.push(near.to_owned());
+                        fault.label(format!("did you mean `{near}`?"))
+                    }
+                    None => {
+                        let mut known = known.to_vec();
+                        known.sort_unstable();
+                        known.dedup();
+                        fault.hint(format!("known keys are {}", known.join(", ")))
+                    }
+                });
         }
+        misspelt
     }
 }
 
@@ -452,10 +462,10 @@ impl<'d, 't> Value<'d, 't> {
     }
 
     /// The value as one of a fixed set of words.
-    pub fn word<T: Copy>(&self, words: &[(&'static str, T)]) -> Option<T> {
+    pub fn word<T: Clone>(&self, words: &[(&'static str, T)]) -> Option<T> {
         let given = self.text()?;
         if let Some((_, value)) = words.iter().find(|(word, _)| *word == given) {
-            return Some(*value);
+            return Some(value.clone());
         }
         let list: Vec<String> = words.iter().map(|(word, _)| format!("`{word}`")).collect();
         let mut fault = Fault::error(format!("`{}` cannot be `{}`", self.path, Untrusted(&given)));

@@ -1,36 +1,36 @@
-//! What was changed of the rules of analysis after a study began.
+//! Deviations: changes of the analysis rules after a study has begun.
 
-use crate::protocol::{AnalysisRules, ExclusionRule, Protocol};
+use crate::protocol::{AnalysisRules, Exclusion, Protocol};
 use std::fmt::Display;
 
-/// A rule that a sentence would call stated before the data.
+/// A rule that a report calls preregistered unless it was changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stated {
-    /// What to leave out.
+pub enum PreregisteredRule {
+    /// Which rows are excluded.
     Exclusions,
-    /// From which rating on one counts as realistic.
+    /// The least rating that counts as realistic.
     RealisticFrom,
-    /// The margin of equivalence.
+    /// The margin of the equivalence test.
     Margin,
 }
 
-impl Stated {
+impl PreregisteredRule {
     const ALL: [Self; 3] = [Self::Exclusions, Self::RealisticFrom, Self::Margin];
 }
 
-/// A change after a study began.
+/// A change after a study has begun.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Deviation {
-    /// In words. Names in it are untrusted.
+    /// The change in words. Names in it are untrusted.
     pub text: String,
-    /// The rules that it changes: no sentence may call them stated beforehand.
-    pub of: &'static [Stated],
+    /// The rules that it changes; a report must not call them preregistered.
+    pub affects: &'static [PreregisteredRule],
 }
 
 /// The changes of `[analysis]`, the planned participants, VAF and covariates from
 /// one version of a protocol to a later one.
 pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
-    // Taken apart without `..`, so that a new rule has to be compared.
+    // No `..`: a new field has to be compared.
     let AnalysisRules {
         primary,
         vaf,
@@ -41,10 +41,10 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
     } = &after.analysis;
     let b = &before.analysis;
     let mut found = Vec::new();
-    let mut compare = |what: &str, of: &'static [Stated], old: String, new: String| {
+    let mut compare = |what: &str, affects, old: String, new: String| {
         if old != new {
             let text = format!("{what}: {old} → {new}");
-            found.push(Deviation { text, of });
+            found.push(Deviation { text, affects });
         }
     };
     compare(
@@ -53,34 +53,35 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
         before.design.participants.to_string(),
         after.design.participants.to_string(),
     );
-    // The rules were stated for the first one.
+    // Every rule was stated for the previous primary question.
     compare(
         "primary question",
-        &Stated::ALL,
+        &PreregisteredRule::ALL,
         b.primary.to_string(),
         primary.to_string(),
     );
     compare("vaf", &[], shown(&b.vaf), shown(vaf));
     compare(
         "realistic_from",
-        &[Stated::RealisticFrom],
+        &[PreregisteredRule::RealisticFrom],
         shown(&b.realistic_from),
         shown(realistic_from),
     );
     compare(
         "equivalence_margin",
-        &[Stated::Margin],
+        &[PreregisteredRule::Margin],
         shown(&b.equivalence_margin),
         shown(equivalence_margin),
     );
-    let word = |u| match u {
-        crate::protocol::Unfinished::Include => "include".to_owned(),
-        crate::protocol::Unfinished::Exclude => "exclude".to_owned(),
-    };
-    compare("unfinished", &[], word(b.unfinished), word(*unfinished));
+    compare(
+        "unfinished",
+        &[],
+        b.unfinished.as_str().to_owned(),
+        unfinished.as_str().to_owned(),
+    );
     compare(
         "exclusion rules",
-        &[Stated::Exclusions],
+        &[PreregisteredRule::Exclusions],
         rules(&b.exclude),
         rules(exclude),
     );
@@ -113,10 +114,10 @@ fn shown(x: &Option<impl Display>) -> String {
         .map_or_else(|| "none".to_owned(), ToString::to_string)
 }
 
-fn rules(all: &[ExclusionRule]) -> String {
-    let one = |e: &ExclusionRule| {
-        let parameters = e.parameters.iter().map(|(k, v)| format!(" {k} = {v}"));
-        format!("{}{}", e.rule, parameters.collect::<String>())
+fn rules(all: &[Exclusion]) -> String {
+    let one = |rule: &Exclusion| match rule.parts() {
+        (name, None) => name.to_owned(),
+        (name, Some((parameter, value))) => format!("{name} {parameter} = {value}"),
     };
     joined(all.iter().map(one).collect())
 }
@@ -135,48 +136,49 @@ mod tests {
     use crate::protocol::example;
 
     #[test]
-    fn every_change_of_the_rules_is_named_and_nothing_else() {
+    fn only_changes_of_the_analysis_are_deviations() {
         let before = example::protocol(3, 3);
         let mut after = before.clone();
         after.study.title = "Another title".to_owned();
         assert_eq!(deviations(&before, &after), []);
         after.analysis.realistic_from = Some(6.0);
         after.design.participants += 1;
-        after.analysis.exclude.push(ExclusionRule {
-            rule: "constant-rater".to_owned(),
-            parameters: std::collections::BTreeMap::new(),
-        });
+        after.analysis.exclude.push(Exclusion::ConstantRater);
+        after.analysis.exclude.push(Exclusion::StrokesBelow(2.0));
         let found: Vec<String> = (deviations(&before, &after).into_iter())
             .map(|d| d.text)
             .collect();
         let found = found.join("; ");
         assert!(found.contains("realistic_from: 5 → 6"), "{found}");
         assert!(found.contains("planned participants: "), "{found}");
-        assert!(found.contains("constant-rater"), "{found}");
+        assert!(
+            found.contains("none → constant-rater, strokes-below strokes = 2"),
+            "{found}"
+        );
     }
 
     #[test]
-    fn a_change_is_of_the_rule_that_it_changes() {
+    fn a_deviation_names_the_rules_that_it_affects() {
         let before = example::protocol(3, 3);
         let of = |change: &dyn Fn(&mut Protocol)| {
             let mut after = before.clone();
             change(&mut after);
             let found = deviations(&before, &after);
             assert_eq!(found.len(), 1, "{found:?}");
-            found[0].of
+            found[0].affects
         };
         assert_eq!(
             of(&|p| p.analysis.realistic_from = Some(6.0)),
-            [Stated::RealisticFrom]
+            [PreregisteredRule::RealisticFrom]
         );
         assert_eq!(
             of(&|p| p.analysis.equivalence_margin = Some(0.25)),
-            [Stated::Margin]
+            [PreregisteredRule::Margin]
         );
         assert_eq!(of(&|p| p.analysis.vaf = Some("other".to_owned())), []);
         assert_eq!(
             of(&|p| p.analysis.primary = study_base::text::QuestionId::new("other").unwrap()),
-            Stated::ALL
+            PreregisteredRule::ALL
         );
     }
 }

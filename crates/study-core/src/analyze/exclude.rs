@@ -1,118 +1,71 @@
-//! Pre-stated rules of exclusion, `[[analysis.exclude]]`.
+//! Applies the preregistered exclusion rules, `[[analysis.exclude]]`.
 //!
-//! Every rule judges the same rows: those that count before any rule does. So
-//! the order of the rules changes nothing but which one is named of a row that
-//! several would leave out: the first. Nothing is left out that no rule names.
+//! Every rule judges the same rows: those that count before any rule is applied.
+//! The order of the rules therefore decides only which rule is reported for a row
+//! that several exclude: the first.
 
 use super::Rules;
-use super::select::{Decision, Reason};
 use crate::outcome::ratings::Ratings;
-use crate::protocol::{ExclusionRule, Role};
-use std::fmt;
-use std::sync::Arc;
+use crate::protocol::{Exclusion, Role};
+use std::collections::{BTreeSet, HashMap};
 
-/// A rule.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Exclusion {
-    /// Participants with two ratings or more that never change.
-    ConstantRater,
-    /// Participants whose mean rating of the hidden references is under this.
-    HiddenReferenceBelow(f64),
-    /// Trials with fewer full strokes than this.
-    StrokesBelow(f64),
-    /// Participants whose cells of a realization and of its hidden repeat are
-    /// further apart than this, on average over the pairs.
-    Inconsistent(f64),
-}
-
-impl Exclusion {
-    /// That of a protocol; `None` for a name that is not one, or a parameter that
-    /// is not there, which the reader of protocols refuses.
-    pub fn of(rule: &ExclusionRule) -> Option<Self> {
-        let parameter = |name: &str| rule.parameters.get(name).copied();
-        match rule.rule.as_str() {
-            "constant-rater" => Some(Self::ConstantRater),
-            "hidden-reference-below" => parameter("rating").map(Self::HiddenReferenceBelow),
-            "strokes-below" => parameter("strokes").map(Self::StrokesBelow),
-            "inconsistent" => parameter("difference").map(Self::Inconsistent),
-            _ => None,
-        }
-    }
-
-    /// Whether it judges by the primary ratings.
-    fn needs_primary(self) -> bool {
-        !matches!(self, Self::StrokesBelow(_))
-    }
-}
-
-impl fmt::Display for Exclusion {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::ConstantRater => f.write_str("constant-rater"),
-            Self::HiddenReferenceBelow(rating) => write!(f, "hidden-reference-below {rating}"),
-            Self::StrokesBelow(strokes) => write!(f, "strokes-below {strokes}"),
-            Self::Inconsistent(difference) => write!(f, "inconsistent {difference}"),
-        }
-    }
-}
-
-/// What a rule did.
+/// The effect of a rule.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Applied {
     /// The rule.
     pub rule: Exclusion,
-    /// Rows that it left out.
+    /// Rows that it excluded.
     pub rows: usize,
     /// Participants with such a row.
     pub participants: usize,
-    /// Why it could judge nothing, or not all.
+    /// Why it could judge no rows, or not all.
     pub problem: Option<&'static str>,
 }
 
-/// Applies the rules to the rows that count so far.
-pub(super) fn apply(ratings: &Ratings, rules: &Rules, decisions: &mut [Decision]) -> Vec<Applied> {
+/// Applies the rules to the rows that count so far, `counts`. Returns the index of
+/// the first rule that excludes each row, and the effect of each rule.
+pub(super) fn apply(
+    ratings: &Ratings,
+    rules: &Rules,
+    counts: &[bool],
+) -> (Vec<Option<usize>>, Vec<Applied>) {
     let judged: Vec<Judgement> = (rules.exclude.iter())
-        .map(|rule| judge(ratings, rules, *rule, decisions))
+        .map(|rule| judge(ratings, rules, *rule, counts))
         .collect();
-    let reasons: Vec<Arc<Reason>> = (rules.exclude.iter())
-        .map(|rule| Arc::new(Reason::Rule(*rule)))
-        .collect();
-    let mut hit = vec![vec![false; ratings.subjects.len()]; rules.exclude.len()];
-    let mut rows = vec![0; rules.exclude.len()];
-    for (i, decision) in decisions.iter_mut().enumerate() {
-        if decision.is_some() || judged.is_empty() {
-            continue;
-        }
-        let subject = ratings.subject[i] as usize;
-        let strokes = ratings.strokes[i];
-        if let Some(k) = judged.iter().position(|j| j.leaves_out(subject, strokes)) {
-            *decision = Some(Arc::clone(&reasons[k]));
-            rows[k] += 1;
-            hit[k][subject] = true;
-        }
-    }
-    (0..judged.len())
-        .map(|k| Applied {
-            rule: rules.exclude[k],
-            rows: rows[k],
-            participants: hit[k].iter().filter(|h| **h).count(),
-            problem: judged[k].problem,
+    let excluded_by: Vec<Option<usize>> = (counts.iter().enumerate())
+        .map(|(i, counts)| {
+            let subject = ratings.subject[i] as usize;
+            let excludes = |j: &Judgement| j.excludes(subject, ratings.strokes[i]);
+            judged.iter().position(excludes).filter(|_| *counts)
         })
-        .collect()
+        .collect();
+    let applied = (judged.iter().enumerate())
+        .map(|(k, judgement)| {
+            let rows = (0..excluded_by.len()).filter(|&i| excluded_by[i] == Some(k));
+            let participants: BTreeSet<u32> = rows.clone().map(|i| ratings.subject[i]).collect();
+            Applied {
+                rule: rules.exclude[k],
+                rows: rows.count(),
+                participants: participants.len(),
+                problem: judgement.problem,
+            }
+        })
+        .collect();
+    (excluded_by, applied)
 }
 
-/// Whom or what a rule leaves out.
+/// Which rows a rule excludes.
 #[derive(Debug, Default)]
 struct Judgement {
-    /// By participant; empty: none.
+    /// Whether a participant is excluded; empty if none is.
     subjects: Vec<bool>,
-    /// Rows with fewer strokes.
+    /// Rows with fewer strokes are excluded.
     strokes: Option<f64>,
     problem: Option<&'static str>,
 }
 
 impl Judgement {
-    fn leaves_out(&self, subject: usize, strokes: Option<u32>) -> bool {
+    fn excludes(&self, subject: usize, strokes: Option<u32>) -> bool {
         self.subjects.get(subject) == Some(&true)
             || strokes
                 .zip(self.strokes)
@@ -134,11 +87,11 @@ impl Judgement {
     }
 }
 
-fn judge(ratings: &Ratings, rules: &Rules, rule: Exclusion, decisions: &[Decision]) -> Judgement {
-    if rule.needs_primary() && !rules.primary {
-        return Judgement::none("it judges by the primary question, which this is not");
+fn judge(ratings: &Ratings, rules: &Rules, rule: Exclusion, counts: &[bool]) -> Judgement {
+    if !matches!(rule, Exclusion::StrokesBelow(_)) && !rules.primary {
+        return Judgement::none("it applies to the primary question, which this is not");
     }
-    let rows = (0..ratings.len()).filter(|&i| decisions[i].is_none());
+    let rows = (0..ratings.len()).filter(|&i| counts[i]);
     let rated = (rows.clone()).filter_map(|i| Some((i, ratings.rating[i]?)));
     match rule {
         Exclusion::ConstantRater => {
@@ -168,14 +121,15 @@ fn judge(ratings: &Ratings, rules: &Rules, rule: Exclusion, decisions: &[Decisio
             let unknown = rows.clone().any(|i| ratings.strokes[i].is_none());
             Judgement {
                 strokes: Some(least),
-                problem: unknown.then_some("some trials have no count of strokes and stay"),
+                problem: unknown
+                    .then_some("the strokes of some trials are unknown; these trials stay"),
                 ..Judgement::default()
             }
         }
         Exclusion::Inconsistent(most) => {
             let pairs = pairs(ratings);
             if pairs.is_empty() {
-                return Judgement::none("the design has no hidden repeat");
+                return Judgement::none("the design has no hidden duplicate");
             }
             let distances = distances(ratings, &pairs, rated);
             let far = |d: &Option<f64>| d.is_some_and(|d| d > most);
@@ -193,7 +147,7 @@ fn average((sum, n): (f64, f64)) -> Option<f64> {
     (n > 0.0).then(|| sum / n)
 }
 
-/// Each hidden repeat and its original.
+/// Indices of each hidden duplicate and its original.
 pub(super) fn pairs(ratings: &Ratings) -> Vec<(usize, usize)> {
     let models = &ratings.models;
     (models.iter().enumerate())
@@ -205,37 +159,37 @@ pub(super) fn pairs(ratings: &Ratings) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// Mean distance between the cells of the pairs, by participant.
+/// Mean distance between the cell means of the pairs, by participant; `None` without
+/// such cells.
 pub(super) fn distances(
     ratings: &Ratings,
     pairs: &[(usize, usize)],
     rated: impl Iterator<Item = (usize, f64)>,
 ) -> Vec<Option<f64>> {
-    let mut slot = vec![usize::MAX; ratings.models.len()];
-    for (k, m) in pairs.iter().flat_map(|(d, o)| [*d, *o]).enumerate() {
-        // Two repeats may share their original.
-        if slot[m] == usize::MAX {
-            slot[m] = k;
-        }
-    }
-    let width = 2 * pairs.len();
+    // Two duplicates may share their original.
+    let paired: BTreeSet<usize> = pairs.iter().flat_map(|(d, o)| [*d, *o]).collect();
+    let columns: HashMap<usize, usize> = paired.into_iter().zip(0..).collect();
+    let width = columns.len();
     let mut cells = vec![(0.0, 0.0); width * ratings.subjects.len()];
-    for (i, v) in rated {
-        let k = ratings.model[i].map_or(usize::MAX, |m| slot[m as usize]);
-        if k != usize::MAX {
-            add(&mut cells[width * ratings.subject[i] as usize + k], v);
+    for (i, rating) in rated {
+        let column = ratings.model[i].and_then(|m| columns.get(&(m as usize)));
+        if let Some(column) = column {
+            add(
+                &mut cells[width * ratings.subject[i] as usize + column],
+                rating,
+            );
         }
     }
     (cells.chunks(width))
         .map(|own| {
+            let mean = |model| average(own[columns[model]]);
             let mut sum = (0.0, 0.0);
-            for (d, o) in pairs {
-                let both = average(own[slot[*d]]).zip(average(own[slot[*o]]));
-                if let Some((d, o)) = both {
+            for (duplicate, original) in pairs {
+                if let Some((d, o)) = mean(duplicate).zip(mean(original)) {
                     add(&mut sum, (d - o).abs());
                 }
             }
-            // Thirds that agree on paper agree here.
+            // Removes rounding errors, so that distances that are equal compare equal.
             average(sum).map(study_stats::describe::rounded)
         })
         .collect()

@@ -1,16 +1,16 @@
 //! Which rows count, and why others do not.
 
 use super::Rules;
-use super::exclude::{self, Applied, Exclusion};
+use super::exclude::{self, Applied};
 use crate::outcome::Status;
 use crate::outcome::event::State;
 use crate::outcome::ratings::{Origin, Ratings};
-use crate::protocol::Unfinished;
+use crate::protocol::{Exclusion, Unfinished};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::sync::Arc;
 
-/// Which rows count beside those of participants.
+/// Which rows also count, besides those of real participants.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Include {
     /// Those of pilots.
@@ -22,15 +22,15 @@ pub struct Include {
 /// Why a row does not count.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reason {
-    /// Of a pilot, beside real ones.
+    /// It is a pilot's, and there are real ones.
     Pilot,
-    /// Of a simulated participant, beside real ones.
+    /// It is a simulated participant's, and there are others.
     Simulated,
-    /// Of an unfinished session, and the protocol leaves these out.
+    /// Its session is unfinished, and the protocol excludes these.
     Unfinished,
     /// The participant's state, with the reason that was given.
     State(State, String),
-    /// A pre-stated rule of exclusion.
+    /// A preregistered exclusion rule.
     Rule(Exclusion),
 }
 
@@ -47,18 +47,17 @@ impl fmt::Display for Reason {
     }
 }
 
-/// The decision about each row; `None`: it counts.
+/// Why a row does not count; `None` if it does.
 pub(super) type Decision = Option<Arc<Reason>>;
 
-/// Decides about every row, and tells what each pre-stated rule did.
+/// Decides which rows count; also returns the effect of each exclusion rule.
 ///
-/// Real rows are analysed alone, unless others are asked for. Where there are
-/// none at all, those of pilots are, and where there are none of these the simulated
-/// ones, under a banner. The rules judge what is
-/// left then.
+/// Rows of real participants are analyzed alone, unless others are included. Without
+/// any, those of pilots are analyzed, and without these the simulated ones, under a
+/// banner. The exclusion rules are applied to the rows that are left.
 pub(super) fn decide(ratings: &Ratings, rules: &Rules) -> (Vec<Decision>, Vec<Applied>) {
     let real = ratings.origin.contains(&Origin::Real);
-    // somebody who sat at the screen, real or pilot
+    // real participants or pilots
     let people = real || ratings.origin.contains(&Origin::Pilot);
     let pilot = Arc::new(Reason::Pilot);
     let simulated = Arc::new(Reason::Simulated);
@@ -86,23 +85,32 @@ pub(super) fn decide(ratings: &Ratings, rules: &Rules) -> (Vec<Decision>, Vec<Ap
             }
         })
         .collect();
-    let applied = exclude::apply(ratings, rules, &mut decisions);
+    let counts: Vec<bool> = decisions.iter().map(Option::is_none).collect();
+    let (left_out, applied) = exclude::apply(ratings, rules, &counts);
+    let reasons: Vec<Decision> = (rules.exclude.iter())
+        .map(|rule| Some(Arc::new(Reason::Rule(*rule))))
+        .collect();
+    for (decision, rule) in decisions.iter_mut().zip(left_out) {
+        if let Some(rule) = rule {
+            decision.clone_from(&reasons[rule]);
+        }
+    }
     (decisions, applied)
 }
 
-/// What was counted.
+/// How many rows and participants there are.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Rows of the table, practice not counted.
+    /// Rows of the table without practice.
     pub rows: usize,
     /// Rows that count and have a rating.
     pub rated: usize,
-    /// Rows that count and should have a rating but have none, for whatever
-    /// reason; the next three are among them.
+    /// Rows that count but have no rating, for any reason; the next three are
+    /// among them.
     pub without_rating: usize,
-    /// Trials that count and failed for good.
+    /// Trials that count and failed in every attempt.
     pub failed: usize,
-    /// Trials that count whose question was declined.
+    /// Trials that count and whose question was declined.
     pub declined: usize,
     /// Trials that count and were never reached, or left empty.
     pub missing: usize,
@@ -110,23 +118,22 @@ pub struct Counts {
     pub corrected: usize,
     /// Rows that count after a failed attempt.
     pub repeated: usize,
-    /// Practice rows, never analysed.
+    /// Practice rows, which are never analyzed.
     pub practice: usize,
     /// Rows that do not count, by reason.
     pub excluded: BTreeMap<String, usize>,
-    /// Participants that count.
+    /// Participants with rows that count.
     pub participants: usize,
-    /// Real ones whose session is finished (or whose state is not known): of these
-    /// and of those whom a pre-stated rule leaves out. Pilots and simulated ones are
-    /// not among those that were planned.
+    /// Real participants whose session is finished or of unknown state, including
+    /// those excluded by a rule. Only these count towards the planned ones.
     pub finished: usize,
     /// Participants with at least one row that does not count.
     pub excluded_participants: usize,
     /// Planned participants.
     pub planned: Option<u32>,
-    /// Participants that count and are pilots.
+    /// Pilots with rows that count.
     pub pilots: usize,
-    /// Participants that count and are simulated.
+    /// Simulated participants with rows that count.
     pub simulated: usize,
     /// Rows of real participants, whether they count or not.
     pub real_rows: usize,
@@ -141,7 +148,7 @@ impl Counts {
         };
         let rated = used.rating.iter().flatten().count();
         let mut gone = vec![false; all.subjects.len()];
-        // Rows share their reasons: each is put into words once.
+        // Rows share their reasons: each is formatted once.
         let mut by_reason: Vec<(&Arc<Reason>, usize)> = Vec::new();
         let mut places: HashMap<*const Reason, usize> = HashMap::new();
         let mut took_part = vec![false; all.subjects.len()];
@@ -191,13 +198,13 @@ impl Counts {
         }
     }
 
-    /// Participants that count and are real.
+    /// Real participants with rows that count.
     pub fn real(&self) -> usize {
         self.participants - self.pilots - self.simulated
     }
 
-    /// Whether fewer have finished than were planned. Without any real participant
-    /// there is nothing to be interim of.
+    /// Whether fewer participants have finished than were planned. A study without
+    /// any real participant is never interim.
     pub fn interim(&self) -> bool {
         self.real() > 0 && self.planned.is_some_and(|p| self.finished < p as usize)
     }

@@ -2,7 +2,7 @@
 
 use super::Rules;
 use super::cells::Cells;
-use super::deviation::Stated;
+use super::deviation::PreregisteredRule;
 use super::exclude::Applied;
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
@@ -70,7 +70,8 @@ pub(super) fn warnings(
                 .to_owned(),
         );
     }
-    let changed = (rules.deviations.iter()).any(|d| d.of.contains(&Stated::Exclusions));
+    let changed =
+        (rules.deviations.iter()).any(|d| d.affects.contains(&PreregisteredRule::Exclusions));
     excluded(&mut warn, exclusions, changed, values);
     headline(&mut warn, values);
     design(&mut warn, cells, values);

@@ -5,7 +5,7 @@
 //! Doubts that need the models' tables or the orders are raised by those who have
 //! them.
 
-use super::{Design, DeviceKind, Protocol, Question, QuestionKind, Role};
+use super::{Design, DeviceKind, Exclusion, Protocol, Question, QuestionKind, Role};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use study_base::diagnostic::Fault;
@@ -276,38 +276,21 @@ fn roles(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
             );
         }
     }
-    let needs = |rule: &str| {
-        protocol
-            .analysis
-            .exclude
-            .iter()
-            .position(|e| e.rule == rule)
-    };
-    let has_reference = protocol
-        .models
-        .iter()
-        .any(|m| m.role == Role::HiddenReference);
+    let has_reference = (protocol.models.iter()).any(|m| m.role == Role::HiddenReference);
     let has_duplicate = protocol.models.iter().any(|m| m.duplicate_of.is_some());
-    for (rule, met, what) in [
-        (
-            "hidden-reference-below",
-            has_reference,
-            "no realization has the role \"hidden-reference\"",
-        ),
-        (
-            "inconsistent",
-            has_duplicate,
-            "no realization has a `duplicate_of`",
-        ),
-    ] {
-        if let Some(i) = needs(rule)
-            && !met
-        {
-            faults.push(
-                Fault::warning(format!("the rule `{rule}` excludes nobody: {what}"))
-                    .at(spans.get(&format!("analysis.exclude[{i}].rule")).cloned()),
-            );
-        }
+    for (i, rule) in protocol.analysis.exclude.iter().enumerate() {
+        let lacks = match rule {
+            Exclusion::HiddenReferenceBelow(_) if !has_reference => {
+                "no realization has the role \"hidden-reference\""
+            }
+            Exclusion::Inconsistent(_) if !has_duplicate => "no realization has a `duplicate_of`",
+            _ => continue,
+        };
+        let (name, _) = rule.parts();
+        faults.push(
+            Fault::warning(format!("the rule `{name}` excludes nobody: {lacks}"))
+                .at(spans.get(&format!("analysis.exclude[{i}].rule")).cloned()),
+        );
     }
 }
 

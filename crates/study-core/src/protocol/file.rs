@@ -1,33 +1,65 @@
 //! Reading a protocol file.
 //!
 //! Strict, and never stopping at the first fault: unknown keys, wrong types,
-//! values that cannot be, and sections that contradict each other are all
-//! reported at once, each with its place. What opens other files (do the models
-//! load? is the order feasible?) is not here.
+//! values out of range, and sections that contradict each other are all reported
+//! at once, each with its place. Faults that need other files (do the models
+//! load? is the order feasible?) are found elsewhere.
 //!
-//! [`parse_orders`] reads the `orders.csv` that a protocol may name.
+//! [`ROOT`] declares every key. [`parse_orders`] reads the `orders.csv` that a
+//! protocol may name.
 
 mod agree;
 mod analysis;
 mod design;
 mod device;
+mod general;
 mod models;
 mod orders;
 mod questions;
-mod reader;
+mod section;
 
-pub use analysis::EXCLUSIONS;
 pub use orders::parse_orders;
 
-use super::{
-    Consent, Entry, FORMAT, Order, Protocol, Question, SessionRules, Study, Text, TrialRules,
-};
-use reader::{Reader, prose};
+use super::keys::{Key, Kind, keys};
+use super::{FORMAT, Protocol, Question};
+use section::Section;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use study_base::diagnostic::table::{Document, Table};
+use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::Untrusted;
+
+/// Every key of a protocol file, by section.
+pub const ROOT: &[Key] = keys! {
+    /// The file format with its version.
+    "format": Kind::Constant(FORMAT), r#""study-protocol/1""#, required;
+    /// Identity and provenance of the study.
+    "study": Kind::Table(general::STUDY), "", required;
+    /// What participants read, in any language. Each text can be left out.
+    "text": Kind::Table(general::TEXT), "";
+    /// The document that the participant agrees to before the session.
+    "consent": Kind::Table(general::CONSENT), "";
+    /// The trials of a participant and their order.
+    "design": Kind::Table(design::DESIGN), "", required;
+    /// How a session goes.
+    "session": Kind::Table(general::SESSION), "";
+    /// What plays the realizations, and its limits.
+    "device": Kind::Table(device::DEVICE), "", required;
+    /// How a trial goes.
+    "trial": Kind::Table(general::TRIAL), "";
+    /// The realizations; at least one whose role is not `practice`.
+    "models": Kind::Tables(models::MODELS), "", required;
+    /// Asked after each trial; at least one.
+    "questions": Kind::Variants(&questions::QUESTIONS), "", required;
+    /// Asked of the experimenter before the first trial.
+    "setup": Kind::Variants(&questions::QUESTIONS), "";
+    /// Asked of the participant once, before the first trial.
+    "intake": Kind::Variants(&questions::QUESTIONS), "";
+    /// Asked of the participant once, at the end.
+    "outro": Kind::Variants(&questions::QUESTIONS), "";
+    /// Decisions that were made before the data.
+    "analysis": Kind::Table(analysis::ANALYSIS), "", required;
+};
 
 /// Largest protocol file that is read, bytes.
 pub const MAX_FILE_BYTES: usize = 1024 * 1024;
@@ -74,13 +106,9 @@ pub fn parse(path: &str, text: &str) -> Parsed {
     }
     let document = Document::parse(text);
     let broken = document.fault_count();
-    let reader = Reader {
-        document: &document,
-        broken: broken > 0,
-    };
     let mut named = Vec::new();
-    let protocol = if format_is_ours(&reader) {
-        read(&reader, &mut named)
+    let protocol = if format_is_known(&document, broken > 0) {
+        read(&document, broken > 0, &mut named)
     } else {
         None
     };
@@ -116,11 +144,11 @@ fn drop_echoes(faults: &mut Vec<Fault>, broken: usize) {
 }
 
 /// A file of another format is not read any further: every key would be a fault.
-fn format_is_ours(reader: &Reader<'_, '_>) -> bool {
-    let mut root = reader.document.root();
+fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
+    let mut root = document.root();
     let Some(value) = root.value("format") else {
-        if !reader.broken {
-            reader.document.fault(
+        if !broken {
+            document.fault(
                 Fault::error("the file has no `format`")
                     .hint(format!("its first line has to be: format = \"{FORMAT}\"")),
             );
@@ -152,38 +180,26 @@ fn format_is_ours(reader: &Reader<'_, '_>) -> bool {
 }
 
 /// Reads all sections; `None` if a part is faulty, which has been reported.
-fn read<'d, 't>(reader: &Reader<'d, 't>, named: &mut Vec<Named>) -> Option<Protocol> {
-    let mut root = reader.document.root();
-    root.value("format");
-    let study = study(reader, &mut root);
-    let text = root.table("text").map(|table| texts(reader, table));
-    let consent = root.table("consent").map(|table| consent(reader, table));
-    let design = design::read(reader, &mut root);
-    let session = root.table("session").map(|table| session(reader, table));
-    let device = device::read(reader, &mut root);
-    let trial = root.table("trial").map(|table| trial(reader, table));
-    let models = models::read(reader, &mut root);
-    let questions = questions::read(reader, &mut root, "questions");
-    let setup = questions::read(reader, &mut root, "setup");
-    let intake = questions::read(reader, &mut root, "intake");
-    let outro = questions::read(reader, &mut root, "outro");
-    let analysis = analysis::read(reader, &mut root);
-    root.finish();
+fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option<Protocol> {
+    let mut root = Section::root(document, broken, ROOT);
+    let study = root.section("study").and_then(general::study);
+    let text = root.section("text").map(general::text);
+    let consent = root.section("consent").and_then(general::consent);
+    let design = root.section("design").and_then(design::read);
+    let session = root.section("session").and_then(general::session);
+    let device = root.section("device").and_then(device::read);
+    let trial = root.section("trial").and_then(general::trial);
+    let models = root
+        .sections("models")
+        .into_iter()
+        .map(models::read)
+        .collect();
+    let questions = questions::read(&mut root, "questions");
+    let setup = questions::read(&mut root, "setup");
+    let intake = questions::read(&mut root, "intake");
+    let outro = questions::read(&mut root, "outro");
+    let analysis = root.section("analysis").and_then(analysis::read);
 
-    named.extend(models.iter().filter_map(|model| {
-        Some(Named {
-            place: format!("{}.file", model.path),
-            file: model.file.clone()?,
-            orders: false,
-        })
-    }));
-    if let Some(Order::File(file)) = design.as_ref().map(|d| &d.order) {
-        named.push(Named {
-            place: "design.order.file".to_owned(),
-            file: file.clone(),
-            orders: true,
-        });
-    }
     let mut draft = agree::Draft {
         design: design.as_ref(),
         device: device.as_ref(),
@@ -195,8 +211,9 @@ fn read<'d, 't>(reader: &Reader<'d, 't>, named: &mut Vec<Named>) -> Option<Proto
         outro,
         analysis: analysis.as_ref(),
     };
-    if !reader.broken {
-        draft.agree(reader.document);
+    named.extend(draft.files());
+    if !broken {
+        draft.agree(document);
     }
     draft.fill_duplicates();
     let agree::Draft {
@@ -207,26 +224,14 @@ fn read<'d, 't>(reader: &Reader<'d, 't>, named: &mut Vec<Named>) -> Option<Proto
         outro,
         ..
     } = draft;
+    let models: Option<_> = models.into_iter().map(models::Draft::finish).collect();
     Some(Protocol {
         study: study?,
-        text: text.unwrap_or_default(),
-        consent: match consent {
-            Some(consent) => Some(consent?),
-            None => None,
-        },
-        session: session.unwrap_or(SessionRules {
-            entry: Entry::Participant,
-            resume_within_h: RESUME_WITHIN_H,
-        }),
-        trial: trial.unwrap_or(TrialRules {
-            reference: None,
-            reference_min_s: 0.0,
-            minimum_strokes: 0,
-        }),
-        models: models
-            .into_iter()
-            .map(models::Draft::finish)
-            .collect::<Option<_>>()?,
+        text: text?,
+        consent,
+        session: session?,
+        trial: trial?,
+        models: models?,
         questions: all(questions)?,
         setup: all(setup)?,
         intake: all(intake)?,
@@ -239,125 +244,6 @@ fn read<'d, 't>(reader: &Reader<'d, 't>, named: &mut Vec<Named>) -> Option<Proto
 
 fn all(drafts: Vec<questions::Draft>) -> Option<Vec<Question>> {
     drafts.into_iter().map(questions::Draft::finish).collect()
-}
-
-const RESUME_WITHIN_H: f64 = 4.0;
-
-fn study<'d, 't>(reader: &Reader<'d, 't>, root: &mut Table<'d, 't>) -> Option<Study> {
-    let mut table = reader.section(root, "study", "it needs an id, a title and a seed")?;
-    let id = reader
-        .need(
-            &mut table,
-            "id",
-            "it names the results folder, such as \"turn-signal\"",
-        )
-        .and_then(|value| {
-            let id = value.text()?;
-            let good = (1..=64).contains(&id.len())
-                && id
-                    .chars()
-                    .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
-            if !good {
-                value.fault(
-                    Fault::error(format!("`{}` is no study id", Untrusted(&id)))
-                        .label("use 1 to 64 of a-z 0-9 -"),
-                );
-            }
-            good.then_some(id)
-        });
-    let title = reader.need_text(&mut table, "title", "a line for people");
-    let seed = reader
-        .need(
-            &mut table,
-            "seed",
-            "any whole number; every order of the study follows from it",
-        )
-        .and_then(|value| {
-            let seed = u64::try_from(value.i64()?).ok();
-            if seed.is_none() {
-                value.fault(Fault::error("`study.seed` cannot be below 0"));
-            }
-            seed
-        });
-    let authors = table
-        .value("authors")
-        .and_then(|v| v.array())
-        .unwrap_or_default()
-        .iter()
-        .filter_map(prose)
-        .collect();
-    let license = reader.text(&mut table, "license");
-    let ethics = reader.text(&mut table, "ethics");
-    let contact = reader.text(&mut table, "contact");
-    let funding = reader.text(&mut table, "funding");
-    let doi = reader.text(&mut table, "doi");
-    table.finish();
-    Some(Study {
-        id: id?,
-        title: title?,
-        seed: seed?,
-        authors,
-        license,
-        ethics,
-        contact,
-        funding,
-        doi,
-    })
-}
-
-fn texts<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> Text {
-    let text = Text {
-        welcome: reader.text(&mut table, "welcome"),
-        instructions: reader.text(&mut table, "instructions"),
-        practice: reader.text(&mut table, "practice"),
-        rest: reader.text(&mut table, "break"),
-        end: reader.text(&mut table, "end"),
-        lang: reader.text(&mut table, "lang"),
-    };
-    table.finish();
-    text
-}
-
-fn consent<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> Option<Consent> {
-    let document = reader.need_text(&mut table, "document", "the title or file name of the form");
-    let version = reader.need_text(&mut table, "version", "which one was signed, such as \"2\"");
-    table.finish();
-    Some(Consent {
-        document: document?,
-        version: version?,
-    })
-}
-
-fn session<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> SessionRules {
-    let entry = table
-        .word(
-            "entry",
-            &[
-                ("participant", Entry::Participant),
-                ("experimenter", Entry::Experimenter),
-            ],
-        )
-        .unwrap_or(Entry::Participant);
-    let resume_within_h = reader
-        .duration(&mut table, "resume_within_h")
-        .unwrap_or(RESUME_WITHIN_H);
-    table.finish();
-    SessionRules {
-        entry,
-        resume_within_h,
-    }
-}
-
-fn trial<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> TrialRules {
-    let rules = TrialRules {
-        reference: reader.text(&mut table, "reference"),
-        reference_min_s: reader
-            .duration(&mut table, "reference_min_s")
-            .unwrap_or(0.0),
-        minimum_strokes: table.u32("minimum_strokes").unwrap_or(0),
-    };
-    table.finish();
-    rules
 }
 
 #[cfg(test)]

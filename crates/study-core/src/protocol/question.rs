@@ -1,39 +1,39 @@
-//! Questions and answers: every kind declares here what it accepts.
+//! Questions, answers, and which answers a question accepts.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use study_base::text::QuestionId;
 use unicode_segmentation::UnicodeSegmentation as _;
 
-/// Longest text that an answer or remark may have, bytes. What is longer is cut
-/// on a character with a notice before it is confirmed, never after.
+/// Longest text of an answer or remark, bytes. Longer text is cut between
+/// characters, with a notice, before it is confirmed.
 pub const MAX_TEXT_BYTES: usize = 4096;
 
 /// A question to a participant or an experimenter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Question {
-    /// Its name; a column of `ratings.csv` or `participants.csv`.
+    /// Its name, also of its column in `ratings.csv` or `participants.csv`.
     pub id: QuestionId,
-    /// What is asked, in any language.
+    /// The text of the question, in any language.
     pub prompt: String,
-    /// What can be answered.
+    /// Which answers are possible.
     pub kind: QuestionKind,
-    /// Whether it can be left empty (text is by default optional, the rest not).
-    /// "Declined", with a reason, is possible always.
+    /// Whether an answer is required; by default for every kind but text.
+    /// Declining, with a reason, is always possible.
     pub required: bool,
 }
 
-/// What can be answered to a question.
+/// The kind of a question, which decides what its answers are.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum QuestionKind {
     /// A whole number on a labelled scale.
     Rating {
-        /// Smallest.
+        /// Smallest rating.
         from: i64,
-        /// Largest, above `from`.
+        /// Largest rating, above `from`.
         to: i64,
-        /// Words at some of the numbers.
+        /// Labels of some of the ratings.
         labels: BTreeMap<i64, String>,
     },
     /// A number on a continuous scale.
@@ -42,14 +42,14 @@ pub enum QuestionKind {
         from: f64,
         /// Right end, above `from`.
         to: f64,
-        /// What one key press moves.
+        /// How far one key press moves it.
         step: f64,
-        /// Words at the two ends (keys are the ends as text).
+        /// Labels of the two ends, by the end as text.
         labels: BTreeMap<String, String>,
     },
     /// One or several of a list.
     Choice {
-        /// What there is to choose from; no two alike.
+        /// The options, no two alike.
         options: Vec<String>,
         /// Whether several can be chosen.
         multiple: bool,
@@ -67,7 +67,7 @@ pub enum QuestionKind {
     Text,
 }
 
-/// What was answered.
+/// An answer to a question.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
@@ -79,15 +79,58 @@ pub enum Answer {
     Choice(Vec<String>),
     /// To a text, as typed.
     Text(String),
-    /// To any question: none, and why.
+    /// To any question: declined.
     Declined {
-        /// The participant's or experimenter's words.
+        /// The reason, as typed.
         reason: String,
     },
 }
 
+/// Why an answer is not accepted, as a request to the person who gave it.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum AnswerError {
+    /// Declined without a reason.
+    #[error("say why it is declined")]
+    NoReason,
+    /// Outside a scale, with its ends.
+    #[error("choose {0} to {1}")]
+    OffScale(f64, f64),
+    /// Outside the range of a number.
+    #[error("{}", range(*.min, *.max))]
+    OutOfRange {
+        /// Smallest number that is accepted.
+        min: Option<f64>,
+        /// Largest number that is accepted.
+        max: Option<f64>,
+    },
+    /// Not an option of the list, or chosen too often.
+    #[error("choose from the list")]
+    NotAnOption,
+    /// No option chosen, although one is required.
+    #[error("choose one")]
+    NothingChosen,
+    /// No text, although it is required.
+    #[error("an answer is needed")]
+    Empty,
+    /// Text longer than [`MAX_TEXT_BYTES`].
+    #[error("at most {MAX_TEXT_BYTES} bytes")]
+    TooLong,
+    /// An answer to another kind of question.
+    #[error("the answer is of another kind than the question")]
+    OtherKind,
+}
+
+fn range(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(a), Some(b)) => format!("a number from {a} to {b}"),
+        (Some(a), None) => format!("a number from {a} up"),
+        (None, Some(b)) => format!("a number up to {b}"),
+        (None, None) => "a number".to_owned(),
+    }
+}
+
 impl Answer {
-    /// As a number, where it is one.
+    /// The answer as a number, if it is one.
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Rating(n) => Some(*n as f64),
@@ -101,8 +144,8 @@ impl Answer {
         matches!(self, Self::Declined { .. })
     }
 
-    /// As it stands in a cell of a CSV: numbers plain, choices joined by `; `,
-    /// declined empty.
+    /// The cell of a CSV: a number, the chosen options joined by `; `, the text, or
+    /// nothing if declined.
     pub fn cell(&self) -> String {
         match self {
             Self::Rating(n) => n.to_string(),
@@ -118,78 +161,56 @@ impl Question {
     /// Checks an answer against the question.
     ///
     /// # Errors
-    /// A short sentence that says what is accepted, for the person who typed it.
-    pub fn accepts(&self, answer: &Answer) -> Result<(), String> {
+    /// [`AnswerError`] if the answer is not accepted.
+    pub fn accepts(&self, answer: &Answer) -> Result<(), AnswerError> {
+        let when = |refused: bool, error| if refused { Err(error) } else { Ok(()) };
         match (&self.kind, answer) {
             (_, Answer::Declined { reason }) => {
-                if reason.trim().is_empty() {
-                    Err("say why it is declined".to_owned())
-                } else {
-                    fits(reason)
-                }
+                when(reason.trim().is_empty(), AnswerError::NoReason)?;
+                fits(reason)
             }
-            (QuestionKind::Rating { from, to, .. }, Answer::Rating(n)) => {
-                if (from..=to).contains(&n) {
-                    Ok(())
-                } else {
-                    Err(format!("choose {from} to {to}"))
-                }
+            (&QuestionKind::Rating { from, to, .. }, Answer::Rating(n)) => {
+                let scale = AnswerError::OffScale(from as f64, to as f64);
+                when(!(from..=to).contains(n), scale)
             }
-            (QuestionKind::Slider { from, to, .. }, Answer::Number(n)) => {
-                if (from..=to).contains(&n) {
-                    Ok(())
-                } else {
-                    Err(format!("choose {from} to {to}"))
-                }
+            (&QuestionKind::Slider { from, to, .. }, Answer::Number(n)) => {
+                when(!(from..=to).contains(n), AnswerError::OffScale(from, to))
             }
-            (QuestionKind::Number { min, max, .. }, Answer::Number(n)) => {
+            (&QuestionKind::Number { min, max, .. }, Answer::Number(n)) => {
                 let low = min.is_some_and(|m| *n < m);
                 let high = max.is_some_and(|m| *n > m);
-                if n.is_finite() && !low && !high {
-                    Ok(())
-                } else {
-                    Err(match (min, max) {
-                        (Some(a), Some(b)) => format!("a number from {a} to {b}"),
-                        (Some(a), None) => format!("a number from {a} up"),
-                        (None, Some(b)) => format!("a number up to {b}"),
-                        (None, None) => "a number".to_owned(),
-                    })
-                }
+                let range = AnswerError::OutOfRange { min, max };
+                when(!n.is_finite() || low || high, range)
             }
             (QuestionKind::Choice { options, multiple }, Answer::Choice(chosen)) => {
                 let known = chosen.iter().all(|c| options.contains(c));
                 let once = (1..chosen.len()).all(|i| !chosen[..i].contains(&chosen[i]));
                 let count = *multiple || chosen.len() <= 1;
-                if !known || !once || !count {
-                    Err("choose from the list".to_owned())
-                } else if chosen.is_empty() && self.required {
-                    Err("choose one".to_owned())
-                } else {
-                    Ok(())
-                }
+                when(!known || !once || !count, AnswerError::NotAnOption)?;
+                when(
+                    chosen.is_empty() && self.required,
+                    AnswerError::NothingChosen,
+                )
             }
             (QuestionKind::Text, Answer::Text(text)) => {
-                if text.trim().is_empty() && self.required {
-                    Err("an answer is needed".to_owned())
-                } else {
-                    fits(text)
-                }
+                when(text.trim().is_empty() && self.required, AnswerError::Empty)?;
+                fits(text)
             }
-            _ => Err("the answer is of another kind than the question".to_owned()),
+            _ => Err(AnswerError::OtherKind),
         }
     }
 }
 
-fn fits(text: &str) -> Result<(), String> {
+fn fits(text: &str) -> Result<(), AnswerError> {
     if text.len() > MAX_TEXT_BYTES {
-        Err(format!("at most {MAX_TEXT_BYTES} bytes"))
+        Err(AnswerError::TooLong)
     } else {
         Ok(())
     }
 }
 
-/// Cuts text to [`MAX_TEXT_BYTES`] between what a reader sees as characters;
-/// says whether anything was cut.
+/// Cuts text to [`MAX_TEXT_BYTES`] between grapheme clusters; also returns whether
+/// anything was cut.
 pub fn cut_to_fit(text: &str) -> (&str, bool) {
     if text.len() <= MAX_TEXT_BYTES {
         return (text, false);
@@ -260,10 +281,8 @@ mod tests {
             assert!(number.accepts(&Answer::Number(bad)).is_err(), "{bad}");
         }
         assert!(slider.accepts(&Answer::Number(0.25)).is_ok());
-        assert_eq!(
-            number.accepts(&Answer::Number(100.0)),
-            Err("a number up to 99".to_owned())
-        );
+        let refused = number.accepts(&Answer::Number(100.0)).unwrap_err();
+        assert_eq!(refused.to_string(), "a number up to 99");
     }
 
     #[test]

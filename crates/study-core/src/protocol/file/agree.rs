@@ -1,9 +1,9 @@
 //! Whether the sections of a file agree: ids that collide, ids that nobody has,
 //! rules that the device cannot keep.
 
-use super::{models, questions};
+use super::{Named, models, questions};
 use crate::protocol::columns::{is_participants_column, is_ratings_column};
-use crate::protocol::{AnalysisRules, Design, DeviceKind, DeviceRules, QuestionKind, Role};
+use crate::protocol::{AnalysisRules, Design, DeviceKind, DeviceRules, Order, QuestionKind, Role};
 use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
 use study_base::text::{ModelId, QuestionId, Untrusted};
@@ -23,6 +23,26 @@ pub(super) struct Draft<'a> {
 }
 
 impl Draft<'_> {
+    /// The other files that the protocol names.
+    pub(super) fn files(&self) -> Vec<Named> {
+        let models = self.models.iter().filter_map(|model| {
+            Some(Named {
+                place: format!("{}.file", model.path),
+                file: model.file.clone()?,
+                orders: false,
+            })
+        });
+        let orders = match self.design.map(|design| &design.order) {
+            Some(Order::File(file)) => Some(Named {
+                place: "design.order.file".to_owned(),
+                file: file.clone(),
+                orders: true,
+            }),
+            _ => None,
+        };
+        models.chain(orders).collect()
+    }
+
     /// Reports every disagreement.
     pub(super) fn agree(&self, document: &Document<'_>) {
         self.something_to_feel_and_ask(document);

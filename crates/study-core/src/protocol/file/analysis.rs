@@ -1,104 +1,95 @@
-//! `[analysis]`: what was decided before the data.
+//! `[analysis]`: decisions that were made before the data.
 
-use super::reader::{Reader, finite, question_id};
-use crate::protocol::{AnalysisRules, ExclusionRule, Unfinished};
-use std::collections::BTreeMap;
-use study_base::diagnostic::table::Table;
-use study_base::diagnostic::{Fault, did_you_mean};
-use study_base::text::Untrusted;
+use super::section::{Section, Variant, shapes};
+use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
+use crate::protocol::{AnalysisRules, Exclusion, Unfinished};
 
-/// The exclusion rules and the parameter that each has to have, if any:
-///
-/// * `constant-rater`: the primary rating never changes.
-/// * `hidden-reference-below`: mean primary rating of the hidden references under
-///   `rating`.
-/// * `strokes-below`: a trial with fewer full strokes than `strokes`.
-/// * `inconsistent`: mean distance between a realization and its hidden duplicate
-///   above `difference`, in points of the primary scale.
-pub const EXCLUSIONS: [(&str, &[&str]); 4] = [
-    ("constant-rater", &[]),
-    ("hidden-reference-below", &["rating"]),
-    ("strokes-below", &["strokes"]),
-    ("inconsistent", &["difference"]),
+pub(super) const ANALYSIS: &[Key] = keys! {
+    /// The id of the question that the analysis is about: a rating, a slider or a number
+    /// of `[[questions]]`.
+    "primary": Kind::Id(Id::Question), r#""realism""#, required;
+    /// The recording whose VAF counts, by its name in the model files; the same for all
+    /// realizations. Needed if a model file has several.
+    "vaf": Kind::Text, r#""validation-1.5hz""#;
+    /// The least rating that counts as realistic. It has to be on the primary scale.
+    "realistic_from": Kind::ANY_NUMBER, "5";
+    /// The margin of the equivalence test against a hidden reference: smaller differences
+    /// count as none.
+    "equivalence_margin": Kind::positive("points of the primary scale"), "0.5";
+    /// Whether the ratings of unfinished sessions and of drop-outs are analyzed.
+    "unfinished": Kind::Word(Unfinished::WORDS), r#""exclude""#, default(r#""include""#);
+    /// Exclusion rules stated before the data. Every rule judges the rows that count
+    /// without any rule, so that the order of the rules does not matter. The report shows
+    /// the results with and without them.
+    "exclude": Kind::Variants(&EXCLUDE), "";
+};
+
+static EXCLUDE: Variants = Variants {
+    tag: "rule",
+    effect: "The name of the rule",
+    common: &[],
+    shapes: &SHAPES,
+};
+
+static SHAPES: [Shape; RULES.len()] = shapes(&RULES);
+
+/// The exclusion rules. A new one is declared here, in [`Exclusion`], and judged
+/// in `analyze/exclude.rs`.
+const RULES: [Variant<Exclusion>; 4] = [
+    Variant::new(
+        "constant-rater",
+        "Excludes participants with two or more primary ratings that are all equal.",
+        &[],
+        |_| Some(Exclusion::ConstantRater),
+    ),
+    Variant::new(
+        "hidden-reference-below",
+        "Excludes participants whose mean primary rating of the hidden references is too low.",
+        keys! {
+            /// The least mean rating.
+            "rating": Kind::ANY_NUMBER, "5", required;
+        },
+        |section| {
+            section
+                .number("rating")
+                .map(Exclusion::HiddenReferenceBelow)
+        },
+    ),
+    Variant::new(
+        "strokes-below",
+        "Excludes trials with too few full strokes. Trials whose strokes were not counted stay.",
+        keys! {
+            /// The least number of strokes.
+            "strokes": Kind::ANY_NUMBER, "2", required;
+        },
+        |section| section.number("strokes").map(Exclusion::StrokesBelow),
+    ),
+    Variant::new(
+        "inconsistent",
+        "Excludes participants who rate a realization and its hidden duplicate too differently.",
+        keys! {
+            /// The largest mean distance between the two, in points of the primary scale.
+            "difference": Kind::ANY_NUMBER, "1.5", required;
+        },
+        |section| section.number("difference").map(Exclusion::Inconsistent),
+    ),
 ];
 
-/// The section; `None` if a part of it is faulty.
-pub(super) fn read<'d, 't>(
-    reader: &Reader<'d, 't>,
-    root: &mut Table<'d, 't>,
-) -> Option<AnalysisRules> {
-    let mut table = reader.section(root, "analysis", "it needs the id of the primary question")?;
-    let primary = reader
-        .need(
-            &mut table,
-            "primary",
-            "the id of the question that the analysis is about",
-        )
-        .and_then(|v| question_id(&v));
-    let vaf = reader.text(&mut table, "vaf");
-    let realistic_from = reader.number(&mut table, "realistic_from");
-    let equivalence_margin = table.value("equivalence_margin").and_then(|v| {
-        let margin = finite(&v)?;
-        if margin <= 0.0 {
-            v.fault(
-                Fault::error("an equivalence margin has to be above 0")
-                    .hint("differences from a hidden reference below it count as none"),
-            );
-            return None;
-        }
-        Some(margin)
-    });
-    let unfinished = table
-        .word(
-            "unfinished",
-            &[
-                ("include", Unfinished::Include),
-                ("exclude", Unfinished::Exclude),
-            ],
-        )
-        .unwrap_or(Unfinished::Include);
-    let exclude = table
-        .tables("exclude")
-        .into_iter()
-        .filter_map(|table| exclusion(reader, table))
+pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
+    let primary = section.question_id("primary");
+    let vaf = section.text("vaf");
+    let realistic_from = section.number("realistic_from");
+    let equivalence_margin = section.number("equivalence_margin");
+    let unfinished = section.word("unfinished");
+    let exclude = (section.variants("exclude", &RULES).into_iter())
+        .filter_map(|(mut section, rule)| (rule?.read)(&mut section))
         .collect();
-    table.finish();
     Some(AnalysisRules {
         primary: primary?,
         vaf,
         realistic_from,
         equivalence_margin,
-        unfinished,
+        unfinished: unfinished?,
         exclude,
-    })
-}
-
-fn exclusion<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> Option<ExclusionRule> {
-    let names = EXCLUSIONS.map(|(name, _)| name);
-    let value = reader.need(
-        &mut table,
-        "rule",
-        "one of `constant-rater`, `hidden-reference-below`, `strokes-below`, `inconsistent`",
-    )?;
-    let rule = value.text()?;
-    let Some((_, parameters)) = EXCLUSIONS.iter().find(|(name, _)| *name == rule) else {
-        let fault = Fault::error(format!("`{}` is no exclusion rule", Untrusted(&rule)));
-        value.fault(match did_you_mean(&rule, names) {
-            Some(near) => fault.label(format!("did you mean `{near}`?")),
-            None => fault.hint(format!("there are {}", names.join(", "))),
-        });
-        return None;
-    };
-    let mut given = BTreeMap::new();
-    for parameter in *parameters {
-        let value = reader.need(&mut table, parameter, "a number");
-        if let Some(number) = value.and_then(|v| finite(&v)) {
-            given.insert((*parameter).to_owned(), number);
-        }
-    }
-    table.finish();
-    Some(ExclusionRule {
-        rule,
-        parameters: given,
     })
 }

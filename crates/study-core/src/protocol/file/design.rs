@@ -1,75 +1,79 @@
 //! `[design]`.
 
-use super::reader::{Reader, count, duration, inner_path, model_id};
+use super::section::Section;
+use crate::protocol::keys::{Key, Kind, Word, Words, keys};
 use crate::protocol::{Breaks, Design, Order};
-use study_base::diagnostic::Fault;
-use study_base::diagnostic::table::{Table, Value};
 
-const MAX_ATTEMPTS: u32 = 3;
+pub(super) const DESIGN: &[Key] = keys! {
+    /// How many participants are planned. An analysis of fewer is reported as interim.
+    "participants": Kind::Whole(1, 100_000), "10", required;
+    /// How often each participant rates each realization.
+    "repetitions": Kind::Whole(1, 10_000), "3", required;
+    /// How the order of the trials is made. [schedule.md](schedule.md) specifies each.
+    "order": Kind::WordOrTable(Order::WORDS, ORDER_FILE), r#""blocked""#, required;
+    /// The largest number of consecutive trials with the same realization; 1 forbids the
+    /// same realization twice in a row.
+    "max_run": Kind::COUNT, "1";
+    /// The least distance between two positions of the same realization.
+    "min_distance": Kind::COUNT, "2";
+    /// The realizations of the practice trials, in this order, before all other trials.
+    /// Practice is never analyzed.
+    "practice": Kind::ModelIds, r#"["spring"]"#;
+    /// Breaks between trials.
+    "breaks": Kind::Table(BREAKS), "{ every = 8, at_least_s = 60 }";
+    /// Failed attempts after which a trial is closed as failed and the session goes on. A
+    /// trial fails if the device does, or if somebody marks it as bad; until then it
+    /// comes back at the end of its block.
+    "max_attempts": Kind::COUNT, "5", default("3");
+};
 
-/// Largest number of participants and of repetitions: above it is a slip.
-const MAX_PARTICIPANTS: u32 = 100_000;
-const MAX_REPETITIONS: u32 = 10_000;
-
-#[derive(Debug, Clone, Copy)]
-enum Word {
-    Blocked,
-    Shuffled,
-    Williams,
-    LatinSquare,
-    Fixed,
+impl Words for Order {
+    const VALUES: &'static [(&'static str, Self)] = &[
+        ("blocked", Self::Blocked),
+        ("shuffled", Self::Shuffled),
+        ("williams", Self::Williams),
+        ("latin-square", Self::LatinSquare),
+        ("fixed", Self::Fixed),
+    ];
+    const WORDS: &'static [Word] = &[
+        Word::new(
+            "blocked",
+            "A new random permutation of the realizations in each repetition.",
+        ),
+        Word::new("shuffled", "One random order of all trials."),
+        Word::new(
+            "williams",
+            "Lines of a Williams design: positions and first-order carry-over are balanced.",
+        ),
+        Word::new(
+            "latin-square",
+            "Lines of a cyclic Latin square: positions are balanced.",
+        ),
+        Word::new("fixed", "The order of `[[models]]`, in each repetition."),
+    ];
 }
 
-const ORDERS: [(&str, Word); 5] = [
-    ("blocked", Word::Blocked),
-    ("shuffled", Word::Shuffled),
-    ("williams", Word::Williams),
-    ("latin-square", Word::LatinSquare),
-    ("fixed", Word::Fixed),
-];
+const ORDER_FILE: &[Key] = keys! {
+    /// A CSV file of orders with the columns `row,position,model`, one line a trial.
+    "file": Kind::Path, r#""orders.csv""#, required;
+};
 
-/// The section; `None` if a part of it is faulty.
-pub(super) fn read<'d, 't>(reader: &Reader<'d, 't>, root: &mut Table<'d, 't>) -> Option<Design> {
-    let mut table = reader.section(
-        root,
-        "design",
-        "it needs participants, repetitions and order",
-    )?;
-    let participants = reader.need_count(&mut table, "participants", "how many are planned");
-    let repetitions = reader.need_count(
-        &mut table,
-        "repetitions",
-        "how often each realization is felt",
-    );
-    for (key, given, most) in [
-        ("participants", participants, MAX_PARTICIPANTS),
-        ("repetitions", repetitions, MAX_REPETITIONS),
-    ] {
-        if given.is_some_and(|n| n > most) {
-            table.fault_at(key, Fault::error(format!("`design.{key}` is above {most}")));
-        }
-    }
-    let order = reader
-        .need(
-            &mut table,
-            "order",
-            "one of `blocked`, `shuffled`, `williams`, `latin-square`, `fixed`, or { file = \"orders.csv\" }",
-        )
-        .and_then(order);
-    let max_run = reader.count(&mut table, "max_run");
-    let min_distance = reader.count(&mut table, "min_distance");
-    let practice = table
-        .value("practice")
-        .and_then(|v| v.array())
-        .unwrap_or_default()
-        .iter()
-        .filter_map(model_id)
-        .collect();
-    let breaks = table.value("breaks").map(breaks_of(reader));
-    let max_attempts = reader
-        .count(&mut table, "max_attempts")
-        .unwrap_or(MAX_ATTEMPTS);
-    table.finish();
+const BREAKS: &[Key] = keys! {
+    /// Trials between two breaks; practice is not counted.
+    "every": Kind::COUNT, "8", required;
+    /// The least duration of a break.
+    "at_least_s": Kind::not_negative("s"), "60", default("0");
+};
+
+pub(super) fn read(mut section: Section<'_, '_>) -> Option<Design> {
+    let participants = section.whole("participants");
+    let repetitions = section.whole("repetitions");
+    let order = order(&mut section);
+    let max_run = section.whole("max_run");
+    let min_distance = section.whole("min_distance");
+    let practice = section.model_ids("practice");
+    let breaks = section.section("breaks").and_then(breaks);
+    let max_attempts = section.whole("max_attempts");
     Some(Design {
         participants: participants?,
         repetitions: repetitions?,
@@ -77,45 +81,23 @@ pub(super) fn read<'d, 't>(reader: &Reader<'d, 't>, root: &mut Table<'d, 't>) ->
         max_run,
         min_distance,
         practice,
-        breaks: match breaks {
-            Some(breaks) => Some(breaks?),
-            None => None,
-        },
-        max_attempts,
+        breaks,
+        max_attempts: max_attempts?,
     })
 }
 
-fn order(value: Value<'_, '_>) -> Option<Order> {
+fn order(section: &mut Section<'_, '_>) -> Option<Order> {
+    let value = section.value("order")?;
     if !value.is_table() {
-        return Some(match value.word(&ORDERS)? {
-            Word::Blocked => Order::Blocked,
-            Word::Shuffled => Order::Shuffled,
-            Word::Williams => Order::Williams,
-            Word::LatinSquare => Order::LatinSquare,
-            Word::Fixed => Order::Fixed,
-        });
+        return value.word(Order::VALUES);
     }
-    let mut table = value.table()?;
-    let file = table.required("file").and_then(|v| inner_path(&v));
-    table.finish();
-    Some(Order::File(file?))
+    section.section("order")?.path_of("file").map(Order::File)
 }
 
-fn breaks_of<'d, 't>(reader: &Reader<'d, 't>) -> impl FnOnce(Value<'d, 't>) -> Option<Breaks> {
-    let reader = *reader;
-    move |value| {
-        let mut table = value.table()?;
-        let every = reader
-            .need(&mut table, "every", "after so many trials")
-            .and_then(|v| count(&v));
-        let at_least_s = match table.value("at_least_s") {
-            Some(value) => duration(&value),
-            None => Some(0.0),
-        };
-        table.finish();
-        Some(Breaks {
-            every: every?,
-            at_least_s: at_least_s?,
-        })
-    }
+fn breaks(mut section: Section<'_, '_>) -> Option<Breaks> {
+    let (every, at_least_s) = (section.whole("every"), section.number("at_least_s"));
+    Some(Breaks {
+        every: every?,
+        at_least_s: at_least_s?,
+    })
 }

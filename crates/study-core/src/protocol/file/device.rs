@@ -1,105 +1,87 @@
 //! `[device]`.
 
-use super::models::DEVICES;
-use super::reader::Reader;
+use super::section::Section;
+use crate::protocol::keys::{Key, Kind, Words as _, keys};
 use crate::protocol::{DeviceKind, DeviceRules, Uncertified};
 use study_base::diagnostic::Fault;
-use study_base::diagnostic::table::Table;
 use study_base::limits::{Limit, Limits};
 
-/// The section; `None` if a part of it is faulty.
-pub(super) fn read<'d, 't>(
-    reader: &Reader<'d, 't>,
-    root: &mut Table<'d, 't>,
-) -> Option<DeviceRules> {
-    let mut table = reader.section(root, "device", "such as kind = \"simulated\"")?;
-    let kind = reader
-        .need(
-            &mut table,
-            "kind",
-            "one of `simulated`, `serial`, `process`, `manual`",
-        )
-        .and_then(|v| v.word(&DEVICES));
-    let value = if kind == Some(DeviceKind::Manual) {
-        table.value("limits")
-    } else {
-        reader.need(
-            &mut table,
-            "limits",
-            "such as limits = { force_n = 12.0, velocity_mm_s = 1000.0 }",
-        )
-    };
-    let given = value.is_some();
-    let limits = value.and_then(|v| v.table()).and_then(|mut limits| {
-        let force_n = reader.need_limit(&mut limits, "force_n", "the largest force, N");
-        let velocity_mm_s = reader.need_limit(
-            &mut limits,
-            "velocity_mm_s",
-            "the speed at which the device trips, mm/s",
+pub(super) const DEVICE: &[Key] = keys! {
+    /// The kind of device that plays the realizations. Port, baud rate and command belong
+    /// to the laboratory, not to the study: they are arguments of `study run`.
+    "kind": Kind::Word(DeviceKind::WORDS), r#""simulated""#, required;
+    /// Limits that no playback exceeds. The lower of these and the device's own apply.
+    "limits": Kind::Table(LIMITS), "{ force_n = 12.0, velocity_mm_s = 1000.0 }", derived("required, unless `kind` is `manual`");
+    /// Permission to play tables that fail their passivity certificate, which could put
+    /// energy into the hand. Without it such a table is refused.
+    "uncertified": Kind::Table(UNCERTIFIED), r#"{ play = true, force_n = 9.0, reason = "the paper's own realizations" }"#;
+};
+
+const LIMITS: &[Key] = keys! {
+    /// The largest force.
+    "force_n": Kind::positive("N"), "12.0", required;
+    /// The speed of the handle above which the device stops.
+    "velocity_mm_s": Kind::positive("mm/s"), "1000.0", required;
+};
+
+const UNCERTIFIED: &[Key] = keys! {
+    /// Whether such tables are played.
+    "play": Kind::Flag, "true", required;
+    /// The largest force for such tables, at most `limits.force_n`.
+    "force_n": Kind::positive("N"), "9.0", required;
+    /// Why they are played; recorded in every session.
+    "reason": Kind::Text, r#""the paper's own realizations""#, required;
+};
+
+pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
+    let kind = section.word("kind");
+    let given = section.value("limits").is_some();
+    let limits = section.section("limits").and_then(limits);
+    let uncertified = section.section("uncertified").and_then(uncertified);
+    if !given && kind != Some(DeviceKind::Manual) {
+        section.report_missing("limits", section.key("limits").such_as());
+    }
+    if let (Some(uncertified), Some(limits)) = (&uncertified, limits)
+        && uncertified.force_n > limits.force_n
+    {
+        section.fault_at_path(
+            "device.uncertified.force_n",
+            Fault::error(format!(
+                "`device.uncertified.force_n` is {} N, above `device.limits.force_n`, {} N",
+                uncertified.force_n.get(),
+                limits.force_n.get()
+            )),
         );
-        limits.finish();
-        Some(Limits {
-            force_n: force_n?,
-            velocity_mm_s: velocity_mm_s?,
-        })
-    });
-    let uncertified = table
-        .table("uncertified")
-        .map(|table| uncertified(reader, table, limits.as_ref()));
-    table.finish();
-    let limits = match limits {
-        Some(limits) => limits,
-        // A sample mounted by hand plays no table: nothing is ever held to these.
-        None if !given && kind == Some(DeviceKind::Manual) => unplayed_limits()?,
-        None => return None,
-    };
+    }
     Some(DeviceRules {
         kind: kind?,
-        limits,
-        uncertified: match uncertified {
-            Some(uncertified) => Some(uncertified?),
-            None => None,
+        limits: match limits {
+            Some(limits) => limits,
+            // A sample mounted by hand plays no table: these limits are never used.
+            None if !given => Limits {
+                force_n: Limit::new(12.0).ok()?,
+                velocity_mm_s: Limit::new(1000.0).ok()?,
+            },
+            None => return None,
         },
+        uncertified,
     })
 }
 
-fn unplayed_limits() -> Option<Limits> {
+fn limits(mut section: Section<'_, '_>) -> Option<Limits> {
+    let (force_n, velocity_mm_s) = (section.limit("force_n"), section.limit("velocity_mm_s"));
     Some(Limits {
-        force_n: Limit::new(12.0).ok()?,
-        velocity_mm_s: Limit::new(1000.0).ok()?,
+        force_n: force_n?,
+        velocity_mm_s: velocity_mm_s?,
     })
 }
 
-fn uncertified<'d, 't>(
-    reader: &Reader<'d, 't>,
-    mut table: Table<'d, 't>,
-    limits: Option<&Limits>,
-) -> Option<Uncertified> {
-    let play = reader
-        .need(&mut table, "play", "true or false")
-        .and_then(|v| v.bool());
-    let force_n = reader.need_limit(&mut table, "force_n", "the largest force for them, N");
-    let reason = reader.need_text(&mut table, "reason", "it stands in every session");
-    table.finish();
-    if let (Some(force), Some(limits)) = (force_n, limits)
-        && force > limits.force_n
-    {
-        above_the_limit(reader, force, limits.force_n);
-    }
+fn uncertified(mut section: Section<'_, '_>) -> Option<Uncertified> {
+    let (play, force_n) = (section.flag("play"), section.limit("force_n"));
+    let reason = section.text("reason");
     Some(Uncertified {
         play: play?,
         force_n: force_n?,
         reason: reason?,
     })
-}
-
-fn above_the_limit(reader: &Reader<'_, '_>, force: Limit, limit: Limit) {
-    reader.document.fault(
-        Fault::error(format!(
-            "`device.uncertified.force_n` is {} N, above `device.limits.force_n`, {} N",
-            force.get(),
-            limit.get()
-        ))
-        .at(reader.document.span_of("device.uncertified.force_n")),
-    );
 }

@@ -1,20 +1,43 @@
 //! `[[models]]`.
 
-use super::reader::{Reader, finite, inner_path, model_id};
+use super::section::Section;
+use crate::protocol::keys::{Id, Key, Kind, NumberRange, Words as _, keys};
 use crate::protocol::{DeviceKind, ModelEntry, Role};
 use std::collections::BTreeMap;
+use std::ops::Bound;
 use study_base::diagnostic::Fault;
-use study_base::diagnostic::table::Table;
 use study_base::text::{ModelId, QuestionId};
 
-/// A model entry with its place; `id` is `None` if it is faulty.
+const AT_MOST_1: NumberRange = (Bound::Unbounded, Bound::Included(1.0));
+
+pub(super) const MODELS: &[Key] = keys! {
+    /// The name of the realization in every file.
+    "id": Kind::Id(Id::Model), r#""lambda-0.9995""#, required;
+    /// Its model file. Simulated and serial devices need one.
+    "file": Kind::Path, r#""models/lambda-0.9995.toml""#, derived("the file of `duplicate_of`, if any");
+    /// Its variance accounted for, VAF = 1 − var(F − F̂) / var(F). If the model file has
+    /// a VAF, too, the two have to agree in the digits given here.
+    "vaf": Kind::Number(AT_MOST_1, ""), "0.96", derived("the VAF in the model file, if any");
+    /// Its role in the study.
+    "role": Kind::Word(Role::WORDS), r#""hidden-reference""#, default(r#""test""#);
+    /// The realization of which this one is a hidden duplicate, to measure consistency.
+    "duplicate_of": Kind::Id(Id::Model), r#""lambda-0.9991""#;
+    /// Its own kind of device. Only `manual`, a sample mounted by hand, can differ from
+    /// `[device]`.
+    "device": Kind::Word(DeviceKind::WORDS), r#""manual""#, derived("`device.kind`");
+    /// Numbers that may explain the ratings. Each becomes a column of the results and is
+    /// correlated with the ratings.
+    "covariates": Kind::Numbers, "{ lambda = 0.9995, dx_mm = 1.0 }";
+};
+
+/// An entry that may be faulty in part.
 #[derive(Debug)]
 pub(super) struct Draft {
     /// Such as `models[0]`.
     pub(super) path: String,
     pub(super) id: Option<ModelId>,
     pub(super) file: Option<String>,
-    /// Whether the file has a `file` key, good or not.
+    /// Whether there is a `file` key, faulty or not.
     pub(super) has_file: bool,
     pub(super) vaf: Option<f64>,
     pub(super) role: Role,
@@ -38,86 +61,31 @@ impl Draft {
     }
 }
 
-const ROLES: [(&str, Role); 5] = [
-    ("test", Role::Test),
-    ("practice", Role::Practice),
-    ("hidden-reference", Role::HiddenReference),
-    ("low-anchor", Role::LowAnchor),
-    ("physical", Role::Physical),
-];
-
-/// The kinds of device, as words.
-pub(super) const DEVICES: [(&str, DeviceKind); 4] = [
-    ("simulated", DeviceKind::Simulated),
-    ("serial", DeviceKind::Serial),
-    ("process", DeviceKind::Process),
-    ("manual", DeviceKind::Manual),
-];
-
-/// All models.
-pub(super) fn read<'d, 't>(reader: &Reader<'d, 't>, root: &mut Table<'d, 't>) -> Vec<Draft> {
-    root.tables("models")
-        .into_iter()
-        .map(|table| model(reader, table))
-        .collect()
-}
-
-fn model<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> Draft {
-    let path = table.path().to_owned();
-    let id = reader
-        .need(&mut table, "id", "it names the realization in every file")
-        .and_then(|v| model_id(&v));
-    let file = table.value("file");
-    let has_file = file.is_some();
-    let file = file.and_then(|v| inner_path(&v));
-    let vaf = table.value("vaf").and_then(|v| {
-        let vaf = v.f64()?;
-        if vaf.is_nan() || vaf > 1.0 || vaf == f64::NEG_INFINITY {
-            v.fault(
-                Fault::error(format!(
-                    "`{}` has to be a number up to 1, not {vaf}",
-                    v.path()
-                ))
-                .hint("VAF = 1 − var(F − F̂) / var(F)"),
-            );
-            return None;
-        }
-        Some(vaf)
-    });
-    let role = table.word("role", &ROLES).unwrap_or(Role::Test);
-    let duplicate_of = table.value("duplicate_of").and_then(|v| model_id(&v));
-    let device = table.word("device", &DEVICES);
-    let covariates = covariates(&mut table);
-    table.finish();
+pub(super) fn read(mut section: Section<'_, '_>) -> Draft {
+    let has_file = section.value("file").is_some();
     Draft {
-        path,
-        id,
-        file,
+        path: section.path().to_owned(),
+        id: section.model_id("id"),
+        file: section.path_of("file"),
         has_file,
-        vaf,
-        role,
-        duplicate_of,
-        device,
-        covariates,
+        vaf: section.number("vaf"),
+        role: section.word("role").unwrap_or(Role::Test),
+        duplicate_of: section.model_id("duplicate_of"),
+        device: section.word("device"),
+        covariates: covariates(&mut section),
     }
 }
 
-fn covariates(table: &mut Table<'_, '_>) -> BTreeMap<String, f64> {
+fn covariates(section: &mut Section<'_, '_>) -> BTreeMap<String, f64> {
     let mut covariates = BTreeMap::new();
-    let Some(mut table) = table.table("covariates") else {
-        return covariates;
-    };
-    for (key, _) in table.keys() {
-        let Some(value) = table.value(&key) else {
-            continue;
-        };
-        if QuestionId::new(key.as_str()).is_err() {
+    for (name, value) in section.entries("covariates") {
+        if QuestionId::new(name.as_str()).is_err() {
             value.fault(Fault::error(
                 "a covariate names a column: use 1 to 32 of A-Z a-z 0-9 _ -",
             ));
         }
-        if let Some(number) = finite(&value) {
-            covariates.insert(key, number);
+        if let Some(number) = super::section::number(&value, Kind::ANY_NUMBER) {
+            covariates.insert(name, number);
         }
     }
     covariates

@@ -205,7 +205,7 @@ mod tests {
                 "line 2 has 2 of 3 columns",
                 "row has to be a whole number from 1, not `0`",
                 "position has to be a whole number from 1, not `x`",
-                "`a/b` is no model id: use 1 to 32 of A-Z a-z 0-9 . _ -",
+                "`a/b` is not a model id: use 1 to 32 of A-Z a-z 0-9 . _ -",
                 "row 1 has position 1 twice",
             ]
         );

@@ -1,16 +1,91 @@
 //! `[[questions]]`, `[[setup]]`, `[[intake]]`, `[[outro]]`: the same kinds in each.
 
-use super::reader::{Reader, finite, prose, question_id};
+use super::section::{Section, Variant, shapes, text};
+use crate::protocol::keys::{Id, Kind, Shape, Variants, keys};
 use crate::protocol::{Question, QuestionKind};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use study_base::diagnostic::Fault;
-use study_base::diagnostic::table::{Table, Value};
 use study_base::text::{QuestionId, Untrusted};
 
 /// Most points of a rating scale: one key or click each.
 const MAX_RATING_POINTS: i64 = 101;
 
-/// A question with its place; parts that are faulty are `None`.
+pub(super) static QUESTIONS: Variants = Variants {
+    tag: "kind",
+    effect: "The kind of answer",
+    common: keys! {
+        /// The name of the question and of its column in the results.
+        "id": Kind::Id(Id::Question), r#""realism""#, required;
+        /// What is asked, in any language.
+        "prompt": Kind::Text, r#""How realistic did it feel?""#, required;
+        /// Whether an answer is needed. "Declined", with a reason, is always an answer.
+        "required": Kind::Flag, "false", derived("`false` for a text, else `true`");
+    },
+    shapes: &SHAPES,
+};
+
+static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
+
+/// The kinds of question. A new one is declared here and in [`QuestionKind`].
+const KINDS: [Variant<QuestionKind>; 5] = [
+    Variant::new(
+        "rating",
+        "A whole number on a labelled scale.",
+        keys! {
+            /// The smallest rating.
+            "from": Kind::ANY_WHOLE, "1", required;
+            /// The largest rating, above `from`. A scale has at most 101 points.
+            "to": Kind::ANY_WHOLE, "7", required;
+            /// Texts at some of the numbers.
+            "labels": Kind::WholeLabels, r#"{ 1 = "not at all realistic", 7 = "very realistic" }"#;
+        },
+        rating,
+    ),
+    Variant::new(
+        "slider",
+        "A number on a continuous scale.",
+        keys! {
+            /// The left end.
+            "from": Kind::ANY_NUMBER, "0", required;
+            /// The right end, above `from`.
+            "to": Kind::ANY_NUMBER, "100", required;
+            /// How far one key press moves the slider.
+            "step": Kind::positive(""), "5", derived("a hundredth of the scale");
+            /// Texts at the two ends.
+            "labels": Kind::NumberLabels, r#"{ 0 = "not at all", 100 = "completely" }"#;
+        },
+        slider,
+    ),
+    Variant::new(
+        "choice",
+        "One or several of a list of options.",
+        keys! {
+            /// The options, no two alike. With `multiple`, none contains a `;`, which
+            /// separates them in the results.
+            "options": Kind::Texts(1), r#"["left", "right", "both"]"#, required;
+            /// Whether several can be chosen.
+            "multiple": Kind::Flag, "true", default("false");
+        },
+        choice,
+    ),
+    Variant::new(
+        "number",
+        "A number that is typed.",
+        keys! {
+            /// The unit, shown with the prompt and recorded in the data dictionary.
+            "unit": Kind::Text, r#""years""#;
+            /// The smallest number that is accepted.
+            "min": Kind::ANY_NUMBER, "18";
+            /// The largest number that is accepted.
+            "max": Kind::ANY_NUMBER, "99";
+        },
+        number,
+    ),
+    Variant::new("text", "Free text.", &[], |_| Some(QuestionKind::Text)),
+];
+
+/// A question that may be faulty in part.
 #[derive(Debug)]
 pub(super) struct Draft {
     /// Such as `questions[0]`.
@@ -35,84 +110,25 @@ impl Draft {
     }
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Word {
-    Rating,
-    Slider,
-    Choice,
-    Number,
-    Text,
-}
-
-const KINDS: [(&str, Word); 5] = [
-    ("rating", Word::Rating),
-    ("slider", Word::Slider),
-    ("choice", Word::Choice),
-    ("number", Word::Number),
-    ("text", Word::Text),
-];
-
-/// All questions of one array.
-pub(super) fn read<'d, 't>(
-    reader: &Reader<'d, 't>,
-    root: &mut Table<'d, 't>,
-    name: &str,
-) -> Vec<Draft> {
-    root.tables(name)
-        .into_iter()
-        .map(|table| question(reader, table))
+/// All questions of an array.
+pub(super) fn read(root: &mut Section<'_, '_>, name: &str) -> Vec<Draft> {
+    (root.variants(name, &KINDS).into_iter())
+        .map(|(mut section, kind)| Draft {
+            path: section.path().to_owned(),
+            id: section.question_id("id"),
+            prompt: section.text("prompt"),
+            required: section.flag("required"),
+            kind: kind.and_then(|kind| (kind.read)(&mut section)),
+        })
         .collect()
 }
 
-fn question<'d, 't>(reader: &Reader<'d, 't>, mut table: Table<'d, 't>) -> Draft {
-    let path = table.path().to_owned();
-    let id = reader
-        .need(&mut table, "id", "it names a column of the results")
-        .and_then(|v| question_id(&v));
-    let prompt = reader.need_text(&mut table, "prompt", "the words that are shown");
-    let required = table.bool("required");
-    let word = reader
-        .need(
-            &mut table,
-            "kind",
-            "one of `rating`, `slider`, `choice`, `number`, `text`",
-        )
-        .and_then(|v| v.word(&KINDS));
-    let Some(word) = word else {
-        // Which keys are known depends on the kind: nothing more can be said.
-        return Draft {
-            path,
-            id,
-            kind: None,
-            prompt,
-            required,
-        };
-    };
-    let kind = match word {
-        Word::Rating => rating(reader, &mut table),
-        Word::Slider => slider(reader, &mut table),
-        Word::Choice => choice(reader, &mut table),
-        Word::Number => number(reader, &mut table),
-        Word::Text => Some(QuestionKind::Text),
-    };
-    table.finish();
-    Draft {
-        path,
-        id,
-        kind,
-        prompt,
-        required,
-    }
-}
-
-fn rating<'d, 't>(reader: &Reader<'d, 't>, table: &mut Table<'d, 't>) -> Option<QuestionKind> {
-    let from = reader.need(table, "from", "the smallest rating, such as 1");
-    let to = reader.need(table, "to", "the largest rating, such as 7");
-    let labels = table.value("labels");
-    let (from, to) = (from?.i64()?, to?.i64()?);
-    upright(table, from < to, from, to)?;
+fn rating(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
+    let (from, to) = (section.whole::<i64>("from"), section.whole::<i64>("to"));
+    let (from, to) = (from?, to?);
+    ascending(section, from, to)?;
     if to.checked_sub(from).is_none_or(|n| n >= MAX_RATING_POINTS) {
-        table.fault_at(
+        section.fault_at(
             "to",
             Fault::error(format!(
                 "a rating has at most {MAX_RATING_POINTS} points, not {from} to {to}"
@@ -121,54 +137,48 @@ fn rating<'d, 't>(reader: &Reader<'d, 't>, table: &mut Table<'d, 't>) -> Option<
         );
         return None;
     }
-    let mut words = BTreeMap::new();
-    for (key, label) in labels.map(entries).unwrap_or_default() {
+    let mut labels = BTreeMap::new();
+    for (key, label) in section.entries("labels") {
         match key.parse::<i64>() {
             Ok(at) if (from..=to).contains(&at) => {
-                words.insert(at, prose(&label)?);
+                labels.insert(at, text(&label)?);
             }
             Ok(at) => label.fault(Fault::error(format!(
                 "the label at {at} is outside the scale {from} to {to}"
             ))),
             Err(_) => label.fault(
                 Fault::error(format!(
-                    "a label stands at a whole number, not at `{}`",
+                    "a label belongs to a whole number, not to `{}`",
                     Untrusted(&key)
                 ))
                 .hint("such as labels = { 1 = \"not at all\", 7 = \"very\" }"),
             ),
         }
     }
-    Some(QuestionKind::Rating {
-        from,
-        to,
-        labels: words,
-    })
+    Some(QuestionKind::Rating { from, to, labels })
 }
 
-fn slider<'d, 't>(reader: &Reader<'d, 't>, table: &mut Table<'d, 't>) -> Option<QuestionKind> {
-    let from = reader.need(table, "from", "the left end, such as 0");
-    let to = reader.need(table, "to", "the right end, such as 100");
-    let step = reader.number(table, "step");
-    let labels = table.value("labels");
-    let (from, to) = (finite(&from?)?, finite(&to?)?);
-    upright(table, from < to, from, to)?;
+fn slider(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
+    let (from, to) = (section.number("from"), section.number("to"));
+    let step = section.number("step");
+    let (from, to) = (from?, to?);
+    ascending(section, from, to)?;
     let step = step.unwrap_or((to - from) / 100.0);
     if !(step > 0.0 && step <= to - from) {
-        table.fault_at(
+        section.fault_at(
             "step",
             Fault::error(format!(
                 "`{}.step` has to be above 0 and at most {}, not {step}",
-                table.path(),
+                section.path(),
                 to - from
             )),
         );
     }
-    let mut words = BTreeMap::new();
-    for (key, label) in labels.map(entries).unwrap_or_default() {
+    let mut labels = BTreeMap::new();
+    for (key, label) in section.entries("labels") {
         match key.parse::<f64>() {
             Ok(at) if at == from || at == to => {
-                words.insert(at.to_string(), prose(&label)?);
+                labels.insert(at.to_string(), text(&label)?);
             }
             _ => label.fault(Fault::error(format!(
                 "a slider has labels at its ends, {from} and {to}, not at `{}`",
@@ -180,23 +190,15 @@ fn slider<'d, 't>(reader: &Reader<'d, 't>, table: &mut Table<'d, 't>) -> Option<
         from,
         to,
         step,
-        labels: words,
+        labels,
     })
 }
 
-fn choice<'d, 't>(reader: &Reader<'d, 't>, table: &mut Table<'d, 't>) -> Option<QuestionKind> {
-    let multiple = table.bool("multiple").unwrap_or(false);
-    let options = reader.need(table, "options", "a list of what can be chosen")?;
-    let mut seen: Vec<String> = Vec::new();
-    let values = options.array()?;
-    if values.is_empty() {
-        options.fault(Fault::error(format!("`{}` is empty", options.path())));
-    }
-    for value in values {
-        let Some(option) = prose(&value) else {
-            continue;
-        };
-        if seen.iter().any(|s| s.trim() == option.trim()) {
+fn choice(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
+    let multiple = section.flag("multiple")?;
+    let mut options: Vec<String> = Vec::new();
+    for (value, option) in section.texts("options") {
+        if options.iter().any(|o| o.trim() == option.trim()) {
             value.fault(Fault::error(format!(
                 "`{}` is there twice",
                 Untrusted(&option)
@@ -204,61 +206,42 @@ fn choice<'d, 't>(reader: &Reader<'d, 't>, table: &mut Table<'d, 't>) -> Option<
         }
         if multiple && option.contains(';') {
             value.fault(
-                Fault::error("an option of a choice of several cannot hold a `;`")
-                    .hint("it stands between the options that were chosen, in the results"),
+                Fault::error("an option of a multiple choice cannot contain a `;`")
+                    .hint("it separates the chosen options in the results"),
             );
         }
-        seen.push(option);
+        options.push(option);
     }
-    Some(QuestionKind::Choice {
-        options: seen,
-        multiple,
-    })
+    Some(QuestionKind::Choice { options, multiple })
 }
 
-fn number<'d, 't>(reader: &Reader<'d, 't>, table: &mut Table<'d, 't>) -> Option<QuestionKind> {
-    let unit = reader.text(table, "unit");
-    let min = reader.number(table, "min");
-    let max = reader.number(table, "max");
+fn number(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
+    let unit = section.text("unit");
+    let (min, max) = (section.number("min"), section.number("max"));
     if let (Some(min), Some(max)) = (min, max)
         && min > max
     {
-        table.fault_at(
+        section.fault_at(
             "min",
-            Fault::error(format!("nothing lies between min = {min} and max = {max}"))
-                .hint("swap them"),
+            Fault::error(format!(
+                "no number lies between min = {min} and max = {max}"
+            ))
+            .hint("swap them"),
         );
     }
     Some(QuestionKind::Number { unit, min, max })
 }
 
-/// The keys and values of a table of labels.
-fn entries<'d, 't>(labels: Value<'d, 't>) -> Vec<(String, Value<'d, 't>)> {
-    let Some(mut table) = labels.table() else {
-        return Vec::new();
-    };
-    table
-        .keys()
-        .into_iter()
-        .filter_map(|(key, _)| table.value(&key).map(|value| (key, value)))
-        .collect()
-}
-
-/// Reports a scale that does not go up.
-fn upright(
-    table: &Table<'_, '_>,
-    up: bool,
-    from: impl std::fmt::Display,
-    to: impl std::fmt::Display,
-) -> Option<()> {
-    if up {
+/// Reports a scale that does not ascend.
+fn ascending<T: PartialOrd + Display>(section: &Section<'_, '_>, from: T, to: T) -> Option<()> {
+    if from < to {
         return Some(());
     }
-    table.fault_at(
+    section.fault_at(
         "from",
         Fault::error(format!(
-            "the scale of `{}` is upside down: from {from} to {to}",
-            table.path()
+            "the scale of `{}` is reversed: from {from} to {to}",
+            section.path()
         ))
         .label("has to be below `to`"),
     );

@@ -1,5 +1,5 @@
 use super::*;
-use crate::protocol::{Answer, DeviceKind, Order, QuestionKind, Role};
+use crate::protocol::{Answer, DeviceKind, Entry, Order, QuestionKind, Role, Text};
 
 const LEAST: &str = r#"
 format = "study-protocol/1"
@@ -216,7 +216,10 @@ strokes = 2
             .is_ok()
     );
     assert!(!p.outro[0].required);
-    assert_eq!(p.analysis.exclude[1].parameters["strokes"], 2.0);
+    assert_eq!(
+        p.analysis.exclude[1],
+        crate::protocol::Exclusion::StrokesBelow(2.0)
+    );
     assert_eq!(p.scheduled_models().count(), 3);
 }
 
@@ -226,7 +229,7 @@ fn a_limit_that_is_no_limit_is_named() {
         let found = changed("force_n = 12.0", &format!("force_n = {bad}"));
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(
-            found[0].starts_with("`device.limits.force_n`: a limit has to be a finite number"),
+            found[0].starts_with("`device.limits.force_n` has to be a finite number above 0, not "),
             "{found:?}"
         );
     }
@@ -304,13 +307,13 @@ fn fixed_columns_are_taken() {
 fn scales_options_and_ranges_have_to_make_sense() {
     assert_eq!(
         changed("from = 1", "from = 7"),
-        ["the scale of `questions[0]` is upside down: from 7 to 7"]
+        ["the scale of `questions[0]` is reversed: from 7 to 7"]
     );
     assert_eq!(
         changed("to = 7", "to = 7\nlabels = { 0 = \"none\", x = \"?\" }"),
         [
             "the label at 0 is outside the scale 1 to 7",
-            "a label stands at a whole number, not at `x`"
+            "a label belongs to a whole number, not to `x`"
         ]
     );
     assert_eq!(
@@ -332,7 +335,7 @@ fn scales_options_and_ranges_have_to_make_sense() {
     );
     assert_eq!(
         question("kind = \"number\"\nmin = 3\nmax = 2"),
-        ["nothing lies between min = 3 and max = 2"]
+        ["no number lies between min = 3 and max = 2"]
     );
     assert_eq!(
         question("kind = \"number\"\nmin = nan"),
@@ -340,7 +343,7 @@ fn scales_options_and_ranges_have_to_make_sense() {
     );
     assert_eq!(
         question("kind = \"slider\"\nfrom = 0\nto = 1\nstep = 0"),
-        ["`outro[0].step` has to be above 0 and at most 1, not 0"]
+        ["`outro[0].step` has to be a finite number above 0, not 0"]
     );
 }
 
@@ -418,7 +421,7 @@ fn a_device_that_plays_tables_needs_files() {
 fn seed_and_counts_are_whole_and_not_negative() {
     assert_eq!(
         changed("seed = 1", "seed = -1"),
-        ["`study.seed` cannot be below 0"]
+        ["`study.seed` has to be a whole number, 0 or more, not -1"]
     );
     assert_eq!(
         changed("seed = 1", "seed = 2.5"),
@@ -431,14 +434,14 @@ fn seed_and_counts_are_whole_and_not_negative() {
     assert_eq!(changed("seed = 1\n", ""), ["[study] has no `seed`"]);
     assert_eq!(
         changed("repetitions = 1", "repetitions = 0"),
-        ["`design.repetitions` has to be at least 1"]
+        ["`design.repetitions` has to be a whole number from 1 to 10000, not 0"]
     );
     assert_eq!(
         changed(
             "order = \"blocked\"",
             "order = \"blocked\"\nbreaks = { every = 0 }"
         ),
-        ["`design.breaks.every` has to be at least 1"]
+        ["`design.breaks.every` has to be a whole number, 1 or more, not 0"]
     );
     for bad in ["Turn", "", "a_b", "../x"] {
         assert_eq!(changed("id = \"s\"", &format!("id = \"{bad}\"")).len(), 1);
@@ -519,6 +522,8 @@ fn any_text_is_read_without_a_panic() {
     let bom = format!("\u{feff}{LEAST}");
     assert!(parse("p", &bom).protocol.is_some());
 }
+
+mod keys;
 
 mod random {
     use super::*;

@@ -128,7 +128,7 @@ fn every_fault_has_its_line() {
         (
             "id = \"a\"",
             "id = \"../a\"",
-            "2: `../a` is no model id: use 1 to 32 of A-Z a-z 0-9 . _ -",
+            "2: `../a` is not a model id: use 1 to 32 of A-Z a-z 0-9 . _ -",
         ),
         ("\"floor\"", "\"flor\"", "3: `lookup` cannot be `flor`"),
         (

@@ -1,0 +1,130 @@
+//! `[study]`, `[text]`, `[consent]`, `[session]` and `[trial]`.
+
+use super::section::Section;
+use crate::protocol::keys::{Id, Key, Kind, Words as _, keys};
+use crate::protocol::{Consent, Entry, SessionRules, Study, Text, TrialRules};
+
+pub(super) const STUDY: &[Key] = keys! {
+    /// The name of the study and of its results folder.
+    "id": Kind::Id(Id::Study), r#""turn-signal""#, required;
+    /// The title, for people. It heads reports and exports.
+    "title": Kind::Text, r#""Realism of turn-signal switch models""#, required;
+    /// The seed of all randomness. Every order of the study follows from it; another seed
+    /// is another study.
+    "seed": Kind::Whole(0, i64::MAX), "2007", required;
+    /// The authors of the study, for exports.
+    "authors": Kind::Texts(0), r#"["A. Researcher", "B. Researcher"]"#;
+    /// The license of the data, for exports.
+    "license": Kind::Text, r#""CC-BY-4.0""#;
+    /// The number of the ethics approval, or a statement about it.
+    "ethics": Kind::Text, r#""IRB 2007-12""#;
+    /// Whom to contact about the study.
+    "contact": Kind::Text, r#""lab@example.org""#;
+    /// Who funded the study.
+    "funding": Kind::Text, r#""Grant 1234""#;
+    /// The DOI of the study or of its paper.
+    "doi": Kind::Text, r#""10.1000/182""#;
+};
+
+pub(super) const TEXT: &[Key] = keys! {
+    /// The first screen of the participant.
+    "welcome": Kind::Text, r#""Welcome, and thank you for taking part.""#;
+    /// Shown before the first trial.
+    "instructions": Kind::Text, r#""Feel each realization, then rate it.""#;
+    /// Shown before the practice trials.
+    "practice": Kind::Text, r#""Two trials to practice come first.""#;
+    /// Shown during a break.
+    "break": Kind::Text, r#""Please rest your hand.""#;
+    /// The last screen of the participant.
+    "end": Kind::Text, r#""That was all. Thank you!""#;
+    /// The language of the study's texts, as a BCP 47 tag. Reports mark quoted texts with
+    /// it.
+    "lang": Kind::Text, r#""en""#;
+};
+
+pub(super) const CONSENT: &[Key] = keys! {
+    /// The title or file name of the document that the participant agrees to. The session
+    /// asks for consent before anything else; no name is stored.
+    "document": Kind::Text, r#""Consent to take part""#, required;
+    /// The version of the document. It is recorded with the time of the consent.
+    "version": Kind::Text, r#""2""#, required;
+};
+
+pub(super) const SESSION: &[Key] = keys! {
+    /// Who types the participant's answers. Each has screens of their own.
+    "entry": Kind::Word(Entry::WORDS), r#""experimenter""#, default(r#""participant""#);
+    /// The longest interruption after which a session simply resumes. After a longer one
+    /// the operator chooses: restart the block, continue (which is recorded), or record a
+    /// drop-out.
+    "resume_within_h": Kind::not_negative("h"), "2.5", default("4");
+};
+
+pub(super) const TRIAL: &[Key] = keys! {
+    /// The instruction about the reference, shown before each trial.
+    "reference": Kind::Text, r#""Operate the real switch.""#;
+    /// The least time that the reference screen stays.
+    "reference_min_s": Kind::not_negative("s"), "5", default("0");
+    /// Full strokes, counted from telemetry, before the questions of a trial open. A
+    /// device without telemetry, such as a sample mounted by hand, cannot count them.
+    "minimum_strokes": Kind::Whole(0, u32::MAX as i64), "2", default("0");
+};
+
+pub(super) fn study(mut section: Section<'_, '_>) -> Option<Study> {
+    let (id, title) = (section.study_id("id"), section.text("title"));
+    let seed = section.whole("seed");
+    let authors = section
+        .texts("authors")
+        .into_iter()
+        .map(|(_, name)| name)
+        .collect();
+    let license = section.text("license");
+    let ethics = section.text("ethics");
+    let contact = section.text("contact");
+    let funding = section.text("funding");
+    let doi = section.text("doi");
+    Some(Study {
+        id: id?,
+        title: title?,
+        seed: seed?,
+        authors,
+        license,
+        ethics,
+        contact,
+        funding,
+        doi,
+    })
+}
+
+pub(super) fn text(mut section: Section<'_, '_>) -> Text {
+    Text {
+        welcome: section.text("welcome"),
+        instructions: section.text("instructions"),
+        practice: section.text("practice"),
+        rest: section.text("break"),
+        end: section.text("end"),
+        lang: section.text("lang"),
+    }
+}
+
+pub(super) fn consent(mut section: Section<'_, '_>) -> Option<Consent> {
+    let (document, version) = (section.text("document"), section.text("version"));
+    Some(Consent {
+        document: document?,
+        version: version?,
+    })
+}
+
+pub(super) fn session(mut section: Section<'_, '_>) -> Option<SessionRules> {
+    Some(SessionRules {
+        entry: section.word("entry")?,
+        resume_within_h: section.number("resume_within_h")?,
+    })
+}
+
+pub(super) fn trial(mut section: Section<'_, '_>) -> Option<TrialRules> {
+    Some(TrialRules {
+        reference: section.text("reference"),
+        reference_min_s: section.number("reference_min_s")?,
+        minimum_strokes: section.whole("minimum_strokes")?,
+    })
+}
