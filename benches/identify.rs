@@ -10,6 +10,7 @@
 use std::fmt::Write as _;
 use study_haptics::identify::grid::{self, Plan};
 use study_haptics::identify::lanes::Processor;
+use study_haptics::identify::method::Ewls;
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{Training, vaf};
 use study_haptics::recording::{self, Recording};
@@ -142,7 +143,9 @@ fn fig4_naive(bencher: divan::Bencher<'_, '_>, rate: u32) {
     let training = Training::new(&train).expect("both directions are there");
     bencher.bench_local(|| {
         for lambda in LAMBDAS {
-            let estimates = training.estimates(lambda).expect("λ is in range");
+            let estimates = training
+                .estimates(Ewls::paper(lambda, Resample::Point))
+                .expect("λ is in range");
             for dx in DX_MM {
                 let found = training
                     .ewls(&estimates, dx, Resample::Bin, Lookup::Linear)
@@ -190,7 +193,8 @@ mod per_sample_and_lambda {
             .counter(divan::counter::ItemsCount::new(train.len() * LAMBDAS.len()))
             .bench_local(|| {
                 for lambda in LAMBDAS {
-                    divan::black_box(training.estimates(lambda)).expect("λ is in range");
+                    divan::black_box(training.estimates(Ewls::paper(lambda, Resample::Point)))
+                        .expect("λ is in range");
                 }
             });
     }

@@ -17,7 +17,7 @@ fn training() -> Trajectory {
 fn a_recording_of_60_s(bencher: Bencher, rate_hz: f64) {
     let (trajectory, target) = (training(), Parameters::a());
     let probe = Probe::default();
-    bencher.bench_local(|| probe.impose(black_box(&trajectory), &target, rate_hz, 1));
+    bencher.bench_local(|| probe.record(black_box(&trajectory), &target, rate_hz, 1));
 }
 
 #[divan::bench(sample_count = 5)]

@@ -1,15 +1,15 @@
 #!/bin/sh
-# Makes the model files of both protocols again, from trajectory to realization:
+# Reproduces the model files of both protocols, from trajectory to realization:
 #
 #     sh protocols/identify.sh
 #
-# The simulated probe records switch B at 10 kHz; the recordings, 35 MB, go to a
-# temporary folder, or to the one that RECORDINGS names. Seeds are fixed, so that
-# every run makes the same recordings and the same files, to the last byte. STUDY
-# names another program than the one that cargo builds, PROTOCOLS another folder
-# than this one for the model files. Takes seconds.
+# The simulated probe records switch B at 10 kHz; the recordings, 35 MB, are written to
+# a temporary folder, or to the folder RECORDINGS. Seeds are fixed, so every run gives
+# the same recordings and files, byte for byte. STUDY is the program to run instead of
+# the one that cargo builds, PROTOCOLS the folder for the model files instead of this
+# one. Takes seconds.
 #
-# tests/identify_shipped.rs holds that what is shipped is what this makes.
+# tests/identify/shipped.rs compares the shipped files with these.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -58,11 +58,11 @@ enum Command {
     Amend(amend::Args),
     /// Verify all journals and the files derived from them
     Verify(verify::Args),
-    /// Generate an excitation trajectory and check it against the limits
+    /// Draw a trajectory and check it against the limits of probe and target
     Trajectory(trajectory::Args),
     /// Move the probe along a trajectory and record the response
     Record(record::Args),
-    /// Identify realizations from recordings: model files and their VAF
+    /// Identify realizations from a recording: model files and their VAF
     Identify(Box<identify::Args>),
     /// Write a commented protocol as a starting point
     New(new::Args),

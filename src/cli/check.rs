@@ -162,7 +162,7 @@ fn certificates(loaded: &load::Loaded) -> String {
         let certificate = realization.certificate();
         failing += usize::from(!certificate.passes());
         out += &format!("{id}: {certificate}\n");
-        out += &format!("    {}\n", super::identify::needs(&certificate));
+        out += &format!("    {}\n", super::identify::required_damping(&certificate));
     }
     if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {
         out += &format!(

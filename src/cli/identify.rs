@@ -6,45 +6,43 @@ mod output;
 
 pub(super) use args::Args;
 
+use super::console::{PATIENCE, progress};
 use super::{Console, Failure, Kind};
-use args::{AccelerationWord, Named};
-use indicatif::{ProgressBar, ProgressStyle};
+use args::NamedPath;
+use indicatif::ProgressBar;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use study_base::text::Untrusted;
 use study_haptics::identify::grid::{self, Cell, Plan};
-use study_haptics::identify::signal::{self, Excitation};
+use study_haptics::identify::signal::{self, Acceleration, Excitation, filter};
 use study_haptics::identify::validation::{self, Ceiling, Validation};
 use study_haptics::identify::{IdentifyError, Training};
 use study_haptics::recording::{self, Recording};
 use study_wire::certificate::{Certificate, SERVO_RATES_HZ};
 
-/// The filter of [`signal::prepare`], for model files.
-const FILTER: &str = "zero-phase low-pass, Butterworth of 2nd order both ways,";
-
-/// What was identified, for [`output`] and [`files`].
-struct Found<'a> {
+/// The results of an identification, for [`output`] and [`files`].
+struct Results<'a> {
     args: &'a Args,
     training: &'a Recording,
-    /// Validations, then tests.
-    recordings: Vec<(&'a Named, &'a Recording)>,
+    /// The --validate recordings, then the --test recordings.
+    recordings: Vec<(&'a NamedPath, &'a Recording)>,
     cells: Vec<Cell>,
     best: Option<usize>,
-    /// The best cell on each of `recordings`.
+    /// The accuracy of the best cell on each of `recordings`.
     validations: Vec<Option<Validation>>,
-    /// For each of `recordings` what a repetition of it says, if there is one.
+    /// The ceiling of VAF on each of `recordings` that has a repetition.
     ceilings: Vec<Option<Ceiling>>,
-    /// Models and figures: path and content.
+    /// Model files and figures: path and content.
     files: Vec<(PathBuf, Vec<u8>)>,
 }
 
-impl Found<'_> {
-    /// The recording whose VAF is to be reported: the first that nothing was chosen
-    /// on, else the first.
+impl Results<'_> {
+    /// The recording whose VAF is to be reported: the first --test recording, or the
+    /// first --validate recording without one.
     fn reported(&self) -> usize {
         let validations = self.args.validate.len();
         if validations < self.recordings.len() {
@@ -55,7 +53,7 @@ impl Found<'_> {
     }
 }
 
-/// Does it.
+/// Identifies a grid of realizations, prints it and writes the files.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let plan = args.plan()?;
     let mut training = read(&args.training, args, console)?;
@@ -67,27 +65,28 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for named in &args.repeat {
         repeats.push((named, read(named, args, console)?));
     }
-    refuse_reuse(&args.training, &training, &recordings, &repeats)?;
+    check_distinct(&args.training, &training, &recordings, &repeats)?;
     if args.thin {
-        let (thinned, gone) = signal::thin(&training, signal::Dwell::default());
+        let (thinned, removed) = signal::thin(&training, signal::Dwell::default());
         console.say(format!(
-            "{gone} samples of dwells are left out of the training"
+            "{removed} samples of dwells removed from the training recording"
         ));
         training = thinned;
     }
-    if let Some(doubt) = Excitation::of(&training).warning() {
+    if let Some(warning) = Excitation::of(&training).warning() {
         console.say(format!(
-            "warning: {}: {doubt}",
+            "warning: {}: {warning}",
             args.training.path.display()
         ));
     }
-    let recordings: Vec<(&Named, &Recording)> = recordings.iter().map(|(n, r)| (*n, r)).collect();
+    let recordings: Vec<(&NamedPath, &Recording)> =
+        recordings.iter().map(|(n, r)| (*n, r)).collect();
     let ceilings = ceilings(&recordings, &repeats)?;
 
     let mut cells = identify(args, &plan, &training, &recordings)
         .map_err(|e| Failure::input(format!("{}: {e}", args.training.path.display())))?;
-    warn_of_other_filters(&training, &recordings, console);
-    let filter = signals_in_words(args, &training);
+    warn_about_filters(&training, &recordings, console);
+    let filter = filter_description(args, &training);
     for cell in &mut cells {
         cell.realization.provenance.filter = Some(filter.clone());
     }
@@ -100,7 +99,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             validation::validate(realization, recording, &detents)
         })
         .collect();
-    let mut found = Found {
+    let mut results = Results {
         args,
         training: &training,
         recordings,
@@ -111,33 +110,33 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: Vec::new(),
     };
     if let Some(dir) = &args.out {
-        found.files = files::models(&mut found.cells, args, dir)?;
-        files::write(dir, &found.files, args.force)?;
+        results.files = files::models(&mut results.cells, args, dir)?;
+        files::write(dir, &results.files, args.force)?;
     }
     if let Some(dir) = &args.figures {
-        let (figures, missing) = files::figures(&found, dir)?;
-        // they follow from the recordings: making them again is no loss
+        let (figures, missing) = files::figures(&results, dir)?;
+        // figures can be drawn again from the recordings, so overwriting loses nothing
         files::write(dir, &figures, true)?;
-        for said in missing {
-            console.say(format!("note: {said}"));
+        for note in missing {
+            console.say(format!("note: {note}"));
         }
-        found.files.extend(figures);
+        results.files.extend(figures);
     }
     if args.json {
-        console.out(output::json(&found))?;
+        console.out(output::json(&results))?;
     } else {
-        console.out(output::table(&found))?;
+        console.out(output::table(&results))?;
     }
-    for (path, _) in &found.files {
+    for (path, _) in &results.files {
         console.say(format!("wrote {}", path.display()));
     }
     Ok(())
 }
 
-/// What a device needs to render a table, in words; also for `study check`.
-pub(super) fn needs(certificate: &Certificate) -> String {
+/// The damping that a device needs to render a realization; also for `study check`.
+pub(super) fn required_damping(certificate: &Certificate) -> String {
     if certificate.stiffness_n_per_mm.is_infinite() {
-        return "its force jumps at nodes: no servo rate renders that".to_owned();
+        return "the force jumps at nodes: no servo rate suffices".to_owned();
     }
     let at = |hz: f64| {
         format!(
@@ -147,17 +146,17 @@ pub(super) fn needs(certificate: &Certificate) -> String {
         )
     };
     format!(
-        "K up to {:.2} N/mm, |b| up to {:.1} N·s/m: the device needs N·s/m of its own: {}",
+        "K up to {:.2} N/mm, |b| up to {:.1} N·s/m; required device damping in N·s/m: {}",
         certificate.stiffness_n_per_mm,
         1000.0 * certificate.damping_n_s_per_mm,
         SERVO_RATES_HZ.map(at).join(", ")
     )
 }
 
-/// Finds the recording that each repetition repeats.
+/// The ceiling of VAF on each recording, from the repetitions.
 fn ceilings(
-    recordings: &[(&Named, &Recording)],
-    repeats: &[(&Named, Recording)],
+    recordings: &[(&NamedPath, &Recording)],
+    repeats: &[(&NamedPath, Recording)],
 ) -> Result<Vec<Option<Ceiling>>, Failure> {
     let mut ceilings = vec![None; recordings.len()];
     for (named, repeat) in repeats {
@@ -168,53 +167,54 @@ fn ceilings(
             .min_by(|a, b| a.1.apart_mm.total_cmp(&b.1.apart_mm));
         let Some((i, ceiling)) = nearest else {
             return Err(Failure::input(format!(
-                "{} repeats the trajectory of no --validate or --test recording",
+                "{} does not repeat the trajectory of a --validate or --test recording",
                 named.path.display()
             ))
-            .hint("record the same trajectory twice: the second is the --repeat"));
+            .hint("record the same trajectory twice, and pass the second recording as --repeat"));
         };
         ceilings[i] = Some(ceiling);
     }
     Ok(ceilings)
 }
 
-/// A VAF belongs to its filter: this stands beside it and in model files.
-fn signals_in_words(args: &Args, training: &Recording) -> String {
-    let mut words = match (args.filter, training.filter()) {
-        (Some(hz), None) => format!("{FILTER} at {hz} Hz"),
-        (Some(hz), Some(before)) => format!("{FILTER} at {hz} Hz; before that {before}"),
+/// How the signals were filtered, for the table and model files: VAF depends on it.
+fn filter_description(args: &Args, training: &Recording) -> String {
+    let mut text = match (args.filter.map(filter::description), training.filter()) {
+        (Some(filter), None) => filter,
+        (Some(filter), Some(before)) => format!("{filter}; before that {before}"),
         (None, Some(recorded)) => format!("as recorded: {recorded}"),
         (None, None) => "as recorded".to_owned(),
     };
-    if let AccelerationWord::Encoder = args.acceleration {
-        words += ", acceleration from the encoder";
+    if args.acceleration == Acceleration::Encoder {
+        text += ", acceleration from the encoder";
     }
     if args.thin {
-        words += ", dwells thinned";
+        text += ", dwells thinned";
     }
-    words
+    text
 }
 
-/// Between signals that went through different filters a VAF is worth little.
-fn warn_of_other_filters(
+/// Warns if a recording was filtered differently from the training recording, which
+/// distorts its VAF.
+fn warn_about_filters(
     training: &Recording,
-    recordings: &[(&Named, &Recording)],
+    recordings: &[(&NamedPath, &Recording)],
     console: &mut Console,
 ) {
-    let words = |r: &Recording| Untrusted(r.filter().unwrap_or("unknown")).to_string();
+    let filter = |r: &Recording| Untrusted(r.filter().unwrap_or("unknown")).to_string();
     for (named, recording) in recordings {
         if recording.filter() != training.filter() {
             console.say(format!(
-                "warning: {}: its filter is not that of the training recording: {}, there {}",
+                "warning: {}: the filter ({}) differs from that of the training recording ({})",
                 named.path.display(),
-                words(recording),
-                words(training),
+                filter(recording),
+                filter(training),
             ));
         }
     }
 }
 
-fn read(named: &Named, args: &Args, console: &mut Console) -> Result<Recording, Failure> {
+fn read(named: &NamedPath, args: &Args, console: &mut Console) -> Result<Recording, Failure> {
     let path = &named.path;
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
     let recording = recording::read(&named.name, BufReader::with_capacity(1 << 16, file))
@@ -226,15 +226,15 @@ fn read(named: &Named, args: &Args, console: &mut Console) -> Result<Recording, 
         .map_err(|e| Failure::input(format!("{}: {e}", path.display())))
 }
 
-/// Two recordings with the same bytes are not independent, whatever they are
-/// called; and two with one name would be one entry of a model file.
-fn refuse_reuse(
-    training_name: &Named,
+/// Rejects recordings with the same bytes, which are not independent, and recordings
+/// with the same name, which would be one entry of a model file.
+fn check_distinct(
+    training_name: &NamedPath,
     training: &Recording,
-    recordings: &[(&Named, Recording)],
-    repeats: &[(&Named, Recording)],
+    recordings: &[(&NamedPath, Recording)],
+    repeats: &[(&NamedPath, Recording)],
 ) -> Result<(), Failure> {
-    let all: Vec<(&Named, &Recording)> = std::iter::once((training_name, training))
+    let all: Vec<(&NamedPath, &Recording)> = std::iter::once((training_name, training))
         .chain(recordings.iter().chain(repeats).map(|(n, r)| (*n, r)))
         .collect();
     for (i, (named, recording)) in all.iter().enumerate() {
@@ -245,7 +245,7 @@ fn refuse_reuse(
                     before.path.display(),
                     named.path.display()
                 ))
-                .hint("identify from one recording, choose on a second, report a third"));
+                .hint("identify from one recording, select on a second and report a third"));
             }
             if recording.name == other.name {
                 return Err(Failure::input(format!(
@@ -265,17 +265,17 @@ fn identify(
     args: &Args,
     plan: &Plan,
     training: &Recording,
-    recordings: &[(&Named, &Recording)],
+    recordings: &[(&NamedPath, &Recording)],
 ) -> Result<Vec<Cell>, IdentifyError> {
     let training = Training::new(training)?;
     let recordings: Vec<&Recording> = recordings.iter().map(|(_, r)| *r).collect();
     let progress = Progress::new(plan.cells());
-    grid::run(&training, plan, args.lookup(), &recordings, || {
+    grid::run(&training, plan, args.lookup, &recordings, || {
         progress.step()
     })
 }
 
-/// A bar on standard error that appears after a second, on a terminal only.
+/// A progress bar that appears after [`PATIENCE`].
 struct Progress {
     began: Instant,
     cells: u64,
@@ -293,16 +293,11 @@ impl Progress {
         }
     }
 
-    /// From any thread.
+    /// Counts a finished cell; called from any thread.
     fn step(&self) {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        if self.began.elapsed() > Duration::from_secs(1) {
-            let bar = self.bar.get_or_init(|| {
-                // indicatif draws nothing where standard error is no terminal
-                let style = ProgressStyle::with_template("{bar:30} {pos}/{len} cells, {eta} left")
-                    .unwrap_or_else(|_| ProgressStyle::default_bar());
-                ProgressBar::new(self.cells).with_style(style)
-            });
+        if self.began.elapsed() > PATIENCE {
+            let bar = self.bar.get_or_init(|| progress(self.cells, "cells"));
             bar.set_position(done);
         }
     }

@@ -1,8 +1,7 @@
-//! `study record`: the probe imposes a trajectory, a recording comes out.
+//! `study record`: move the probe along a trajectory and record the response.
 //!
-//! The probe and the target are the simulated ones, and the header of the recording
-//! then holds everything that it takes to make it again, to the byte; or a probe at the
-//! end of a [`wire`].
+//! With the simulated probe and target the header of the recording contains everything
+//! needed to reproduce it byte for byte. [`wire`] records with a probe on a serial port.
 
 mod wire;
 
@@ -14,14 +13,14 @@ use super::{Console, Failure, Kind};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use study_base::text::Untrusted;
-use study_haptics::identify::signal::{Excitation, LowPass, delay, difference, excitation};
-use study_haptics::plant::{self, Measured, Parameters, Probe, ProbeError};
+use study_haptics::identify::signal::{Excitation, LowPass, delay, difference, excitation, filter};
+use study_haptics::plant::{self, Measurement, Parameters, Probe, ProbeError};
 use study_haptics::recording::{self, Columns};
 use study_haptics::trajectory::{self, Trajectory};
 
-/// That of the recordings of the documentation, Hz.
+/// Default corner frequency of the filter, Hz, as in the documentation.
 const FILTER_HZ: f64 = 30.0;
-/// Rows of the picture of the excitation.
+/// Height of the chart of condition numbers, lines.
 const ROWS: usize = 4;
 
 /// Arguments of `study record`.
@@ -31,15 +30,15 @@ pub(super) struct Args {
     #[arg(value_name = "TRAJECTORY")]
     trajectory: PathBuf,
 
-    /// Write the recording here [default: standard output]
+    /// Write the recording to this file [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Samples a second
+    /// Sampling rate
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
     rate: f64,
 
-    /// What moves: the simulated probe and target, or a probe on a serial port
+    /// The probe: simulated (with a simulated target), or on a serial port
     #[arg(long, value_name = "KIND", value_parser = ["simulated", "serial"], default_value = "simulated")]
     device: String,
     #[command(flatten)]
@@ -48,28 +47,37 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 12.0)]
     max_force: f64,
 
-    /// The noise of the sensors
+    /// Seed of the sensors' noise
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
 
-    /// The target: a, b or a plant file
+    /// The simulated target: a, b or a plant file
     #[arg(long, value_name = "a|b|FILE", default_value = "a")]
     plant: String,
 
-    /// Corner of the zero-phase filter on x, a and F
+    /// Corner frequency of the zero-phase filter on x, a and F
     #[arg(long, value_name = "HZ", default_value_t = FILTER_HZ, conflicts_with = "raw")]
     filter: f64,
 
-    /// Write what the sensors say: no filter, no velocity
+    /// Write the unfiltered signals of the sensors, without velocity
     #[arg(long)]
     raw: bool,
 
-    /// Overwrite FILE if it is there
+    /// Overwrite FILE if it exists
     #[arg(long, requires = "out")]
     force: bool,
 }
 
-/// Does it.
+impl Args {
+    /// The filter; `None` with `--raw`.
+    fn low_pass(&self) -> Result<Option<LowPass>, Failure> {
+        (!self.raw)
+            .then(|| LowPass::new(self.filter, self.rate).map_err(Failure::input))
+            .transpose()
+    }
+}
+
+/// Records and writes the recording.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if args.device == "serial" {
         return wire::run(args, console);
@@ -77,27 +85,24 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if args.place.port.is_some() || args.place.baud.is_some() {
         return Err(Failure::new(
             Kind::Usage,
-            "--port makes no sense with the simulated probe",
+            "--port and --baud do not apply to the simulated probe",
         )
-        .hint("--device serial records with the probe at that port"));
+        .hint("--device serial records with the probe on that port"));
     }
     let trajectory = read_trajectory(&args.trajectory, console)?;
     let (name, target) = read_plant(&args.plant, console)?;
     refuse_to_overwrite(args.out.as_deref(), args.force)?;
-    let filter = match args.raw {
-        true => None,
-        false => Some(LowPass::new(args.filter, args.rate).map_err(Failure::input)?),
-    };
+    let filter = args.low_pass()?;
     let probe = Probe::default();
     let measured = probe
-        .impose(&trajectory, &target, args.rate, args.seed)
-        .map_err(|e| refused(args, &e))?;
+        .record(&trajectory, &target, args.rate, args.seed)
+        .map_err(|e| probe_failure(args, &e))?;
     let header = header(args, &trajectory, &name, &target, &probe);
     let bytes = recording_bytes(&trajectory, &measured, filter, args.rate, &header);
     finish(args, &bytes, console)
 }
 
-/// Tells what was recorded, and writes it.
+/// Prints a summary of the recording and writes it.
 fn finish(args: &Args, bytes: &[u8], console: &mut Console) -> Result<(), Failure> {
     summary(bytes, console);
     match &args.out {
@@ -110,15 +115,17 @@ fn finish(args: &Args, bytes: &[u8], console: &mut Console) -> Result<(), Failur
     }
 }
 
-fn refused(args: &Args, error: &ProbeError) -> Failure {
+fn probe_failure(args: &Args, error: &ProbeError) -> Failure {
     let failure = Failure::input(format!("{}: {error}", args.trajectory.display()));
     match error {
-        ProbeError::Trajectory(_) => failure.hint("nothing moved; `study trajectory` draws it"),
+        ProbeError::Trajectory(_) => {
+            failure.hint("nothing was moved; `study trajectory` draws the trajectory")
+        }
         _ => failure,
     }
 }
 
-/// What stands in the header: words, then the files that it was made of.
+/// The header of the recording: a description, then the trajectory and plant files.
 fn header(
     args: &Args,
     trajectory: &Trajectory,
@@ -131,7 +138,7 @@ fn header(
         true => "--raw".to_owned(),
         false => format!("--filter {}", args.filter),
     };
-    // model files keep this line: it says what was recorded, and how
+    // model files keep this line as their note
     let mut out = format!(
         "simulated, not measured: study record {} --plant {name} --rate {} --seed {} {filter} (simulation {})\n",
         Untrusted(&trajectory_file.to_string_lossy()),
@@ -146,7 +153,7 @@ fn header(
         "probe: encoder {} mm, force noise {} N rms, acceleration noise {} m/s² rms; F is what it applies to the target, positive with +x",
         probe.encoder_mm, probe.force_noise_n, probe.acceleration_noise_m_s2
     );
-    let [from_s, to_s] = trajectory.kept_s();
+    let [from_s, to_s] = trajectory.recorded_s();
     let _ = writeln!(out, "kept: {from_s} to {to_s} s, between the ramps");
     let _ = writeln!(
         out,
@@ -157,7 +164,7 @@ fn header(
         ("PLANT", plant::file::write(target)),
     ] {
         let _ = writeln!(out, "{file}:");
-        // a reader may drop blanks at the end of a line, and then a blank line is lost
+        // blank lines would be lost where trailing spaces are stripped
         for line in text.lines().filter(|line| !line.is_empty()) {
             let _ = writeln!(out, "  {line}");
         }
@@ -169,25 +176,25 @@ fn filter_line(args: &Args) -> String {
     match args.raw {
         true => "filter: none; x as the encoder counts, a and F with their noise\n".to_owned(),
         false => format!(
-            "filter: zero-phase low-pass, Butterworth of 2nd order both ways, at {} Hz; the same on x, a and F; v: central difference of x\n",
-            args.filter
+            "filter: {}; the same on x, a and F; v: central difference of x\n",
+            filter::description(args.filter)
         ),
     }
 }
 
-/// The recording between the ramps. The filter sees the ramps too, so its ends are
-/// not in the recording.
+/// The recording between the ramps as CSV. The ramps are filtered too, so that the
+/// transients of the filter at the ends are not part of the recording.
 fn recording_bytes(
     trajectory: &Trajectory,
-    measured: &Measured,
+    measured: &Measurement,
     filter: Option<LowPass>,
     rate_hz: f64,
     header: &str,
 ) -> Vec<u8> {
     let [x_mm, a_m_s2, f_n] = [&measured.x_mm, &measured.a_m_s2, &measured.f_n]
-        .map(|column| filter.map_or_else(|| column.clone(), |f| f.both_ways(column)));
+        .map(|column| filter.map_or_else(|| column.clone(), |f| f.zero_phase(column)));
     let v_mm_s = filter.map(|_| difference(&x_mm, 1.0 / rate_hz));
-    let [from_s, to_s] = trajectory.kept_s();
+    let [from_s, to_s] = trajectory.recorded_s();
     let first = measured.t_s.partition_point(|t| *t < from_s - 1e-9);
     let last = measured.t_s.partition_point(|t| *t <= to_s + 1e-9);
     let columns = Columns {
@@ -202,12 +209,14 @@ fn recording_bytes(
     bytes
 }
 
-/// Tells what was recorded, as whoever reads the file will find it.
+/// Prints a summary of the recording.
 fn summary(bytes: &[u8], console: &mut Console) {
     let recording = match recording::read("the recording", bytes) {
         Ok(recording) => recording,
         Err(e) => {
-            console.say(format!("warning: nothing can be identified from it: {e}"));
+            console.say(format!(
+                "warning: the recording cannot be used for identification: {e}"
+            ));
             return;
         }
     };
@@ -222,10 +231,10 @@ fn summary(bytes: &[u8], console: &mut Console) {
     ));
     match delay::accelerometer_s(&recording) {
         Ok(Some(late_s)) => console.say(format!(
-            "delay of the accelerometer against the encoder: {:.3} ms",
+            "delay of the accelerometer relative to the encoder: {:.3} ms",
             late_s * 1e3
         )),
-        Ok(None) | Err(_) => console.say("the delay of the accelerometer cannot be told"),
+        Ok(None) | Err(_) => console.say("the delay of the accelerometer cannot be determined"),
     }
     let excitation = Excitation::of(&recording);
     let Some((median, worst)) = excitation.median().zip(excitation.worst()) else {
@@ -235,8 +244,8 @@ fn summary(bytes: &[u8], console: &mut Console) {
         "condition number of [a v x 1]: median {median:.1}, worst {:.0} at {:.1} mm, above {} in {:.0} % of the windows",
         worst.condition,
         worst.x_mm,
-        excitation::DOUBTFUL,
-        100.0 * excitation.doubtful_share()
+        excitation::ILL_CONDITIONED,
+        100.0 * excitation.ill_conditioned_share()
     ));
     for line in excitation_picture(&excitation).lines() {
         console.say(line);
@@ -246,23 +255,22 @@ fn summary(bytes: &[u8], console: &mut Console) {
     }
 }
 
-/// The larger condition number of both directions over x.
+/// A bar chart of the condition number over x, the larger one of both directions.
 fn excitation_picture(excitation: &Excitation) -> String {
     let (Some(first), Some(last)) = (excitation.windows.first(), excitation.windows.last()) else {
         return String::new();
     };
     let half = 0.5 * excitation::WINDOW_MM;
     let range = [first.x_mm - half, last.x_mm + half];
-    // windows are whole and few
     let count = ((range[1] - range[0]) / excitation::WINDOW_MM).round() as usize;
     if !(2..=200).contains(&count) {
         return String::new();
     }
-    // two characters a window; 0 is empty, 1 the floor of the picture
+    // two characters per window; positions without a window have no bar
     let mut values = vec![0.0f64; 2 * count];
     for window in &excitation.windows {
-        let place = ((window.x_mm - first.x_mm) / excitation::WINDOW_MM).round() as usize;
-        for value in values.iter_mut().skip(2 * place).take(2) {
+        let index = ((window.x_mm - first.x_mm) / excitation::WINDOW_MM).round() as usize;
+        for value in values.iter_mut().skip(2 * index).take(2) {
             *value = value.max(window.condition);
         }
     }

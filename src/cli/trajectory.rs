@@ -1,4 +1,4 @@
-//! `study trajectory`: what an excitation looks like, and whether it can be run.
+//! `study trajectory`: draw a trajectory and check it against limits.
 
 pub(super) mod picture;
 
@@ -7,15 +7,17 @@ use std::fs::{self, OpenOptions};
 use std::io::{BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
-use study_haptics::plant::{self, MOST_RATE_HZ, Parameters, Probe};
+use study_haptics::plant::{self, MAX_RATE_HZ, MIN_RATE_HZ, Parameters, Probe};
 use study_haptics::trajectory::{Trajectory, check, file, spectrum};
+use study_wire::predict::Motion;
 
-/// Trajectory and plant files are small.
-const MOST_BYTES: u64 = 1024 * 1024;
-/// Rows of a curve and of the spectrum, in characters.
+/// Largest size of a trajectory or plant file.
+const MAX_BYTES: u64 = 1024 * 1024;
+/// Height of a curve, lines.
 const CURVE_ROWS: usize = 8;
+/// Height of the spectrum, lines.
 const SPECTRUM_ROWS: usize = 5;
-/// Frequencies that are shown, as a multiple of the highest asked for.
+/// Upper end of the spectrum as a multiple of the highest frequency of any part.
 const SHOWN_SPECTRUM: f64 = 2.0;
 
 /// Arguments of `study trajectory`.
@@ -29,42 +31,51 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Rows a second of the CSV
+    /// Sampling rate of the CSV
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
     rate: f64,
 
-    /// The target it has to suit: a, b or a plant file
+    /// The target, whose limits apply: a, b or a plant file
     #[arg(long, value_name = "a|b|FILE", default_value = "a")]
     plant: String,
 
-    /// Overwrite FILE if it is there
+    /// Overwrite FILE if it exists
     #[arg(long, requires = "out")]
     force: bool,
 }
 
-/// A sampling rate, checked where clap can name the argument.
-pub(super) fn rate(given: &str) -> Result<f64, String> {
-    let value: f64 = given.trim().parse().map_err(|_| "this is no number")?;
-    let least = plant::LEAST_RATE_HZ;
-    if (least..=MOST_RATE_HZ).contains(&value) {
-        Ok(value)
-    } else {
-        Err(format!("a rate is from {least} to {MOST_RATE_HZ} Hz"))
+/// Why a sampling rate is rejected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(super) enum RateError {
+    #[error("not a number")]
+    NotANumber,
+    #[error("a sampling rate is from {MIN_RATE_HZ} to {MAX_RATE_HZ} Hz")]
+    OutOfRange,
+}
+
+/// Parses a sampling rate, Hz.
+pub(super) fn rate(given: &str) -> Result<f64, RateError> {
+    let value: f64 = given.trim().parse().map_err(|_| RateError::NotANumber)?;
+    match (MIN_RATE_HZ..=MAX_RATE_HZ).contains(&value) {
+        true => Ok(value),
+        false => Err(RateError::OutOfRange),
     }
 }
 
-/// Does it.
+/// Draws a trajectory, checks it and writes it as CSV.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let trajectory = read_trajectory(&args.spec, console)?;
     let (_, target) = read_plant(&args.plant, console)?;
     refuse_to_overwrite(args.out.as_deref(), args.force)?;
     console.out(page(&trajectory, console.width))?;
     if let Err(violations) = Probe::default().check(&trajectory, &target) {
-        let said: Vec<String> = violations.iter().map(ToString::to_string).collect();
-        return Err(
-            Failure::input(format!("{}: {}", args.spec.display(), said.join("; ")))
-                .hint("lower the amplitude or the frequency of a part, or move offset_mm"),
-        );
+        let violations: Vec<String> = violations.iter().map(ToString::to_string).collect();
+        return Err(Failure::input(format!(
+            "{}: {}",
+            args.spec.display(),
+            violations.join("; ")
+        ))
+        .hint("lower the amplitude or the frequency of a part, or move offset_mm"));
     }
     if let Some(out) = &args.out {
         write_file(out, |sink| write_csv(sink, &trajectory, args.rate))?;
@@ -75,7 +86,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
 
 fn write_csv(sink: &mut dyn Write, trajectory: &Trajectory, rate_hz: f64) -> std::io::Result<()> {
     writeln!(sink, "t_s,x_mm,v_mm_s,a_m_s2")?;
-    // bounded by the longest trajectory and the highest rate
+    // bounded by the longest trajectory and the highest sampling rate
     let rows = (trajectory.total_s() * rate_hz + 1e-6).floor() as usize;
     for i in 0..=rows {
         let t_s = i as f64 / rate_hz;
@@ -89,11 +100,11 @@ fn write_csv(sink: &mut dyn Write, trajectory: &Trajectory, rate_hz: f64) -> std
     Ok(())
 }
 
-/// What is shown: numbers, position and speed over time, spectrum.
+/// The text shown: extremes, position and velocity over time, spectrum.
 fn page(trajectory: &Trajectory, width: usize) -> String {
     let columns = width.clamp(40, 120) - picture::LABEL - 2;
     let e = check::extremes(trajectory);
-    let title = trajectory.title.as_deref().unwrap_or("a trajectory");
+    let title = trajectory.title.as_deref().unwrap_or("untitled trajectory");
     let mut out = format!(
         "{}\n{} s, ramps of {} s before and after\nposition {:.2} to {:.2} mm, speed up to {:.1} mm/s, acceleration up to {:.2} m/s²\n",
         Untrusted(title),
@@ -106,11 +117,8 @@ fn page(trajectory: &Trajectory, width: usize) -> String {
     );
     let total_s = trajectory.total_s();
     for (heading, of) in [
-        (
-            "position, mm",
-            (|p| p.x_mm) as fn(study_haptics::trajectory::Point) -> f64,
-        ),
-        ("speed, mm/s", |p| p.v_mm_s),
+        ("position, mm", (|m| m.x_mm) as fn(Motion) -> f64),
+        ("velocity, mm/s", |m| m.v_mm_s),
     ] {
         let value = |t_s: f64| of(trajectory.at(t_s));
         out.push_str(&picture::curve(
@@ -139,18 +147,18 @@ fn page(trajectory: &Trajectory, width: usize) -> String {
 fn text_of(path: &Path) -> Result<String, Failure> {
     let mut text = String::new();
     fs::File::open(path)
-        .and_then(|file| file.take(MOST_BYTES + 1).read_to_string(&mut text))
+        .and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text))
         .map_err(|e| Failure::file(path, &e))?;
-    if text.len() as u64 > MOST_BYTES {
+    if text.len() as u64 > MAX_BYTES {
         return Err(Failure::input(format!(
-            "{} is larger than {MOST_BYTES} bytes",
+            "{} is larger than {MAX_BYTES} bytes",
             path.display()
         )));
     }
     Ok(text)
 }
 
-/// Reads a trajectory; its warnings go to standard error.
+/// Reads a trajectory file; prints its warnings.
 pub(super) fn read_trajectory(path: &Path, console: &mut Console) -> Result<Trajectory, Failure> {
     match file::parse(&path.display().to_string(), &text_of(path)?) {
         (Some(trajectory), findings) => {
@@ -161,7 +169,8 @@ pub(super) fn read_trajectory(path: &Path, console: &mut Console) -> Result<Traj
     }
 }
 
-/// The built-in target of that name, or the one in the file; with what to call it.
+/// The target with this name or in this file, and its description for a recording's
+/// header.
 pub(super) fn read_plant(
     given: &str,
     console: &mut Console,
@@ -172,7 +181,7 @@ pub(super) fn read_plant(
     let path = Path::new(given);
     if !path.exists() {
         return Err(
-            Failure::input(format!("there is no target and no file called {given}"))
+            Failure::input(format!("there is no target or file named {given}"))
                 .hint("--plant is a, b or the path of a plant file"),
         );
     }
@@ -185,19 +194,18 @@ pub(super) fn read_plant(
     }
 }
 
-/// Before any work: the file that would be written is not there, or may go.
+/// Fails if a file exists and may not be overwritten.
 pub(super) fn refuse_to_overwrite(out: Option<&Path>, force: bool) -> Result<(), Failure> {
     match out {
-        Some(path) if !force && path.exists() => Err(Failure::input(format!(
-            "{} is there already",
-            path.display()
-        ))
-        .hint("--force overwrites it; nothing was written")),
+        Some(path) if !force && path.exists() => {
+            Err(Failure::input(format!("{} already exists", path.display()))
+                .hint("--force overwrites it; nothing was written"))
+        }
         _ => Ok(()),
     }
 }
 
-/// Writes a file as a whole: a reader sees all of it or none.
+/// Writes a file atomically: a reader sees all of it or none.
 pub(super) fn write_file(
     path: &Path,
     content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -218,7 +226,7 @@ pub(super) fn write_file(
         })
         .and_then(|()| fs::rename(&part, path));
     written.map_err(|e| {
-        // what is left of it is of no use
+        // an incomplete file is of no use
         let _ = fs::remove_file(&part);
         Failure::file(path, &e)
     })
@@ -234,7 +242,7 @@ mod tests {
         let trajectory = file::parse("v.toml", text).0.unwrap();
         let page = page(&trajectory, 80);
         assert!(page.contains("position 2.50 to 32.50 mm"), "{page}");
-        for heading in ["position, mm", "speed, mm/s", "spectrum"] {
+        for heading in ["position, mm", "velocity, mm/s", "spectrum"] {
             assert!(page.contains(heading), "{page}");
         }
         assert!(
@@ -244,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_rate_that_can_be_sampled_is_one() {
+    fn only_a_possible_sampling_rate_is_accepted() {
         assert_eq!(rate("1000"), Ok(1000.0));
         for bad in ["0", "nan", "inf", "-1", "40001", "x"] {
             assert!(rate(bad).is_err(), "{bad}");

@@ -168,16 +168,10 @@ fn metres_are_refused_and_a_wrong_unit_of_velocity_is_warned_of() {
         }
         text(NAMES, &rows)
     };
-    refused(&scaled(1, 1e-3), "x_mm looks like metres");
-    warned(
-        &scaled(2, 1e-3),
-        "times as fast as v_mm_s says: look at the units",
-    );
-    warned(
-        &scaled(3, 1e3),
-        "times as fast as a_m_s2 says: look at the units",
-    );
-    warned(&scaled(2, -1.0), "look at the units and the sign");
+    refused(&scaled(1, 1e-3), "x_mm seems to be in metres");
+    warned(&scaled(2, 1e-3), "times v_mm_s: check its unit and sign");
+    warned(&scaled(3, 1e3), "times a_m_s2: check its unit and sign");
+    warned(&scaled(2, -1.0), "check its unit and sign");
 }
 
 #[test]
@@ -189,7 +183,7 @@ fn swapped_columns_do_not_fit_together() {
         ("t_s,x_mm,v_mm_s,f_n,a_m_s2", "a_m_s2"),
     ] {
         let (code, _, err) = identify(&text(names, &training()), &[]);
-        let said = format!("as {column} says: look at the units");
+        let said = format!("times {column}: check its unit");
         assert!(err.contains(&said) || code == 1, "{names}: {err}");
     }
     refused(
@@ -216,7 +210,7 @@ fn position_and_force_in_each_others_columns_are_doubted_and_no_right_recording_
             }
             let read = recording::read(name, &bytes[..]).unwrap();
             let said = read.warnings.iter().map(ToString::to_string);
-            said.filter(|w| w.contains("look swapped")).count()
+            said.filter(|w| w.contains("seem to be swapped")).count()
         };
         assert_eq!(doubts(&whole.x_mm, &whole.f_n), 0, "{name}");
         assert_eq!(doubts(&whole.f_n, &whole.x_mm), 1, "{name}");
@@ -225,8 +219,11 @@ fn position_and_force_in_each_others_columns_are_doubted_and_no_right_recording_
     let names = "t_s,x_mm,ignored,unused,f_n";
     let swapped = "t_s,f_n,ignored,unused,x_mm";
     let (_, _, err) = identify(&text(names, &rows), &[]);
-    assert!(!err.contains("look swapped"), "{err}");
-    warned(&text(swapped, &rows), "x_mm and f_n look swapped: f_n is ");
+    assert!(!err.contains("seem to be swapped"), "{err}");
+    warned(
+        &text(swapped, &rows),
+        "x_mm and f_n seem to be swapped: f_n is ",
+    );
 }
 
 #[test]

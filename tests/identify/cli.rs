@@ -60,7 +60,7 @@ fn json_has_a_cell_for_every_lambda_and_dx_with_unrounded_vaf() {
         places,
         [(0.999, 0.5), (0.999, 1.0), (0.9995, 0.5), (0.9995, 1.0)]
     );
-    // golden numbers as in tests/identify_golden.rs
+    // golden numbers as in tests/identify/golden.rs
     let vaf = cells[1]["vaf"]["validation_a.csv"].as_f64().unwrap();
     assert!((vaf - 0.949471).abs() < 0.51e-6, "{vaf}");
     assert_eq!(cells[0]["method"], "ewls");
@@ -85,7 +85,7 @@ fn the_table_names_the_best_cell_and_what_it_was_chosen_on() {
     .success()
     .stdout(predicate::str::contains("*  0.999  1.034      1"))
     .stdout(predicate::str::contains(
-        "highest VAF: 0.949471 on validation_a, chosen on this recording",
+        "highest VAF: 0.949471 on validation_a, selected on this recording",
     ))
     .stdout(predicate::str::contains("\u{1b}").not());
 }
@@ -130,7 +130,7 @@ fn a_model_file_is_written_once_and_overwritten_only_when_asked() {
     let text = fs::read_to_string(&path).unwrap();
     assert!(text.contains("id = \"lambda-0.9995-dx-1\"\n"), "{text}");
     fs::write(&path, "mine").unwrap();
-    refused(&args, 1, "lambda-0.9995-dx-1.toml is there already");
+    refused(&args, 1, "lambda-0.9995-dx-1.toml already exists");
     assert_eq!(fs::read_to_string(&path).unwrap(), "mine");
     identify(&args).arg("--force").assert().success();
     assert_eq!(fs::read_to_string(&path).unwrap(), text);
@@ -160,7 +160,7 @@ fn ids_that_collide_or_leave_the_folder_are_refused() {
             said,
         );
     };
-    with("same", "two cells would be called same");
+    with("same", "two cells would have the id same");
     with("../{dx}", "is not a model id");
     assert_eq!(fs::read_dir(out).unwrap().count(), 0);
 }
@@ -193,7 +193,7 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
         "--window",
         "tricube",
         2,
-        "--window has no meaning for this method",
+        "--window does not apply to this method",
     );
     with("--dx", "0.1:1", 2, "a range is FROM:TO:STEP");
     with(

@@ -108,7 +108,7 @@ fn on_random_switches_a_direction_state_leaves_a_fifth_of_the_papers_residual() 
 /// Measured, in order: 10.0 17.8 15.0 11.6 11.1 8.7 6.5 12.3 12.9 8.6 5.6 8.8.
 /// δ and ridges were chosen on other switches.
 ///
-/// `cargo test --release --test identify_estimators_switches -- --ignored`
+/// `cargo test --release --test identify estimators_switches -- --ignored`
 #[test]
 #[ignore = "16 minutes of simulated motion: ten seconds in release, minutes without"]
 fn on_each_of_12_random_switches_a_direction_state_leaves_a_fifth_of_the_papers_residual() {

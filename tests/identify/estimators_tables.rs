@@ -360,7 +360,7 @@ fn a_place_without_samples_is_in_the_warnings_of_every_table() {
         let told = found
             .warnings
             .iter()
-            .any(|w| matches!(w, Warning::EmptyBins { .. } | Warning::Thin { .. }));
+            .any(|w| matches!(w, Warning::Filled { .. }));
         assert!(told, "{method} {:?}", found.warnings);
     }
 }

@@ -11,6 +11,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use study_haptics::identify::grid::{self, Plan};
+use study_haptics::identify::method::Ewls;
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{Training, vaf};
 use study_haptics::recording::{self, Recording};
@@ -77,7 +78,9 @@ fn parameters_in_the_middle_agree_with_the_reference_to_the_printed_digits() {
     let recording = recording("training_a.csv");
     let training = Training::new(&recording).unwrap();
     for golden in &GOLDEN {
-        let estimates = training.estimates(golden.lambda).unwrap();
+        let estimates = training
+            .estimates(Ewls::paper(golden.lambda, Resample::Point))
+            .unwrap();
         for (theta, printed) in [
             (&estimates.positive, golden.positive),
             (&estimates.negative, golden.negative),
@@ -100,7 +103,9 @@ fn vaf_agrees_with_the_reference_to_the_printed_digits() {
     let validation = recording("validation_a.csv");
     let training = Training::new(&recording_a).unwrap();
     for golden in &GOLDEN {
-        let estimates = training.estimates(golden.lambda).unwrap();
+        let estimates = training
+            .estimates(Ewls::paper(golden.lambda, Resample::Point))
+            .unwrap();
         for (resample, dx_mm, expected) in [
             (Resample::Point, 0.5, golden.point_half),
             (Resample::Bin, 0.5, golden.bin_half),

@@ -131,7 +131,9 @@ fn for_the_papers_lambda_the_grid_is_the_plain_recursion_to_1e9() {
         let plan = Plan::ewls(&lambdas, &[0.5, 1.0], resample);
         let cells = grid::run(&training, &plan, Lookup::Linear, &[&validation], || ()).unwrap();
         for (lambda, cells) in lambdas.iter().zip(cells.chunks(2)) {
-            let estimates = training.estimates(*lambda).unwrap();
+            let estimates = training
+                .estimates(Ewls::paper(*lambda, Resample::Point))
+                .unwrap();
             for (cell, dx) in cells.iter().zip([0.5, 1.0]) {
                 let plain = training
                     .ewls(&estimates, dx, resample, Lookup::Linear)
@@ -258,7 +260,7 @@ fn a_point_table_does_not_feel_the_other_increments() {
 
 #[test]
 fn the_golden_numbers_come_out_of_the_grid_as_well() {
-    // reference as in identify_golden.rs
+    // reference as in tests/identify/golden.rs
     let (train, validation) = (recording("training_a.csv"), recording("validation_a.csv"));
     let training = Training::new(&train).unwrap();
     for (resample, dx, expected) in [
@@ -307,7 +309,7 @@ fn a_grid_of_several_methods_keeps_their_order_and_counts_its_cells() {
         .iter()
         .map(|c| {
             (
-                c.method.word(),
+                c.method.as_str(),
                 c.method.lambda(),
                 c.realization.provenance.dx_mm,
             )

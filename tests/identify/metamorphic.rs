@@ -4,6 +4,7 @@
 
 use std::fmt::Write as _;
 use study_haptics::identify::grid::{self, Plan};
+use study_haptics::identify::method::Ewls;
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{IdentifyError, Training, vaf};
 use study_haptics::recording::{self, Recording};
@@ -46,7 +47,9 @@ const MINUS: Theta = [0.2, 0.03, 0.4, -8.0];
 fn a_known_table_is_recovered_from_noise_free_data() {
     let r = recording("r", 20, 0.0, PLUS, MINUS, 0.0);
     let training = Training::new(&r).unwrap();
-    let estimates = training.estimates(0.999).unwrap();
+    let estimates = training
+        .estimates(Ewls::paper(0.999, Resample::Point))
+        .unwrap();
     for resample in [Resample::Point, Resample::Bin] {
         let found = training
             .ewls(&estimates, 1.0, resample, Lookup::Linear)
@@ -127,7 +130,9 @@ fn what_cannot_be_identified_says_why() {
     let r = recording("r", 5, 0.0, PLUS, MINUS, 0.0);
     let training = Training::new(&r).unwrap();
     for bad in [0.0, -1.0, 1.5, f64::NAN] {
-        let error = training.estimates(bad).unwrap_err();
+        let error = training
+            .estimates(Ewls::paper(bad, Resample::Point))
+            .unwrap_err();
         assert!(error.to_string().starts_with("lambda has to be above 0"));
     }
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
@@ -143,7 +148,7 @@ fn what_cannot_be_identified_says_why() {
         Err(IdentifyError::TooFine { .. })
     ));
     // forgetting everything but the last sample cannot give four parameters
-    match training.estimates(1e-3) {
+    match training.estimates(Ewls::paper(1e-3, Resample::Point)) {
         Err(IdentifyError::Diverged { .. }) => {}
         other => panic!("{other:?}"),
     }
@@ -154,6 +159,6 @@ fn what_cannot_be_identified_says_why() {
     }
     assert_eq!(
         Training::new(&one_way).unwrap_err().to_string(),
-        "r never moves with v < 0: both directions are needed"
+        "r has no samples with v < 0: both directions are needed"
     );
 }

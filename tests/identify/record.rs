@@ -7,6 +7,7 @@ use predicates::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
 use study_haptics::identify::Training;
+use study_haptics::identify::method::Ewls;
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::signal::{Acceleration, Excitation, Settings, prepare};
 use study_haptics::identify::vaf;
@@ -115,9 +116,9 @@ fn the_columns_are_filtered_unless_raw_is_asked_for() {
 #[test]
 fn a_plant_that_is_not_there_and_a_filter_above_the_rate_are_refused() {
     for (extra, said) in [
-        (["--plant", "c"], "no target and no file called c"),
+        (["--plant", "c"], "no target or file named c"),
         (["--filter", "500"], "below half the sampling rate"),
-        (["--filter", "nan"], "a filter corner"),
+        (["--filter", "nan"], "the corner frequency of the filter"),
     ] {
         study()
             .arg("record")
@@ -136,7 +137,7 @@ fn of(name: &str, target: &Parameters, rate_hz: f64, seed: u64) -> Recording {
         .0
         .unwrap();
     let measured = Probe::default()
-        .impose(&trajectory, target, rate_hz, seed)
+        .record(&trajectory, target, rate_hz, seed)
         .unwrap();
     let raw = Recording {
         name: name.into(),
@@ -154,7 +155,7 @@ fn of(name: &str, target: &Parameters, rate_hz: f64, seed: u64) -> Recording {
         acceleration: Acceleration::Accelerometer,
     };
     let mut done = prepare(&raw, settings).unwrap();
-    let [from, to] = trajectory.kept_s();
+    let [from, to] = trajectory.recorded_s();
     let first = done.t_s.partition_point(|t| *t < from - 1e-9);
     let last = done.t_s.partition_point(|t| *t <= to + 1e-9);
     for column in [
@@ -175,7 +176,9 @@ fn vafs(training: &Recording, validation: &Recording, cells: &[(f64, f64)]) -> V
     cells
         .iter()
         .map(|(lambda, dx)| {
-            let estimates = training.estimates(*lambda).unwrap();
+            let estimates = training
+                .estimates(Ewls::paper(*lambda, Resample::Point))
+                .unwrap();
             let table = training
                 .ewls(&estimates, *dx, Resample::Point, Lookup::Linear)
                 .unwrap();
@@ -185,7 +188,7 @@ fn vafs(training: &Recording, validation: &Recording, cells: &[(f64, f64)]) -> V
 }
 
 /// Reference: the same cells on the shipped recordings of switch A by another
-/// implementation (`tests/identify_golden.rs`); 0.003, another noise.
+/// implementation (`tests/identify/golden.rs`); 0.003, another noise.
 #[test]
 fn switch_a_recorded_here_gives_the_vafs_of_the_shipped_recordings() {
     let training = of("training.toml", &Parameters::a(), 1000.0, 1);

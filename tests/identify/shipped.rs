@@ -41,7 +41,7 @@ fn shipped(protocol: &str) -> BTreeMap<String, Realization> {
 }
 
 /// Everything again, from the trajectories. Unoptimised this takes a minute:
-/// `cargo test --release --test identify_shipped -- --ignored`
+/// `cargo test --release --test identify shipped -- --ignored`
 #[test]
 #[ignore = "a minute unoptimised"]
 fn the_script_makes_every_file_to_the_last_byte() {

@@ -30,7 +30,7 @@ fn the_papers_trajectories_are_drawn_and_pass() {
             .success()
             .stdout(
                 predicate::str::contains(range)
-                    .and(predicate::str::contains("speed, mm/s"))
+                    .and(predicate::str::contains("velocity, mm/s"))
                     .and(predicate::str::contains("spectrum")),
             );
     }
@@ -64,7 +64,7 @@ fn the_csv_has_a_row_for_every_sample_and_is_never_overwritten_unasked() {
     );
     command(&[])
         .code(1)
-        .stderr(predicate::str::contains("is there already"));
+        .stderr(predicate::str::contains("already exists"));
     command(&["--force"]).success();
 }
 
@@ -88,7 +88,7 @@ fn what_goes_beyond_a_stop_is_refused_with_the_instant_and_nothing_is_written() 
             .assert()
             .code(1)
             .stderr(
-                predicate::str::contains("the limit of the target, at ")
+                predicate::str::contains("the limit of the target, from ")
                     .and(predicate::str::contains("hint")),
             );
         assert!(!out.exists());
@@ -121,7 +121,9 @@ fn every_fault_of_a_trajectory_file_is_told_at_once() {
                     "`parts[1].order` has to be from 3 to 16",
                 ))
                 .and(predicate::str::contains("is longer than a bit"))
-                .and(predicate::str::contains("each another than the one before")),
+                .and(predicate::str::contains(
+                    "each different from the one before",
+                )),
         );
 }
 

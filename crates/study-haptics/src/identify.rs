@@ -1,27 +1,26 @@
-//! From a recording to a realization.
+//! Identification: from a recording to a realization.
 //!
-//! A [`Training`] is a recording grouped by direction of travel and sorted by x,
-//! once. All estimators stand behind one call:
+//! A [`Training`] groups a recording by direction of travel and sorts each group by
+//! position, once. All estimators share one call:
 //!
 //! ```text
 //! Training::new(&recording)?.identify(method, dx_mm, lookup)? → Identified
 //! ```
 //!
-//! * [`Method`]: which estimator, with every option of its own. `Display` is what a
-//!   model file keeps of it.
-//! * [`Identified`]: a [`Realization`] without id and VAF, the same for all methods,
-//!   and what is doubtful about it. A node that rests on nothing is in the warnings.
-//! * [`IdentifyError`]: why there is none.
+//! * [`Method`]: the estimator with its options. Model files keep its `Display`.
+//! * [`Identified`]: a [`Realization`] without id and VAF, and the warnings about it.
+//!   The same for all methods.
+//! * [`IdentifyError`]: why identification failed.
 //!
-//! [`Training::estimates_of`] and [`Training::ewls`] are the two halves of the EWLS
-//! family, for many dx from one recursion; [`grid::run`] makes a table for every λ
-//! and dx and compares each with other recordings.
+//! [`Training::estimates`] and [`Training::ewls`] are the two halves of the EWLS
+//! family: one recursion serves many dx. [`grid::run`] identifies a realization for
+//! every λ and dx and validates each on other recordings.
 //!
 //! Samples with v = 0 belong to no direction and are left out, except by the hat
-//! table, whose direction state knows them; prediction gives them the direction of
-//! the sample before. The nodes are multiples of dx inside the data of both
-//! directions. Not here: filtering (a recording is used as it is), files, and what
-//! a terminal shows. Formulas and measurements: `docs/estimators.md`.
+//! table, whose direction state is defined for them; prediction assigns them the
+//! direction of the previous sample. The nodes are the multiples of dx in the range
+//! that both directions cover. Recordings are used unfiltered: [`signal`] has the
+//! filters. Formulas and results: `docs/estimators.md`.
 //!
 //! Reference: Colton & Hollerbach, World Haptics 2007, equation 1 and section 4.
 
@@ -36,52 +35,52 @@ pub mod lanes;
 pub mod method;
 mod problem;
 pub mod resample;
+pub mod samples;
 pub mod signal;
 pub mod two_sided;
 pub mod vaf;
 pub mod validation;
 
 pub use method::Method;
-pub use problem::{IdentifyError, Warning};
+pub use problem::{Cause, IdentifyError, Warning};
+pub use samples::{Samples, Theta};
 
 use crate::model::{Branch, Provenance, Realization, Trained};
-use crate::recording::Recording;
-use ewls::{Sorted, Theta};
+use crate::recording::{Recording, range};
 use method::{Ewls, Sort, Start, TwoSided, Width};
 use problem::START_UP_SAMPLES;
 use resample::{Resample, Resampled};
 use study_wire::predict::{Direction, Lookup};
 
-/// A recording ready to be identified from.
+/// A recording prepared for identification.
 #[derive(Debug)]
 pub struct Training<'r> {
     recording: &'r Recording,
-    positive: Sorted,
-    negative: Sorted,
+    positive: Samples,
+    negative: Samples,
     /// Where both directions have samples, mm.
     range_mm: [f64; 2],
-    // every table asks for these two, and a grid has a hundred tables
+    // every table of a grid needs these two
     force_range_n: [f64; 2],
     top_speed_mm_s: f64,
 }
 
 impl<'r> Training<'r> {
-    /// Groups by the sign of v and sorts by x.
+    /// Groups the samples by the sign of v and sorts each group by x.
     ///
     /// # Errors
-    /// [`IdentifyError`] if a direction is missing or they do not overlap.
+    /// [`IdentifyError`] if a direction has no samples or the directions do not
+    /// overlap in x.
     pub fn new(recording: &'r Recording) -> Result<Self, IdentifyError> {
-        let positive = sorted(recording, |v| v > 0.0);
-        let negative = sorted(recording, |v| v < 0.0);
-        for (samples, sign) in [(&positive, true), (&negative, false)] {
-            if samples.is_empty() {
-                return Err(IdentifyError::OneDirection {
-                    recording: recording.name.clone(),
-                    positive: sign,
-                });
-            }
-        }
-        let (plus, minus) = (positive.range_mm(), negative.range_mm());
+        let positive = Samples::of(recording, |v| v > 0.0);
+        let negative = Samples::of(recording, |v| v < 0.0);
+        let range_of = |samples: &Samples, positive| {
+            (samples.range_mm()).ok_or_else(|| IdentifyError::OneDirection {
+                recording: recording.name.clone(),
+                positive,
+            })
+        };
+        let (plus, minus) = (range_of(&positive, true)?, range_of(&negative, false)?);
         let low = plus[0].max(minus[0]);
         let high = plus[1].min(minus[1]);
         if low >= high {
@@ -92,29 +91,24 @@ impl<'r> Training<'r> {
             positive,
             negative,
             range_mm: [low, high],
-            force_range_n: recording
-                .f_n
-                .iter()
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], f| {
-                    [f.min(low), f.max(high)]
-                }),
+            force_range_n: range(&recording.f_n),
             top_speed_mm_s: recording.top_speed_mm_s(),
         })
     }
 
-    /// The samples of v > 0 and of v < 0.
-    pub fn directions(&self) -> [&Sorted; 2] {
+    /// The samples with v > 0 and those with v < 0.
+    pub fn directions(&self) -> [&Samples; 2] {
         [&self.positive, &self.negative]
     }
 
-    /// L of a forgetting factor in mm, the smaller of the two directions.
-    pub fn memory_mm(&self, lambda: f64) -> f64 {
-        self.positive
-            .memory_mm(lambda)
-            .min(self.negative.memory_mm(lambda))
+    /// The memory L of a forgetting factor, mm: the smaller of the two directions.
+    /// `None` if it is unlimited (λ = 1).
+    pub fn memory_mm(&self, lambda: f64) -> Option<f64> {
+        let [plus, minus] = self.directions().map(|samples| samples.memory_mm(lambda));
+        Some(plus?.min(minus?))
     }
 
-    /// A realization by any method. dx has no meaning for some, see
+    /// Identifies a realization. Methods without dx ignore `dx_mm`, see
     /// [`Method::has_dx`].
     ///
     /// # Errors
@@ -129,9 +123,9 @@ impl<'r> Training<'r> {
         method.check()?;
         match method {
             Method::Ewls(options) => {
-                // a fault of dx before the work begins
+                // check dx before the long computation
                 self.nodes(dx_mm)?;
-                let estimates = self.estimates_of(options)?;
+                let estimates = self.estimates(options)?;
                 self.ewls(&estimates, dx_mm, options.resample, lookup)
             }
             Method::TwoSided(options) => self.two_sided(options, dx_mm, lookup),
@@ -142,22 +136,15 @@ impl<'r> Training<'r> {
         }
     }
 
-    /// One θ a sample in both directions, by the paper's own recursion.
+    /// One estimate of θ per sample, in both directions. `options.resample` is not
+    /// used.
     ///
     /// # Errors
-    /// [`IdentifyError`] if λ is not in (0, 1] or the estimates are no numbers.
-    pub fn estimates(&self, lambda: f64) -> Result<Estimates, IdentifyError> {
-        self.estimates_of(Ewls::paper(lambda, Resample::Point))
-    }
-
-    /// One θ a sample in both directions; `options.resample` has no part in it.
-    ///
-    /// # Errors
-    /// [`IdentifyError`] if λ is not in (0, 1] or the estimates are no numbers.
-    pub fn estimates_of(&self, options: Ewls) -> Result<Estimates, IdentifyError> {
+    /// [`IdentifyError`] if λ is not in (0, 1] or an estimate is not finite.
+    pub fn estimates(&self, options: Ewls) -> Result<Estimates, IdentifyError> {
         Method::Ewls(options).check()?;
-        let of = |samples, backward| {
-            let theta = ewls::estimate_with(samples, &options, backward);
+        let estimate = |samples, backward| {
+            let theta = ewls::estimate(samples, &options, backward);
             let finite = theta.iter().flatten().all(|p| p.is_finite());
             finite.then_some(theta).ok_or(IdentifyError::Diverged {
                 lambda: options.lambda,
@@ -165,12 +152,12 @@ impl<'r> Training<'r> {
         };
         Ok(Estimates {
             options,
-            positive: of(&self.positive, false)?,
-            negative: of(&self.negative, true)?,
+            positive: estimate(&self.positive, false)?,
+            negative: estimate(&self.negative, true)?,
         })
     }
 
-    /// The nodes of a table.
+    /// The positions of a table's nodes, mm.
     ///
     /// # Errors
     /// [`IdentifyError`] if dx does not suit the recording.
@@ -179,7 +166,7 @@ impl<'r> Training<'r> {
         if !(dx_mm.is_finite() && dx_mm > 0.0) {
             return Err(IdentifyError::Dx(dx_mm));
         }
-        if (high - low) / dx_mm >= resample::MOST_NODES as f64 {
+        if (high - low) / dx_mm >= resample::MAX_NODES as f64 {
             return Err(IdentifyError::TooFine { dx_mm, low, high });
         }
         let nodes = resample::nodes(low, high, dx_mm);
@@ -194,7 +181,7 @@ impl<'r> Training<'r> {
         Ok(nodes)
     }
 
-    /// A table of the EWLS family from estimates that were made before.
+    /// A table of the EWLS family from estimates computed before.
     ///
     /// # Errors
     /// [`IdentifyError`] if dx does not suit the recording.
@@ -206,7 +193,7 @@ impl<'r> Training<'r> {
         lookup: Lookup,
     ) -> Result<Identified, IdentifyError> {
         let nodes = self.nodes(dx_mm)?;
-        let at_nodes = |samples: &Sorted, theta: &[Theta]| {
+        let at_nodes = |samples: &Samples, theta: &[Theta]| {
             resample::at_nodes(resample, &samples.x_mm, theta, &nodes, dx_mm)
         };
         let positive = at_nodes(&self.positive, &estimates.positive);
@@ -218,7 +205,7 @@ impl<'r> Training<'r> {
         Ok(self.ewls_table(options, dx_mm, nodes, positive, negative, lookup))
     }
 
-    /// A table of the EWLS family from values at its nodes.
+    /// A table of the EWLS family from the parameters at its nodes.
     fn ewls_table(
         &self,
         options: Ewls,
@@ -229,21 +216,19 @@ impl<'r> Training<'r> {
         lookup: Lookup,
     ) -> Identified {
         let start_up = self.start_up(&options, &nodes);
-        let mut identified = self.table(nodes, positive, negative, lookup);
+        let mut identified = self.table(nodes, positive, negative, Cause::NoSamples, lookup);
         identified.warnings.extend(start_up);
-        let memory = self.memory_mm(options.lambda);
         identified.realization.provenance = Provenance {
-            method: Method::Ewls(options).to_string(),
             lambda: Some(options.lambda),
-            memory_mm: memory.is_finite().then_some(memory),
+            memory_mm: self.memory_mm(options.lambda),
             dx_mm: Some(dx_mm),
-            resample: Some(options.resample.word().into()),
-            ..self.provenance()
+            resample: Some(options.resample.as_str().into()),
+            ..self.provenance(Method::Ewls(options))
         };
         identified
     }
 
-    /// Mean force by position and direction.
+    /// Baseline: mean force by position and direction.
     ///
     /// # Errors
     /// [`IdentifyError`] if dx does not suit the recording.
@@ -251,37 +236,34 @@ impl<'r> Training<'r> {
         let nodes = self.nodes(dx_mm)?;
         let positive = baseline::static_profile(&self.positive, &nodes, dx_mm);
         let negative = baseline::static_profile(&self.negative, &nodes, dx_mm);
-        let mut identified = self.table(nodes, positive, negative, lookup);
+        let mut identified = self.table(nodes, positive, negative, Cause::NoSamples, lookup);
         identified.realization.provenance = Provenance {
-            method: "static".into(),
             dx_mm: Some(dx_mm),
-            resample: Some("bin".into()),
-            ..self.provenance()
+            resample: Some(Resample::Bin.as_str().into()),
+            ..self.provenance(Method::Static)
         };
         Ok(identified)
     }
 
-    /// One straight line, as a table of two nodes at the ends of the range.
+    /// Baseline: one straight line, as a table of two nodes at the ends of the range.
     pub fn spring(&self, lookup: Lookup) -> Identified {
         let theta = baseline::spring(self.recording);
-        let both = Resampled {
+        let branch = Resampled {
             theta: vec![theta; 2],
-            empty: 0,
+            filled: 0,
         };
-        let mut identified = self.table(self.range_mm.to_vec(), both.clone(), both, lookup);
-        identified.realization.provenance = Provenance {
-            method: "spring".into(),
-            ..self.provenance()
-        };
-        if theta[2] < 0.0 {
-            identified.warnings.push(Warning::NegativeSpring {
-                k_n_per_mm: theta[2],
-            });
+        let nodes = self.range_mm.to_vec();
+        let mut identified = self.table(nodes, branch.clone(), branch, Cause::NoSamples, lookup);
+        identified.realization.provenance = self.provenance(Method::Spring);
+        let [_, _, k_n_per_mm, _] = theta;
+        if k_n_per_mm < 0.0 {
+            let warning = Warning::NegativeSpring { k_n_per_mm };
+            identified.warnings.push(warning);
         }
         identified
     }
 
-    /// Least squares around each node.
+    /// Weighted least squares around each node.
     fn two_sided(
         &self,
         options: TwoSided,
@@ -289,53 +271,41 @@ impl<'r> Training<'r> {
         lookup: Lookup,
     ) -> Result<Identified, IdentifyError> {
         let nodes = self.nodes(dx_mm)?;
-        let width = |samples: &Sorted| match options.width {
-            Width::Mm(mm) => mm,
-            Width::Lambda(lambda) => samples.memory_mm(lambda),
-        };
-        let of = |samples: &Sorted| {
-            let l_mm = width(samples);
-            two_sided::at_nodes(samples, &nodes, options.window, l_mm, options.bounded)
-                .ok_or(IdentifyError::Narrow { width_mm: l_mm })
-        };
-        let (positive, negative) = (of(&self.positive)?, of(&self.negative)?);
-        let mut identified = self.table(nodes, positive, negative, lookup);
-        // what is filled here is not empty but thin
-        for warning in &mut identified.warnings {
-            if let Warning::EmptyBins {
-                positive,
-                negative,
-                of,
-            } = *warning
-            {
-                *warning = Warning::Thin {
-                    positive,
-                    negative,
-                    of,
-                };
+        let [l_plus, l_minus] = self.directions().map(|samples| match options.width {
+            Width::Mm(mm) => Ok(mm),
+            Width::Lambda(lambda) => {
+                (samples.memory_mm(lambda)).ok_or(IdentifyError::Lambda(lambda))
             }
-        }
+        });
+        let (l_plus, l_minus) = (l_plus?, l_minus?);
+        let estimate = |samples: &Samples, width_mm| {
+            two_sided::at_nodes(samples, &nodes, options.window, width_mm, options.bounded)
+                .ok_or(IdentifyError::Narrow { width_mm })
+        };
+        let positive = estimate(&self.positive, l_plus)?;
+        let negative = estimate(&self.negative, l_minus)?;
+        let mut identified = self.table(nodes, positive, negative, Cause::FewSamples, lookup);
+        let method = Method::TwoSided(options);
         identified.realization.provenance = Provenance {
-            method: Method::TwoSided(options).to_string(),
-            lambda: Method::TwoSided(options).lambda(),
-            memory_mm: Some(width(&self.positive).min(width(&self.negative))),
+            lambda: method.lambda(),
+            memory_mm: Some(l_plus.min(l_minus)),
             dx_mm: Some(dx_mm),
-            ..self.provenance()
+            ..self.provenance(method)
         };
         Ok(identified)
     }
 
-    /// The nodes where the recursion of one direction or the other has hardly
-    /// begun; with a warm start there are none.
+    /// A warning about nodes where the recursion of either direction has seen few
+    /// samples. A warm start has none.
     fn start_up(&self, options: &Ewls, nodes: &[f64]) -> Option<Warning> {
         if options.start == Start::Warm {
             return None;
         }
-        let fortieth = |x: &[f64]| x[START_UP_SAMPLES.min(x.len() - 1)];
-        let mut low = fortieth(&self.positive.x_mm);
+        let end_of_start_up = |x: &[f64]| x[START_UP_SAMPLES.min(x.len() - 1)];
+        let mut low = end_of_start_up(&self.positive.x_mm);
         let mut high = f64::INFINITY;
         match options.sort {
-            Sort::Ascending => low = low.max(fortieth(&self.negative.x_mm)),
+            Sort::Ascending => low = low.max(end_of_start_up(&self.negative.x_mm)),
             Sort::Travel => {
                 let x = &self.negative.x_mm;
                 high = x[x.len() - 1 - START_UP_SAMPLES.min(x.len() - 1)];
@@ -352,36 +322,42 @@ impl<'r> Training<'r> {
         })
     }
 
-    fn provenance(&self) -> Provenance {
+    /// What model files say about the recording, and the method.
+    fn provenance(&self, method: Method) -> Provenance {
         Provenance {
+            method: method.to_string(),
             filter: Some(match self.recording.filter() {
-                Some(words) => format!("as recorded: {words}"),
+                Some(description) => format!("as recorded: {description}"),
                 None => "as recorded".into(),
             }),
             recordings: [(self.recording.name.clone(), self.recording.sha256.clone())].into(),
-            // a probe's program writes there what was recorded, and whether it is real
+            // `study record` writes there what was recorded and whether it is simulated
             note: self.recording.header.first().cloned(),
             ..Provenance::default()
         }
     }
 
+    /// A table with the direction rule `sign` from the parameters at its nodes;
+    /// `cause` is why nodes were filled, if some were.
     fn table(
         &self,
         nodes: Vec<f64>,
         positive: Resampled,
         negative: Resampled,
+        cause: Cause,
         lookup: Lookup,
     ) -> Identified {
         let mut warnings = Vec::new();
-        if positive.empty + negative.empty > 0 {
-            warnings.push(Warning::EmptyBins {
-                positive: positive.empty,
-                negative: negative.empty,
+        if positive.filled + negative.filled > 0 {
+            warnings.push(Warning::Filled {
+                cause,
+                positive: positive.filled,
+                negative: negative.filled,
                 of: nodes.len(),
             });
         }
-        let both = [&positive.theta, &negative.theta];
-        warnings.extend(problem::unmeasured(self.force_range_n, &nodes, both));
+        let branches = [&positive.theta, &negative.theta];
+        warnings.extend(problem::implausible(self.force_range_n, &nodes, branches));
         Identified {
             realization: Realization {
                 id: String::new(),
@@ -402,39 +378,24 @@ impl<'r> Training<'r> {
     }
 }
 
-/// One θ a sample, in the order of [`Training::directions`].
+/// One estimate of θ per sample, in the order of [`Training::directions`].
 #[derive(Debug, Clone)]
 pub struct Estimates {
-    /// How they were made.
+    /// The options they were computed with.
     pub options: Ewls,
-    /// Of v > 0.
+    /// For v > 0.
     pub positive: Vec<Theta>,
-    /// Of v < 0.
+    /// For v < 0, in ascending order of x.
     pub negative: Vec<Theta>,
 }
 
-/// A realization without an id and without VAF, and what is doubtful about it.
+/// An identified realization; its id and VAF are empty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identified {
     /// The table.
     pub realization: Realization,
-    /// What is doubtful.
+    /// What is doubtful about it.
     pub warnings: Vec<Warning>,
-}
-
-fn sorted(recording: &Recording, belongs: impl Fn(f64) -> bool) -> Sorted {
-    let mut order: Vec<usize> = (0..recording.len())
-        .filter(|i| belongs(recording.v_mm_s[*i]))
-        .collect();
-    // stable: ties keep their order in time
-    order.sort_by(|a, b| recording.x_mm[*a].total_cmp(&recording.x_mm[*b]));
-    let pick = |column: &[f64]| order.iter().map(|i| column[*i]).collect();
-    Sorted {
-        x_mm: pick(&recording.x_mm),
-        v_mm_s: pick(&recording.v_mm_s),
-        a_m_s2: pick(&recording.a_m_s2),
-        f_n: pick(&recording.f_n),
-    }
 }
 
 fn branch(theta: &[Theta]) -> Branch {

@@ -1,11 +1,11 @@
-//! The realization table: a haptic model's parameters by position and direction.
+//! Realizations: a haptic model's parameters by position and direction.
 //!
-//! The paper's equation 1, F = m±(x) a + b±(x) v + k±(x) x + F0±(x), sampled at
-//! the nodes `x_mm`. Units: x mm, v mm/s, a m/s², F N, so m kg, b N·s/mm, k N/mm,
-//! F0 N. F is the force that the probe applies to the target, positive with +x.
-//! Reading and writing of model files is in [`mod@file`]; the force in [`predict`] and
-//! whether it can be active in [`certificate`] use nothing but `core` and slices, so
-//! that a firmware can share them.
+//! The paper's equation 1, F = m±(x) a + b±(x) v + k±(x) x + F0±(x), sampled at the
+//! nodes `x_mm`. Units: x mm, v mm/s, a m/s², F N, hence m kg, b N·s/mm, k N/mm, F0 N.
+//! F is the force that the probe applies to the target, positive with +x.
+//! [`mod@file`] reads and writes model files. The predicted force
+//! ([`study_wire::predict`]) and the passivity certificate ([`certificate`]) are shared
+//! with the firmware.
 
 pub mod file;
 
@@ -13,33 +13,33 @@ use std::collections::BTreeMap;
 use study_wire::certificate::{self, Certificate};
 use study_wire::predict::{BranchView, Direction, Lookup, TableView};
 
-/// The version of the file format that this program writes and reads.
+/// The `format` of a model file.
 pub const FORMAT: &str = "study-model/1";
 
-/// A haptic model's parameters, as a model file has them.
+/// A haptic model's parameters and their origin: the contents of a model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Realization {
-    /// The file's own name for it.
+    /// Its id.
     pub id: String,
-    /// How it came about.
+    /// How it was identified.
     pub provenance: Provenance,
-    /// Variance accounted for, by the name of the recording.
+    /// Variance accounted for, by name of the recording.
     pub vaf: BTreeMap<String, f64>,
     /// How parameters between nodes are found.
     pub lookup: Lookup,
-    /// How the two branches are joined.
+    /// How the two branches are combined.
     pub direction: Direction,
-    /// The range that the table was identified in.
+    /// The range in which it was identified.
     pub trained: Trained,
     /// Positions of the nodes, mm, strictly ascending, at least two.
     pub x_mm: Vec<f64>,
-    /// For v > 0.
+    /// Parameters for v > 0.
     pub positive: Branch,
-    /// For v < 0.
+    /// Parameters for v < 0.
     pub negative: Branch,
 }
 
-/// The parameters of one direction, one value a node.
+/// The parameters of one direction, one value per node.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Branch {
     /// Mass, kg.
@@ -52,38 +52,38 @@ pub struct Branch {
     pub f0_n: Vec<f64>,
 }
 
-/// Where a table was identified: outside it, nothing is known.
+/// The range in which a realization was identified; outside it, the target is unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trained {
     /// Lowest and highest position, mm.
     pub x_mm: [f64; 2],
-    /// Largest speed, mm/s.
+    /// Highest speed, mm/s.
     pub v_mm_s: f64,
 }
 
-/// How a table came about.
+/// How a realization was identified.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Provenance {
-    /// Estimator, such as `ewls`.
+    /// The estimator with its options, such as `ewls start=warm`.
     pub method: String,
-    /// Forgetting factor, where the method has one.
+    /// Forgetting factor, if the method has one.
     pub lambda: Option<f64>,
-    /// L = 1 / ((1 − λ) ρ), mm, the smaller of the two directions.
+    /// The memory L = 1 / ((1 − λ) ρ), mm, the smaller of the two directions.
     pub memory_mm: Option<f64>,
     /// Resampling increment, mm.
     pub dx_mm: Option<f64>,
-    /// How the estimates were brought to the nodes: `point`, `bin`, `hat`.
+    /// Resampling method: `point`, `bin`, `hat`.
     pub resample: Option<String>,
-    /// The filter that the recordings went through.
+    /// The filter applied to the recordings.
     pub filter: Option<String>,
-    /// Name → SHA-256 of each recording that was used.
+    /// SHA-256 hash of each recording, by name.
     pub recordings: BTreeMap<String, String>,
-    /// Anything else worth knowing, in words.
+    /// Remarks.
     pub note: Option<String>,
 }
 
 impl Realization {
-    /// The table as borrowed slices, for [`predict`].
+    /// The table as borrowed slices, for [`study_wire::predict`].
     pub fn table(&self) -> TableView<'_> {
         TableView {
             x_mm: &self.x_mm,
@@ -93,7 +93,8 @@ impl Realization {
         }
     }
 
-    /// Whether it can put energy into a hand, over the range that it was trained in.
+    /// The passivity certificate over the trained range: whether the realization can
+    /// supply energy to a hand.
     pub fn certificate(&self) -> Certificate {
         let range = certificate::Range {
             x_mm: self.trained.x_mm,

@@ -1,28 +1,30 @@
-//! What a probe measured: time, position, velocity, acceleration, force.
+//! Recordings of a probe: time, position, velocity, acceleration, force.
 //!
-//! A recording is a CSV: `#` lines in words, one line of column names, then
-//! numbers. `t_s`, `x_mm` and `f_n` have to be there; `v_mm_s` and `a_m_s2` are
-//! used as they are where they are given and are differences of x where they are
-//! not, with a warning. Other columns are passed over. Nothing is filtered or
-//! thinned. F is the force that the probe applies to the target, positive with +x.
+//! A recording is a CSV file: `#` lines of text, one line of column names, then
+//! numbers. `t_s`, `x_mm` and `f_n` are required; `v_mm_s` and `a_m_s2` are used as
+//! given, and computed as differences of x with a warning if absent. Other columns are
+//! ignored. Nothing is filtered or thinned. F is the force that the probe applies to
+//! the target, positive with +x.
 //!
-//! Invariant of a [`Recording`]: all columns are equally long, at least three
-//! rows, finite; time ascends strictly; x and F vary.
+//! Invariant of a [`Recording`] that was read: all columns are equally long, finite and
+//! have at least three rows; time ascends strictly; x and F vary.
 
+mod column;
 mod motion;
 mod rows;
 mod swapped;
 mod write;
 
+pub(crate) use column::{mean_and_variance, range};
 pub use write::{Columns, write};
 
 use std::fmt;
 use std::io::BufRead;
 
-/// A recording as columns, with the SHA-256 of the bytes it was read from.
+/// A recording as columns, with the SHA-256 hash of the bytes it was read from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// Names it in model files and messages.
+    /// Its name in model files and messages.
     pub name: String,
     /// Time, s, strictly ascending.
     pub t_s: Vec<f64>,
@@ -34,23 +36,40 @@ pub struct Recording {
     pub a_m_s2: Vec<f64>,
     /// Force that the probe applies to the target, N.
     pub f_n: Vec<f64>,
-    /// The `#` lines above the column names, without `#` and the blank after it.
+    /// The `#` lines above the column names, without `#` and the space after it.
     pub header: Vec<String>,
-    /// SHA-256 of all bytes of the file, 64 lower-case hexadecimal digits.
+    /// SHA-256 hash of all bytes of the file, 64 lower-case hexadecimal digits.
     pub sha256: String,
-    /// What is doubtful about it.
+    /// What is doubtful about the recording.
     pub warnings: Vec<Warning>,
 }
 
 impl Recording {
-    /// How many samples it has.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.t_s.len()
     }
 
-    /// Never: a recording has at least three rows.
+    /// Whether there are no samples; [`read`] rejects such recordings.
     pub fn is_empty(&self) -> bool {
         self.t_s.is_empty()
+    }
+
+    /// The samples with these indices, with the same name, header and hash.
+    #[must_use]
+    pub fn select(&self, indices: &[usize]) -> Self {
+        let pick = |column: &[f64]| indices.iter().map(|i| column[*i]).collect();
+        Self {
+            name: self.name.clone(),
+            t_s: pick(&self.t_s),
+            x_mm: pick(&self.x_mm),
+            v_mm_s: pick(&self.v_mm_s),
+            a_m_s2: pick(&self.a_m_s2),
+            f_n: pick(&self.f_n),
+            header: self.header.clone(),
+            sha256: self.sha256.clone(),
+            warnings: self.warnings.clone(),
+        }
     }
 
     /// Time from the first sample to the last, s.
@@ -60,15 +79,15 @@ impl Recording {
 
     /// Lowest and highest position, mm.
     pub fn range_mm(&self) -> [f64; 2] {
-        motion::range(&self.x_mm)
+        range(&self.x_mm)
     }
 
-    /// What its header says that its signals went through, if it does: the line
-    /// `filter: …` up to a semicolon.
+    /// The filter of its signals according to the header: the text of the line
+    /// `filter: …` up to a semicolon. `None` if unknown.
     pub fn filter(&self) -> Option<&str> {
         let line = self.header.iter().find_map(|l| l.strip_prefix("filter:"))?;
-        let words = line.split(';').next().unwrap_or(line).trim();
-        (!words.is_empty()).then_some(words)
+        let description = line.split(';').next().unwrap_or(line).trim();
+        (!description.is_empty()).then_some(description)
     }
 
     /// Largest speed, mm/s.
@@ -77,46 +96,46 @@ impl Recording {
     }
 }
 
-/// What is doubtful about a recording that can be used.
+/// What is doubtful about a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
-    /// A column was absent and is a difference of x.
+    /// A column was absent and was computed from x.
     Derived {
         /// The column.
         column: &'static str,
-        /// How it was computed.
-        how: &'static str,
+        /// How it was computed, such as `central difference of x_mm`.
+        formula: &'static str,
     },
-    /// Samples are missing in time.
+    /// Samples are missing.
     Gaps {
-        /// How many steps are longer than one and a half usual ones.
+        /// Number of intervals longer than 1.5 median ones.
         count: usize,
         /// The longest, s.
         longest_s: f64,
-        /// Where the longest begins, s.
+        /// Start of the longest, s.
         at_s: f64,
     },
     /// The target was moved in one direction only.
     OneDirection,
-    /// A column that should move with x does not have its scale.
+    /// A column does not have the scale of the differences of x.
     Scale {
         /// The column.
         column: &'static str,
-        /// What x says, over what the column says.
+        /// The difference of x over the value of the column, by regression.
         ratio: f64,
     },
-    /// A column has one value from beginning to end.
+    /// A column has the same value in every row.
     Constant {
         /// The column.
         column: &'static str,
     },
-    /// Position and force look as if each stood in the other's column.
+    /// The columns of position and force seem to be swapped.
     Swapped {
-        /// How many times smoother the force is.
+        /// The smoothness of the force over that of the position.
         smoother: f64,
-        /// Share of the force's variance that the position leaves open.
+        /// Share of the force's variance that the position does not explain.
         of_force: f64,
-        /// Share of the position's variance that the force leaves open.
+        /// Share of the position's variance that the force does not explain.
         of_position: f64,
     },
 }
@@ -124,7 +143,9 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Derived { column, how } => write!(f, "no column {column}: it is {how}"),
+            Self::Derived { column, formula } => {
+                write!(f, "no column {column}: computed as the {formula}")
+            }
             Self::Gaps {
                 count,
                 longest_s,
@@ -136,7 +157,7 @@ impl fmt::Display for Warning {
             Self::OneDirection => f.write_str("the target moves in one direction only"),
             Self::Scale { column, ratio } => write!(
                 f,
-                "x_mm changes {ratio:.3e} times as fast as {column} says: look at the units and the sign"
+                "the differences of x_mm are {ratio:.3e} times {column}: check its unit and sign"
             ),
             Self::Constant { column } => write!(f, "{column} is the same in every row"),
             Self::Swapped {
@@ -145,7 +166,7 @@ impl fmt::Display for Warning {
                 of_position,
             } => write!(
                 f,
-                "x_mm and f_n look swapped: f_n is {smoother:.0} times smoother than x_mm, lies to one side of zero, and explains {:.0} % of the variance of x_mm, which explains {:.0} % of that of f_n: look at the column names",
+                "x_mm and f_n seem to be swapped: f_n is {smoother:.0} times smoother than x_mm, is one-sided, and explains {:.0} % of the variance of x_mm, which explains {:.0} % of that of f_n; check the column names",
                 100.0 * (1.0 - of_position),
                 100.0 * (1.0 - of_force)
             ),
@@ -153,13 +174,13 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Why a file is no recording, and at which line.
+/// Why a file is not a valid recording, and at which line.
 #[derive(Debug, thiserror::Error)]
 #[error("{name}: line {line}: {fault}")]
 pub struct RecordingError {
     /// The name that the caller gave.
     pub name: String,
-    /// From 1. What is about a whole column points to the line of column names.
+    /// Line number from 1. For faults of a whole column the line of column names.
     pub line: u64,
     /// What is wrong.
     pub fault: RecordingFault,
@@ -174,31 +195,31 @@ pub enum RecordingFault {
     /// There is no line of column names.
     #[error("the file ends before a line of column names such as t_s,x_mm,f_n")]
     NoColumns,
-    /// A column is not there.
+    /// A required column is missing.
     #[error("no column {missing}; the columns are {found}")]
     MissingColumn {
         /// Its name.
         missing: &'static str,
-        /// Those that are there.
+        /// The columns of the file.
         found: String,
     },
-    /// A column is there twice.
+    /// A column occurs twice.
     #[error("two columns are called {0}")]
     DoubleColumn(&'static str),
     /// A row is longer or shorter than the line of column names.
-    #[error("{found} fields where the columns are {expected}")]
+    #[error("{found} fields, but there are {expected} columns")]
     Ragged {
-        /// Fields of this row.
+        /// Number of fields in this row.
         found: usize,
-        /// Columns.
+        /// Number of columns.
         expected: usize,
     },
-    /// A field is no number.
-    #[error("{column} is `{text}`, which is no number")]
+    /// A field is not a number.
+    #[error("{column} is `{text}`, which is not a number")]
     NotANumber {
         /// The column.
         column: &'static str,
-        /// The field, cut and escaped.
+        /// The field, truncated and escaped.
         text: String,
     },
     /// A number is NaN or infinite.
@@ -209,30 +230,30 @@ pub enum RecordingFault {
         /// The number.
         value: f64,
     },
-    /// Time stands still or goes back.
+    /// Time does not increase.
     #[error("t_s goes from {before} to {now}: time has to increase")]
     Time {
-        /// The row before.
+        /// Time of the previous row, s.
         before: f64,
-        /// This row.
+        /// Time of this row, s.
         now: f64,
     },
     /// There are too few rows.
-    #[error("{0} rows: a recording has at least {least}", least = rows::LEAST_ROWS)]
+    #[error("{0} rows: a recording has at least {least}", least = rows::MIN_ROWS)]
     TooShort(usize),
     /// There are too many rows.
-    #[error("more than {most} rows: thin the recording or cut it", most = rows::MOST_ROWS)]
+    #[error("more than {most} rows: shorten the recording or lower its sampling rate", most = rows::MAX_ROWS)]
     TooLong,
     /// A line is too long to be a row of numbers.
-    #[error("the line is longer than {most} bytes", most = rows::MOST_LINE_BYTES)]
+    #[error("the line is longer than {most} bytes", most = rows::MAX_LINE_BYTES)]
     LongLine,
-    /// A column that has to vary does not.
+    /// Position or force does not vary.
     #[error("{0} is the same in every row: nothing was measured")]
     Constant(&'static str),
-    /// The stroke is too small to be millimetres.
-    #[error("the stroke is {stroke_mm} mm: x_mm looks like metres, multiply it by 1000")]
+    /// The stroke is too small to be in millimetres.
+    #[error("the stroke is {stroke_mm} mm: x_mm seems to be in metres, multiply it by 1000")]
     Metres {
-        /// Highest less lowest x.
+        /// Highest minus lowest x.
         stroke_mm: f64,
     },
 }
@@ -240,7 +261,7 @@ pub enum RecordingFault {
 /// Reads a recording.
 ///
 /// # Errors
-/// [`RecordingError`] with the line of the first thing that is wrong.
+/// [`RecordingError`] with the line of the first fault.
 pub fn read(name: impl Into<String>, input: impl BufRead) -> Result<Recording, RecordingError> {
     let name = name.into();
     match rows::read(input) {
@@ -280,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn the_filter_is_what_the_header_says() {
+    fn the_filter_is_read_from_the_header() {
         let with = |header: &str| read_text(&format!("{header}{GOOD}")).unwrap();
         let r = with("# filter: low-pass at 30 Hz; v: differences\n");
         assert_eq!(r.filter(), Some("low-pass at 30 Hz"));
@@ -309,15 +330,15 @@ mod tests {
         assert_eq!(
             said,
             [
-                "no column v_mm_s: it is the central difference of x_mm",
-                "no column a_m_s2: it is the second central difference of x_mm",
+                "no column v_mm_s: computed as the central difference of x_mm",
+                "no column a_m_s2: computed as the second central difference of x_mm",
                 "the target moves in one direction only",
             ]
         );
     }
 
     #[test]
-    fn byte_order_mark_carriage_returns_blank_lines_and_quoted_names_are_no_obstacle() {
+    fn byte_order_mark_carriage_returns_blank_lines_and_quoted_names_are_accepted() {
         let text = "\u{feff}# made elsewhere\r\n\"t_s\",\"x_mm\",\"f_n\"\r\n0, 1 ,2\r\n\r\n1,3,1\r\n# pause\r\n2,1,2";
         let r = read_text(text).unwrap();
         assert_eq!(r.header, ["made elsewhere"]);
@@ -328,8 +349,11 @@ mod tests {
     fn every_bad_row_is_named_with_its_line() {
         let at = |row: &str| format!("# h\nt_s,x_mm,f_n\n0,1,1\n\n1,2,2\n{row}\n3,1,1\n");
         for (row, said) in [
-            ("2,1", "r.csv: line 6: 2 fields where the columns are 3"),
-            ("2,1,1,1", "r.csv: line 6: 4 fields where the columns are 3"),
+            ("2,1", "r.csv: line 6: 2 fields, but there are 3 columns"),
+            (
+                "2,1,1,1",
+                "r.csv: line 6: 4 fields, but there are 3 columns",
+            ),
             (
                 "2,NaN,1",
                 "r.csv: line 6: x_mm is NaN, which cannot be a measurement",
@@ -338,10 +362,10 @@ mod tests {
                 "2,1,1e999",
                 "r.csv: line 6: f_n is inf, which cannot be a measurement",
             ),
-            ("2,,1", "r.csv: line 6: x_mm is ``, which is no number"),
+            ("2,,1", "r.csv: line 6: x_mm is ``, which is not a number"),
             (
                 "2,\u{1b}[2J,1",
-                "r.csv: line 6: x_mm is `\\u{1b}[2J`, which is no number",
+                "r.csv: line 6: x_mm is `\\u{1b}[2J`, which is not a number",
             ),
             (
                 "1,1,1",
@@ -357,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_recording_says_what_is_missing() {
+    fn a_file_that_is_not_a_recording_is_refused_with_what_is_missing() {
         assert_eq!(
             message(""),
             "r.csv: line 1: the file ends before a line of column names such as t_s,x_mm,f_n"
@@ -381,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_measured_and_metres_are_refused() {
+    fn constant_columns_and_metres_are_refused() {
         assert_eq!(
             message("# h\nt_s,x_mm,f_n\n0,1,1\n1,1,2\n2,1,3\n"),
             "r.csv: line 2: x_mm is the same in every row: nothing was measured"
@@ -392,7 +416,7 @@ mod tests {
         );
         assert_eq!(
             message("t_s,x_mm,f_n\n0,0.001,1\n1,0.035,2\n2,0.001,3\n"),
-            "r.csv: line 1: the stroke is 0.034 mm: x_mm looks like metres, multiply it by 1000"
+            "r.csv: line 1: the stroke is 0.034 mm: x_mm seems to be in metres, multiply it by 1000"
         );
     }
 
@@ -409,7 +433,7 @@ mod tests {
         let r = read_text(&text).unwrap();
         let said: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
         assert_eq!(said[0], "1 gaps in time, the longest 0.0080 s at 0.1990 s");
-        assert!(said[1].contains("as fast as v_mm_s says"), "{said:?}");
+        assert!(said[1].contains("times v_mm_s: check its unit"), "{said:?}");
         assert_eq!(said.len(), 2, "{said:?}");
     }
 }

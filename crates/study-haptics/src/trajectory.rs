@@ -1,18 +1,16 @@
-//! How a probe moves the target: excitation as a formula.
+//! Trajectories: the motion of a probe that excites the target.
 //!
-//! A [`Trajectory`] is an offset, a sum of [`Part`]s (sine, swept sine, PRBS, steps
-//! at constant speed) and a ramp that brings the sum in smoothly and takes it out
-//! again. [`Trajectory::at`] gives position, velocity and acceleration at any
-//! instant in closed form, so a trajectory has no sampling rate and nothing is ever
-//! differentiated. [`check`] compares it with what probe and target can do before
-//! anything moves; [`mod@file`] reads and writes it as TOML.
+//! A [`Trajectory`] is an offset plus a sum of [`Part`]s (sine, swept sine, PRBS, steps
+//! at constant speed), faded in and out by a ramp. [`Trajectory::at`] gives position,
+//! velocity and acceleration at any instant in closed form, so a trajectory has no
+//! sampling rate and is never differentiated numerically. [`check`] compares it with
+//! the limits of probe and target before anything moves; [`mod@file`] reads and writes
+//! it as TOML.
 //!
-//! Not here: what the target answers (`plant`), files, and pictures.
-//!
-//! Units: s, Hz, mm, mm/s, m/s². Time starts at 0 with the ramp:
+//! Units: s, Hz, mm, mm/s, m/s². Time starts at 0 with the first ramp:
 //!
 //! ```text
-//! 0 ──ramp_s── kept from here ──duration_s── kept to here ──ramp_s── total_s
+//! 0 ──ramp_s── recording starts ──duration_s── recording ends ──ramp_s── total_s
 //! ```
 //!
 //! Outside [0, total_s] the trajectory rests at its offset.
@@ -26,62 +24,53 @@ pub mod spectrum;
 pub use check::{Envelope, Violation};
 pub use parts::{Part, Prbs, Shape, Sine, Steps, Sweep};
 
-/// The first line of a trajectory file.
+use study_wire::predict::Motion;
+
+/// The `format` of a trajectory file.
 pub const FORMAT: &str = "study-trajectory/1";
-/// Longest time of excitation, s.
-pub const LONGEST_S: f64 = 3600.0;
+/// Longest duration between the ramps, s.
+pub const MAX_DURATION_S: f64 = 3600.0;
 /// Longest ramp, s.
-pub const LONGEST_RAMP_S: f64 = 60.0;
-/// Most parts of a sum.
-pub const MOST_PARTS: usize = 32;
+pub const MAX_RAMP_S: f64 = 60.0;
+/// Most parts of a trajectory.
+pub const MAX_PARTS: usize = 32;
 
-/// Position, velocity and acceleration at an instant.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Point {
-    /// mm.
-    pub x_mm: f64,
-    /// mm/s.
-    pub v_mm_s: f64,
-    /// m/s².
-    pub a_m_s2: f64,
-}
-
-/// An excitation.
+/// The motion of a probe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// For people; may be absent.
+    /// A title for people.
     pub title: Option<String>,
-    /// Where it rests and what its parts are added to, mm.
+    /// The position at rest, to which the parts are added, mm.
     pub offset_mm: f64,
-    /// Time between the ramps, s: what a recording keeps.
+    /// Time between the ramps, which is recorded, s.
     pub duration_s: f64,
     /// Time of each ramp, s.
     pub ramp_s: f64,
-    /// Added up.
+    /// The terms of the sum.
     pub parts: Vec<Part>,
-    /// Bounds of its own, beside those of probe and target.
+    /// Limits in addition to those of probe and target.
     pub limits: Option<Envelope>,
 }
 
 impl Trajectory {
-    /// Time from rest to rest, s.
+    /// Total time from rest to rest, s.
     pub fn total_s(&self) -> f64 {
         self.duration_s + 2.0 * self.ramp_s
     }
 
-    /// The part of the time that a recording keeps: from, to, s.
-    pub fn kept_s(&self) -> [f64; 2] {
+    /// Start and end of the recorded time, s.
+    pub fn recorded_s(&self) -> [f64; 2] {
         [self.ramp_s, self.ramp_s + self.duration_s]
     }
 
-    /// Where it is at `t_s`.
-    pub fn at(&self, t_s: f64) -> Point {
-        let rest = Point {
-            x_mm: self.offset_mm,
-            ..Point::default()
-        };
+    /// The motion at time `t_s`, s.
+    pub fn at(&self, t_s: f64) -> Motion {
         if !(t_s > 0.0 && t_s < self.total_s()) {
-            return rest;
+            return Motion {
+                x_mm: self.offset_mm,
+                v_mm_s: 0.0,
+                a_m_s2: 0.0,
+            };
         }
         // deviation from the offset and its derivatives, in mm and s throughout
         let mut deviation = [0.0; 3];
@@ -93,36 +82,37 @@ impl Trajectory {
         }
         let [d, d1, d2] = deviation;
         let [w, w1, w2] = self.weight(t_s);
-        Point {
+        Motion {
             x_mm: self.offset_mm + w * d,
             v_mm_s: w1 * d + w * d1,
             a_m_s2: 1e-3 * (w2 * d + 2.0 * w1 * d1 + w * d2),
         }
     }
 
-    /// The ramp's weight and its two derivatives.
+    /// The weight of the ramps and its first two derivatives.
     fn weight(&self, t_s: f64) -> [f64; 3] {
         let left_s = self.total_s() - t_s;
         if t_s < self.ramp_s {
-            rise(t_s, self.ramp_s)
+            minimum_jerk(t_s, self.ramp_s)
         } else if left_s < self.ramp_s {
-            let [w, w1, w2] = rise(left_s, self.ramp_s);
+            let [w, w1, w2] = minimum_jerk(left_s, self.ramp_s);
             [w, -w1, w2]
         } else {
             [1.0, 0.0, 0.0]
         }
     }
 
-    /// The highest frequency that was asked for, Hz: of a sine its own, of PRBS and
-    /// steps that of their fastest change.
+    /// The highest frequency of any part, Hz; for PRBS and steps that of their fastest
+    /// change.
     pub fn top_hz(&self) -> f64 {
         self.parts.iter().map(Part::top_hz).fold(0.0, f64::max)
     }
 }
 
-/// From 0 to 1 in `over_s` with velocity and acceleration 0 at both ends (the
-/// minimum-jerk polynomial), with its two derivatives. `t_s` lies in [0, over_s].
-fn rise(t_s: f64, over_s: f64) -> [f64; 3] {
+/// The minimum-jerk polynomial, which rises from 0 to 1 in `over_s` with zero velocity
+/// and acceleration at both ends, and its first two derivatives. `t_s` lies in
+/// [0, over_s].
+pub(crate) fn minimum_jerk(t_s: f64, over_s: f64) -> [f64; 3] {
     let u = t_s / over_s;
     [
         u * u * u * (10.0 + u * (-15.0 + 6.0 * u)),
@@ -144,7 +134,7 @@ mod tests {
         })
     }
 
-    /// Every kind at once.
+    /// A trajectory with all kinds of parts.
     fn everything() -> Trajectory {
         Trajectory {
             title: None,
@@ -226,11 +216,11 @@ mod tests {
         );
     }
 
-    /// Reference: the first row of the shipped recordings of the same trajectories
-    /// by another implementation (t = 0.5 s; 28.56638 and 2.50051 mm), which is
-    /// filtered: 0.01 mm.
+    /// Reference: the first row of the shipped recordings of these trajectories by
+    /// another implementation (t = 0.5 s; 28.56638 and 2.50051 mm). They are filtered,
+    /// hence the tolerance of 0.01 mm.
     #[test]
-    fn the_papers_trajectories_are_where_the_recordings_are() {
+    fn the_papers_trajectories_agree_with_the_recordings() {
         let training = Trajectory {
             parts: vec![
                 sine(12.0, 0.5),

@@ -165,7 +165,7 @@ fn compare(table: &Realization, samples: &[Sample]) -> Result<(Score, bool), Str
     let measured = samples.iter().all(|s| s.force_measured_n.is_some());
     let filter = LowPass::new(FILTER_HZ, 1.0 / period_s).map_err(|e| e.to_string())?;
     let column = |of: fn(&Sample) -> f64| -> Vec<f64> {
-        filter.both_ways(&samples.iter().map(of).collect::<Vec<f64>>())
+        filter.zero_phase(&samples.iter().map(of).collect::<Vec<f64>>())
     };
     let x_mm = column(|s| s.x_mm);
     let f_n = column(|s| s.force_measured_n.unwrap_or(s.force_command_n));

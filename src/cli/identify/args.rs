@@ -1,108 +1,210 @@
-//! The arguments of `study identify`, and the plan that they make.
+//! The arguments of `study identify`, and the grid that they describe.
 
 use super::{Failure, Kind};
 use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
+use study_base::text::Untrusted;
 use study_haptics::identify::Method;
 use study_haptics::identify::grid::Plan;
 use study_haptics::identify::method::{
     Delta, Ewls, Hat, Segments, Sort, Start, State, TwoSided, Width, Window,
 };
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::signal;
+use study_haptics::identify::signal::{Acceleration, Settings};
 use study_wire::predict::Lookup;
 
-/// More numbers in a list than this are a slip of the finger.
-const MOST_NUMBERS: usize = 1000;
+/// Longer lists of numbers are a typing error.
+const MAX_NUMBERS: usize = 1000;
+
+/// Why an argument is rejected.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum ArgumentError {
+    #[error("a named recording is NAME=PATH")]
+    Name,
+    #[error("`{}` is not a number", Untrusted(.0))]
+    NotANumber(String),
+    #[error("a range is FROM:TO:STEP")]
+    RangeParts,
+    #[error("a range ascends from FROM to TO with a STEP above 0")]
+    RangeOrder,
+    #[error("the range has more than {MAX_NUMBERS} numbers")]
+    RangeLength,
+    #[error("a forgetting factor is above 0 and at most 1")]
+    Lambda,
+    #[error("an increment is a length above 0 mm")]
+    Increment,
+    #[error("the value has to be above 0")]
+    NotPositive,
+    #[error("a ridge is 0 or more")]
+    Ridge,
+    #[error("there is no such value")]
+    Choice,
+}
+
+/// A value of an option with its name and help text.
+type Choice<T> = (T, &'static str, &'static str);
+
+const ACCELERATIONS: [Choice<Acceleration>; 2] = [
+    (
+        Acceleration::Accelerometer,
+        "accelerometer",
+        "The column a_m_s2",
+    ),
+    (
+        Acceleration::Encoder,
+        "encoder",
+        "The second difference of the position",
+    ),
+];
+const RESAMPLES: [Choice<Resample>; 3] = [
+    (
+        Resample::Point,
+        "point",
+        "Interpolate between means over equal 5 µm counts",
+    ),
+    (Resample::Bin, "bin", "Mean over the bin around the node"),
+    (
+        Resample::Hat,
+        "hat",
+        "Mean weighted by the distance from the node",
+    ),
+];
+const LOOKUPS: [Choice<Lookup>; 3] = [
+    (Lookup::Linear, "linear", "Interpolate linearly"),
+    (Lookup::Floor, "floor", "Take the node to the left"),
+    (Lookup::Nearest, "nearest", "Take the nearest node"),
+];
+const STARTS: [Choice<Start>; 2] = [
+    (Start::Cold, "cold", "From zero and P = 10⁶ I"),
+    (
+        Start::Warm,
+        "warm",
+        "From a backward pass over the first samples",
+    ),
+];
+const SORTS: [Choice<Sort>; 2] = [
+    (
+        Sort::Ascending,
+        "ascending",
+        "Ascending x in both directions",
+    ),
+    (Sort::Travel, "travel", "In the direction of travel"),
+];
+const WINDOWS: [Choice<Window>; 2] = [
+    (
+        Window::Exponential,
+        "exponential",
+        "Sum of a forward and a backward EWLS",
+    ),
+    (Window::Tricube, "tricube", "Smooth, with finite support"),
+];
+const BOUNDS: [Choice<bool>; 2] = [
+    (true, "on", "Require m, b >= 0"),
+    (false, "off", "No bounds"),
+];
+
+/// Parses an option with a fixed set of values.
+fn choice<T: Copy + Send + Sync + 'static>(
+    choices: &'static [Choice<T>],
+) -> impl TypedValueParser<Value = T> {
+    let names = choices
+        .iter()
+        .map(|(_, name, help)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(names).try_map(|given| {
+        let found = choices.iter().find(|(_, name, _)| *name == given);
+        found.map(|(value, ..)| *value).ok_or(ArgumentError::Choice)
+    })
+}
 
 /// Arguments of `study identify`.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Args {
-    /// The recording to identify from: a CSV with t_s, x_mm, f_n (and v_mm_s, a_m_s2)
+    /// The training recording: a CSV file with t_s, x_mm, f_n (and v_mm_s, a_m_s2)
     #[arg(value_name = "TRAINING")]
-    pub(super) training: Named,
+    pub(super) training: NamedPath,
 
-    /// Recordings that lambda and dx are chosen on; NAME=PATH names one in model files
+    /// Recordings on which lambda and dx are selected; NAME=PATH sets the name in model files
     #[arg(long, value_name = "REC", num_args = 1.., required = true)]
-    pub(super) validate: Vec<Named>,
+    pub(super) validate: Vec<NamedPath>,
 
-    /// Recordings that nothing is chosen on: the VAF to report
+    /// Recordings that are not used for selection: their VAF is the one to report
     #[arg(long, value_name = "REC", num_args = 1..)]
-    pub(super) test: Vec<Named>,
+    pub(super) test: Vec<NamedPath>,
 
-    /// Second recordings of the trajectory of a --validate or --test recording: the most that any model could explain
+    /// Second recordings of the trajectory of a --validate or --test recording: they give the highest VAF that a model can reach
     #[arg(long, value_name = "REC", num_args = 1..)]
-    pub(super) repeat: Vec<Named>,
+    pub(super) repeat: Vec<NamedPath>,
 
-    /// Low-pass x, a and F of all recordings at this corner, without delay
-    #[arg(long, value_name = "HZ", value_parser = length)]
+    /// Low-pass filter x, a and F of all recordings at this corner frequency, with zero phase
+    #[arg(long, value_name = "HZ", value_parser = positive)]
     pub(super) filter: Option<f64>,
 
-    /// Where the acceleration comes from
-    #[arg(long, value_enum, default_value_t = AccelerationWord::Accelerometer)]
-    pub(super) acceleration: AccelerationWord,
+    /// Source of the acceleration
+    #[arg(long, value_name = "SOURCE", value_parser = choice(&ACCELERATIONS), default_value = "accelerometer")]
+    pub(super) acceleration: Acceleration,
 
-    /// Leave most samples of dwells out of the training recording
+    /// Remove most samples of dwells from the training recording
     #[arg(long)]
     pub(super) thin: bool,
 
-    /// The estimator
-    #[arg(long, value_enum, default_value_t = MethodWord::Ewls)]
-    pub(super) method: MethodWord,
+    /// Estimator
+    #[arg(long, value_enum, default_value_t = MethodName::Ewls)]
+    pub(super) method: MethodName,
 
     /// Forgetting factors, above 0 and at most 1: a list, or FROM:TO:STEP [default: 0.999:0.9999:0.0001]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = lambdas)]
     pub(super) lambda: Vec<Numbers>,
 
-    /// Resampling increments in mm: a list, or FROM:TO:STEP [default: 0.5,1; for figures 11 from 0.05 to 4]
+    /// Resampling increments in mm: a list, or FROM:TO:STEP [default: 0.5,1; with --figures 11 values from 0.05 to 4]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = increments)]
     pub(super) dx: Vec<Numbers>,
 
-    /// How the estimates are brought to the nodes
-    #[arg(long, value_enum)]
-    pub(super) resample: Option<ResampleWord>,
+    /// Resampling of the estimates at the nodes [default: bin]
+    #[arg(long, value_name = "METHOD", value_parser = choice(&RESAMPLES))]
+    pub(super) resample: Option<Resample>,
 
-    /// How parameters between nodes are found
-    #[arg(long, value_enum, default_value_t = LookupWord::Linear)]
-    pub(super) lookup: LookupWord,
+    /// Look-up of parameters between nodes
+    #[arg(long, value_name = "RULE", value_parser = choice(&LOOKUPS), default_value = "linear")]
+    pub(super) lookup: Lookup,
 
-    /// How the recursion begins
-    #[arg(long, value_enum)]
-    pub(super) start: Option<StartWord>,
+    /// Initial state of the recursion [default: cold]
+    #[arg(long, value_name = "START", value_parser = choice(&STARTS))]
+    pub(super) start: Option<Start>,
 
-    /// The order of the samples in the recursion
-    #[arg(long, value_enum)]
-    pub(super) sort: Option<SortWord>,
+    /// Order of the samples in the recursion [default: ascending]
+    #[arg(long, value_name = "ORDER", value_parser = choice(&SORTS))]
+    pub(super) sort: Option<Sort>,
 
-    /// How the weights of two-sided fall
-    #[arg(long, value_enum)]
-    pub(super) window: Option<WindowWord>,
+    /// Shape of the weights of two-sided [default: tricube]
+    #[arg(long, value_name = "SHAPE", value_parser = choice(&WINDOWS))]
+    pub(super) window: Option<Window>,
 
-    /// Reach of the weights of two-sided in mm, instead of --lambda
-    #[arg(long, value_name = "MM", value_parser = length, conflicts_with = "lambda")]
+    /// Width of the weights of two-sided in mm, instead of --lambda
+    #[arg(long, value_name = "MM", value_parser = positive, conflicts_with = "lambda")]
     pub(super) width: Option<f64>,
 
-    /// How a hat table joins its directions
+    /// Direction state of a hat table [default: play]
     #[arg(long, value_enum)]
-    pub(super) direction: Option<DirectionWord>,
+    pub(super) direction: Option<DirectionRule>,
 
-    /// Distance over which a hat table changes direction in mm [default: the shortest that the training recording allows]
-    #[arg(long, value_name = "MM", value_parser = length)]
+    /// Length over which a hat table changes direction, in mm [default: the shortest that suits the training recording]
+    #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) delta: Option<f64>,
 
     /// Ridges of a hat table: on the curvature of F, on the slopes of m and b [default: 0.003,0.05]
-    #[arg(long, value_name = "F,DYNAMICS", value_delimiter = ',', value_parser = weight, num_args = 2)]
+    #[arg(long, value_name = "F,DYNAMICS", value_delimiter = ',', value_parser = ridge, num_args = 2)]
     pub(super) ridge: Vec<f64>,
 
-    /// Whether m and b of two-sided (default: off) and hat tables (default: on) are kept from below 0
-    #[arg(long, value_enum)]
-    pub(super) bounds: Option<Switch>,
+    /// Whether m, b >= 0 for two-sided (default: off) and hat tables (default: on)
+    #[arg(long, value_name = "SWITCH", value_parser = choice(&BOUNDS))]
+    pub(super) bounds: Option<bool>,
 
-    /// Straight lines of the segments baseline [default: 12]
+    /// Number of segments of the segments baseline [default: 12]
     #[arg(long, value_name = "N")]
     pub(super) segments: Option<usize>,
 
-    /// Print one JSON document, numbers unrounded
+    /// Print the results as one JSON document, with unrounded numbers
     #[arg(long)]
     pub(super) json: bool,
 
@@ -110,32 +212,24 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
 
-    /// Ids of the model files; {lambda} and {dx} stand for the cell's own
+    /// Template of the ids of the model files, with {lambda} and {dx}
     #[arg(long, value_name = "TEMPLATE", requires = "out")]
     pub(super) id: Option<String>,
 
-    /// Overwrite model files that are there
+    /// Overwrite existing model files
     #[arg(long, requires = "out")]
     pub(super) force: bool,
 
-    /// Write the figures (SVG, PNG) and their numbers (CSV) into this folder
+    /// Write the figures (SVG, PNG) and their data (CSV) into this folder
     #[arg(long, value_name = "DIR")]
     pub(super) figures: Option<PathBuf>,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum AccelerationWord {
-    /// The column of the recording
-    Accelerometer,
-    /// The second difference of the position
-    Encoder,
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum MethodWord {
-    /// The paper's: exponentially weighted least squares along x
+pub(super) enum MethodName {
+    /// The paper's method: exponentially weighted least squares along x
     Ewls,
-    /// The paper's with m, b >= 0
+    /// The paper's method with m, b >= 0
     Constrained,
     /// Weighted least squares around each node
     TwoSided,
@@ -143,156 +237,117 @@ pub(super) enum MethodWord {
     Hat,
     /// Baseline: mean force by position and direction
     Static,
-    /// Baseline: straight lines by direction
+    /// Baseline: piecewise linear force by direction
     Segments,
     /// Baseline: one straight line
     Spring,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum ResampleWord {
-    /// At the node, between means over equal 5 µm counts
-    Point,
-    /// The mean over the bin around the node
-    Bin,
-    /// The mean weighted by how near the node is
-    Hat,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum LookupWord {
-    /// Interpolated
-    Linear,
-    /// The node to the left
-    Floor,
-    /// The nearest node
-    Nearest,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum StartWord {
-    /// From zero and P = 10⁶ I
-    Cold,
-    /// From where a pass back over the first samples ends
-    Warm,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum SortWord {
-    /// From the lowest x up
-    Ascending,
-    /// As the target travels
-    Travel,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum WindowWord {
-    /// An EWLS forward and one backward
-    Exponential,
-    /// Smooth, and zero beyond its reach
-    Tricube,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum DirectionWord {
-    /// The sign of v, as the paper
+pub(super) enum DirectionRule {
+    /// The sign of v, as in the paper
     Sign,
-    /// Play
+    /// Play (backlash)
     Play,
-    /// Dahl's friction
+    /// Dahl friction
     Dahl,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Switch {
-    /// m, b >= 0
-    On,
-    /// No bounds
-    Off,
-}
-
-/// A path and the name that its recording has in model files.
+/// A recording's path and its name in model files.
 #[derive(Debug, Clone)]
-pub(super) struct Named {
+pub(super) struct NamedPath {
     pub(super) name: String,
     pub(super) path: PathBuf,
 }
 
-impl std::str::FromStr for Named {
-    type Err = String;
-    /// `NAME=PATH`, or a path, whose stem is the name. A `=` behind a `/` belongs
-    /// to the path.
-    fn from_str(given: &str) -> Result<Self, String> {
+impl std::str::FromStr for NamedPath {
+    type Err = ArgumentError;
+    /// `NAME=PATH`, or a path, whose stem is the name. A `=` after a `/` is part of the
+    /// path.
+    fn from_str(given: &str) -> Result<Self, ArgumentError> {
         match given.split_once('=') {
             Some((name, path)) if !name.contains(['/', '\\']) => {
                 if name.is_empty() || path.is_empty() {
-                    return Err("a named recording is NAME=PATH".into());
+                    return Err(ArgumentError::Name);
                 }
                 Ok(Self {
                     name: name.into(),
                     path: path.into(),
                 })
             }
-            _ => Ok(Self::unnamed(Path::new(given))),
+            _ => {
+                let path = Path::new(given);
+                let name = path.file_stem().unwrap_or(path.as_os_str());
+                Ok(Self {
+                    name: name.to_string_lossy().into_owned(),
+                    path: path.to_owned(),
+                })
+            }
         }
     }
 }
 
-impl Named {
-    fn unnamed(path: &Path) -> Self {
-        let name = path.file_stem().unwrap_or(path.as_os_str());
-        Self {
-            name: name.to_string_lossy().into_owned(),
-            path: path.to_owned(),
-        }
-    }
-
-    /// The name of the file, for `--json`.
+impl NamedPath {
+    /// The file name, for `--json`.
     pub(super) fn file_name(&self) -> String {
         let name = self.path.file_name().unwrap_or(self.path.as_os_str());
         name.to_string_lossy().into_owned()
     }
 }
 
-/// One entry of a list: a number, or those of a range.
+fn number(text: &str) -> Result<f64, ArgumentError> {
+    let text = text.trim();
+    text.parse()
+        .map_err(|_| ArgumentError::NotANumber(text.to_owned()))
+}
+
+/// One entry of a list: a number, or the numbers of a range.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Numbers(Vec<f64>);
 
 impl Numbers {
     /// `0.5`, or `0.1:0.5:0.1` with both ends.
-    fn parse(given: &str) -> Result<Self, String> {
-        let number = |text: &str| {
-            let text = text.trim();
-            text.parse::<f64>()
-                .map_err(|_| format!("`{}` is no number", study_base::text::Untrusted(text)))
-        };
+    fn parse(given: &str) -> Result<Self, ArgumentError> {
         let parts: Vec<&str> = given.split(':').collect();
         let [from, to, step] = parts[..] else {
             return match parts[..] {
                 [one] => Ok(Self(vec![number(one)?])),
-                _ => Err("a range is FROM:TO:STEP".into()),
+                _ => Err(ArgumentError::RangeParts),
             };
         };
         let (low, high, width) = (number(from)?, number(to)?, number(step)?);
         let steps = (high - low) / width;
         if !(width > 0.0 && steps >= 0.0) {
-            return Err("a range goes up from FROM to TO by a STEP above 0".into());
+            return Err(ArgumentError::RangeOrder);
         }
-        if steps >= MOST_NUMBERS as f64 {
-            return Err(format!("that range has more than {MOST_NUMBERS} numbers"));
+        if steps >= MAX_NUMBERS as f64 {
+            return Err(ArgumentError::RangeLength);
         }
-        // 0.999 + 3 · 0.0001 shall be what 0.9993 is
+        // 0.999 + 3 · 0.0001 has to equal 0.9993
         let digits = decimals(from).max(decimals(step));
-        // a hundredth of a step forgives the rounding of the division
+        // a hundredth of a step absorbs the rounding of the division
         let last = (steps + 0.01).floor() as usize;
         (0..=last)
             .map(|i| number(&format!("{:.digits$}", low + i as f64 * width)))
             .collect::<Result<_, _>>()
             .map(Self)
     }
+
+    /// Numbers that all satisfy a condition.
+    fn all(
+        given: &str,
+        valid: impl Fn(f64) -> bool,
+        otherwise: ArgumentError,
+    ) -> Result<Self, ArgumentError> {
+        let numbers = Self::parse(given)?;
+        match numbers.0.iter().all(|value| valid(*value)) {
+            true => Ok(numbers),
+            false => Err(otherwise),
+        }
+    }
 }
 
-/// Digits behind the point; 17 for other ways to write a number.
+/// Number of decimals; 17 for other notations.
 fn decimals(text: &str) -> usize {
     let text = text.trim();
     match text.split_once('.') {
@@ -302,107 +357,82 @@ fn decimals(text: &str) -> usize {
     }
 }
 
-/// Forgetting factors, checked where clap can name the argument.
-fn lambdas(given: &str) -> Result<Numbers, String> {
-    let numbers = Numbers::parse(given)?;
-    if numbers.0.iter().all(|value| *value > 0.0 && *value <= 1.0) {
-        Ok(numbers)
-    } else {
-        Err("a forgetting factor is above 0 and at most 1".into())
+/// Parses forgetting factors.
+fn lambdas(given: &str) -> Result<Numbers, ArgumentError> {
+    Numbers::all(given, |v| v > 0.0 && v <= 1.0, ArgumentError::Lambda)
+}
+
+/// Parses resampling increments.
+fn increments(given: &str) -> Result<Numbers, ArgumentError> {
+    let valid = |v: f64| v > 0.0 && v.is_finite();
+    Numbers::all(given, valid, ArgumentError::Increment)
+}
+
+fn positive(given: &str) -> Result<f64, ArgumentError> {
+    match number(given)? {
+        value if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err(ArgumentError::NotPositive),
     }
 }
 
-/// Resampling increments.
-fn increments(given: &str) -> Result<Numbers, String> {
-    let numbers = Numbers::parse(given)?;
-    if numbers.0.iter().all(|v| *v > 0.0 && v.is_finite()) {
-        Ok(numbers)
-    } else {
-        Err("an increment is a length above 0 mm".into())
+fn ridge(given: &str) -> Result<f64, ArgumentError> {
+    match number(given)? {
+        value if value >= 0.0 && value.is_finite() => Ok(value),
+        _ => Err(ArgumentError::Ridge),
     }
 }
 
-fn length(given: &str) -> Result<f64, String> {
-    match given.trim().parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        Ok(_) => Err("this has to be above 0".into()),
-        Err(_) => Err("this is no number".into()),
-    }
-}
-
-fn weight(given: &str) -> Result<f64, String> {
-    match given.trim().parse::<f64>() {
-        Ok(value) if value >= 0.0 && value.is_finite() => Ok(value),
-        Ok(_) => Err("a ridge is 0 or more".into()),
-        Err(_) => Err("this is no number".into()),
-    }
-}
-
-/// Over the range of the paper's grid.
+/// The range of the paper's grid.
 const DEFAULT_LAMBDAS: [f64; 10] = [
     0.999, 0.9991, 0.9992, 0.9993, 0.9994, 0.9995, 0.9996, 0.9997, 0.9998, 0.9999,
 ];
-/// The paper's best and the one of its study, mm.
+/// The best cell of the paper's grid and the increment of its study, mm.
 const DEFAULT_DX_MM: [f64; 2] = [0.5, 1.0];
-/// Over the range of the paper's Fig. 4, mm.
+/// The range of the paper's Fig. 4, mm.
 const FIGURE_DX_MM: [f64; 11] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
+
+/// All numbers of some lists, each once.
+fn distinct(lists: &[Numbers]) -> Vec<f64> {
+    let mut all = Vec::new();
+    for value in lists.iter().flat_map(|list| &list.0) {
+        if !all.contains(value) {
+            all.push(*value);
+        }
+    }
+    all
+}
 
 impl Args {
     /// How signals are prepared.
-    pub(super) fn signals(&self) -> signal::Settings {
-        signal::Settings {
+    pub(super) fn signals(&self) -> Settings {
+        Settings {
             filter_hz: self.filter,
-            acceleration: match self.acceleration {
-                AccelerationWord::Accelerometer => signal::Acceleration::Accelerometer,
-                AccelerationWord::Encoder => signal::Acceleration::Encoder,
-            },
+            acceleration: self.acceleration,
         }
     }
 
-    /// How parameters between nodes are found.
-    pub(super) fn lookup(&self) -> Lookup {
-        match self.lookup {
-            LookupWord::Linear => Lookup::Linear,
-            LookupWord::Floor => Lookup::Floor,
-            LookupWord::Nearest => Lookup::Nearest,
-        }
-    }
-
-    /// Every method with its options, and every dx.
+    /// The grid: every method with its options, and every dx.
     pub(super) fn plan(&self) -> Result<Plan, Failure> {
-        self.refuse_what_has_no_meaning()?;
-        let flat = |lists: &[Numbers]| -> Vec<f64> {
-            let mut all = Vec::new();
-            for value in lists.iter().flat_map(|list| &list.0) {
-                if !all.contains(value) {
-                    all.push(*value);
-                }
-            }
-            all
-        };
-        let dx_mm = match flat(&self.dx) {
+        self.check_options_apply()?;
+        let dx_mm = match distinct(&self.dx) {
             given if !given.is_empty() => given,
             _ if self.figures.is_some() => FIGURE_DX_MM.to_vec(),
             _ => DEFAULT_DX_MM.to_vec(),
         };
-        let lambdas = match flat(&self.lambda) {
+        let lambdas = match distinct(&self.lambda) {
             given if given.is_empty() => DEFAULT_LAMBDAS.to_vec(),
             given => given,
         };
         let each = |of: &dyn Fn(f64) -> Method| lambdas.iter().map(|l| of(*l)).collect();
-        let on = |usual| self.bounds.map_or(usual, |b| b == Switch::On);
         let methods: Vec<Method> = match self.method {
-            MethodWord::Ewls => each(&|lambda| self.ewls(lambda, false)),
-            MethodWord::Constrained => each(&|lambda| self.ewls(lambda, true)),
-            MethodWord::TwoSided => {
+            MethodName::Ewls => each(&|lambda| self.ewls(lambda, false)),
+            MethodName::Constrained => each(&|lambda| self.ewls(lambda, true)),
+            MethodName::TwoSided => {
                 let of = |width| {
                     Method::TwoSided(TwoSided {
-                        window: match self.window {
-                            Some(WindowWord::Exponential) => Window::Exponential,
-                            Some(WindowWord::Tricube) | None => Window::Tricube,
-                        },
+                        window: self.window.unwrap_or(Window::Tricube),
                         width,
-                        bounded: on(false),
+                        bounded: self.bounds.unwrap_or(false),
                     })
                 };
                 match self.width {
@@ -410,13 +440,13 @@ impl Args {
                     None => each(&|lambda| of(Width::Lambda(lambda))),
                 }
             }
-            MethodWord::Hat => vec![self.hat(on(true))],
-            MethodWord::Static => vec![Method::Static],
-            MethodWord::Segments => vec![Method::Segments(
+            MethodName::Hat => vec![self.hat()],
+            MethodName::Static => vec![Method::Static],
+            MethodName::Segments => vec![Method::Segments(
                 self.segments
                     .map_or_else(Segments::default, |count| Segments { count }),
             )],
-            MethodWord::Spring => vec![Method::Spring],
+            MethodName::Spring => vec![Method::Spring],
         };
         Ok(Plan { methods, dx_mm })
     }
@@ -424,43 +454,33 @@ impl Args {
     fn ewls(&self, lambda: f64, bounded: bool) -> Method {
         Method::Ewls(Ewls {
             lambda,
-            resample: match self.resample {
-                Some(ResampleWord::Point) => Resample::Point,
-                Some(ResampleWord::Bin) | None => Resample::Bin,
-                Some(ResampleWord::Hat) => Resample::Hat,
-            },
-            start: match self.start {
-                Some(StartWord::Cold) | None => Start::Cold,
-                Some(StartWord::Warm) => Start::Warm,
-            },
-            sort: match self.sort {
-                Some(SortWord::Ascending) | None => Sort::Ascending,
-                Some(SortWord::Travel) => Sort::Travel,
-            },
+            resample: self.resample.unwrap_or(Resample::Bin),
+            start: self.start.unwrap_or(Start::Cold),
+            sort: self.sort.unwrap_or(Sort::Ascending),
             bounded,
         })
     }
 
-    fn hat(&self, bounded: bool) -> Method {
-        let usual = Hat::default();
+    fn hat(&self) -> Method {
+        let default = Hat::default();
         let delta = self.delta.map_or(Delta::Scan, Delta::Mm);
         Method::Hat(Hat {
             state: match self.direction {
-                Some(DirectionWord::Sign) => State::Sign,
-                Some(DirectionWord::Play) | None => State::Play(delta),
-                Some(DirectionWord::Dahl) => State::Dahl(delta),
+                Some(DirectionRule::Sign) => State::Sign,
+                Some(DirectionRule::Play) | None => State::Play(delta),
+                Some(DirectionRule::Dahl) => State::Dahl(delta),
             },
-            ridge_force: self.ridge.first().copied().unwrap_or(usual.ridge_force),
-            ridge_dynamics: self.ridge.get(1).copied().unwrap_or(usual.ridge_dynamics),
-            bounded,
+            ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
+            ridge_dynamics: self.ridge.get(1).copied().unwrap_or(default.ridge_dynamics),
+            bounded: self.bounds.unwrap_or(default.bounded),
         })
     }
 
-    /// A flag that would be passed over in silence is a mistake. Those of the paper's
-    /// recursion are let through, so that one script can make baselines as well.
-    fn refuse_what_has_no_meaning(&self) -> Result<(), Failure> {
-        use MethodWord::{Constrained, Ewls, Hat, Segments, Static, TwoSided};
-        let given: [(&str, bool, &[MethodWord]); 9] = [
+    /// Rejects options that the method does not have. Those of the paper's recursion are
+    /// accepted, so that one script can identify baselines as well.
+    fn check_options_apply(&self) -> Result<(), Failure> {
+        use MethodName::{Constrained, Ewls, Hat, Segments, Static, TwoSided};
+        let given: [(&str, bool, &[MethodName]); 9] = [
             (
                 "--lambda",
                 !self.lambda.is_empty(),
@@ -485,7 +505,7 @@ impl Args {
         {
             Some((flag, _, _)) => Err(Failure::new(
                 Kind::Usage,
-                format!("{flag} has no meaning for this method"),
+                format!("{flag} does not apply to this method"),
             )),
             None => Ok(()),
         }
@@ -497,7 +517,7 @@ mod tests {
     use super::*;
 
     fn named(given: &str) -> (String, String) {
-        let named: Named = given.parse().unwrap();
+        let named: NamedPath = given.parse().unwrap();
         (named.name, named.path.display().to_string())
     }
 
@@ -510,8 +530,8 @@ mod tests {
             pair("validation-1.5hz", "a/val.csv")
         );
         assert_eq!(named("./dx=1/val.csv"), pair("val", "./dx=1/val.csv"));
-        assert!("=a".parse::<Named>().is_err());
-        assert!("a=".parse::<Named>().is_err());
+        assert!("=a".parse::<NamedPath>().is_err());
+        assert!("a=".parse::<NamedPath>().is_err());
     }
 
     #[test]

@@ -1,30 +1,34 @@
-//! The files that `study identify` writes: models and figures.
+//! The files that `study identify` writes: model files and figures.
 
-use super::args::{Args, MethodWord};
-use super::{Failure, Found, Kind};
+use super::super::trajectory::{refuse_to_overwrite, write_file};
+use super::args::{Args, MethodName};
+use super::{Failure, Kind, Results};
 use crate::report::identification::{self, Drawing, Place};
 use crate::report::png::Painter;
-use std::fs::{self, OpenOptions};
-use std::io::Write as _;
+use std::fs;
 use std::path::{Path, PathBuf};
 use study_base::text::{ModelId, Untrusted};
 use study_haptics::identify::grid::Cell;
 use study_haptics::model::file;
 
 /// Path and content.
-type Written = (PathBuf, Vec<u8>);
+type OutputFile = (PathBuf, Vec<u8>);
 
-/// Gives every cell its id and makes its file.
-pub(super) fn models(cells: &mut [Cell], args: &Args, dir: &Path) -> Result<Vec<Written>, Failure> {
+/// Sets the id of every cell; returns the model files.
+pub(super) fn models(
+    cells: &mut [Cell],
+    args: &Args,
+    dir: &Path,
+) -> Result<Vec<OutputFile>, Failure> {
     let template = args.id.as_deref().unwrap_or(match args.method {
-        MethodWord::Ewls => "lambda-{lambda}-dx-{dx}",
-        MethodWord::Constrained => "constrained-lambda-{lambda}-dx-{dx}",
-        MethodWord::TwoSided if args.width.is_some() => "two-sided-dx-{dx}",
-        MethodWord::TwoSided => "two-sided-{lambda}-dx-{dx}",
-        MethodWord::Hat => "hat-dx-{dx}",
-        MethodWord::Static => "static-dx-{dx}",
-        MethodWord::Segments => "segments",
-        MethodWord::Spring => "spring",
+        MethodName::Ewls => "lambda-{lambda}-dx-{dx}",
+        MethodName::Constrained => "constrained-lambda-{lambda}-dx-{dx}",
+        MethodName::TwoSided if args.width.is_some() => "two-sided-dx-{dx}",
+        MethodName::TwoSided => "two-sided-{lambda}-dx-{dx}",
+        MethodName::Hat => "hat-dx-{dx}",
+        MethodName::Static => "static-dx-{dx}",
+        MethodName::Segments => "segments",
+        MethodName::Spring => "spring",
     });
     let mut ids: Vec<ModelId> = Vec::new();
     let mut files = Vec::new();
@@ -36,8 +40,8 @@ pub(super) fn models(cells: &mut [Cell], args: &Args, dir: &Path) -> Result<Vec<
             .replace("{dx}", &number(provenance.dx_mm));
         let id = ModelId::new(id).map_err(Failure::input)?;
         if ids.iter().any(|other| other.collides_with(&id)) {
-            return Err(Failure::input(format!("two cells would be called {id}"))
-                .hint("the template needs {lambda} or {dx}, or the list is too long"));
+            return Err(Failure::input(format!("two cells would have the id {id}"))
+                .hint("use {lambda} and {dx} in the template, or fewer values"));
         }
         cell.realization.id = id.to_string();
         files.push((
@@ -49,47 +53,27 @@ pub(super) fn models(cells: &mut [Cell], args: &Args, dir: &Path) -> Result<Vec<
     Ok(files)
 }
 
-/// Writes the files; without `force` none if one of them is there.
-pub(super) fn write(dir: &Path, files: &[Written], force: bool) -> Result<(), Failure> {
+/// Writes the files; without `force` none if one of them exists.
+pub(super) fn write(dir: &Path, files: &[OutputFile], force: bool) -> Result<(), Failure> {
     fs::create_dir_all(dir).map_err(|e| Failure::file(dir, &e))?;
-    if !force && let Some((path, _)) = files.iter().find(|(path, _)| path.exists()) {
-        return Err(
-            Failure::input(format!("{} is there already", path.display()))
-                .hint("--force overwrites it; nothing was written"),
-        );
+    for (path, _) in files {
+        refuse_to_overwrite(Some(path), force)?;
     }
     for (path, content) in files {
-        // A reader never sees half a file: the whole one takes the name at once.
-        let mut part = path.clone().into_os_string();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let written = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .open(&part)
-            .and_then(|mut file| file.write_all(content).and_then(|()| file.sync_all()))
-            .and_then(|()| fs::rename(&part, path));
-        if let Err(e) = written {
-            // what is left of it is of no use
-            let _ = fs::remove_file(&part);
-            return Err(Failure::file(path, &e));
-        }
+        write_file(path, |sink| sink.write_all(content))?;
     }
     Ok(())
 }
 
-/// The figures that the cells are enough for, as SVG, PNG and CSV, and in words
-/// those that they are not.
+/// The figures as SVG, PNG and CSV, and notes on figures that need more cells.
 pub(super) fn figures(
-    found: &Found<'_>,
+    results: &Results<'_>,
     dir: &Path,
-) -> Result<(Vec<Written>, Vec<&'static str>), Failure> {
+) -> Result<(Vec<OutputFile>, Vec<&'static str>), Failure> {
     let mut missing = Vec::new();
     let mut drawings: Vec<Drawing> = Vec::new();
-    // chosen on this one, and drawn for the one that nothing was chosen on
-    let (chosen_on, _) = found.recordings[0];
-    let places: Vec<Place> = found
+    let (selected_on, _) = results.recordings[0];
+    let places: Vec<Place> = results
         .cells
         .iter()
         .filter_map(|cell| {
@@ -102,28 +86,28 @@ pub(super) fn figures(
             })
         })
         .collect();
-    let whole = places.len() == found.cells.len();
-    let name = Untrusted(&chosen_on.name).to_string();
-    match identification::surface(&places, found.best.filter(|_| whole), &name) {
+    let whole = places.len() == results.cells.len();
+    let name = Untrusted(&selected_on.name).to_string();
+    match identification::surface(&places, results.best.filter(|_| whole), &name) {
         Some(drawing) => drawings.push(drawing),
-        None => missing.push("no Fig. 4: it takes two or more lambda and dx"),
+        None => missing.push("no Fig. 4: it requires at least two lambda and two dx"),
     }
-    let shown = found.best.unwrap_or(0);
-    if let Some(cell) = found.cells.get(shown) {
-        let recording = found.recordings[found.reported()].1;
+    let shown = results.best.unwrap_or(0);
+    if let Some(cell) = results.cells.get(shown) {
+        let recording = results.recordings[results.reported()].1;
         drawings.push(identification::parameters(&cell.realization));
         drawings.push(identification::force(&cell.realization, recording));
         drawings.push(identification::spectra(&cell.realization, recording));
         let dx = cell.realization.provenance.dx_mm;
-        let beside: Vec<_> = found
+        let same_dx: Vec<_> = results
             .cells
             .iter()
             .filter(|other| other.realization.provenance.dx_mm == dx)
             .filter_map(|other| Some((other.realization.provenance.lambda?, &other.realization)))
             .collect();
-        match identification::map(&beside) {
+        match identification::map(&same_dx) {
             Some(drawing) => drawings.push(drawing),
-            None => missing.push("no Fig. 8: it takes two or more lambda"),
+            None => missing.push("no Fig. 8: it requires at least two lambda"),
         }
     }
     let painter = Painter::default();

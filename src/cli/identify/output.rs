@@ -1,45 +1,42 @@
 //! What `study identify` prints.
 
-use super::Found;
-use super::args::Named;
+use super::Results;
+use super::args::NamedPath;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
 use study_haptics::identify::Method;
 use study_haptics::identify::grid::Cell;
-use study_haptics::identify::validation::{JUST_NOTICEABLE_N, Part};
-use study_haptics::model::file::lookup_word;
+use study_haptics::identify::vaf::Score;
+use study_haptics::identify::validation::{Accuracy, JUST_NOTICEABLE_N};
+use study_haptics::model::file::lookup_name;
 use study_haptics::recording::Recording;
 use study_wire::certificate::Certificate;
 use unicode_width::UnicodeWidthStr as _;
 
-/// More cells than this are shown as a surface instead of a list.
-const MOST_ROWS: usize = 30;
+/// Most cells shown as a list; more are shown as rows of lambda and columns of dx.
+const MAX_ROWS: usize = 30;
 
-/// `study-identify/1`.
-pub(super) fn json(found: &Found<'_>) -> String {
-    let cells: Vec<Value> = found
+/// The results as a JSON document, format `study-identify/1`.
+pub(super) fn json(results: &Results<'_>) -> String {
+    let cells: Vec<Value> = results
         .cells
         .iter()
         .map(|cell| {
             let provenance = &cell.realization.provenance;
-            let by_file =
-                |of: fn(&study_haptics::identify::vaf::Score) -> f64| -> Map<String, Value> {
-                    found
-                        .recordings
-                        .iter()
-                        .zip(&cell.scores)
-                        .map(|((named, _), score)| (key(found, named), of(score).into()))
-                        .collect()
-                };
+            let by_file = |of: fn(&Score) -> f64| -> Map<String, Value> {
+                (results.recordings.iter().zip(&cell.scores))
+                    .map(|((named, _), score)| (key(results, named), of(score).into()))
+                    .collect()
+            };
             let warnings: Vec<String> = cell.warnings.iter().map(ToString::to_string).collect();
             json!({
-                "method": cell.method.word(),
+                "method": cell.method.as_str(),
                 "lambda": provenance.lambda,
                 "memory_mm": provenance.memory_mm,
                 "dx_mm": provenance.dx_mm,
                 "resample": provenance.resample,
-                "lookup": lookup_word(cell.realization.lookup),
+                "lookup": lookup_name(cell.realization.lookup),
                 "start": start(cell.method),
                 "sort": sort(cell.method),
                 "estimator": provenance.method,
@@ -55,29 +52,29 @@ pub(super) fn json(found: &Found<'_>) -> String {
             })
         })
         .collect();
-    let recording = |named: &Named, recording: &Recording, role: &str| {
+    let recording = |named: &NamedPath, recording: &Recording, role: &str| {
         let warnings: Vec<String> = recording.warnings.iter().map(ToString::to_string).collect();
         json!({
-            "file": key(found, named),
+            "file": key(results, named),
             "name": named.name,
             "sha256": recording.sha256,
             "role": role,
             "warnings": warnings,
         })
     };
-    let recordings: Vec<Value> = found
+    let recordings: Vec<Value> = results
         .recordings
         .iter()
         .enumerate()
         .map(|(i, (named, r))| {
-            let validates = i < found.args.validate.len();
+            let validates = i < results.args.validate.len();
             recording(named, r, if validates { "validate" } else { "test" })
         })
         .collect();
-    let validation: Map<String, Value> = found
+    let validation: Map<String, Value> = results
         .recordings
         .iter()
-        .zip(found.validations.iter().zip(&found.ceilings))
+        .zip(results.validations.iter().zip(&results.ceilings))
         .filter_map(|((named, _), (validation, ceiling))| {
             let v = validation.as_ref()?;
             let detents: Vec<Value> = v
@@ -94,32 +91,32 @@ pub(super) fn json(found: &Found<'_>) -> String {
                     "vaf": c.vaf, "noise_n": c.noise_n, "apart_mm": c.apart_mm,
                 })),
             });
-            Some((key(found, named), document))
+            Some((key(results, named), document))
         })
         .collect();
     let document = json!({
         "format": "study-identify/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
-        "training": recording(&found.args.training, found.training, "training"),
+        "training": recording(&results.args.training, results.training, "training"),
         "recordings": recordings,
-        "best": found.best,
+        "best": results.best,
         "validation": validation,
         "cells": cells,
     });
     format!("{document:#}\n")
 }
 
-fn part(part: &Part) -> Value {
+fn part(accuracy: &Accuracy) -> Value {
     json!({
-        "samples": part.samples,
-        "vaf": part.vaf,
-        "bias_n": part.bias_n,
-        "residual_n": part.residual_n,
-        "nrmse": part.nrmse,
+        "samples": accuracy.samples,
+        "vaf": accuracy.vaf,
+        "bias_n": accuracy.bias_n,
+        "residual_n": accuracy.residual_n,
+        "nrmse": accuracy.nrmse,
     })
 }
 
-/// What is not finite, such as a margin that nothing can mend, is null.
+/// Numbers that are not finite, such as an unbounded stiffness, become null.
 fn certificate(certificate: &Certificate) -> Value {
     let margins: Map<String, Value> = certificate
         .conditions()
@@ -142,22 +139,22 @@ fn certificate(certificate: &Certificate) -> Value {
 
 fn start(method: Method) -> Option<&'static str> {
     match method {
-        Method::Ewls(options) => Some(options.start.word()),
+        Method::Ewls(options) => Some(options.start.as_str()),
         _ => None,
     }
 }
 
 fn sort(method: Method) -> Option<&'static str> {
     match method {
-        Method::Ewls(options) => Some(options.sort.word()),
+        Method::Ewls(options) => Some(options.sort.as_str()),
         _ => None,
     }
 }
 
-/// The file's name; the whole path where two recordings have the same.
-fn key(found: &Found<'_>, named: &Named) -> String {
+/// The file name of a recording; its path if two recordings have the same file name.
+fn key(results: &Results<'_>, named: &NamedPath) -> String {
     let name = named.file_name();
-    let same = found
+    let same = results
         .recordings
         .iter()
         .filter(|(other, _)| other.file_name() == name)
@@ -169,59 +166,59 @@ fn key(found: &Found<'_>, named: &Named) -> String {
     }
 }
 
-/// The table for a terminal, and what to make of it.
-pub(super) fn table(found: &Found<'_>) -> String {
+/// The results as text for a terminal.
+pub(super) fn table(results: &Results<'_>) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
         "{}: {} samples, {:.1} s, x {:.2} to {:.2} mm, |v| up to {:.0} mm/s",
-        Untrusted(&found.training.name),
-        found.training.len(),
-        found.training.duration_s(),
-        found.training.range_mm()[0],
-        found.training.range_mm()[1],
-        found.training.top_speed_mm_s(),
+        Untrusted(&results.training.name),
+        results.training.len(),
+        results.training.duration_s(),
+        results.training.range_mm()[0],
+        results.training.range_mm()[1],
+        results.training.top_speed_mm_s(),
     );
-    if let Some(cell) = found.cells.first() {
-        let _ = writeln!(out, "{}", how(cell));
+    if let Some(cell) = results.cells.first() {
+        let _ = writeln!(out, "{}", settings(cell));
     }
     out.push('\n');
-    match surface(found) {
+    match surface(results) {
         Some(rows) => {
-            let name = Untrusted(&found.recordings[0].0.name);
+            let name = Untrusted(&results.recordings[0].0.name);
             let _ = writeln!(out, "VAF on {name}, by lambda (and L in mm) and dx in mm:");
             out.push_str(&align(&rows));
         }
         None => {
-            let mut rows = vec![heads(found)];
-            let cells = found.cells.iter().enumerate();
-            rows.extend(cells.map(|(i, cell)| row(cell, found.best == Some(i))));
+            let mut rows = vec![heads(results)];
+            let cells = results.cells.iter().enumerate();
+            rows.extend(cells.map(|(i, cell)| row(cell, results.best == Some(i))));
             out.push_str(&align(&rows));
         }
     }
     out.push('\n');
-    out.push_str(&verdict(found));
-    out.push_str(&worth(found));
-    for (said, cells) in warnings(found) {
-        let _ = writeln!(out, "warning: {said} ({cells})");
+    out.push_str(&selection(results));
+    out.push_str(&best_in_detail(results));
+    for (warning, cells) in warnings(results) {
+        let _ = writeln!(out, "warning: {warning} ({cells})");
     }
     out
 }
 
-/// A large grid as rows of lambda and columns of dx.
-fn surface(found: &Found<'_>) -> Option<Vec<Vec<String>>> {
-    if found.cells.len() <= MOST_ROWS {
+/// A large grid as rows of lambda and columns of dx; `None` for a small one.
+fn surface(results: &Results<'_>) -> Option<Vec<Vec<String>>> {
+    if results.cells.len() <= MAX_ROWS {
         return None;
     }
     let mut increments: Vec<f64> = Vec::new();
     let mut rows: Vec<(f64, Vec<String>)> = Vec::new();
-    for (i, cell) in found.cells.iter().enumerate() {
+    for (i, cell) in results.cells.iter().enumerate() {
         let provenance = &cell.realization.provenance;
         let (lambda, dx) = (provenance.lambda?, provenance.dx_mm?);
         if !increments.contains(&dx) {
             increments.push(dx);
         }
-        let mark = if found.best == Some(i) { "*" } else { "" };
+        let mark = if results.best == Some(i) { "*" } else { "" };
         let vaf = format!("{mark}{:.4}", cell.scores.first()?.vaf);
         match rows.last_mut() {
             Some((last, row)) if *last == lambda => row.push(vaf),
@@ -244,32 +241,32 @@ fn surface(found: &Found<'_>) -> Option<Vec<Vec<String>>> {
         .then_some(table)
 }
 
-/// The best cell in parts, its ceiling and its certificate.
-fn worth(found: &Found<'_>) -> String {
-    let Some(cell) = found.best.map(|best| &found.cells[best]) else {
+/// The accuracy of the best cell by direction and detent, its ceiling and certificate.
+fn best_in_detail(results: &Results<'_>) -> String {
+    let Some(cell) = results.best.map(|best| &results.cells[best]) else {
         return String::new();
     };
     let mut rows = vec![
-        ["", "VAF", "NRMSE", "bias N", "residual N", "noticed"]
+        ["", "VAF", "NRMSE", "bias N", "residual N", "in JND"]
             .map(String::from)
             .to_vec(),
     ];
     let mut ceilings = String::new();
-    for ((named, _), (validation, ceiling)) in found
+    for ((named, _), (validation, ceiling)) in results
         .recordings
         .iter()
-        .zip(found.validations.iter().zip(&found.ceilings))
+        .zip(results.validations.iter().zip(&results.ceilings))
     {
         let Some(v) = validation else { continue };
-        let mut row = |what: String, part: &Option<Part>| {
-            if let Some(part) = part {
+        let mut row = |samples: String, accuracy: &Option<Accuracy>| {
+            if let Some(accuracy) = accuracy {
                 rows.push(vec![
-                    what,
-                    format!("{:.4}", part.vaf),
-                    format!("{:.3}", part.nrmse),
-                    format!("{:+.3}", part.bias_n),
-                    format!("{:.3}", part.residual_n),
-                    format!("{:.1}x", part.noticeable()),
+                    samples,
+                    format!("{:.4}", accuracy.vaf),
+                    format!("{:.3}", accuracy.nrmse),
+                    format!("{:+.3}", accuracy.bias_n),
+                    format!("{:.3}", accuracy.residual_n),
+                    format!("{:.1}", accuracy.in_noticeable_differences()),
                 ]);
             }
         };
@@ -282,7 +279,7 @@ fn worth(found: &Found<'_>) -> String {
         if let Some(c) = ceiling {
             let _ = writeln!(
                 ceilings,
-                "the most that any model could reach on {}: {:.6}, by its repetition ({:.3} N does not come back)",
+                "highest VAF that a model can reach on {}: {:.6} (its repetition differs by noise of {:.3} N)",
                 Untrusted(&named.name),
                 c.vaf,
                 c.noise_n
@@ -292,45 +289,45 @@ fn worth(found: &Found<'_>) -> String {
     let provenance = &cell.realization.provenance;
     let filter = provenance.filter.as_deref().unwrap_or("unknown");
     format!(
-        "\nthe {} cell in parts, signals {filter}; `noticed` in just noticeable differences of {JUST_NOTICEABLE_N} N\n{}{ceilings}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n",
-        if found.cells.len() == 1 {
+        "\nthe {} cell in detail; signals: {filter}; JND: just noticeable difference, {JUST_NOTICEABLE_N} N\n{}{ceilings}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n",
+        if results.cells.len() == 1 {
             "only"
         } else {
             "best"
         },
         align(&rows),
         cell.certificate,
-        super::needs(&cell.certificate),
+        super::required_damping(&cell.certificate),
         100.0 * cell.certificate.negative_mass,
         100.0 * cell.certificate.negative_damping,
     )
 }
 
-/// A name as long as a path would push the numbers off the screen.
-fn short_name(named: &Named) -> String {
+/// The name, truncated so that the numbers stay on the screen.
+fn short_name(named: &NamedPath) -> String {
     let name: String = named.name.chars().take(24).collect();
     Untrusted(&name).to_string()
 }
 
-/// What all cells have in common.
-fn how(cell: &Cell) -> String {
-    let mut words = vec![cell.method.word().to_owned()];
+/// The settings that all cells share.
+fn settings(cell: &Cell) -> String {
+    let mut parts = vec![cell.method.as_str().to_owned()];
     if let Some(start) = start(cell.method) {
-        words.push(format!("{start} start"));
+        parts.push(format!("{start} start"));
     }
     if let Some(sort) = sort(cell.method) {
-        words.push(format!("{sort} in x"));
+        parts.push(format!("{sort} in x"));
     }
     if let Some(resample) = &cell.realization.provenance.resample {
-        words.push(format!("{resample} resampling"));
+        parts.push(format!("{resample} resampling"));
     }
-    words.push(format!("{} look-up", lookup_word(cell.realization.lookup)));
-    words.join(", ")
+    parts.push(format!("{} look-up", lookup_name(cell.realization.lookup)));
+    parts.join(", ")
 }
 
-fn heads(found: &Found<'_>) -> Vec<String> {
+fn heads(results: &Results<'_>) -> Vec<String> {
     let mut heads: Vec<String> = ["", "lambda", "L mm", "dx mm"].map(String::from).to_vec();
-    for (named, _) in &found.recordings {
+    for (named, _) in &results.recordings {
         heads.push(format!("VAF {}", short_name(named)));
         heads.push("bias N".into());
         heads.push("residual N".into());
@@ -376,62 +373,63 @@ fn row(cell: &Cell, best: bool) -> Vec<String> {
     row
 }
 
-/// Which cell is best and what that is worth.
-fn verdict(found: &Found<'_>) -> String {
-    let Some(best) = found.best else {
+/// The VAF of the best cell, on what it was selected, and the VAF to report.
+fn selection(results: &Results<'_>) -> String {
+    let Some(best) = results.best else {
         return "no cell has a VAF\n".into();
     };
-    let cell = &found.cells[best];
-    let validations = found.args.validate.len();
+    let cell = &results.cells[best];
+    let validations = results.args.validate.len();
     let list = |from: usize, to: usize| {
-        found.recordings[from..to]
+        results.recordings[from..to]
             .iter()
             .zip(&cell.scores[from..to])
             .map(|((named, _), s)| format!("{:.6} on {}", s.vaf, Untrusted(&named.name)))
             .collect::<Vec<_>>()
             .join(", ")
     };
-    if found.cells.len() == 1 {
-        return format!("VAF {}\n", list(0, found.recordings.len()));
+    if results.cells.len() == 1 {
+        return format!("VAF {}\n", list(0, results.recordings.len()));
     }
     let mut out = format!(
         "* highest VAF: {}{}",
         list(0, validations),
         if validations == 1 {
-            ", chosen on this recording"
+            ", selected on this recording"
         } else {
-            " (highest mean), chosen on these recordings"
+            " (highest mean), selected on these recordings"
         }
     );
     out.push('\n');
-    if validations < found.recordings.len() {
+    if validations < results.recordings.len() {
         let _ = writeln!(
             out,
             "  to report: {}",
-            list(validations, found.recordings.len())
+            list(validations, results.recordings.len())
         );
     } else {
-        out += "  a VAF that chose its own cell is optimistic: report one on a --test recording\n";
+        out += "  the VAF on the recording used for selection is optimistic: report the VAF on a --test recording\n";
     }
     out
 }
 
-/// Each warning once, with the cells that have it.
-fn warnings(found: &Found<'_>) -> Vec<(String, String)> {
-    let mut said: Vec<(String, usize)> = Vec::new();
-    for warning in found.cells.iter().flat_map(|cell| &cell.warnings) {
+/// Each warning once, with the number of cells that have it.
+fn warnings(results: &Results<'_>) -> Vec<(String, String)> {
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    for warning in results.cells.iter().flat_map(|cell| &cell.warnings) {
         let text = warning.to_string();
-        match said.iter_mut().find(|(other, _)| *other == text) {
+        match counts.iter_mut().find(|(other, _)| *other == text) {
             Some((_, count)) => *count += 1,
-            None => said.push((text, 1)),
+            None => counts.push((text, 1)),
         }
     }
-    said.into_iter()
-        .map(|(text, count)| (text, format!("{count} of {} cells", found.cells.len())))
+    counts
+        .into_iter()
+        .map(|(text, count)| (text, format!("{count} of {} cells", results.cells.len())))
         .collect()
 }
 
-/// Columns as wide as their widest entry, flush right.
+/// Columns as wide as their widest entry, right-aligned.
 fn align(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let widths: Vec<usize> = (0..columns)

@@ -1,5 +1,5 @@
-//! A recording by a probe at the end of a wire: the trajectory is sampled, followed
-//! by the device, and comes back as it was measured.
+//! Recording with a probe on a serial port: the sampled trajectory is sent to the device,
+//! which follows it and returns the measured signals.
 
 use super::{Args, filter_line, finish, recording_bytes};
 use crate::cli::console::shell_command;
@@ -10,13 +10,12 @@ use crate::device::host::name;
 use crate::device::probe::{self, Path};
 use study_base::limits::Limit;
 use study_base::text::Untrusted;
-use study_haptics::identify::signal::LowPass;
-use study_haptics::plant::Measured;
+use study_haptics::plant::Measurement;
 use study_haptics::trajectory;
 
-/// The command that records the same way, to be typed as it is. A port that stands in
-/// `device.toml` is found there again.
-fn again(args: &Args) -> String {
+/// The command line of this recording. A port set in `device.toml` is read from there
+/// again.
+fn command_line(args: &Args) -> String {
     let mut words: Vec<String> = ["study", "record"].map(str::to_owned).to_vec();
     words.push(args.trajectory.to_string_lossy().into_owned());
     let mut option = |name: &str, value: Option<String>| {
@@ -36,16 +35,13 @@ fn again(args: &Args) -> String {
     shell_command(&words)
 }
 
-/// Does it.
+/// Records with the device and writes the recording.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let trajectory = read_trajectory(&args.trajectory, console)?;
     refuse_to_overwrite(args.out.as_deref(), args.force)?;
     let force_n = Limit::new(args.max_force).map_err(Failure::input)?.get();
-    let filter = match args.raw {
-        true => None,
-        false => Some(LowPass::new(args.filter, args.rate).map_err(Failure::input)?),
-    };
-    // bounded by the longest trajectory and the highest rate
+    let filter = args.low_pass()?;
+    // bounded by the longest trajectory and the highest sampling rate
     let samples = (trajectory.total_s() * args.rate + 1e-6).floor() as usize + 1;
     let t_s: Vec<f64> = (0..samples).map(|i| i as f64 / args.rate).collect();
     let path = Path {
@@ -71,7 +67,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             "nothing was recorded; `study device info` shows what the probe reaches, `study trajectory` what the path asks for",
         )
     })?;
-    let measured = Measured {
+    let measured = Measurement {
         t_s,
         x_mm: recorded.x_mm,
         a_m_s2: recorded.a_m_s2,
@@ -81,17 +77,17 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         true => "simulated, not measured: the simulated probe at the end of a wire",
         false => "measured by a probe",
     };
-    // model files keep the first line: it says what was recorded, and how
+    // model files keep the first line as their note
     let mut header = format!(
         "{what}, {} ({}); {} (study {})\n",
         name(&device.serial),
         name(&device.firmware),
-        Untrusted(&again(args)),
+        Untrusted(&command_line(args)),
         env!("CARGO_PKG_VERSION"),
     );
     header.push_str(&filter_line(args));
     header.push_str("TRAJECTORY:\n");
-    // a reader may drop blanks at the end of a line, and then a blank line is lost
+    // blank lines would be lost where trailing spaces are stripped
     for line in trajectory::file::write(&trajectory).lines() {
         if !line.is_empty() {
             header.push_str(&format!("  {line}\n"));

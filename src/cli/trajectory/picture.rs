@@ -1,15 +1,15 @@
-//! Curves and columns of characters for a terminal.
+//! Curves and bar charts of characters for a terminal.
 //!
-//! Curves are drawn in braille, two dots a column and four a row; of each dot's
-//! time the lowest and highest value are joined, so that nothing between is lost.
+//! Curves are drawn with braille characters, two dots per column and four per row. Each
+//! dot column covers the range of all values in its time, so that no peak is lost.
 
 use crate::report::plot::Axis;
 use std::fmt::Write as _;
 
-/// Columns of the labels at the left.
+/// Width of the labels on the left, columns.
 pub(in crate::cli) const LABEL: usize = 9;
-/// Values that are looked at for each dot.
-const LOOKS: usize = 16;
+/// Values evaluated for each dot column.
+const VALUES_PER_DOT: usize = 16;
 /// Bits of a braille cell: by column, then row.
 const DOTS: [[u32; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
 const BLOCKS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
@@ -28,9 +28,10 @@ pub(in crate::cli) fn curve(
     // neighbours share a value, so that the line has no holes
     let spans: Vec<[f64; 2]> = (0..dots)
         .map(|dot| {
-            (0..=LOOKS)
-                .map(|look| {
-                    let share = (dot * LOOKS + look) as f64 / (dots * LOOKS) as f64;
+            (0..=VALUES_PER_DOT)
+                .map(|i| {
+                    let n = VALUES_PER_DOT;
+                    let share = (dot * n + i) as f64 / (dots * n) as f64;
                     value(from + (to - from) * share)
                 })
                 .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
@@ -58,7 +59,8 @@ pub(in crate::cli) fn curve(
     framed(heading, unit, range, columns, [low, high], drawn.collect())
 }
 
-/// One column for each value, logarithmic from `least_share` of the largest.
+/// A bar chart with one bar for each value, logarithmic from `least_share` of the largest
+/// value.
 pub(in crate::cli) fn columns(
     heading: &str,
     unit: &str,
@@ -91,7 +93,7 @@ pub(in crate::cli) fn columns(
     framed(heading, unit, range, values.len(), bounds, drawn.collect())
 }
 
-/// Labels at the left, an axis below.
+/// The rows with labels on the left and an axis below.
 fn framed(
     heading: &str,
     unit: &str,
@@ -116,7 +118,7 @@ fn framed(
     out
 }
 
-/// A number of at most [`LABEL`] columns.
+/// A number that fits into [`LABEL`] columns.
 fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
@@ -133,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_straight_line_goes_from_corner_to_corner() {
+    fn a_straight_line_is_drawn_from_corner_to_corner() {
         let drawn = curve("a line", "s", [0.0, 10.0], 8, 2, |t| t);
         assert_eq!(
             drawn,
@@ -142,10 +144,10 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_and_a_silent_spectrum_are_drawn_too() {
+    fn a_constant_and_an_empty_spectrum_are_drawn_too() {
         assert!(curve("c", "s", [0.0, 1.0], 10, 2, |_| 3.0).contains("3.00"));
-        let silent = columns("s", "Hz", [0.0, 1.0], &[0.0; 10], 1e-4, 2);
-        assert!(!silent.contains('█'), "{silent}");
+        let empty = columns("s", "Hz", [0.0, 1.0], &[0.0; 10], 1e-4, 2);
+        assert!(!empty.contains('█'), "{empty}");
     }
 
     #[test]

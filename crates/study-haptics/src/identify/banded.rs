@@ -1,12 +1,13 @@
-//! Symmetric systems whose matrix is zero far from the diagonal, with bounds.
+//! Symmetric banded systems, with bounds on the unknowns.
 //!
-//! [`Banded::solve`] is Cholesky within the band, n·h² operations for n unknowns
-//! and half-width h. [`Banded::solve_bounded`] finds the minimum of ½xᵀAx − rᵀx with
-//! some x ≥ 0 by block principal pivoting (Portugal, Júdice & Vicente 1994, Math.
-//! Comp. 63:625): all unknowns that break a condition change sides at once, and one
-//! at a time where that does not help, which ends for every positive definite A.
+//! [`Banded::solve`] is a Cholesky factorization within the band: n·h² operations
+//! for n unknowns and half-bandwidth h. [`Banded::solve_bounded`] minimizes
+//! ½xᵀAx − rᵀx with some x ≥ 0 by block principal pivoting (Portugal, Júdice &
+//! Vicente 1994, Math. Comp. 63:625): all unknowns that violate a condition are
+//! exchanged at once, and one at a time where that does not help, which terminates
+//! for every positive definite A.
 
-/// A symmetric matrix with `half` diagonals beside the main one.
+/// A symmetric matrix with `half` diagonals on either side of the main one.
 #[derive(Debug, Clone)]
 pub(super) struct Banded {
     n: usize,
@@ -15,21 +16,21 @@ pub(super) struct Banded {
     lower: Vec<f64>,
 }
 
-/// What an unknown may be.
+/// The constraint on an unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Bound {
-    /// Anything.
+    /// Any value.
     Free,
     /// 0 or more.
     NotNegative,
-    /// 0.
+    /// Fixed at 0.
     Zero,
 }
 
-/// Changes of all unknowns at once without fewer faults, before one at a time.
-const PATIENCE: usize = 3;
-/// A pivot this small beside its diagonal element has no digit left.
-const NO_RANK: f64 = 1e-13;
+/// Block exchanges in a row that may fail to reduce the number of violations.
+const MAX_FAILED_EXCHANGES: usize = 3;
+/// Pivots below this share of their diagonal element are rounding errors.
+const SINGULAR: f64 = 1e-13;
 
 impl Banded {
     pub(super) fn zero(n: usize, half: usize) -> Self {
@@ -44,13 +45,13 @@ impl Banded {
         i * (self.half + 1) + self.half + j - i
     }
 
-    /// Adds to (i, j) and its mirror; j ≤ i ≤ j + half.
+    /// Adds `value` to (i, j) and (j, i); j ≤ i ≤ j + half.
     pub(super) fn add(&mut self, i: usize, j: usize, value: f64) {
         let at = self.at(i, j);
         self.lower[at] += value;
     }
 
-    /// A x.
+    /// The product A x.
     pub(super) fn times(&self, x: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; self.n];
         for i in 0..self.n {
@@ -65,8 +66,8 @@ impl Banded {
         product
     }
 
-    /// The minimum with the unknowns that are not `free` held at 0; `None` if A has
-    /// no rank on the others.
+    /// The minimum with the unknowns that are not `free` held at 0; `None` if A is
+    /// singular in the others.
     pub(super) fn solve(&self, right: &[f64], free: &[bool]) -> Option<Vec<f64>> {
         let mut factor = self.lower.clone();
         for i in 0..self.n {
@@ -86,9 +87,9 @@ impl Banded {
                     .sum();
                 let left = factor[at] - done;
                 factor[at] = if i == j {
-                    // false for a NaN
-                    let has_rank = left > NO_RANK * self.lower[at];
-                    if !has_rank {
+                    // false for NaN
+                    let regular = left > SINGULAR * self.lower[at];
+                    if !regular {
                         return None;
                     }
                     left.sqrt()
@@ -117,36 +118,36 @@ impl Banded {
         Some(x)
     }
 
-    /// The minimum within the bounds; `None` if A has no rank.
+    /// The minimum within the bounds; `None` if A is singular.
     pub(super) fn solve_bounded(&self, right: &[f64], bounds: &[Bound]) -> Option<Vec<f64>> {
         let mut free: Vec<bool> = bounds.iter().map(|b| *b != Bound::Zero).collect();
         let mut least = usize::MAX;
-        let mut patience = PATIENCE;
-        // far more than block pivoting takes; one at a time it may need all of them
+        let mut block_exchanges = MAX_FAILED_EXCHANGES;
+        // block pivoting needs far fewer; single exchanges may need all of them
         for _ in 0..20 * self.n + 100 {
             let x = self.solve(right, &free)?;
-            let faults = self.faults(right, bounds, &free, &x);
-            let Some(last) = faults.last() else {
+            let violated = self.violated(right, bounds, &free, &x);
+            let Some(last) = violated.last() else {
                 return Some(x);
             };
-            if faults.len() < least {
-                least = faults.len();
-                patience = PATIENCE;
-            } else if patience > 0 {
-                patience -= 1;
+            if violated.len() < least {
+                least = violated.len();
+                block_exchanges = MAX_FAILED_EXCHANGES;
+            } else if block_exchanges > 0 {
+                block_exchanges -= 1;
             } else {
                 free[*last] = !free[*last];
                 continue;
             }
-            for i in faults {
+            for i in violated {
                 free[i] = !free[i];
             }
         }
         None
     }
 
-    /// Bounded unknowns below 0, and those at 0 that would rather rise.
-    fn faults(&self, right: &[f64], bounds: &[Bound], free: &[bool], x: &[f64]) -> Vec<usize> {
+    /// Bounded unknowns below 0, and those held at 0 whose gradient is negative.
+    fn violated(&self, right: &[f64], bounds: &[Bound], free: &[bool], x: &[f64]) -> Vec<usize> {
         let product = self.times(x);
         (0..self.n)
             .filter(|i| {
@@ -155,7 +156,7 @@ impl Banded {
                 } else if free[*i] {
                     x[*i] < 0.0
                 } else {
-                    // rounding may not send an unknown to and fro
+                    // rounding errors must not exchange an unknown back and forth
                     let rounding = 1e-10 * (product[*i].abs() + right[*i].abs());
                     product[*i] - right[*i] < -rounding
                 }
@@ -169,11 +170,11 @@ mod tests {
     use super::*;
     use study_base::rng::Stream;
 
-    /// A positive definite matrix of half-width 3 and a right side.
+    /// A positive definite matrix of half-bandwidth 3 and a right-hand side.
     fn system(noise: &mut Stream, n: usize) -> (Banded, Vec<f64>) {
         let half = 3;
         let mut a = Banded::zero(n, half);
-        // Σ φφᵀ of windows, as a normal matrix is
+        // Σ φφᵀ over windows, like a normal matrix
         for _ in 0..3 * n {
             let first = noise.below(n as u64 - 1) as usize;
             let end = (first + 1 + half).min(n);
@@ -238,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn without_rank_there_is_no_solution() {
+    fn a_singular_system_has_no_solution() {
         let mut a = Banded::zero(2, 1);
         for (i, j) in [(0, 0), (1, 0), (1, 1)] {
             a.add(i, j, 1.0);

@@ -1,23 +1,22 @@
-//! Two simple realizations to compare with: what a table without dynamics, and
-//! what a plain spring, make of the same recording.
+//! Two baselines: a force profile without dynamics, and a spring.
 //!
 //! * `static`: for each direction the mean force of the samples in
-//!   [node − dx/2, node + dx/2), whatever their speed; m = b = k = 0 and F0 is that
-//!   mean, which is the least-squares fit of F0 alone. A recorded force profile
-//!   played back (Angerilli 2001) is this.
+//!   [node − dx/2, node + dx/2) at any speed; m = b = k = 0 and F0 is that mean, the
+//!   least-squares fit of F0 alone. This is playback of a recorded force profile
+//!   (Angerilli 2001).
 //! * `spring`: F = k x + F0 by least squares over all samples of both directions.
 
-use super::ewls::{Sorted, Theta};
 use super::resample::{self, Resampled};
+use super::samples::{Samples, Theta};
 use crate::recording::Recording;
 
-/// Mean force at each node of one direction, as [0, 0, 0, F].
-pub fn static_profile(samples: &Sorted, nodes: &[f64], dx_mm: f64) -> Resampled {
+/// The mean force at each node of one direction, as [0, 0, 0, F].
+pub fn static_profile(samples: &Samples, nodes: &[f64], dx_mm: f64) -> Resampled {
     let forces: Vec<Theta> = samples.f_n.iter().map(|f| [0.0, 0.0, 0.0, *f]).collect();
     resample::bin(&samples.x_mm, &forces, nodes, dx_mm)
 }
 
-/// The straight line through all samples, as [0, 0, k, F0].
+/// The least-squares line through all samples, as [0, 0, k, F0].
 pub fn spring(recording: &Recording) -> Theta {
     let n = recording.len() as f64;
     let mean_x = recording.x_mm.iter().sum::<f64>() / n;

@@ -1,23 +1,23 @@
-//! m, b ≥ 0 for one least-squares estimate, exactly.
+//! The exact least-squares solution under m, b ≥ 0.
 //!
 //! With θ the unconstrained minimum and P ∝ (ΣφφᵀW)⁻¹, the minimum with the
-//! parameters C held at 0 is θ_c = θ − P_C (P_CC)⁻¹ θ_C and costs
-//! θ_Cᵀ (P_CC)⁻¹ θ_C more. Of C = {m}, {b}, {m, b} the one of least cost that
-//! leaves the other ≥ 0 is the solution: the problem is convex, and its active set
-//! is one of these. The scale of P does not matter.
+//! parameters C held at 0 is θ_c = θ − P_C (P_CC)⁻¹ θ_C, and its cost is higher by
+//! θ_Cᵀ (P_CC)⁻¹ θ_C. The problem is convex and its active set is {m}, {b} or
+//! {m, b}, so the feasible candidate of least cost is the solution. The scale of P
+//! does not matter.
 
-use super::ewls::Theta;
+use super::samples::Theta;
 
-/// θ and the columns of P that belong to m and b, for the bounded minimum.
-/// `by_m[i]` is P_i,m and `by_b[i]` is P_i,b, in the order of [`Theta`].
-pub fn bounded(theta: Theta, by_m: [f64; 4], by_b: [f64; 4]) -> Theta {
+/// The minimum under m, b ≥ 0 from the unconstrained minimum θ and the columns of P
+/// that belong to m and b, all in the order of [`Theta`].
+pub fn bounded(theta: Theta, p_m: [f64; 4], p_b: [f64; 4]) -> Theta {
     let [m, b, ..] = theta;
     if m >= 0.0 && b >= 0.0 {
         return theta;
     }
-    let (mm, mb, bb) = (by_m[0], by_m[1], by_b[1]);
+    let (mm, mb, bb) = (p_m[0], p_m[1], p_b[1]);
     let minus = |of_m: f64, of_b: f64| -> Theta {
-        std::array::from_fn(|i| theta[i] - by_m[i] * of_m - by_b[i] * of_b)
+        std::array::from_fn(|i| theta[i] - p_m[i] * of_m - p_b[i] * of_b)
     };
     let mut best: Option<(f64, Theta)> = None;
     let mut offer = |cost: f64, mut candidate: Theta, at_zero: &[usize]| {
@@ -25,7 +25,7 @@ pub fn bounded(theta: Theta, by_m: [f64; 4], by_b: [f64; 4]) -> Theta {
             candidate[*i] = 0.0;
         }
         let feasible = candidate[0] >= 0.0 && candidate[1] >= 0.0;
-        // false for a NaN, which a P that lost its rank gives
+        // false for NaN, which a singular P gives
         if feasible && cost >= 0.0 && best.is_none_or(|(least, _)| cost < least) {
             best = Some((cost, candidate));
         }
@@ -36,7 +36,7 @@ pub fn bounded(theta: Theta, by_m: [f64; 4], by_b: [f64; 4]) -> Theta {
     let of_m = (bb * m - mb * b) / determinant;
     let of_b = (mm * b - mb * m) / determinant;
     offer(m * of_m + b * of_b, minus(of_m, of_b), &[0, 1]);
-    // rounding may have taken P's rank: the bounds hold all the same
+    // P is singular to working precision: keep the bounds at least
     best.map_or([m.max(0.0), b.max(0.0), theta[2], theta[3]], |(_, t)| t)
 }
 
@@ -66,7 +66,7 @@ mod tests {
         (r, y)
     }
 
-    /// Gauss–Jordan on the parameters that are free; the others are 0.
+    /// Gauss–Jordan elimination for the parameters that are free; the others are 0.
     fn solve(r: &[[f64; 4]; 4], y: &[f64; 4], free: &[usize]) -> Theta {
         let n = free.len();
         let mut rows: Vec<Vec<f64>> = free
@@ -113,7 +113,7 @@ mod tests {
             let theta = bounded(free, inverse_column(&r, 0), inverse_column(&r, 1));
             let g = gradient(&r, &y, &theta);
             assert!(theta[0] >= 0.0 && theta[1] >= 0.0, "{theta:?}");
-            // no slope in k and F0; in m and b none, or upwards at the bound
+            // the gradient is 0 in k and F0; in m and b it is 0, or positive at the bound
             assert!(g[2].abs() < 1e-8 && g[3].abs() < 1e-8, "{g:?}");
             for i in 0..2 {
                 assert!(g[i] > -1e-8, "{g:?}");
@@ -121,12 +121,12 @@ mod tests {
             }
             at_bounds[usize::from(theta[0] == 0.0) + 2 * usize::from(theta[1] == 0.0)] += 1;
         }
-        // every active set has come up
+        // every active set occurs
         assert!(at_bounds.iter().all(|n| *n > 50), "{at_bounds:?}");
     }
 
     #[test]
-    fn the_bounded_estimate_is_the_best_of_all_that_are_tried_by_force() {
+    fn the_bounded_estimate_is_the_best_of_all_active_sets() {
         let mut noise = Stream::new(8, &["brute"]);
         for _ in 0..500 {
             let (r, y) = problem(&mut noise);
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_without_rank_still_gives_parameters_within_bounds() {
+    fn a_singular_matrix_still_gives_parameters_within_bounds() {
         let zero = [0.0; 4];
         let theta = bounded([-1.0, 2.0, 3.0, 4.0], zero, zero);
         assert_eq!(theta, [0.0, 2.0, 3.0, 4.0]);

@@ -1,38 +1,38 @@
-//! A realization for every method and dx, each compared with other recordings.
+//! A grid of realizations: every method with every dx, validated on other recordings.
 //!
-//! What a grid of the paper's method repeats is done once: the samples are passed
-//! once for all λ (`lanes::recursion`) and all dx (`runs`), and no estimate is
-//! kept, only sums over runs of samples. A recording is walked once for all tables
-//! with the same nodes (`lanes::errors`). Memory is that of the recordings and
-//! the tables. The rest runs side by side in chunks that do not depend on the number
-//! of threads, so neither do the numbers.
+//! Work shared by the cells of the paper's method is done once: one pass over the
+//! samples serves all λ (`lanes::recursion`) and all dx (`runs`), and only sums over
+//! runs of samples are stored. One pass over a recording serves all tables with the
+//! same nodes (`lanes::errors`). Memory is that of the recordings and the tables.
+//! Work is split into parallel chunks that do not depend on the number of threads, so
+//! the results do not either.
 //!
-//! Sums depend on where the runs of all dx cut them: in the last digits a table made
-//! together with other dx can differ from the same table made alone (not with
-//! `point`, whose runs are the same).
+//! The order of summation depends on the dx of the grid: a table identified together
+//! with other dx can differ in the last digits from the same table identified alone
+//! (except with `point`, whose runs do not change).
 
 mod runs;
 
 use super::lanes::errors::errors;
 use super::lanes::recursion::{self, Run, Sums};
-use super::lanes::{LAMBDAS_A_PASS, Processor};
+use super::lanes::{LAMBDAS_PER_PASS, Processor};
 use super::method::{Ewls, Sort, Start};
 use super::resample::{Resample, Resampled};
 use super::vaf::{self, Score};
-use super::{Identified, IdentifyError, Method, Training, Warning, ewls};
+use super::{Identified, IdentifyError, Method, Samples, Training, Warning, ewls};
 use crate::model::Realization;
-use crate::recording::Recording;
+use crate::recording::{Recording, mean_and_variance};
 use rayon::prelude::*;
 use runs::{Nodes, Runs};
 use study_wire::certificate::Certificate;
 use study_wire::predict::{Direction, Lookup};
 
-/// What to identify: every method with every dx.
+/// The cells of a grid: every method with every dx.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Methods with their options.
     pub methods: Vec<Method>,
-    /// Resampling increments, mm, for those methods that have them.
+    /// Resampling increments, mm, for the methods that have them.
     pub dx_mm: Vec<f64>,
 }
 
@@ -48,40 +48,32 @@ impl Plan {
         }
     }
 
-    /// One method.
-    pub fn one(method: Method, dx_mm: &[f64]) -> Self {
-        Self {
-            methods: vec![method],
-            dx_mm: dx_mm.to_vec(),
-        }
-    }
-
-    /// How many realizations it makes.
+    /// Number of realizations.
     pub fn cells(&self) -> usize {
-        let of = |method: &Method| {
+        let cells = |method: &Method| {
             if method.has_dx() { self.dx_mm.len() } else { 1 }
         };
-        self.methods.iter().map(of).sum()
+        self.methods.iter().map(cells).sum()
     }
 }
 
-/// One realization and how well it predicts.
+/// One realization of a grid and how well it predicts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
     /// How it was identified.
     pub method: Method,
-    /// With VAF by the names of the recordings; its id is empty.
+    /// The realization with its VAF by name of recording; its id is empty.
     pub realization: Realization,
-    /// In the order of the recordings.
+    /// The scores on each recording, in their order.
     pub scores: Vec<Score>,
-    /// Whether it can put energy into a hand.
+    /// The passivity certificate.
     pub certificate: Certificate,
-    /// What is doubtful.
+    /// What is doubtful about the realization.
     pub warnings: Vec<Warning>,
 }
 
-/// Identifies every cell, method by method, and scores it on `recordings`. `done`
-/// is told after each cell.
+/// Identifies every cell, method by method, and scores it on `recordings`. Calls
+/// `done` after each cell, from any thread.
 ///
 /// # Errors
 /// [`IdentifyError`] of the first cell that cannot be identified.
@@ -95,13 +87,13 @@ pub fn run(
     run_on(Processor::best(), training, plan, lookup, recordings, done)
 }
 
-/// [`run`] on the loops of one kind of processor.
+/// [`run`] with the loops of one instruction set.
 ///
 /// # Errors
 /// As [`run`].
 ///
 /// # Panics
-/// If this machine does not have that processor.
+/// If this machine does not support the instruction set.
 pub fn run_on(
     processor: Processor,
     training: &Training<'_>,
@@ -110,7 +102,7 @@ pub fn run_on(
     recordings: &[&Recording],
     done: impl Fn() + Sync,
 ) -> Result<Vec<Cell>, IdentifyError> {
-    // faults of the arguments before the work begins
+    // check the arguments before the long computation
     for method in &plan.methods {
         method.check()?;
     }
@@ -128,7 +120,7 @@ pub fn run_on(
         .methods
         .iter()
         .zip(&identified)
-        .flat_map(|(method, made)| vec![*method; made.len()])
+        .flat_map(|(method, tables)| vec![*method; tables.len()])
         .collect();
     let identified: Vec<Identified> = identified.into_iter().flatten().collect();
     let realizations: Vec<&Realization> = identified.iter().map(|i| &i.realization).collect();
@@ -149,59 +141,61 @@ fn identify(
     tables: &[Nodes],
     lookup: Lookup,
 ) -> Result<Vec<Vec<Identified>>, IdentifyError> {
-    let mut made: Vec<Option<Result<Vec<Identified>, IdentifyError>>> = vec![None; methods.len()];
+    let mut identified: Vec<Option<Result<Vec<Identified>, IdentifyError>>> =
+        vec![None; methods.len()];
     for (options, members) in families(methods) {
         let lambdas: Vec<f64> = members
             .iter()
             .filter_map(|i| methods[*i].lambda())
             .collect();
-        let found = ewls_tables(processor, training, options, &lambdas, tables, lookup);
-        for (i, tables) in members.into_iter().zip(found) {
-            made[i] = Some(tables);
+        let of_family = ewls_tables(processor, training, options, &lambdas, tables, lookup);
+        for (i, tables) in members.into_iter().zip(of_family) {
+            identified[i] = Some(tables);
         }
     }
-    made.into_par_iter()
+    identified
+        .into_par_iter()
         .zip(methods)
-        .map(|(made, method)| made.unwrap_or_else(|| each(training, *method, tables, lookup)))
+        .map(|(done, method)| done.unwrap_or_else(|| one_method(training, *method, tables, lookup)))
         .collect::<Vec<_>>()
         .into_iter()
         .collect()
 }
 
-/// One method by itself.
-fn each(
+/// The tables of a method that shares no work with others.
+fn one_method(
     training: &Training<'_>,
     method: Method,
     tables: &[Nodes],
     lookup: Lookup,
 ) -> Result<Vec<Identified>, IdentifyError> {
-    if let Method::Ewls(options) = method {
-        let estimates = training.estimates_of(options)?;
-        return tables
-            .iter()
-            .map(|nodes| training.ewls(&estimates, nodes.dx_mm, options.resample, lookup))
-            .collect();
+    match method {
+        Method::Ewls(options) => {
+            let estimates = training.estimates(options)?;
+            let table =
+                |nodes: &Nodes| training.ewls(&estimates, nodes.dx_mm, options.resample, lookup);
+            tables.iter().map(table).collect()
+        }
+        Method::Segments(options) => Ok(vec![training.segments(options, lookup)?]),
+        Method::Spring => Ok(vec![training.spring(lookup)]),
+        Method::TwoSided(_) | Method::Hat(_) | Method::Static => tables
+            .par_iter()
+            .map(|nodes| training.identify(method, nodes.dx_mm, lookup))
+            .collect::<Vec<_>>()
+            .into_iter()
+            .collect(),
     }
-    if !method.has_dx() {
-        let any = 1.0;
-        return Ok(vec![training.identify(method, any, lookup)?]);
-    }
-    tables
-        .par_iter()
-        .map(|nodes| training.identify(method, nodes.dx_mm, lookup))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .collect()
 }
 
-/// The EWLS methods that differ in λ only, by their indices.
+/// The EWLS methods grouped by their options without λ: these options and the
+/// indices of the methods.
 fn families(methods: &[Method]) -> Vec<(Ewls, Vec<usize>)> {
     let mut families: Vec<(Ewls, Vec<usize>)> = Vec::new();
     for (i, method) in methods.iter().enumerate() {
         let Method::Ewls(options) = method else {
             continue;
         };
-        if !options.bounded && options.lambda < recursion::LEAST_LAMBDA {
+        if !options.bounded && options.lambda < recursion::MIN_LAMBDA {
             continue;
         }
         let same = |family: &Ewls| {
@@ -218,7 +212,7 @@ fn families(methods: &[Method]) -> Vec<(Ewls, Vec<usize>)> {
     families
 }
 
-/// The tables of each λ, all from one pass over the samples for every dozen of λ.
+/// The tables of each λ. One pass over the samples serves [`LAMBDAS_PER_PASS`] λ.
 fn ewls_tables(
     processor: Processor,
     training: &Training<'_>,
@@ -230,10 +224,10 @@ fn ewls_tables(
     let runs = training
         .directions()
         .map(|samples| Runs::new(options.resample, &samples.x_mm, tables));
-    let together = if options.bounded { 1 } else { LAMBDAS_A_PASS };
+    let per_pass = if options.bounded { 1 } else { LAMBDAS_PER_PASS };
     let passes: Vec<(usize, &[f64])> = [0, 1]
         .into_iter()
-        .flat_map(|direction| lambdas.chunks(together).map(move |l| (direction, l)))
+        .flat_map(|direction| lambdas.chunks(per_pass).map(move |l| (direction, l)))
         .collect();
     let sums: Vec<Option<Vec<Sums>>> = passes
         .into_par_iter()
@@ -263,14 +257,14 @@ fn ewls_tables(
                 return Err(IdentifyError::Diverged { lambda: *lambda });
             };
             let table = |(i, nodes): (usize, &Nodes)| {
-                let found: Option<[Resampled; 2]> = runs[0]
+                let resampled: Option<[Resampled; 2]> = runs[0]
                     .table(i, nodes, plus)
                     .zip(runs[1].table(i, nodes, minus))
                     .map(Into::into);
-                match found {
+                match resampled {
                     Some([mut positive, mut negative]) => {
                         if options.bounded {
-                            // what is left of taking moments off may be -1e-18
+                            // rounding of the moments may leave -1e-18
                             let thetas = positive.theta.iter_mut().chain(&mut negative.theta);
                             for p in thetas.flat_map(|theta| &mut theta[..2]) {
                                 *p = p.max(0.0);
@@ -285,7 +279,7 @@ fn ewls_tables(
                             lookup,
                         ))
                     }
-                    // no node has a sample of its own: see `resample`
+                    // no node has samples around it: see `resample`
                     None => training.identify(Method::Ewls(options), nodes.dx_mm, lookup),
                 }
             };
@@ -294,12 +288,12 @@ fn ewls_tables(
         .collect()
 }
 
-/// The sums of one direction for a dozen of λ, in ascending order of x whatever the
-/// order of the recursion.
+/// The sums of one direction for the λ of one pass, in ascending order of x whatever
+/// the order of the recursion.
 fn pass(
     processor: Processor,
     options: Ewls,
-    samples: &ewls::Sorted,
+    samples: &Samples,
     backward: bool,
     lambdas: &[f64],
     runs: &Runs,
@@ -309,7 +303,7 @@ fn pass(
         Start::Warm => ewls::warm_samples(lambda),
     };
     let moments = runs.moments;
-    let of = |samples: &ewls::Sorted, runs: &[Run]| -> Vec<Option<Vec<Sums>>> {
+    let sums_over = |samples: &Samples, runs: &[Run]| -> Vec<Option<Vec<Sums>>> {
         if options.bounded {
             let alone = |l: &f64| ewls::bounded_sums(samples, *l, warm(*l), runs, moments);
             lambdas.iter().map(alone).collect()
@@ -318,16 +312,16 @@ fn pass(
         }
     };
     if !(backward && options.sort == Sort::Travel) {
-        return of(samples, &runs.runs);
+        return sums_over(samples, &runs.runs);
     }
     let n = samples.len();
-    let turn = |run: &Run| Run {
+    let reverse = |run: &Run| Run {
         from: n - run.to,
         to: n - run.from,
         ..*run
     };
-    let turned: Vec<Run> = runs.runs.iter().rev().map(turn).collect();
-    let mut sums = of(&samples.descending(), &turned);
+    let reversed: Vec<Run> = runs.runs.iter().rev().map(reverse).collect();
+    let mut sums = sums_over(&samples.reordered(&samples.descending()), &reversed);
     for sums in sums.iter_mut().flatten() {
         sums.reverse();
     }
@@ -341,13 +335,14 @@ fn score(
     recordings: &[&Recording],
     done: impl Fn() + Sync,
 ) -> Vec<Vec<Score>> {
-    let variances: Vec<f64> = recordings.iter().map(|r| vaf::variance(&r.f_n)).collect();
-    // those with the same nodes are walked through together
+    let variance = |r: &&Recording| mean_and_variance(&r.f_n).1;
+    let variances: Vec<f64> = recordings.iter().map(variance).collect();
+    // tables with the same nodes are compared in one pass
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, r) in realizations.iter().enumerate() {
         let alike = |group: &Vec<usize>| {
             let first = realizations[group[0]];
-            group.len() < LAMBDAS_A_PASS
+            group.len() < LAMBDAS_PER_PASS
                 && r.direction == Direction::Sign
                 && first.direction == Direction::Sign
                 && first.x_mm == r.x_mm
@@ -416,8 +411,8 @@ fn cell(
     }
 }
 
-/// The cell with the highest mean VAF over the first `validations` recordings;
-/// of equals the first.
+/// The index of the cell with the highest mean VAF over the first `validations`
+/// recordings, the first one of equals; `None` if no cell has a finite VAF.
 pub fn best(cells: &[Cell], validations: usize) -> Option<usize> {
     let mean = |cell: &Cell| {
         let scores = &cell.scores[..validations.min(cell.scores.len())];

@@ -1,33 +1,32 @@
-//! The hat table: all nodes of both directions at once, by penalised least squares.
+//! The hat table: all nodes of both directions at once, by penalized least squares.
 //!
-//! F = Σ_j h_j(x) (m_j a + b_j v + F_j) for each direction, joined with (1 ± z)/2,
-//! is exactly what [`study_wire::predict`] computes from the table: h_j is the
-//! look-up, z the direction state, k = 0 and F0 = F_j. So the table is the least
-//! squares solution for the force that will be predicted, not for a force at one
-//! place. The fit is linear in the table; only δ of the direction state is not, and
-//! is tried.
+//! F = Σ_j h_j(x) (m_j a + b_j v + F_j) for each direction, combined with the weights
+//! (1 ± z)/2, is exactly what [`study_wire::predict`] computes from the table: h_j is
+//! the look-up, z the direction state, k = 0 and F0 = F_j. The table is therefore the
+//! least-squares solution for the predicted force itself. The problem is linear in
+//! the table; δ of the direction state is found by a scan.
 //!
-//! What is minimised is the mean square error plus, over the mean information of a
-//! node, ridges on second differences of F_j (curvature) and on first differences
-//! of m_j and 60·b_j (b in N·s/mm is that much smaller than m in kg). The ridges
-//! carry the table over places that were not visited; m, b ≥ 0 is a bound on each
-//! node, held exactly.
+//! The cost is the squared error plus, in units of a node's mean information, ridge
+//! penalties on second differences of F_j (curvature) and on first differences of m_j
+//! and 60·b_j (b in N·s/mm is smaller than m in kg by about that factor). The ridges
+//! interpolate over positions that were not visited; m, b ≥ 0 holds exactly at each
+//! node.
 
 use super::banded::{Banded, Bound};
-use super::ewls::Theta;
+use super::samples::Theta;
 use crate::recording::Recording;
 use study_wire::predict::{Direction, DirectionState, Lookup, Motion};
 
-/// Unknowns of a node: m, b·B_SCALE, F in + and in −.
+/// Unknowns per node: m, b·B_SCALE, F in + and in −.
 const PER_NODE: usize = 6;
-/// Unknowns beside the diagonal: second differences of F reach two nodes.
+/// Half-bandwidth: second differences of F reach two nodes.
 const HALF: usize = 2 * PER_NODE;
-/// b in N·s/mm times this is of the size of m in kg.
+/// b in N·s/mm times this is of the magnitude of m in kg.
 const B_SCALE: f64 = 60.0;
-/// Share of a node's information that keeps m and b at 0 where nothing tells them.
+/// Share of a node's information that keeps m and b at 0 where they are not excited.
 const FLOOR: f64 = 1e-12;
 
-/// Weights of the penalties and what m and b may be.
+/// Weights of the penalties and the bound on m and b.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Penalty {
     pub(super) ridge_force: f64,
@@ -35,23 +34,23 @@ pub(super) struct Penalty {
     pub(super) dynamics: Bound,
 }
 
-/// θ at the nodes, and how much each rests on.
+/// θ at the nodes and the weight of the samples behind each.
 #[derive(Debug, Clone)]
-pub(super) struct Table {
+pub(super) struct HatTable {
     pub(super) positive: Vec<Theta>,
     pub(super) negative: Vec<Theta>,
-    /// Σ h_j (1 ± z)/2 of each node, + and −.
+    /// Σ h_j (1 ± z)/2 of each node, for + and −.
     pub(super) weight: Vec<[f64; 2]>,
 }
 
-/// The best table; `None` if the recording and the ridges leave it undetermined.
+/// The table of least cost; `None` if recording and ridges leave it undetermined.
 pub(super) fn table(
     recording: &Recording,
     nodes: &[f64],
     lookup: Lookup,
     rule: Direction,
     penalty: Penalty,
-) -> Option<Table> {
+) -> Option<HatTable> {
     let n = nodes.len() * PER_NODE;
     let mut normal = Banded::zero(n, HALF);
     let mut right = vec![0.0; n];
@@ -114,7 +113,7 @@ pub(super) fn table(
         };
         x.chunks_exact(PER_NODE).map(of).collect()
     };
-    Some(Table {
+    Some(HatTable {
         positive: side(0),
         negative: side(1),
         weight,
@@ -135,10 +134,10 @@ fn add_ridges(normal: &mut Banded, nodes: usize, information: f64, penalty: Pena
     for side in 0..2 {
         for j in 0..nodes {
             for p in 0..2 {
-                let here = unknown(j, side, p);
-                add(&[(here, 1.0)], information * FLOOR);
+                let own = unknown(j, side, p);
+                add(&[(own, 1.0)], information * FLOOR);
                 if j > 0 {
-                    add(&[(unknown(j - 1, side, p), -1.0), (here, 1.0)], on_dynamics);
+                    add(&[(unknown(j - 1, side, p), -1.0), (own, 1.0)], on_dynamics);
                 }
             }
             if j > 1 {
@@ -153,8 +152,8 @@ fn add_ridges(normal: &mut Banded, nodes: usize, information: f64, penalty: Pena
     }
 }
 
-/// The node that a look-up begins with and the share of the next one; the ends
-/// are held, as in prediction.
+/// The left node of a look-up and the weight of the next one; constant beyond the
+/// ends, as in prediction.
 fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
     let right = nodes.partition_point(|node| *node <= x_mm);
     if right == 0 || right == nodes.len() {

@@ -1,23 +1,23 @@
-//! What [`Training`] makes of hat tables: the one with a direction state, and the
-//! segmented baseline, which is a hat table of forces alone.
+//! Methods of [`Training`] that identify hat tables: with a direction state, and the
+//! segmented baseline, a hat table of forces alone.
 
 use super::banded::Bound;
-use super::hat::{self, Penalty, Table};
+use super::hat::{self, HatTable, Penalty};
 use super::method::{Delta, Hat, Method, Segments, State};
 use super::resample::Resampled;
-use super::{Identified, IdentifyError, Training, Warning, two_sided, vaf};
+use super::{Cause, Identified, IdentifyError, Training, Warning, two_sided, vaf};
 use crate::model::Provenance;
 use study_wire::predict::{Direction, Lookup};
 
-/// δ that are tried, in twentieths of a mm: 0.3 to 1 mm.
+/// First and last δ of the scan, in twentieths of a mm: 0.3 to 1 mm.
 const SCAN: [u32; 2] = [6, 20];
 
-/// How much more than the least a shorter δ may leave, in rms. Chosen, with the ridge
-/// on m and b, on simulated switches: `docs/estimators.md` says on which.
-const HARDLY_MORE: f64 = 1.1;
+/// The rms error of the chosen δ over the least one is at most this. Chosen, together
+/// with the ridge on m and b, on simulated switches: see `docs/estimators.md`.
+const TOLERANCE: f64 = 1.1;
 
 impl Training<'_> {
-    /// All nodes at once, by penalised least squares, with a direction state.
+    /// All nodes at once, by penalized least squares, with a direction state.
     pub(super) fn hat(
         &self,
         options: Hat,
@@ -45,20 +45,18 @@ impl Training<'_> {
             }
         };
         identified.realization.provenance = Provenance {
-            method: Method::Hat(options).to_string(),
             dx_mm: Some(dx_mm),
-            ..self.provenance()
+            ..self.provenance(Method::Hat(options))
         };
         Ok(identified)
     }
 
-    /// The table of the shortest δ that leaves hardly more of this recording than the
-    /// one that leaves least: every second of [`SCAN`], then the neighbours of the
-    /// least.
+    /// The table with the shortest δ whose rms error on this recording is within
+    /// [`TOLERANCE`] of the least. Tried are every second value of [`SCAN`] and then the
+    /// neighbours of the best.
     ///
-    /// What a recording leaves is flat in δ, and a longer one also takes what is not
-    /// hysteresis but the slow reversals of this motion; on others the shorter
-    /// predicts better.
+    /// The error is flat in δ, and a longer δ also fits the slow reversals of this
+    /// motion, which are not hysteresis; on other motions the shorter δ predicts better.
     fn scan(
         &self,
         table: impl Fn(f64) -> Result<Identified, IdentifyError>,
@@ -67,28 +65,28 @@ impl Training<'_> {
         let attempt = |twentieths: u32| -> Result<(u32, f64, Identified), IdentifyError> {
             let identified = table(f64::from(twentieths) / 20.0)?;
             let score = vaf::score(&identified.realization, self.recording);
-            let left = score.residual_n.hypot(score.bias_n);
-            Ok((twentieths, left, identified))
+            let rms_n = score.residual_n.hypot(score.bias_n);
+            Ok((twentieths, rms_n, identified))
         };
-        let least = |tried: &[(u32, f64, Identified)]| {
-            let (at, left, _) = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-            Some((*at, *left))
+        let best = |tried: &[(u32, f64, Identified)]| {
+            let (at, rms_n, _) = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+            Some((*at, *rms_n))
         };
         let mut tried = (first..=last)
             .step_by(2)
             .map(attempt)
             .collect::<Result<Vec<_>, _>>()?;
-        let (at, _) = least(&tried).ok_or(IdentifyError::Undetermined)?;
+        let (at, _) = best(&tried).ok_or(IdentifyError::Undetermined)?;
         for neighbour in [at - 1, at + 1] {
             if (first..=last).contains(&neighbour) {
                 tried.push(attempt(neighbour)?);
             }
         }
         tried.sort_by_key(|(twentieths, ..)| *twentieths);
-        let (at, left) = least(&tried).ok_or(IdentifyError::Undetermined)?;
+        let (at, least_n) = best(&tried).ok_or(IdentifyError::Undetermined)?;
         let (_, _, mut identified) = tried
             .into_iter()
-            .find(|(_, other, _)| *other <= HARDLY_MORE * left)
+            .find(|(_, rms_n, _)| *rms_n <= TOLERANCE * least_n)
             .ok_or(IdentifyError::Undetermined)?;
         if SCAN.contains(&at) {
             identified.warnings.push(Warning::DeltaAtEnd {
@@ -98,8 +96,8 @@ impl Training<'_> {
         Ok(identified)
     }
 
-    /// Force by direction as straight lines between equally spaced nodes over the
-    /// range of both directions (a segmented static model, MacLean 1996).
+    /// Baseline: force by direction, piecewise linear between equally spaced nodes over
+    /// the range of both directions (a segmented static model, MacLean 1996).
     pub(super) fn segments(
         &self,
         options: Segments,
@@ -113,16 +111,13 @@ impl Training<'_> {
             return Err(IdentifyError::NoOverlap(self.recording.name.clone()));
         }
         let penalty = Penalty {
-            // only carries a line over segments without samples
+            // only interpolates over segments without samples
             ridge_force: 1e-6,
             ridge_dynamics: 0.0,
             dynamics: Bound::Zero,
         };
         let mut identified = self.hat_with(nodes, lookup, Direction::Sign, penalty)?;
-        identified.realization.provenance = Provenance {
-            method: Method::Segments(options).to_string(),
-            ..self.provenance()
-        };
+        identified.realization.provenance = self.provenance(Method::Segments(options));
         Ok(identified)
     }
 
@@ -133,27 +128,22 @@ impl Training<'_> {
         rule: Direction,
         penalty: Penalty,
     ) -> Result<Identified, IdentifyError> {
-        let Table {
+        let HatTable {
             positive,
             negative,
             weight,
         } = hat::table(self.recording, &nodes, lookup, rule, penalty)
             .ok_or(IdentifyError::Undetermined)?;
-        let thin = |side: usize| {
-            let light = |w: &&[f64; 2]| w[side] < two_sided::LEAST_WEIGHT;
-            weight.iter().filter(light).count()
+        let branch = |theta, side: usize| {
+            let sparse = |w: &&[f64; 2]| w[side] < two_sided::MIN_WEIGHT;
+            Resampled {
+                theta,
+                filled: weight.iter().filter(sparse).count(),
+            }
         };
-        let (of, thin) = (nodes.len(), [thin(0), thin(1)]);
-        let branch = |theta| Resampled { theta, empty: 0 };
-        let mut identified = self.table(nodes, branch(positive), branch(negative), lookup);
+        let (positive, negative) = (branch(positive, 0), branch(negative, 1));
+        let mut identified = self.table(nodes, positive, negative, Cause::FewSamples, lookup);
         identified.realization.direction = rule;
-        if thin != [0, 0] {
-            identified.warnings.push(Warning::Thin {
-                positive: thin[0],
-                negative: thin[1],
-                of,
-            });
-        }
         Ok(identified)
     }
 }

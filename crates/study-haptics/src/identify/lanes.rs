@@ -1,31 +1,31 @@
-//! Four λ at once: arithmetic on four numbers side by side.
+//! Vectorized arithmetic for four λ at once.
 //!
-//! What a grid does for every λ on the same sample has the same operands but for λ,
-//! θ and P. A [`Lane`] holds one such number for four λ, and a compiler that may use
-//! AVX2 makes one instruction of each operation on it. Two loops are written so:
-//! [`recursion`], which leaves sums of the estimates over runs of samples, and
-//! [`errors`], which compares predictions with a recording.
+//! For one sample, the computations for different λ differ only in λ, θ and P. A
+//! [`Lane`] holds such a number for four λ, and with AVX2 each operation on it
+//! compiles to one instruction. Two loops use it: [`recursion`], which computes sums
+//! of the estimates over runs of samples, and [`errors`], which compares predictions
+//! with a recording.
 //!
-//! Each loop is compiled twice, for AVX2 with FMA and for any processor, and chosen
-//! at run time. Both do the same roundings in the same order (`mul_add` is one
-//! rounding on every machine), so the numbers do not depend on the processor, to the
-//! last bit. A processor older than 2013 computes `mul_add` in software, slowly.
+//! Each loop is compiled twice, for AVX2 with FMA and for any processor, and selected
+//! at run time. Both perform the same roundings in the same order (`mul_add` rounds
+//! once on every machine), so results are bit-identical on all processors. Processors
+//! older than 2013 compute `mul_add` in software, slowly.
 //!
-//! Invariant: lanes never mix. What comes out for a λ does not depend on which
-//! others are in the grid.
+//! Invariant: lanes never mix. The result for a λ does not depend on the other λ of
+//! the grid.
 
 pub mod errors;
 pub mod recursion;
 
-/// Numbers in a [`Lane`].
+/// Number of values in a [`Lane`].
 pub const WIDTH: usize = 4;
 
-/// Lanes that one pass over the samples serves: enough to keep the processor busy
-/// while a division waits, few enough for their state to stay near it.
-pub const LANES_A_PASS: usize = 3;
+/// Lanes per pass over the samples: enough to hide the latency of a division, few
+/// enough for their state to stay in the cache.
+pub const LANES_PER_PASS: usize = 3;
 
-/// λ that one pass over the samples serves.
-pub const LAMBDAS_A_PASS: usize = WIDTH * LANES_A_PASS;
+/// λ per pass over the samples.
+pub const LAMBDAS_PER_PASS: usize = WIDTH * LANES_PER_PASS;
 
 /// One number for each of four λ.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,7 @@ impl Lane {
     /// Zeros.
     pub const ZERO: Self = Self([0.0; WIDTH]);
 
-    /// The same number four times.
+    /// The same value in all four places.
     #[inline(always)]
     pub fn all(value: f64) -> Self {
         Self([value; WIDTH])
@@ -54,7 +54,7 @@ impl Lane {
 
     /// `c` − `self` · `b`, rounded once.
     #[inline(always)]
-    pub fn take_from(self, b: Self, c: Self) -> Self {
+    pub fn negated_mul_add(self, b: Self, c: Self) -> Self {
         let mut out = c;
         for i in 0..WIDTH {
             out.0[i] = (-self.0[i]).mul_add(b.0[i], c.0[i]);
@@ -84,17 +84,17 @@ operator!(Sub, sub, -);
 operator!(Mul, mul, *);
 operator!(Div, div, /);
 
-/// Which of the two compilations runs.
+/// The instruction set of the two loops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Processor {
-    /// With AVX2 and FMA.
+    /// AVX2 and FMA.
     Avx2,
-    /// Any.
+    /// Any processor.
     Portable,
 }
 
 impl Processor {
-    /// The fastest that this machine has.
+    /// The fastest that this machine supports.
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")

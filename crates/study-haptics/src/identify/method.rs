@@ -1,36 +1,35 @@
-//! The estimators and their options: one value says how a table is made.
+//! The estimators and their options.
 //!
-//! A [`Method`] has everything but the nodes' spacing dx and the look-up, which a
-//! grid varies; [`Training::identify`](super::Training::identify) takes the three
-//! together. Its `Display` stands in model files as `provenance.method`: the word,
-//! and after it every option that is not the usual one, so that a table can be
-//! made again.
+//! A [`Method`] specifies a table up to the node spacing dx and the look-up, which a
+//! grid varies; [`Training::identify`](super::Training::identify) takes all three.
+//! Its `Display` is the `provenance.method` of model files: the name followed by the
+//! options that differ from the default, so that a table can be reproduced.
 
 use super::IdentifyError;
 use super::resample::Resample;
 use std::fmt;
 use study_wire::predict::Direction;
 
-/// How a realization is identified.
+/// An estimator with its options.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// The paper's: exponentially weighted least squares along x, one pass.
+    /// The paper's method: exponentially weighted least squares along x.
     Ewls(Ewls),
-    /// Least squares around each node, with weights that fall to both sides.
+    /// Least squares around each node, with weights that decrease to both sides.
     TwoSided(TwoSided),
-    /// All nodes at once, by penalised least squares, with a direction state.
+    /// All nodes at once, by penalized least squares, with a direction state.
     Hat(Hat),
     /// Baseline: mean force by position and direction.
     Static,
-    /// Baseline: force by direction as straight lines between few nodes.
+    /// Baseline: force by direction, piecewise linear between few nodes.
     Segments(Segments),
     /// Baseline: one straight line.
     Spring,
 }
 
 impl Method {
-    /// As it stands in arguments.
-    pub fn word(self) -> &'static str {
+    /// The name in arguments and model files.
+    pub fn as_str(self) -> &'static str {
         match self {
             Self::Ewls(Ewls { bounded: false, .. }) => "ewls",
             Self::Ewls(_) => "constrained",
@@ -42,12 +41,12 @@ impl Method {
         }
     }
 
-    /// Whether dx has a meaning for it.
+    /// Whether the nodes are multiples of dx.
     pub fn has_dx(self) -> bool {
         !matches!(self, Self::Segments(_) | Self::Spring)
     }
 
-    /// The forgetting factor, where it has one.
+    /// The forgetting factor, if the method has one.
     pub fn lambda(self) -> Option<f64> {
         match self {
             Self::Ewls(options) => Some(options.lambda),
@@ -62,7 +61,7 @@ impl Method {
     /// Checks the options.
     ///
     /// # Errors
-    /// [`IdentifyError`] for the first number that is out of range.
+    /// [`IdentifyError`] for the first option that is out of range.
     pub fn check(self) -> Result<(), IdentifyError> {
         if let Some(lambda) = self.lambda()
             && !(lambda > 0.0 && lambda <= 1.0)
@@ -73,7 +72,7 @@ impl Method {
             Self::Ewls(_) | Self::Static | Self::Spring => Ok(()),
             Self::TwoSided(options) => match options.width {
                 Width::Mm(mm) => positive("the width of two-sided weights", mm),
-                // without forgetting there would be one θ for all positions
+                // without forgetting there would be a single θ for all positions
                 Width::Lambda(1.0) => Err(IdentifyError::Lambda(1.0)),
                 Width::Lambda(_) => Ok(()),
             },
@@ -85,7 +84,7 @@ impl Method {
                 not_negative("the ridge on m and b", options.ridge_dynamics)
             }
             Self::Segments(options) => {
-                if (1..super::resample::MOST_NODES).contains(&options.count) {
+                if (1..super::resample::MAX_NODES).contains(&options.count) {
                     Ok(())
                 } else {
                     Err(IdentifyError::Segments(options.count))
@@ -95,39 +94,39 @@ impl Method {
     }
 }
 
-fn positive(what: &'static str, value: f64) -> Result<(), IdentifyError> {
+fn positive(option: &'static str, value: f64) -> Result<(), IdentifyError> {
     if value.is_finite() && value > 0.0 {
         Ok(())
     } else {
-        Err(IdentifyError::Length { what, value })
+        Err(IdentifyError::Length { option, value })
     }
 }
 
-fn not_negative(what: &'static str, value: f64) -> Result<(), IdentifyError> {
+fn not_negative(option: &'static str, value: f64) -> Result<(), IdentifyError> {
     if value.is_finite() && value >= 0.0 {
         Ok(())
     } else {
-        Err(IdentifyError::Ridge { what, value })
+        Err(IdentifyError::Ridge { option, value })
     }
 }
 
-/// Options of the paper's method.
+/// Options of exponentially weighted least squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ewls {
-    /// Forgetting factor, above 0 and at most 1.
+    /// Forgetting factor λ, above 0 and at most 1.
     pub lambda: f64,
-    /// How the estimates are brought to the nodes.
+    /// Resampling of the estimates at the nodes.
     pub resample: Resample,
-    /// How the recursion begins.
+    /// Initial state of the recursion.
     pub start: Start,
-    /// The order of the samples.
+    /// Order of the samples.
     pub sort: Sort,
-    /// Whether every estimate has m, b ≥ 0.
+    /// Whether m, b ≥ 0 in every estimate.
     pub bounded: bool,
 }
 
 impl Ewls {
-    /// The paper's own: cold start, ascending order, no bounds.
+    /// The method as published: cold start, ascending order, no bounds.
     pub fn paper(lambda: f64, resample: Resample) -> Self {
         Self {
             lambda,
@@ -139,18 +138,18 @@ impl Ewls {
     }
 }
 
-/// How the recursion begins.
+/// Initial state of the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// From θ = 0 and P = 10⁶ I.
+    /// θ = 0 and P = 10⁶ I.
     Cold,
-    /// From where a pass back over the first 3/(1 − λ) samples ends.
+    /// The state after a backward pass over the first 3/(1 − λ) samples.
     Warm,
 }
 
 impl Start {
-    /// As it stands in arguments.
-    pub fn word(self) -> &'static str {
+    /// The name in arguments and model files.
+    pub fn as_str(self) -> &'static str {
         match self {
             Self::Cold => "cold",
             Self::Warm => "warm",
@@ -158,18 +157,18 @@ impl Start {
     }
 }
 
-/// The order of the samples in the recursion.
+/// Order of the samples in the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sort {
-    /// From the lowest x up in both directions.
+    /// Ascending x in both directions.
     Ascending,
-    /// As the target travels: up in +, down in −.
+    /// The direction of travel: ascending in +, descending in −.
     Travel,
 }
 
 impl Sort {
-    /// As it stands in arguments.
-    pub fn word(self) -> &'static str {
+    /// The name in arguments and model files.
+    pub fn as_str(self) -> &'static str {
         match self {
             Self::Ascending => "ascending",
             Self::Travel => "travel",
@@ -180,26 +179,26 @@ impl Sort {
 /// Options of two-sided least squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoSided {
-    /// How the weights fall.
+    /// Shape of the weights.
     pub window: Window,
-    /// How far they reach.
+    /// Width L of the weights.
     pub width: Width,
     /// Whether m, b ≥ 0 at every node.
     pub bounded: bool,
 }
 
-/// How weights fall with the distance from a node.
+/// The weight of a sample by its distance from a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Window {
-    /// e^(−|x − node|/L): an EWLS forward and one backward, combined.
+    /// e^(−|x − node|/L), the sum of a forward and a backward EWLS.
     Exponential,
-    /// (1 − |u|³)³ with u = (x − node)/(3L), 0 beyond.
+    /// (1 − |u|³)³ with u = (x − node)/(3L), 0 for |u| > 1.
     Tricube,
 }
 
 impl Window {
-    /// As it stands in arguments.
-    pub fn word(self) -> &'static str {
+    /// The name in arguments and model files.
+    pub fn as_str(self) -> &'static str {
         match self {
             Self::Exponential => "exponential",
             Self::Tricube => "tricube",
@@ -207,19 +206,20 @@ impl Window {
     }
 }
 
-/// L of two-sided weights.
+/// The width L of two-sided weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Width {
-    /// That of an EWLS: L = 1 / ((1 − λ) ρ), in each direction by its own ρ.
+    /// The memory of EWLS with this λ: L = 1 / ((1 − λ) ρ), with the sample density ρ
+    /// of each direction.
     Lambda(f64),
-    /// mm.
+    /// A length, mm.
     Mm(f64),
 }
 
 /// Options of the hat table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hat {
-    /// How the branches are joined, in identification and afterwards.
+    /// The direction state, in identification and in prediction.
     pub state: State,
     /// Weight of the squared second differences of F along the nodes.
     pub ridge_force: f64,
@@ -230,7 +230,7 @@ pub struct Hat {
 }
 
 impl Default for Hat {
-    /// Play with δ found on the training data, m, b ≥ 0.
+    /// Play, with δ found on the training recording, and m, b ≥ 0.
     fn default() -> Self {
         Self {
             state: State::Play(Delta::Scan),
@@ -253,8 +253,8 @@ pub enum State {
 }
 
 impl State {
-    /// As it stands in arguments.
-    pub fn word(self) -> &'static str {
+    /// The name in arguments and model files.
+    pub fn as_str(self) -> &'static str {
         match self {
             Self::Sign => "sign",
             Self::Play(_) => "play",
@@ -262,7 +262,7 @@ impl State {
         }
     }
 
-    /// The rule with one δ.
+    /// The direction rule with a given δ, mm.
     pub(super) fn with(self, delta_mm: f64) -> Direction {
         match self {
             Self::Sign => Direction::Sign,
@@ -272,25 +272,25 @@ impl State {
     }
 }
 
-/// δ of a direction state.
+/// The length δ of a direction state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delta {
-    /// mm.
+    /// A length, mm.
     Mm(f64),
-    /// The shortest in 0.3 to 1 mm that leaves at most a tenth more (rms) of the
-    /// training recording than the one that leaves least.
+    /// The shortest in 0.3 to 1 mm whose rms error on the training recording exceeds the
+    /// least one by at most a tenth.
     Scan,
 }
 
 /// Options of the segmented baseline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Segments {
-    /// How many straight lines over the range of both directions.
+    /// Number of segments over the range of both directions.
     pub count: usize,
 }
 
 impl Default for Segments {
-    /// Twelve.
+    /// Twelve segments.
     fn default() -> Self {
         Self { count: 12 }
     }
@@ -298,19 +298,19 @@ impl Default for Segments {
 
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.word())?;
+        f.write_str(self.as_str())?;
         match self {
             Self::Ewls(options) => {
                 if options.start != Start::Cold {
-                    write!(f, " start={}", options.start.word())?;
+                    write!(f, " start={}", options.start.as_str())?;
                 }
                 if options.sort != Sort::Ascending {
-                    write!(f, " sort={}", options.sort.word())?;
+                    write!(f, " sort={}", options.sort.as_str())?;
                 }
                 Ok(())
             }
             Self::TwoSided(options) => {
-                write!(f, " window={}", options.window.word())?;
+                write!(f, " window={}", options.window.as_str())?;
                 if let Width::Mm(mm) = options.width {
                     write!(f, " width={mm}")?;
                 }
@@ -334,11 +334,7 @@ impl fmt::Display for Method {
 }
 
 fn bounds(f: &mut fmt::Formatter<'_>, bounded: bool) -> fmt::Result {
-    if bounded {
-        f.write_str(" m,b>=0")
-    } else {
-        Ok(())
-    }
+    f.write_str(if bounded { " m,b>=0" } else { "" })
 }
 
 #[cfg(test)]
@@ -346,7 +342,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_method_in_words_has_every_option_that_is_not_the_usual_one() {
+    fn a_displayed_method_has_every_option_that_is_not_the_default() {
         let paper = Ewls::paper(0.999, Resample::Point);
         assert_eq!(Method::Ewls(paper).to_string(), "ewls");
         let warm = Ewls {

@@ -1,92 +1,92 @@
-//! Why a recording gives no realization, and what is doubtful about one.
+//! Errors of identification and warnings about its results.
 
-use super::ewls::Theta;
-use super::resample::MOST_NODES;
+use super::resample::MAX_NODES;
+use super::samples::Theta;
 use std::fmt;
 
-/// Samples of the recursion before its estimate rests on ten for each parameter.
+/// Number of samples after which an estimate rests on ten samples per parameter.
 pub(super) const START_UP_SAMPLES: usize = 40;
 
-/// Why a recording gives no realization.
+/// Why identification failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum IdentifyError {
     /// λ is out of range.
     #[error("lambda has to be above 0 and at most 1, not {0}")]
     Lambda(f64),
-    /// dx is no length.
+    /// dx is not a positive length.
     #[error("dx has to be a length above 0 mm, not {0}")]
     Dx(f64),
-    /// Fewer than two nodes fit.
+    /// Fewer than two nodes fit in the range of the recording.
     #[error("dx = {dx_mm} mm leaves {nodes} nodes in {low} to {high} mm: a table has at least two")]
     TooCoarse {
-        /// mm.
+        /// Resampling increment, mm.
         dx_mm: f64,
-        /// How many fit.
+        /// Number of nodes that fit.
         nodes: usize,
-        /// Where both directions begin, mm.
+        /// Lower end of the range common to both directions, mm.
         low: f64,
-        /// Where the first of them ends, mm.
+        /// Upper end of the range common to both directions, mm.
         high: f64,
     },
     /// More nodes than a table can have.
     #[error(
         "dx = {dx_mm} mm gives more than {most} nodes in {low} to {high} mm",
-        most = MOST_NODES
+        most = MAX_NODES
     )]
     TooFine {
-        /// mm.
+        /// Resampling increment, mm.
         dx_mm: f64,
-        /// Where both directions begin, mm.
+        /// Lower end of the range common to both directions, mm.
         low: f64,
-        /// Where the first of them ends, mm.
+        /// Upper end of the range common to both directions, mm.
         high: f64,
     },
     /// There is only one direction of travel.
-    #[error("{recording} never moves with v {0} 0: both directions are needed", if *.positive { '>' } else { '<' })]
+    #[error("{recording} has no samples with v {0} 0: both directions are needed", if *.positive { '>' } else { '<' })]
     OneDirection {
-        /// Its name.
+        /// Name of the recording.
         recording: String,
-        /// Which direction is missing.
+        /// Whether the missing direction is v > 0.
         positive: bool,
     },
-    /// The two directions were never at the same positions.
+    /// The two directions cover no common positions.
     #[error("{0}: the two directions have no range of x in common")]
     NoOverlap(String),
-    /// A number that has to be a length is none.
-    #[error("{what} has to be a length above 0 mm, not {value}")]
+    /// An option that is a length is not positive.
+    #[error("{option} has to be a length above 0 mm, not {value}")]
     Length {
-        /// Which.
-        what: &'static str,
-        /// mm.
+        /// The option.
+        option: &'static str,
+        /// Its value, mm.
         value: f64,
     },
-    /// A weight of a penalty is negative or no number.
-    #[error("{what} has to be 0 or more, not {value}")]
+    /// The weight of a penalty is negative or not finite.
+    #[error("{option} has to be 0 or more, not {value}")]
     Ridge {
-        /// Which.
-        what: &'static str,
-        /// The weight.
+        /// The option.
+        option: &'static str,
+        /// Its value.
         value: f64,
     },
     /// A number of segments that no table can have.
-    #[error("{0} segments: a table has 1 to {most}", most = MOST_NODES - 1)]
+    #[error("{0} segments: a table has 1 to {most}", most = MAX_NODES - 1)]
     Segments(usize),
-    /// The weights around the nodes hold too little.
+    /// Too few samples around every node.
     #[error(
-        "within {width_mm} mm of the nodes there are too few samples for four parameters: take a larger width"
+        "too few samples for four parameters within {width_mm} mm of the nodes: choose a larger width"
     )]
     Narrow {
         /// L, mm.
         width_mm: f64,
     },
-    /// The normal equations have no single solution.
+    /// The normal equations are singular.
     #[error(
-        "the recording leaves parameters of the table undetermined: take a larger ridge or a larger dx"
+        "the recording leaves parameters of the table undetermined: choose a larger ridge or a larger dx"
     )]
     Undetermined,
-    /// The recursion left the range of numbers.
+    /// An estimate of the recursion is not finite.
     #[error(
-        "the estimates with lambda = {lambda} are no numbers: the recording does not excite all parameters; take a larger lambda"
+        "the estimates with lambda = {lambda} diverge: the recording does not excite all parameters; choose a larger lambda"
     )]
     Diverged {
         /// The forgetting factor.
@@ -94,51 +94,53 @@ pub enum IdentifyError {
     },
 }
 
+/// Why nodes were interpolated between their neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// There are no samples around them.
+    NoSamples,
+    /// There are too few samples around them.
+    FewSamples,
+}
+
 /// What is doubtful about a realization.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
-    /// Nodes without a sample of their own were filled from their neighbours.
-    EmptyBins {
-        /// Of the + direction.
+    /// Nodes were interpolated between their neighbours.
+    Filled {
+        /// Why.
+        cause: Cause,
+        /// Number of nodes in the + direction.
         positive: usize,
-        /// Of the − direction.
+        /// Number of nodes in the − direction.
         negative: usize,
         /// Nodes of the table.
         of: usize,
     },
-    /// Nodes where the recursion had hardly begun.
+    /// Nodes at which the recursion has seen few samples.
     StartUp {
-        /// How many.
+        /// Number of nodes.
         nodes: usize,
-        /// The highest of them, mm.
+        /// Position of the highest of them, mm.
         to_mm: f64,
     },
-    /// Nodes with too few samples around them were filled from their neighbours.
-    Thin {
-        /// Of the + direction.
-        positive: usize,
-        /// Of the − direction.
-        negative: usize,
-        /// Nodes of the table.
-        of: usize,
-    },
-    /// The force at rest of some nodes is far from anything that was measured.
-    Unmeasured {
-        /// How many, of both directions.
+    /// The static force of some nodes is far outside the measured range.
+    Implausible {
+        /// Number of nodes, in both directions.
         nodes: usize,
-        /// The worst, N.
+        /// The most extreme force, N.
         force_n: f64,
-        /// Where that is, mm.
+        /// Position of that force, mm.
         at_mm: f64,
     },
-    /// The best δ is the first or the last of those that were tried.
+    /// The best δ is at an end of the scan.
     DeltaAtEnd {
-        /// mm.
+        /// The best δ, mm.
         delta_mm: f64,
     },
-    /// A spring that pushes away: it has no stable place.
+    /// The spring has a negative stiffness and is unstable.
     NegativeSpring {
-        /// N/mm.
+        /// Stiffness, N/mm.
         k_n_per_mm: f64,
     },
 }
@@ -146,78 +148,68 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::EmptyBins {
+            Self::Filled {
+                cause,
                 positive,
                 negative,
                 of,
-            } => write!(
-                f,
-                "of {of} nodes {positive} in + and {negative} in - have no sample and were filled from their neighbours"
-            ),
+            } => {
+                let cause = match cause {
+                    Cause::NoSamples => "no samples",
+                    Cause::FewSamples => "too few samples",
+                };
+                write!(
+                    f,
+                    "{positive} of {of} nodes in + and {negative} in - have {cause} around them and were interpolated"
+                )
+            }
             Self::StartUp { nodes, to_mm } => write!(
                 f,
                 "{nodes} nodes, the last at {to_mm:.2} mm, rest on fewer than {START_UP_SAMPLES} samples"
             ),
-            Self::Thin {
-                positive,
-                negative,
-                of,
-            } => write!(
-                f,
-                "of {of} nodes {positive} in + and {negative} in - have too few samples around them and were filled from their neighbours"
-            ),
-            Self::Unmeasured {
+            Self::Implausible {
                 nodes,
                 force_n,
                 at_mm,
             } => write!(
                 f,
-                "{nodes} nodes have a force at rest far outside what was measured, the worst {force_n:.1} N at {at_mm:.2} mm"
+                "the static force of {nodes} nodes is far outside the measured range, the most extreme {force_n:.1} N at {at_mm:.2} mm"
             ),
             Self::DeltaAtEnd { delta_mm } => write!(
                 f,
-                "of the training recording delta = {delta_mm} mm leaves least, the end of what was tried: a better one may lie beyond"
+                "the best delta, {delta_mm} mm, is at an end of the scan: a better one may lie beyond it"
             ),
             Self::NegativeSpring { k_n_per_mm } => {
-                write!(f, "the spring pushes away, {k_n_per_mm:.4} N/mm")
+                write!(
+                    f,
+                    "the stiffness of the spring is negative: {k_n_per_mm:.4} N/mm"
+                )
             }
         }
     }
 }
 
-/// Whether the force at rest of a node is more than half the measured range
-/// outside of it: a place where the estimate rests on nothing that was felt.
-pub(super) fn unmeasured(
+/// A warning about nodes whose static force lies outside the measured range, low to
+/// high, N, by more than half of it.
+pub(super) fn implausible(
     [low, high]: [f64; 2],
     nodes: &[f64],
     branches: [&Vec<Theta>; 2],
 ) -> Option<Warning> {
     let (middle, reach) = (0.5 * (low + high), high - low);
-    let mut worst: Option<(f64, Warning)> = None;
-    let mut count = 0;
-    for branch in branches {
-        for (at_mm, theta) in nodes.iter().zip(branch) {
-            let force_n = theta[2] * at_mm + theta[3];
-            let off = (force_n - middle).abs();
-            if off <= reach {
-                continue;
-            }
-            count += 1;
-            if worst.as_ref().is_none_or(|(most, _)| off > *most) {
-                let warning = Warning::Unmeasured {
-                    nodes: count,
-                    force_n,
-                    at_mm: *at_mm,
-                };
-                worst = Some((off, warning));
-            }
-        }
-    }
-    worst.map(|(_, mut warning)| {
-        if let Warning::Unmeasured { nodes, .. } = &mut warning {
-            *nodes = count;
-        }
-        warning
+    let outside: Vec<(f64, f64)> = branches
+        .into_iter()
+        .flat_map(|branch| nodes.iter().zip(branch))
+        .map(|(at_mm, theta)| (theta[2] * at_mm + theta[3], *at_mm))
+        .filter(|(force_n, _)| (force_n - middle).abs() > reach)
+        .collect();
+    let distance = |(force_n, _): &(f64, f64)| (force_n - middle).abs();
+    let (force_n, at_mm) =
+        *(outside.iter().rev()).max_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    Some(Warning::Implausible {
+        nodes: outside.len(),
+        force_n,
+        at_mm,
     })
 }
 
@@ -226,17 +218,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn forces_that_nobody_felt_are_counted_with_the_worst() {
+    fn implausible_forces_are_counted_and_the_most_extreme_is_given() {
         let measured = [-4.0, 4.0];
         let at = |k: f64, f0: f64| [0.0, 0.0, k, f0];
-        // at 2 mm: 7.9 N is within half the range of what was measured, 8.1 N is not
+        // at 2 mm: 7.9 N is within half the range beyond the measured one, 8.1 N is not
         let nodes = [1.0, 2.0];
-        let fine = vec![at(0.0, 4.0), at(3.0, 1.9)];
-        assert_eq!(unmeasured(measured, &nodes, [&fine, &fine]), None);
+        let plausible = vec![at(0.0, 4.0), at(3.0, 1.9)];
+        assert_eq!(
+            implausible(measured, &nodes, [&plausible, &plausible]),
+            None
+        );
         let off = vec![at(0.0, -30.0), at(3.0, 2.1)];
         assert_eq!(
-            unmeasured(measured, &nodes, [&fine, &off]),
-            Some(Warning::Unmeasured {
+            implausible(measured, &nodes, [&plausible, &off]),
+            Some(Warning::Implausible {
                 nodes: 2,
                 force_n: -30.0,
                 at_mm: 1.0

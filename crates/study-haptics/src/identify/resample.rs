@@ -1,42 +1,41 @@
-//! From one θ a sample to one θ a node.
+//! Resampling: from one θ per sample to one θ per node.
 //!
-//! The nodes are the multiples of dx inside the range of both directions, so that
-//! every node has samples of both around it. Three ways to a node:
+//! The nodes are the multiples of dx in the range of both directions, so that every
+//! node has samples of both around it. Three methods:
 //!
-//! * `point`, the paper's literal reading: samples at equal counts of a 5 µm
-//!   encoder, round(x / 0.005), are averaged; between counts it is linear.
-//! * `bin`: the mean over [node − dx/2, node + dx/2). A bin without samples takes
-//!   the straight line between the nearest bins that have some (at an end the
-//!   nearest one) and is counted, because a table that looks complete and is not
-//!   should be known.
-//!
-//! * `hat`: the mean weighted with 1 − |x − node|/dx, over (node − dx, node + dx):
-//!   the share that a linear look-up takes of the node. Without samples as `bin`.
+//! * `point`, the literal reading of the paper: samples at equal counts of a 5 µm
+//!   encoder, round(x / 0.005), are averaged, and the averages interpolated linearly.
+//! * `bin`: the mean over [node − dx/2, node + dx/2). An empty bin is interpolated
+//!   linearly between the nearest bins with samples (at an end it takes the nearest
+//!   one) and counted, so that a table with gaps is recognized.
+//! * `hat`: the mean weighted by 1 − |x − node|/dx over (node − dx, node + dx), the
+//!   weight of the node in a linear look-up. Nodes without samples as for `bin`.
 //!
 //! All are linear in θ, so a shift of the origin of x does not change the force.
 
-use super::ewls::Theta;
+use super::samples::Theta;
+use std::ops::Range;
 
-/// The count of the encoder of the `point` method, mm.
-pub const COUNT_MM: f64 = 0.005;
+/// Resolution of the encoder assumed by the `point` method, mm.
+const COUNT_MM: f64 = 0.005;
 
-/// More nodes than this are a mistake in dx.
-pub const MOST_NODES: usize = crate::model::file::MOST_NODES;
+/// Most nodes of a table; more are a mistake in dx.
+pub const MAX_NODES: usize = crate::model::file::MAX_NODES;
 
-/// How estimates are brought to the nodes.
+/// How the parameters at a node follow from the estimates around it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Resample {
-    /// At the node, between means over equal encoder counts.
+    /// Interpolated between means over equal encoder counts.
     Point,
     /// The mean over the bin around the node.
     Bin,
-    /// The mean weighted by how near the node is.
+    /// The mean weighted by the distance from the node.
     Hat,
 }
 
 impl Resample {
-    /// As it stands in model files and arguments.
-    pub fn word(self) -> &'static str {
+    /// The name in model files and arguments.
+    pub fn as_str(self) -> &'static str {
         match self {
             Self::Point => "point",
             Self::Bin => "bin",
@@ -45,13 +44,13 @@ impl Resample {
     }
 }
 
-/// The multiples of `dx_mm` in [`low`, `high`]; empty if dx is not positive or
-/// there would be more than [`MOST_NODES`].
+/// The multiples of `dx_mm` in [`low`, `high`], mm; empty if dx is not positive or
+/// there would be more than [`MAX_NODES`].
 pub fn nodes(low: f64, high: f64, dx_mm: f64) -> Vec<f64> {
     let first = (low / dx_mm).ceil();
     let last = (high / dx_mm).floor();
-    // also refuses a NaN
-    if !(dx_mm > 0.0 && last - first < MOST_NODES as f64) {
+    // also rejects NaN
+    if !(dx_mm > 0.0 && last - first < MAX_NODES as f64) {
         return Vec::new();
     }
     let mut nodes = Vec::new();
@@ -64,50 +63,57 @@ pub fn nodes(low: f64, high: f64, dx_mm: f64) -> Vec<f64> {
     nodes
 }
 
-/// Values at the nodes, and how many nodes had no sample of their own.
+/// The parameters at the nodes of one direction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resampled {
-    /// One a node.
+    /// One per node.
     pub theta: Vec<Theta>,
-    /// Nodes filled from their neighbours.
-    pub empty: usize,
+    /// Number of nodes interpolated between their neighbours for want of samples.
+    pub filled: usize,
 }
 
-/// Values at the nodes by one of the ways. `x_mm` ascends and is not empty.
+/// The parameters at the nodes. `x_mm` ascends and is not empty.
 pub fn at_nodes(
-    how: Resample,
+    method: Resample,
     x_mm: &[f64],
     theta: &[Theta],
     nodes: &[f64],
     dx_mm: f64,
 ) -> Resampled {
-    match how {
+    match method {
         Resample::Point => point(x_mm, theta, nodes),
         Resample::Bin => bin(x_mm, theta, nodes, dx_mm),
         Resample::Hat => hat(x_mm, theta, nodes, dx_mm),
     }
 }
 
-/// Values at the nodes, between means over equal counts. `x_mm` ascends and is
-/// not empty.
-pub fn point(x_mm: &[f64], theta: &[Theta], nodes: &[f64]) -> Resampled {
+/// Groups of samples at equal encoder counts: the position of the count, mm, and
+/// the samples. `x_mm` ascends.
+pub(super) fn equal_counts(x_mm: &[f64]) -> (Vec<f64>, Vec<Range<usize>>) {
     let count = |x: f64| (x / COUNT_MM).round_ties_even();
-    let mut places = Vec::new();
-    let mut means = Vec::new();
+    let mut positions = Vec::new();
+    let mut groups = Vec::new();
     let mut from = 0;
     while from < x_mm.len() {
-        let here = count(x_mm[from]);
-        let to = from + x_mm[from..].partition_point(|x| count(*x) <= here);
-        places.push(here * COUNT_MM);
-        means.push(mean(&theta[from..to]));
+        let own = count(x_mm[from]);
+        let to = from + x_mm[from..].partition_point(|x| count(*x) <= own);
+        positions.push(own * COUNT_MM);
+        groups.push(from..to);
         from = to;
     }
+    (positions, groups)
+}
+
+/// Interpolated between means over equal counts. `x_mm` ascends and is not empty.
+pub fn point(x_mm: &[f64], theta: &[Theta], nodes: &[f64]) -> Resampled {
+    let (positions, groups) = equal_counts(x_mm);
+    let means: Vec<Theta> = groups.into_iter().map(|g| mean(&theta[g])).collect();
     Resampled {
         theta: nodes
             .iter()
-            .map(|node| interpolate(&places, &means, *node))
+            .map(|node| interpolate(&positions, &means, *node))
             .collect(),
-        empty: 0,
+        filled: 0,
     }
 }
 
@@ -120,7 +126,7 @@ pub fn bin(x_mm: &[f64], theta: &[Theta], nodes: &[f64], dx_mm: f64) -> Resample
     })
 }
 
-/// Means weighted with 1 − |x − node|/dx. `x_mm` ascends and is not empty.
+/// Means weighted by 1 − |x − node|/dx. `x_mm` ascends and is not empty.
 pub fn hat(x_mm: &[f64], theta: &[Theta], nodes: &[f64], dx_mm: f64) -> Resampled {
     means(x_mm, theta, nodes, |node| {
         let first = x_mm.partition_point(|x| *x <= node - dx_mm);
@@ -141,7 +147,7 @@ pub fn hat(x_mm: &[f64], theta: &[Theta], nodes: &[f64], dx_mm: f64) -> Resample
     })
 }
 
-/// The nodes' own means, and straight lines between them where there is none.
+/// The means at the nodes, interpolated where a node has no samples.
 fn means(
     x_mm: &[f64],
     theta: &[Theta],
@@ -150,28 +156,29 @@ fn means(
 ) -> Resampled {
     let own: Vec<Option<Theta>> = nodes.iter().map(|node| own(*node)).collect();
     filled(nodes, &own).unwrap_or_else(|| Resampled {
-        // No node has a sample around it: the samples themselves are all there is.
-        empty: nodes.len(),
+        // no node has samples around it: interpolate between the samples themselves
+        filled: nodes.len(),
         ..point(x_mm, theta, nodes)
     })
 }
 
-/// Fills nodes without a value from their neighbours; `None` if all are.
+/// Interpolates nodes without a value between their neighbours; `None` if no node has
+/// a value.
 pub(super) fn filled(nodes: &[f64], own: &[Option<Theta>]) -> Option<Resampled> {
-    let (places, values): (Vec<f64>, Vec<Theta>) = nodes
+    let (positions, values): (Vec<f64>, Vec<Theta>) = nodes
         .iter()
         .zip(own)
         .filter_map(|(node, theta)| theta.map(|theta| (*node, theta)))
         .unzip();
-    if places.is_empty() {
+    if positions.is_empty() {
         return None;
     }
     Some(Resampled {
         theta: nodes
             .iter()
-            .map(|node| interpolate(&places, &values, *node))
+            .map(|node| interpolate(&positions, &values, *node))
             .collect(),
-        empty: nodes.len() - places.len(),
+        filled: nodes.len() - positions.len(),
     })
 }
 
@@ -185,17 +192,17 @@ fn mean(values: &[Theta]) -> Theta {
     sum.map(|s| s / values.len() as f64)
 }
 
-/// Straight lines between (`places`, `values`), the ends held.
-pub(super) fn interpolate(places: &[f64], values: &[Theta], x: f64) -> Theta {
-    let right = places.partition_point(|place| *place <= x);
+/// Linear interpolation between (`positions`, `values`), constant beyond the ends.
+pub(super) fn interpolate(positions: &[f64], values: &[Theta], x: f64) -> Theta {
+    let right = positions.partition_point(|position| *position <= x);
     if right == 0 {
         return values[0];
     }
     let left = right - 1;
-    if right == places.len() || places[left] == x {
+    if right == positions.len() || positions[left] == x {
         return values[left];
     }
-    let weight = (x - places[left]) / (places[right] - places[left]);
+    let weight = (x - positions[left]) / (positions[right] - positions[left]);
     std::array::from_fn(|i| values[left][i] + weight * (values[right][i] - values[left][i]))
 }
 
@@ -227,7 +234,7 @@ mod tests {
         let values: Vec<_> = [3.0, 6.0, 9.0, 100.0, 200.0].map(theta).to_vec();
         let at = bin(&x, &values, &[1.0, 2.0], 1.0);
         assert_eq!(f0(&at), [6.0, 150.0]);
-        assert_eq!(at.empty, 0);
+        assert_eq!(at.filled, 0);
     }
 
     #[test]
@@ -236,7 +243,7 @@ mod tests {
         let values = [theta(10.0), theta(40.0)];
         let at = bin(&x, &values, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 1.0);
         assert_eq!(f0(&at), [10.0, 10.0, 20.0, 30.0, 40.0, 40.0]);
-        assert_eq!(at.empty, 4);
+        assert_eq!(at.filled, 4);
     }
 
     #[test]
@@ -246,7 +253,7 @@ mod tests {
         let at = hat(&x, &values, &[1.0, 4.0], 1.0);
         // (0.5·2 + 1·8 + 0.25·4) / 1.75; 4.0 has none within 1 mm and takes it
         assert_eq!(f0(&at), [10.0 / 1.75, 10.0 / 1.75]);
-        assert_eq!(at.empty, 1);
+        assert_eq!(at.filled, 1);
     }
 
     #[test]

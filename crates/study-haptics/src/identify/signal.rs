@@ -1,17 +1,14 @@
-//! From what a probe measured to signals that can be identified from.
+//! Signal processing: from a probe's recording to signals for identification.
 //!
-//! [`prepare`] low-passes position, acceleration and force with one and the same
-//! zero-phase filter and derives velocity by central difference; [`thin()`] takes
-//! the samples of a dwell away; [`excitation`] says whether a, v and x move
-//! independently enough to tell their parameters apart; [`delay`] compares the
-//! accelerometer with the encoder in time.
+//! [`prepare`] low-pass filters position, acceleration and force with the same
+//! zero-phase filter ([`filter`]) and computes the velocity by central differences;
+//! [`thin()`] removes most samples of dwells; [`excitation`] tells whether a, v and x
+//! vary independently enough to identify their parameters; [`delay`] measures the lag
+//! between accelerometer and encoder.
 //!
-//! The filter is the same on x, a and F because a filter that differs between them
-//! would show as a mass or a damping that is not there. It is run forward and
-//! backward, so that it delays nothing: [`filter`].
-//!
-//! Not here: reading, and what a protocol or a terminal makes of it. A filtered or
-//! thinned recording keeps the name and hash of the file that it came from.
+//! x, a and F need the same filter, because a difference between them would appear as
+//! mass or damping. A filtered or thinned recording keeps the name and hash of its
+//! file.
 
 pub mod delay;
 pub mod excitation;
@@ -24,10 +21,10 @@ pub use thin::{Dwell, thin};
 
 use crate::recording::Recording;
 
-/// Steps of time may differ by this share from the usual one.
-const STEP_TOLERANCE: f64 = 0.1;
+/// A sampling interval may differ from the mean one by this share.
+const INTERVAL_TOLERANCE: f64 = 0.1;
 
-/// Where the acceleration comes from.
+/// The source of the acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Acceleration {
     /// The column of the recording, filtered like the others.
@@ -39,76 +36,78 @@ pub enum Acceleration {
 /// How signals are prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Corner of the filter, Hz; `None`: nothing is filtered.
+    /// Corner frequency of the filter, Hz; `None`: no filter.
     pub filter_hz: Option<f64>,
-    /// Where the acceleration comes from.
+    /// The source of the acceleration.
     pub acceleration: Acceleration,
 }
 
 /// Why signals cannot be prepared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SignalError {
-    /// The corner is out of range.
+    /// The corner frequency is out of range.
     #[error(
-        "a filter corner has to be above 0 and below half the sampling rate of {rate_hz} Hz, not {corner_hz}"
+        "the corner frequency of the filter has to be above 0 and below half the sampling rate of {rate_hz} Hz, not {corner_hz}"
     )]
     Corner {
-        /// Hz.
+        /// Corner frequency, Hz.
         corner_hz: f64,
-        /// Hz.
+        /// Sampling rate, Hz.
         rate_hz: f64,
     },
-    /// A filter needs samples at equal times.
+    /// A filter needs equally spaced samples.
     #[error(
-        "{recording}: the step of time at {at_s} s is {step_s} s where the usual one is {usual_s} s: a filter needs equal steps"
+        "{recording}: the sampling interval at {at_s} s is {interval_s} s instead of {mean_s} s: a filter needs a recording without gaps"
     )]
     Uneven {
-        /// Its name.
+        /// Name of the recording.
         recording: String,
-        /// s.
+        /// Start of the interval, s.
         at_s: f64,
-        /// s.
-        step_s: f64,
-        /// s.
-        usual_s: f64,
+        /// Its length, s.
+        interval_s: f64,
+        /// The mean interval, s.
+        mean_s: f64,
     },
 }
 
-/// The usual step of time of a recording, s: the mean, if no step is far from it.
+/// The sampling interval of an evenly sampled recording, s.
 ///
 /// # Errors
-/// [`SignalError::Uneven`] with the first step that is.
-pub fn even_step_s(recording: &Recording) -> Result<f64, SignalError> {
-    let usual_s = recording.duration_s() / (recording.len() - 1) as f64;
+/// [`SignalError::Uneven`] with the first interval that differs from the mean by more
+/// than a tenth.
+pub fn sampling_interval_s(recording: &Recording) -> Result<f64, SignalError> {
+    let mean_s = recording.duration_s() / (recording.len() - 1) as f64;
     for pair in recording.t_s.windows(2) {
-        let step_s = pair[1] - pair[0];
-        if (step_s / usual_s - 1.0).abs() > STEP_TOLERANCE {
+        let interval_s = pair[1] - pair[0];
+        if (interval_s / mean_s - 1.0).abs() > INTERVAL_TOLERANCE {
             return Err(SignalError::Uneven {
                 recording: recording.name.clone(),
                 at_s: pair[0],
-                step_s,
-                usual_s,
+                interval_s,
+                mean_s,
             });
         }
     }
-    Ok(usual_s)
+    Ok(mean_s)
 }
 
-/// The recording with its signals prepared.
+/// The recording with its signals filtered and its velocity and acceleration computed
+/// as `settings` demand.
 ///
 /// # Errors
-/// [`SignalError`] if the corner does not suit the sampling rate, or there is no
-/// one sampling rate.
+/// [`SignalError`] if the corner frequency does not suit the sampling rate, or the
+/// recording is not evenly sampled.
 pub fn prepare(recording: &Recording, settings: Settings) -> Result<Recording, SignalError> {
     let mut prepared = recording.clone();
     if settings.filter_hz.is_none() && settings.acceleration == Acceleration::Accelerometer {
         return Ok(prepared);
     }
-    let step_s = even_step_s(recording)?;
+    let step_s = sampling_interval_s(recording)?;
     if let Some(corner_hz) = settings.filter_hz {
         let low_pass = LowPass::new(corner_hz, 1.0 / step_s)?;
         for column in [&mut prepared.x_mm, &mut prepared.a_m_s2, &mut prepared.f_n] {
-            *column = low_pass.both_ways(column);
+            *column = low_pass.zero_phase(column);
         }
         prepared.v_mm_s = difference(&prepared.x_mm, step_s);
     }
@@ -118,7 +117,7 @@ pub fn prepare(recording: &Recording, settings: Settings) -> Result<Recording, S
     Ok(prepared)
 }
 
-/// Central difference, one-sided at the ends, mm/s.
+/// The velocity by central differences, one-sided at the ends, mm/s.
 pub fn difference(x_mm: &[f64], step_s: f64) -> Vec<f64> {
     let last = x_mm.len().saturating_sub(1);
     (0..x_mm.len())
@@ -129,7 +128,8 @@ pub fn difference(x_mm: &[f64], step_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Second central difference, that of the neighbour at the ends, m/s².
+/// The acceleration by second central differences, at the ends that of the neighbour,
+/// m/s².
 pub fn second_difference(x_mm: &[f64], step_s: f64) -> Vec<f64> {
     if x_mm.len() < 3 {
         return vec![0.0; x_mm.len()];
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// 5 sin 2π2t mm at 1 kHz with an accelerometer of its own scale.
+    /// 5 sin 2π2t mm at 1 kHz, with an accelerometer.
     fn recording(rows: usize, gap_at: Option<usize>) -> Recording {
         let mut text = String::from("t_s,x_mm,a_m_s2,f_n\n");
         for i in 0..rows {
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn all_signals_go_through_the_same_filter_and_v_is_of_the_filtered_x() {
+    fn all_signals_pass_the_same_filter_and_v_is_the_difference_of_the_filtered_x() {
         let raw = recording(2000, None);
         let settings = Settings {
             filter_hz: Some(8.0),
@@ -174,12 +174,12 @@ mod tests {
         let done = prepare(&raw, settings).unwrap();
         let low_pass = LowPass::new(8.0, 1000.0).unwrap();
         let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
-        assert!(close(&done.f_n, &low_pass.both_ways(&raw.f_n)));
-        assert!(close(&done.a_m_s2, &low_pass.both_ways(&raw.a_m_s2)));
+        assert!(close(&done.f_n, &low_pass.zero_phase(&raw.f_n)));
+        assert!(close(&done.a_m_s2, &low_pass.zero_phase(&raw.a_m_s2)));
         let v = (done.x_mm[501] - done.x_mm[499]) / 2e-3;
         assert!((done.v_mm_s[500] - v).abs() < 1e-9);
         assert_eq!(done.sha256, raw.sha256);
-        // the second difference of x is what this accelerometer measured
+        // the second difference of x agrees with this accelerometer
         let encoder = prepare(
             &raw,
             Settings {
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_in_time_and_a_corner_that_cannot_be_are_refused() {
+    fn a_gap_in_time_and_an_impossible_corner_frequency_are_refused() {
         let settings = |hz| Settings {
             filter_hz: Some(hz),
             acceleration: Acceleration::Accelerometer,
@@ -203,7 +203,7 @@ mod tests {
         let gap = prepare(&recording(300, Some(100)), settings(30.0)).unwrap_err();
         assert!(
             gap.to_string()
-                .starts_with("r: the step of time at 0.099 s is"),
+                .starts_with("r: the sampling interval at 0.099 s is"),
             "{gap}"
         );
         for bad in [0.0, -1.0, 500.0, f64::NAN, f64::INFINITY] {

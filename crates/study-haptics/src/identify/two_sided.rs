@@ -1,31 +1,32 @@
-//! Least squares around each node, with samples on both sides of it.
+//! Weighted least squares around each node, with samples on both sides of it.
 //!
-//! A recursion that passes along x knows only what lies behind it, so its table
-//! lags by its memory L. Here the weights fall with the distance from the node to
-//! both sides. Exponential weights e^(−|x − node|/L) are what an EWLS forward and
-//! one backward sum up to, so that λ means what it means there, L = 1/((1 − λ)ρ).
-//! Tricube weights (1 − |u|³)³, u = (x − node)/(3L), end.
+//! A recursion along x uses only the samples behind it, so its table lags by its
+//! memory L. Here the weights decrease with the distance from the node to both sides.
+//! Exponential weights e^(−|x − node|/L) are the sum of a forward and a backward EWLS,
+//! so λ has the same meaning, L = 1/((1 − λ)ρ). Tricube weights (1 − |u|³)³,
+//! u = (x − node)/(3L), have a finite support.
 //!
-//! φ = [a v (x − node) 1], so k and the force at the node come out directly,
-//! whatever the origin of x, and F0 = F − k·node. The prior is that of EWLS, 10⁻⁶ I.
-//! Passed in the other direction, the same samples give the same table.
+//! φ = [a v (x − node) 1], so the solution contains k and the force at the node for
+//! any origin of x, and F0 = F − k·node. The prior is that of EWLS, 10⁻⁶ I. Reversing
+//! the order of the samples does not change the table.
 
 use super::constrained;
-use super::ewls::{START, Sorted, Theta};
 use super::method::Window;
 use super::resample::{self, Resampled};
+use super::samples::{INITIAL_COVARIANCE, Samples, Theta};
 
-/// Tricube weights end at so many L: they then hold the samples about as close as
-/// exponential ones.
-const TRICUBE_REACH: f64 = 3.0;
+/// Support of tricube weights in multiples of L; the effective width is then about
+/// that of exponential weights.
+const TRICUBE_SUPPORT: f64 = 3.0;
 
-/// Sum of weights that four parameters rest on: two samples each.
-pub(super) const LEAST_WEIGHT: f64 = 8.0;
+/// Least sum of weights for four parameters: two samples each.
+pub(super) const MIN_WEIGHT: f64 = 8.0;
 
-/// θ at the nodes from samples of one direction, those with too little around them
-/// filled from their neighbours; `None` if all have.
+/// θ at the nodes from the samples of one direction, with weights of width `l_mm`.
+/// Nodes with too few samples around them are interpolated between their neighbours;
+/// `None` if all nodes have too few.
 pub fn at_nodes(
-    samples: &Sorted,
+    samples: &Samples,
     nodes: &[f64],
     window: Window,
     l_mm: f64,
@@ -33,7 +34,7 @@ pub fn at_nodes(
 ) -> Option<Resampled> {
     let around = match window {
         Window::Exponential => exponential(samples, nodes, l_mm),
-        Window::Tricube => tricube(samples, nodes, TRICUBE_REACH * l_mm),
+        Window::Tricube => tricube(samples, nodes, TRICUBE_SUPPORT * l_mm),
     };
     let own: Vec<Option<Theta>> = nodes
         .iter()
@@ -46,17 +47,18 @@ pub fn at_nodes(
     resample::filled(nodes, &own)
 }
 
-/// Σ w φ φᵀ, whose last entry is Σ w, and Σ w φ F around a place.
+/// The normal equations around a position.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
-    /// Both triangles.
+    /// Σ w φ φᵀ, both triangles; its last entry is Σ w.
     r: [[f64; 4]; 4],
+    /// Σ w φ F.
     y: [f64; 4],
 }
 
 impl Sums {
-    /// Takes in sample `i` of `samples`, seen from `origin_mm`.
-    fn add(&mut self, samples: &Sorted, i: usize, origin_mm: f64, weight: f64) {
+    /// Adds sample `i` of `samples`, with x relative to `origin_mm`.
+    fn add(&mut self, samples: &Samples, i: usize, origin_mm: f64, weight: f64) {
         let phi = [
             samples.a_m_s2[i],
             samples.v_mm_s[i],
@@ -73,7 +75,7 @@ impl Sums {
         }
     }
 
-    /// The same samples with weights `factor` times, seen from `by_mm` further on.
+    /// The same samples with the origin moved by `by_mm` and weights times `factor`.
     fn moved(mut self, by_mm: f64, factor: f64) -> Self {
         for j in 0..4 {
             self.r[2][j] -= by_mm * self.r[3][j];
@@ -100,9 +102,9 @@ impl Sums {
         self
     }
 
-    /// [m b k F], F the force at the origin; `None` if it rests on too little.
+    /// [m b k F] with F the force at the origin; `None` if there are too few samples.
     fn solve(&self, bounded: bool) -> Option<Theta> {
-        if self.r[3][3] < LEAST_WEIGHT {
+        if self.r[3][3] < MIN_WEIGHT {
             return None;
         }
         let p = inverse(&self.r)?;
@@ -120,9 +122,11 @@ impl Sums {
     }
 }
 
-/// (R + I/START)⁻¹ by Gauss–Jordan on the scaled matrix; `None` if it has no rank.
+/// (R + I/[`INITIAL_COVARIANCE`])⁻¹ by Gauss–Jordan elimination on the scaled matrix;
+/// `None` if it is singular.
 fn inverse(r: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
-    let scale: [f64; 4] = std::array::from_fn(|i| (r[i][i] + 1.0 / START).sqrt().recip());
+    let scale: [f64; 4] =
+        std::array::from_fn(|i| (r[i][i] + 1.0 / INITIAL_COVARIANCE).sqrt().recip());
     let mut left: [[f64; 4]; 4] =
         std::array::from_fn(|i| std::array::from_fn(|j| r[i][j] * scale[i] * scale[j]));
     let mut right = [[0.0; 4]; 4];
@@ -130,12 +134,12 @@ fn inverse(r: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
         left[i][i] = 1.0;
         right[i][i] = 1.0;
     }
-    // positive definite with a diagonal of ones: no pivoting needed
+    // positive definite with unit diagonal: no pivoting needed
     for p in 0..4 {
         let pivot = left[p][p];
-        // false for a NaN
-        let has_rank = pivot > 1e-14;
-        if !has_rank {
+        // false for NaN
+        let regular = pivot > 1e-14;
+        if !regular {
             return None;
         }
         let (row, unit) = (
@@ -156,8 +160,9 @@ fn inverse(r: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
     }))
 }
 
-/// One pass up and one down: each node's sums come from its neighbour's.
-fn exponential(samples: &Sorted, nodes: &[f64], l_mm: f64) -> Vec<Sums> {
+/// Sums with exponential weights at each node: one pass up and one down, each node's
+/// sums following from its neighbour's.
+fn exponential(samples: &Samples, nodes: &[f64], l_mm: f64) -> Vec<Sums> {
     let mut around: Vec<Sums> = Vec::with_capacity(nodes.len());
     let mut sums = Sums::default();
     let mut i = 0;
@@ -187,7 +192,8 @@ fn exponential(samples: &Sorted, nodes: &[f64], l_mm: f64) -> Vec<Sums> {
     around
 }
 
-fn tricube(samples: &Sorted, nodes: &[f64], reach_mm: f64) -> Vec<Sums> {
+/// Sums with tricube weights at each node, which end at `reach_mm`.
+fn tricube(samples: &Samples, nodes: &[f64], reach_mm: f64) -> Vec<Sums> {
     let x = &samples.x_mm;
     nodes
         .iter()
@@ -209,10 +215,11 @@ fn tricube(samples: &Sorted, nodes: &[f64], reach_mm: f64) -> Vec<Sums> {
 mod tests {
     use super::*;
     use crate::identify::ewls;
+    use crate::identify::method::Ewls;
 
-    /// Samples of a force that no straight line fits, 100 per mm.
-    fn samples() -> Sorted {
-        let mut s = Sorted::default();
+    /// Samples of a nonlinear force, 100 per mm.
+    fn samples() -> Samples {
+        let mut s = Samples::default();
         for i in 0..2000 {
             let i = f64::from(i);
             let (x, v, a) = (0.01 * i, 20.0 + 7.0 * (1.3 * i).sin(), (0.7 * i).cos());
@@ -224,11 +231,10 @@ mod tests {
         s
     }
 
-    /// What a probe that moved in the other direction measures, origin at the
-    /// other end.
-    fn mirrored(s: &Sorted) -> Sorted {
+    /// The samples of a probe with the opposite axis and its origin at the other end.
+    fn mirrored(s: &Samples) -> Samples {
         let minus = |column: &[f64]| column.iter().rev().map(|p| 0.0 - p).collect();
-        Sorted {
+        Samples {
             x_mm: s.x_mm.iter().rev().map(|x| 20.0 - x).collect(),
             v_mm_s: minus(&s.v_mm_s),
             a_m_s2: minus(&s.a_m_s2),
@@ -259,14 +265,15 @@ mod tests {
         }
     }
 
-    /// A recursion over samples that all lie below the node is the forward half.
+    /// All samples lie below the node, so the forward pass is all there is.
     #[test]
     fn at_the_upper_end_exponential_weights_are_those_of_ewls() {
         let s = samples();
         // the last of the samples, 100 per mm
         let node = s.x_mm[1999];
         let lambda: f64 = 0.99;
-        let recursion = *ewls::estimate(&s, lambda).last().unwrap();
+        let options = Ewls::paper(lambda, resample::Resample::Point);
+        let recursion = *ewls::estimate(&s, &options, false).last().unwrap();
         let l_mm = -0.01 / lambda.ln();
         let both = at_nodes(&s, &[node], Window::Exponential, l_mm, false).unwrap();
         for (one, other) in both.theta[0].iter().zip(recursion) {
@@ -285,7 +292,7 @@ mod tests {
         }
         for window in [Window::Exponential, Window::Tricube] {
             let at = at_nodes(&s, &[3.0, 10.0, 17.0], window, 0.3, false).unwrap();
-            assert_eq!(at.empty, 1, "{window:?}");
+            assert_eq!(at.filled, 1, "{window:?}");
             let middle = 0.5 * (at.theta[0][3] + at.theta[2][3]);
             assert!((at.theta[1][3] - middle).abs() < 1e-12);
             assert!(at_nodes(&s, &[10.0], window, 0.3, false).is_none());

@@ -1,27 +1,27 @@
-//! How much of a recording's force a realization predicts.
+//! Variance accounted for (VAF): how well a realization predicts a recording's force.
 //!
-//! VAF = 1 − var(F − F̂) / var(F). It does not see a constant error, so the bias,
-//! mean(F̂ − F), stands beside it, and so does the residual as a force, the
-//! standard deviation of F − F̂. The prediction is that of [`study_wire::predict`]:
-//! a sample with v = 0 takes the direction of the sample before it (the first:
-//! +), and outside the nodes the edge parameters apply to the actual x.
+//! VAF = 1 − var(F − F̂) / var(F). It is insensitive to a constant error, so it comes
+//! with the bias, mean(F̂ − F), and the residual, the standard deviation of F − F̂. The
+//! prediction is that of [`study_wire::predict`]: a sample with v = 0 has the direction
+//! of the previous sample (+ for the first), and outside the nodes the parameters of
+//! the nearest node apply to the actual x.
 
 use crate::model::Realization;
-use crate::recording::Recording;
+use crate::recording::{Recording, mean_and_variance};
 use study_wire::predict::{DirectionState, Motion, force_n};
 
-/// What came of a prediction.
+/// The accuracy of a prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// Variance accounted for, at most 1; below 0 the mean would be better.
+    /// Variance accounted for, at most 1; below 0 the mean force predicts better.
     pub vaf: f64,
-    /// mean(F̂ − F), N: positive where the realization is too strong.
+    /// mean(F̂ − F), N; positive where the predicted force is too large.
     pub bias_n: f64,
     /// Standard deviation of F − F̂, N.
     pub residual_n: f64,
 }
 
-/// Predicted force of each sample, N.
+/// The predicted force of each sample, N.
 pub fn predict<'r>(
     realization: &'r Realization,
     recording: &'r Recording,
@@ -39,30 +39,21 @@ pub fn predict<'r>(
     })
 }
 
-/// Compares the prediction with what was measured.
-pub fn score(realization: &Realization, recording: &Recording) -> Score {
-    let errors: Vec<f64> = predict(realization, recording)
+/// The prediction error F̂ − F of each sample, N.
+pub fn errors(realization: &Realization, recording: &Recording) -> Vec<f64> {
+    predict(realization, recording)
         .zip(&recording.f_n)
         .map(|(predicted, measured)| predicted - measured)
-        .collect();
-    let (bias_n, error_variance) = mean_and_variance(&errors);
+        .collect()
+}
+
+/// Compares the prediction with the measured force.
+pub fn score(realization: &Realization, recording: &Recording) -> Score {
+    let (bias_n, error_variance) = mean_and_variance(&errors(realization, recording));
     let (_, variance) = mean_and_variance(&recording.f_n);
     Score {
         vaf: 1.0 - error_variance / variance,
         bias_n,
         residual_n: error_variance.sqrt(),
     }
-}
-
-/// Variance (÷ n).
-pub(super) fn variance(values: &[f64]) -> f64 {
-    mean_and_variance(values).1
-}
-
-/// Mean and variance (÷ n) in two passes: a large mean costs no digits.
-pub(super) fn mean_and_variance(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-    (mean, squares / n)
 }

@@ -1,43 +1,42 @@
-//! What a VAF is worth: the residual as a force, by direction and by detent, and
-//! the most that any model could reach.
+//! Validation in detail: accuracy by direction and detent, and the highest VAF that a
+//! model can reach.
 //!
-//! VAF is of the spread only. Beside it: the error with its mean, as a share of the
-//! force's spread (NRMSE = rms(F̂ − F) / σ_F), and the residual as a force,
-//! σ_F √(1 − VAF), which a hand compares with the least force difference that it
-//! notices, about 0.1 N (Doerrer & Werthschützky 2002).
+//! VAF ignores a constant error. NRMSE = rms(F̂ − F) / σ_F includes it, and the residual
+//! force σ_F √(1 − VAF) can be compared with the just noticeable difference in force,
+//! about 0.1 N (Doerrer & Werthschützky 2002).
 //!
-//! No model explains what does not come back: where the same trajectory was recorded
-//! twice, F₁ and F₂ differ by two lots of noise, so the ceiling is
+//! No model explains what is not repeatable: if the same trajectory was recorded twice,
+//! F₁ − F₂ contains the noise of both, so the ceiling of VAF is
 //! 1 − ½ var(F₁ − F₂) / var(F₁).
 //!
-//! A detent is a place that holds the handle: between two crests, where the force
-//! needed at rest falls through zero. Crests are looked for in the mean of the two
-//! directions' static profiles, so a recording of one direction has none.
+//! A detent is the range between two crests, where the static force falls through
+//! zero. Crests are found in the mean of the static profiles of both directions, so a
+//! recording of one direction has none.
 
-use super::vaf::{self, Score};
+use super::vaf;
 use crate::model::Realization;
-use crate::recording::Recording;
+use crate::recording::{Recording, mean_and_variance};
 
-/// The least difference in force that a hand notices, N.
+/// The just noticeable difference in force, N.
 pub const JUST_NOTICEABLE_N: f64 = 0.1;
 
-/// How wide the bins of the profile are in which crests are looked for, mm.
+/// Bin width of the profile in which crests are found, mm.
 const PROFILE_MM: f64 = 1.0;
 
-/// How far the force has to go past zero for a crest or valley to count, N: above
-/// friction's noise, far below a detent.
+/// The force of a crest or valley has to exceed this, N: above the noise of friction,
+/// far below a detent.
 const CROSSING_N: f64 = 0.3;
 
-/// Two recordings whose positions differ by more than this on average are not of one
-/// trajectory, mm rms.
+/// Recordings whose positions differ by more than this, mm rms, are not of the same
+/// trajectory.
 const SAME_TRAJECTORY_MM: f64 = 0.5;
 
-/// A comparison of some samples.
+/// The accuracy of a prediction over some samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Part {
-    /// How many.
+pub struct Accuracy {
+    /// Number of samples.
     pub samples: usize,
-    /// Variance accounted for within them.
+    /// Variance accounted for, within these samples.
     pub vaf: f64,
     /// mean(F̂ − F), N.
     pub bias_n: f64,
@@ -47,32 +46,33 @@ pub struct Part {
     pub nrmse: f64,
 }
 
-/// A realization against a recording, whole and in parts.
+/// The accuracy of a realization on a recording, overall and in parts. A part without
+/// samples, or in which the force does not vary, is `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Validation {
     /// All samples.
-    pub whole: Part,
-    /// Samples with v > 0, if any.
-    pub positive: Option<Part>,
-    /// Samples with v < 0, if any.
-    pub negative: Option<Part>,
-    /// Range of each detent, mm, and the samples in it, if any.
-    pub detents: Vec<([f64; 2], Option<Part>)>,
+    pub whole: Accuracy,
+    /// Samples with v > 0.
+    pub positive: Option<Accuracy>,
+    /// Samples with v < 0.
+    pub negative: Option<Accuracy>,
+    /// The range of each detent, mm, and the samples in it.
+    pub detents: Vec<([f64; 2], Option<Accuracy>)>,
 }
 
-impl Part {
-    /// How many times what a hand notices the residual is.
-    pub fn noticeable(&self) -> f64 {
+impl Accuracy {
+    /// The residual in just noticeable differences.
+    pub fn in_noticeable_differences(&self) -> f64 {
         self.residual_n / JUST_NOTICEABLE_N
     }
 
-    /// `None` without samples or where the force does not vary.
+    /// `None` without samples or if the force does not vary.
     fn new(errors: &[f64], forces: &[f64]) -> Option<Self> {
-        let variance = vaf::variance(forces);
+        let (_, variance) = mean_and_variance(forces);
         if forces.is_empty() || variance == 0.0 {
             return None;
         }
-        let (bias_n, spread) = vaf::mean_and_variance(errors);
+        let (bias_n, spread) = mean_and_variance(errors);
         Some(Self {
             samples: errors.len(),
             vaf: 1.0 - spread / variance,
@@ -83,64 +83,52 @@ impl Part {
     }
 }
 
-impl From<Part> for Score {
-    fn from(part: Part) -> Self {
-        Self {
-            vaf: part.vaf,
-            bias_n: part.bias_n,
-            residual_n: part.residual_n,
-        }
-    }
-}
-
-/// Compares a realization with a recording; `detents` as [`detents`] finds them.
-/// `None` never happens for a recording as [`crate::recording::read`] gives it.
+/// Compares a realization with a recording; `detents` as found by [`detents`]. `None`
+/// if the force of the recording does not vary; [`crate::recording::read`] rejects
+/// such recordings.
 pub fn validate(
     realization: &Realization,
     recording: &Recording,
     detents: &[[f64; 2]],
 ) -> Option<Validation> {
-    let errors: Vec<f64> = vaf::predict(realization, recording)
-        .zip(&recording.f_n)
-        .map(|(predicted, measured)| predicted - measured)
-        .collect();
+    let errors = vaf::errors(realization, recording);
     let part = |belongs: &dyn Fn(usize) -> bool| {
         let (mut e, mut f) = (Vec::new(), Vec::new());
         for i in (0..recording.len()).filter(|i| belongs(*i)) {
             e.push(errors[i]);
             f.push(recording.f_n[i]);
         }
-        Part::new(&e, &f)
+        Accuracy::new(&e, &f)
     };
     let (x, v) = (&recording.x_mm, &recording.v_mm_s);
     let inside = |[low, high]: [f64; 2]| part(&move |i| x[i] >= low && x[i] < high);
     Some(Validation {
-        whole: Part::new(&errors, &recording.f_n)?,
+        whole: Accuracy::new(&errors, &recording.f_n)?,
         positive: part(&|i| v[i] > 0.0),
         negative: part(&|i| v[i] < 0.0),
         detents: detents.iter().map(|d| (*d, inside(*d))).collect(),
     })
 }
 
-/// The ranges between crests, mm, ascending: the whole range cut at every crest.
-/// Empty where there is no crest.
+/// The ranges between crests, mm, ascending: the whole range divided at every crest.
+/// Empty if there is no crest.
 pub fn detents(recording: &Recording) -> Vec<[f64; 2]> {
     let [low, high] = recording.range_mm();
     let bins = ((high - low) / PROFILE_MM).ceil().min(1e6) as usize;
-    // Σ F and samples of each direction
+    // Σ F and number of samples, for each direction
     let mut sums = vec![[(0.0, 0.0); 2]; bins.max(1)];
     for i in 0..recording.len() {
         let v = recording.v_mm_s[i];
         if v != 0.0 {
-            // inside by construction; the highest x belongs to the last bin
+            // the highest x belongs to the last bin
             let bin = (((recording.x_mm[i] - low) / PROFILE_MM) as usize).min(sums.len() - 1);
             let of = &mut sums[bin][usize::from(v < 0.0)];
             *of = (of.0 + recording.f_n[i], of.1 + 1.0);
         }
     }
     let mut crests = Vec::new();
-    // whether the force was last clearly positive, and where it was last so
-    let mut holding: Option<(bool, f64)> = None;
+    // whether the force of the last bin above CROSSING_N was positive, and its position
+    let mut last: Option<(bool, f64)> = None;
     for (bin, [plus, minus]) in sums.iter().enumerate() {
         if plus.1 == 0.0 || minus.1 == 0.0 {
             continue;
@@ -150,12 +138,12 @@ pub fn detents(recording: &Recording) -> Vec<[f64; 2]> {
         if force.abs() < CROSSING_N {
             continue;
         }
-        if let Some((true, before)) = holding
+        if let Some((true, before)) = last
             && force < 0.0
         {
             crests.push(0.5 * (before + at));
         }
-        holding = Some((force > 0.0, at));
+        last = Some((force > 0.0, at));
     }
     if crests.is_empty() {
         return Vec::new();
@@ -174,22 +162,22 @@ pub fn detents(recording: &Recording) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// What a repeated recording says.
+/// The repeatability of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ceiling {
     /// The highest VAF that a model can be expected to reach.
     pub vaf: f64,
-    /// Standard deviation of what does not come back, N.
+    /// Standard deviation of the part of the force that is not repeatable, N.
     pub noise_n: f64,
-    /// How far apart the two trajectories are, mm rms.
+    /// Difference of the positions in the two recordings, mm rms.
     pub apart_mm: f64,
 }
 
-/// The ceiling of `recording` by a repetition of its trajectory; `None` if the two
-/// are not of one trajectory or do not overlap in time.
+/// The ceiling of VAF on `recording` from a second recording of its trajectory; `None`
+/// if the trajectories differ or overlap by less than half in time.
 ///
-/// The repetition is read at the recording's times, from the start of each, by
-/// straight lines.
+/// The repetition is interpolated linearly at the times of the recording, both counted
+/// from their first sample.
 pub fn ceiling(recording: &Recording, repeat: &Recording) -> Option<Ceiling> {
     let (start, other) = (recording.t_s[0], repeat.t_s[0]);
     let mut right = 1;
@@ -216,8 +204,8 @@ pub fn ceiling(recording: &Recording, repeat: &Recording) -> Option<Ceiling> {
         return None;
     }
     let apart_mm = (apart / overlap).sqrt();
-    let noise = 0.5 * vaf::variance(&differences);
-    let variance = vaf::variance(&forces);
+    let noise = 0.5 * mean_and_variance(&differences).1;
+    let (_, variance) = mean_and_variance(&forces);
     (apart_mm <= SAME_TRAJECTORY_MM && variance > 0.0).then(|| Ceiling {
         vaf: 1.0 - noise / variance,
         noise_n: noise.sqrt(),

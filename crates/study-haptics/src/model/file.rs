@@ -1,14 +1,13 @@
-//! Reading and writing of model files.
+//! Reading and writing model files.
 //!
-//! A model file is TOML with `format = "study-model/1"`. Reading is strict and
-//! reports every fault with its line: unknown keys, numbers that are not finite,
-//! positions that do not ascend, lists whose lengths differ, ranges upside down.
-//! Writing is stable: the same realization gives the same bytes, numbers have the
-//! fewest digits that read back as the same number, and
-//! `parse(write(r)) == r` for every valid `r`.
+//! A model file is TOML with `format = "study-model/1"`. Reading is strict and reports
+//! every fault with its line: unknown keys, numbers that are not finite, positions that
+//! do not ascend, lists of different lengths, reversed ranges. Writing is reproducible:
+//! the same realization gives the same bytes, numbers have the fewest digits that read
+//! back as the same number, and `parse(write(r)) == r` for every valid `r`.
 //!
-//! A file of a newer format is refused by its number, without further faults: its
-//! unknown keys are not mistakes.
+//! A file of a newer format is refused by its number alone, because its unknown keys are
+//! not mistakes.
 
 mod write;
 
@@ -22,29 +21,30 @@ use study_base::limits::Limit;
 use study_base::text::{ModelId, Untrusted};
 use study_wire::predict::{Direction, Lookup};
 
-/// A table has no more nodes than this.
-pub const MOST_NODES: usize = 20_000;
+/// Most nodes of a table.
+pub const MAX_NODES: usize = 20_000;
 
-/// The words of `lookup`.
+/// The values of `lookup`.
 const LOOKUPS: [(&str, Lookup); 3] = [
     ("linear", Lookup::Linear),
     ("floor", Lookup::Floor),
     ("nearest", Lookup::Nearest),
 ];
 
-/// The parameters of a branch, in the order of [`Branch`].
+/// The keys of a branch, in the order of [`Branch`].
 const PARAMETERS: [&str; 4] = ["m_kg", "b_n_s_per_mm", "k_n_per_mm", "f0_n"];
 
-/// The word of a look-up in model files and arguments.
-pub fn lookup_word(lookup: Lookup) -> &'static str {
-    LOOKUPS
-        .iter()
-        .find(|(_, value)| *value == lookup)
-        .map_or("linear", |(word, _)| word)
+/// The name of a look-up in model files and arguments.
+pub fn lookup_name(lookup: Lookup) -> &'static str {
+    match lookup {
+        Lookup::Linear => "linear",
+        Lookup::Floor => "floor",
+        Lookup::Nearest => "nearest",
+    }
 }
 
-/// Reads a model file; `path` is for the messages. The realization is there if
-/// and only if the findings have no error.
+/// Reads a model file; `path` is for messages. `None` if and only if the findings
+/// contain an error.
 pub fn parse(path: &str, text: &str) -> (Option<Realization>, Findings) {
     let document = Document::parse(text);
     let realization = read(&document);
@@ -57,7 +57,7 @@ pub fn parse(path: &str, text: &str) -> (Option<Realization>, Findings) {
 
 fn read(document: &Document<'_>) -> Option<Realization> {
     let mut root = document.root();
-    if !format_is_ours(&mut root) {
+    if !has_known_format(&mut root) {
         return None;
     }
     let id = id(&mut root);
@@ -78,7 +78,7 @@ fn read(document: &Document<'_>) -> Option<Realization> {
         root.fault_at(
             "x_mm",
             Fault::warning("there are nodes outside `trained.x_mm`")
-                .hint("nothing is known of the target there"),
+                .hint("the target was not identified there"),
         );
     }
     root.finish();
@@ -95,10 +95,10 @@ fn read(document: &Document<'_>) -> Option<Realization> {
     })
 }
 
-/// Whether the rest of the file can be read with the rules of this version.
-fn format_is_ours(root: &mut Table<'_, '_>) -> bool {
+/// Whether the rest of the file can be read as [`FORMAT`].
+fn has_known_format(root: &mut Table<'_, '_>) -> bool {
     let Some(value) = root.required("format") else {
-        // most likely ours and forgotten: the rest is worth reading
+        // most likely forgotten: report the faults of the rest as well
         return true;
     };
     let Some(given) = value.text() else {
@@ -115,7 +115,7 @@ fn format_is_ours(root: &mut Table<'_, '_>) -> bool {
     value.fault(if newer {
         fault
             .label("a newer format")
-            .hint("a newer version of study wrote it: use that one")
+            .hint("it was written by a newer version of study, which can read it")
     } else {
         fault.hint(format!("a model file begins with format = \"{FORMAT}\""))
     });
@@ -135,20 +135,20 @@ fn id(root: &mut Table<'_, '_>) -> Option<String> {
 
 fn direction(value: Value<'_, '_>) -> Option<Direction> {
     let mut table = value.table()?;
-    let rule = table
-        .required("rule")
-        .and_then(|v| v.word(&[("sign", 0), ("play", 1), ("dahl", 2)]));
-    let direction = match rule {
-        Some(0) => Some(Direction::Sign),
-        Some(rule) => table
+    type WithDelta = fn(f64) -> Direction;
+    let rules: [(&str, Option<WithDelta>); 3] = [
+        ("sign", None),
+        ("play", Some(|delta_mm| Direction::Play { delta_mm })),
+        ("dahl", Some(|delta_mm| Direction::Dahl { delta_mm })),
+    ];
+    let direction = match table.required("rule").and_then(|v| v.word(&rules)) {
+        Some(None) => Some(Direction::Sign),
+        Some(Some(with_delta)) => table
             .required("delta_mm")
             .and_then(|v| positive(&v))
-            .map(|delta_mm| match rule {
-                1 => Direction::Play { delta_mm },
-                _ => Direction::Dahl { delta_mm },
-            }),
+            .map(with_delta),
         None => {
-            // known, whatever the rule was meant to be
+            // a valid key, whatever the rule was meant to be
             let _ = table.value("delta_mm");
             None
         }
@@ -190,9 +190,9 @@ fn trained(value: Value<'_, '_>) -> Option<Trained> {
 
 fn positions(value: &Value<'_, '_>) -> Option<Vec<f64>> {
     let numbers = numbers(value)?;
-    if !(2..=MOST_NODES).contains(&numbers.len()) {
+    if !(2..=MAX_NODES).contains(&numbers.len()) {
         value.fault(Fault::error(format!(
-            "`{}` has {} nodes: a table has 2 to {MOST_NODES}",
+            "`{}` has {} nodes: a table has 2 to {MAX_NODES}",
             value.path(),
             numbers.len()
         )));
@@ -305,7 +305,7 @@ fn branch(value: Value<'_, '_>, nodes: Option<usize>) -> Option<Branch> {
     })
 }
 
-/// A list of finite numbers; every one that is not is a fault of its own.
+/// A list of finite numbers; each other value is a fault.
 fn numbers(value: &Value<'_, '_>) -> Option<Vec<f64>> {
     let values = value.array()?;
     let numbers: Vec<f64> = values.iter().filter_map(finite).collect();

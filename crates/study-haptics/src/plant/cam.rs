@@ -1,16 +1,16 @@
-//! The cam: height and slope of the path that the follower takes.
+//! The cam: height and slope along the path of the follower.
 //!
 //! h'(y) = S·[Σ tanh((y−v)/w) − Σ tanh((y−c)/w)] over valleys v and crests c, and
 //! h its integral in closed form, w·ln cosh. The follower's spring presses with
 //! N = max(0, N0 + ks·(h(y) − h(y0))), and the cam's force along the path is N·h'.
 
-use super::parameters::{Parameters, Well};
+use super::parameters::{Extremum, Parameters};
 
-/// The cam of one target.
+/// The cam of a target.
 #[derive(Debug, Clone)]
 pub(super) struct Cam {
-    /// Each well with the sign of its slope: valleys turn it up, crests down.
-    wells: Vec<(Well, f64)>,
+    /// Valleys and crests, with the sign of the curvature: + for valleys, − for crests.
+    extrema: Vec<(Extremum, f64)>,
     slope: f64,
     preload_n: f64,
     spring_n_per_mm: f64,
@@ -19,12 +19,12 @@ pub(super) struct Cam {
     ripple_per_mm: f64,
 }
 
-/// What the cam does to the follower at a place.
+/// The forces between follower and cam at one position.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Press {
-    /// Force between follower and cam, N.
+pub(super) struct CamForces {
+    /// Normal force, N.
     pub(super) normal_n: f64,
-    /// Force along the path that moving on takes, N.
+    /// Force along the path needed to move on, N.
     pub(super) force_n: f64,
 }
 
@@ -33,7 +33,7 @@ impl Cam {
         let up = p.valleys.iter().map(|w| (*w, 1.0));
         let down = p.crests.iter().map(|w| (*w, -1.0));
         let mut cam = Self {
-            wells: up.chain(down).collect(),
+            extrema: up.chain(down).collect(),
             slope: p.slope,
             preload_n: p.preload_n,
             spring_n_per_mm: p.spring_n_per_mm,
@@ -45,22 +45,23 @@ impl Cam {
         cam
     }
 
-    /// h, mm, and h' at `y_mm`.
+    /// The height h, mm, and its slope h' at `y_mm`.
     fn height_and_slope(&self, y_mm: f64) -> (f64, f64) {
         let mut height = 0.0;
         let mut slope = 0.0;
-        for (well, sign) in &self.wells {
-            let u = (y_mm - well.at_mm) / well.width_mm;
+        for (extremum, sign) in &self.extrema {
+            let u = (y_mm - extremum.at_mm) / extremum.width_mm;
             // tanh and ln cosh from one exponential, without overflow
             let e = libm::exp(-2.0 * libm::fabs(u));
             let log_cosh = libm::fabs(u) + libm::log1p(e) - std::f64::consts::LN_2;
-            height += sign * well.width_mm * log_cosh;
+            height += sign * extremum.width_mm * log_cosh;
             slope += sign * libm::copysign((1.0 - e) / (1.0 + e), u);
         }
         (self.slope * height, self.slope * slope)
     }
 
-    pub(super) fn press(&self, y_mm: f64) -> Press {
+    /// The forces with the follower at `y_mm`.
+    pub(super) fn forces(&self, y_mm: f64) -> CamForces {
         let (height, slope) = self.height_and_slope(y_mm);
         let compressed = height - self.height_at_preload_mm;
         let normal_n = (self.preload_n + self.spring_n_per_mm * compressed).max(0.0);
@@ -69,7 +70,7 @@ impl Cam {
         } else {
             self.ripple_n * libm::sin(self.ripple_per_mm * y_mm)
         };
-        Press {
+        CamForces {
             normal_n,
             force_n: normal_n * slope + ripple,
         }
@@ -99,15 +100,15 @@ mod tests {
     #[test]
     fn far_away_nothing_overflows() {
         let cam = Cam::new(&Parameters::b());
-        assert!(cam.press(1e6).force_n.is_finite());
-        assert!(cam.press(-1e6).force_n.is_finite());
+        assert!(cam.forces(1e6).force_n.is_finite());
+        assert!(cam.forces(-1e6).force_n.is_finite());
     }
 
-    /// Stable where the force crosses zero upwards: the detents.
+    /// Detents are stable: the force crosses zero upwards.
     #[test]
     fn there_are_three_detents() {
         let cam = Cam::new(&Parameters::a());
-        let force = |i: i32| cam.press(f64::from(i) * 0.01).force_n;
+        let force = |i: i32| cam.forces(f64::from(i) * 0.01).force_n;
         let stable: Vec<f64> = (1..3500)
             .filter(|i| force(i - 1) < 0.0 && force(*i) >= 0.0)
             .map(|i| f64::from(i) * 0.01)

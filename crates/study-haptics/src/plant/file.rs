@@ -1,22 +1,22 @@
-//! Reading and writing of plant files: the parameters of a target.
+//! Reading and writing plant files: the parameters of a target.
 //!
-//! TOML with `format = "study-plant/1"`. `like = "a"` (or `"b"`) starts from a
-//! built-in target, and only what differs has to be said; without `like` every key
-//! is required. Strict, every fault with its line; what is no target is refused by
-//! [`Parameters::check`].
+//! TOML with `format = "study-plant/1"`. `like = "a"` (or `"b"`) starts from a built-in
+//! target, of which the other keys override parameters; without `like` every key is
+//! required. Reading is strict and reports every fault with its line;
+//! [`Parameters::check`] rejects parameters that cannot be simulated.
 
-use super::parameters::{Parameters, Well};
+use super::parameters::{Extremum, Parameters};
 use std::fmt::Write as _;
 use study_base::diagnostic::table::{Document, Table, Value};
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::Untrusted;
 
-/// The first line of a plant file.
+/// The `format` of a plant file.
 pub const FORMAT: &str = "study-plant/1";
 /// Most valleys, and most crests.
-const MOST_WELLS: usize = 100;
+const MAX_EXTREMA: usize = 100;
 
-/// Every number of a target under its key.
+/// The numbers of a target by key.
 fn numbers(p: &mut Parameters) -> [(&'static str, &mut f64); 21] {
     [
         ("slope", &mut p.slope),
@@ -43,8 +43,8 @@ fn numbers(p: &mut Parameters) -> [(&'static str, &mut f64); 21] {
     ]
 }
 
-/// Reads a plant file; `path` is for the messages. The parameters are there if and
-/// only if the findings have no error.
+/// Reads a plant file; `path` is for messages. `None` if and only if the findings
+/// contain an error.
 pub fn parse(path: &str, text: &str) -> (Option<Parameters>, Findings) {
     let document = Document::parse(text);
     let parameters = read(&document);
@@ -77,34 +77,35 @@ fn read(document: &Document<'_>) -> Option<Parameters> {
         if let Some((None, name)) = &named {
             value.fault(
                 Fault::error(format!("there is no built-in target `{}`", Untrusted(name)))
-                    .hint("they are `a` and `b`"),
+                    .hint("the built-in targets are `a` and `b`"),
             );
         }
         named.and_then(|(parameters, _)| parameters)
     });
+    // without a built-in target every key is required
     let whole = like.is_none();
     let mut parameters = like.flatten().unwrap_or_else(Parameters::a);
-    for (key, place) in numbers(&mut parameters) {
-        if let Some(number) = need(&mut root, key, whole).and_then(|value| value.f64()) {
-            *place = number;
+    for (key, parameter) in numbers(&mut parameters) {
+        if let Some(number) = value(&mut root, key, whole).and_then(|value| value.f64()) {
+            *parameter = number;
         }
     }
-    if let Some(stops) = need(&mut root, "stops_mm", whole).and_then(|v| pair(&v)) {
+    if let Some(stops) = value(&mut root, "stops_mm", whole).and_then(|v| pair(&v)) {
         parameters.stops_mm = stops;
     }
-    if let Some(valleys) = need(&mut root, "valleys", whole).and_then(wells) {
+    if let Some(valleys) = value(&mut root, "valleys", whole).and_then(extrema) {
         parameters.valleys = valleys;
     }
-    if let Some(crests) = need(&mut root, "crests", whole).and_then(wells) {
+    if let Some(crests) = value(&mut root, "crests", whole).and_then(extrema) {
         parameters.crests = crests;
     }
     root.finish();
     Some(parameters)
 }
 
-/// The value of a key, whose absence is a fault where the file has to be whole.
-fn need<'d, 't>(root: &mut Table<'d, 't>, key: &str, whole: bool) -> Option<Value<'d, 't>> {
-    if whole {
+/// The value of a key, which may be `required`.
+fn value<'d, 't>(root: &mut Table<'d, 't>, key: &str, required: bool) -> Option<Value<'d, 't>> {
+    if required {
         root.required(key)
     } else {
         root.value(key)
@@ -124,11 +125,11 @@ fn pair(value: &Value<'_, '_>) -> Option<[f64; 2]> {
 }
 
 /// `[{ at_mm = 5, width_mm = 1.5 }, …]`
-fn wells(value: Value<'_, '_>) -> Option<Vec<Well>> {
+fn extrema(value: Value<'_, '_>) -> Option<Vec<Extremum>> {
     let all = value.array()?;
-    if all.len() > MOST_WELLS {
+    if all.len() > MAX_EXTREMA {
         value.fault(Fault::error(format!(
-            "`{}` has {} entries: at most {MOST_WELLS}",
+            "`{}` has {} entries: at most {MAX_EXTREMA} are allowed",
             value.path(),
             all.len()
         )));
@@ -140,7 +141,7 @@ fn wells(value: Value<'_, '_>) -> Option<Vec<Well>> {
             let at_mm = table.required("at_mm").and_then(|v| v.f64());
             let width_mm = table.required("width_mm").and_then(|v| v.f64());
             table.finish();
-            Some(Well {
+            Some(Extremum {
                 at_mm: at_mm?,
                 width_mm: width_mm?,
             })
@@ -148,17 +149,17 @@ fn wells(value: Value<'_, '_>) -> Option<Vec<Well>> {
         .collect()
 }
 
-/// The file of a target, every parameter said.
+/// The text of a plant file, with every parameter.
 pub fn write(parameters: &Parameters) -> String {
     let mut p = parameters.clone();
     let mut out = format!("format = \"{FORMAT}\"\n");
-    for (key, wells) in [("valleys", &p.valleys), ("crests", &p.crests)] {
-        let wells: Vec<String> = wells
+    for (key, extrema) in [("valleys", &p.valleys), ("crests", &p.crests)] {
+        let extrema: Vec<String> = extrema
             .iter()
-            .map(|w| format!("{{ at_mm = {:?}, width_mm = {:?} }}", w.at_mm, w.width_mm))
+            .map(|e| format!("{{ at_mm = {:?}, width_mm = {:?} }}", e.at_mm, e.width_mm))
             .collect();
         // writing to a String cannot fail
-        let _ = writeln!(out, "{key} = [{}]", wells.join(", "));
+        let _ = writeln!(out, "{key} = [{}]", extrema.join(", "));
     }
     let _ = writeln!(out, "stops_mm = {:?}", p.stops_mm);
     for (key, number) in numbers(&mut p) {
@@ -178,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read_back() {
+    fn a_written_plant_is_read_back() {
         for plant in [Parameters::a(), Parameters::b()] {
             let (read, findings) = parse("p.toml", &write(&plant));
             assert!(findings.faults.is_empty(), "{findings:?}");
@@ -187,12 +188,12 @@ mod tests {
     }
 
     #[test]
-    fn only_what_differs_has_to_be_said() {
+    fn keys_override_the_parameters_of_a_built_in_target() {
         let text = "format = \"study-plant/1\"\nlike = \"a\"\nslope = 0.4\ncrests = [{ at_mm = 12, width_mm = 0.5 }]\n";
         let plant = parse("p.toml", text).0.unwrap();
         let expected = Parameters {
             slope: 0.4,
-            crests: vec![Well {
+            crests: vec![Extremum {
                 at_mm: 12.0,
                 width_mm: 0.5,
             }],
@@ -202,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_told_all_at_once() {
+    fn all_faults_are_reported_at_once() {
         let text = "format = \"study-plant/1\"\nlike = \"c\"\nslop = 1\nfriction = \"x\"\nvalleys = [{ at_mm = 1 }]\nstops_mm = [1]\n";
         assert_eq!(
             messages(text),

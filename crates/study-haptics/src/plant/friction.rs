@@ -9,18 +9,18 @@ pub(super) struct LuGre {
     z_mm: f64,
 }
 
-/// What a LuGre step needs besides the motion.
+/// The parameters of LuGre friction at the present normal force.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contact {
-    /// Coulomb friction now, N.
+    /// Coulomb friction at the present normal force, N.
     pub(super) coulomb_n: f64,
     /// σ0, N/mm.
     pub(super) bristle_n_per_mm: f64,
     /// σ1, N·s/mm.
     pub(super) bristle_n_s_per_mm: f64,
-    /// Share above Coulomb at rest.
+    /// Breakaway friction in excess of Coulomb friction, as a share of it.
     pub(super) stribeck: f64,
-    /// Speed at which it fades, mm/s.
+    /// Stribeck speed, mm/s.
     pub(super) stribeck_mm_s: f64,
 }
 
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sliding_on_ends_at_coulomb_friction_against_the_motion() {
+    fn steady_sliding_has_coulomb_friction_against_the_motion() {
         let contact = Contact {
             coulomb_n: 1.2,
             bristle_n_per_mm: 20.0,
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pivot_never_holds_more_than_it_can() {
+    fn the_friction_of_the_pivot_never_exceeds_its_coulomb_friction() {
         let mut pivot = Dahl::default();
         let mut largest = 0.0f64;
         for i in 0..10_000 {

@@ -1,23 +1,24 @@
 //! A hand on the slider of the playback device.
 //!
-//! The hand follows a voluntary trajectory, which it pulls the slider along with
-//! through a spring and a damper (Hogan's equilibrium point; Flash & Hogan 1985
-//! for the minimum-jerk strokes):
+//! The hand has a voluntary trajectory and pulls the slider after it through a spring
+//! and a damper (Hogan's equilibrium point; Flash & Hogan 1985 for the minimum-jerk
+//! strokes):
 //!
-//! M·a = k·(x* − x) + b·(v* − v) − c·v − F, with M = hand and slider together, x*
-//! the voluntary trajectory, c the slider's own damping and F the device's force
-//! as the hand has to apply it.
+//! M·a = k·(x* − x) + b·(v* − v) − c·v − F, with M the mass of hand and slider, x* the
+//! voluntary trajectory, c the damping of the slider and F the rendered force, which
+//! the hand has to apply.
 //!
-//! The slider's mass is felt beside the rendered force, as on a device that does
-//! not make up for it. The hand does not react to what it feels.
+//! The slider's mass is felt in addition to the rendered force, as on a device without
+//! compensation. The hand does not react to what it feels.
 
+use crate::trajectory::minimum_jerk;
 use study_base::rng::Stream;
 use study_wire::predict::Motion;
 
-/// What a hand and the slider are made of.
+/// The parameters of a hand and of the slider.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandParameters {
-    /// Mass of hand and finger that moves along, kg.
+    /// Effective mass of hand and finger, kg.
     pub hand_kg: f64,
     /// Mass of the slider with its grip, kg.
     pub slider_kg: f64,
@@ -27,11 +28,11 @@ pub struct HandParameters {
     pub damping_n_s_per_mm: f64,
     /// Damping of the slider's bearing, N·s/mm.
     pub bearing_n_s_per_mm: f64,
-    /// Slowest and fastest stroke, as the peak speed of the voluntary one, mm/s.
+    /// Range of the peak speed of voluntary strokes, mm/s.
     pub speed_mm_s: [f64; 2],
-    /// Shortest and longest rest between strokes, s.
+    /// Range of the rest between strokes, s.
     pub rest_s: [f64; 2],
-    /// How far the ends of strokes vary, mm.
+    /// Largest deviation of the end of a stroke, mm.
     pub end_spread_mm: f64,
 }
 
@@ -50,7 +51,7 @@ impl Default for HandParameters {
     }
 }
 
-/// A hand that goes back and forth between two ends.
+/// A hand that moves back and forth between two ends.
 #[derive(Debug)]
 pub struct Hand {
     parameters: HandParameters,
@@ -58,7 +59,7 @@ pub struct Hand {
     variation: Stream,
     motion: Motion,
     stroke: Stroke,
-    /// Since the stroke began, s.
+    /// Time since the stroke began, s.
     stroke_s: f64,
     upwards: bool,
 }
@@ -73,8 +74,8 @@ struct Stroke {
 }
 
 impl Hand {
-    /// A hand at rest at the lower of `ends_mm`; `variation` gives each stroke its
-    /// speed, its rest and where it ends.
+    /// A hand at rest at the lower one of `ends_mm`; speed, rest and end of each stroke
+    /// are drawn from `variation`.
     pub fn new(parameters: HandParameters, ends_mm: [f64; 2], variation: Stream) -> Self {
         let [low_mm, _] = ends_mm;
         Self {
@@ -97,12 +98,12 @@ impl Hand {
         }
     }
 
-    /// Where hand and slider are.
+    /// The present motion of hand and slider.
     pub fn motion(&self) -> Motion {
         self.motion
     }
 
-    /// Lets `dt_s` pass against the force that the device holds, N.
+    /// Simulates `dt_s` seconds with the constant rendered force `force_n`.
     pub fn step(&mut self, force_n: f64, dt_s: f64) -> Motion {
         self.stroke_s += dt_s;
         if self.stroke_s >= self.stroke.moving_s + self.stroke.resting_s {
@@ -147,14 +148,12 @@ impl Hand {
 }
 
 impl Stroke {
-    /// Position, mm, and speed, mm/s, of the voluntary trajectory.
+    /// Position, mm, and velocity, mm/s, of the voluntary trajectory.
     fn at(&self, t_s: f64) -> (f64, f64) {
         if t_s >= self.moving_s {
             return (self.from_mm + self.by_mm, 0.0);
         }
-        let s = t_s / self.moving_s;
-        let share = s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
-        let rate = 30.0 * s * s * (1.0 - s) * (1.0 - s) / self.moving_s;
+        let [share, rate, _] = minimum_jerk(t_s, self.moving_s);
         (self.from_mm + self.by_mm * share, self.by_mm * rate)
     }
 }
@@ -187,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seed_alone_decides_the_movement() {
+    fn the_movement_depends_on_the_seed_alone() {
         let end = |seed| {
             let mut hand = hand(seed);
             for _ in 0..20_000 {

@@ -1,26 +1,26 @@
-//! What a target is made of.
+//! The parameters of a target.
 
 /// A valley or a crest of the cam.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Well {
-    /// Where, mm of the follower's path.
+pub struct Extremum {
+    /// Position along the follower's path, mm.
     pub at_mm: f64,
-    /// How wide the turn of the slope is, mm. Small is crisp.
+    /// Width over which the slope changes sign, mm; smaller is sharper.
     pub width_mm: f64,
 }
 
-/// Every parameter of a target.
+/// The parameters of a target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
-    /// Where the follower rests.
-    pub valleys: Vec<Well>,
-    /// Between the valleys.
-    pub crests: Vec<Well>,
-    /// Slope of the cam's flanks, 1.
+    /// Valleys of the cam, where the follower rests.
+    pub valleys: Vec<Extremum>,
+    /// Crests of the cam, between the valleys.
+    pub crests: Vec<Extremum>,
+    /// Slope of the cam's flanks, dimensionless.
     pub slope: f64,
     /// Force of the follower's spring in the reference valley, N.
     pub preload_n: f64,
-    /// Position where the spring has its preload, mm.
+    /// Position at which the spring has its preload, mm.
     pub preload_at_mm: f64,
     /// Stiffness of the follower's spring, N/mm.
     pub spring_n_per_mm: f64,
@@ -28,15 +28,15 @@ pub struct Parameters {
     pub ripple_n: f64,
     /// Wavelength of the surface ripple, mm.
     pub ripple_mm: f64,
-    /// Coulomb coefficient between follower and cam.
+    /// Coefficient of Coulomb friction between follower and cam.
     pub friction: f64,
-    /// How much more than Coulomb friction breaks loose, share.
+    /// Breakaway friction in excess of Coulomb friction, as a share of it.
     pub stribeck: f64,
-    /// Speed at which that has mostly gone, mm/s.
+    /// Stribeck speed, at which the excess has mostly vanished, mm/s.
     pub stribeck_mm_s: f64,
-    /// Elastic slip before the follower moves, mm.
+    /// Presliding displacement before the follower slips, mm.
     pub presliding_mm: f64,
-    /// Damping of the elastic slip, N·s/m.
+    /// Damping of the presliding displacement, N·s/m.
     pub bristle_n_s_per_m: f64,
     /// Viscous friction of the follower, N·s/m.
     pub follower_n_s_per_m: f64,
@@ -44,15 +44,15 @@ pub struct Parameters {
     pub pivot_n: f64,
     /// Viscous friction of the pivot, N·s/m.
     pub pivot_n_s_per_m: f64,
-    /// Mass ahead of the backlash, kg.
+    /// Mass of the handle, before the backlash, kg.
     pub handle_kg: f64,
-    /// Mass of lever and follower behind it, kg.
+    /// Mass of lever and follower, behind the backlash, kg.
     pub follower_kg: f64,
-    /// Free play between the two, mm.
+    /// Backlash between handle and follower, mm.
     pub backlash_mm: f64,
-    /// Stiffness of the contact on either side of it, N/mm.
+    /// Stiffness of the contact at either end of the backlash, N/mm.
     pub contact_n_per_mm: f64,
-    /// Damping of the contact, N·s/m.
+    /// Damping of this contact, N·s/m.
     pub contact_n_s_per_m: f64,
     /// Lower and upper end stop of the handle, mm.
     pub stops_mm: [f64; 2],
@@ -62,21 +62,21 @@ pub struct Parameters {
     pub stop_n_s_per_m: f64,
 }
 
-/// Why a set of parameters is no target.
+/// A parameter with which a target cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("a target's {what} has to be {must}")]
-pub struct BadPlant {
-    what: &'static str,
-    must: &'static str,
+#[error("a target's {parameter} has to be {requirement}")]
+pub struct PlantError {
+    parameter: &'static str,
+    requirement: &'static str,
 }
 
 impl Parameters {
     /// Switch A: a smooth cam. Largest static force over the stroke 8.86 N.
     pub fn a() -> Self {
-        let well = |at_mm, width_mm| Well { at_mm, width_mm };
+        let at = |at_mm, width_mm| Extremum { at_mm, width_mm };
         Self {
-            valleys: vec![well(5.0, 1.5), well(17.5, 1.3), well(30.0, 1.5)],
-            crests: vec![well(11.25, 1.4), well(23.9, 1.2)],
+            valleys: vec![at(5.0, 1.5), at(17.5, 1.3), at(30.0, 1.5)],
+            crests: vec![at(11.25, 1.4), at(23.9, 1.2)],
             slope: 0.478,
             preload_n: 13.5,
             preload_at_mm: 17.5,
@@ -102,12 +102,12 @@ impl Parameters {
         }
     }
 
-    /// Switch B: a sharp cam with a rippled surface. Largest static force 8.69 N;
-    /// `docs/simulation.md` says where that differs from its description.
+    /// Switch B: a sharp cam with a rippled surface. Largest static force 8.69 N, which
+    /// differs from the description of the switch, see `docs/simulation.md`.
     pub fn b() -> Self {
         let mut b = Self::a();
-        for well in b.valleys.iter_mut().chain(&mut b.crests) {
-            well.width_mm *= 0.3;
+        for extremum in b.valleys.iter_mut().chain(&mut b.crests) {
+            extremum.width_mm *= 0.3;
         }
         Self {
             slope: 0.40,
@@ -116,7 +116,7 @@ impl Parameters {
         }
     }
 
-    /// The built-in target of that name, `a` or `b` in either case.
+    /// The built-in target with this name, `a` or `b` in either case.
     pub fn named(name: &str) -> Option<Self> {
         match name {
             "a" | "A" => Some(Self::a()),
@@ -125,21 +125,23 @@ impl Parameters {
         }
     }
 
-    /// Checks that the parameters describe something that can be simulated.
+    /// Checks that the target can be simulated.
     ///
     /// # Errors
-    /// [`BadPlant`] for the first that does not: a number that is not finite, a
-    /// mass, width or length that is not positive, a friction below zero, stops
-    /// upside down.
-    pub fn check(&self) -> Result<(), BadPlant> {
-        let require = |good: bool, what, must| {
-            if good {
+    /// [`PlantError`] for the first parameter that is out of range, such as a number that
+    /// is not finite, a mass or length that is not positive, or stops in the wrong order.
+    pub fn check(&self) -> Result<(), PlantError> {
+        let require = |satisfied: bool, parameter, requirement| {
+            if satisfied {
                 Ok(())
             } else {
-                Err(BadPlant { what, must })
+                Err(PlantError {
+                    parameter,
+                    requirement,
+                })
             }
         };
-        for (what, value) in [
+        for (parameter, value) in [
             ("follower mass", self.follower_kg),
             ("presliding", self.presliding_mm),
             ("Stribeck speed", self.stribeck_mm_s),
@@ -149,11 +151,11 @@ impl Parameters {
         ] {
             require(
                 value.is_finite() && value > 0.0,
-                what,
+                parameter,
                 "finite and above zero",
             )?;
         }
-        for (what, value) in [
+        for (parameter, value) in [
             ("handle mass", self.handle_kg),
             ("spring stiffness", self.spring_n_per_mm),
             ("ripple", self.ripple_n),
@@ -170,7 +172,7 @@ impl Parameters {
         ] {
             require(
                 value.is_finite() && value >= 0.0,
-                what,
+                parameter,
                 "finite and not negative",
             )?;
         }
@@ -184,11 +186,11 @@ impl Parameters {
             "end stops",
             "finite, the lower first",
         )?;
-        let wells = || self.valleys.iter().chain(&self.crests);
+        let extrema = || self.valleys.iter().chain(&self.crests);
         require(
-            wells().all(|w| w.at_mm.is_finite() && w.width_mm.is_finite() && w.width_mm > 0.0),
+            extrema().all(|w| w.at_mm.is_finite() && w.width_mm.is_finite() && w.width_mm > 0.0),
             "valleys and crests",
-            "at finite places, with widths above zero",
+            "at finite positions, with widths above zero",
         )?;
         require(!self.valleys.is_empty(), "cam", "given at least one valley")
     }
@@ -199,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_parameter_that_is_no_number_is_refused_by_name() {
+    fn a_parameter_that_is_not_finite_is_refused_by_name() {
         let mut plant = Parameters::a();
         plant.friction = f64::NAN;
         assert_eq!(

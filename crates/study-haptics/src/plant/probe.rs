@@ -1,39 +1,37 @@
-//! The probe: imposes a trajectory on the target and measures what comes of it.
+//! The simulated probe: moves the target along a trajectory and records the response.
 //!
-//! Position-controlled: the handle is where the trajectory says, at every step of
-//! the simulation; the servo is ideal. What is measured is the position as an
-//! encoder counts it, the force of an impedance head and the acceleration of an
-//! accelerometer, both with white noise that has the same rms at every sampling
-//! rate. Each sensor draws from a stream of its own, so that the noise of one does
-//! not depend on another.
-//!
-//! Not here: filtering (`identify::signal`), files, and a real probe.
+//! The servo is ideal: the handle follows the trajectory exactly, at every step of the
+//! simulation. Measured are the position by an encoder, the force by an impedance head
+//! and the acceleration by an accelerometer, the latter two with white noise whose rms
+//! does not depend on the sampling rate. Each sensor has its own random stream, so its
+//! noise does not depend on the others. The signals are not filtered, see
+//! [`crate::identify::signal`].
 //!
 //! Reference: Colton & Hollerbach 2007, section 2 (direct-drive motor, incremental
 //! encoder, impedance head).
 
-use super::parameters::{BadPlant, Parameters};
+use super::parameters::{Parameters, PlantError};
 use super::target::{DT_S, Target};
-use crate::trajectory::{Envelope, Point, Trajectory, Violation, check};
+use crate::trajectory::{Envelope, Trajectory, Violation, check};
 use study_base::limits::Limit;
 use study_base::rng::Stream;
 use study_wire::predict::Motion;
 
-/// Highest sampling rate: one sample a step of the simulation, Hz.
-pub const MOST_RATE_HZ: f64 = 40_000.0;
+/// Highest sampling rate: one sample per step of the simulation, Hz.
+pub const MAX_RATE_HZ: f64 = 40_000.0;
 /// Lowest sampling rate, Hz.
-pub const LEAST_RATE_HZ: f64 = 10.0;
+pub const MIN_RATE_HZ: f64 = 10.0;
 
-/// What the probe's sensors are like and what its motor can do.
+/// The sensors of the probe and the limits of its motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Probe {
-    /// One count of the encoder, mm.
+    /// Resolution of the encoder, mm; 0 is continuous.
     pub encoder_mm: f64,
-    /// Noise of the force, N rms.
+    /// Noise of the force sensor, N rms.
     pub force_noise_n: f64,
-    /// Noise of the acceleration, m/s² rms.
+    /// Noise of the accelerometer, m/s² rms.
     pub acceleration_noise_m_s2: f64,
-    /// What it can follow.
+    /// Limits of its motion.
     pub envelope: Envelope,
 }
 
@@ -56,32 +54,33 @@ impl Default for Probe {
 /// Why nothing was recorded.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProbeError {
-    /// The target is none.
+    /// The target cannot be simulated.
     #[error(transparent)]
-    Plant(#[from] BadPlant),
-    /// The trajectory goes beyond what probe or target can follow.
+    Plant(#[from] PlantError),
+    /// The trajectory exceeds limits of the probe or the target.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     Trajectory(Vec<Violation>),
     /// The sampling rate is out of range.
-    #[error("a sampling rate has to be from {LEAST_RATE_HZ} to {MOST_RATE_HZ} Hz, not {0}")]
+    #[error("a sampling rate has to be from {MIN_RATE_HZ} to {MAX_RATE_HZ} Hz, not {0}")]
     Rate(f64),
 }
 
-/// What was measured, ramps included: columns of equal length.
+/// The signals of the sensors over a whole trajectory, ramps included. All columns are
+/// equally long.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
+pub struct Measurement {
     /// Time, s.
     pub t_s: Vec<f64>,
-    /// Encoder, mm.
+    /// Position by the encoder, mm.
     pub x_mm: Vec<f64>,
-    /// Accelerometer, m/s².
+    /// Acceleration by the accelerometer, m/s².
     pub a_m_s2: Vec<f64>,
-    /// Impedance head, N.
+    /// Force by the impedance head, N.
     pub f_n: Vec<f64>,
 }
 
-/// The bounds of a target: its stops. It has no limits of its own on speed.
-pub fn envelope_of(target: &Parameters) -> Envelope {
+/// The limits of a target: its end stops.
+fn envelope_of_target(target: &Parameters) -> Envelope {
     Envelope {
         travel_mm: target.stops_mm,
         velocity_mm_s: None,
@@ -90,10 +89,10 @@ pub fn envelope_of(target: &Parameters) -> Envelope {
 }
 
 impl Probe {
-    /// Compares a trajectory with what this probe and the target can follow.
+    /// Compares a trajectory with the limits of this probe and of the target.
     ///
     /// # Errors
-    /// Every bound that is passed, with the instant.
+    /// Every limit that is exceeded.
     pub fn check(
         &self,
         trajectory: &Trajectory,
@@ -101,32 +100,32 @@ impl Probe {
     ) -> Result<(), Vec<Violation>> {
         let envelopes = [
             ("the probe", self.envelope),
-            ("the target", envelope_of(target)),
+            ("the target", envelope_of_target(target)),
         ];
         check::check(trajectory, &envelopes)
     }
 
-    /// Imposes the trajectory on a target at rest and samples at `rate_hz`, from
-    /// t = 0 to the end of the last ramp.
+    /// Moves a target at rest along the trajectory and samples at `rate_hz`, from t = 0
+    /// to the end of the last ramp. `seed` determines the noise.
     ///
     /// # Errors
     /// [`ProbeError`] before anything moves.
-    pub fn impose(
+    pub fn record(
         &self,
         trajectory: &Trajectory,
         target: &Parameters,
         rate_hz: f64,
         seed: u64,
-    ) -> Result<Measured, ProbeError> {
-        if !(LEAST_RATE_HZ..=MOST_RATE_HZ).contains(&rate_hz) {
+    ) -> Result<Measurement, ProbeError> {
+        if !(MIN_RATE_HZ..=MAX_RATE_HZ).contains(&rate_hz) {
             return Err(ProbeError::Rate(rate_hz));
         }
         let mut moved = Target::new(target.clone(), trajectory.offset_mm)?;
         self.check(trajectory, target)
             .map_err(ProbeError::Trajectory)?;
-        // both are bounded by LONGEST_S and MOST_RATE_HZ, so the casts are exact
+        // both are bounded by MAX_DURATION_S and MAX_RATE_HZ, so the casts are exact
         let samples = (trajectory.total_s() * rate_hz + 1e-6).floor() as usize + 1;
-        let mut measured = Measured {
+        let mut measured = Measurement {
             t_s: Vec::with_capacity(samples),
             x_mm: Vec::with_capacity(samples),
             a_m_s2: Vec::with_capacity(samples),
@@ -142,13 +141,12 @@ impl Probe {
             let at = t_s / DT_S;
             let before = (at + 1e-6).floor();
             while step < before as u64 + 2 {
-                let motion = motion(trajectory.at(step as f64 * DT_S));
-                force = [force[1], moved.step(motion)];
+                force = [force[1], moved.step(trajectory.at(step as f64 * DT_S))];
                 step += 1;
             }
             let weight = (at - before).clamp(0.0, 1.0);
             let f_n = force[0] + weight * (force[1] - force[0]);
-            let Point { x_mm, a_m_s2, .. } = trajectory.at(t_s);
+            let Motion { x_mm, a_m_s2, .. } = trajectory.at(t_s);
             let a_m_s2 = a_m_s2 + self.acceleration_noise_m_s2 * acceleration_noise.normal();
             measured.t_s.push(t_s);
             measured.x_mm.push(self.count(x_mm));
@@ -160,21 +158,13 @@ impl Probe {
         Ok(measured)
     }
 
-    /// What the encoder says of a position.
+    /// A position rounded to the resolution of the encoder.
     fn count(&self, x_mm: f64) -> f64 {
         if self.encoder_mm > 0.0 {
             libm::rint(x_mm / self.encoder_mm) * self.encoder_mm
         } else {
             x_mm
         }
-    }
-}
-
-fn motion(point: Point) -> Motion {
-    Motion {
-        x_mm: point.x_mm,
-        v_mm_s: point.v_mm_s,
-        a_m_s2: point.a_m_s2,
     }
 }
 
@@ -198,9 +188,9 @@ mod tests {
         }
     }
 
-    fn record(rate_hz: f64, seed: u64) -> Measured {
+    fn record(rate_hz: f64, seed: u64) -> Measurement {
         Probe::default()
-            .impose(&trajectory(15.0), &Parameters::a(), rate_hz, seed)
+            .record(&trajectory(15.0), &Parameters::a(), rate_hz, seed)
             .unwrap()
     }
 
@@ -210,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sensors_have_the_resolution_and_the_noise_that_they_should() {
+    fn the_sensors_have_their_resolution_and_noise() {
         let noisy = record(1000.0, 1);
         let quiet = Probe {
             encoder_mm: 0.0,
@@ -219,7 +209,7 @@ mod tests {
             ..Probe::default()
         };
         let truth = quiet
-            .impose(&trajectory(15.0), &Parameters::a(), 1000.0, 1)
+            .record(&trajectory(15.0), &Parameters::a(), 1000.0, 1)
             .unwrap();
         assert_eq!(noisy.t_s.len(), 2001);
         let error = |a: &[f64], b: &[f64]| rms(a.iter().zip(b).map(|(a, b)| a - b));
@@ -247,7 +237,7 @@ mod tests {
         };
         let at = |rate_hz| {
             quiet
-                .impose(&trajectory(15.0), &Parameters::a(), rate_hz, 1)
+                .record(&trajectory(15.0), &Parameters::a(), rate_hz, 1)
                 .unwrap()
                 .f_n
         };
@@ -259,13 +249,13 @@ mod tests {
     }
 
     #[test]
-    fn nothing_moves_beyond_a_stop_or_at_an_impossible_rate() {
+    fn a_trajectory_beyond_a_stop_and_an_impossible_rate_are_refused() {
         let probe = Probe::default();
-        let refused = probe.impose(&trajectory(18.0), &Parameters::a(), 1000.0, 1);
+        let refused = probe.record(&trajectory(18.0), &Parameters::a(), 1000.0, 1);
         let said = refused.unwrap_err().to_string();
-        assert!(said.contains("the limit of the target, at "), "{said}");
+        assert!(said.contains("the limit of the target, from "), "{said}");
         for rate in [0.0, f64::NAN, 1e6] {
-            let refused = probe.impose(&trajectory(15.0), &Parameters::a(), rate, 1);
+            let refused = probe.record(&trajectory(15.0), &Parameters::a(), rate, 1);
             assert!(matches!(refused, Err(ProbeError::Rate(_))), "{rate}");
         }
     }

@@ -1,14 +1,14 @@
-//! The turn-signal switch under a probe that imposes its motion.
+//! The turn-signal switch, moved by a probe.
 
 use super::cam::Cam;
 use super::friction::{Contact, Dahl, LuGre};
-use super::parameters::{BadPlant, Parameters};
+use super::parameters::{Parameters, PlantError};
 use study_wire::predict::Motion;
 
-/// Time step of the simulation, s. The stiffest contact is stable with it.
+/// Time step of the simulation, s; stable for the stiffest contact.
 pub const DT_S: f64 = 25e-6;
 
-/// A target, with whatever moves and stores in it.
+/// A target with its state.
 #[derive(Debug, Clone)]
 pub struct Target {
     parameters: Parameters,
@@ -24,8 +24,8 @@ impl Target {
     /// A target at rest with its follower under the handle at `x_mm`.
     ///
     /// # Errors
-    /// [`BadPlant`] if the parameters describe none.
-    pub fn new(parameters: Parameters, x_mm: f64) -> Result<Self, BadPlant> {
+    /// [`PlantError`] if the target cannot be simulated.
+    pub fn new(parameters: Parameters, x_mm: f64) -> Result<Self, PlantError> {
         parameters.check()?;
         Ok(Self {
             cam: Cam::new(&parameters),
@@ -38,15 +38,15 @@ impl Target {
         })
     }
 
-    /// Moves the handle to `motion` and lets [`DT_S`] pass; the force that the
+    /// Simulates [`DT_S`] seconds with the handle at `motion`. Returns the force that the
     /// probe applies, N.
     pub fn step(&mut self, motion: Motion) -> f64 {
         let p = &self.parameters;
         let contact = self.contact_n(motion);
-        let press = self.cam.press(self.y_mm);
+        let cam = self.cam.forces(self.y_mm);
         let friction = self.follower.step(
             &Contact {
-                coulomb_n: p.friction * press.normal_n,
+                coulomb_n: p.friction * cam.normal_n,
                 bristle_n_per_mm: self.bristle_n_per_mm,
                 bristle_n_s_per_mm: p.bristle_n_s_per_m * 1e-3,
                 stribeck: p.stribeck,
@@ -56,7 +56,7 @@ impl Target {
             DT_S,
         );
         let viscous = p.follower_n_s_per_m * 1e-3 * self.y_mm_s;
-        let net_n = contact - press.force_n - friction - viscous;
+        let net_n = contact - cam.force_n - friction - viscous;
         // semi-implicit Euler: the speed first; N/kg is m/s², so 1000 mm/s²
         self.y_mm_s += DT_S * 1e3 * net_n / p.follower_kg;
         self.y_mm += DT_S * self.y_mm_s;
@@ -71,7 +71,7 @@ impl Target {
             + self.stop_n(motion)
     }
 
-    /// What the handle presses on the follower through the backlash, N.
+    /// The force of the handle on the follower through the backlash, N.
     fn contact_n(&self, motion: Motion) -> f64 {
         let p = &self.parameters;
         let apart = motion.x_mm - self.y_mm;
@@ -87,7 +87,7 @@ impl Target {
         }
     }
 
-    /// What it takes to press the handle into an end stop, N.
+    /// The force of the probe against an end stop, N.
     fn stop_n(&self, motion: Motion) -> f64 {
         let p = &self.parameters;
         let [low, high] = p.stops_mm;
@@ -123,7 +123,7 @@ mod tests {
             .collect()
     }
 
-    /// Largest force against a slow stroke from stop to stop, N.
+    /// The largest force during a slow stroke from stop to stop, N.
     fn largest_static_n(parameters: Parameters) -> f64 {
         let mut target = Target::new(parameters, 0.0).unwrap();
         sweep(&mut target, 0.0, 35.0, 2.0)
@@ -132,8 +132,8 @@ mod tests {
             .fold(f64::MIN, f64::max)
     }
 
-    /// Reference: the description of the two switches, 8.86 N (A), 9.08 N (B). B
-    /// comes out 4 % low; `docs/simulation.md` says what is known about that.
+    /// Reference: the description of the two switches, 8.86 N (A), 9.08 N (B). The
+    /// simulated B is 4 % lower, see `docs/simulation.md`.
     #[test]
     fn the_largest_static_force_is_that_of_the_description() {
         let a = largest_static_n(Parameters::a());
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_back_takes_another_force_and_friction_is_lost() {
+    fn the_force_has_hysteresis_and_dissipates_energy() {
         let mut target = Target::new(Parameters::a(), 3.0).unwrap();
         let up = sweep(&mut target, 3.0, 32.0, 20.0);
         let down = sweep(&mut target, 32.0, 3.0, 20.0);
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn within_the_backlash_only_the_pivot_is_felt() {
+    fn within_the_backlash_there_is_only_the_friction_of_the_pivot() {
         let mut target = Target::new(Parameters::a(), 17.5).unwrap();
         let small = sweep(&mut target, 17.5, 17.7, 5.0);
         let most = small.iter().map(|(_, f)| f.abs()).fold(0.0, f64::max);
@@ -188,14 +188,14 @@ mod tests {
     }
 
     #[test]
-    fn an_end_stop_stops() {
+    fn an_end_stop_is_stiff() {
         let mut target = Target::new(Parameters::a(), 34.0).unwrap();
         let (_, force) = *sweep(&mut target, 34.0, 36.0, 20.0).last().unwrap();
         assert!(force > 60.0, "{force}");
     }
 
     #[test]
-    fn the_same_motion_gives_the_same_force_to_the_bit() {
+    fn the_same_motion_gives_bit_identical_forces() {
         let run = || {
             let mut target = Target::new(Parameters::b(), 3.0).unwrap();
             sweep(&mut target, 3.0, 32.0, 100.0)
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_that_describe_nothing_are_refused() {
+    fn impossible_parameters_are_refused() {
         let mut parameters = Parameters::a();
         parameters.follower_kg = 0.0;
         assert!(Target::new(parameters, 17.5).is_err());

@@ -1,17 +1,17 @@
-//! Velocity and acceleration where they are absent, and doubts about the rest.
+//! Velocity and acceleration where they are absent, and plausibility checks.
 
-use super::rows::{COLUMNS, Rows};
+use super::rows::Rows;
 use super::swapped::swapped;
-use super::{Recording, RecordingError, RecordingFault, Warning};
+use super::{Recording, RecordingError, RecordingFault, Warning, range};
 
-/// A stroke below this, in mm, was surely written in metres.
-const LEAST_STROKE_MM: f64 = 0.1;
-/// Steps of time that are looked at to find the usual one.
-const STEPS: usize = 4096;
+/// A smaller stroke, in mm, must have been written in metres.
+const MIN_STROKE_MM: f64 = 0.1;
+/// Number of intervals from which the median one is estimated.
+const INTERVALS: usize = 4096;
 
-/// Makes the recording of its rows.
+/// The recording with these rows.
 pub(super) fn complete(name: String, rows: Rows) -> Result<Recording, RecordingError> {
-    let [t_s, x_mm, mut v_mm_s, mut a_m_s2, f_n] = rows.columns;
+    let Rows { t_s, x_mm, f_n, .. } = rows;
     let refuse = |fault| {
         Err(RecordingError {
             name: name.clone(),
@@ -19,42 +19,43 @@ pub(super) fn complete(name: String, rows: Rows) -> Result<Recording, RecordingE
             fault,
         })
     };
-    for (column, values) in [(COLUMNS[1], &x_mm), (COLUMNS[4], &f_n)] {
+    for (column, values) in [("x_mm", &x_mm), ("f_n", &f_n)] {
         if is_constant(values) {
             return refuse(RecordingFault::Constant(column));
         }
     }
     let [low, high] = range(&x_mm);
     let stroke_mm = high - low;
-    if stroke_mm < LEAST_STROKE_MM {
+    if stroke_mm < MIN_STROKE_MM {
         return refuse(RecordingFault::Metres { stroke_mm });
     }
     let mut warnings: Vec<Warning> = gaps(&t_s).into_iter().collect();
-    if v_mm_s.is_empty() && a_m_s2.is_empty() {
+    if rows.v_mm_s.is_none() && rows.a_m_s2.is_none() {
         warnings.extend(swapped(&t_s, &x_mm, &f_n));
     }
-    if v_mm_s.is_empty() {
-        v_mm_s = (0..t_s.len()).map(|i| velocity(&t_s, &x_mm, i)).collect();
-        warnings.push(Warning::Derived {
-            column: COLUMNS[2],
-            how: "the central difference of x_mm",
-        });
+    let velocity = |i: usize| velocity(&t_s, &x_mm, i);
+    let acceleration = |i: usize| acceleration(&t_s, &x_mm, i);
+    if let Some(given) = &rows.v_mm_s {
+        warnings.extend(scale("v_mm_s", given, velocity));
     } else {
-        warnings.extend(scale(COLUMNS[2], &v_mm_s, |i| velocity(&t_s, &x_mm, i)));
-    }
-    if a_m_s2.is_empty() {
-        a_m_s2 = (0..t_s.len())
-            .map(|i| acceleration(&t_s, &x_mm, i))
-            .collect();
         warnings.push(Warning::Derived {
-            column: COLUMNS[3],
-            how: "the second central difference of x_mm",
+            column: "v_mm_s",
+            formula: "central difference of x_mm",
         });
-    } else if is_constant(&a_m_s2) {
-        warnings.push(Warning::Constant { column: COLUMNS[3] });
-    } else {
-        warnings.extend(scale(COLUMNS[3], &a_m_s2, |i| acceleration(&t_s, &x_mm, i)));
     }
+    match &rows.a_m_s2 {
+        None => warnings.push(Warning::Derived {
+            column: "a_m_s2",
+            formula: "second central difference of x_mm",
+        }),
+        Some(given) if is_constant(given) => {
+            warnings.push(Warning::Constant { column: "a_m_s2" });
+        }
+        Some(given) => warnings.extend(scale("a_m_s2", given, acceleration)),
+    }
+    let rows_of = |value: &dyn Fn(usize) -> f64| (0..t_s.len()).map(value).collect();
+    let v_mm_s: Vec<f64> = rows.v_mm_s.unwrap_or_else(|| rows_of(&velocity));
+    let a_m_s2 = rows.a_m_s2.unwrap_or_else(|| rows_of(&acceleration));
     if !(v_mm_s.iter().any(|v| *v > 0.0) && v_mm_s.iter().any(|v| *v < 0.0)) {
         warnings.push(Warning::OneDirection);
     }
@@ -71,27 +72,18 @@ pub(super) fn complete(name: String, rows: Rows) -> Result<Recording, RecordingE
     })
 }
 
-/// Lowest and highest.
-pub(super) fn range(values: &[f64]) -> [f64; 2] {
-    values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
-            [low.min(*x), high.max(*x)]
-        })
-}
-
 fn is_constant(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] == pair[1])
 }
 
-/// Central difference, one-sided at the ends, mm/s.
+/// The central difference at row `i`, one-sided at the ends, mm/s.
 fn velocity(t: &[f64], x: &[f64], i: usize) -> f64 {
     let before = i.saturating_sub(1);
     let after = (i + 1).min(t.len() - 1);
     (x[after] - x[before]) / (t[after] - t[before])
 }
 
-/// Second central difference, that of the neighbour at the ends, m/s².
+/// The second central difference at row `i`, at the ends that of the neighbour, m/s².
 fn acceleration(t: &[f64], x: &[f64], i: usize) -> f64 {
     let i = i.clamp(1, t.len() - 2);
     let before = (x[i] - x[i - 1]) / (t[i] - t[i - 1]);
@@ -99,23 +91,23 @@ fn acceleration(t: &[f64], x: &[f64], i: usize) -> f64 {
     (after - before) / (0.5 * (t[i + 1] - t[i - 1])) / 1000.0
 }
 
-/// Steps of time longer than one and a half usual ones.
+/// A warning about intervals longer than 1.5 median ones.
 fn gaps(t: &[f64]) -> Option<Warning> {
-    // the median of evenly chosen steps: memory does not grow with the recording
-    let every = (t.len() / STEPS).max(1);
-    let mut steps: Vec<f64> = (1..t.len())
+    // from evenly chosen intervals, so that memory does not grow with the recording
+    let every = (t.len() / INTERVALS).max(1);
+    let mut intervals: Vec<f64> = (1..t.len())
         .step_by(every)
         .map(|i| t[i] - t[i - 1])
         .collect();
-    let middle = steps.len() / 2;
-    let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let middle = intervals.len() / 2;
+    let median = *intervals.select_nth_unstable_by(middle, f64::total_cmp).1;
     let (mut count, mut longest_s, mut at_s) = (0, 0.0, 0.0);
     for pair in t.windows(2) {
-        let step = pair[1] - pair[0];
-        if step > 1.5 * usual {
+        let interval = pair[1] - pair[0];
+        if interval > 1.5 * median {
             count += 1;
-            if step > longest_s {
-                (longest_s, at_s) = (step, pair[0]);
+            if interval > longest_s {
+                (longest_s, at_s) = (interval, pair[0]);
             }
         }
     }
@@ -126,15 +118,19 @@ fn gaps(t: &[f64]) -> Option<Warning> {
     })
 }
 
-/// Whether a given column has the scale of the difference of x that it should
-/// be. Noise of the differences does not bias the ratio, as it would the inverse.
-fn scale(column: &'static str, given: &[f64], of_x: impl Fn(usize) -> f64) -> Option<Warning> {
+/// A warning if a column does not have the scale of the difference of x. The ratio is a
+/// regression on the given values, which noise of the differences does not bias.
+fn scale(
+    column: &'static str,
+    given: &[f64],
+    difference: impl Fn(usize) -> f64,
+) -> Option<Warning> {
     let (mut product, mut square) = (0.0, 0.0);
     for (i, value) in given.iter().enumerate() {
-        product += of_x(i) * value;
+        product += difference(i) * value;
         square += value * value;
     }
     let ratio = product / square;
-    // also true of a NaN, which an all-zero column gives
+    // also true for NaN, the ratio of an all-zero column
     (!(0.5..=2.0).contains(&ratio)).then_some(Warning::Scale { column, ratio })
 }

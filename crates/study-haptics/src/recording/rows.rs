@@ -1,33 +1,39 @@
-//! The rows of a recording's CSV, checked one by one.
+//! Reading the rows of a recording's CSV file.
 //!
-//! Not a general CSV reader: every field is a number, so a comma is always a
-//! border and a line is always a row. That gives exact line numbers and needs no
-//! memory but the columns and one line.
+//! Not a general CSV reader: every field is a number, so a comma always separates
+//! fields and a line is always a row. This gives exact line numbers and needs no memory
+//! except for the columns and one line.
 
 use super::RecordingFault;
 use sha2::{Digest as _, Sha256};
 use std::io::{BufRead, Read as _};
 use study_base::text::Untrusted;
 
-/// Second differences need three.
-pub(super) const LEAST_ROWS: usize = 3;
-/// A hundred minutes at 10 kHz, 2.4 GB of columns.
-pub(super) const MOST_ROWS: usize = 60_000_000;
-/// Longer lines are no rows of numbers.
-pub(super) const MOST_LINE_BYTES: usize = 65_536;
-/// Header lines that are kept.
-const MOST_HEADER_LINES: usize = 1000;
+/// Least number of rows: second differences need three.
+pub(super) const MIN_ROWS: usize = 3;
+/// Most rows: a hundred minutes at 10 kHz, 2.4 GB of columns.
+pub(super) const MAX_ROWS: usize = 60_000_000;
+/// Longer lines cannot be rows of numbers.
+pub(super) const MAX_LINE_BYTES: usize = 65_536;
+/// Most header lines that are stored.
+const MAX_HEADER_LINES: usize = 1000;
 
-/// In the order of [`Rows::columns`].
-pub(super) const COLUMNS: [&str; 5] = ["t_s", "x_mm", "v_mm_s", "a_m_s2", "f_n"];
-/// Those that have to be there, as indices of [`COLUMNS`].
+/// Names of the columns.
+const COLUMNS: [&str; 5] = ["t_s", "x_mm", "v_mm_s", "a_m_s2", "f_n"];
+/// The required ones, as indices of [`COLUMNS`].
 const REQUIRED: [usize; 3] = [0, 1, 4];
 
-/// What was read: columns that were absent are empty.
+/// The contents of a file.
 #[derive(Debug)]
 pub(super) struct Rows {
-    pub(super) columns: [Vec<f64>; 5],
+    pub(super) t_s: Vec<f64>,
+    pub(super) x_mm: Vec<f64>,
+    pub(super) v_mm_s: Option<Vec<f64>>,
+    pub(super) a_m_s2: Option<Vec<f64>>,
+    pub(super) f_n: Vec<f64>,
+    /// The `#` lines above the column names.
     pub(super) header: Vec<String>,
+    /// Number of the line of column names.
     pub(super) header_line: u64,
     pub(super) sha256: String,
 }
@@ -38,12 +44,12 @@ type Fault = (u64, RecordingFault);
 pub(super) fn read(input: impl BufRead) -> Result<Rows, Fault> {
     let mut lines = Lines::new(input);
     let mut header = Vec::new();
-    let places = loop {
+    let fields = loop {
         let Some(line) = lines.next()? else {
             return Err((lines.number.max(1), RecordingFault::NoColumns));
         };
         if let Some(words) = line.strip_prefix(b"#") {
-            if header.len() < MOST_HEADER_LINES {
+            if header.len() < MAX_HEADER_LINES {
                 let words = words.strip_prefix(b" ").unwrap_or(words);
                 header.push(String::from_utf8_lossy(words).into_owned());
             }
@@ -58,36 +64,42 @@ pub(super) fn read(input: impl BufRead) -> Result<Rows, Fault> {
         if line.starts_with(b"#") {
             continue;
         }
-        if rows == MOST_ROWS {
+        if rows == MAX_ROWS {
             return Err((lines.number, RecordingFault::TooLong));
         }
-        row(line, &places, &mut columns).map_err(|fault| (lines.number, fault))?;
+        row(line, &fields, &mut columns).map_err(|fault| (lines.number, fault))?;
         rows += 1;
     }
-    if rows < LEAST_ROWS {
+    if rows < MIN_ROWS {
         return Err((lines.number, RecordingFault::TooShort(rows)));
     }
+    let given = |column: usize| fields.contains(&Some(column));
+    let [t_s, x_mm, v_mm_s, a_m_s2, f_n] = columns;
     Ok(Rows {
-        columns,
+        t_s,
+        x_mm,
+        v_mm_s: given(2).then_some(v_mm_s),
+        a_m_s2: given(3).then_some(a_m_s2),
+        f_n,
         header,
         header_line,
         sha256: lines.sha256(),
     })
 }
 
-/// For each field the column that it belongs to, if we want it.
+/// For each field the index of its column in [`COLUMNS`]; `None` for other columns.
 fn columns(line: &[u8]) -> Result<Vec<Option<usize>>, RecordingFault> {
     let text = String::from_utf8_lossy(line);
     let names: Vec<&str> = text
         .split(',')
         .map(|name| name.trim().trim_matches('"'))
         .collect();
-    let places: Vec<Option<usize>> = names
+    let fields: Vec<Option<usize>> = names
         .iter()
         .map(|name| COLUMNS.iter().position(|column| column == name))
         .collect();
     for (column, name) in COLUMNS.into_iter().enumerate() {
-        let found = places.iter().filter(|p| **p == Some(column)).count();
+        let found = fields.iter().filter(|f| **f == Some(column)).count();
         if found > 1 {
             return Err(RecordingFault::DoubleColumn(name));
         }
@@ -99,24 +111,24 @@ fn columns(line: &[u8]) -> Result<Vec<Option<usize>>, RecordingFault> {
             });
         }
     }
-    Ok(places)
+    Ok(fields)
 }
 
 /// Appends one row.
 fn row(
     line: &[u8],
-    places: &[Option<usize>],
+    fields: &[Option<usize>],
     columns: &mut [Vec<f64>; 5],
 ) -> Result<(), RecordingFault> {
     let found = line.iter().filter(|byte| **byte == b',').count() + 1;
-    if found != places.len() {
+    if found != fields.len() {
         return Err(RecordingFault::Ragged {
             found,
-            expected: places.len(),
+            expected: fields.len(),
         });
     }
-    for (field, place) in line.split(|byte| *byte == b',').zip(places) {
-        let Some(column) = *place else { continue };
+    for (field, column) in line.split(|byte| *byte == b',').zip(fields) {
+        let Some(column) = *column else { continue };
         let name = COLUMNS[column];
         let value: f64 = std::str::from_utf8(field)
             .ok()
@@ -145,13 +157,13 @@ fn row(
     Ok(())
 }
 
-/// Text of the file for a message: escaped, not longer than a line of it.
+/// Text of the file for a message: truncated and escaped.
 fn shown(text: &str) -> String {
     let cut: String = text.chars().take(40).collect();
     Untrusted(&cut).to_string()
 }
 
-/// Lines that are not blank, with their number, hashed as they go by.
+/// An iterator over the lines that are not blank, with line numbers; hashes all lines.
 struct Lines<R> {
     input: R,
     line: Vec<u8>,
@@ -175,14 +187,14 @@ impl<R: BufRead> Lines<R> {
             let read = self
                 .input
                 .by_ref()
-                .take(MOST_LINE_BYTES as u64 + 1)
+                .take(MAX_LINE_BYTES as u64 + 1)
                 .read_until(b'\n', &mut self.line)
                 .map_err(|e| (self.number + 1, RecordingFault::Io(e)))?;
             if read == 0 {
                 return Ok(None);
             }
             self.number += 1;
-            if read > MOST_LINE_BYTES {
+            if read > MAX_LINE_BYTES {
                 return Err((self.number, RecordingFault::LongLine));
             }
             self.hash.update(&self.line);

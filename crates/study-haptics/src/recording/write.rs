@@ -1,28 +1,29 @@
-//! Writing of a recording's CSV.
+//! Writing a recording's CSV file.
 
 use std::io::{self, Write};
 
-/// Columns of equal length, as they are to stand in the file.
+/// The columns of the file, all of equal length.
 #[derive(Debug, Clone, Copy)]
 pub struct Columns<'c> {
-    /// s.
+    /// Time, s.
     pub t_s: &'c [f64],
-    /// mm.
+    /// Position, mm.
     pub x_mm: &'c [f64],
-    /// mm/s; `None`: no such column.
+    /// Velocity, mm/s; `None`: no such column.
     pub v_mm_s: Option<&'c [f64]>,
-    /// m/s².
+    /// Acceleration, m/s².
     pub a_m_s2: &'c [f64],
-    /// N.
+    /// Force that the probe applies to the target, N.
     pub f_n: &'c [f64],
 }
 
 /// Writes the header, one `#` line for each of its lines, the column names and the
-/// rows. Digits are fixed: 1 µs, 10 nm, 0.1 µm/s, 10 µm/s², 10 µN, each far below what
-/// a probe resolves; so the same columns give the same bytes everywhere.
+/// rows. The number of decimals is fixed: 1 µs, 10 nm, 0.1 µm/s, 10 µm/s², 10 µN, each
+/// far below the resolution of a probe, so the same columns give the same bytes on all
+/// platforms.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of writing to `out`.
 pub fn write(out: &mut impl Write, header: &str, columns: Columns<'_>) -> io::Result<()> {
     for line in header.lines() {
         writeln!(out, "# {line}")?;
@@ -46,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_written_is_read_back_with_its_header() {
+    fn a_written_recording_is_read_back_with_its_header() {
         let (t_s, x_mm, a_m_s2, f_n) = (
             [0.0, 0.001, 0.002],
             [1.0, 2.5, -0.12345],
@@ -73,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn without_velocity_the_reader_derives_it() {
+    fn without_velocity_the_reader_computes_it() {
         let some = [0.0, 1.0, 2.0, 1.0];
         let columns = Columns {
             t_s: &[0.0, 1.0, 2.0, 3.0],

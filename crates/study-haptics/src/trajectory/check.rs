@@ -1,30 +1,32 @@
-//! Whether probe and target can follow a trajectory, before anything moves.
+//! Whether a trajectory respects the limits of probe and target.
 //!
-//! A trajectory is looked at in steps of at most a two-hundredth of its fastest
-//! period, so a peak is missed by less than 0.02 %.
+//! A trajectory is sampled at steps of at most 1/200 of its shortest period, so a peak
+//! is missed by less than 0.02 %.
 
-use super::{Point, Trajectory};
+use super::Trajectory;
 use std::fmt;
 use study_base::limits::Limit;
+use study_wire::predict::Motion;
 
-/// Steps of one period of the highest frequency.
+/// Steps per period of the highest frequency.
 const STEPS_PER_PERIOD: f64 = 200.0;
-/// No more steps than this are looked at, whatever the frequencies; longest step s.
-const MOST_STEPS: f64 = 2e7;
-const LONGEST_STEP_S: f64 = 1e-3;
+/// Most steps.
+const MAX_STEPS: f64 = 2e7;
+/// Longest step, s.
+const MAX_STEP_S: f64 = 1e-3;
 
-/// What something can follow.
+/// Limits on a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Envelope {
     /// Lowest and highest position, mm.
     pub travel_mm: [f64; 2],
-    /// Largest speed, mm/s; `None`: unlimited.
+    /// Highest speed, mm/s; `None`: unlimited.
     pub velocity_mm_s: Option<Limit>,
-    /// Largest acceleration, m/s²; `None`: unlimited.
+    /// Highest acceleration, m/s²; `None`: unlimited.
     pub acceleration_m_s2: Option<Limit>,
 }
 
-/// What goes beyond an envelope.
+/// The quantity that exceeds a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Position.
@@ -35,20 +37,20 @@ pub enum Quantity {
     Acceleration,
 }
 
-/// Where a trajectory leaves an envelope.
+/// A limit that a trajectory exceeds.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub struct Violation {
-    /// Whose bound it is, such as `the target`.
-    pub whose: String,
-    /// What is too large.
+    /// Owner of the limit, such as `the target`.
+    pub owner: String,
+    /// The quantity that exceeds it.
     pub quantity: Quantity,
-    /// The bound; of the position the one that is passed.
-    pub bound: f64,
-    /// The first instant beyond it, s.
+    /// The limit, mm, mm/s or m/s².
+    pub limit: f64,
+    /// The first instant beyond the limit, s.
     pub first_s: f64,
-    /// The instant furthest beyond it, s.
+    /// The instant furthest beyond the limit, s.
     pub worst_s: f64,
-    /// The value there; the position itself, of the others the magnitude.
+    /// The value at that instant: the position, or the magnitude of speed or acceleration.
     pub worst: f64,
 }
 
@@ -61,8 +63,8 @@ impl fmt::Display for Violation {
         };
         write!(
             f,
-            "the {what} passes {} {unit}, the limit of {}, at {:.4} s and is {:.2} {unit} at {:.4} s",
-            self.bound, self.whose, self.first_s, self.worst, self.worst_s
+            "the {what} exceeds {} {unit}, the limit of {}, from {:.4} s on and reaches {:.2} {unit} at {:.4} s",
+            self.limit, self.owner, self.first_s, self.worst, self.worst_s
         )
     }
 }
@@ -72,20 +74,20 @@ impl fmt::Display for Violation {
 pub struct Extremes {
     /// Lowest and highest position, mm.
     pub x_mm: [f64; 2],
-    /// Largest speed, mm/s.
+    /// Highest speed, mm/s.
     pub v_mm_s: f64,
-    /// Largest acceleration, m/s².
+    /// Highest acceleration, m/s².
     pub a_m_s2: f64,
 }
 
-/// Every instant that is looked at, with the motion there.
-fn instants(trajectory: &Trajectory) -> impl Iterator<Item = (f64, Point)> + '_ {
+/// The sampled instants, s, and the motion at each.
+fn instants(trajectory: &Trajectory) -> impl Iterator<Item = (f64, Motion)> + '_ {
     let total_s = trajectory.total_s();
     let top_hz = trajectory.top_hz().max(0.5 / trajectory.ramp_s.max(1e-4));
     let step_s = (1.0 / (STEPS_PER_PERIOD * top_hz))
-        .min(LONGEST_STEP_S)
-        .max(total_s / MOST_STEPS);
-    // at most MOST_STEPS, so the cast is exact
+        .min(MAX_STEP_S)
+        .max(total_s / MAX_STEPS);
+    // at most MAX_STEPS, so the cast is exact
     let steps = (total_s / step_s).ceil().max(1.0) as u64;
     (0..=steps).map(move |i| {
         let t_s = total_s * i as f64 / steps as f64;
@@ -93,64 +95,62 @@ fn instants(trajectory: &Trajectory) -> impl Iterator<Item = (f64, Point)> + '_ 
     })
 }
 
-/// How far, how fast, how sharply it goes.
+/// The extremes of position, speed and acceleration.
 pub fn extremes(trajectory: &Trajectory) -> Extremes {
     let none = Extremes {
         x_mm: [f64::INFINITY, f64::NEG_INFINITY],
         v_mm_s: 0.0,
         a_m_s2: 0.0,
     };
-    instants(trajectory).fold(none, |e, (_, point)| Extremes {
-        x_mm: [e.x_mm[0].min(point.x_mm), e.x_mm[1].max(point.x_mm)],
-        v_mm_s: e.v_mm_s.max(point.v_mm_s.abs()),
-        a_m_s2: e.a_m_s2.max(point.a_m_s2.abs()),
+    instants(trajectory).fold(none, |e, (_, motion)| Extremes {
+        x_mm: [e.x_mm[0].min(motion.x_mm), e.x_mm[1].max(motion.x_mm)],
+        v_mm_s: e.v_mm_s.max(motion.v_mm_s.abs()),
+        a_m_s2: e.a_m_s2.max(motion.a_m_s2.abs()),
     })
 }
 
-/// Compares a trajectory, ramps included, with every envelope, each under the
-/// name of whose it is; its own limits are the first.
+/// Compares a trajectory, including its ramps, with its own limits and with
+/// `envelopes`, each given with the name of its owner.
 ///
 /// # Errors
-/// All violations, at most one for each bound.
+/// All violations, at most one for each limit.
 pub fn check(
     trajectory: &Trajectory,
     envelopes: &[(&str, Envelope)],
 ) -> Result<(), Vec<Violation>> {
-    let own = trajectory
-        .limits
-        .map(|own| ("the trajectory's own file", own));
-    let mut bounds: Vec<Bound> = own
+    let own = trajectory.limits.map(|own| ("the trajectory file", own));
+    let mut monitors: Vec<Monitor> = own
         .iter()
         .chain(envelopes)
-        .flat_map(|(whose, envelope)| Bound::all_of(whose, envelope))
+        .flat_map(|(owner, envelope)| Monitor::all_of(owner, envelope))
         .collect();
-    for (t_s, point) in instants(trajectory) {
-        for bound in &mut bounds {
-            bound.look(t_s, point);
+    for (t_s, motion) in instants(trajectory) {
+        for monitor in &mut monitors {
+            monitor.observe(t_s, motion);
         }
     }
-    let found: Vec<Violation> = bounds.into_iter().filter_map(|b| b.found).collect();
+    let found: Vec<Violation> = monitors.into_iter().filter_map(|m| m.violation).collect();
     if found.is_empty() { Ok(()) } else { Err(found) }
 }
 
-/// One bound and what has been found beyond it.
-struct Bound {
-    whose: String,
+/// Observes one limit along a trajectory.
+struct Monitor {
+    owner: String,
     quantity: Quantity,
-    /// −1: a lower bound.
+    /// 1 for an upper limit, −1 for a lower one.
     sign: f64,
-    bound: f64,
-    found: Option<Violation>,
+    limit: f64,
+    violation: Option<Violation>,
 }
 
-impl Bound {
-    fn all_of(whose: &str, envelope: &Envelope) -> Vec<Self> {
-        let one = |quantity, sign, bound| Self {
-            whose: whose.to_owned(),
+impl Monitor {
+    fn all_of(owner: &str, envelope: &Envelope) -> Vec<Self> {
+        let one = |quantity, sign, limit| Self {
+            owner: owner.to_owned(),
             quantity,
             sign,
-            bound,
-            found: None,
+            limit,
+            violation: None,
         };
         let [low, high] = envelope.travel_mm;
         let mut all = vec![
@@ -170,27 +170,27 @@ impl Bound {
         all
     }
 
-    fn look(&mut self, t_s: f64, point: Point) {
+    fn observe(&mut self, t_s: f64, motion: Motion) {
         let value = match self.quantity {
-            Quantity::Travel => point.x_mm,
-            Quantity::Velocity => point.v_mm_s.abs(),
-            Quantity::Acceleration => point.a_m_s2.abs(),
+            Quantity::Travel => motion.x_mm,
+            Quantity::Velocity => motion.v_mm_s.abs(),
+            Quantity::Acceleration => motion.a_m_s2.abs(),
         };
-        if self.sign * (value - self.bound) <= 0.0 {
+        if self.sign * (value - self.limit) <= 0.0 {
             return;
         }
-        match &mut self.found {
-            // the first of peaks that differ by rounding
+        match &mut self.violation {
+            // keep the first of peaks that differ only by rounding
             Some(found) if self.sign * (value - found.worst) > 1e-9 * value.abs() => {
                 found.worst = value;
                 found.worst_s = t_s;
             }
             Some(_) => {}
             None => {
-                self.found = Some(Violation {
-                    whose: self.whose.clone(),
+                self.violation = Some(Violation {
+                    owner: self.owner.clone(),
                     quantity: self.quantity,
-                    bound: self.bound,
+                    limit: self.limit,
                     first_s: t_s,
                     worst_s: t_s,
                     worst: value,
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_passes_and_its_extremes_are_those_of_the_formula() {
+    fn a_trajectory_within_limits_passes_and_its_extremes_are_those_of_the_formula() {
         assert_eq!(
             check(&trajectory(15.0), &[("the probe", envelope(200.0, 10.0))]),
             Ok(())
@@ -239,12 +239,12 @@ mod tests {
             (e.x_mm[1] - 32.5).abs() < 1e-3 && (e.x_mm[0] - 2.5).abs() < 1e-3,
             "{e:?}"
         );
-        // within the ramps it is a little faster than 15·2π
+        // during the ramps it is slightly faster than 15·2π
         assert!((94.2..99.0).contains(&e.v_mm_s), "{e:?}");
     }
 
     #[test]
-    fn every_bound_that_is_passed_is_named_with_its_instant() {
+    fn every_exceeded_limit_is_named_with_its_instant() {
         let found = check(
             &trajectory(18.0),
             &[("the target", envelope(100.0, 1000.0))],
@@ -255,14 +255,14 @@ mod tests {
         assert_eq!(found[0].quantity, Quantity::Travel);
         assert!((found[0].worst + 0.5).abs() < 1e-3 && (found[0].worst_s - 0.75).abs() < 1e-2);
         assert!(
-            said[1].starts_with("the position passes 35 mm, the limit of the target, at 1.2"),
+            said[1].starts_with("the position exceeds 35 mm, the limit of the target, from 1.2"),
             "{said:?}"
         );
-        assert!(said[2].contains("speed passes 100 mm/s"), "{said:?}");
+        assert!(said[2].contains("speed exceeds 100 mm/s"), "{said:?}");
     }
 
     #[test]
-    fn the_limits_of_its_own_file_count_too() {
+    fn the_limits_of_the_trajectory_file_apply_too() {
         let mut own = trajectory(15.0);
         own.limits = Some(envelope(200.0, 0.1));
         let found = check(&own, &[]).unwrap_err();
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bound_that_is_touched_is_not_passed() {
+    fn a_limit_that_is_reached_is_not_exceeded() {
         let mut flat = trajectory(0.0);
         flat.offset_mm = 35.0;
         assert_eq!(check(&flat, &[("the target", envelope(1.0, 1.0))]), Ok(()));

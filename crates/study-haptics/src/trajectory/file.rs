@@ -1,11 +1,11 @@
-//! Reading and writing of trajectory files.
+//! Reading and writing trajectory files.
 //!
-//! TOML with `format = "study-trajectory/1"`. Reading is strict and reports every
-//! fault with its line; writing is stable, and `parse(write(t)) == t` for every
+//! TOML with `format = "study-trajectory/1"`. Reading is strict and reports every fault
+//! with its line. Writing is reproducible, and `parse(write(t)) == t` for every
 //! trajectory that was read.
 
 use super::parts::{PRBS_ORDERS, Part, Prbs, Shape, Sine, Steps, Sweep};
-use super::{Envelope, FORMAT, LONGEST_RAMP_S, LONGEST_S, MOST_PARTS, Trajectory};
+use super::{Envelope, FORMAT, MAX_DURATION_S, MAX_PARTS, MAX_RAMP_S, Trajectory};
 use std::fmt::Write as _;
 use std::ops::RangeInclusive;
 use study_base::diagnostic::table::{Document, Table, Value};
@@ -13,18 +13,18 @@ use study_base::diagnostic::{Fault, Findings};
 use study_base::limits::Limit;
 
 /// Most levels of steps.
-const MOST_LEVELS: usize = 1000;
-/// Positions and amplitudes, mm.
+const MAX_LEVELS: usize = 1000;
+/// Range of positions and amplitudes, mm.
 const LENGTHS_MM: RangeInclusive<f64> = -1000.0..=1000.0;
-/// Frequencies, Hz.
+/// Range of frequencies, Hz.
 const FREQUENCIES_HZ: RangeInclusive<f64> = 1e-3..=1000.0;
-/// Times, s.
-const TIMES_S: RangeInclusive<f64> = 1e-3..=LONGEST_S;
+/// Range of times, s.
+const TIMES_S: RangeInclusive<f64> = 1e-3..=MAX_DURATION_S;
 
 const SHAPES: [(&str, Shape); 2] = [("triangular", Shape::Triangular), ("linear", Shape::Linear)];
 
-/// Reads a trajectory file; `path` is for the messages. The trajectory is there if
-/// and only if the findings have no error.
+/// Reads a trajectory file; `path` is for messages. `None` if and only if the findings
+/// contain an error.
 pub fn parse(path: &str, text: &str) -> (Option<Trajectory>, Findings) {
     let document = Document::parse(text);
     let trajectory = read(&document);
@@ -49,16 +49,16 @@ fn read(document: &Document<'_>) -> Option<Trajectory> {
         return None;
     }
     let title = root.text("title");
-    let offset_mm = need(&mut root, "offset_mm", LENGTHS_MM);
-    let duration_s = need(&mut root, "duration_s", TIMES_S);
-    let ramp_s = need(&mut root, "ramp_s", 1e-3..=LONGEST_RAMP_S);
+    let offset_mm = required(&mut root, "offset_mm", LENGTHS_MM);
+    let duration_s = required(&mut root, "duration_s", TIMES_S);
+    let ramp_s = required(&mut root, "ramp_s", 1e-3..=MAX_RAMP_S);
     let limits = root.table("limits").and_then(limits);
     let tables = root.tables("parts");
-    if tables.is_empty() || tables.len() > MOST_PARTS {
+    if tables.is_empty() || tables.len() > MAX_PARTS {
         root.fault_at(
             "parts",
             Fault::error(format!(
-                "there are {} parts: a trajectory has 1 to {MOST_PARTS}",
+                "there are {} parts: a trajectory has 1 to {MAX_PARTS}",
                 tables.len()
             ))
             .hint("a part is [[parts]] with kind = \"sine\", \"sweep\", \"prbs\" or \"steps\""),
@@ -76,7 +76,7 @@ fn read(document: &Document<'_>) -> Option<Trajectory> {
     })
 }
 
-/// A number in a range; a NaN is in none.
+/// A number in a range; NaN is in no range.
 fn number(value: &Value<'_, '_>, range: RangeInclusive<f64>) -> Option<f64> {
     let number = value.f64()?;
     if range.contains(&number) {
@@ -91,13 +91,13 @@ fn number(value: &Value<'_, '_>, range: RangeInclusive<f64>) -> Option<f64> {
     None
 }
 
-/// The same, of a key that has to be there.
-fn need(table: &mut Table<'_, '_>, key: &str, range: RangeInclusive<f64>) -> Option<f64> {
+/// The number of a required key.
+fn required(table: &mut Table<'_, '_>, key: &str, range: RangeInclusive<f64>) -> Option<f64> {
     number(&table.required(key)?, range)
 }
 
-/// The same, of a key that may be absent.
-fn or(
+/// The number of an optional key.
+fn optional(
     table: &mut Table<'_, '_>,
     key: &str,
     range: RangeInclusive<f64>,
@@ -169,9 +169,9 @@ fn part(mut table: Table<'_, '_>) -> Option<Part> {
 }
 
 fn sine(table: &mut Table<'_, '_>) -> Option<Sine> {
-    let amplitude_mm = need(table, "amplitude_mm", LENGTHS_MM);
-    let frequency_hz = need(table, "frequency_hz", FREQUENCIES_HZ);
-    let phase_deg = or(table, "phase_deg", -360.0..=360.0, 0.0);
+    let amplitude_mm = required(table, "amplitude_mm", LENGTHS_MM);
+    let frequency_hz = required(table, "frequency_hz", FREQUENCIES_HZ);
+    let phase_deg = optional(table, "phase_deg", -360.0..=360.0, 0.0);
     Some(Sine {
         amplitude_mm: amplitude_mm?,
         frequency_hz: frequency_hz?,
@@ -181,11 +181,11 @@ fn sine(table: &mut Table<'_, '_>) -> Option<Sine> {
 
 fn sweep(table: &mut Table<'_, '_>) -> Option<Sweep> {
     let shape = table.required("shape").and_then(|v| v.word(&SHAPES));
-    let amplitude_mm = need(table, "amplitude_mm", LENGTHS_MM);
-    let from_hz = need(table, "from_hz", FREQUENCIES_HZ);
-    let to_hz = need(table, "to_hz", FREQUENCIES_HZ);
-    let period_s = need(table, "period_s", TIMES_S);
-    let phase_deg = or(table, "phase_deg", -360.0..=360.0, 0.0);
+    let amplitude_mm = required(table, "amplitude_mm", LENGTHS_MM);
+    let from_hz = required(table, "from_hz", FREQUENCIES_HZ);
+    let to_hz = required(table, "to_hz", FREQUENCIES_HZ);
+    let period_s = required(table, "period_s", TIMES_S);
+    let phase_deg = optional(table, "phase_deg", -360.0..=360.0, 0.0);
     Some(Sweep {
         shape: shape?,
         amplitude_mm: amplitude_mm?,
@@ -197,7 +197,7 @@ fn sweep(table: &mut Table<'_, '_>) -> Option<Sweep> {
 }
 
 fn prbs(table: &mut Table<'_, '_>) -> Option<Prbs> {
-    let amplitude_mm = need(table, "amplitude_mm", LENGTHS_MM);
+    let amplitude_mm = required(table, "amplitude_mm", LENGTHS_MM);
     let order = table.required("order").and_then(|value| {
         let order = value.u32()?;
         if !PRBS_ORDERS.contains(&order) {
@@ -211,7 +211,7 @@ fn prbs(table: &mut Table<'_, '_>) -> Option<Prbs> {
         }
         Some(order)
     });
-    let bit_s = need(table, "bit_s", TIMES_S);
+    let bit_s = required(table, "bit_s", TIMES_S);
     let rise_s = table.required("rise_s").and_then(|value| {
         let rise_s = number(&value, TIMES_S)?;
         if bit_s.is_some_and(|bit_s| rise_s > bit_s) {
@@ -233,20 +233,20 @@ fn steps(table: &mut Table<'_, '_>) -> Option<Steps> {
         if levels.len() < all.len() {
             return None;
         }
-        let round = levels.iter().cycle().skip(1);
-        let apart = levels.iter().zip(round).all(|(a, b)| a != b);
-        if !(2..=MOST_LEVELS).contains(&levels.len()) || !apart {
+        let next = levels.iter().cycle().skip(1);
+        let apart = levels.iter().zip(next).all(|(a, b)| a != b);
+        if !(2..=MAX_LEVELS).contains(&levels.len()) || !apart {
             value.fault(Fault::error(format!(
-                "`{}` has to be 2 to {MOST_LEVELS} levels, each another than the one before (the first follows the last)",
+                "`{}` has to be 2 to {MAX_LEVELS} levels, each different from the one before (the first follows the last)",
                 value.path()
             )));
             return None;
         }
         Some(levels)
     });
-    let speed_mm_s = need(table, "speed_mm_s", 1e-3..=1e5);
-    let acceleration_m_s2 = need(table, "acceleration_m_s2", 1e-3..=1e4);
-    let hold_s = or(table, "hold_s", 0.0..=LONGEST_S, 0.0);
+    let speed_mm_s = required(table, "speed_mm_s", 1e-3..=1e5);
+    let acceleration_m_s2 = required(table, "acceleration_m_s2", 1e-3..=1e4);
+    let hold_s = optional(table, "hold_s", 0.0..=MAX_DURATION_S, 0.0);
     Some(Steps {
         levels_mm: levels?,
         speed_mm_s: speed_mm_s?,
@@ -255,23 +255,20 @@ fn steps(table: &mut Table<'_, '_>) -> Option<Steps> {
     })
 }
 
-/// The file of a trajectory.
+/// The text of a trajectory file.
 pub fn write(trajectory: &Trajectory) -> String {
     let t = trajectory;
     let mut out = format!("format = \"{FORMAT}\"\n");
     if let Some(title) = &t.title {
         line(&mut out, "title", toml::Value::String(title.clone()));
     }
-    let mut all = |pairs: &[(&str, f64)]| {
-        for (key, number) in pairs {
-            line(&mut out, key, format!("{number:?}"));
-        }
-    };
-    all(&[
+    for (key, number) in [
         ("offset_mm", t.offset_mm),
         ("duration_s", t.duration_s),
         ("ramp_s", t.ramp_s),
-    ]);
+    ] {
+        line(&mut out, key, format!("{number:?}"));
+    }
     if let Some(limits) = &t.limits {
         out.push_str("\n[limits]\n");
         line(&mut out, "travel_mm", format!("{:?}", limits.travel_mm));
@@ -286,14 +283,14 @@ pub fn write(trajectory: &Trajectory) -> String {
     }
     for part in &t.parts {
         out.push_str("\n[[parts]]\n");
-        let mut all = |kind: &str, pairs: &[(&str, f64)]| {
+        let mut numbers = |kind: &str, pairs: &[(&str, f64)]| {
             line(&mut out, "kind", format!("\"{kind}\""));
             for (key, number) in pairs {
                 line(&mut out, key, format!("{number:?}"));
             }
         };
         match part {
-            Part::Sine(p) => all(
+            Part::Sine(p) => numbers(
                 "sine",
                 &[
                     ("amplitude_mm", p.amplitude_mm),
@@ -302,7 +299,7 @@ pub fn write(trajectory: &Trajectory) -> String {
                 ],
             ),
             Part::Sweep(p) => {
-                all(
+                numbers(
                     "sweep",
                     &[
                         ("amplitude_mm", p.amplitude_mm),
@@ -312,12 +309,14 @@ pub fn write(trajectory: &Trajectory) -> String {
                         ("phase_deg", p.phase_deg),
                     ],
                 );
-                let word = SHAPES.iter().find(|(_, shape)| *shape == p.shape);
-                let word = word.map_or("linear", |(word, _)| word);
-                line(&mut out, "shape", format!("\"{word}\""));
+                let shape = match p.shape {
+                    Shape::Triangular => "triangular",
+                    Shape::Linear => "linear",
+                };
+                line(&mut out, "shape", format!("\"{shape}\""));
             }
             Part::Prbs(p) => {
-                all(
+                numbers(
                     "prbs",
                     &[
                         ("amplitude_mm", p.amplitude_mm),
@@ -328,7 +327,7 @@ pub fn write(trajectory: &Trajectory) -> String {
                 line(&mut out, "order", p.order());
             }
             Part::Steps(p) => {
-                all(
+                numbers(
                     "steps",
                     &[
                         ("speed_mm_s", p.speed_mm_s),

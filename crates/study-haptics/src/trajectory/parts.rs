@@ -1,17 +1,16 @@
-//! The terms of a trajectory: deviations from its offset, in closed form.
+//! The parts of a trajectory: deviations from its offset, in closed form.
 //!
 //! Each part gives position (mm), velocity (mm/s) and acceleration (mm/s²) at an
-//! instant. All are twice differentiable but for the acceleration of steps, which
-//! jumps between 0 and ± its bound, and the sweep's, which jumps where a linear
-//! sweep starts again.
+//! instant. The acceleration is continuous except for steps, where it jumps between 0
+//! and ± its limit, and where a linear sweep restarts.
 
-use super::rise;
+use super::minimum_jerk;
 use std::f64::consts::TAU;
 
-/// Shift registers this long are known to have a maximal sequence here.
+/// The supported lengths of shift registers, bits.
 pub const PRBS_ORDERS: std::ops::RangeInclusive<u32> = 3..=16;
 
-/// Feedback taps (bits from 1) of maximal-length registers of 3 to 16 bits.
+/// Feedback taps (bits from 1) of maximal-length shift registers of 3 to 16 bits.
 /// Ward & Molteno, "Table of linear feedback shift registers", 2007.
 const TAPS: [&[u32]; 14] = [
     &[3, 2],
@@ -30,84 +29,85 @@ const TAPS: [&[u32]; 14] = [
     &[16, 14, 13, 11],
 ];
 
-/// One term of a sum.
+/// One term of a trajectory.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Part {
-    /// One frequency.
+    /// A sine.
     Sine(Sine),
-    /// A sine whose frequency moves.
+    /// A swept sine.
     Sweep(Sweep),
     /// A pseudo-random binary sequence.
     Prbs(Prbs),
-    /// Between levels at constant speed.
+    /// Moves between levels at constant speed.
     Steps(Steps),
 }
 
-/// A·sin(2πft + φ).
+/// A sine, A·sin(2πft + φ).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sine {
-    /// mm.
+    /// Amplitude A, mm.
     pub amplitude_mm: f64,
-    /// Hz.
+    /// Frequency f, Hz.
     pub frequency_hz: f64,
-    /// Phase at t = 0, degrees.
+    /// Phase φ at t = 0, degrees.
     pub phase_deg: f64,
 }
 
-/// How a swept frequency moves in a period.
+/// The frequency of a sweep over a period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
-    /// From the first frequency to the second and back.
+    /// Up from the first frequency to the second and back.
     Triangular,
-    /// From the first to the second, then at once from the first again.
+    /// From the first frequency to the second, then again from the first.
     Linear,
 }
 
-/// A·sin(2π∫f dt + φ), f linear in time.
+/// A swept sine, A·sin(2π∫f dt + φ) with f piecewise linear in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sweep {
-    /// How f moves.
+    /// Course of the frequency.
     pub shape: Shape,
-    /// mm.
+    /// Amplitude A, mm.
     pub amplitude_mm: f64,
-    /// Hz at the beginning of a period.
+    /// Frequency at the beginning of a period, Hz.
     pub from_hz: f64,
-    /// Hz at its middle (triangular) or its end (linear).
+    /// Frequency at the middle (triangular) or end (linear) of a period, Hz.
     pub to_hz: f64,
-    /// s.
+    /// Period of the sweep, s.
     pub period_s: f64,
-    /// Phase at t = 0, degrees.
+    /// Phase φ at t = 0, degrees.
     pub phase_deg: f64,
 }
 
-/// ±A in the order of a maximal-length shift register, from all ones.
+/// A pseudo-random binary sequence: ±A in the order of a maximal-length shift register
+/// that starts with all ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prbs {
-    /// mm.
+    /// Amplitude A, mm.
     pub amplitude_mm: f64,
-    /// Time of a bit, s.
+    /// Duration of a bit, s.
     pub bit_s: f64,
-    /// Time of a change, at the beginning of its bit, s; at most `bit_s`.
+    /// Duration of a change at the beginning of a bit, s; at most `bit_s`.
     pub rise_s: f64,
-    /// `true` for +; 2^order − 1 of them.
+    /// The 2^order − 1 bits, `true` for +.
     bits: Vec<bool>,
 }
 
-/// From level to level at constant speed, with a rest at each, over and over.
+/// Periodic moves from level to level at constant speed, with a rest at each level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steps {
     /// Deviations from the offset, mm; at least two, neighbours differ.
     pub levels_mm: Vec<f64>,
-    /// mm/s.
+    /// Speed of the moves, mm/s.
     pub speed_mm_s: f64,
-    /// How fast it gets there and stops again, m/s².
+    /// Acceleration and deceleration of the moves, m/s².
     pub acceleration_m_s2: f64,
     /// Rest at each level, s.
     pub hold_s: f64,
 }
 
 impl Part {
-    /// Position, velocity, acceleration (mm, mm/s, mm/s²) at `t_s` ≥ 0.
+    /// Position, velocity and acceleration (mm, mm/s, mm/s²) at `t_s` ≥ 0.
     pub fn at(&self, t_s: f64) -> [f64; 3] {
         match self {
             Self::Sine(sine) => sine.at(t_s),
@@ -117,7 +117,7 @@ impl Part {
         }
     }
 
-    /// The highest frequency asked for; of a change in `s` seconds 1/(2s). Hz.
+    /// The highest frequency, Hz; for a change within s seconds it is 1/(2s).
     pub fn top_hz(&self) -> f64 {
         match self {
             Self::Sine(s) => s.frequency_hz,
@@ -139,15 +139,15 @@ impl Part {
 impl Sine {
     fn at(&self, t_s: f64) -> [f64; 3] {
         let w = TAU * self.frequency_hz;
-        turning(
+        sinusoid(
             self.amplitude_mm,
             [w * t_s + self.phase_deg.to_radians(), w, 0.0],
         )
     }
 }
 
-/// A·sin of a phase with its two derivatives.
-fn turning(amplitude: f64, [phase, rate, change]: [f64; 3]) -> [f64; 3] {
+/// A·sin(phase) and its first two derivatives, from the phase and its own.
+fn sinusoid(amplitude: f64, [phase, rate, change]: [f64; 3]) -> [f64; 3] {
     let (sin, cos) = libm::sincos(phase);
     [
         amplitude * sin,
@@ -160,16 +160,16 @@ impl Sweep {
     fn at(&self, t_s: f64) -> [f64; 3] {
         let periods = libm::floor(t_s / self.period_s);
         let into_s = t_s - periods * self.period_s;
-        // the mean frequency of a period is that of its ends, whatever the shape
+        // for both shapes the mean frequency over a period is that of its ends
         let before = periods * 0.5 * (self.from_hz + self.to_hz) * self.period_s;
         let (cycles, hz, slope) = match self.shape {
-            Shape::Linear => self.up(into_s, self.period_s),
+            Shape::Linear => self.rising(into_s, self.period_s),
             Shape::Triangular => {
                 let half_s = 0.5 * self.period_s;
                 if into_s < half_s {
-                    self.up(into_s, half_s)
+                    self.rising(into_s, half_s)
                 } else {
-                    let (all, _, _) = self.up(half_s, half_s);
+                    let (all, _, _) = self.rising(half_s, half_s);
                     let s = into_s - half_s;
                     let slope = (self.from_hz - self.to_hz) / half_s;
                     let hz = self.to_hz + slope * s;
@@ -178,11 +178,11 @@ impl Sweep {
             }
         };
         let phase = TAU * (before + cycles) + self.phase_deg.to_radians();
-        turning(self.amplitude_mm, [phase, TAU * hz, TAU * slope])
+        sinusoid(self.amplitude_mm, [phase, TAU * hz, TAU * slope])
     }
 
-    /// Cycles, frequency and its slope `s` seconds into a rise of `over_s`.
-    fn up(&self, s: f64, over_s: f64) -> (f64, f64, f64) {
+    /// Number of cycles, frequency and its slope `s` seconds into a rise of `over_s`.
+    fn rising(&self, s: f64, over_s: f64) -> (f64, f64, f64) {
         let slope = (self.to_hz - self.from_hz) / over_s;
         let cycles = (self.from_hz + 0.5 * slope * s) * s;
         (cycles, self.from_hz + slope * s, slope)
@@ -190,7 +190,7 @@ impl Sweep {
 }
 
 impl Prbs {
-    /// A sequence of a register of `order` bits; `None` unless that is in
+    /// The sequence of a register of `order` bits; `None` unless `order` is in
     /// [`PRBS_ORDERS`].
     pub fn new(amplitude_mm: f64, order: u32, bit_s: f64, rise_s: f64) -> Option<Self> {
         let taps = TAPS.get(order.checked_sub(*PRBS_ORDERS.start())? as usize)?;
@@ -214,7 +214,7 @@ impl Prbs {
         })
     }
 
-    /// Bits of the register.
+    /// Length of the shift register, bits.
     pub fn order(&self) -> u32 {
         (self.bits.len() + 1).ilog2()
     }
@@ -228,73 +228,73 @@ impl Prbs {
         let bit = libm::floor(t_s / self.bit_s);
         let into_s = t_s - bit * self.bit_s;
         // not negative and far below 2^53, so the cast is exact
-        let place = bit as usize;
-        let level = |place: usize| {
-            let positive = self.bits[place % self.bits.len()];
+        let index = bit as usize;
+        let level = |index: usize| {
+            let positive = self.bits[index % self.bits.len()];
             self.amplitude_mm * if positive { 1.0 } else { -1.0 }
         };
-        let to = level(place);
-        let from = level(place.saturating_sub(1));
+        let to = level(index);
+        let from = level(index.saturating_sub(1));
         if from == to || into_s >= self.rise_s {
             return [to, 0.0, 0.0];
         }
-        let [w, w1, w2] = rise(into_s.max(0.0), self.rise_s);
+        let [w, w1, w2] = minimum_jerk(into_s.max(0.0), self.rise_s);
         [from + (to - from) * w, (to - from) * w1, (to - from) * w2]
     }
 }
 
 impl Steps {
-    /// From where to where, over one round.
+    /// Start and end of each move of one period, mm.
     fn moves(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         let next = self.levels_mm.iter().cycle().skip(1);
         self.levels_mm.iter().copied().zip(next.copied())
     }
 
-    /// Time at top speed and time of getting there, s, and the speed, mm/s, of a
-    /// move of `way_mm`.
-    fn profile(&self, way_mm: f64) -> (f64, f64, f64) {
+    /// Time at constant speed, s, time of acceleration, s, and the speed, mm/s, of a move
+    /// over `distance_mm`.
+    fn profile(&self, distance_mm: f64) -> (f64, f64, f64) {
         let a = 1e3 * self.acceleration_m_s2;
-        let reached = libm::sqrt(a * way_mm);
+        let reached = libm::sqrt(a * distance_mm);
         let speed = self.speed_mm_s.min(reached);
         let ramp_s = speed / a;
-        ((way_mm / speed - ramp_s).max(0.0), ramp_s, speed)
+        ((distance_mm / speed - ramp_s).max(0.0), ramp_s, speed)
     }
 
-    fn move_s(&self, way_mm: f64) -> f64 {
-        let (even_s, ramp_s, _) = self.profile(way_mm);
-        even_s + 2.0 * ramp_s
+    fn move_s(&self, distance_mm: f64) -> f64 {
+        let (constant_s, ramp_s, _) = self.profile(distance_mm);
+        constant_s + 2.0 * ramp_s
     }
 
     fn at(&self, t_s: f64) -> [f64; 3] {
-        let round_s: f64 = self
+        let period_s: f64 = self
             .moves()
             .map(|(from, to)| self.hold_s + self.move_s((to - from).abs()))
             .sum();
-        let mut s = t_s - libm::floor(t_s / round_s) * round_s;
+        let mut s = t_s - libm::floor(t_s / period_s) * period_s;
         for (from, to) in self.moves() {
             if s < self.hold_s {
                 return [from, 0.0, 0.0];
             }
             s -= self.hold_s;
-            let way = (to - from).abs();
-            let (even_s, ramp_s, speed) = self.profile(way);
-            let took_s = even_s + 2.0 * ramp_s;
-            if s < took_s {
+            let distance = (to - from).abs();
+            let (constant_s, ramp_s, speed) = self.profile(distance);
+            let total_s = constant_s + 2.0 * ramp_s;
+            if s < total_s {
                 let a = speed / ramp_s;
                 let [d, v, a] = if s < ramp_s {
                     [0.5 * a * s * s, a * s, a]
-                } else if s < ramp_s + even_s {
+                } else if s < ramp_s + constant_s {
                     [speed * (s - 0.5 * ramp_s), speed, 0.0]
                 } else {
-                    let left = took_s - s;
-                    [way - 0.5 * a * left * left, a * left, -a]
+                    let left = total_s - s;
+                    [distance - 0.5 * a * left * left, a * left, -a]
                 };
                 let sign = (to - from).signum();
                 return [from + sign * d, sign * v, sign * a];
             }
-            s -= took_s;
+            s -= total_s;
         }
-        // rounding at the very end of a round
+        // rounding at the very end of a period
         [self.levels_mm[0], 0.0, 0.0]
     }
 }
@@ -317,7 +317,7 @@ mod tests {
             let ones = bits.iter().filter(|b| **b).count();
             assert_eq!(bits.len(), (1 << order) - 1);
             assert_eq!(ones, 1 << (order - 1), "{order}");
-            // two-valued autocorrelation: −1 at every other shift
+            // two-valued autocorrelation: −1 at every shift other than 0
             for shift in [1, 2, bits.len() / 2, bits.len() - 1] {
                 let same = (0..bits.len())
                     .filter(|i| bits[*i] == bits[(i + shift) % bits.len()])
@@ -343,14 +343,14 @@ mod tests {
             .filter(|t| sweep.at(*t - 1e-4)[0] < 0.0 && sweep.at(*t)[0] >= 0.0)
             .count();
         assert!((7..=8).contains(&crossings), "{crossings}");
-        // periods of 50 whole cycles: it repeats
+        // periods of 50 whole cycles: it is periodic
         for t in [0.3, 7.7, 13.1] {
             assert!((sweep.at(t)[0] - sweep.at(t + 20.0)[0]).abs() < 1e-9);
         }
     }
 
     #[test]
-    fn steps_keep_their_speed_between_their_levels() {
+    fn steps_move_at_constant_speed_between_their_levels() {
         let steps = Steps {
             levels_mm: vec![-10.0, 10.0],
             speed_mm_s: 40.0,
@@ -361,7 +361,7 @@ mod tests {
         let [x, v, a] = steps.at(0.5 + 0.02 + 0.24);
         assert!(x.abs() < 1e-9 && v == 40.0 && a == 0.0, "{x} {v} {a}");
         assert_eq!(steps.at(0.5 + 0.52 + 0.3)[0], 10.0);
-        // a short way never gets to its speed and does not overshoot
+        // a short move does not reach its speed and does not overshoot
         let short = Steps {
             levels_mm: vec![0.0, 0.1],
             ..steps

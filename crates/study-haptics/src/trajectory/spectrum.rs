@@ -1,25 +1,25 @@
-//! How much of each frequency a trajectory contains.
+//! The amplitude spectrum of a trajectory.
 //!
-//! Amplitudes of the position about its mean under a Hann window, over what a
-//! recording keeps, so that a sine of A mm shows as A at its frequency. By
-//! Goertzel's recursion: only the few frequencies of a picture are needed.
+//! Amplitudes of the position about its mean with a Hann window, over the recorded
+//! time; a sine of A mm has the amplitude A at its frequency. Computed by Goertzel's
+//! algorithm, because a picture needs only a few frequencies.
 
 use super::Trajectory;
 use std::f64::consts::TAU;
 
-/// Samples a period of the highest frequency that is asked for.
+/// Samples per period of the highest frequency of the spectrum.
 const SAMPLES_PER_PERIOD: f64 = 8.0;
-/// No more than this.
-const MOST_SAMPLES: f64 = 65_536.0;
+/// Most samples.
+const MAX_SAMPLES: f64 = 65_536.0;
 
 /// The largest amplitude, mm, in each of `bands` equal bands up to `to_hz`.
 pub fn bands(trajectory: &Trajectory, to_hz: f64, bands: usize) -> Vec<f64> {
-    let [from_s, until_s] = trajectory.kept_s();
+    let [from_s, until_s] = trajectory.recorded_s();
     let duration_s = until_s - from_s;
-    // above twice what the trajectory holds: PRBS and steps have weak overtones
+    // at least twice the highest frequency: PRBS and steps have weak overtones
     let rate_hz = SAMPLES_PER_PERIOD * to_hz.max(2.0 * trajectory.top_hz());
-    // at most MOST_SAMPLES, so the cast is exact
-    let n = (duration_s * rate_hz).ceil().clamp(64.0, MOST_SAMPLES) as usize;
+    // at most MAX_SAMPLES, so the cast is exact
+    let n = (duration_s * rate_hz).ceil().clamp(64.0, MAX_SAMPLES) as usize;
     let step_s = duration_s / n as f64;
     let positions: Vec<f64> = (0..n)
         .map(|i| trajectory.at(from_s + step_s * i as f64).x_mm)
@@ -30,7 +30,7 @@ pub fn bands(trajectory: &Trajectory, to_hz: f64, bands: usize) -> Vec<f64> {
         .enumerate()
         .map(|(i, x)| (x - mean) * (1.0 - libm::cos(TAU * i as f64 / n as f64)))
         .collect();
-    // lines at multiples of 1/duration; a band of less than one line takes the nearest
+    // lines are multiples of 1/duration; a band narrower than one takes the nearest
     let line = |hz: f64| (hz * duration_s).round() as usize;
     (0..bands)
         .map(|band| {
@@ -45,15 +45,15 @@ pub fn bands(trajectory: &Trajectory, to_hz: f64, bands: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Amplitude of `k` cycles in all of `values`.
+/// The amplitude of the sinusoid with `k` cycles over all `values`.
 fn amplitude(values: &[f64], k: usize) -> f64 {
     let n = values.len() as f64;
-    let turn = 2.0 * libm::cos(TAU * k as f64 / n);
+    let factor = 2.0 * libm::cos(TAU * k as f64 / n);
     let (mut one, mut two) = (0.0, 0.0);
     for value in values {
-        (one, two) = (value + turn * one - two, one);
+        (one, two) = (value + factor * one - two, one);
     }
-    let power = one * one + two * two - turn * one * two;
+    let power = one * one + two * two - factor * one * two;
     2.0 * libm::sqrt(power.max(0.0)) / n
 }
 
@@ -63,7 +63,7 @@ mod tests {
     use crate::trajectory::{Part, Sine};
 
     #[test]
-    fn a_sine_shows_with_its_amplitude_at_its_frequency() {
+    fn a_sine_has_its_amplitude_at_its_frequency() {
         let sine = |amplitude_mm, frequency_hz| {
             Part::Sine(Sine {
                 amplitude_mm,

@@ -1,15 +1,14 @@
-//! Which runs of samples the tables of several dx need the sums of, and how the
-//! nodes come of them.
+//! The runs of samples to sum over for the tables of several dx, and the parameters
+//! at the nodes from these sums.
 //!
-//! All three ways of resampling are sums over runs of neighbouring samples. The
-//! edges of all tables together cut the samples into runs, each sample is in at
-//! most one, and every node is put together from a few: so one more table costs
-//! nothing at a sample. The values are those of [`resample`] up to the order of
-//! addition.
+//! All three resampling methods are sums over runs of neighbouring samples. The bin
+//! edges of all tables together divide the samples into disjoint runs, and every node
+//! combines a few of them, so that another table costs nothing per sample. The values
+//! are those of [`resample`] up to the order of addition.
 
-use crate::identify::ewls::Theta;
 use crate::identify::lanes::recursion::{Run, Sums};
-use crate::identify::resample::{self, COUNT_MM, Resample, Resampled};
+use crate::identify::resample::{self, Resample, Resampled};
+use crate::identify::samples::Theta;
 use std::ops::Range;
 
 /// The nodes of one table.
@@ -24,29 +23,35 @@ pub(super) struct Nodes {
 pub(super) struct Runs {
     /// Ascending, without overlap.
     pub(super) runs: Vec<Run>,
-    /// Samples of each run and Σ(x − origin), mm.
+    /// Number of samples of each run and Σ(x − origin), mm.
     sizes: Vec<(f64, f64)>,
     /// One for each table.
-    tables: Vec<Recipe>,
+    tables: Vec<Composition>,
     /// Whether Σ (x − origin) θ is needed.
     pub(super) moments: bool,
 }
 
-/// How the nodes of a table come of the sums.
+/// The runs to the left of a node and to the right.
+type Halves = [Range<usize>; 2];
+
+/// How the nodes of a table are composed of runs, given by their indices.
 #[derive(Debug)]
-enum Recipe {
-    /// Straight lines between the means of runs at these places.
-    Point { places: Vec<f64>, runs: Vec<usize> },
-    /// The mean of the runs of each node.
+enum Composition {
+    /// Interpolation between the means of runs at these positions.
+    Point {
+        positions: Vec<f64>,
+        runs: Vec<usize>,
+    },
+    /// The mean over the runs of each node.
     Bin(Vec<Range<usize>>),
-    /// The weighted mean of the runs to the left and to the right of each node.
-    Hat(Vec<[Range<usize>; 2]>),
+    /// The weighted mean over the runs on both sides of each node.
+    Hat(Vec<Halves>),
 }
 
 impl Runs {
     /// For samples at `x_mm`, ascending and not empty.
-    pub(super) fn new(how: Resample, x_mm: &[f64], tables: &[Nodes]) -> Self {
-        let (bounds, tables) = match how {
+    pub(super) fn new(method: Resample, x_mm: &[f64], tables: &[Nodes]) -> Self {
+        let (bounds, tables) = match method {
             Resample::Point => points(x_mm, tables),
             Resample::Bin => {
                 let ranges = |t: &Nodes| -> Vec<[usize; 3]> {
@@ -57,10 +62,11 @@ impl Runs {
                     };
                     t.x_mm.iter().map(of).collect()
                 };
-                let (bounds, found) = cut(tables.iter().map(ranges).collect());
-                let whole = |node: [Range<usize>; 2]| node[0].start..node[1].end;
-                let recipe = |nodes: Vec<_>| Recipe::Bin(nodes.into_iter().map(whole).collect());
-                (bounds, found.into_iter().map(recipe).collect())
+                let (bounds, nodes) = divide(tables.iter().map(ranges).collect());
+                let whole = |node: Halves| node[0].start..node[1].end;
+                let composition =
+                    |nodes: Vec<_>| Composition::Bin(nodes.into_iter().map(whole).collect());
+                (bounds, nodes.into_iter().map(composition).collect())
             }
             Resample::Hat => {
                 let ranges = |t: &Nodes| -> Vec<[usize; 3]> {
@@ -73,8 +79,8 @@ impl Runs {
                     };
                     t.x_mm.iter().map(of).collect()
                 };
-                let (bounds, found) = cut(tables.iter().map(ranges).collect());
-                (bounds, found.into_iter().map(Recipe::Hat).collect())
+                let (bounds, nodes) = divide(tables.iter().map(ranges).collect());
+                (bounds, nodes.into_iter().map(Composition::Hat).collect())
             }
         };
         let runs: Vec<Run> = bounds
@@ -96,23 +102,23 @@ impl Runs {
             runs,
             sizes,
             tables,
-            moments: how == Resample::Hat,
+            moments: method == Resample::Hat,
         }
     }
 
-    /// The nodes of table `i`; `None` if not one has a sample of its own.
+    /// The parameters at the nodes of table `i`; `None` if no node has samples.
     pub(super) fn table(&self, i: usize, nodes: &Nodes, sums: &[Sums]) -> Option<Resampled> {
         match &self.tables[i] {
-            Recipe::Point { places, runs } => {
+            Composition::Point { positions, runs } => {
                 let mean = |run: &usize| sums[*run].theta.map(|s| s / self.sizes[*run].0);
                 let means: Vec<Theta> = runs.iter().map(mean).collect();
-                let at = |node: &f64| resample::interpolate(places, &means, *node);
+                let at = |node: &f64| resample::interpolate(positions, &means, *node);
                 Some(Resampled {
                     theta: nodes.x_mm.iter().map(at).collect(),
-                    empty: 0,
+                    filled: 0,
                 })
             }
-            Recipe::Bin(ranges) => {
+            Composition::Bin(ranges) => {
                 let own: Vec<Option<Theta>> = ranges
                     .iter()
                     .map(|range| {
@@ -126,7 +132,7 @@ impl Runs {
                     .collect();
                 resample::filled(&nodes.x_mm, &own)
             }
-            Recipe::Hat(ranges) => {
+            Composition::Hat(ranges) => {
                 let own: Vec<Option<Theta>> = nodes
                     .x_mm
                     .iter()
@@ -139,13 +145,7 @@ impl Runs {
     }
 
     /// Σ w θ / Σ w with w = 1 ∓ (x − node)/dx to the right and left.
-    fn hat(
-        &self,
-        node: f64,
-        dx_mm: f64,
-        halves: &[Range<usize>; 2],
-        sums: &[Sums],
-    ) -> Option<Theta> {
+    fn hat(&self, node: f64, dx_mm: f64, halves: &Halves, sums: &[Sums]) -> Option<Theta> {
         let mut total = 0.0;
         let mut sum = [0.0; 4];
         for (half, slope) in halves.iter().zip([1.0 / dx_mm, -1.0 / dx_mm]) {
@@ -167,26 +167,16 @@ fn add(sum: &mut Theta, factor: f64, theta: &Theta) {
     }
 }
 
-/// Groups at equal counts, those next to nodes only.
-fn points(x_mm: &[f64], tables: &[Nodes]) -> (Vec<Range<usize>>, Vec<Recipe>) {
-    let count = |x: f64| (x / COUNT_MM).round_ties_even();
-    let mut groups = Vec::new();
-    let mut places = Vec::new();
-    let mut from = 0;
-    while from < x_mm.len() {
-        let here = count(x_mm[from]);
-        let to = from + x_mm[from..].partition_point(|x| count(*x) <= here);
-        places.push(here * COUNT_MM);
-        groups.push(from..to);
-        from = to;
-    }
-    let beside = |node: &f64| {
-        let right = places.partition_point(|place| place <= node);
-        [right.saturating_sub(1), right.min(places.len() - 1)]
+/// Groups at equal encoder counts, only those next to nodes.
+fn points(x_mm: &[f64], tables: &[Nodes]) -> (Vec<Range<usize>>, Vec<Composition>) {
+    let (positions, groups) = resample::equal_counts(x_mm);
+    let neighbours = |node: &f64| {
+        let right = positions.partition_point(|position| position <= node);
+        [right.saturating_sub(1), right.min(positions.len() - 1)]
     };
     let mut used = vec![false; groups.len()];
     for node in tables.iter().flat_map(|t| &t.x_mm) {
-        for group in beside(node) {
+        for group in neighbours(node) {
             used[group] = true;
         }
     }
@@ -197,29 +187,27 @@ fn points(x_mm: &[f64], tables: &[Nodes]) -> (Vec<Range<usize>>, Vec<Recipe>) {
         number[group] = bounds.len();
         bounds.push(range);
     }
-    let recipe = |t: &Nodes| {
-        let mut own: Vec<usize> = t.x_mm.iter().flat_map(beside).collect();
+    let composition = |t: &Nodes| {
+        let mut own: Vec<usize> = t.x_mm.iter().flat_map(neighbours).collect();
         own.sort_unstable();
         own.dedup();
-        Recipe::Point {
-            places: own.iter().map(|group| places[*group]).collect(),
+        Composition::Point {
+            positions: own.iter().map(|group| positions[*group]).collect(),
             runs: own.iter().map(|group| number[*group]).collect(),
         }
     };
-    (bounds, tables.iter().map(recipe).collect())
+    (bounds, tables.iter().map(composition).collect())
 }
 
-/// The runs to the left of a node and to the right.
-type Halves = [Range<usize>; 2];
-
-/// For each table and node [from, middle, to) as indices of samples: the runs
-/// between all of them, and which runs each node has on either side of its middle.
-fn cut(tables: Vec<Vec<[usize; 3]>>) -> (Vec<Range<usize>>, Vec<Vec<Halves>>) {
+/// Divides the samples into runs. `tables` has for each node the indices [from,
+/// middle, to) of its samples. Returns the runs between all of these indices, and for
+/// each table and node the runs on either side of its middle.
+fn divide(tables: Vec<Vec<[usize; 3]>>) -> (Vec<Range<usize>>, Vec<Vec<Halves>>) {
     let mut edges: Vec<usize> = tables.iter().flatten().flatten().copied().collect();
     edges.sort_unstable();
     edges.dedup();
     let run = |edge: usize| edges.partition_point(|e| *e < edge);
-    let found = tables
+    let halves = tables
         .iter()
         .map(|nodes| {
             nodes
@@ -229,5 +217,5 @@ fn cut(tables: Vec<Vec<[usize; 3]>>) -> (Vec<Range<usize>>, Vec<Vec<Halves>>) {
         })
         .collect();
     let bounds = edges.windows(2).map(|pair| pair[0]..pair[1]).collect();
-    (bounds, found)
+    (bounds, halves)
 }

@@ -1,31 +1,31 @@
-//! How far the tables of several λ are from a recording, all at once.
+//! Prediction errors of the tables of several λ on one recording.
 //!
-//! Where a sample lies between the nodes does not depend on λ, so it is found once
-//! for all tables that share their nodes. The force is that of
-//! [`study_wire::predict`] with the direction rule `sign`, rounding by rounding.
-//! Mean and variance of the errors come from one pass: over 512 samples each error
-//! is taken relative to the first, which costs no digits, and the parts are joined
-//! as Chan, Golub & LeVeque do (1979).
+//! The position of a sample between the nodes does not depend on λ, so it is found
+//! once for all tables that share their nodes. The force is bit for bit that of
+//! [`study_wire::predict`] with the direction rule `sign`. Mean and variance of the
+//! errors come from one pass: within chunks of 512 samples the errors are taken
+//! relative to the first, which preserves precision, and the chunks are combined as
+//! in Chan, Golub & LeVeque (1979).
 
 use super::{Lane, Processor, WIDTH};
 use crate::model::Realization;
 use crate::recording::Recording;
 use study_wire::predict::Lookup;
 
-/// Samples whose places are found before they are used.
+/// Samples that are located before they are compared.
 const CHUNK: usize = 512;
 
-/// Mean and variance of the errors of a table.
+/// Mean and variance of the prediction errors of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
     /// mean(F̂ − F), N.
     pub mean_n: f64,
-    /// var(F̂ − F), divided by n, N².
+    /// var(F̂ − F) with divisor n, N².
     pub variance_n2: f64,
 }
 
-/// The errors of each realization on `recording`. All have to have the same nodes
-/// and look-up and the direction rule `sign`.
+/// The errors of each realization on `recording`. All have to share their nodes and
+/// look-up and have the direction rule `sign`.
 pub fn errors(
     processor: Processor,
     realizations: &[&Realization],
@@ -34,7 +34,7 @@ pub fn errors(
     let Some(first) = realizations.first() else {
         return Vec::new();
     };
-    let tables: Vec<Table> = realizations.chunks(WIDTH).map(Table::new).collect();
+    let tables: Vec<LaneTable> = realizations.chunks(WIDTH).map(LaneTable::new).collect();
     let mut moments = vec![Moments::default(); tables.len()];
     let nodes = Nodes {
         x_mm: &first.x_mm,
@@ -44,7 +44,7 @@ pub fn errors(
         #[cfg(target_arch = "x86_64")]
         Processor::Avx2 => {
             assert_eq!(Processor::best(), processor, "this machine has AVX2");
-            // SAFETY: the line above has established that the machine has AVX2 and FMA.
+            // SAFETY: the assertion above shows that the machine has AVX2 and FMA.
             #[allow(unsafe_code, reason = "the same loop, compiled for AVX2")]
             unsafe {
                 avx2(nodes, &tables, recording, &mut moments);
@@ -69,12 +69,13 @@ struct Nodes<'a> {
     lookup: Lookup,
 }
 
-/// m, b, k, F0 of four realizations: the + direction's nodes, then those of −.
+/// m, b, k, F0 of four realizations at the nodes of the + direction, then of the −
+/// direction.
 #[derive(Debug)]
-struct Table(Vec<[Lane; 4]>);
+struct LaneTable(Vec<[Lane; 4]>);
 
-impl Table {
-    /// At most four; the last fills lanes that are left.
+impl LaneTable {
+    /// From at most four realizations; the last one fills unused lanes.
     fn new(realizations: &[&Realization]) -> Self {
         let of = |i: usize| realizations[i.min(realizations.len() - 1)];
         let mut table = Vec::new();
@@ -96,25 +97,26 @@ impl Table {
     }
 }
 
-/// Where a sample lies in a table.
+/// The position of a sample in a [`LaneTable`]: between the entries `left` and
+/// `right`, whose weights are 1 − `weight` and `weight`.
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
+struct Position {
     left: usize,
     right: usize,
     weight: f64,
 }
 
-/// Follows a recording through the nodes.
+/// Locates the samples of a recording one after the other.
 #[derive(Debug)]
-struct Walk {
+struct Cursor {
     left: usize,
     negative: bool,
 }
 
-impl Walk {
-    /// As `locate` in [`study_wire::predict`], from where the sample before was.
+impl Cursor {
+    /// As `locate` in [`study_wire::predict`], searching from the previous sample.
     #[inline(always)]
-    fn step(&mut self, nodes: Nodes<'_>, x: f64, v: f64) -> Place {
+    fn step(&mut self, nodes: Nodes<'_>, x: f64, v: f64) -> Position {
         if v > 0.0 {
             self.negative = false;
         } else if v < 0.0 {
@@ -144,7 +146,7 @@ impl Walk {
             }
         };
         let offset = if self.negative { last + 1 } else { 0 };
-        Place {
+        Position {
             left: offset + at,
             right: offset + (at + 1).min(last),
             weight,
@@ -152,7 +154,7 @@ impl Walk {
     }
 }
 
-/// n, mean and Σ(e − mean)² of four tables.
+/// n, mean and Σ(e − mean)² for four tables.
 #[derive(Debug, Clone, Copy)]
 struct Moments {
     n: f64,
@@ -184,16 +186,16 @@ impl Moments {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2(nodes: Nodes<'_>, tables: &[Table], recording: &Recording, moments: &mut [Moments]) {
+fn avx2(nodes: Nodes<'_>, tables: &[LaneTable], recording: &Recording, moments: &mut [Moments]) {
     compare(nodes, tables, recording, moments);
 }
 
-/// F̂ − F of a sample [a, v, x, F]. A function, not a closure: only what is inlined
-/// is compiled for AVX2.
+/// F̂ − F of a sample [a, v, x, F]. A function, not a closure: only inlined code is
+/// compiled for AVX2.
 #[inline(always)]
-fn error(table: &Table, place: Place, [a, v, x, f]: [f64; 4]) -> Lane {
-    let (left, right) = (&table.0[place.left], &table.0[place.right]);
-    let weight = Lane::all(place.weight);
+fn error(table: &LaneTable, at: Position, [a, v, x, f]: [f64; 4]) -> Lane {
+    let (left, right) = (&table.0[at.left], &table.0[at.right]);
+    let weight = Lane::all(at.weight);
     let m = left[0] + weight * (right[0] - left[0]);
     let b = left[1] + weight * (right[1] - left[1]);
     let k = left[2] + weight * (right[2] - left[2]);
@@ -202,33 +204,33 @@ fn error(table: &Table, place: Place, [a, v, x, f]: [f64; 4]) -> Lane {
 }
 
 #[inline(always)]
-fn compare(nodes: Nodes<'_>, tables: &[Table], recording: &Recording, moments: &mut [Moments]) {
-    let mut walk = Walk {
+fn compare(nodes: Nodes<'_>, tables: &[LaneTable], recording: &Recording, moments: &mut [Moments]) {
+    let mut cursor = Cursor {
         left: 0,
         negative: false,
     };
-    let mut places = [Place::default(); CHUNK];
+    let mut positions = [Position::default(); CHUNK];
     for from in (0..recording.len()).step_by(CHUNK) {
         let range = from..(from + CHUNK).min(recording.len());
-        let places = &mut places[..range.len()];
+        let positions = &mut positions[..range.len()];
         let (x, v) = (
             &recording.x_mm[range.clone()],
             &recording.v_mm_s[range.clone()],
         );
-        for (place, (x, v)) in places.iter_mut().zip(x.iter().zip(v)) {
-            *place = walk.step(nodes, *x, *v);
+        for (position, (x, v)) in positions.iter_mut().zip(x.iter().zip(v)) {
+            *position = cursor.step(nodes, *x, *v);
         }
         let (a, f) = (&recording.a_m_s2[range.clone()], &recording.f_n[range]);
         for (table, moments) in tables.iter().zip(moments.iter_mut()) {
-            let first = error(table, places[0], [a[0], v[0], x[0], f[0]]);
+            let first = error(table, positions[0], [a[0], v[0], x[0], f[0]]);
             let mut sum = Lane::ZERO;
             let mut squares = Lane::ZERO;
-            for i in 0..places.len() {
-                let e = error(table, places[i], [a[i], v[i], x[i], f[i]]) - first;
+            for i in 0..positions.len() {
+                let e = error(table, positions[i], [a[i], v[i], x[i], f[i]]) - first;
                 sum = sum + e;
                 squares = e.mul_add(e, squares);
             }
-            let n = places.len() as f64;
+            let n = positions.len() as f64;
             let mean = sum * Lane::all(1.0 / n);
             moments.join(&Moments {
                 n,

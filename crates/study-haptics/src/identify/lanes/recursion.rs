@@ -1,41 +1,39 @@
-//! The recursion of [`ewls`](crate::identify::ewls) for several λ, which leaves
-//! sums of θ over runs of samples instead of one θ a sample.
+//! The recursion of [`ewls`](crate::identify::ewls) for several λ at once, giving
+//! sums of θ over runs of samples instead of one θ per sample.
 //!
-//! It is the same recursion with another scale: with w = λⁿ and Q = w P,
+//! It is the same recursion in scaled form: with w = λⁿ and Q = w P,
 //!
 //! ```text
 //! g = Q φ,  k = g / (w λ + φᵀ g),  θ ← θ + k e,  Q ← Q − g kᵀ,  w ← w λ
 //! ```
 //!
-//! which saves the ten divisions by λ. Every 64 samples Q is divided by w, before w
-//! can become too small. In exact arithmetic θ is that of `ewls`; in double
-//! precision the two agree to 1e-8 for λ of 0.998 and above (less below, where the
-//! estimates themselves hang on the last digit).
-//!
-//! Memory is that of the sums: no estimate is kept.
+//! which saves ten divisions by λ. Every 64 samples Q is divided by w, before w
+//! becomes too small. In exact arithmetic θ is that of `ewls`; in double precision
+//! the two agree to 1e-8 for λ ≥ 0.998 (less below, where the estimates themselves
+//! are ill-conditioned). Only the sums are stored.
 
 use super::{Lane, Processor, WIDTH};
-use crate::identify::ewls::{START, Sorted, Theta};
+use crate::identify::samples::{INITIAL_COVARIANCE, Samples, Theta};
 
-/// Samples after which the scale of Q is taken back to 1.
+/// Number of samples between rescalings of Q.
 const RESCALE: usize = 64;
 
-/// The smallest λ that this recursion is for: λ^64 has to stay far above the
-/// smallest number.
-pub const LEAST_LAMBDA: f64 = 0.01;
+/// The smallest λ of this recursion: λ^64 has to stay far above the smallest
+/// positive number.
+pub const MIN_LAMBDA: f64 = 0.01;
 
 /// A run of samples [`from`, `to`) whose estimates are summed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Run {
     /// First sample.
     pub from: usize,
-    /// One behind the last.
+    /// One past the last sample.
     pub to: usize,
-    /// Where moments are counted from, mm.
+    /// The origin of the first moment, mm.
     pub origin_mm: f64,
 }
 
-/// What is kept of the estimates over a run.
+/// Sums of the estimates over a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sums {
     /// Σ θ.
@@ -44,44 +42,44 @@ pub struct Sums {
     pub moment: Theta,
 }
 
-/// The sums of each run, for each λ.
+/// The sums over each run, for each λ.
 ///
-/// `samples` are in the order of the recursion, `runs` ascend and do not overlap.
-/// Before it begins, the recursion passes back over the first `warm(λ)` samples.
-/// Without `moments` those are 0. `None` for a λ whose estimates are no numbers. λ has to be at least
-/// [`LEAST_LAMBDA`].
+/// `samples` are in the order of the recursion; `runs` ascend and do not overlap. The
+/// recursion first passes back over the first `warm(λ)` samples. Without `moments`
+/// the moments are 0. `None` for a λ whose estimates are not finite. λ has to be at
+/// least [`MIN_LAMBDA`].
 pub fn sums(
     processor: Processor,
-    samples: &Sorted,
+    samples: &Samples,
     lambdas: &[f64],
     warm: impl Fn(f64) -> usize,
     runs: &[Run],
     moments: bool,
 ) -> Vec<Option<Vec<Sums>>> {
     let mut states: Vec<State> = lambdas.chunks(WIDTH).map(State::cold).collect();
-    let mut kept = vec![Kept::ZERO; states.len() * runs.len()];
-    // each λ goes back over a stretch of its own: one at a time
+    let mut sums = vec![LaneSums::ZERO; states.len() * runs.len()];
+    // each λ has its own number of samples to go back over: one at a time
     for (i, lambda) in lambdas.iter().enumerate() {
         let first = warm(*lambda).min(samples.len());
         if first > 0 {
             let mut alone = State::cold(&[*lambda]);
             back(processor, samples, first, &mut alone);
-            states[i / WIDTH].take(i % WIDTH, &alone);
+            states[i / WIDTH].copy_lane(i % WIDTH, &alone);
         }
     }
-    dispatch(processor, samples, &mut states, runs, &mut kept, moments);
+    dispatch(processor, samples, &mut states, runs, &mut sums, moments);
     (0..lambdas.len())
         .map(|i| {
             let (state, lane) = (i / WIDTH, i % WIDTH);
             let pick = |of: &[Lane; 4]| of.map(|p| p.0[lane]);
-            let all: Vec<Sums> = kept
+            let all: Vec<Sums> = sums
                 .chunks(states.len())
                 .map(|run| Sums {
                     theta: pick(&run[state].theta),
                     moment: pick(&run[state].moment),
                 })
                 .collect();
-            // a θ that has left the range of numbers does not come back
+            // a θ that is not finite stays so
             let last = pick(&states[state].theta);
             let finite = last.iter().all(|p| p.is_finite())
                 && all
@@ -92,7 +90,7 @@ pub fn sums(
         .collect()
 }
 
-/// Where the entries of the upper triangle are kept.
+/// Indices of the entries of the upper triangle.
 const UPPER: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]];
 
 /// The recursion of four λ between two samples.
@@ -106,14 +104,14 @@ struct State {
     lambda: Lane,
 }
 
-/// The sums of four λ over one run.
+/// [`Sums`] over one run for four λ.
 #[derive(Debug, Clone, Copy)]
-struct Kept {
+struct LaneSums {
     theta: [Lane; 4],
     moment: [Lane; 4],
 }
 
-impl Kept {
+impl LaneSums {
     const ZERO: Self = Self {
         theta: [Lane::ZERO; 4],
         moment: [Lane::ZERO; 4],
@@ -132,12 +130,12 @@ impl Kept {
 }
 
 impl State {
-    /// At most four λ; the last fills lanes that are left.
+    /// From at most four λ; the last one fills unused lanes.
     fn cold(lambdas: &[f64]) -> Self {
         let lambda = Lane(std::array::from_fn(|i| lambdas[i.min(lambdas.len() - 1)]));
         let mut q = [Lane::ZERO; 10];
         for i in 0..4 {
-            q[UPPER[i][i]] = Lane::all(START);
+            q[UPPER[i][i]] = Lane::all(INITIAL_COVARIANCE);
         }
         Self {
             q,
@@ -147,8 +145,8 @@ impl State {
         }
     }
 
-    /// Takes over one lane from the first of another.
-    fn take(&mut self, lane: usize, other: &Self) {
+    /// Copies the first lane of another state into lane `lane`.
+    fn copy_lane(&mut self, lane: usize, other: &Self) {
         let own = self
             .q
             .iter_mut()
@@ -173,16 +171,19 @@ impl State {
         let spread = a.mul_add(g[0], v.mul_add(g[1], x.mul_add(g[2], g[3])));
         let d = Lane::all(1.0) / (self.scale + spread);
         let e = force - theta[3];
-        let e = a.take_from(theta[0], v.take_from(theta[1], x.take_from(theta[2], e)));
-        // Q is read again: it does not fit into the registers, and to keep a copy of it
-        // would cost more stores than the recursion itself has
+        let e = a.negated_mul_add(
+            theta[0],
+            v.negated_mul_add(theta[1], x.negated_mul_add(theta[2], e)),
+        );
+        // Read Q again: it does not fit into the registers, and spilling a copy would cost
+        // more stores than the recursion itself has
         let q = std::hint::black_box(&mut self.q);
         for j in 0..4 {
             let k = g[j] * d;
             self.theta[j] = k.mul_add(e, self.theta[j]);
             for i in 0..=j {
                 let at = UPPER[i][j];
-                q[at] = g[i].take_from(k, q[at]);
+                q[at] = g[i].negated_mul_add(k, q[at]);
             }
         }
         self.scale = self.scale * self.lambda;
@@ -200,89 +201,101 @@ impl State {
 
 fn dispatch(
     processor: Processor,
-    samples: &Sorted,
+    samples: &Samples,
     states: &mut [State],
     runs: &[Run],
-    kept: &mut [Kept],
+    sums: &mut [LaneSums],
     moments: bool,
 ) {
     match processor {
         #[cfg(target_arch = "x86_64")]
         Processor::Avx2 => {
             assert_eq!(Processor::best(), processor, "this machine has AVX2");
-            // SAFETY: the line above has established that the machine has AVX2 and FMA.
+            // SAFETY: the assertion above shows that the machine has AVX2 and FMA.
             #[allow(unsafe_code, reason = "the same loop, compiled for AVX2")]
             unsafe {
-                avx2(samples, states, runs, kept, moments);
+                avx2(samples, states, runs, sums, moments);
             }
         }
-        _ => either(samples, states, runs, kept, moments),
+        _ => either(samples, states, runs, sums, moments),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept], moments: bool) {
-    either(samples, states, runs, kept, moments);
-}
-
-#[inline(always)]
-fn either(samples: &Sorted, states: &mut [State], runs: &[Run], kept: &mut [Kept], moments: bool) {
-    if moments {
-        pass::<true>(samples, states, runs, kept);
-    } else {
-        pass::<false>(samples, states, runs, kept);
-    }
-}
-
-/// `kept` has one entry for each state of the first run, then of the second, …
-///
-/// Here and in what it calls there are functions where closures would do: only what
-/// is inlined is compiled for AVX2, and a closure need not be.
-#[inline(always)]
-fn pass<const MOMENTS: bool>(
-    samples: &Sorted,
+fn avx2(
+    samples: &Samples,
     states: &mut [State],
     runs: &[Run],
-    kept: &mut [Kept],
+    sums: &mut [LaneSums],
+    moments: bool,
 ) {
-    let mut at = 0;
-    for (run, kept) in runs.iter().zip(kept.chunks_mut(states.len())) {
-        stretch::<false, false>(samples, at, run.from, states, 0.0, &mut []);
-        stretch::<true, MOMENTS>(samples, run.from, run.to, states, run.origin_mm, kept);
-        at = run.to;
-    }
-    stretch::<false, false>(samples, at, samples.len(), states, 0.0, &mut []);
+    either(samples, states, runs, sums, moments);
 }
 
-/// Passes over the samples [`from`, `to`); with `KEEP` adds θ, with
-/// `MOMENTS` also its moment, to `kept`, one for each state.
 #[inline(always)]
-fn stretch<const KEEP: bool, const MOMENTS: bool>(
-    samples: &Sorted,
+fn either(
+    samples: &Samples,
+    states: &mut [State],
+    runs: &[Run],
+    sums: &mut [LaneSums],
+    moments: bool,
+) {
+    if moments {
+        pass::<true>(samples, states, runs, sums);
+    } else {
+        pass::<false>(samples, states, runs, sums);
+    }
+}
+
+/// `sums` has one entry per state for the first run, then for the second, …
+///
+/// This function and its callees avoid closures: only inlined code is compiled for
+/// AVX2, and a closure need not be inlined.
+#[inline(always)]
+fn pass<const MOMENTS: bool>(
+    samples: &Samples,
+    states: &mut [State],
+    runs: &[Run],
+    sums: &mut [LaneSums],
+) {
+    let mut next = 0;
+    for (run, sums) in runs.iter().zip(sums.chunks_mut(states.len())) {
+        stretch::<false, false>(samples, next, run.from, states, 0.0, &mut []);
+        stretch::<true, MOMENTS>(samples, run.from, run.to, states, run.origin_mm, sums);
+        next = run.to;
+    }
+    stretch::<false, false>(samples, next, samples.len(), states, 0.0, &mut []);
+}
+
+/// Passes over the samples [`from`, `to`); with `SUM` adds θ, and with `MOMENTS` also
+/// its moment, to `sums`, which has one entry per state.
+#[inline(always)]
+fn stretch<const SUM: bool, const MOMENTS: bool>(
+    samples: &Samples,
     from: usize,
     to: usize,
     states: &mut [State],
     origin_mm: f64,
-    kept: &mut [Kept],
+    sums: &mut [LaneSums],
 ) {
     let (x, v) = (&samples.x_mm[from..to], &samples.v_mm_s[from..to]);
     let (a, f) = (&samples.a_m_s2[from..to], &samples.f_n[from..to]);
     for i in 0..to - from {
         let phi = [Lane::all(a[i]), Lane::all(v[i]), Lane::all(x[i])];
         let force = Lane::all(f[i]);
-        if KEEP {
+        if SUM {
             let arm = Lane::all(x[i] - origin_mm);
-            for (state, kept) in states.iter_mut().zip(kept.iter_mut()) {
+            for (state, sums) in states.iter_mut().zip(sums.iter_mut()) {
                 state.step(phi, force);
-                kept.add::<MOMENTS>(&state.theta, arm);
+                sums.add::<MOMENTS>(&state.theta, arm);
             }
         } else {
             for state in states.iter_mut() {
                 state.step(phi, force);
             }
         }
-        // at places that depend on nothing but the sample
+        // at indices that depend only on the sample, so that lanes stay independent
         if (from + i) % RESCALE == RESCALE - 1 {
             for state in states.iter_mut() {
                 state.rescale();
@@ -291,15 +304,9 @@ fn stretch<const KEEP: bool, const MOMENTS: bool>(
     }
 }
 
-/// One state back over the first samples.
-fn back(processor: Processor, samples: &Sorted, first: usize, state: &mut State) {
-    let reversed = |column: &[f64]| column[..first].iter().rev().copied().collect();
-    let samples = Sorted {
-        x_mm: reversed(&samples.x_mm),
-        v_mm_s: reversed(&samples.v_mm_s),
-        a_m_s2: reversed(&samples.a_m_s2),
-        f_n: reversed(&samples.f_n),
-    };
+/// Passes one state back over the first samples.
+fn back(processor: Processor, samples: &Samples, first: usize, state: &mut State) {
+    let samples = samples.reordered(&(0..first).rev().collect::<Vec<_>>());
     dispatch(
         processor,
         &samples,

@@ -1,34 +1,32 @@
-//! How much later one channel is than another.
+//! The delay between two channels.
 //!
-//! The lag at which the cross-correlation of two signals is largest, between
-//! samples by the parabola through the three highest. That is good to a small
-//! share of a sample where both signals are well below the sampling rate, which a
-//! low-pass makes sure of.
+//! The lag of the maximum of the cross-correlation, interpolated between samples by a
+//! parabola through three points. The error is a small share of a sample for signals
+//! well below the sampling rate, which a low-pass filter ensures.
 //!
-//! What can be compared are two measurements of one quantity: the accelerometer
-//! with the second difference of the encoder. The force is another quantity, and
-//! its lag against the motion is what damping is: a delay of the force sensor
-//! needs a known load.
+//! Only two measurements of one quantity can be compared: the accelerometer and the
+//! second difference of the encoder. The lag of the force behind the motion is an
+//! effect of damping, so the delay of the force sensor requires a known load.
 
-use super::{Acceleration, Settings, SignalError, even_step_s, prepare, second_difference};
+use super::{Acceleration, Settings, SignalError, prepare, sampling_interval_s, second_difference};
 use crate::recording::Recording;
 
-/// Corner of the filter that both go through before they are compared, Hz.
+/// Corner frequency of the filter applied to both channels, Hz.
 const CORNER_HZ: f64 = 20.0;
-/// Longest delay that is looked for, s.
-const LONGEST_S: f64 = 0.05;
-/// Samples that are enough.
-const MOST_SAMPLES: usize = 200_000;
-/// Correlation below which the two are not one quantity.
-const LEAST_CORRELATION: f64 = 0.5;
+/// Longest delay that can be found, s.
+const MAX_DELAY_S: f64 = 0.05;
+/// Number of samples that suffice.
+const MAX_SAMPLES: usize = 200_000;
+/// Below this correlation the channels do not measure the same quantity.
+const MIN_CORRELATION: f64 = 0.5;
 
-/// How late the accelerometer is against the encoder, s; positive: later. `None`
-/// if the two have little to do with one another.
+/// The delay of the accelerometer relative to the encoder, s; positive if the
+/// accelerometer is later. `None` if the two are hardly correlated.
 ///
 /// # Errors
-/// [`SignalError`] if the recording has no one sampling rate, or one below 40 Hz.
+/// [`SignalError`] if the recording is not evenly sampled, or at 40 Hz or less.
 pub fn accelerometer_s(recording: &Recording) -> Result<Option<f64>, SignalError> {
-    let step_s = even_step_s(recording)?;
+    let step_s = sampling_interval_s(recording)?;
     let smooth = prepare(
         recording,
         Settings {
@@ -38,14 +36,14 @@ pub fn accelerometer_s(recording: &Recording) -> Result<Option<f64>, SignalError
     )?;
     let encoder = second_difference(&smooth.x_mm, step_s);
     // bounded by the length of the recording
-    let most = (LONGEST_S / step_s).ceil() as usize;
-    Ok(samples(&encoder, &smooth.a_m_s2, most).map(|lag| lag * step_s))
+    let most = (MAX_DELAY_S / step_s).ceil() as usize;
+    Ok(in_samples(&encoder, &smooth.a_m_s2, most).map(|lag| lag * step_s))
 }
 
-/// By how many samples `other` is later than `reference`, at most `most` either
-/// way. `None` without a clear maximum inside.
-pub fn samples(reference: &[f64], other: &[f64], most: usize) -> Option<f64> {
-    let n = reference.len().min(other.len()).min(MOST_SAMPLES);
+/// The delay of `other` relative to `reference` in samples, between −`most` and
+/// `most`. `None` without a clear maximum of the correlation.
+pub fn in_samples(reference: &[f64], other: &[f64], most: usize) -> Option<f64> {
+    let n = reference.len().min(other.len()).min(MAX_SAMPLES);
     if most == 0 || n < 4 * most + 8 {
         return None;
     }
@@ -65,19 +63,19 @@ pub fn samples(reference: &[f64], other: &[f64], most: usize) -> Option<f64> {
     let all: Vec<f64> = (0..=2 * most).map(correlation).collect();
     let top = (0..all.len()).max_by(|a, b| all[*a].total_cmp(&all[*b]))?;
     let own: f64 = middle.iter().map(|a| a * a).sum();
-    let alike = all[top] / libm::sqrt(own);
-    // a constant gives a NaN
-    if alike.is_nan() || alike < LEAST_CORRELATION || top == 0 || top == 2 * most {
+    let maximum = all[top] / libm::sqrt(own);
+    // NaN for a constant signal
+    if maximum.is_nan() || maximum < MIN_CORRELATION || top == 0 || top == 2 * most {
         return None;
     }
-    let [before, here, after] = [all[top - 1], all[top], all[top + 1]];
-    let bend = before - 2.0 * here + after;
-    let between = if bend < 0.0 {
-        0.5 * (before - after) / bend
+    let [before, at, after] = [all[top - 1], all[top], all[top + 1]];
+    let curvature = before - 2.0 * at + after;
+    let fraction = if curvature < 0.0 {
+        0.5 * (before - after) / curvature
     } else {
         0.0
     };
-    Some(top as f64 - most as f64 + between)
+    Some(top as f64 - most as f64 + fraction)
 }
 
 #[cfg(test)]
@@ -96,22 +94,22 @@ mod tests {
     #[test]
     fn a_delay_between_samples_is_found() {
         for late in [-7.3, -0.25, 0.0, 0.4, 3.5, 12.9] {
-            let found = samples(&wave(0.0), &wave(late), 40).unwrap();
+            let found = in_samples(&wave(0.0), &wave(late), 40).unwrap();
             assert!((found - late).abs() < 0.02, "{late}: {found}");
         }
     }
 
     #[test]
-    fn what_has_no_common_course_has_no_delay() {
+    fn uncorrelated_signals_have_no_delay() {
         let mut noise = study_base::rng::Stream::new(1, &["noise"]);
         let noise: Vec<f64> = (0..4000).map(|_| noise.normal()).collect();
-        assert_eq!(samples(&wave(0.0), &noise, 40), None);
-        assert_eq!(samples(&wave(0.0), &vec![1.0; 4000], 40), None);
-        assert_eq!(samples(&[1.0, 2.0], &[1.0, 2.0], 1), None);
+        assert_eq!(in_samples(&wave(0.0), &noise, 40), None);
+        assert_eq!(in_samples(&wave(0.0), &vec![1.0; 4000], 40), None);
+        assert_eq!(in_samples(&[1.0, 2.0], &[1.0, 2.0], 1), None);
     }
 
     #[test]
-    fn a_late_accelerometer_shows_in_a_recording() {
+    fn the_delay_of_an_accelerometer_is_found() {
         let mut text = String::from("t_s,x_mm,a_m_s2,f_n\n");
         for i in 0..5000 {
             let t = f64::from(i) * 1e-3;

@@ -1,70 +1,71 @@
-//! Whether a recording tells m, b, k and F0 apart.
+//! Whether the excitation of a recording suffices to identify m, b, k and F0.
 //!
-//! In each window of x and each direction: the condition number of the matrix with
-//! the columns [a v x 1], x from the middle of the window and every column scaled
-//! to length 1. Where two columns are nearly one (on a single sine a follows from
-//! x), least squares divides what belongs together at will, and the parameters
-//! fail on another trajectory whatever their VAF on this one. A swept sine has
-//! about 5, a single sine thousands.
+//! For each window of x and each direction: the condition number of the matrix with
+//! the columns [a v x 1], with x relative to the centre of the window and every column
+//! scaled to length 1. If two columns are nearly collinear (in a single sine a follows
+//! from x), their parameters are not identifiable and fail on another trajectory,
+//! whatever the VAF on this one. A swept sine has a condition number of about 5, a
+//! single sine of thousands.
 
-use crate::recording::Recording;
+use crate::recording::{Recording, range};
 
 /// Width of a window, mm.
 pub const WINDOW_MM: f64 = 1.0;
-/// Condition number above which parameters are not to be trusted.
-pub const DOUBTFUL: f64 = 100.0;
+/// Condition number above which parameters are not identifiable.
+pub const ILL_CONDITIONED: f64 = 100.0;
 /// Windows with fewer samples are left out.
-const LEAST_SAMPLES: usize = 20;
+const MIN_SAMPLES: usize = 20;
 /// More windows than this are a mistake in units.
-const MOST_WINDOWS: f64 = 100_000.0;
-/// What a double can tell from infinite in a matrix of squares.
-const MOST_CONDITION: f64 = 1e8;
+const MAX_WINDOWS: f64 = 100_000.0;
+/// The largest condition number that the eigenvalues of a Gram matrix resolve in
+/// double precision.
+const MAX_CONDITION: f64 = 1e8;
 
-/// The condition number in one window and direction.
+/// The condition number of one window and direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// Its middle, mm.
+    /// Centre of the window, mm.
     pub x_mm: f64,
-    /// Whether of v > 0, else of v < 0.
+    /// Whether v > 0, else v < 0.
     pub positive: bool,
-    /// How many samples.
+    /// Number of samples.
     pub samples: usize,
-    /// From 1; at most 1e8, which stands for more.
+    /// Condition number, at least 1; saturates at 1e8, the limit of double precision.
     pub condition: f64,
 }
 
 /// The windows of a recording, ascending in x, + before −.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
-    /// Those with enough samples.
+    /// The windows with at least 20 samples.
     pub windows: Vec<Window>,
 }
 
 impl Excitation {
-    /// Looks at a recording in windows of [`WINDOW_MM`].
+    /// Analyzes a recording in windows of [`WINDOW_MM`].
     pub fn of(recording: &Recording) -> Self {
         let [low, high] = recording.range_mm();
         let first = (low / WINDOW_MM).floor();
-        let count = ((high / WINDOW_MM).floor() - first + 1.0).min(MOST_WINDOWS);
-        // at most MOST_WINDOWS, so the cast is exact
+        let count = ((high / WINDOW_MM).floor() - first + 1.0).min(MAX_WINDOWS);
+        // at most MAX_WINDOWS, so the cast is exact
         let mut sums = vec![[Gram::default(); 2]; count as usize];
         for i in 0..recording.len() {
             let (x, v) = (recording.x_mm[i], recording.v_mm_s[i]);
             if v == 0.0 {
                 continue;
             }
-            let place = (x / WINDOW_MM).floor() - first;
-            let Some(window) = sums.get_mut(place as usize) else {
+            let index = (x / WINDOW_MM).floor() - first;
+            let Some(window) = sums.get_mut(index as usize) else {
                 continue;
             };
-            let middle = (first + place + 0.5) * WINDOW_MM;
-            window[usize::from(v < 0.0)].add([recording.a_m_s2[i], v, x - middle, 1.0]);
+            let centre = (first + index + 0.5) * WINDOW_MM;
+            window[usize::from(v < 0.0)].add([recording.a_m_s2[i], v, x - centre, 1.0]);
         }
         let windows = sums
             .iter()
             .enumerate()
-            .flat_map(|(place, both)| {
-                let x_mm = (first + place as f64 + 0.5) * WINDOW_MM;
+            .flat_map(|(index, both)| {
+                let x_mm = (first + index as f64 + 0.5) * WINDOW_MM;
                 [(true, both[0]), (false, both[1])].map(|(positive, gram)| Window {
                     x_mm,
                     positive,
@@ -72,46 +73,46 @@ impl Excitation {
                     condition: gram.condition(),
                 })
             })
-            .filter(|window| window.samples >= LEAST_SAMPLES)
+            .filter(|window| window.samples >= MIN_SAMPLES)
             .collect();
         Self { windows }
     }
 
-    /// The middle one of all condition numbers; `None` without windows.
+    /// The median of the condition numbers; `None` without windows.
     pub fn median(&self) -> Option<f64> {
         let mut all: Vec<f64> = self.windows.iter().map(|w| w.condition).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied()
     }
 
-    /// The window with the largest.
+    /// The window with the largest condition number; `None` without windows.
     pub fn worst(&self) -> Option<Window> {
         let by = |a: &&Window, b: &&Window| a.condition.total_cmp(&b.condition);
         self.windows.iter().max_by(by).copied()
     }
 
-    /// Share of the windows above [`DOUBTFUL`], 0 to 1.
-    pub fn doubtful_share(&self) -> f64 {
-        let doubtful = self
+    /// The share of windows above [`ILL_CONDITIONED`], 0 to 1.
+    pub fn ill_conditioned_share(&self) -> f64 {
+        let above = self
             .windows
             .iter()
-            .filter(|w| w.condition > DOUBTFUL)
+            .filter(|w| w.condition > ILL_CONDITIONED)
             .count();
-        doubtful as f64 / self.windows.len().max(1) as f64
+        above as f64 / self.windows.len().max(1) as f64
     }
 
-    /// One sentence if the parameters of half of the windows are not to be trusted.
+    /// A warning if the parameters are not identifiable in half of the windows.
     pub fn warning(&self) -> Option<String> {
         let median = self.median()?;
-        (median > DOUBTFUL).then(|| {
+        (median > ILL_CONDITIONED).then(|| {
             format!(
-                "a, v and x hardly move independently: the condition number of [a v x 1] has a median of {median:.0} (above {DOUBTFUL}): m, b and k cannot be told apart; record a swept sine, or leave m or k out"
+                "m, b and k are not identifiable, because a, v and x hardly vary independently: the median condition number of [a v x 1] is {median:.0}, above {ILL_CONDITIONED}; record a swept sine"
             )
         })
     }
 }
 
-/// Sums of products of the columns.
+/// The Gram matrix of the columns.
 #[derive(Debug, Clone, Copy, Default)]
 struct Gram {
     samples: usize,
@@ -128,34 +129,25 @@ impl Gram {
         }
     }
 
-    /// Of the matrix with columns of length 1: the root of the ratio of the
-    /// extreme eigenvalues of its products.
+    /// The condition number of the matrix with columns of length 1: the square root of
+    /// the ratio of the extreme eigenvalues of its Gram matrix.
     fn condition(&self) -> f64 {
         let length: [f64; 4] = std::array::from_fn(|i| libm::sqrt(self.sums[i][i]));
         if !length.iter().all(|l| *l > 0.0) {
-            return MOST_CONDITION;
+            return MAX_CONDITION;
         }
         let scaled = std::array::from_fn(|i| {
             std::array::from_fn(|j| self.sums[i][j] / (length[i] * length[j]))
         });
-        let values = eigenvalues(scaled);
-        let [low, high] = extremes(&values);
-        if low <= high / (MOST_CONDITION * MOST_CONDITION) {
-            return MOST_CONDITION;
+        let [low, high] = range(&eigenvalues(scaled));
+        if low <= high / (MAX_CONDITION * MAX_CONDITION) {
+            return MAX_CONDITION;
         }
         libm::sqrt(high / low)
     }
 }
 
-fn extremes(values: &[f64]) -> [f64; 2] {
-    values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-            [low.min(*v), high.max(*v)]
-        })
-}
-
-/// Eigenvalues of a symmetric matrix by Jacobi's rotations.
+/// The eigenvalues of a symmetric matrix by Jacobi rotations.
 fn eigenvalues(mut m: [[f64; 4]; 4]) -> [f64; 4] {
     for _ in 0..30 {
         let off: f64 = (0..4)

@@ -1,32 +1,38 @@
-//! A second-order Butterworth low-pass, run forward and backward.
+//! A zero-phase low-pass filter: second-order Butterworth, forward and backward.
 //!
-//! What scipy's `butter(2, corner, fs=rate)` and `filtfilt` do: bilinear transform
-//! with the corner prewarped; the signal is extended at both ends by its own
-//! points, turned about the end, and each pass begins in the steady state of its
-//! first value. Forward and backward together: no delay, the gain squared, so half
-//! of the amplitude (−6 dB) at the corner.
+//! The filter of scipy's `butter(2, corner, fs=rate)` and `filtfilt`: bilinear
+//! transform with prewarping; the signal is extended at both ends by odd reflection,
+//! and each pass starts in the steady state of its first value. Forward and backward
+//! passes together have no delay and the squared gain, so half of the amplitude
+//! (−6 dB) remains at the corner frequency.
 //!
-//! The extension is longer than scipy's 9 samples where the corner is far below
-//! the rate: at 10 kHz and 30 Hz nine samples are no time for a transient to fade.
+//! The extension is longer than scipy's 9 samples if the corner frequency is far below
+//! the sampling rate: at 10 kHz and 30 Hz a transient does not decay in 9 samples.
 
 use super::SignalError;
 use std::f64::consts::{PI, SQRT_2};
 
-/// scipy's own `padlen` for a filter of this order.
-const LEAST_PAD: usize = 9;
+/// scipy's default `padlen` for a filter of this order.
+const MIN_PAD: usize = 9;
 
-/// The filter.
+/// What recordings and model files say about a signal that was filtered at
+/// `corner_hz`.
+pub fn description(corner_hz: f64) -> String {
+    format!("zero-phase low-pass, Butterworth of 2nd order both ways, at {corner_hz} Hz")
+}
+
+/// A zero-phase low-pass filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowPass {
     b: [f64; 3],
     /// a1 and a2; a0 is 1.
     a: [f64; 2],
-    /// Samples that a signal is extended by.
+    /// Length of the extension at each end, samples.
     pad: usize,
 }
 
 impl LowPass {
-    /// A filter with its corner at `corner_hz` for signals sampled at `rate_hz`.
+    /// A filter with the corner frequency `corner_hz` for signals sampled at `rate_hz`.
     ///
     /// # Errors
     /// [`SignalError::Corner`] unless 0 < corner < rate/2.
@@ -43,20 +49,13 @@ impl LowPass {
                 2.0 * (k * k - 1.0) * norm,
                 (1.0 - SQRT_2 * k + k * k) * norm,
             ],
-            // one period of the corner; the transient is at e^-4 there
-            pad: ((rate_hz / corner_hz).ceil().min(1e6) as usize).max(LEAST_PAD),
+            // one period of the corner frequency, after which a transient is at e^-4
+            pad: ((rate_hz / corner_hz).ceil().min(1e6) as usize).max(MIN_PAD),
         })
     }
 
-    /// The same with another extension, for comparison with scipy's `padlen`.
-    #[must_use]
-    pub fn padded_by(self, pad: usize) -> Self {
-        Self { pad, ..self }
-    }
-
-    /// The signal without what is above the corner, not delayed. A signal of one
-    /// sample comes back as it is.
-    pub fn both_ways(&self, signal: &[f64]) -> Vec<f64> {
+    /// The filtered signal, without delay. A signal of one sample is returned unchanged.
+    pub fn zero_phase(&self, signal: &[f64]) -> Vec<f64> {
         let n = signal.len();
         if n < 2 {
             return signal.to_vec();
@@ -74,14 +73,14 @@ impl LowPass {
         extended
     }
 
-    /// One pass, from the steady state of the first value (direct form II
+    /// One pass, starting in the steady state of the first value (direct form II
     /// transposed).
     fn pass<'s>(&self, signal: impl Iterator<Item = &'s mut f64>) {
         let ([b0, b1, b2], [a1, a2]) = (self.b, self.a);
         let mut state: Option<[f64; 2]> = None;
         for value in signal {
             let x = *value;
-            // of a constant x with y = x: z1 = x − b0·x, z2 = b2·x − a2·x
+            // the steady state y = x for constant x: z1 = x − b0·x, z2 = b2·x − a2·x
             let [z1, z2] = state.unwrap_or([(1.0 - b0) * x, (b2 - a2) * x]);
             let y = b0 * x + z1;
             state = Some([b1 * x - a1 * y + z2, b2 * x - a2 * y]);
@@ -116,14 +115,15 @@ mod tests {
     }
 
     /// Reference: scipy 1.17.1, `signal.filtfilt(*butter(2, 30, fs=1000), x)`, with
-    /// its own padlen of 9 and with padlen=34 (one period of the corner); 1e-12.
+    /// its default padlen of 9 and with padlen=34 (one period of the corner frequency);
+    /// 1e-12.
     #[test]
-    fn both_ways_is_filtfilt() {
-        let places = [0, 1, 7, 20, 38, 39];
+    fn the_result_is_that_of_filtfilt() {
+        let indices = [0, 1, 7, 20, 38, 39];
         let filter = LowPass::new(30.0, 1000.0).unwrap();
         for (filter, expected) in [
             (
-                filter.padded_by(9),
+                LowPass { pad: 9, ..filter },
                 [
                     -0.11043960516167856,
                     0.11946492704352034,
@@ -145,13 +145,10 @@ mod tests {
                 ],
             ),
         ] {
-            let found = filter.both_ways(&signal());
-            for (place, expected) in places.into_iter().zip(expected) {
-                let found: f64 = found[place];
-                assert!(
-                    (found - expected).abs() < 1e-12,
-                    "{place}: {found} {expected}"
-                );
+            let found = filter.zero_phase(&signal());
+            for (i, expected) in indices.into_iter().zip(expected) {
+                let found: f64 = found[i];
+                assert!((found - expected).abs() < 1e-12, "{i}: {found} {expected}");
             }
         }
     }
@@ -161,7 +158,7 @@ mod tests {
         let filter = LowPass::new(30.0, 10_000.0).unwrap();
         let line: Vec<f64> = (0..5000).map(|i| 3.0 + 0.01 * f64::from(i)).collect();
         // away from the ends, where the filter starts from rest
-        let found = filter.both_ways(&line);
+        let found = filter.zero_phase(&line);
         for i in 1000..4000 {
             assert!(
                 (found[i] - line[i]).abs() < 1e-6,
@@ -170,9 +167,9 @@ mod tests {
                 line[i]
             );
         }
-        assert_eq!(filter.both_ways(&[4.0]), [4.0]);
-        assert!(filter.both_ways(&[]).is_empty());
-        let two = filter.both_ways(&[1.0, 1.0]);
+        assert_eq!(filter.zero_phase(&[4.0]), [4.0]);
+        assert!(filter.zero_phase(&[]).is_empty());
+        let two = filter.zero_phase(&[1.0, 1.0]);
         assert!(two.iter().all(|y| (y - 1.0).abs() < 1e-12));
     }
 
@@ -181,7 +178,7 @@ mod tests {
         let filter = LowPass::new(30.0, 1000.0).unwrap();
         let wave = |t: f64| (std::f64::consts::TAU * 30.0 * t).sin();
         let x: Vec<f64> = (0..4000).map(|i| wave(f64::from(i) * 1e-3)).collect();
-        let y = filter.both_ways(&x);
+        let y = filter.zero_phase(&x);
         for i in 1000..3000 {
             assert!((y[i] - 0.5 * x[i]).abs() < 1e-6, "{i}");
         }

@@ -1,23 +1,23 @@
-//! Dwells: stretches of time at one place.
+//! Thinning of dwells: intervals in which the position does not change.
 //!
-//! The recursion along x forgets with every sample, also with those that come from
-//! one place and say nothing new: a long rest blows its covariance up and wipes
-//! out what was known. So of every stretch that stays within a few encoder counts
-//! only a few samples are kept, spread evenly over it.
+//! The recursion along x forgets with every sample, also with samples of a dwell that
+//! carry no new information: a long dwell inflates the covariance and erases earlier
+//! estimates. Of every interval within a few encoder counts, only a few samples are
+//! therefore kept, evenly spaced in time.
 
 use crate::recording::Recording;
 
-/// What a dwell is and how much of it is kept.
+/// The definition of a dwell and how much of it is kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dwell {
-    /// A stretch lasts as long as x stays this near to where it began, mm.
+    /// A dwell lasts as long as x stays this close to its first position, mm.
     pub within_mm: f64,
-    /// Most samples that are kept of it.
+    /// Most samples kept of a dwell.
     pub keep: usize,
 }
 
 impl Default for Dwell {
-    /// Two counts of a 5 µm encoder; eight samples.
+    /// Within two counts of a 5 µm encoder; eight samples are kept.
     fn default() -> Self {
         Self {
             within_mm: 0.01,
@@ -26,8 +26,8 @@ impl Default for Dwell {
     }
 }
 
-/// The recording without most of its dwells, and how many samples went. At least
-/// one sample of a stretch is kept; time then has gaps, so filter before.
+/// The recording without most samples of its dwells, and the number of samples removed.
+/// At least one sample of a dwell is kept. Filter first: the result has gaps in time.
 pub fn thin(recording: &Recording, dwell: Dwell) -> (Recording, usize) {
     let x = &recording.x_mm;
     let most = dwell.keep.max(1);
@@ -36,31 +36,21 @@ pub fn thin(recording: &Recording, dwell: Dwell) -> (Recording, usize) {
     while from < x.len() {
         let length = x[from..]
             .iter()
-            .take_while(|there| (*there - x[from]).abs() <= dwell.within_mm)
+            .take_while(|later| (*later - x[from]).abs() <= dwell.within_mm)
             .count()
             .max(1);
         let few = length.min(most);
         kept.extend((0..few).map(|i| from + i * length / few));
         from += length;
     }
-    let gone = x.len() - kept.len();
-    let pick = |column: &[f64]| kept.iter().map(|i| column[*i]).collect();
-    let thinned = Recording {
-        t_s: pick(&recording.t_s),
-        x_mm: pick(&recording.x_mm),
-        v_mm_s: pick(&recording.v_mm_s),
-        a_m_s2: pick(&recording.a_m_s2),
-        f_n: pick(&recording.f_n),
-        ..recording.clone()
-    };
-    (thinned, gone)
+    (recording.select(&kept), x.len() - kept.len())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Up, a rest of `rest` samples with a flickering count, down.
+    /// Up, a dwell of `rest` samples with a flickering count, down.
     fn recording(rest: usize) -> Recording {
         let up = (0..100).map(f64::from);
         let still = (0..rest).map(|i| 100.0 + if i % 2 == 0 { 0.0 } else { 0.005 });
@@ -73,9 +63,9 @@ mod tests {
     }
 
     #[test]
-    fn a_rest_is_thinned_and_a_motion_is_not() {
-        let (thinned, gone) = thin(&recording(1000), Dwell::default());
-        assert_eq!(gone, 992);
+    fn a_dwell_is_thinned_and_a_motion_is_not() {
+        let (thinned, removed) = thin(&recording(1000), Dwell::default());
+        assert_eq!(removed, 992);
         assert_eq!(thinned.len(), 208);
         let rest: Vec<f64> = thinned.t_s[100..108].to_vec();
         assert_eq!(
@@ -86,9 +76,9 @@ mod tests {
     }
 
     #[test]
-    fn without_a_rest_nothing_goes() {
+    fn without_a_dwell_nothing_is_removed() {
         let moving = recording(3);
-        let (thinned, gone) = thin(&moving, Dwell::default());
-        assert_eq!((gone, thinned), (0, moving));
+        let (thinned, removed) = thin(&moving, Dwell::default());
+        assert_eq!((removed, thinned), (0, moving));
     }
 }

@@ -1,4 +1,4 @@
-//! Parts and ceilings with known answers.
+//! Validation of synthetic recordings with known results.
 
 use super::*;
 use crate::identify::Training;
@@ -24,7 +24,7 @@ fn switch(x: f64, v: f64) -> f64 {
 }
 
 #[test]
-fn detents_lie_between_the_places_that_push_away() {
+fn detents_lie_between_crests() {
     let r = recording("r", |_, x, v| switch(x, v));
     let found = detents(&r);
     assert_eq!(found.len(), 3, "{found:?}");
@@ -45,13 +45,13 @@ fn parts_add_up_and_a_constant_error_is_in_the_nrmse_only() {
     let off = validate(&found.realization, &shifted, &detents(&r)).unwrap();
     assert!((off.whole.vaf - plain.whole.vaf).abs() < 1e-9);
     assert!((off.whole.bias_n - plain.whole.bias_n - 1.5).abs() < 1e-9);
-    let sd = vaf::variance(&shifted.f_n).sqrt();
+    let sd = mean_and_variance(&shifted.f_n).1.sqrt();
     let expected = (off.whole.residual_n.powi(2) + off.whole.bias_n.powi(2)).sqrt() / sd;
     assert!((off.whole.nrmse - expected).abs() < 1e-12);
     // σ_F √(1 − VAF)
     let residual = sd * (1.0 - off.whole.vaf).sqrt();
     assert!((residual - off.whole.residual_n).abs() < 1e-9);
-    let of = |part: Option<Part>| part.unwrap().samples;
+    let of = |part: Option<Accuracy>| part.unwrap().samples;
     let detents: usize = plain.detents.iter().map(|(_, part)| of(*part)).sum();
     assert_eq!(detents, r.len());
     let still = r.v_mm_s.iter().filter(|v| **v == 0.0).count();
@@ -60,7 +60,7 @@ fn parts_add_up_and_a_constant_error_is_in_the_nrmse_only() {
 
 #[test]
 fn the_ceiling_of_a_repetition_is_its_noise() {
-    // ±0.2 N, independent of one another: the noise of one is 0.2 N
+    // independent, ±0.2 N: the noise of each recording is 0.2 N
     let noise = |seed: usize| {
         move |i: usize| {
             let mut h = (i + seed).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -74,7 +74,7 @@ fn the_ceiling_of_a_repetition_is_its_noise() {
     let b = recording("b", |i, x, v| switch(x, v) + two(i));
     let found = ceiling(&a, &b).unwrap();
     assert!((found.noise_n - 0.2).abs() < 0.01, "{found:?}");
-    let expected = 1.0 - 0.04 / vaf::variance(&a.f_n);
+    let expected = 1.0 - 0.04 / mean_and_variance(&a.f_n).1;
     assert!((found.vaf - expected).abs() < 1e-3, "{found:?} {expected}");
     assert!(found.apart_mm < 1e-12);
 }

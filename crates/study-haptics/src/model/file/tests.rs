@@ -43,7 +43,7 @@ fn faults(from: &str, to: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_model_file_is_read_as_it_says() {
+fn a_model_file_is_read() {
     let (realization, findings) = parse("a.toml", SMALL);
     assert_eq!(findings.faults, []);
     let r = realization.unwrap();
@@ -158,7 +158,7 @@ fn every_fault_has_its_line() {
 }
 
 #[test]
-fn a_newer_format_is_refused_by_its_number_alone() {
+fn a_newer_format_is_refused_without_further_faults() {
     let newer = "study-model/2\"\ncolour = \"red";
     assert_eq!(
         faults("study-model/1", newer),
@@ -169,7 +169,7 @@ fn a_newer_format_is_refused_by_its_number_alone() {
 }
 
 #[test]
-fn text_that_is_no_toml_or_empty_is_a_fault_and_no_panic() {
+fn invalid_toml_and_empty_text_are_faults() {
     for text in ["", "\0", "x_mm = [", "x_mm = 1\nx_mm = 2", "[[positive]]"] {
         let (realization, findings) = parse("a.toml", text);
         assert!(realization.is_none() && findings.has_errors(), "{text:?}");
@@ -177,7 +177,7 @@ fn text_that_is_no_toml_or_empty_is_a_fault_and_no_panic() {
 }
 
 #[test]
-fn names_of_recordings_in_any_language_survive() {
+fn names_of_recordings_may_contain_any_characters() {
     let (realization, _) = parse("a.toml", SMALL);
     let mut r = realization.unwrap();
     for name in ["a.b", "", "ü 1", "a\"b\\c\u{1b}\n", "\u{202e}x"] {
@@ -210,7 +210,7 @@ fn branches(nodes: usize) -> impl Strategy<Value = Branch> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn whatever_is_written_reads_back_as_the_same(
+    fn every_realization_is_read_back_as_it_was_written(
         (x0, dx, positive, negative) in (2usize..20).prop_flat_map(|n| (
             -50.0f64..50.0,
             prop::collection::vec(1e-9f64..3.0, n),

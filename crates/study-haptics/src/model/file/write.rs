@@ -1,20 +1,20 @@
 //! The text of a model file.
 
-use super::{FORMAT, PARAMETERS, lookup_word};
+use super::{FORMAT, PARAMETERS, lookup_name};
 use crate::model::{Branch, Realization};
 use std::fmt::Write as _;
 use study_wire::predict::Direction;
 
-/// Numbers of a list that stand on one line.
-const ON_A_LINE: usize = 6;
+/// Numbers of a list per line.
+const PER_LINE: usize = 6;
 
-/// The model file of a realization.
+/// The text of a model file.
 pub fn write(realization: &Realization) -> String {
     let r = realization;
     let mut out = Text::default();
     out.text("format", FORMAT);
     out.text("id", &r.id);
-    out.text("lookup", lookup_word(r.lookup));
+    out.text("lookup", lookup_name(r.lookup));
     let direction = match r.direction {
         Direction::Sign => "{ rule = \"sign\" }".to_owned(),
         Direction::Play { delta_mm } => format!("{{ rule = \"play\", delta_mm = {delta_mm:?} }}"),
@@ -83,13 +83,13 @@ impl Text {
     }
 
     fn number(&mut self, key: &str, value: f64) {
-        // {:?} has the fewest digits that read back, and a point or an exponent
+        // {:?} gives the fewest digits that read back, and a point or an exponent
         self.raw(key, &format!("{value:?}"));
     }
 
     fn list(&mut self, key: &str, values: &[f64]) {
         let lines: Vec<String> = values
-            .chunks(ON_A_LINE)
+            .chunks(PER_LINE)
             .map(|line| {
                 let numbers: Vec<String> = line.iter().map(|v| format!("{v:?}")).collect();
                 format!("  {},\n", numbers.join(", "))
@@ -116,7 +116,7 @@ impl Text {
     }
 }
 
-/// A basic string of TOML: escapes what it demands, and what could hide.
+/// A basic TOML string, with invisible and control characters escaped.
 fn quoted(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 2);
     out.push('"');
@@ -134,7 +134,7 @@ fn quoted(text: &str) -> String {
     out
 }
 
-/// A key, bare where TOML allows it.
+/// A key, bare if TOML allows it.
 fn key(name: &str) -> String {
     let bare = !name.is_empty()
         && name

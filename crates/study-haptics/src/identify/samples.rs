@@ -1,0 +1,102 @@
+//! The samples of one direction of travel, and the parameter vector.
+
+use crate::recording::{Recording, range};
+
+/// A parameter vector θ in the order m (kg), b (N·s/mm), k (N/mm), F0 (N).
+pub type Theta = [f64; 4];
+
+/// P(0) of every recursion is this multiple of the identity matrix; its inverse is
+/// the prior of the direct solutions.
+pub(super) const INITIAL_COVARIANCE: f64 = 1e6;
+
+/// The samples of one direction of travel in ascending order of x; samples at the
+/// same x keep their order in time. All columns are equally long.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Samples {
+    /// Position, mm, ascending.
+    pub x_mm: Vec<f64>,
+    /// Velocity, mm/s, all of one sign.
+    pub v_mm_s: Vec<f64>,
+    /// Acceleration, m/s².
+    pub a_m_s2: Vec<f64>,
+    /// Force, N.
+    pub f_n: Vec<f64>,
+}
+
+impl Samples {
+    /// The samples of `recording` whose velocity satisfies `belongs`.
+    pub(super) fn of(recording: &Recording, belongs: impl Fn(f64) -> bool) -> Self {
+        let mut order: Vec<usize> = (0..recording.len())
+            .filter(|i| belongs(recording.v_mm_s[*i]))
+            .collect();
+        // stable: ties keep their order in time
+        order.sort_by(|a, b| recording.x_mm[*a].total_cmp(&recording.x_mm[*b]));
+        let r = recording;
+        Self::pick([&r.x_mm, &r.v_mm_s, &r.a_m_s2, &r.f_n], &order)
+    }
+
+    fn pick(columns: [&[f64]; 4], order: &[usize]) -> Self {
+        let [x_mm, v_mm_s, a_m_s2, f_n] =
+            columns.map(|column| order.iter().map(|i| column[*i]).collect());
+        Self {
+            x_mm,
+            v_mm_s,
+            a_m_s2,
+            f_n,
+        }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.x_mm.len()
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.x_mm.is_empty()
+    }
+
+    /// Lowest and highest position, mm; `None` without samples.
+    pub fn range_mm(&self) -> Option<[f64; 2]> {
+        (!self.is_empty()).then(|| range(&self.x_mm))
+    }
+
+    /// The samples in another order, given as indices.
+    pub(super) fn reordered(&self, order: &[usize]) -> Self {
+        Self::pick([&self.x_mm, &self.v_mm_s, &self.a_m_s2, &self.f_n], order)
+    }
+
+    /// Indices in descending order of x; samples at the same x keep their order in
+    /// time.
+    pub(super) fn descending(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.len()).collect();
+        order.sort_by(|a, b| self.x_mm[*b].total_cmp(&self.x_mm[*a]));
+        order
+    }
+
+    /// The memory L = 1 / ((1 − λ) ρ) of a forgetting factor, mm, with ρ samples per
+    /// mm; `None` if it is unlimited (λ = 1) or there are no samples.
+    pub fn memory_mm(&self, lambda: f64) -> Option<f64> {
+        let [low, high] = self.range_mm()?;
+        let per_mm = self.len() as f64 / (high - low);
+        (lambda < 1.0).then(|| 1.0 / ((1.0 - lambda) * per_mm))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_is_a_length_and_without_forgetting_unlimited() {
+        // 200 samples over 19.9 mm
+        let samples = Samples {
+            x_mm: (0..200).map(|i| 0.1 * f64::from(i)).collect(),
+            ..Samples::default()
+        };
+        let memory_mm = samples.memory_mm(0.99).unwrap();
+        assert!((memory_mm - 19.9 / 200.0 * 100.0).abs() < 1e-9);
+        assert_eq!(samples.memory_mm(1.0), None);
+        assert_eq!(Samples::default().memory_mm(0.99), None);
+    }
+}
