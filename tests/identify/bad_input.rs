@@ -1,5 +1,5 @@
-//! `study identify` on recordings that are not what they should be: one clear error,
-//! or a warning beside the table; never a panic, never a silent table.
+//! `study identify` on invalid or doubtful recordings: one clear error, or a warning with
+//! the table.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
@@ -11,7 +11,7 @@ use study_haptics::recording;
 
 const NAMES: &str = "t_s,x_mm,v_mm_s,a_m_s2,f_n";
 
-/// t, x, v, a, F of a made-up switch, 4 s at 500 Hz.
+/// t, x, v, a, F of a synthetic switch, 4 s at 500 Hz.
 fn rows(sines: &[(f64, f64)]) -> Vec<[f64; 5]> {
     (0..2000)
         .map(|i| {
@@ -70,14 +70,14 @@ fn identify(training: &str, more: &[&str]) -> (i32, String, String) {
     )
 }
 
-/// An error of the input, and no table.
+/// Expects an input error and no table.
 fn refused(training: &str, said: &str) {
     let (code, out, err) = identify(training, &[]);
     assert_eq!((code, out.as_str()), (1, ""), "{err}");
     assert!(err.contains(said), "{said:?} in {err}");
 }
 
-/// A table, and a warning beside it, also in the JSON document.
+/// Expects a table and a warning, also in the JSON document.
 fn warned(training: &str, said: &str) {
     let (code, out, err) = identify(training, &[]);
     assert_eq!(code, 0, "{err}");
@@ -100,18 +100,18 @@ fn a_good_recording_has_no_warning() {
 }
 
 #[test]
-fn gaps_are_warned_of_and_cannot_be_filtered() {
+fn gaps_give_a_warning_and_cannot_be_filtered() {
     let mut rows = training();
     rows.drain(300..420);
     let gappy = text(NAMES, &rows);
-    warned(&gappy, "1 gaps in time, the longest 0.2420 s");
+    warned(&gappy, "1 gap in time, the longest 0.2420 s");
     let (code, out, err) = identify(&gappy, &["--filter", "30"]);
     assert_eq!((code, out.as_str()), (1, ""), "{err}");
     assert!(err.contains("gap"), "{err}");
 }
 
 #[test]
-fn what_is_no_number_is_refused_with_its_line() {
+fn a_value_that_is_not_finite_is_refused_with_its_line() {
     for (value, said) in [
         (
             f64::NAN,
@@ -130,7 +130,7 @@ fn what_is_no_number_is_refused_with_its_line() {
 }
 
 #[test]
-fn a_constant_column_is_refused_or_warned_of() {
+fn a_constant_column_is_refused_or_gives_a_warning() {
     let constant = |column: usize| {
         let mut rows = training();
         for row in &mut rows {
@@ -160,7 +160,7 @@ fn one_direction_is_refused() {
 }
 
 #[test]
-fn metres_are_refused_and_a_wrong_unit_of_velocity_is_warned_of() {
+fn metres_are_refused_and_a_wrong_unit_of_velocity_gives_a_warning() {
     let scaled = |column: usize, factor: f64| {
         let mut rows = training();
         for row in &mut rows {
@@ -175,7 +175,7 @@ fn metres_are_refused_and_a_wrong_unit_of_velocity_is_warned_of() {
 }
 
 #[test]
-fn swapped_columns_do_not_fit_together() {
+fn swapped_columns_are_refused_or_give_a_warning() {
     for (names, column) in [
         ("t_s,x_mm,a_m_s2,v_mm_s,f_n", "v_mm_s"),
         ("t_s,f_n,v_mm_s,a_m_s2,x_mm", "v_mm_s"),
@@ -192,10 +192,10 @@ fn swapped_columns_do_not_fit_together() {
     );
 }
 
-/// Without v and a nothing has a scale; what is left to tell is how position and force
-/// move, in every recording that is here.
+/// Without v and a only the courses of position and force tell; checked on every recording
+/// of the repository.
 #[test]
-fn position_and_force_in_each_others_columns_are_doubted_and_no_right_recording_is() {
+fn swapped_position_and_force_give_a_warning_and_correct_recordings_do_not() {
     for name in [
         "recordings/training_a.csv",
         "recordings/validation_a.csv",
@@ -203,7 +203,7 @@ fn position_and_force_in_each_others_columns_are_doubted_and_no_right_recording_
     ] {
         let file = fs::File::open(format!("tests/data/{name}")).unwrap();
         let whole = recording::read(name, std::io::BufReader::new(file)).unwrap();
-        let doubts = |x_mm: &[f64], f_n: &[f64]| {
+        let warnings = |x_mm: &[f64], f_n: &[f64]| {
             let mut bytes = Vec::from("t_s,x_mm,f_n\n");
             for ((t, x), f) in whole.t_s.iter().zip(x_mm).zip(f_n) {
                 bytes.extend(format!("{t},{x},{f}\n").bytes());
@@ -212,8 +212,8 @@ fn position_and_force_in_each_others_columns_are_doubted_and_no_right_recording_
             let said = read.warnings.iter().map(ToString::to_string);
             said.filter(|w| w.contains("seem to be swapped")).count()
         };
-        assert_eq!(doubts(&whole.x_mm, &whole.f_n), 0, "{name}");
-        assert_eq!(doubts(&whole.f_n, &whole.x_mm), 1, "{name}");
+        assert_eq!(warnings(&whole.x_mm, &whole.f_n), 0, "{name}");
+        assert_eq!(warnings(&whole.f_n, &whole.x_mm), 1, "{name}");
     }
     let rows: Vec<[f64; 5]> = training();
     let names = "t_s,x_mm,ignored,unused,f_n";
@@ -233,7 +233,7 @@ fn one_row_or_none_is_refused() {
     refused(&lines(2), "1 rows: a recording has at least 3");
     refused(&lines(1), "0 rows: a recording has at least 3");
     refused("", "the file ends before a line of column names");
-    // three rows are a recording, and no stroke
+    // three rows are a valid recording, but not a stroke
     let (code, out, err) = identify(&lines(4), &[]);
     assert_eq!((code, out.as_str()), (1, ""), "{err}");
 }
@@ -271,7 +271,7 @@ fn factors_and_increments_out_of_range_are_refused() {
             assert!(err.contains(said), "{given}: {err}");
         }
     }
-    // the smallest and the largest λ that there are
+    // the extremes of λ
     for lambda in ["1e-9", "1"] {
         let (code, out, err) = identify(&good, &["--lambda", lambda]);
         assert!(code == 0 && out.contains("VAF") || code == 1, "{err}");

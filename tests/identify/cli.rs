@@ -1,4 +1,4 @@
-//! `study identify` as somebody types it.
+//! The command `study identify`.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
@@ -71,7 +71,7 @@ fn json_has_a_cell_for_every_lambda_and_dx_with_unrounded_vaf() {
 }
 
 #[test]
-fn the_table_names_the_best_cell_and_what_it_was_chosen_on() {
+fn the_table_marks_the_best_cell_and_names_the_recording_used_for_selection() {
     identify(&[
         TRAINING,
         "--validate",
@@ -91,7 +91,7 @@ fn the_table_names_the_best_cell_and_what_it_was_chosen_on() {
 }
 
 #[test]
-fn a_recording_is_not_validated_on_itself_even_under_another_name() {
+fn a_copy_of_the_training_recording_is_refused_for_validation() {
     let dir = tempfile::tempdir().unwrap();
     let copy = dir.path().join("other.csv");
     fs::copy(TRAINING, &copy).unwrap();
@@ -110,7 +110,7 @@ fn a_recording_is_not_validated_on_itself_even_under_another_name() {
 }
 
 #[test]
-fn a_model_file_is_written_once_and_overwritten_only_when_asked() {
+fn a_model_file_is_overwritten_only_with_force() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("models");
     let out = out.to_str().unwrap();
@@ -212,11 +212,11 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
     refused(
         &[TRAINING, "--validate", &format!("v={path}")],
         1,
-        "ragged.csv: line 3: 2 fields where the columns are 3",
+        "ragged.csv: line 3: 2 fields, but there are 3 columns",
     );
 }
 
-/// Every figure as SVG, as PNG and as numbers.
+/// SVG, PNG and CSV.
 #[test]
 fn each_figure_comes_in_three_files() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! How much better than the paper's cell: on the recordings of switch A, and on
-//! random simulated switches. All figures are of the simulation.
+//! The accuracy of the estimators compared with the paper's best cell, on the recordings
+//! of switch A and on random simulated switches.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
@@ -34,9 +34,9 @@ fn hat(state: State, bounded: bool) -> Method {
     })
 }
 
-/// The column A of the table in docs/estimators.md, dx = 0.5 mm.
+/// Column A of the table in docs/estimators.md, dx = 0.5 mm.
 #[test]
-fn on_switch_a_each_method_predicts_what_it_is_known_for() {
+fn on_switch_a_each_method_reaches_its_known_vaf() {
     let (train, validation) = (recording("training_a"), recording("validation_a"));
     let training = Training::new(&train).unwrap();
     let of = |method| vaf_of(&training, &validation, method);
@@ -47,7 +47,7 @@ fn on_switch_a_each_method_predicts_what_it_is_known_for() {
             bounded,
         })
     };
-    // (method, VAF that the prototype found, how far ours may be from it)
+    // (method, VAF by the prototype, tolerance)
     for (method, known, within) in [
         (paper(0.999), 0.951, 0.001),
         (exponential(true), 0.991, 0.002),
@@ -70,8 +70,8 @@ fn on_switch_a_each_method_predicts_what_it_is_known_for() {
     assert!(left > 10.0 * best, "{left} {best}");
 }
 
-/// How many times less of the variance the hat table with a direction state leaves
-/// than the paper's cell, on random switch `i`.
+/// The ratio of the unexplained variance of the paper's cell to that of the hat table
+/// with a direction state, on a random switch.
 fn factor(switch: u64, seconds: [f64; 2], lambda: f64) -> f64 {
     let parameters = crate::switches::random_switch(switch);
     let mut noise = Stream::new(switch + 2, &["bench"]);
@@ -95,8 +95,8 @@ fn factor(switch: u64, seconds: [f64; 2], lambda: f64) -> f64 {
     left(paper(lambda)) / left(hat(State::Play(Delta::Scan), true))
 }
 
-/// One period of the sweep: a third of the samples of 60 s, so that λ = 0.997
-/// remembers as many mm as 0.999 does there.
+/// One period of the sweep: a third of the samples of 60 s, so that λ = 0.997 has the
+/// memory L of 0.999 there.
 #[test]
 fn on_random_switches_a_direction_state_leaves_a_fifth_of_the_papers_residual() {
     for switch in 0..3 {
@@ -106,7 +106,7 @@ fn on_random_switches_a_direction_state_leaves_a_fifth_of_the_papers_residual() 
 }
 
 /// Measured, in order: 10.0 17.8 15.0 11.6 11.1 8.7 6.5 12.3 12.9 8.6 5.6 8.8.
-/// δ and ridges were chosen on other switches.
+/// δ and ridges were selected on other switches.
 ///
 /// `cargo test --release --test identify estimators_switches -- --ignored`
 #[test]

@@ -1,4 +1,4 @@
-//! What has to hold of every estimator, and what each is there for.
+//! Properties of every estimator, and the purpose of each.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
@@ -78,7 +78,7 @@ fn hat(state: State) -> Method {
     })
 }
 
-/// One or more of everything.
+/// At least one of each method.
 fn every_method() -> Vec<Method> {
     vec![
         ewls(0.99, |o| o.resample = Resample::Point),
@@ -105,7 +105,7 @@ fn identified(recording: &Recording, method: Method, dx_mm: f64) -> Identified {
         .unwrap()
 }
 
-/// Force at rest at node `j`, N.
+/// The static force at node `j`, N.
 fn force(table: &Realization, branch: &Branch, j: usize) -> f64 {
     branch.k_n_per_mm[j] * table.x_mm[j] + branch.f0_n[j]
 }
@@ -171,9 +171,9 @@ fn a_hat_table_recovers_the_table_that_made_the_force() {
 }
 
 #[test]
-fn the_best_delta_at_the_end_of_the_scan_is_said() {
+fn a_best_delta_at_the_end_of_the_scan_gives_a_warning() {
     let r = target("r", 20, 0.0);
-    // friction that changes at once wants no state at all
+    // friction that changes at once requires no state
     let found = identified(&r, hat(State::Play(Delta::Scan)), 1.0);
     assert_eq!(
         found.realization.direction,
@@ -218,7 +218,7 @@ fn no_method_depends_on_the_origin_of_x() {
 }
 
 #[test]
-fn a_reversal_of_the_axis_swaps_the_directions_where_a_method_has_no_side() {
+fn a_reversal_of_the_axis_swaps_the_directions_for_symmetric_methods() {
     let here = target("r", 20, 0.1);
     let mut there = here.clone();
     for column in [
@@ -258,7 +258,7 @@ fn a_reversal_of_the_axis_swaps_the_directions_where_a_method_has_no_side() {
         let worst = differ(method);
         assert!(worst < 1e-6, "{method}: {worst} N");
     }
-    // the paper's lags upwards in both directions
+    // the paper's method lags upwards in both directions
     assert!(differ(ewls(0.99, |_| ())) > 0.01);
 }
 
@@ -292,7 +292,7 @@ fn bounded_tables_have_no_negative_mass_or_damping_and_free_ones_have() {
 }
 
 #[test]
-fn a_warm_start_saves_the_first_nodes() {
+fn a_warm_start_improves_the_first_nodes() {
     let r = target("r", 20, 0.2);
     let worst = |start| {
         let found = identified(&r, ewls(0.99, |o| o.start = start), 0.02);
@@ -314,7 +314,7 @@ fn a_warm_start_saves_the_first_nodes() {
 }
 
 #[test]
-fn along_its_travel_the_negative_direction_lags_downwards() {
+fn sorted_by_travel_the_negative_direction_lags_downwards() {
     let r = target("r", 20, 0.0);
     // friction apart, the force is 4 sin(x/2): where it rises, a lag upwards (the
     // table follows what lay below) is too low and a lag downwards too high
@@ -332,9 +332,9 @@ fn along_its_travel_the_negative_direction_lags_downwards() {
 }
 
 #[test]
-fn a_place_without_samples_is_in_the_warnings_of_every_table() {
+fn positions_without_samples_give_a_warning_for_every_table() {
     let mut r = target("r", 20, 0.1);
-    // the encoder lost 12 to 18 mm
+    // no samples from 12 to 18 mm
     let keep: Vec<bool> = r.x_mm.iter().map(|x| !(12.0..18.0).contains(x)).collect();
     for column in [
         &mut r.t_s,
@@ -366,7 +366,7 @@ fn a_place_without_samples_is_in_the_warnings_of_every_table() {
 }
 
 #[test]
-fn what_no_method_can_do_is_refused_by_each() {
+fn every_method_refuses_impossible_arguments() {
     let r = target("r", 5, 0.1);
     let training = Training::new(&r).unwrap();
     for method in every_method() {
@@ -402,10 +402,10 @@ fn what_no_method_can_do_is_refused_by_each() {
     ));
 }
 
-/// P of a recursion grows by 1/λ a sample where nothing is excited; with noise on
-/// position and force it recovers, and the table with it.
+/// Without excitation P of a recursion grows by 1/λ per sample; it recovers with noise on
+/// position and force.
 #[test]
-fn eight_seconds_at_one_place_ruin_no_table() {
+fn eight_seconds_at_one_position_ruin_no_table() {
     let mut r = target("r", 20, 0.05);
     let mut noise = Stream::new(5, &["dwell"]);
     let t = r.t_s[r.len() - 1];
@@ -428,7 +428,7 @@ fn eight_seconds_at_one_place_ruin_no_table() {
 }
 
 #[test]
-fn odd_recordings_give_finite_tables_or_reasons() {
+fn odd_recordings_give_finite_tables_or_errors() {
     let mut draw = Stream::new(11, &["odd"]);
     let mut tables = 0;
     for round in 0..300 {

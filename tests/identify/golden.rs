@@ -1,6 +1,5 @@
-//! The paper's EWLS against numbers computed elsewhere, on the recordings of a
-//! simulated turn-signal switch (1 kHz, filtered at 30 Hz; the plant stands in
-//! their headers). Reference: the project's own prototype in double precision;
+//! The paper's EWLS compared with reference values, on recordings of a simulated
+//! turn-signal switch (1 kHz, filtered at 30 Hz; the plant is in their headers). Reference: the project's own prototype in double precision;
 //! printed to six or seven significant digits. The tolerance is half a unit of the
 //! last one and a twentieth of that, because one (0.015941852, printed .0159418)
 //! was rounded twice.

@@ -1,5 +1,5 @@
-//! The grid's fast loops against the recursion as the paper has it, and against
-//! themselves: on any processor, in any company, with any number of threads.
+//! The vectorized loops of the grid agree with the plain recursion, and do not depend on
+//! processor, other λ or number of threads.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
@@ -23,15 +23,7 @@ fn recording(name: &str) -> Recording {
 /// Every `n`th row: short enough for many recursions in a test.
 fn thinned(name: &str, n: usize) -> Recording {
     let whole = recording(name);
-    let pick = |column: &[f64]| column.iter().step_by(n).copied().collect();
-    Recording {
-        t_s: pick(&whole.t_s),
-        x_mm: pick(&whole.x_mm),
-        v_mm_s: pick(&whole.v_mm_s),
-        a_m_s2: pick(&whole.a_m_s2),
-        f_n: pick(&whole.f_n),
-        ..whole
-    }
+    whole.select(&(0..whole.len()).step_by(n).collect::<Vec<_>>())
 }
 
 const LAMBDAS: [f64; 15] = [
@@ -76,7 +68,7 @@ fn parameters(branch: &Branch) -> impl Iterator<Item = f64> {
 }
 
 #[test]
-fn the_grid_agrees_with_one_cell_at_a_time() {
+fn the_grid_agrees_with_cells_identified_alone() {
     let train = thinned("training_a.csv", 10);
     let validation = thinned("validation_a.csv", 10);
     let training = Training::new(&train).unwrap();
@@ -99,8 +91,8 @@ fn the_grid_agrees_with_one_cell_at_a_time() {
                 let inside = nodes[0] + 1.0..nodes[nodes.len() - 1] - 1.0;
                 let all = parameters(found).zip(parameters(expected));
                 for ((found, expected), x) in all.zip(nodes.iter().cycle()) {
-                    // where the recursion has just begun, or remembers few samples,
-                    // four parameters hang on the last digits
+                    // where the recursion has just begun, or has a short memory, the
+                    // estimates are ill-conditioned
                     let well_known = inside.contains(x) && cell.method.lambda() >= Some(0.998);
                     let tolerance = if well_known { 1e-8 } else { 1e-6 };
                     assert!(
@@ -120,8 +112,8 @@ fn the_grid_agrees_with_one_cell_at_a_time() {
     }
 }
 
-/// The plain recursion and the lanes round differently; on a whole recording and for
-/// the λ of the paper's grid that is less than 1e-9 of a table's scale and of a VAF.
+/// The plain recursion and the lanes round differently; on a whole recording and for the
+/// λ of the paper's grid the difference is below 1e-9 of a table's scale and of a VAF.
 #[test]
 fn for_the_papers_lambda_the_grid_is_the_plain_recursion_to_1e9() {
     let (train, validation) = (recording("training_a.csv"), recording("validation_a.csv"));
@@ -162,10 +154,9 @@ fn for_the_papers_lambda_the_grid_is_the_plain_recursion_to_1e9() {
     }
 }
 
-/// With bounds the recursion is the same one sample at a time, so that only the order
-/// of addition differs.
+/// With bounds the recursion is the same, so that only the order of summation differs.
 #[test]
-fn a_bounded_grid_agrees_with_one_cell_at_a_time() {
+fn a_bounded_grid_agrees_with_cells_identified_alone() {
     let train = thinned("training_a.csv", 50);
     let validation = thinned("validation_a.csv", 50);
     let training = Training::new(&train).unwrap();
@@ -209,7 +200,7 @@ fn a_bounded_grid_agrees_with_one_cell_at_a_time() {
 }
 
 #[test]
-fn every_processor_gives_the_same_bits() {
+fn results_are_bit_identical_on_all_processors() {
     let train = thinned("training_a.csv", 40);
     let validation = thinned("validation_a.csv", 40);
     let training = Training::new(&train).unwrap();
@@ -225,7 +216,7 @@ fn every_processor_gives_the_same_bits() {
 }
 
 #[test]
-fn a_lambda_does_not_feel_its_neighbours_nor_the_number_of_threads() {
+fn results_do_not_depend_on_other_lambda_or_the_number_of_threads() {
     let train = thinned("training_a.csv", 10);
     let validation = thinned("validation_a.csv", 10);
     let training = Training::new(&train).unwrap();
@@ -247,7 +238,7 @@ fn a_lambda_does_not_feel_its_neighbours_nor_the_number_of_threads() {
 }
 
 #[test]
-fn a_point_table_does_not_feel_the_other_increments() {
+fn a_point_table_does_not_depend_on_other_increments() {
     let train = thinned("training_a.csv", 10);
     let training = Training::new(&train).unwrap();
     let run = |dx: &[f64]| {
@@ -259,7 +250,7 @@ fn a_point_table_does_not_feel_the_other_increments() {
 }
 
 #[test]
-fn the_golden_numbers_come_out_of_the_grid_as_well() {
+fn the_grid_reproduces_the_reference_values() {
     // reference as in tests/identify/golden.rs
     let (train, validation) = (recording("training_a.csv"), recording("validation_a.csv"));
     let training = Training::new(&train).unwrap();
@@ -331,8 +322,8 @@ fn a_grid_of_several_methods_keeps_their_order_and_counts_its_cells() {
 }
 
 #[test]
-fn estimates_that_leave_the_range_of_numbers_are_told_and_not_shown() {
-    // a force that cannot be squared
+fn estimates_that_are_not_finite_are_an_error() {
+    // a force whose square overflows
     let mut train = thinned("training_a.csv", 40);
     for f in &mut train.f_n {
         *f *= 1e307;

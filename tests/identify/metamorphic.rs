@@ -1,4 +1,4 @@
-//! What has to hold of identification whatever the numbers are.
+//! Properties of identification that hold for all parameters.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
@@ -109,7 +109,7 @@ fn a_constant_error_is_bias_and_not_vaf() {
 }
 
 #[test]
-fn the_spring_is_the_line_that_was_recorded() {
+fn the_spring_recovers_a_line() {
     let theta = [0.0, 0.0, 0.7, -3.0];
     let r = recording("r", 5, 0.0, theta, theta, 0.0);
     let spring = Training::new(&r)
@@ -126,7 +126,7 @@ fn the_spring_is_the_line_that_was_recorded() {
 }
 
 #[test]
-fn what_cannot_be_identified_says_why() {
+fn impossible_arguments_give_an_error_with_the_reason() {
     let r = recording("r", 5, 0.0, PLUS, MINUS, 0.0);
     let training = Training::new(&r).unwrap();
     for bad in [0.0, -1.0, 1.5, f64::NAN] {

@@ -1,4 +1,4 @@
-//! `study record`: a recording that says how to make it again.
+//! `study record`: a recording with everything needed to reproduce it.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -30,7 +30,7 @@ fn read(path: &Path) -> Recording {
     recording::read("r", std::io::BufReader::new(file)).unwrap()
 }
 
-/// The block of the header under `name`, as the file that it was.
+/// The file in the header under `name`.
 fn block(header: &[String], name: &str) -> String {
     let lines = header.iter().skip_while(|line| *line != name).skip(1);
     lines
@@ -40,7 +40,7 @@ fn block(header: &[String], name: &str) -> String {
 }
 
 #[test]
-fn the_header_is_enough_to_make_the_recording_again_to_the_byte() {
+fn the_header_suffices_to_reproduce_the_recording_byte_for_byte() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     study()
@@ -69,7 +69,7 @@ fn the_header_is_enough_to_make_the_recording_again_to_the_byte() {
         .arg(path("two.csv"))
         .assert()
         .success();
-    // the first line says where the parameters came from
+    // the first line names the source of the parameters
     let rest = |name: &str| {
         let text = fs::read_to_string(path(name)).unwrap();
         text.split_once('\n').unwrap().1.to_owned()
@@ -78,7 +78,7 @@ fn the_header_is_enough_to_make_the_recording_again_to_the_byte() {
 }
 
 #[test]
-fn the_columns_are_filtered_unless_raw_is_asked_for() {
+fn the_columns_are_filtered_unless_raw() {
     let record = |extra: &[&str]| {
         let out = study()
             .arg("record")
@@ -94,13 +94,13 @@ fn the_columns_are_filtered_unless_raw_is_asked_for() {
     assert_eq!(filtered.len(), 20 * 500 + 1);
     assert!(filtered.warnings.is_empty(), "{:?}", filtered.warnings);
     let raw = record(&["--raw"]);
-    // the encoder counts in 5 µm
+    // multiples of 5 µm, the resolution of the encoder
     assert!(
         raw.x_mm
             .iter()
             .all(|x| (x / 0.005 - (x / 0.005).round()).abs() < 1e-6)
     );
-    // and filtering it afterwards gives the same, away from the ends
+    // filtering it afterwards gives the same, away from the ends
     let settings = Settings {
         filter_hz: Some(30.0),
         acceleration: Acceleration::Accelerometer,
@@ -114,7 +114,7 @@ fn the_columns_are_filtered_unless_raw_is_asked_for() {
 }
 
 #[test]
-fn a_plant_that_is_not_there_and_a_filter_above_the_rate_are_refused() {
+fn an_unknown_plant_and_an_impossible_filter_are_refused() {
     for (extra, said) in [
         (["--plant", "c"], "no target or file named c"),
         (["--filter", "500"], "below half the sampling rate"),
@@ -130,7 +130,7 @@ fn a_plant_that_is_not_there_and_a_filter_above_the_rate_are_refused() {
     }
 }
 
-/// A recording of the library's probe through the filter of the shipped ones.
+/// A recording by the simulated probe with the filter of the stored recordings.
 fn of(name: &str, target: &Parameters, rate_hz: f64, seed: u64) -> Recording {
     let text = fs::read_to_string(shipped(name)).unwrap();
     let trajectory = study_haptics::trajectory::file::parse(name, &text)
@@ -190,7 +190,7 @@ fn vafs(training: &Recording, validation: &Recording, cells: &[(f64, f64)]) -> V
 /// Reference: the same cells on the shipped recordings of switch A by another
 /// implementation (`tests/identify/golden.rs`); 0.003, another noise.
 #[test]
-fn switch_a_recorded_here_gives_the_vafs_of_the_shipped_recordings() {
+fn recordings_of_switch_a_give_the_vafs_of_the_stored_recordings() {
     let training = of("training.toml", &Parameters::a(), 1000.0, 1);
     let validation = of("validation-1.5hz.toml", &Parameters::a(), 1000.0, 2);
     assert_eq!((training.len(), validation.len()), (60_001, 20_001));

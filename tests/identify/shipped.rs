@@ -1,5 +1,5 @@
-//! The model files of the protocols are what `protocols/identify.sh` makes, to the
-//! last byte; and a file of this format's first day still reads as it did.
+//! The shipped model files equal the output of `protocols/identify.sh` byte for byte, and
+//! files of format version 1 are read unchanged.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
@@ -40,11 +40,11 @@ fn shipped(protocol: &str) -> BTreeMap<String, Realization> {
         .collect()
 }
 
-/// Everything again, from the trajectories. Unoptimised this takes a minute:
+/// Starts from the trajectories. Takes a minute without optimization:
 /// `cargo test --release --test identify shipped -- --ignored`
 #[test]
 #[ignore = "a minute unoptimised"]
-fn the_script_makes_every_file_to_the_last_byte() {
+fn the_script_reproduces_every_file_byte_for_byte() {
     let dir = tempfile::tempdir().unwrap();
     Command::new("sh")
         .arg("protocols/identify.sh")
@@ -65,11 +65,11 @@ fn the_script_makes_every_file_to_the_last_byte() {
     }
 }
 
-/// The simulated probe, its filter and the digits of the file are what they were when
-/// the realizations were identified. If this fails for a good reason, raise
+/// The simulated probe, its filter and the file format have not changed since the
+/// realizations were identified. If they change for a good reason, increment
 /// `plant::SIMULATION` and run `protocols/identify.sh`.
 #[test]
-fn the_recordings_of_the_shipped_realizations_can_be_made_again_to_the_byte() {
+fn the_recordings_of_the_shipped_realizations_are_reproduced_byte_for_byte() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("again.csv");
     Command::cargo_bin("study")
@@ -89,7 +89,7 @@ fn the_recordings_of_the_shipped_realizations_can_be_made_again_to_the_byte() {
 }
 
 #[test]
-fn the_shipped_realizations_say_where_they_come_from() {
+fn the_shipped_realizations_name_their_recordings() {
     let mut trainings = BTreeSet::new();
     for (stem, realization) in FOLDERS.into_iter().flat_map(shipped) {
         let provenance = realization.provenance;
@@ -109,7 +109,7 @@ fn the_shipped_realizations_say_where_they_come_from() {
 /// Colton & Hollerbach 2007, Fig. 11: of the five realizations of the study λ = 0.9995
 /// has the highest VAF, and it falls to both sides.
 #[test]
-fn the_papers_five_have_the_papers_order() {
+fn the_papers_five_realizations_have_the_papers_order() {
     let vafs: Vec<f64> = [0.9991, 0.9993, 0.9995, 0.9997, 0.9999]
         .iter()
         .map(|lambda| shipped("turn-signal")[&format!("lambda-{lambda}")].vaf[VALIDATION])
@@ -120,7 +120,7 @@ fn the_papers_five_have_the_papers_order() {
     assert!(a < b && b < peak && peak > d && d > e, "{vafs:?}");
 }
 
-/// What VAF predicts can only be told where it differs.
+/// Whether VAF predicts ratings can be judged only if it varies.
 #[test]
 fn the_extended_realizations_are_spread_in_vaf() {
     let mut vafs: Vec<f64> = shipped("turn-signal-extended")
@@ -131,7 +131,7 @@ fn the_extended_realizations_are_spread_in_vaf() {
     vafs.sort_by(f64::total_cmp);
     assert_eq!(vafs.len(), 8);
     assert!(vafs[7] - vafs[0] > 0.4, "{vafs:?}");
-    // no half of them in a heap
+    // no half of them is clustered
     assert!(vafs[4] < vafs[7] - 0.05, "{vafs:?}");
     let anchor = shipped("turn-signal-extended")["spring"].vaf[VALIDATION];
     assert!(anchor < 0.1, "{anchor}");

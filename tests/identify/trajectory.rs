@@ -1,4 +1,4 @@
-//! `study trajectory`: what it draws, writes and refuses.
+//! The command `study trajectory`.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -37,7 +37,7 @@ fn the_papers_trajectories_are_drawn_and_pass() {
 }
 
 #[test]
-fn the_csv_has_a_row_for_every_sample_and_is_never_overwritten_unasked() {
+fn the_csv_has_a_row_for_every_sample_and_is_overwritten_only_with_force() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("t.csv");
     let command = |force: &[&str]| {
@@ -55,7 +55,7 @@ fn the_csv_has_a_row_for_every_sample_and_is_never_overwritten_unasked() {
     let text = fs::read_to_string(&out).unwrap();
     assert_eq!(text.lines().next(), Some("t_s,x_mm,v_mm_s,a_m_s2"));
     assert_eq!(text.lines().count(), 1 + 500 * 21 + 1);
-    // a quarter of a period after two whole ones: the upper turn
+    // a quarter of a period after two whole ones: a reversal
     let turn = text.lines().find(|l| l.starts_with("1.500000,")).unwrap();
     let row: Vec<f64> = turn.split(',').map(|f| f.parse().unwrap()).collect();
     assert!(
@@ -69,7 +69,7 @@ fn the_csv_has_a_row_for_every_sample_and_is_never_overwritten_unasked() {
 }
 
 #[test]
-fn what_goes_beyond_a_stop_is_refused_with_the_instant_and_nothing_is_written() {
+fn a_trajectory_beyond_a_stop_is_refused_and_nothing_is_written() {
     let dir = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(shipped("validation-1.5hz.toml")).unwrap();
     let spec = dir.path().join("far.toml");
@@ -96,7 +96,7 @@ fn what_goes_beyond_a_stop_is_refused_with_the_instant_and_nothing_is_written() 
 }
 
 #[test]
-fn every_fault_of_a_trajectory_file_is_told_at_once() {
+fn all_faults_of_a_trajectory_file_are_reported_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let spec = dir.path().join("bad.toml");
     fs::write(

@@ -152,7 +152,8 @@ impl fmt::Display for Warning {
                 at_s,
             } => write!(
                 f,
-                "{count} gaps in time, the longest {longest_s:.4} s at {at_s:.4} s"
+                "{count} gap{} in time, the longest {longest_s:.4} s at {at_s:.4} s",
+                if *count == 1 { "" } else { "s" }
             ),
             Self::OneDirection => f.write_str("the target moves in one direction only"),
             Self::Scale { column, ratio } => write!(
@@ -326,9 +327,9 @@ mod tests {
         let r = read_text("t_s,x_mm,f_n\n0,0,1\n1,1,2\n2,8,3\n3,27,4\n").unwrap();
         assert_eq!(r.v_mm_s, [1.0, 4.0, 13.0, 19.0]);
         assert_eq!(r.a_m_s2, [0.006, 0.006, 0.012, 0.012]);
-        let said: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
+        let messages: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
         assert_eq!(
-            said,
+            messages,
             [
                 "no column v_mm_s: computed as the central difference of x_mm",
                 "no column a_m_s2: computed as the second central difference of x_mm",
@@ -348,7 +349,7 @@ mod tests {
     #[test]
     fn every_bad_row_is_named_with_its_line() {
         let at = |row: &str| format!("# h\nt_s,x_mm,f_n\n0,1,1\n\n1,2,2\n{row}\n3,1,1\n");
-        for (row, said) in [
+        for (row, expected) in [
             ("2,1", "r.csv: line 6: 2 fields, but there are 3 columns"),
             (
                 "2,1,1,1",
@@ -376,7 +377,7 @@ mod tests {
                 "r.csv: line 6: t_s goes from 1 to 0.5: time has to increase",
             ),
         ] {
-            assert_eq!(message(&at(row)), said);
+            assert_eq!(message(&at(row)), expected);
         }
     }
 
@@ -431,9 +432,15 @@ mod tests {
             text += &format!("{t},{},{v},{},{}\n", 10.0 * x, -w * w * x / 100.0, t.sin());
         }
         let r = read_text(&text).unwrap();
-        let said: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
-        assert_eq!(said[0], "1 gaps in time, the longest 0.0080 s at 0.1990 s");
-        assert!(said[1].contains("times v_mm_s: check its unit"), "{said:?}");
-        assert_eq!(said.len(), 2, "{said:?}");
+        let messages: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            messages[0],
+            "1 gap in time, the longest 0.0080 s at 0.1990 s"
+        );
+        assert!(
+            messages[1].contains("times v_mm_s: check its unit"),
+            "{messages:?}"
+        );
+        assert_eq!(messages.len(), 2, "{messages:?}");
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! [`prepare`] low-pass filters position, acceleration and force with the same
 //! zero-phase filter ([`filter`]) and computes the velocity by central differences;
-//! [`thin()`] removes most samples of dwells; [`excitation`] tells whether a, v and x
+//! [`thin()`] removes most samples of dwells; [`excitation`] shows whether a, v and x
 //! vary independently enough to identify their parameters; [`delay`] measures the lag
 //! between accelerometer and encoder.
 //!

@@ -252,8 +252,11 @@ mod tests {
     fn a_trajectory_beyond_a_stop_and_an_impossible_rate_are_refused() {
         let probe = Probe::default();
         let refused = probe.record(&trajectory(18.0), &Parameters::a(), 1000.0, 1);
-        let said = refused.unwrap_err().to_string();
-        assert!(said.contains("the limit of the target, from "), "{said}");
+        let message = refused.unwrap_err().to_string();
+        assert!(
+            message.contains("the limit of the target, from "),
+            "{message}"
+        );
         for rate in [0.0, f64::NAN, 1e6] {
             let refused = probe.record(&trajectory(15.0), &Parameters::a(), rate, 1);
             assert!(matches!(refused, Err(ProbeError::Rate(_))), "{rate}");

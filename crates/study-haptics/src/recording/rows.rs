@@ -48,10 +48,10 @@ pub(super) fn read(input: impl BufRead) -> Result<Rows, Fault> {
         let Some(line) = lines.next()? else {
             return Err((lines.number.max(1), RecordingFault::NoColumns));
         };
-        if let Some(words) = line.strip_prefix(b"#") {
+        if let Some(text) = line.strip_prefix(b"#") {
             if header.len() < MAX_HEADER_LINES {
-                let words = words.strip_prefix(b" ").unwrap_or(words);
-                header.push(String::from_utf8_lossy(words).into_owned());
+                let text = text.strip_prefix(b" ").unwrap_or(text);
+                header.push(String::from_utf8_lossy(text).into_owned());
             }
         } else {
             break columns(line).map_err(|fault| (lines.number, fault))?;

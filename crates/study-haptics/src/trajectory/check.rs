@@ -250,15 +250,19 @@ mod tests {
             &[("the target", envelope(100.0, 1000.0))],
         )
         .unwrap_err();
-        let said: Vec<String> = found.iter().map(ToString::to_string).collect();
-        assert_eq!(found.len(), 3, "{said:?}");
+        let messages: Vec<String> = found.iter().map(ToString::to_string).collect();
+        assert_eq!(found.len(), 3, "{messages:?}");
         assert_eq!(found[0].quantity, Quantity::Travel);
         assert!((found[0].worst + 0.5).abs() < 1e-3 && (found[0].worst_s - 0.75).abs() < 1e-2);
         assert!(
-            said[1].starts_with("the position exceeds 35 mm, the limit of the target, from 1.2"),
-            "{said:?}"
+            messages[1]
+                .starts_with("the position exceeds 35 mm, the limit of the target, from 1.2"),
+            "{messages:?}"
         );
-        assert!(said[2].contains("speed exceeds 100 mm/s"), "{said:?}");
+        assert!(
+            messages[2].contains("speed exceeds 100 mm/s"),
+            "{messages:?}"
+        );
     }
 
     #[test]

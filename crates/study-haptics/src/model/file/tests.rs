@@ -58,7 +58,7 @@ fn a_model_file_is_read() {
 
 #[test]
 fn every_fault_has_its_line() {
-    for (from, to, said) in [
+    for (from, to, expected) in [
         (
             "[0, 0.1, 0]",
             "[0, nan, 0]",
@@ -153,7 +153,10 @@ fn every_fault_has_its_line() {
         ),
     ] {
         let found = faults(from, to);
-        assert!(found.iter().any(|f| f == said), "{said}\n{found:#?}");
+        assert!(
+            found.iter().any(|f| f == expected),
+            "{expected}\n{found:#?}"
+        );
     }
 }
 
