@@ -1,16 +1,16 @@
 //! The cells of a row, and the header of each table of a study.
 
 use super::rows::{AttemptRow, ParticipantRow, RatingRow};
-use super::{Author, Failure, Sample};
+use super::{Author, Failure, Sample, State, Status};
 use crate::protocol::columns::{
     AttemptColumn, Column, ParticipantColumn, RatingColumn, Repeats, SampleColumn,
 };
-use crate::protocol::{Answer, Protocol};
+use crate::protocol::{Answer, DeviceKind, Protocol, Role};
 use chrono::{DateTime, FixedOffset};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use study_base::text::QuestionId;
+use study_base::text::{ModelId, ParticipantId, QuestionId};
 
 /// A cell of a table. Its `Display` is the cell's text in a CSV, not yet quoted.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,8 +42,8 @@ impl fmt::Display for Cell<'_> {
     }
 }
 
-impl<'a> From<&'a str> for Cell<'a> {
-    fn from(text: &'a str) -> Self {
+impl<'a> Cell<'a> {
+    fn text(text: &'a str) -> Self {
         match text {
             "" => Self::Empty,
             _ => Self::Text(text.into()),
@@ -51,50 +51,67 @@ impl<'a> From<&'a str> for Cell<'a> {
     }
 }
 
-impl From<u32> for Cell<'_> {
-    fn from(n: u32) -> Self {
-        Self::Whole(n.into())
+/// A field of a row.
+trait Field {
+    /// Its cell; `name` says which one where the column repeats.
+    fn cell(&self, name: &str) -> Cell<'_>;
+}
+
+impl<T: Field> Field for Option<T> {
+    fn cell(&self, name: &str) -> Cell<'_> {
+        self.as_ref().map_or(Cell::Empty, |value| value.cell(name))
     }
 }
 
-impl From<f64> for Cell<'_> {
-    fn from(x: f64) -> Self {
-        if x.is_finite() {
-            Self::Number(x)
-        } else {
-            Self::Empty
-        }
-    }
+macro_rules! fields {
+    ($($field:ty: |$value:ident, $name:pat_param| $cell:expr;)*) => {
+        $(impl Field for $field {
+            fn cell(&self, $name: &str) -> Cell<'_> {
+                let $value = self;
+                $cell
+            }
+        })*
+    };
 }
 
-impl From<bool> for Cell<'_> {
-    fn from(flag: bool) -> Self {
-        Self::Flag(flag)
-    }
-}
-
-impl From<DateTime<FixedOffset>> for Cell<'_> {
-    fn from(at: DateTime<FixedOffset>) -> Self {
-        Self::Time(at)
-    }
-}
-
-impl<'a> From<&'a Answer> for Cell<'a> {
-    fn from(answer: &'a Answer) -> Self {
-        match answer {
-            Answer::Rating(n) => Self::Whole((*n).into()),
-            Answer::Number(x) => Self::Number(*x),
-            Answer::Text(text) => text.as_str().into(),
-            Answer::Choice(_) => Self::Text(answer.cell().into()),
-            Answer::Declined { .. } => Self::Empty,
-        }
-    }
-}
-
-impl<'a, T: Into<Cell<'a>>> From<Option<T>> for Cell<'a> {
-    fn from(value: Option<T>) -> Self {
-        value.map_or(Self::Empty, Into::into)
-    }
+fields! {
+    u32: |n, _| Cell::Whole((*n).into());
+    u64: |n, _| Cell::Whole((*n).into());
+    f64: |x, _| if x.is_finite() { Cell::Number(*x) } else { Cell::Empty };
+    bool: |flag, _| Cell::Flag(*flag);
+    DateTime<FixedOffset>: |at, _| Cell::Time(*at);
+    String: |text, _| Cell::text(text);
+    &str: |text, _| Cell::text(text);
+    ParticipantId: |id, _| Cell::text(id.as_str());
+    ModelId: |id, _| Cell::text(id.as_str());
+    QuestionId: |id, _| Cell::text(id.as_str());
+    Role: |role, _| Cell::text(role.as_str());
+    DeviceKind: |kind, _| Cell::text(kind.as_str());
+    Status: |status, _| Cell::text(status.as_str());
+    State: |state, _| Cell::text(state.as_str());
+    Failure: |failure, _| Cell::text(match failure {
+        Failure::DeviceFault => "device-fault",
+        Failure::PlaybackLost => "playback-lost",
+        Failure::MarkedBad => "marked-bad",
+        Failure::Stopped => "stopped",
+        Failure::Interrupted => "interrupted",
+    });
+    Author: |author, _| Cell::text(match author {
+        Author::Participant => "participant",
+        Author::Experimenter => "experimenter",
+    });
+    Answer: |answer, _| match answer {
+        Answer::Rating(n) => Cell::Whole((*n).into()),
+        Answer::Number(x) => Cell::Number(*x),
+        Answer::Text(text) => Cell::text(text),
+        Answer::Choice(_) => Cell::Text(answer.cell().into()),
+        Answer::Declined { .. } => Cell::Empty,
+    };
+    BTreeMap<QuestionId, Answer>: |answers, name| {
+        let mut found = answers.iter().filter(|(id, _)| id.as_str() == name);
+        found.next().map_or(Cell::Empty, |(_, answer)| Field::cell(answer, name))
+    };
+    BTreeMap<String, f64>: |numbers, name| numbers.get(name).map_or(Cell::Empty, |x| x.cell(name));
 }
 
 /// A row of a table.
@@ -167,195 +184,99 @@ impl ParticipantColumn {
     }
 }
 
-fn answer<'a>(answers: &'a BTreeMap<QuestionId, Answer>, question: &str) -> Cell<'a> {
-    let found = answers.iter().find(|(id, _)| id.as_str() == question);
-    found.map(|(_, answer)| answer).into()
-}
+/// Which field of a row is in which column. A column without a field does not compile,
+/// and a field without a column is an unused variable.
+macro_rules! row {
+    ($row:ident: $columns:ident { $($column:ident: $field:ident,)* }) => {
+        impl Row for $row {
+            type Column = $columns;
 
-// In each of these a field without a column is an unused variable.
-
-impl Row for RatingRow {
-    type Column = RatingColumn;
-
-    fn cell(&self, column: RatingColumn, name: &str) -> Cell<'_> {
-        use RatingColumn as C;
-        let Self {
-            study,
-            participant,
-            session,
-            row,
-            trial,
-            block,
-            position,
-            planned_position,
-            model,
-            role,
-            repetition,
-            previous_model,
-            practice,
-            pilot,
-            simulated,
-            device_kind,
-            device_id,
-            operator,
-            tool_version,
-            protocol_version,
-            answers,
-            corrected,
-            declined,
-            remarks,
-            reference_s,
-            exploration_s,
-            response_s,
-            strokes,
-            least_energy_j,
-            switches_per_s,
-            clamp_count,
-            started_at,
-            rated_at,
-            attempt,
-            status,
-            vaf,
-            covariates,
-        } = self;
-        match column {
-            C::Study => study.as_str().into(),
-            C::Participant => participant.as_str().into(),
-            C::Session => (*session).into(),
-            C::Row => (*row).into(),
-            C::Trial => (*trial).into(),
-            C::Block => (*block).into(),
-            C::Position => (*position).into(),
-            C::PlannedPosition => (*planned_position).into(),
-            C::Model => model.as_str().into(),
-            C::Role => role.as_str().into(),
-            C::Repetition => (*repetition).into(),
-            C::PreviousModel => previous_model.as_ref().map(|m| m.as_str()).into(),
-            C::Practice => (*practice).into(),
-            C::Pilot => (*pilot).into(),
-            C::Simulated => (*simulated).into(),
-            C::DeviceKind => device_kind.as_str().into(),
-            C::DeviceId => device_id.as_str().into(),
-            C::Operator => operator.as_str().into(),
-            C::ToolVersion => tool_version.as_str().into(),
-            C::ProtocolVersion => (*protocol_version).into(),
-            C::Questions => answer(answers, name),
-            C::Corrected => (*corrected).into(),
-            C::Declined => (*declined).into(),
-            C::Remarks => remarks.as_str().into(),
-            C::ReferenceS => (*reference_s).into(),
-            C::ExplorationS => (*exploration_s).into(),
-            C::ResponseS => (*response_s).into(),
-            C::Strokes => (*strokes).into(),
-            C::LeastEnergyJ => (*least_energy_j).into(),
-            C::SwitchesPerS => (*switches_per_s).into(),
-            C::ClampCount => clamp_count.map_or(Cell::Empty, |n| Cell::Whole(n.into())),
-            C::StartedAt => (*started_at).into(),
-            C::RatedAt => (*rated_at).into(),
-            C::Attempt => (*attempt).into(),
-            C::Status => status.as_str().into(),
-            C::Vaf => (*vaf).into(),
-            C::Covariates => covariates.get(name).copied().into(),
+            fn cell(&self, column: $columns, name: &str) -> Cell<'_> {
+                let Self { $($field),* } = self;
+                match column { $($columns::$column => Field::cell($field, name)),* }
+            }
         }
+    };
+}
+
+row! {
+    RatingRow: RatingColumn {
+        Study: study,
+        Participant: participant,
+        Session: session,
+        Row: row,
+        Trial: trial,
+        Block: block,
+        Position: position,
+        PlannedPosition: planned_position,
+        Model: model,
+        Role: role,
+        Repetition: repetition,
+        PreviousModel: previous_model,
+        Practice: practice,
+        Pilot: pilot,
+        Simulated: simulated,
+        DeviceKind: device_kind,
+        DeviceId: device_id,
+        Operator: operator,
+        ToolVersion: tool_version,
+        ProtocolVersion: protocol_version,
+        Questions: answers,
+        Corrected: corrected,
+        Declined: declined,
+        Remarks: remarks,
+        ReferenceS: reference_s,
+        ExplorationS: exploration_s,
+        ResponseS: response_s,
+        Strokes: strokes,
+        LeastEnergyJ: least_energy_j,
+        SwitchesPerS: switches_per_s,
+        ClampCount: clamp_count,
+        StartedAt: started_at,
+        RatedAt: rated_at,
+        Attempt: attempt,
+        Status: status,
+        Vaf: vaf,
+        Covariates: covariates,
     }
 }
 
-impl Row for AttemptRow {
-    type Column = AttemptColumn;
-
-    fn cell(&self, column: AttemptColumn, _: &str) -> Cell<'_> {
-        use AttemptColumn as C;
-        let Self {
-            participant,
-            session,
-            simulated,
-            pilot,
-            trial,
-            attempt,
-            model,
-            what,
-            question,
-            from,
-            to,
-            failure,
-            by,
-            text,
-            at,
-        } = self;
-        match column {
-            C::Participant => participant.as_str().into(),
-            C::Session => (*session).into(),
-            C::Pilot => (*pilot).into(),
-            C::Simulated => (*simulated).into(),
-            C::Trial => (*trial).into(),
-            C::Attempt => (*attempt).into(),
-            C::Model => model.as_ref().map(|m| m.as_str()).into(),
-            C::What => (*what).into(),
-            C::Question => question.as_ref().map(|q| q.as_str()).into(),
-            C::From => from.as_ref().into(),
-            C::To => to.as_ref().into(),
-            C::Failure => failure.map(failure_level).into(),
-            C::By => by.map(author_level).into(),
-            C::Text => text.as_str().into(),
-            C::At => (*at).into(),
-        }
+row! {
+    AttemptRow: AttemptColumn {
+        Participant: participant,
+        Session: session,
+        Pilot: pilot,
+        Simulated: simulated,
+        Trial: trial,
+        Attempt: attempt,
+        Model: model,
+        What: what,
+        Question: question,
+        From: from,
+        To: to,
+        Failure: failure,
+        By: by,
+        Text: text,
+        At: at,
     }
 }
 
-fn failure_level(failure: Failure) -> &'static str {
-    match failure {
-        Failure::DeviceFault => "device-fault",
-        Failure::PlaybackLost => "playback-lost",
-        Failure::MarkedBad => "marked-bad",
-        Failure::Stopped => "stopped",
-        Failure::Interrupted => "interrupted",
-    }
-}
-
-fn author_level(author: Author) -> &'static str {
-    match author {
-        Author::Participant => "participant",
-        Author::Experimenter => "experimenter",
-    }
-}
-
-impl Row for ParticipantRow {
-    type Column = ParticipantColumn;
-
-    fn cell(&self, column: ParticipantColumn, name: &str) -> Cell<'_> {
-        use ParticipantColumn as C;
-        let Self {
-            participant,
-            session,
-            state,
-            reason,
-            row,
-            pilot,
-            simulated,
-            erased,
-            consent_version,
-            protocol_version,
-            trials_done,
-            trials_planned,
-            started_at,
-            answers,
-        } = self;
-        match column {
-            C::Participant => participant.as_str().into(),
-            C::Session => (*session).into(),
-            C::State => state.as_str().into(),
-            C::Reason => reason.as_str().into(),
-            C::Row => (*row).into(),
-            C::Pilot => (*pilot).into(),
-            C::Simulated => (*simulated).into(),
-            C::Erased => (*erased).into(),
-            C::ConsentVersion => consent_version.as_deref().into(),
-            C::ProtocolVersion => (*protocol_version).into(),
-            C::TrialsDone => (*trials_done).into(),
-            C::TrialsPlanned => (*trials_planned).into(),
-            C::StartedAt => (*started_at).into(),
-            C::Questions => answer(answers, name),
-        }
+row! {
+    ParticipantRow: ParticipantColumn {
+        Participant: participant,
+        Session: session,
+        State: state,
+        Reason: reason,
+        Row: row,
+        Pilot: pilot,
+        Simulated: simulated,
+        Erased: erased,
+        ConsentVersion: consent_version,
+        ProtocolVersion: protocol_version,
+        TrialsDone: trials_done,
+        TrialsPlanned: trials_planned,
+        StartedAt: started_at,
+        Questions: answers,
     }
 }
 
