@@ -320,12 +320,14 @@ mod tests {
     use super::*;
     use study_base::text::ParticipantId;
 
+    #[cfg(unix)]
     fn io(number: i32) -> String {
         let source = io::Error::from_raw_os_error(number);
         let path = "results/x/study.json".into();
         StoreError::Io { path, source }.to_string()
     }
 
+    #[cfg(unix)]
     #[test]
     fn an_error_of_the_system_has_words_and_no_number() {
         // errno.h of Linux: ENOENT 2, EACCES 13, ENOSPC 28, EIO 5.

@@ -5,6 +5,7 @@
 
 use super::sessions::SessionData;
 use super::{StudyFolder, layout};
+use crate::protocol::columns::ParticipantColumn;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use study_base::text::Untrusted;
@@ -68,11 +69,15 @@ impl StudyFolder {
 /// Participant and session of each row of a table.
 fn named(table: &[u8]) -> BTreeSet<(String, String)> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(table);
-    let place = |header: &csv::StringRecord, name: &str| header.iter().position(|h| h == name);
     let Ok(header) = reader.headers() else {
         return BTreeSet::new();
     };
-    let (Some(id), Some(session)) = (place(header, "participant"), place(header, "session")) else {
+    // Both tables have these columns under the same names.
+    let find = |column: ParticipantColumn| header.iter().position(|h| h == column.name());
+    let (Some(id), Some(session)) = (
+        find(ParticipantColumn::Participant),
+        find(ParticipantColumn::Session),
+    ) else {
         return BTreeSet::new();
     };
     reader
