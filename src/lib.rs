@@ -1,44 +1,45 @@
-//! `study`: from probe recordings of a haptic device to a defended result.
+//! `study`: haptic experiments, from probe recordings to a report.
 //!
-//! record → identify → validate → play back → rate → analyze. The heart is the
-//! experiment runner: what a subject says in an hour is irreplaceable, and the
-//! device can hurt somebody. The method is that of Colton & Hollerbach, "Haptic
-//! Models of an Automotive Turn-Signal Switch", World Haptics 2007.
+//! record → identify → validate → play back → rate → analyze. The method is that of
+//! Colton & Hollerbach, "Haptic Models of an Automotive Turn-Signal Switch", World
+//! Haptics 2007. The central part is the experiment runner: a session cannot be
+//! repeated, and a device can injure.
 //!
 //! # Layers
 //!
-//! A module imports only from layers above its own line, and of those only what
-//! `tests/architecture.rs` lists.
+//! A crate or module uses only layers above its own line, and of those only what
+//! `tests/architecture.rs` lists. `docs/architecture.md` describes each.
 //!
-//! | layer | modules |
+//! | layer | crates and modules |
 //! |---|---|
-//! | 0 | [`rng`], [`text`], [`limits`], [`diagnostic`] |
-//! | 1 | [`protocol`], [`model`], [`trajectory`], [`recording`], [`stats`] |
-//! | 2 | [`schedule`], [`outcome`], [`plant`], [`identify`] |
-//! | 3 | [`session`], [`store`], [`device`], [`rater`], [`analyze`] |
+//! | 0 | `study-base` (text, limits, diagnostic, rng), `study-wire` (serial format, servo), `study-stats` |
+//! | 1 | `study-haptics` (trajectory, plant, recording, identify, model); `study-core`: protocol |
+//! | 2 | `study-core`: schedule, outcome |
+//! | 3 | `study-core`: session, store, analyze; [`device`], [`rater`] |
 //! | 4 | [`runner`], [`report`] |
 //! | 5 | [`tui`] |
 //! | 6 | [`cli`] |
 //!
 //! Input and output happen only in `store`, `tui`, `runner` (the clock),
-//! `device::{link, serial, process}` and
-//! `cli`. Everywhere else time, randomness and identity are arguments.
+//! `device::{link, process}` and `cli`. Everywhere else time, randomness and identity
+//! are arguments.
 //!
 //! # Glossary
 //!
-//! * **protocol**: the study file. Never the serial one, which is the **wire**.
-//! * **realization**: a haptic model's parameters, the paper's word. **fit** is a
-//!   statistical one.
-//! * **study**: one protocol and everything that was gathered with it.
-//! * **participant**: who takes part, under a pseudonym. **operator**: who runs
-//!   the session. **rater**: a simulated participant.
+//! * **protocol**: the study file. The serial format is called **wire**.
+//! * **realization**: the parameters of a haptic model, the paper's word. In file
+//!   formats its key is `model`; a **model file** holds one. **fit**: a statistical model.
+//! * **study**: one protocol and everything that was collected with it.
+//! * **participant**: a person who takes part, under a pseudonym. **rater**: a simulated
+//!   participant. **operator**: who runs the session, also called the experimenter.
 //! * **row**: a place in the planned orders; **seat**: a row, or the number of a
-//!   pilot or simulated participant, which take no row.
+//!   pilot or simulated participant, which use no row.
 //! * **session**: one sitting of a participant. **block**: a part of a session in
 //!   which each realization comes once. **trial**: one planned presentation.
-//!   **attempt**: one try at a trial; a failed one comes back.
-//! * **answer**: to one question; **outcome**: everything known of a trial.
+//!   **attempt**: one try at a trial; a failed one is repeated.
+//! * **answer**: to one question; **outcome**: everything known about a trial.
 //! * **recording**: what a probe measured. **telemetry**: what a device reports.
+//! * **limp**: a device that produces no force.
 //! * **VAF**: variance accounted for, 1 − var(F − F̂)/var(F), of a realization on
 //!   a recording it was not identified from.
 //! * `lambda`: forgetting factor; `dx`: resampling increment; `m`, `b`, `k`, `F0`:
