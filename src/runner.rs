@@ -357,6 +357,9 @@ impl Runner {
                 Report::Telemetry(_) | Report::Progress { .. } => self.last_report.map(|_| at),
                 _ => None,
             };
+            if let Report::Stopped(_) | Report::Fault(_) | Report::Lost(_) = &report {
+                self.send(Job::TelemetryEnd);
+            }
             let input = match report {
                 Report::Loaded => Input::DeviceLoaded,
                 Report::Mount(code) => Input::DeviceMount(code),
@@ -372,18 +375,9 @@ impl Runner {
                     continue;
                 }
                 Report::Progress { strokes, clamps } => Input::DeviceProgress { strokes, clamps },
-                Report::Stopped(playback) => {
-                    self.send(Job::TelemetryEnd);
-                    Input::DeviceStopped(playback)
-                }
-                Report::Fault(what) => {
-                    self.send(Job::TelemetryEnd);
-                    Input::DeviceFault(what)
-                }
-                Report::Lost(what) => {
-                    self.send(Job::TelemetryEnd);
-                    Input::DeviceLost(what)
-                }
+                Report::Stopped(playback) => Input::DeviceStopped(playback),
+                Report::Fault(what) => Input::DeviceFault(what),
+                Report::Lost(what) => Input::DeviceLost(what),
                 Report::Ready => Input::DeviceReady,
             };
             self.feed(input);

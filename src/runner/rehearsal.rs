@@ -101,7 +101,7 @@ pub fn run_one(
     }
     Err(RehearsalError::Stuck {
         participant: participant.to_owned(),
-        screen: screen_name(&runner.view().screen).to_owned(),
+        screen: format!("{:?}", runner.view().screen),
     })
 }
 
@@ -204,26 +204,4 @@ fn answers(
         .map(|q| (q.id.clone(), rater.answer(q, felt)))
         .filter(|(_, answer)| !matches!(answer, Answer::Text(text) if text.is_empty()))
         .collect()
-}
-
-fn screen_name(screen: &Screen) -> &'static str {
-    match screen {
-        Screen::Who { .. } => "the first screen",
-        Screen::ResumeChoice { .. } => "the choice how to resume",
-        Screen::Consent { .. } => "the consent",
-        Screen::Message { .. } => "a message",
-        Screen::Form { .. } => "a form",
-        Screen::Reference { .. } => "the reference prompt",
-        Screen::Loading => "loading",
-        Screen::Mount { .. } => "mounting a sample",
-        Screen::Playing { .. } => "playing",
-        Screen::Stopping => "stopping",
-        Screen::Stopped { .. } => "a stopped playback",
-        Screen::DeviceTrouble { .. } => "a device fault",
-        Screen::Saving => "saving",
-        Screen::SaveTrouble { .. } => "a save failure",
-        Screen::Break { .. } => "a break",
-        Screen::Paused { .. } => "a pause",
-        Screen::End { .. } => "the end",
-    }
 }

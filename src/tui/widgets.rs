@@ -9,6 +9,7 @@ use ratatui::style::Style;
 use ratatui::symbols::border;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Widget};
+use std::borrow::Cow;
 
 /// A centred part of `area`, at most `width` by `height` cells.
 pub fn middle(area: Rect, width: u16, height: u16) -> Rect {
@@ -34,6 +35,11 @@ pub fn row(area: Rect, y: u16) -> Rect {
 pub fn rows(area: Rect, y: u16, height: u16) -> Rect {
     let y = y.min(area.height);
     Rect::new(area.x, area.y + y, area.width, height.min(area.height - y))
+}
+
+/// Text of one style as a line.
+pub fn styled<'a>(text: impl Into<Cow<'a, str>>, style: Style) -> Line<'a> {
+    Line::from(Span::styled(text, style))
 }
 
 /// Draws a left-aligned line. The text must already be safe.
@@ -62,7 +68,7 @@ pub fn right(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
 /// Draws wrapped lines, each centred.
 pub fn centre_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
     for (y, line) in (0..area.height).zip(lines) {
-        let line = Line::from(Span::styled(line.as_str(), style));
+        let line = styled(line.as_str(), style);
         centre(buf, row(area, y), &line);
     }
 }
@@ -70,7 +76,7 @@ pub fn centre_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) 
 /// Draws wrapped lines, left-aligned.
 pub fn left_all(buf: &mut Buffer, area: Rect, lines: &[String], style: Style) {
     for (y, line) in (0..area.height).zip(lines) {
-        let line = Line::from(Span::styled(line.as_str(), style));
+        let line = styled(line.as_str(), style);
         left(buf, row(area, y), &line);
     }
 }

@@ -4,6 +4,7 @@ use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::process::{Signal, getpid, kill_process};
 use signal_hook::SigId;
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+use signal_hook::low_level::signal_name;
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -49,13 +50,8 @@ impl Signals {
 
     /// The name of a terminating signal that has arrived, once.
     pub(super) fn take(&self) -> Option<&'static str> {
-        match i32::try_from(self.terminating.swap(0, Ordering::SeqCst)) {
-            Ok(SIGHUP) => Some("SIGHUP"),
-            Ok(SIGINT) => Some("SIGINT"),
-            Ok(SIGQUIT) => Some("SIGQUIT"),
-            Ok(SIGTERM) => Some("SIGTERM"),
-            _ => None,
-        }
+        let number = i32::try_from(self.terminating.swap(0, Ordering::SeqCst));
+        signal_name(number.ok()?)
     }
 
     /// Whether the program was stopped and continued since the last call.
@@ -89,14 +85,8 @@ pub(super) fn hung_up() -> bool {
         PollFd::new(&stdin, PollFlags::empty()),
         PollFd::new(&stdout, PollFlags::empty()),
     ];
-    let now = Timespec {
-        tv_sec: 0,
-        tv_nsec: 0,
-    };
-    match rustix::event::poll(&mut ends, Some(&now)) {
-        Ok(_) => ends.iter().any(|end| end.revents().intersects(gone)),
-        Err(_) => false,
-    }
+    let polled = rustix::event::poll(&mut ends, Some(&Timespec::default()));
+    polled.is_ok() && ends.iter().any(|end| end.revents().intersects(gone))
 }
 
 /// Lets a write past the limit of the file size fail with an error instead of ending

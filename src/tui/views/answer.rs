@@ -5,11 +5,10 @@ use super::scale::{self, Boxes, TRACK_ROWS, Track};
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Target;
 use crate::tui::ui_state::field::{self, Field};
-use crate::tui::widgets::{TextField, left, middle, row};
+use crate::tui::widgets::{TextField, left, middle, row, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
-use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use std::collections::BTreeMap;
 use study_core::protocol::{Question, QuestionKind};
@@ -211,7 +210,7 @@ impl Widget for &AnswerField<'_> {
                 Some(number) => format!("= {number} {}", wrap::one_line(unit, 20)),
                 None => wrap::one_line(unit, 24),
             };
-            let line = Line::from(Span::styled(format!("  {read}"), self.theme.quiet()));
+            let line = styled(format!("  {read}"), self.theme.quiet());
             left(buf, row(inner, 1), &line);
         } else if let Some(text) = self.text() {
             text.render(self.inner(area), buf);

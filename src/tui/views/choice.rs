@@ -1,7 +1,7 @@
 //! A list of options; it scrolls if it is taller than its area.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{left, row};
+use crate::tui::widgets::{left, row, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -130,7 +130,7 @@ impl Widget for &List<'_> {
         }
         // Arrows in the last column show that there is more above or below.
         let more = |y: u16, arrow: &'static str, buf: &mut Buffer| {
-            let line = Line::from(Span::styled(arrow, self.theme.key()));
+            let line = styled(arrow, self.theme.key());
             crate::tui::widgets::right(buf, row(area, y), &line);
         };
         if first > 0 {

@@ -1,13 +1,12 @@
 //! Dialogs: drawn above a screen.
 
 use super::answer::AnswerField;
-use crate::tui::editor::Editor;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::dialog::{Confirm, Correct, Dialog, Step};
-use crate::tui::widgets::{TextField, dialog, hints, left, left_all, middle, row, rows};
+use crate::tui::widgets::{TextField, dialog, hints, left, left_all, middle, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
-use ratatui::layout::{Position, Rect};
+use ratatui::layout::{Margin, Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use study_core::outcome::Author;
@@ -69,28 +68,28 @@ impl DialogView<'_> {
     }
 
     fn inside(&self, area: Rect) -> Rect {
-        let (_, place) = self.place(area);
-        Rect {
-            x: place.x + 3.min(place.width),
-            width: place.width.saturating_sub(6),
-            y: place.y + 1.min(place.height),
-            height: place.height.saturating_sub(2),
-        }
+        self.place(area).1.inner(Margin::new(3, 1))
     }
 
     /// The text field and its area.
-    fn field(&self, area: Rect) -> Option<(&Editor, Rect)> {
-        let inside = self.inside(area);
-        let at = |from: u16| rows(inside, from, inside.height.saturating_sub(from + 2));
-        match self.dialog {
-            Dialog::Help | Dialog::Confirm(_) => None,
-            Dialog::Remark { text, .. } => Some((text, at(3))),
-            Dialog::MarkBad { reason, .. } | Dialog::Decline { reason } => Some((reason, at(3))),
+    fn field(&self, area: Rect) -> Option<(TextField<'_>, Rect)> {
+        let (editor, from) = match self.dialog {
+            Dialog::Help | Dialog::Confirm(_) => return None,
+            Dialog::Remark { text, .. } => (text, 3),
+            Dialog::MarkBad { reason, .. } | Dialog::Decline { reason } => (reason, 3),
             Dialog::Correct(correct) => match &correct.step {
-                Step::Reason { reason, .. } => Some((reason, at(5))),
-                _ => None,
+                Step::Reason { reason, .. } => (reason, 5),
+                _ => return None,
             },
-        }
+        };
+        let field = TextField {
+            editor,
+            focused: true,
+            theme: self.theme,
+        };
+        let inside = self.inside(area);
+        let height = inside.height.saturating_sub(from + 2);
+        Some((field, rows(inside, from, height)))
     }
 
     fn answer<'b>(&'b self, area: Rect) -> Option<(AnswerField<'b>, Rect)> {
@@ -114,12 +113,7 @@ impl DialogView<'_> {
 
     /// The position of the terminal's cursor.
     pub fn cursor(&self, area: Rect) -> Option<Position> {
-        if let Some((editor, at)) = self.field(area) {
-            let field = TextField {
-                editor,
-                focused: true,
-                theme: self.theme,
-            };
+        if let Some((field, at)) = self.field(area) {
             return field.cursor(at);
         }
         let (answer, at) = self.answer(area)?;
@@ -206,7 +200,7 @@ impl DialogView<'_> {
                     wrap::one_line(&item.title, 11),
                     wrap::one_line(item.question.id.as_str(), 18),
                 );
-                left(buf, row(inside, y), &Line::from(Span::styled(words, style)));
+                left(buf, row(inside, y), &styled(words, style));
             }
             let keys = [("↑ ↓", "select"), ("Enter", "correct")];
             self.keys(buf, inside, &keys);
@@ -217,11 +211,7 @@ impl DialogView<'_> {
         };
         let columns = usize::from(inside.width);
         let prompt = wrap::one_line(&item.question.prompt, columns);
-        left(
-            buf,
-            row(inside, 1),
-            &Line::from(Span::styled(prompt, self.theme.strong())),
-        );
+        left(buf, row(inside, 1), &styled(prompt, self.theme.strong()));
         let now = answer_words(&item.answer, columns.saturating_sub(20));
         let title = wrap::one_line(&item.title, 12);
         let arrow = match &correct.step {
@@ -239,13 +229,13 @@ impl DialogView<'_> {
         match &correct.step {
             Step::Reason { by, .. } => {
                 left(buf, row(inside, 3), &self.by(*by));
-                let why = Line::from(Span::styled("Why? Both answers are kept.", quiet));
+                let why = styled("Why? Both answers are kept.", quiet);
                 left(buf, row(inside, 4), &why);
                 let keys = [("Enter", "correct"), ("Tab", "author")];
                 self.keys(buf, inside, &keys);
             }
             _ => {
-                let new = Line::from(Span::styled("The new answer:", quiet));
+                let new = styled("The new answer:", quiet);
                 left(buf, row(inside, 4), &new);
                 let keys = [("Enter", "continue"), ("F6", "decline")];
                 self.keys(buf, inside, &keys);
@@ -299,12 +289,7 @@ impl Widget for &DialogView<'_> {
                 self.ask(buf, inside, words, &[("y", yes), ("n", "back")]);
             }
         }
-        if let Some((editor, at)) = self.field(area) {
-            let field = TextField {
-                editor,
-                focused: true,
-                theme: self.theme,
-            };
+        if let Some((field, at)) = self.field(area) {
             field.render(at, buf);
         }
         if let Some((answer, at)) = self.answer(area) {

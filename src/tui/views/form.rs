@@ -6,7 +6,7 @@
 use super::answer::AnswerField;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::{Form, Target};
-use crate::tui::widgets::{centre_all, left, left_all, middle, row, rows};
+use crate::tui::widgets::{centre_all, left, left_all, middle, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
@@ -211,7 +211,7 @@ impl FormView<'_> {
         if area.height < 3 || self.view.correctable.is_empty() {
             return;
         }
-        let title = Line::from(Span::styled("Earlier answers", self.theme.quiet()));
+        let title = styled("Earlier answers", self.theme.quiet());
         left(buf, row(area, 0), &title);
         for (y, earlier) in (1..area.height).zip(&self.view.correctable) {
             let columns = usize::from(area.width).saturating_sub(30);
@@ -241,7 +241,7 @@ impl Widget for &FormView<'_> {
             } else {
                 "Ask"
             };
-            let label = Line::from(Span::styled(ask, self.theme.quiet()));
+            let label = styled(ask, self.theme.quiet());
             left(buf, row(placed.prompt, 0), &label);
             let indented = Rect {
                 x: placed.prompt.x + 8.min(placed.prompt.width),

@@ -13,11 +13,10 @@ use crate::runner::Strip;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::dialog::{Confirm, Dialog};
 use crate::tui::ui_state::{Target, UiState};
-use crate::tui::widgets::{centre, hints, middle, row, rows};
+use crate::tui::widgets::{centre, hints, middle, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
-use ratatui::text::{Line, Span};
 use ratatui::widgets::{Clear, Widget};
 use study_core::protocol::Entry;
 use study_core::session::view::DeviceState;
@@ -271,7 +270,7 @@ impl Widget for &Page<'_> {
             if self.view.entry == Entry::Experimenter
                 && self.view.line.device != DeviceState::Unknown
             {
-                let line = Line::from(Span::styled(COMMANDS, self.theme.quiet()));
+                let line = styled(COMMANDS, self.theme.quiet());
                 centre(buf, row(area, area.height - 2), &line);
             }
         }
@@ -285,7 +284,7 @@ impl Widget for &Page<'_> {
             for (up, words) in (0..).zip(lines.into_iter().rev()) {
                 let place = row(area, area.height - 4 - up);
                 Clear.render(place, buf);
-                let line = Line::from(Span::styled(words, self.theme.notice()));
+                let line = styled(words, self.theme.notice());
                 centre(buf, place, &line);
             }
         }

@@ -3,7 +3,7 @@
 
 use crate::runner::Strip;
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{centre, clock, middle, right, row, rows};
+use crate::tui::widgets::{centre, clock, middle, right, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -60,7 +60,7 @@ impl Widget for &Playing<'_> {
                     self.strokes_missing
                 )
             };
-            let line = Line::from(Span::styled(strokes, self.theme.text()));
+            let line = styled(strokes, self.theme.text());
             centre(buf, row(words, y + 4), &line);
         }
         if let Some(strip) = self.strip.filter(|_| strip_rows > 0) {
@@ -134,18 +134,14 @@ impl Widget for &Trace<'_> {
                 width: AXIS - 1,
                 ..row(area, y)
             };
-            right(
-                buf,
-                at,
-                &Line::from(Span::styled(label, self.theme.quiet())),
-            );
+            right(buf, at, &styled(label, self.theme.quiet()));
         }
         let foot = Rect {
             x: plot.x,
             width: plot.width,
             ..row(area, area.height - 1)
         };
-        let quiet = |text: String| Line::from(Span::styled(text, self.theme.quiet()));
+        let quiet = |text: String| styled(text, self.theme.quiet());
         crate::tui::widgets::left(buf, foot, &quiet(short(*from)));
         centre(buf, foot, &quiet(short(f64::midpoint(*from, *to))));
         right(buf, foot, &quiet(format!("{} mm", short(*to))));

@@ -2,7 +2,7 @@
 
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Reading;
-use crate::tui::widgets::{centre, centre_all, clock, left_all, middle, right, row, rows};
+use crate::tui::widgets::{centre, centre_all, clock, left_all, middle, right, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -263,7 +263,7 @@ impl ProseView<'_> {
                 height: 1,
                 ..area
             };
-            let line = Line::from(Span::styled(self.prose.above.as_str(), self.theme.quiet()));
+            let line = styled(self.prose.above.as_str(), self.theme.quiet());
             centre(buf, above, &line);
         }
         if lines.len() <= 2 {
@@ -283,10 +283,10 @@ impl ProseView<'_> {
             ..area
         };
         if foot.bottom() <= area.bottom() && !self.prose.title.is_empty() {
-            let line = Line::from(Span::styled(self.prose.title.as_str(), self.theme.quiet()));
+            let line = styled(self.prose.title.as_str(), self.theme.quiet());
             centre(buf, foot, &line);
         }
-        let arrow = |text: &'static str| Line::from(Span::styled(text, self.theme.key()));
+        let arrow = |text: &'static str| styled(text, self.theme.key());
         if from > 0 {
             right(buf, row(area, 0), &arrow("↑ more  "));
         }

@@ -1,11 +1,10 @@
 //! Scales: numbers in boxes, or a line with a marker.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{centre, frame, left, right, row, rows};
+use crate::tui::widgets::{centre, frame, left, right, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use std::collections::BTreeMap;
 
@@ -147,7 +146,7 @@ impl Widget for &Boxes<'_> {
             if inside.height >= 5 && place.width >= 11 {
                 big(buf, inside, &number(n), text);
             } else {
-                let label = Line::from(Span::styled(number(n), text));
+                let label = styled(number(n), text);
                 centre(buf, row(inside, inside.height / 2), &label);
             }
         }
@@ -157,7 +156,7 @@ impl Widget for &Boxes<'_> {
                 if at.y >= area.bottom() {
                     break;
                 }
-                let line = Line::from(Span::styled(line.as_str(), self.theme.text()));
+                let line = styled(line.as_str(), self.theme.text());
                 if n == self.from {
                     left(buf, at, &line);
                 } else if n == self.to {
@@ -191,7 +190,7 @@ fn big(buf: &mut Buffer, area: Rect, text: &str, style: ratatui::style::Style) {
     let top = area.height.saturating_sub(3) / 2;
     for i in 0..3u16 {
         let line: Vec<&str> = text.chars().map(|c| glyph(c)[usize::from(i)]).collect();
-        let line = Line::from(Span::styled(line.join(" "), style));
+        let line = styled(line.join(" "), style);
         centre(buf, row(area, top + i), &line);
     }
 }
@@ -262,14 +261,14 @@ impl Widget for &Track<'_> {
             return;
         }
         let dashes = "─".repeat(usize::from(line.width.saturating_sub(2)));
-        let track = Line::from(Span::styled(format!("├{dashes}┤"), self.theme.outline()));
+        let track = styled(format!("├{dashes}┤"), self.theme.outline());
         left(buf, line, &track);
         if let Some(value) = self.value.filter(|v| v.is_finite()) {
             let part = ((value - self.from) / (self.to - self.from)).clamp(0.0, 1.0);
             let part = if part.is_nan() { 0.0 } else { part };
             let column = (part * f64::from(line.width.saturating_sub(1))).round() as u16;
             let x = line.x + column;
-            let mark = Line::from(Span::styled("●", self.theme.chosen()));
+            let mark = styled("●", self.theme.chosen());
             left(
                 buf,
                 Rect {
@@ -279,10 +278,7 @@ impl Widget for &Track<'_> {
                 },
                 &mark,
             );
-            let text = Line::from(Span::styled(
-                value.to_string().replace('-', "−"),
-                self.theme.chosen(),
-            ));
+            let text = styled(value.to_string().replace('-', "−"), self.theme.chosen());
             let wide = u16::try_from(text.width()).unwrap_or(u16::MAX);
             let start = x
                 .saturating_sub(wide / 2)
@@ -301,7 +297,7 @@ impl Widget for &Track<'_> {
         };
         let end = |n: f64| {
             let text = n.to_string().replace('-', "−");
-            Line::from(Span::styled(wrap::one_line(&text, 12), self.theme.strong()))
+            styled(wrap::one_line(&text, 12), self.theme.strong())
         };
         left(buf, ends, &end(self.from));
         right(buf, ends, &end(self.to));
@@ -314,7 +310,7 @@ impl Widget for &Track<'_> {
                     width: line.width.min(at.width),
                     ..at
                 };
-                let text = Line::from(Span::styled(text.as_str(), self.theme.text()));
+                let text = styled(text.as_str(), self.theme.text());
                 if side {
                     right(buf, at, &text);
                 } else {

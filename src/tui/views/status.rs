@@ -1,10 +1,10 @@
 //! The experimenter's status line, the banner and the progress.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{centre, clock, left, right};
+use crate::tui::widgets::{centre, clock, left, right, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
+use ratatui::layout::{Margin, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use study_core::session::view::{Banner, Counts, DeviceState, StatusLine};
@@ -45,11 +45,7 @@ fn device(state: DeviceState) -> String {
 
 impl Widget for &Status<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let inside = Rect {
-            x: area.x + 1.min(area.width),
-            width: area.width.saturating_sub(2),
-            ..area
-        };
+        let inside = area.inner(Margin::new(1, 0));
         let quiet = self.theme.quiet();
         let line = self.line;
         let who = [&line.participant, &line.operator]
@@ -58,7 +54,7 @@ impl Widget for &Status<'_> {
             .map(|name| wrap::one_line(name, 12))
             .collect::<Vec<_>>()
             .join(" · ");
-        left(buf, inside, &Line::from(Span::styled(who, quiet)));
+        left(buf, inside, &styled(who, quiet));
 
         let bad = matches!(line.device, DeviceState::Fault | DeviceState::Lost);
         let mut spans = vec![Span::styled(
@@ -109,19 +105,11 @@ impl Widget for &Top<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         if let Some(banner) = self.view.banner {
             let words = match banner {
-                Banner::Pilot => " PILOT — not analysed with the real data ",
-                Banner::Simulated => " SIMULATED — not analysed with the real data ",
+                Banner::Pilot => " PILOT — not analyzed with real data ",
+                Banner::Simulated => " SIMULATED — not analyzed with real data ",
             };
-            let at = Rect {
-                x: area.x + 1.min(area.width),
-                width: area.width.saturating_sub(2),
-                ..area
-            };
-            left(
-                buf,
-                at,
-                &Line::from(Span::styled(words, self.theme.banner())),
-            );
+            let at = area.inner(Margin::new(1, 0));
+            left(buf, at, &styled(words, self.theme.banner()));
         }
         let mut words = Vec::new();
         if let Screen::Form { page, pages, .. } = &self.view.screen

@@ -1,11 +1,10 @@
 //! Faults of the device or the disk: what happened, what it means, what to do.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{centre, frame, left_all, middle, row, rows};
+use crate::tui::widgets::{centre, frame, left_all, middle, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
-use ratatui::text::{Line, Span};
+use ratatui::layout::{Margin, Rect};
 use ratatui::widgets::Widget;
 use study_core::protocol::DeviceKind;
 use study_core::session::{Screen, View};
@@ -69,16 +68,8 @@ impl Widget for &Trouble<'_> {
         let then_rows = u16::try_from(then.len()).unwrap_or(1);
         let place = middle(area, wide, what_rows + then_rows + 7);
         frame(buf, place, true, self.theme.trouble_frame());
-        let inside = Rect {
-            x: place.x + 3.min(place.width),
-            width: place.width.saturating_sub(6),
-            y: place.y + 1.min(place.height),
-            height: place.height.saturating_sub(2),
-        };
-        let title = Line::from(Span::styled(
-            format!("  {}  ", self.title),
-            self.theme.trouble(),
-        ));
+        let inside = place.inner(Margin::new(3, 1));
+        let title = styled(format!("  {}  ", self.title), self.theme.trouble());
         centre(buf, row(inside, 1), &title);
         left_all(buf, rows(inside, 3, what_rows), &what, self.theme.strong());
         let then_area = rows(inside, 4 + what_rows, then_rows);

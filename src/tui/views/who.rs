@@ -2,10 +2,9 @@
 
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Who;
-use crate::tui::widgets::{TextField, centre, left, middle, row};
+use crate::tui::widgets::{TextField, centre, left, middle, row, styled};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
-use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
 /// The widget of the first screen.
@@ -77,7 +76,7 @@ impl Widget for &WhoView<'_> {
         } else {
             "Who takes part?"
         };
-        let title = Line::from(Span::styled(title, self.theme.strong()));
+        let title = styled(title, self.theme.strong());
         centre(buf, row(place, 0), &title);
         for (label, hint, field, at) in self.fields(area) {
             let start = Rect {
@@ -85,12 +84,12 @@ impl Widget for &WhoView<'_> {
                 width: LABEL.min(place.width),
                 ..at
             };
-            let label = Line::from(Span::styled(label, self.theme.text()));
+            let label = styled(label, self.theme.text());
             left(buf, start, &label);
             field.render(at, buf);
             let below = Rect { y: at.y + 1, ..at };
             if below.bottom() <= area.bottom() && !at.is_empty() {
-                let hint = Line::from(Span::styled(format!("  {hint}"), self.theme.quiet()));
+                let hint = styled(format!("  {hint}"), self.theme.quiet());
                 left(buf, below, &hint);
             }
         }
