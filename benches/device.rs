@@ -1,6 +1,7 @@
 //! How long simulated playbacks take: 150 of 12 s are a study of 10 × 15 trials.
 
 use divan::{Bencher, black_box};
+use std::num::NonZeroU16;
 use std::time::Duration;
 use study::device::firmware::{self, Firmware};
 use study::device::virtual_device::{Options, VirtualDevice};
@@ -9,10 +10,10 @@ use study::rater::Impression;
 use study_base::limits::{Limit, Limits};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::message::{
-    Commit, Few, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, TableCrc,
+    Commit, FixedVec, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, TableCrc,
 };
 use study_wire::predict::{Direction, Lookup, Motion};
-use study_wire::servo::{Core, Rendering, Settings, State};
+use study_wire::servo::{Rendering, Servo, ServoSettings, ServoState};
 
 fn main() {
     divan::main();
@@ -107,7 +108,7 @@ fn a_thousand_servo_steps(bencher: Bencher) {
             }
         })
         .collect();
-    let mut core = Core::new(Settings::default());
+    let mut core = Servo::new(ServoSettings::default());
     core.start();
     bencher.bench_local(|| {
         let mut sum = 0.0;
@@ -116,7 +117,7 @@ fn a_thousand_servo_steps(bencher: Bencher) {
         }
         sum
     });
-    assert_eq!(core.state(), State::Playing);
+    assert_eq!(core.state(), ServoState::Playing);
 }
 
 /// The same with everything that a firmware does in it: watchdog, telemetry at
@@ -125,7 +126,7 @@ fn a_thousand_servo_steps(bencher: Bencher) {
 fn a_thousand_periods_of_the_simulated_device(bencher: Bencher) {
     let mut host = Playing::new(&realization());
     bencher.bench_local(|| host.quarter_second());
-    assert!(host.device.state().forceful());
+    assert!(host.device.state().applies_force());
 }
 
 /// A host in front of a device that plays.
@@ -169,7 +170,7 @@ impl Playing {
             crc.node(&node);
             playing.say(Request::TableChunk(TableChunk {
                 first: i as u16,
-                nodes: Few::of(&[node]),
+                nodes: FixedVec::of(&[node]),
             }));
         }
         let crc = crc.value();
@@ -179,7 +180,7 @@ impl Playing {
             playback: 1,
             crc,
             longest_ms: 600_000,
-            every: 4,
+            every: NonZeroU16::new(4),
         }));
         playing
     }

@@ -1,14 +1,17 @@
-//! What plays a realization.
+//! Playback devices, the host's side.
 //!
-//! [`Device`] never blocks: a command is asked for, and what came of it is
-//! reported by a later [`Device::poll`]. Time is an argument, so the same device
-//! runs on a virtual clock. The host never closes the force loop.
+//! A [`Device`] never blocks: a command returns at once, and a later [`Device::poll`]
+//! reports the result. Time is an argument, so a device also runs on a virtual clock.
+//! The host never closes the force loop.
 //!
-//! [`wire`] is what host and device say to each other, in [`frame`]s.
-//! [`virtual_device`] is the simulated one, in this process; [`core`] the servo
-//! step that it shares with a firmware, [`table`] what it demands of a table,
-//! [`faults`] what it can be told to do wrong. [`process`] is a child program of
-//! the lab's, [`manual`] an experimenter who mounts samples.
+//! - [`host`] is the host's side of the wire format, [`link`] runs it on a link, and
+//!   [`serial`] opens serial ports.
+//! - [`virtual_device`] is the simulated device in virtual time, [`firmware`] its
+//!   device side, and [`faults`] the faults that can be injected.
+//! - [`process`] is a controller program of the lab, [`manual`] an experimenter who
+//!   mounts samples.
+//! - [`table`] checks tables before they are sent, [`check`] tests a device against
+//!   `docs/wire.md`, and [`probe`] records with a probe.
 
 pub mod check;
 pub mod faults;
@@ -27,67 +30,66 @@ use study_base::limits::Limits;
 use study_core::outcome::{Playback, Sample};
 use study_haptics::model::Realization;
 
-/// Who a device is and what it can do.
+/// Identity and limits of a device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identity {
-    /// Names it in every file, such as `simulated-1`.
+    /// Name of the device in every file, such as `simulated-1`.
     pub id: String,
-    /// Whether no motor and no hand is behind it.
+    /// Whether it is simulated, without motor and hand.
     pub simulated: bool,
-    /// Whether it reports samples while it plays.
+    /// Whether it reports samples during playback.
     pub telemetry: bool,
-    /// What it never exceeds, whatever is asked.
+    /// Limits that it never exceeds.
     pub limits: Limits,
 }
 
-/// Why a command was refused on the spot.
+/// Why a command was refused immediately.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DeviceError {
     /// The table cannot be played.
     #[error("the device refuses the table: {0}")]
     Refused(String),
-    /// The command does not fit the device's state.
+    /// The command is not possible in the device's state.
     #[error("the device cannot {command} while {state}")]
     WrongState {
-        /// What was asked.
+        /// The command.
         command: &'static str,
-        /// What it is doing.
+        /// The state of the device.
         state: &'static str,
     },
-    /// It does not answer.
+    /// The device does not answer.
     #[error("the device does not answer: {0}")]
     Lost(String),
 }
 
-/// What is to be played.
+/// What a device has to play.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stimulus<'a> {
-    /// The realization's id. Never shown to anybody in the session.
+    /// Id of the realization. Never shown during a session.
     pub model: &'a str,
-    /// Its table; a physical sample and a child program may do without.
+    /// Table of the realization; optional for physical samples and controller programs.
     pub table: Option<&'a Realization>,
-    /// What it is called towards people: opaque, see [`manual::codes`].
+    /// Opaque code shown to people, see [`manual::codes`].
     pub code: &'a str,
     /// Whether a person mounts it.
     pub by_hand: bool,
-    /// Whether a table that fails its certificate may be played: the device is
-    /// armed for it explicitly.
-    pub permitted: bool,
+    /// Whether a table that fails its certificate may be played.
+    pub allow_uncertified: bool,
 }
 
 impl<'a> Stimulus<'a> {
-    /// A table alone, permitted.
+    /// A table alone, also an uncertified one.
     pub fn of_table(table: &'a Realization) -> Self {
         Self {
             model: &table.id,
             table: Some(table),
             code: "",
             by_hand: false,
-            permitted: true,
+            allow_uncertified: true,
         }
     }
 
-    /// The table, for a device that plays nothing else.
+    /// The table, for a device that plays only tables.
     ///
     /// # Errors
     /// [`DeviceError::Refused`] if there is none.
@@ -97,47 +99,55 @@ impl<'a> Stimulus<'a> {
     }
 }
 
-/// What a device says between two polls, in order.
+/// A report of a device. [`Device::poll`] returns reports in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Report {
-    /// The table is there and valid.
+    /// The stimulus is loaded.
     Loaded,
-    /// Instead of [`Report::Loaded`]: the sample with this code is to be mounted
-    /// by a person, and started when that is done.
+    /// Instead of [`Report::Loaded`]: a person has to mount the sample with this code
+    /// before the playback is started.
     Mount(String),
-    /// It plays.
+    /// The playback has started.
     Started,
-    /// What it measured since the last report.
+    /// Samples since the last report.
     Telemetry(Vec<Sample>),
-    /// Full strokes and clamps so far.
+    /// Totals of the playback so far.
     Progress {
         /// Full strokes.
         strokes: u32,
         /// Clamps.
         clamps: u64,
     },
-    /// It has stopped and is limp.
+    /// The playback has stopped and the device is limp.
     Stopped(Playback),
-    /// It has tripped and is limp, latched until the next load.
+    /// The device has tripped and is limp until the next load.
     Fault(String),
-    /// It does not answer any more.
+    /// The device no longer answers.
     Lost(String),
-    /// It is back, limp and ready for a table.
+    /// The device answers again, limp and without a table.
     Ready,
+}
+
+impl Report {
+    /// Whether the report is still valid after [`Device::limp`]; reports about the
+    /// interrupted playback are not.
+    fn survives_limp(&self) -> bool {
+        matches!(self, Self::Fault(_) | Self::Lost(_) | Self::Ready)
+    }
 }
 
 /// A playback device, real or simulated.
 ///
-/// `at` is monotonic time since an origin of the caller's and never goes back.
+/// `at` is monotonic time since an origin chosen by the caller.
 pub trait Device: Send {
-    /// Who it is.
+    /// Identity and limits.
     fn identity(&self) -> Identity;
 
-    /// Sends what is to be played; [`Report::Loaded`] or [`Report::Mount`] follows.
-    /// The device plays it under `limits`, or its own where they are lower.
+    /// Loads a stimulus; [`Report::Loaded`] or [`Report::Mount`] follows. The lower of
+    /// `limits` and the device's own limits apply.
     ///
     /// # Errors
-    /// [`DeviceError`] if it cannot even be asked.
+    /// [`DeviceError`] if the command cannot be sent.
     fn load(
         &mut self,
         what: &Stimulus<'_>,
@@ -145,23 +155,23 @@ pub trait Device: Send {
         at: Duration,
     ) -> Result<(), DeviceError>;
 
-    /// Starts playing what is loaded; [`Report::Started`] follows.
+    /// Starts playing the loaded stimulus; [`Report::Started`] follows.
     ///
     /// # Errors
     /// [`DeviceError`] if nothing is loaded.
     fn start(&mut self, at: Duration) -> Result<(), DeviceError>;
 
-    /// Stops playing; [`Report::Stopped`] follows, unless a fault or a loss did
-    /// before.
+    /// Stops playing; [`Report::Stopped`] follows, unless a fault or a loss was
+    /// reported before.
     ///
     /// # Errors
-    /// [`DeviceError`] if it does not answer or nothing was started.
+    /// [`DeviceError`] if the device does not answer or nothing was started.
     fn stop(&mut self, at: Duration) -> Result<(), DeviceError>;
 
-    /// Zero force at once. Cannot fail: a device that does not hear it goes limp
-    /// by its own watchdog. Whatever was playing is lost without a report.
+    /// Switches the force off at once. This cannot fail: a device that does not receive
+    /// it goes limp by its watchdog. The playback is lost without a report.
     fn limp(&mut self, at: Duration);
 
-    /// What happened up to `at`.
+    /// Reports of everything that happened up to `at`.
     fn poll(&mut self, at: Duration) -> Vec<Report>;
 }

@@ -15,7 +15,7 @@
 //! answer draws never depends on what was felt.
 
 mod impression;
-mod words;
+mod remarks;
 
 pub use impression::Impression;
 
@@ -160,7 +160,7 @@ impl Rater {
         if silent && !required {
             return Answer::Text(String::new());
         }
-        let said = felt.map_or_else(|| words::general(draw), |felt| words::about(felt, draw));
+        let said = felt.map_or_else(|| remarks::general(draw), |felt| remarks::about(felt, draw));
         Answer::Text(said.to_owned())
     }
 

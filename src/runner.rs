@@ -334,7 +334,7 @@ impl Runner {
             table,
             code: self.codes.get(model).map_or("", String::as_str),
             by_hand,
-            permitted: protocol.device.uncertified.as_ref().is_some_and(|u| u.play),
+            allow_uncertified: protocol.device.uncertified.as_ref().is_some_and(|u| u.play),
         };
         if let Some(strip) = &mut self.strip {
             strip.samples.clear();

@@ -58,7 +58,7 @@ pub fn period(device: &mut Device, board: &mut dyn Board) {
     let mut room = [0; 32];
     let len = board.received(&mut room).min(room.len());
     device.receive(&room[..len], now_ms, &mut |bytes| board.send(bytes));
-    if !device.state().forceful() {
+    if !device.state().applies_force() {
         board.drive(Drive::Force(0.0));
     }
 }

@@ -137,7 +137,7 @@ fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
                     .conditions()
                     .iter()
                     .map(|(condition, margin)| Margin {
-                        condition: condition.word(),
+                        condition: condition.as_str(),
                         unit: condition.unit(),
                         value: margin.value,
                         at_mm: margin.at_mm,

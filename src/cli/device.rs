@@ -1,11 +1,15 @@
-//! `study device`: what could play.
+//! `study device`: ports, device tests and the simulated device.
 
 mod check;
 mod hold;
 pub(super) mod port;
 mod rendered;
+#[cfg(unix)]
 mod safety;
+#[cfg(unix)]
 mod simulate;
+#[cfg(not(unix))]
+mod unsupported;
 
 use super::{Console, Failure, Kind, load};
 use serialport::SerialPortType;
@@ -28,42 +32,45 @@ enum What {
         #[arg(long)]
         json: bool,
     },
-    /// Ask a device who it is and what it can do
+    /// Show the identity and the limits of a device
     Info(check::InfoArgs),
-    /// Check a device on a serial port against docs/wire.md, clause by clause
+    /// Test a device on a serial port against the clauses of docs/wire.md
     Check(check::CheckArgs),
-    /// Be a simulated device on a pseudo-terminal, whose path is the first line
+    /// Run a simulated device on a pseudo-terminal; its path is the first line of output
+    #[cfg(unix)]
     Simulate(simulate::Args),
-    /// Play one table for long, without a session
+    /// Run a simulated device (not supported on this system)
+    #[cfg(not(unix))]
+    #[command(hide = true)]
+    Simulate(unsupported::Args),
+    /// Play one table without a session
     #[command(hide = true)]
     Hold(hold::Args),
-    /// Measure the time to zero force when the host is killed, stopped, stalled or
+    /// Measure the time to zero force after the host is killed, stopped, stalled or
     /// unplugged, on a simulated device
+    #[cfg(unix)]
     #[command(hide = true)]
     Safety(safety::Args),
-    /// Show what to write on the samples of a study: for who labels them, not for
-    /// the experimenter
+    /// List the codes for the labels of physical samples; not for the experimenter
     Codes {
         /// A protocol.toml or the folder that holds one
         protocol: PathBuf,
     },
 }
 
-/// Different for each run of the program.
-pub(super) fn nonce() -> u32 {
-    use std::hash::{BuildHasher as _, RandomState};
-    RandomState::new().hash_one(std::process::id()) as u32
-}
-
-/// Does it.
+/// Runs a subcommand of `study device`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     match &args.what {
         What::List { json } => list(*json, console),
         What::Info(args) => check::info(args, console),
         What::Check(args) => check::check(args, console),
         What::Hold(args) => hold::run(args, console),
+        #[cfg(unix)]
         What::Safety(args) => safety::run(args, console),
+        #[cfg(unix)]
         What::Simulate(args) => simulate::run(args, console),
+        #[cfg(not(unix))]
+        What::Simulate(_) => Err(unsupported::failure()),
         What::Codes { protocol } => codes(protocol, console),
     }
 }
@@ -82,15 +89,16 @@ fn codes(path: &Path, console: &mut Console) -> Result<(), Failure> {
     }
     if out.is_empty() {
         return Err(
-            Failure::input(format!("{}: no sample is mounted by hand", path.display()))
-                .hint("say device = \"manual\" at the model, or kind = \"manual\" in [device]"),
+            Failure::input(format!("{}: no sample is mounted by hand", path.display())).hint(
+                "set device = \"manual\" in the model's entry, or kind = \"manual\" in [device]",
+            ),
         );
     }
     console.out(out)
 }
 
-/// A port, and what is plugged into it as far as the system knows.
-struct Port {
+/// A serial port and the connected device, as far as the system knows.
+struct ListedPort {
     path: String,
     what: String,
     serial_number: Option<String>,
@@ -98,12 +106,12 @@ struct Port {
 
 fn list(json: bool, console: &mut Console) -> Result<(), Failure> {
     let found = serialport::available_ports()
-        .map_err(|e| Failure::new(Kind::Device, format!("the serial ports: {e}")))?;
-    let mut ports: Vec<Port> = found
+        .map_err(|e| Failure::new(Kind::Device, format!("cannot list the serial ports: {e}")))?;
+    let mut ports: Vec<ListedPort> = found
         .into_iter()
         .map(|port| {
             let (what, serial_number) = describe(port.port_type);
-            Port {
+            ListedPort {
                 path: port.port_name,
                 what,
                 serial_number,

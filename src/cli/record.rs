@@ -5,7 +5,7 @@
 
 mod wire;
 
-use super::playback::Port;
+use super::device_selection::SerialPortArgs;
 use super::trajectory::{
     picture, rate, read_plant, read_trajectory, refuse_to_overwrite, write_file,
 };
@@ -42,7 +42,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "KIND", value_parser = ["simulated", "serial"], default_value = "simulated")]
     device: String,
     #[command(flatten)]
-    place: Port,
+    port: SerialPortArgs,
     /// Largest force of a probe on a serial port, N
     #[arg(long, value_name = "N", default_value_t = 12.0)]
     max_force: f64,
@@ -82,7 +82,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if args.device == "serial" {
         return wire::run(args, console);
     }
-    if args.place.port.is_some() || args.place.baud.is_some() {
+    if args.port.port.is_some() || args.port.baud.is_some() {
         return Err(Failure::new(
             Kind::Usage,
             "--port and --baud do not apply to the simulated probe",

@@ -1,6 +1,6 @@
 //! `study rehearse`: a whole study with simulated participants.
 
-use super::playback::with_person;
+use super::device_selection::with_manual_samples;
 use super::{Console, Failure, Kind, load};
 use crate::device::faults::FaultPlan;
 use crate::device::manual::Manual;
@@ -116,7 +116,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             device_kind: kind,
             device: match kind {
                 DeviceKind::Manual => Box::new(Manual::default()),
-                _ => with_person(Box::new(VirtualDevice::new(options)), &protocol),
+                _ => with_manual_samples(Box::new(VirtualDevice::new(options)), &protocol),
             },
             device_check: None,
             clock: Box::new(clock.clone()),

@@ -1,7 +1,7 @@
 //! `study run`: a session in the terminal.
 
 use super::console::shell_command;
-use super::playback::{self, PlaybackArgs, Waiting};
+use super::device_selection::{self, DeviceArgs, WaitDisplay};
 use super::{Console, Failure, Kind, load};
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Runner, Setup};
@@ -25,7 +25,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "NAME")]
     operator: Option<String>,
     #[command(flatten)]
-    playback: PlaybackArgs,
+    device: DeviceArgs,
     /// Mark the session as a pilot: stored separately from real data, uses no row
     #[arg(long)]
     pilot: bool,
@@ -48,7 +48,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     tui::check_platform().map_err(unusable)?;
     let loaded = load::load(&args.protocol)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
-    let kind = args.playback.device.unwrap_or(loaded.protocol.device.kind);
+    let kind = args.device.kind.unwrap_or(loaded.protocol.device.kind);
     // Checks come before the device, and the device before the terminal, so that an
     // error message stays on the screen.
     let participant = check_ids(args)?;
@@ -78,9 +78,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         live: args.live,
         colour: tui::Colour::detect(|name| std::env::var(name).ok()),
     };
-    let place = &args.playback.place;
-    let mut waiting = Waiting::on_screen(options);
-    let opened = playback::open(place, kind, &loaded.protocol, &mut waiting);
+    let address = &args.device.address;
+    let mut waiting = WaitDisplay::on_screen(options);
+    let opened = device_selection::open(address, kind, &loaded.protocol, &mut waiting);
     drop(waiting);
     let Some(device) = opened? else {
         return console.out("Nothing was recorded.\n");
@@ -112,7 +112,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         kind: seats,
         rows: args.rows.clone(),
         device_kind: kind,
-        device_check: playback::commissioned(&device.identity().id, console),
+        device_check: device_selection::commissioned(&device.identity().id, console),
         device,
         clock: Box::new(clock),
         live: args.live,
@@ -203,16 +203,13 @@ fn resume_command(args: &Args, participant: &str) -> String {
     };
     let results = Some(path(&args.results)).filter(|p| p != "results");
     option("results", results);
-    option(
-        "device",
-        args.playback.device.map(|k| k.as_str().to_owned()),
-    );
-    option("port", args.playback.place.serial.port.clone());
+    option("device", args.device.kind.map(|k| k.as_str().to_owned()));
+    option("port", args.device.address.serial.port.clone());
     option(
         "baud",
-        args.playback.place.serial.baud.map(|b| b.to_string()),
+        args.device.address.serial.baud.map(|b| b.to_string()),
     );
-    option("command", args.playback.place.command.clone());
+    option("command", args.device.address.command.clone());
     option(
         "rows",
         args.rows

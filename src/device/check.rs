@@ -1,175 +1,172 @@
-//! Commissioning: whether a device keeps `docs/wire.md`, clause by clause.
+//! Commissioning: tests a device against the clauses of `docs/wire.md`.
 //!
-//! [`commission`] talks to whatever is at the end of a [`Wire`], never with more than
-//! [`FORCE_N`], and gives a verdict for each clause that can be seen from outside.
-//! Time comes from the wire, so the same check runs over a port and, in tests, in
-//! virtual time on a simulated device with a planted defect.
+//! [`commission`] tests the device on a [`Connection`] with at most [`FORCE_N`] and gives
+//! a verdict for each clause that can be tested from outside. The connection provides the
+//! time, so the same test runs on a port and, in virtual time, on a simulated device.
 
 mod clauses;
+pub(super) mod exchange;
 mod playing;
-pub(super) mod talk;
 mod uploads;
 
 use super::link::LinkError;
+use exchange::Exchange;
 use std::time::Duration;
 use study_wire::frame::crc32;
 use study_wire::message::Identity;
-use talk::Talk;
 
-/// Largest force that is asked for, N.
+/// Largest force of the test, N.
 pub const FORCE_N: f64 = 2.0;
 
-/// Bytes to a device and back, with a clock.
-pub trait Wire {
-    /// Since some origin; never goes back.
+/// A link to a device with a clock.
+pub trait Connection {
+    /// Monotonic time since an arbitrary origin.
     fn now(&mut self) -> Duration;
 
-    /// Writes `bytes`, then waits at most `wait` for some; what came.
+    /// Writes `bytes`, waits at most `wait` for bytes and returns those received.
     ///
     /// # Errors
-    /// [`LinkError`]: the link has ended.
+    /// [`LinkError`] if the link has ended.
     fn exchange(&mut self, bytes: &[u8], wait: Duration) -> Result<Vec<u8>, LinkError>;
 }
 
-/// What one clause came to.
+/// Result of the test of one clause.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Verdict {
-    /// Of `docs/wire.md`, such as `6.3`.
+    /// Number of the clause in `docs/wire.md`, such as `6.3`.
     pub clause: &'static str,
-    /// What was looked at.
+    /// Requirement that was tested.
     pub what: &'static str,
-    /// Whether it is kept.
+    /// Whether the requirement is met.
     pub pass: bool,
-    /// What was seen.
+    /// Observation.
     pub seen: String,
 }
 
-/// A device's commissioning.
+/// Result of a commissioning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Commissioning {
-    /// Who it is; `None` if it never said so.
+    /// Identification of the device; `None` if it sent none.
     pub device: Option<Identity>,
-    /// In the order in which it was looked at.
+    /// Verdicts in the order of the tests.
     pub verdicts: Vec<Verdict>,
-    /// Round trips of a heartbeat: median, 99th percentile, largest, ms.
+    /// Round-trip time: median, 99th percentile, maximum, ms.
     pub latency_ms: Option<[f64; 3]>,
 }
 
 impl Commissioning {
-    /// Whether every clause is kept.
+    /// Whether every requirement is met.
     pub fn passes(&self) -> bool {
         !self.verdicts.is_empty() && self.verdicts.iter().all(|v| v.pass)
     }
 
     /// One line for a session's records: device, verdict, latency.
     pub fn summary(&self) -> String {
-        let kept = self.verdicts.iter().filter(|v| v.pass).count();
-        let mut line = format!("{kept} of {} clauses kept", self.verdicts.len());
-        let broken: Vec<&str> = self
-            .verdicts
-            .iter()
-            .filter(|v| !v.pass)
-            .map(|v| v.clause)
-            .collect();
-        if !broken.is_empty() {
-            line.push_str(&format!(", broken: {}", broken.join(", ")));
+        let passed = self.verdicts.iter().filter(|v| v.pass).count();
+        let mut line = format!("{passed} of {} tests passed", self.verdicts.len());
+        let failed = self.failed_clauses();
+        if !failed.is_empty() {
+            line.push_str(&format!(", failed: {}", failed.join(", ")));
         }
-        if let Some([median, p99, most]) = self.latency_ms {
+        if let Some([median, p99, max]) = self.latency_ms {
             line.push_str(&format!(
-                "; round trip {median:.2} ms, 99 % {p99:.2} ms, at most {most:.2} ms"
+                "; round trip {median:.2} ms, 99 % {p99:.2} ms, at most {max:.2} ms"
             ));
         }
         line
     }
-}
 
-/// Why a clause is broken.
-#[derive(Debug)]
-pub(super) enum Broken {
-    /// In words.
-    Seen(String),
-    /// Nothing more can be asked.
-    Gone(String),
-}
-
-impl Broken {
-    pub(super) fn seen(what: impl Into<String>) -> Self {
-        Self::Seen(what.into())
+    /// The clauses whose requirements are not met.
+    pub fn failed_clauses(&self) -> Vec<&'static str> {
+        let failed = self.verdicts.iter().filter(|v| !v.pass);
+        failed.map(|v| v.clause).collect()
     }
 }
 
-/// What was seen of a clause that is kept.
-type Kept = Result<String, Broken>;
+/// Why a test or a recording fails.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CheckFailure {
+    /// The device does not do what is required.
+    #[error("{0}")]
+    Violation(String),
+    /// The device no longer answers or is incompatible; no further test is possible.
+    #[error("{0}")]
+    Disconnected(String),
+}
 
+impl CheckFailure {
+    pub(super) fn violation(what: impl Into<String>) -> Self {
+        Self::Violation(what.into())
+    }
+}
+
+/// The observation if the requirement is met.
+type ClauseResult = Result<String, CheckFailure>;
+
+/// A requirement of the specification and its test.
 struct Clause {
     clause: &'static str,
     what: &'static str,
-    look: fn(&mut Talk<'_>) -> Kept,
+    test: fn(&mut Exchange<'_>) -> ClauseResult,
 }
 
-/// Looks at a device. `tell` hears each verdict as it comes; `nonce` is another one
-/// for each run.
+/// Tests a device. `report` receives each verdict at once; `nonce` has to differ between
+/// runs.
 pub fn commission(
-    wire: &mut dyn Wire,
+    connection: &mut dyn Connection,
     nonce: u32,
-    tell: &mut dyn FnMut(&Verdict),
+    report: &mut dyn FnMut(&Verdict),
 ) -> Commissioning {
-    let mut talk = Talk::new(wire, nonce);
+    let mut exchange = Exchange::new(connection, nonce);
     let mut verdicts = Vec::new();
-    for Clause { clause, what, look } in clauses::ALL {
-        // each begins with a device that is limp, idle and heard
-        let ready = match verdicts.is_empty() {
+    for Clause { clause, what, test } in clauses::ALL {
+        // Each test begins with an idle device that receives heartbeats.
+        let reset = match verdicts.is_empty() {
             true => Ok(()),
-            false => talk.ready(),
+            false => exchange.reset(),
         };
-        let kept = ready.and_then(|()| look(&mut talk));
-        let (pass, seen, gone) = match kept {
-            Ok(seen) => (true, seen, false),
-            Err(Broken::Seen(seen)) => (false, seen, false),
-            Err(Broken::Gone(seen)) => (false, seen, true),
-        };
+        let result = reset.and_then(|()| test(&mut exchange));
+        let disconnected = matches!(result, Err(CheckFailure::Disconnected(_)));
+        let pass = result.is_ok();
+        let seen = result.unwrap_or_else(|failure| failure.to_string());
         let verdict = Verdict {
             clause,
             what,
             pass,
             seen,
         };
-        tell(&verdict);
+        report(&verdict);
         verdicts.push(verdict);
-        // what nobody answers cannot be asked
-        if gone || talk.device.is_none() {
+        if disconnected || exchange.device.is_none() {
             break;
         }
     }
-    // whatever came of it
-    let _ = talk.limp();
+    // Also after a failure; the verdicts report it.
+    let _ = exchange.limp();
     Commissioning {
-        device: talk.device,
+        device: exchange.device,
         verdicts,
-        latency_ms: talk.latency_ms,
+        latency_ms: exchange.latency_ms,
     }
 }
 
-/// Who is at the end of a wire: zero force, then HELLO.
+/// Identifies a device: LIMP, then HELLO.
 ///
 /// # Errors
-/// In words: nobody, somebody else, another version.
-pub fn greet(wire: &mut dyn Wire, nonce: u32) -> Result<Identity, String> {
-    let mut talk = Talk::new(wire, nonce);
-    match clauses::introduce(&mut talk) {
-        Ok(device) => Ok(device),
-        Err(Broken::Seen(why) | Broken::Gone(why)) => Err(why),
-    }
+/// [`CheckFailure`] if there is no answer, an incorrect one, or another version.
+pub fn identify(connection: &mut dyn Connection, nonce: u32) -> Result<Identity, CheckFailure> {
+    clauses::identify(&mut Exchange::new(connection, nonce))
 }
 
-/// Percentile of sorted values, by the nearest rank.
-fn percentile(sorted: &[f64], share: f64) -> f64 {
-    let rank = (share * sorted.len() as f64).ceil() as usize;
-    let place = rank.saturating_sub(1).min(sorted.len().saturating_sub(1));
-    sorted.get(place).copied().unwrap_or(f64::NAN)
+/// Quantile of sorted values by the nearest rank, `fraction` between 0 and 1; `None`
+/// without values.
+fn quantile(sorted: &[f64], fraction: f64) -> Option<f64> {
+    let rank = (fraction * sorted.len() as f64).ceil() as usize;
+    let last = sorted.len().checked_sub(1)?;
+    sorted.get(rank.saturating_sub(1).min(last)).copied()
 }
 
-/// Numbers that no two clauses share.
+/// A number that depends on the clause.
 fn tag(clause: &str) -> u32 {
     crc32(clause.as_bytes()) | 1
 }

@@ -1,68 +1,67 @@
-//! The simulated device's side of the link: the handler, a servo, a hand.
+//! The simulated device: the handler of `study-wire` with a simulated motor and hand.
 //!
-//! [`Firmware`] is a device at the end of a wire: bytes go in, bytes come out, and
-//! time passes when it is told so. What it plays and says follows from its
-//! options, the bytes and the instants of both; how often it is looked at in
-//! between changes nothing.
+//! [`Firmware`] receives and sends bytes and simulates time on request. Its behavior is
+//! determined by its options, the received bytes and their times; the frequency of the
+//! calls has no influence.
 //!
-//! The servo runs at every multiple of its period. A hand takes the handle when a
-//! playback starts and lets go of it a little after its end; the probe of a
-//! recording is ideal and moves the simulated target. `docs/simulation.md` says
-//! what they are made of. Nothing that it reports is measured.
+//! The servo runs at every multiple of its period. A simulated hand takes the handle when
+//! a playback starts and releases it shortly after the end. In a recording an ideal probe
+//! moves the simulated target. `docs/simulation.md` describes the models. Nothing in the
+//! reports is measured.
 
 mod body;
 mod flaw;
 
 use body::Body;
 pub use flaw::Flaw;
-use flaw::Tamper;
+use flaw::FlawInjector;
 use std::time::Duration;
 use study_base::limits::{Limit, Limits};
 use study_haptics::plant::{HandParameters, Parameters};
 use study_wire::handler::{Bounds, Drive, Handler, Measured, Profile};
-use study_wire::message::{Fault, Flags, Loaded, Name, State};
-use study_wire::servo::Settings;
+use study_wire::message::{DeviceState, Fault, Flags, Loaded, Name};
+use study_wire::servo::ServoSettings;
 
-/// Room for a table's nodes.
-pub const MOST_NODES: usize = 1024;
-/// Room for a path's points: two minutes at 1 kHz and more.
-pub const MOST_POINTS: usize = 1 << 17;
-/// A processor that does not answer its hardware watchdog for so long is reset.
+/// Largest number of nodes of a table.
+pub const MAX_NODES: usize = 1024;
+/// Largest number of points of a path: more than two minutes at 1 kHz.
+pub const MAX_POINTS: usize = 1 << 17;
+/// A processor that hangs for this time is reset by its hardware watchdog.
 const HARDWARE_WATCHDOG: Duration = Duration::from_millis(10);
-/// Time that is passed over when nothing can happen in it.
+/// Only this much of a longer idle time is simulated.
 const IDLE: Duration = Duration::from_secs(1);
 
-/// What a simulated device is like.
+/// Options of a simulated device.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Decides how the hand moves in each playback, and the probe's noise.
+    /// Seed of the hand's motion in each playback and of the probe's noise.
     pub seed: u64,
-    /// Servo periods per second, held to 500 … 20,000; no number reads as 4000.
+    /// Servo periods per second, limited to 500 … 20,000; 4000 for NaN.
     pub servo_hz: f64,
-    /// Most telemetry samples per second.
+    /// Highest telemetry rate, samples per second.
     pub telemetry_hz: f64,
-    /// What the device never exceeds.
+    /// Limits of the device.
     pub limits: Limits,
-    /// Without a fresh heartbeat for so long it goes limp, ms.
+    /// Time without a fresh heartbeat after which it goes limp, ms.
     pub watchdog_ms: u16,
     /// Hand and slider.
     pub hand: HandParameters,
-    /// What the probe of a recording moves.
+    /// Target that the probe moves in a recording.
     pub target: Parameters,
-    /// Smallest mass that is rendered, kg: minus infinity plays every table as it
-    /// is, which no hand may be able to hold.
+    /// Smallest mass that is rendered, kg. Minus infinity renders every table unchanged,
+    /// which may be unstable with any hand.
     pub least_mass_kg: f64,
-    /// What its clock says at the beginning, ms: a clock wraps at 2³².
+    /// Initial time of its clock, ms; the clock wraps at 2³².
     pub clock_ms: u32,
-    /// Names it.
+    /// Serial number.
     pub serial: String,
-    /// What is wrong with it.
+    /// Planted defect.
     pub flaw: Option<Flaw>,
 }
 
 impl Default for Options {
-    /// 4 kHz servo, 1 kHz telemetry, 15 N, 1 m/s, 30 ms, seed 0; no less mass than
-    /// the slider's own can be taken away.
+    /// 4 kHz servo, 1 kHz telemetry, 15 N, 1 m/s, 30 ms, seed 0; the smallest mass
+    /// compensates that of the slider.
     fn default() -> Self {
         let limit = |value| Limit::new(value).expect("a positive constant");
         let hand = HandParameters::default();
@@ -89,22 +88,24 @@ impl Default for Options {
 #[derive(Debug)]
 pub struct Firmware {
     options: Options,
-    handler: Box<Handler<MOST_NODES, MOST_POINTS>>,
+    handler: Box<Handler<MAX_NODES, MAX_POINTS>>,
     body: Body,
     /// Servo periods since the beginning.
     ticks: u64,
     period_ns: f64,
-    /// When its clock began to count.
+    /// When its clock started.
     started: Duration,
     clock_ms: u32,
-    stalled_until: Option<Stall>,
-    tamper: Option<Tamper>,
-    /// Up to when time has passed.
+    stall: Option<Stall>,
+    injector: Option<FlawInjector>,
+    /// Current time of the simulation.
     now: Duration,
-    /// What came while it stalled.
+    /// Bytes received during a stall.
     unread: Vec<u8>,
     sent: Vec<u8>,
 }
+
+/// A time in which the processor hangs.
 
 #[derive(Debug, Clone, Copy)]
 struct Stall {
@@ -113,7 +114,7 @@ struct Stall {
 }
 
 impl Firmware {
-    /// A device that has just been powered up, at the instant zero.
+    /// A device that is powered up at time zero.
     pub fn new(mut options: Options) -> Self {
         options.servo_hz = if options.servo_hz.is_nan() {
             Options::default().servo_hz
@@ -127,10 +128,10 @@ impl Firmware {
             period_ns: 1e9 / options.servo_hz,
             started: Duration::ZERO,
             clock_ms: options.clock_ms,
-            stalled_until: None,
-            tamper: options
+            stall: None,
+            injector: options
                 .flaw
-                .map(|flaw| Tamper::new(flaw, options.watchdog_ms)),
+                .map(|flaw| FlawInjector::new(flaw, options.watchdog_ms)),
             now: Duration::ZERO,
             unread: Vec::new(),
             sent: Vec::new(),
@@ -143,76 +144,76 @@ impl Firmware {
         Duration::from_secs_f64(1.0 / self.options.servo_hz)
     }
 
-    /// What it is doing.
-    pub fn state(&self) -> State {
+    /// The current state.
+    pub fn state(&self) -> DeviceState {
         self.handler.state()
     }
 
-    /// Why it is limp.
+    /// Why it is limp, or why the last playback ended.
     pub fn fault(&self) -> Fault {
         self.handler.fault()
     }
 
-    /// The force on the motor at this moment, N.
+    /// The current force of the motor, N.
     pub fn held_n(&self) -> f64 {
         self.body.force_n()
     }
 
-    /// The largest force that what is loaded may have, N; 0 if nothing is.
+    /// Force limit of what is loaded, N; 0 if nothing is.
     pub fn limit_n(&self) -> f64 {
         self.handler.limit_n()
     }
 
-    /// Takes in what the link has received by `at`.
+    /// Processes bytes that the link has received at `at`.
     pub fn receive(&mut self, bytes: &[u8], at: Duration) {
         self.advance(at);
-        if self.stalled_until.is_some() {
+        if self.stall.is_some() {
             self.unread.extend_from_slice(bytes);
             return;
         }
         let now_ms = self.clock(at);
-        match &mut self.tamper {
-            None => self.hear(bytes, at),
-            Some(tamper) => {
-                let [heard, answered] = tamper.inbound(bytes, at, now_ms);
-                self.hear(&heard, at);
-                self.sent.extend(answered);
+        match &mut self.injector {
+            None => self.handle(bytes, at),
+            Some(injector) => {
+                let [received, answers] = injector.inbound(bytes, at, now_ms);
+                self.handle(&received, at);
+                self.sent.extend(answers);
             }
         }
     }
 
-    fn hear(&mut self, bytes: &[u8], at: Duration) {
+    fn handle(&mut self, bytes: &[u8], at: Duration) {
         let now_ms = self.clock(at);
         let sent = &mut self.sent;
         self.handler
             .receive(bytes, now_ms, &mut |bytes| sent.extend_from_slice(bytes));
-        self.notice();
+        self.update_body();
     }
 
-    /// What it has said since this was asked last.
+    /// Takes the bytes to be sent.
     pub fn take_output(&mut self) -> Vec<u8> {
-        let said = std::mem::take(&mut self.sent);
-        match &mut self.tamper {
-            None => said,
-            Some(tamper) => tamper.outbound(&said, self.now),
+        let sent = std::mem::take(&mut self.sent);
+        match &mut self.injector {
+            None => sent,
+            Some(injector) => injector.outbound(&sent, self.now),
         }
     }
 
-    /// Lets time pass: every servo period that begins before `until`.
+    /// Simulates every servo period that begins before `until`.
     pub fn advance(&mut self, until: Duration) {
         let due = (until.as_secs_f64() * self.options.servo_hz + 1e-6) as u64;
         let idle = (IDLE.as_secs_f64() * self.options.servo_hz) as u64;
         if !self.handler.state().armed()
             && !self.body.moving()
-            && self.stalled_until.is_none()
+            && self.stall.is_none()
             && due > self.ticks + idle
         {
             self.ticks = due - idle;
         }
         while self.ticks < due {
             let at = Duration::from_nanos((self.ticks as f64 * self.period_ns).round() as u64);
-            while let Some(late) = self.tamper.as_mut().and_then(|t| t.overdue(at)) {
-                self.hear(&late, at);
+            while let Some(late) = self.injector.as_mut().and_then(|t| t.overdue(at)) {
+                self.handle(&late, at);
             }
             if self.awake(at) {
                 self.servo(at);
@@ -223,54 +224,54 @@ impl Firmware {
         self.now = self.now.max(until);
     }
 
-    /// Hangs for a while: nothing is read or sent, and the motor goes on with the
-    /// force that it has. The hardware's own watchdog resets a processor that
-    /// hangs for 10 ms; one that comes back before has missed servo periods.
+    /// Stalls the processor: nothing is read or sent, and the motor keeps its force. The
+    /// hardware watchdog resets the processor after 10 ms; after a shorter stall it has
+    /// missed servo periods.
     pub fn stall(&mut self, at: Duration, lasting: Duration) {
         self.advance(at);
-        self.stalled_until = Some(Stall {
+        self.stall = Some(Stall {
             since: at,
             until: at + lasting,
         });
     }
 
-    /// Powers up anew: nothing is loaded, nobody has said HELLO, the clock starts.
+    /// Restarts the device: nothing is loaded, there is no connection, the clock is 0.
     pub fn reset(&mut self, at: Duration) {
         self.advance(at);
         self.reboot(at);
     }
 
-    /// Trips: a guard, a button, a drive's fault.
+    /// Trips, as by a guard, a button or a fault of the drive.
     pub fn trip(&mut self, fault: Fault, at: Duration) {
         self.advance(at);
         let now_ms = self.clock(at);
         let sent = &mut self.sent;
         self.handler
             .trip(fault, now_ms, &mut |bytes| sent.extend_from_slice(bytes));
-        self.notice();
+        self.update_body();
     }
 
-    // inlined, it would give its half a megabyte of stack to every step
+    // If it were inlined, every step would need half a megabyte of stack.
     #[cold]
     #[inline(never)]
     fn reboot(&mut self, at: Duration) {
         *self.handler = Handler::new(profile(&self.options));
         self.started = at;
         self.clock_ms = 0;
-        self.stalled_until = None;
+        self.stall = None;
         self.unread.clear();
-        self.notice();
+        self.update_body();
     }
 
-    /// Its own clock, ms.
+    /// Time of the device's clock, ms.
     fn clock(&self, at: Duration) -> u32 {
         let since = at.saturating_sub(self.started).as_millis();
         self.clock_ms.wrapping_add(since as u32)
     }
 
-    /// Whether the processor runs at this instant.
+    /// Whether the processor runs at `at`.
     fn awake(&mut self, at: Duration) -> bool {
-        let Some(stall) = self.stalled_until else {
+        let Some(stall) = self.stall else {
             return true;
         };
         if at >= stall.since + HARDWARE_WATCHDOG {
@@ -280,8 +281,8 @@ impl Firmware {
         if at < stall.until {
             return false;
         }
-        self.stalled_until = None;
-        if self.handler.state().forceful() {
+        self.stall = None;
+        if self.handler.state().applies_force() {
             let now_ms = self.clock(at);
             let sent = &mut self.sent;
             self.handler.trip(Fault::Overrun, now_ms, &mut |bytes| {
@@ -289,7 +290,7 @@ impl Firmware {
             });
         }
         let unread = std::mem::take(&mut self.unread);
-        self.hear(&unread, at);
+        self.handle(&unread, at);
         true
     }
 
@@ -300,16 +301,16 @@ impl Firmware {
         let drive = self
             .handler
             .servo(measured, now_ms, &mut |bytes| sent.extend_from_slice(bytes));
-        self.notice();
+        self.update_body();
         self.body.drive(drive);
     }
 
-    /// Hand and motor follow what the handler has come to.
-    fn notice(&mut self) {
-        let forceful = self.handler.state().forceful();
+    /// Lets hand and motor follow the state of the handler.
+    fn update_body(&mut self) {
+        let forceful = self.handler.state().applies_force();
         if !forceful {
             self.body.release();
-        } else if !self.body.taken() {
+        } else if !self.body.is_held() {
             let range = match self.handler.loaded() {
                 Loaded::Table => self.handler.range_mm(),
                 _ => None,
@@ -319,7 +320,7 @@ impl Firmware {
     }
 }
 
-/// What the simulated device says of itself.
+/// The profile of the simulated device.
 fn profile(options: &Options) -> Profile {
     Profile {
         firmware: Name::new(concat!("study ", env!("CARGO_PKG_VERSION"))),
@@ -343,10 +344,10 @@ fn profile(options: &Options) -> Profile {
             damping_n_s_per_mm: 0.2,
             stroke_mm: [-20.0, 60.0],
         },
-        servo: Settings {
+        servo: ServoSettings {
             servo_hz: options.servo_hz,
             least_mass_kg: options.least_mass_kg,
-            ..Settings::default()
+            ..ServoSettings::default()
         },
         rest_mm_s: 5.0,
         rest_s: 0.05,

@@ -1,155 +1,106 @@
-//! The host's side of the wire, bytes in and bytes out, with time as an argument.
+//! The host's side of the wire format: bytes in, bytes out, time as an argument.
 //!
-//! [`Host`] says hello, uploads tables, plays and stops, with one request under way
-//! at a time: sent again every [`RETRY`] until it is answered, [`TRIES`] times, then
-//! the device counts as lost and is greeted until it answers. It sends heartbeats
-//! only while whoever it works for has been [heard](Host::fed) lately.
+//! A [`Host`] opens connections, uploads tables, plays and stops. It sends one request
+//! at a time and repeats it every [`RETRY_INTERVAL`], up to [`MAX_TRIES`] times. Then the
+//! device counts as lost, and the host tries to reconnect. Heartbeats are sent only
+//! while the user interface calls [`Host::keep_alive`].
 //!
-//! It has neither clock nor port: [`link`](super::link) runs it on a thread beside a
-//! port, [`virtual_device`](super::virtual_device) in virtual time beside the
-//! simulated device.
+//! A host has neither clock nor port: [`link`](super::link) runs it on a thread with a
+//! port, [`virtual_device`](super::virtual_device) in virtual time with the simulated
+//! device.
 
 mod clock;
-mod talk;
+mod replies;
+mod stage;
 mod upload;
 
 pub use clock::DeviceClock;
 
 use super::{DeviceError, Identity, Report, Stimulus};
+use stage::Stage;
 use std::collections::VecDeque;
+use std::num::NonZeroU16;
 use std::time::Duration;
 use study_base::limits::{Limit, Limits};
 use study_base::text::{Untrusted, is_unsafe};
 use study_wire::frame::Decoder;
-use study_wire::message::{self, Heartbeat, Hello, Outcome, Play, Reply, Request, Stop, WireError};
+use study_wire::message::{self, Heartbeat, Hello, Play, Reply, Request, Stop, WireError};
 
-/// How long an answer is waited for before the request is sent again.
-pub const RETRY: Duration = Duration::from_millis(100);
-/// How often a request is sent before the device counts as lost.
-pub const TRIES: u32 = 5;
-/// Between two heartbeats while something is loaded.
-pub const BEAT: Duration = Duration::from_millis(10);
-/// Between two heartbeats otherwise: only to see whether the device is there.
-const PING: Duration = Duration::from_millis(100);
-/// A heartbeat is sent only if the screen's loop was heard so lately.
-pub const STALL: Duration = Duration::from_millis(100);
-/// How long beyond the watchdog time a heartbeat says something, ms.
+/// Time after which an unanswered request is sent again.
+pub const RETRY_INTERVAL: Duration = Duration::from_millis(100);
+/// Number of times a request is sent before the device counts as lost.
+pub const MAX_TRIES: u32 = 5;
+/// Time between heartbeats while the device's watchdog is active.
+pub const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(10);
+/// Time between heartbeats otherwise, to notice when the device is lost.
+const IDLE_HEARTBEAT_INTERVAL: Duration = Duration::from_millis(100);
+/// Heartbeats stop when the user interface has not polled for this time.
+pub const SUPERVISION_TIMEOUT: Duration = Duration::from_millis(100);
+/// A heartbeat expires this long after the watchdog time, ms.
 const DEADLINE_SLACK_MS: u32 = 10;
-/// A deadline a second ahead is none (wire.md 6.1), and the clock is an estimate, ms.
-const DEADLINE_MOST_MS: u32 = 900;
-/// How long heartbeats may stay without an answer.
-const MUTE: Duration = Duration::from_millis(500);
-/// How long a handle may take to come to rest before a table goes up.
-const REST_WITHIN: Duration = Duration::from_secs(4);
-/// How long a device that does not answer is left alone before it is greeted again.
-const GREET_AGAIN: Duration = Duration::from_millis(500);
-/// Longest playback that is asked for, ms, if the device allows it.
+/// Largest distance of a deadline, ms. The limit of wire.md 6.1 is 1000 ms on the
+/// device's clock, which the host only estimates.
+const MAX_DEADLINE_MS: u32 = 900;
+/// A device that answers no heartbeat for this time is lost.
+const REPLY_TIMEOUT: Duration = Duration::from_millis(500);
+/// Time for the handle to come to rest before an upload.
+const REST_TIMEOUT: Duration = Duration::from_secs(4);
+/// Time between two attempts to reconnect to a device that does not answer.
+const RECONNECT_INTERVAL: Duration = Duration::from_millis(500);
+/// Requested longest playback, ms; the device's own limit may be lower.
 const LONGEST_MS: u32 = 10 * 60 * 1000;
-/// Heartbeats whose sending is remembered.
-const BEATS: usize = 64;
+/// Number of heartbeats whose send time is stored.
+const MAX_PENDING_HEARTBEATS: usize = 64;
 
-/// What the host does with the device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stage {
-    /// There is no port.
-    Unlinked,
-    /// LIMP and HELLO are on their way.
-    Greeting,
-    /// It did not answer, or not as it should; it is greeted again then.
-    Mute { again: Duration },
-    /// Limp, nothing loaded.
-    Idle,
-    /// A table goes up.
-    Loading { since: Duration },
-    /// It is up.
-    Loaded { since: Duration },
-    /// PLAY is on its way.
-    Starting,
-    /// It plays.
-    Playing { since: Duration },
-    /// STOP is on its way or its end is waited for.
-    Stopping { since: Duration },
-    /// It has ended; STATE asks how.
-    Asking,
-}
-
-impl Stage {
-    fn as_str(self) -> &'static str {
-        match self {
-            Self::Unlinked | Self::Greeting | Self::Mute { .. } => "it does not answer",
-            Self::Idle => "nothing is loaded",
-            Self::Loading { .. } => "the table is being loaded",
-            Self::Loaded { .. } => "a table is loaded",
-            Self::Starting => "it is about to play",
-            Self::Playing { .. } => "it plays",
-            Self::Stopping { .. } | Self::Asking => "it is about to stop",
-        }
-    }
-
-    /// Whether the device needs its heartbeats.
-    fn armed(self) -> bool {
-        matches!(
-            self,
-            Self::Loading { .. }
-                | Self::Loaded { .. }
-                | Self::Starting
-                | Self::Playing { .. }
-                | Self::Stopping { .. }
-        )
-    }
-
-    /// Whether the device has introduced itself.
-    fn known(self) -> bool {
-        !matches!(self, Self::Unlinked | Self::Greeting | Self::Mute { .. })
-    }
-}
-
-/// A request that waits for its answer.
+/// A request without an answer so far.
 #[derive(Debug, Clone, Copy)]
-struct Flight {
+struct PendingRequest {
     request: Request,
     sequence: u16,
     sent: Duration,
     tries: u32,
 }
 
-/// How a host works.
+/// When the next REARM is sent, and when the host stops trying.
+#[derive(Debug, Clone, Copy)]
+struct RearmRetry {
+    next: Duration,
+    until: Duration,
+}
+
+/// Settings of a host.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Heartbeats stop so long after [`Host::fed`]. `None`: whoever lets time pass is
-    /// alive, as in virtual time.
-    pub stall: Option<Duration>,
-    /// Telemetry samples per second that are asked for.
+pub struct HostSettings {
+    /// Heartbeats stop this long after the last [`Host::keep_alive`]. `None`: without
+    /// supervision, for virtual time.
+    pub supervision_timeout: Option<Duration>,
+    /// Requested telemetry rate, samples per second.
     pub telemetry_hz: f64,
 }
 
-impl Default for Settings {
-    /// [`STALL`] and 1 kHz.
+impl Default for HostSettings {
+    /// [`SUPERVISION_TIMEOUT`] and 1 kHz.
     fn default() -> Self {
         Self {
-            stall: Some(STALL),
+            supervision_timeout: Some(SUPERVISION_TIMEOUT),
             telemetry_hz: 1000.0,
         }
     }
 }
 
-/// What the link has been like.
+/// Quality of the link.
 #[derive(Debug, Clone, Default)]
 pub struct Health {
-    /// The device's clock.
+    /// Estimate of the device's clock.
     pub clock: DeviceClock,
-    /// Bytes between zeros that were no frame, and frames that were no message.
+    /// Invalid frames and messages received.
     pub bad_frames: u64,
     /// Requests that were sent again.
     pub repeats: u64,
-    /// Heartbeats sent.
-    pub beats: u64,
-    /// Telemetry samples received and known to be lost.
+    /// Telemetry samples received.
     pub samples: u64,
-    /// See above.
+    /// Telemetry samples known to be lost.
     pub samples_lost: u64,
-    /// What came of the last playback, in full.
-    pub outcome: Option<Outcome>,
 }
 
 /// The host's side of a connection.
@@ -162,74 +113,76 @@ pub struct Host {
     reports: Vec<Report>,
     nonce: u32,
     sequence: u16,
-    flight: Option<Flight>,
-    todo: VecDeque<Request>,
-    /// When REARM is tried again, and until when.
-    rest: Option<(Duration, Duration)>,
-    /// CRC of the table that goes up or is up.
+    pending: Option<PendingRequest>,
+    queue: VecDeque<Request>,
+    rearm_retry: Option<RearmRetry>,
+    /// CRC of the table that is being uploaded or is loaded.
     crc: u32,
     playback: u32,
     received: u64,
     lost: u64,
-    told: (u32, u32),
-    beat_count: u32,
-    next_beat: Duration,
-    beats: VecDeque<(u32, Duration)>,
-    /// Since when nothing has come back.
-    unheard: Option<Duration>,
-    fed: Option<Duration>,
-    settings: Settings,
-    trouble: Option<String>,
+    /// Strokes and clamps in the last progress report.
+    reported: (u32, u32),
+    heartbeat_count: u32,
+    next_heartbeat: Option<Duration>,
+    /// Count and send time of heartbeats without an answer so far.
+    pending_heartbeats: VecDeque<(u32, Duration)>,
+    /// When the first heartbeat without any answer since was sent.
+    silent_since: Option<Duration>,
+    /// When the user interface last polled.
+    alive_at: Option<Duration>,
+    settings: HostSettings,
+    failure: Option<String>,
     health: Health,
 }
 
 impl Host {
-    /// A host without a port. `nonce` tells its connections from those of another.
-    pub fn new(nonce: u32, settings: Settings) -> Self {
+    /// A host without a port. `nonce` distinguishes its connections from others.
+    pub fn new(nonce: u32, settings: HostSettings) -> Self {
         Self {
-            stage: Stage::Unlinked,
+            stage: Stage::Disconnected,
             identity: None,
             decoder: Decoder::new(),
             out: Vec::new(),
             reports: Vec::new(),
             nonce,
             sequence: 0,
-            flight: None,
-            todo: VecDeque::new(),
-            rest: None,
+            pending: None,
+            queue: VecDeque::new(),
+            rearm_retry: None,
             crc: 0,
             playback: 0,
             received: 0,
             lost: 0,
-            told: (0, 0),
-            beat_count: 0,
-            next_beat: Duration::ZERO,
-            beats: VecDeque::new(),
-            unheard: None,
-            fed: None,
+            reported: (0, 0),
+            heartbeat_count: 0,
+            next_heartbeat: Some(Duration::ZERO),
+            pending_heartbeats: VecDeque::new(),
+            silent_since: None,
+            alive_at: None,
             settings,
-            trouble: None,
+            failure: None,
             health: Health::default(),
         }
     }
 
-    /// A port is there: zero force first, then hello.
-    pub fn linked(&mut self, at: Duration) {
+    /// Starts a connection on a new port with LIMP and HELLO.
+    pub fn connected(&mut self, at: Duration) {
         self.decoder = Decoder::new();
         self.out.clear();
-        self.greet(at);
+        self.open_connection(at);
     }
 
-    /// The port is gone.
-    pub fn unlinked(&mut self, why: &str) {
-        self.tell_loss(why);
+    /// The port is lost.
+    pub fn disconnected(&mut self, why: &str) {
+        self.report_loss(why);
         self.out.clear();
-        self.flight = None;
-        self.todo.clear();
-        self.stage = Stage::Unlinked;
+        self.pending = None;
+        self.queue.clear();
+        self.stage = Stage::Disconnected;
     }
 
-    /// Who the device is, once it has said so.
+    /// Identification of the device, once it has been received.
     pub fn device(&self) -> Option<&message::Identity> {
         self.identity.as_ref()
     }
@@ -239,32 +192,27 @@ impl Host {
         identity(self.identity.as_ref()?)
     }
 
-    /// Whether the device has answered and is not lost.
-    pub fn answers(&self) -> bool {
-        self.stage.known()
-    }
-
-    /// Whether the device needs heartbeats: it has a table, gets one or plays.
+    /// Whether the device needs heartbeats: during upload, while loaded and in playback.
     pub fn armed(&self) -> bool {
         self.stage.armed()
     }
 
-    /// What the link has been like.
+    /// Quality of the link.
     pub fn health(&self) -> &Health {
         &self.health
     }
 
-    /// The screen's loop was alive then.
-    pub fn fed(&mut self, at: Duration) {
-        self.fed = Some(self.fed.map_or(at, |before| before.max(at)));
+    /// The user interface polled at this time.
+    pub fn keep_alive(&mut self, at: Duration) {
+        self.alive_at = Some(self.alive_at.map_or(at, |before| before.max(at)));
     }
 
-    /// What is to be written to the port.
+    /// Takes the bytes to be written to the port.
     pub fn take_output(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.out)
     }
 
-    /// What has happened since the last call.
+    /// Takes the reports since the last call.
     pub fn take_reports(&mut self) -> Vec<Report> {
         std::mem::take(&mut self.reports)
     }
@@ -292,21 +240,24 @@ impl Host {
                 state: self.stage.as_str(),
             });
         }
-        super::table::check(table).map_err(DeviceError::Refused)?;
         let Some(device) = &self.identity else {
             return Err(DeviceError::Lost(self.stage.as_str().to_owned()));
         };
-        let upload = upload::of(table, limits.capped_at(own.limits), what.permitted, device)
-            .map_err(DeviceError::Refused)?;
+        let limits = limits.capped_at(own.limits);
+        let upload = upload::of(table, limits, what.allow_uncertified, device)
+            .map_err(|e| DeviceError::Refused(e.to_string()))?;
         self.crc = upload.crc;
-        self.flight = None;
-        // whatever the device does and whyever it is limp: from zero force to idle
-        self.todo = [Request::Limp, Request::Rearm].into();
-        self.todo.extend(upload.requests);
-        self.rest = Some((at, at + REST_WITHIN));
+        self.pending = None;
+        // From any state: zero force first, then idle.
+        self.queue = [Request::Limp, Request::Rearm].into();
+        self.queue.extend(upload.requests);
+        self.rearm_retry = Some(RearmRetry {
+            next: at,
+            until: at + REST_TIMEOUT,
+        });
         self.stage = Stage::Loading { since: at };
-        self.next_beat = at;
-        self.beat(at);
+        self.next_heartbeat = Some(at);
+        self.send_heartbeat(at);
         self.next_request(at);
         Ok(())
     }
@@ -327,9 +278,9 @@ impl Host {
             playback: self.playback,
             crc: self.crc,
             longest_ms: LONGEST_MS.min(device.longest_ms),
-            every: every(device.servo_hz, self.settings.telemetry_hz),
+            every: Some(sample_interval(device.servo_hz, self.settings.telemetry_hz)),
         };
-        (self.received, self.lost, self.told) = (0, 0, (0, 0));
+        (self.received, self.lost, self.reported) = (0, 0, (0, 0));
         self.stage = Stage::Starting;
         self.send(Request::Play(play), at);
         Ok(())
@@ -342,13 +293,13 @@ impl Host {
     pub fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
         match self.stage {
             Stage::Playing { .. } => self.ask_to_stop(at),
-            // PLAY is answered first; a stop that overtook it would be refused
-            Stage::Starting => self.todo.push_back(Request::Stop(Stop {
+            // PLAY has to be answered first, or STOP would be refused.
+            Stage::Starting => self.queue.push_back(Request::Stop(Stop {
                 playback: self.playback,
             })),
-            // on its way, or its end has been told
-            Stage::Stopping { .. } | Stage::Asking | Stage::Idle => {}
-            Stage::Unlinked | Stage::Greeting | Stage::Mute { .. } => {}
+            // STOP has been sent, or the end has been reported.
+            Stage::Stopping { .. } | Stage::AwaitingOutcome | Stage::Idle => {}
+            Stage::Disconnected | Stage::Connecting | Stage::Silent { .. } => {}
             Stage::Loading { .. } | Stage::Loaded { .. } => {
                 return Err(DeviceError::WrongState {
                     command: "stop",
@@ -361,18 +312,17 @@ impl Host {
 
     /// See [`Device::limp`](super::Device::limp).
     pub fn limp(&mut self, at: Duration) {
-        if !matches!(self.stage, Stage::Unlinked | Stage::Greeting) {
+        if !matches!(self.stage, Stage::Disconnected | Stage::Connecting) {
             if self.stage.known() {
                 self.stage = Stage::Idle;
-                self.todo.clear();
+                self.queue.clear();
             }
             self.send(Request::Limp, at);
         }
-        self.reports
-            .retain(|r| matches!(r, Report::Fault(_) | Report::Lost(_) | Report::Ready));
+        self.reports.retain(Report::survives_limp);
     }
 
-    /// Takes in what has come from the port.
+    /// Processes bytes received from the port.
     pub fn receive(&mut self, bytes: &[u8], at: Duration) {
         for byte in bytes {
             let decoded = match self.decoder.push(*byte) {
@@ -388,53 +338,52 @@ impl Host {
         }
     }
 
-    /// Lets time pass: repeats, heartbeats, what has become due.
+    /// Sends what is due at `at`: repeats, heartbeats and queued requests.
     pub fn advance(&mut self, at: Duration) {
-        if let Stage::Mute { again } = self.stage
-            && at >= again
+        if let Stage::Silent { retry } = self.stage
+            && at >= retry
         {
-            self.greet(at);
+            self.open_connection(at);
         }
         self.repeat(at);
-        if let Some((again, _)) = self.rest
-            && self.flight.is_none()
-            && at >= again
+        if let Some(rearm) = self.rearm_retry
+            && self.pending.is_none()
+            && at >= rearm.next
         {
             self.next_request(at);
         }
-        self.beat(at);
+        self.send_heartbeat(at);
         if self
-            .unheard
-            .is_some_and(|since| at.saturating_sub(since) > MUTE)
+            .silent_since
+            .is_some_and(|since| at.saturating_sub(since) > REPLY_TIMEOUT)
         {
-            self.lose("it does not answer any more", at);
+            self.lose_device("it no longer answers", at);
         }
     }
 
-    /// The next moment at which [`Host::advance`] has something to do.
-    pub fn next(&self) -> Duration {
-        let mut next = match self.stage {
-            Stage::Unlinked => return Duration::MAX,
-            Stage::Mute { again } => return again,
-            Stage::Greeting => Duration::MAX,
-            _ => self.next_beat,
+    /// When [`Host::advance`] next has something to do; `None` if nothing is due.
+    pub fn next(&self) -> Option<Duration> {
+        let heartbeat = match self.stage {
+            Stage::Disconnected => return None,
+            Stage::Silent { retry } => return Some(retry),
+            Stage::Connecting => None,
+            _ => self.next_heartbeat,
         };
-        if let Some(flight) = &self.flight {
-            next = next.min(flight.sent + RETRY);
-        } else if let Some((again, _)) = self.rest {
-            next = next.min(again);
-        }
-        next
+        let request = match (&self.pending, self.rearm_retry) {
+            (Some(pending), _) => Some(pending.sent + RETRY_INTERVAL),
+            (None, rearm) => rearm.map(|rearm| rearm.next),
+        };
+        heartbeat.into_iter().chain(request).min()
     }
 
-    fn greet(&mut self, at: Duration) {
+    fn open_connection(&mut self, at: Duration) {
         self.nonce = self.nonce.wrapping_add(1);
-        self.stage = Stage::Greeting;
-        self.todo.clear();
-        self.rest = None;
-        self.unheard = None;
-        self.beats.clear();
-        // by a frame of its own: HELLO waits for an answer, zero force does not
+        self.stage = Stage::Connecting;
+        self.queue.clear();
+        self.rearm_retry = None;
+        self.silent_since = None;
+        self.pending_heartbeats.clear();
+        // LIMP does not wait for an answer, HELLO does.
         self.sequence = self.sequence.wrapping_add(1);
         let limp = Request::Limp.frame(self.sequence);
         self.out.extend_from_slice(limp.as_bytes());
@@ -445,7 +394,7 @@ impl Host {
         self.sequence = self.sequence.wrapping_add(1);
         self.out
             .extend_from_slice(request.frame(self.sequence).as_bytes());
-        self.flight = Some(Flight {
+        self.pending = Some(PendingRequest {
             request,
             sequence: self.sequence,
             sent: at,
@@ -454,26 +403,29 @@ impl Host {
     }
 
     fn repeat(&mut self, at: Duration) {
-        let Some(flight) = &mut self.flight else {
+        let Some(pending) = &mut self.pending else {
             return;
         };
-        if at.saturating_sub(flight.sent) < RETRY {
+        if at.saturating_sub(pending.sent) < RETRY_INTERVAL {
             return;
         }
-        if flight.tries < TRIES {
-            flight.tries += 1;
-            flight.sent = at;
+        if pending.tries < MAX_TRIES {
+            pending.tries += 1;
+            pending.sent = at;
             self.health.repeats += 1;
-            let frame = flight.request.frame(flight.sequence);
+            let frame = pending.request.frame(pending.sequence);
             self.out.extend_from_slice(frame.as_bytes());
         } else {
-            let what = upload::word(&flight.request);
-            self.lose(&format!("no answer to {what} after {TRIES} tries"), at);
+            let request = upload::describe(&pending.request);
+            self.lose_device(
+                &format!("no answer to {request} after {MAX_TRIES} tries"),
+                at,
+            );
         }
     }
 
     fn next_request(&mut self, at: Duration) {
-        if let Some(request) = self.todo.pop_front() {
+        if let Some(request) = self.queue.pop_front() {
             self.send(request, at);
         }
     }
@@ -486,75 +438,74 @@ impl Host {
         self.send(Request::Stop(stop), at);
     }
 
-    fn beat(&mut self, at: Duration) {
-        if !self.stage.known() || at < self.next_beat {
+    fn send_heartbeat(&mut self, at: Duration) {
+        if !self.stage.known() || self.next_heartbeat.is_none_or(|next| at < next) {
             return;
         }
-        self.next_beat = match self.settings.stall {
-            _ if self.stage.armed() => at + BEAT,
-            Some(_) => at + PING,
-            // nobody waits for news in virtual time
-            None => Duration::MAX,
+        self.next_heartbeat = match self.settings.supervision_timeout {
+            _ if self.stage.armed() => Some(at + HEARTBEAT_INTERVAL),
+            Some(_) => Some(at + IDLE_HEARTBEAT_INTERVAL),
+            // In virtual time nobody waits for the loss of an idle device.
+            None => None,
         };
-        let alive = match (self.settings.stall, self.fed) {
+        let alive = match (self.settings.supervision_timeout, self.alive_at) {
             (None, _) => true,
-            (Some(stall), Some(fed)) => at.saturating_sub(fed) < stall,
+            (Some(stall), Some(alive_at)) => at.saturating_sub(alive_at) < stall,
             (Some(_), None) => false,
         };
         let (true, Some(device)) = (alive, &self.identity) else {
             return;
         };
         let now_ms = self.health.clock.at(at).unwrap_or(device.clock_ms);
-        self.beat_count = self.beat_count.wrapping_add(1);
+        self.heartbeat_count = self.heartbeat_count.wrapping_add(1);
         let beat = Heartbeat {
-            count: self.beat_count,
+            count: self.heartbeat_count,
             deadline_ms: now_ms.wrapping_add(
-                (u32::from(device.watchdog_ms) + DEADLINE_SLACK_MS).min(DEADLINE_MOST_MS),
+                (u32::from(device.watchdog_ms) + DEADLINE_SLACK_MS).min(MAX_DEADLINE_MS),
             ),
         };
-        // heartbeats carry no sequence number that counts
+        // The sequence number of a heartbeat has no meaning.
         let frame = Request::Heartbeat(beat).frame(0);
         self.out.extend_from_slice(frame.as_bytes());
-        self.health.beats += 1;
-        self.unheard = self.unheard.or(Some(at));
-        if self.beats.len() == BEATS {
-            self.beats.pop_front();
+
+        self.silent_since = self.silent_since.or(Some(at));
+        if self.pending_heartbeats.len() == MAX_PENDING_HEARTBEATS {
+            self.pending_heartbeats.pop_front();
         }
-        self.beats.push_back((beat.count, at));
+        self.pending_heartbeats.push_back((beat.count, at));
     }
 
-    /// It does not answer, or not as it should: zero force as far as it hears, and
-    /// greeted again soon.
-    fn lose(&mut self, why: &str, at: Duration) {
-        self.tell_loss(why);
-        self.flight = None;
-        self.todo.clear();
-        self.rest = None;
-        self.unheard = None;
+    /// Reports the device as lost, sends LIMP and reconnects later.
+    fn lose_device(&mut self, why: &str, at: Duration) {
+        self.report_loss(why);
+        self.pending = None;
+        self.queue.clear();
+        self.rearm_retry = None;
+        self.silent_since = None;
         self.sequence = self.sequence.wrapping_add(1);
         let limp = Request::Limp.frame(self.sequence);
         self.out.extend_from_slice(limp.as_bytes());
-        self.stage = Stage::Mute {
-            again: at + GREET_AGAIN,
+        self.stage = Stage::Silent {
+            retry: at + RECONNECT_INTERVAL,
         };
     }
 
-    fn tell_loss(&mut self, why: &str) {
+    fn report_loss(&mut self, why: &str) {
         if self.stage.known() {
             self.reports.push(Report::Lost(why.to_owned()));
         }
-        self.trouble = Some(why.to_owned());
+        self.failure = Some(why.to_owned());
     }
 
-    /// Why the device does not answer, if it does not.
-    pub fn trouble(&self) -> Option<&str> {
-        self.trouble.as_deref().filter(|_| !self.stage.known())
+    /// Why the device does not answer; `None` if it does.
+    pub fn failure(&self) -> Option<&str> {
+        self.failure.as_deref().filter(|_| !self.stage.known())
     }
 
     fn other_version(&mut self, version: u8, at: Duration) {
-        self.lose(
+        self.lose_device(
             &format!(
-                "it speaks version {version} of the wire format, and this program version {}",
+                "it uses version {version} of the wire format; this program supports version {}",
                 message::VERSION
             ),
             at,
@@ -562,16 +513,16 @@ impl Host {
     }
 }
 
-/// Servo periods between two samples, at least one.
-fn every(servo_hz: f64, telemetry_hz: f64) -> u16 {
-    // `as` saturates, and makes 0 of what is no number
-    ((servo_hz / telemetry_hz).round() as u16).max(1)
+/// Servo periods per telemetry sample, at least one.
+fn sample_interval(servo_hz: f64, telemetry_hz: f64) -> NonZeroU16 {
+    // `as` saturates and turns NaN into 0.
+    NonZeroU16::new((servo_hz / telemetry_hz).round() as u16).unwrap_or(NonZeroU16::MIN)
 }
 
-/// What a device says of itself, for a session; `None` if it is no device's.
+/// The identity for a session; `None` if the limits are invalid.
 fn identity(device: &message::Identity) -> Option<Identity> {
     Some(Identity {
-        id: name(&device.serial),
+        id: display_name(&device.serial),
         simulated: device.flags.simulated,
         telemetry: device.flags.telemetry,
         limits: Limits {
@@ -581,8 +532,8 @@ fn identity(device: &message::Identity) -> Option<Identity> {
     })
 }
 
-/// A device's text, harmless in a file and on a terminal.
-pub fn name(name: &message::Name) -> String {
+/// A device's text with unsafe characters replaced, for files and terminals.
+pub fn display_name(name: &message::Name) -> String {
     let text = String::from_utf8_lossy(name.as_bytes());
     let text: String = text
         .chars()

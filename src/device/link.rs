@@ -1,16 +1,19 @@
-//! Bytes to a device and back, and a thread that looks after them.
+//! Links to devices, and the thread that serves a link.
 //!
-//! A [`Link`] is read and written in bounded time; every error but a time-out is its
-//! end, and a new one is opened. [`Threaded`] runs the host's side of the wire
-//! beside a link on a thread of its own: heartbeats do not wait for a screen, and no
-//! screen waits for a device. The thread sends heartbeats only while the screen's
-//! loop polls. [`memory`] is a link without a port, in virtual time.
+//! A [`Link`] is read and written in bounded time. Every error ends the link, and a new
+//! one is opened. [`LinkedDevice`] runs the [`Host`] on its own thread, so that
+//! heartbeats do not wait for the user interface and the user interface does not wait
+//! for the device. The thread sends heartbeats only while the user interface polls.
+//! [`memory`] is a simulated line in virtual time; `pty`, on Unix, a simulated device
+//! on a pseudo-terminal.
 
 pub mod memory;
+#[cfg(unix)]
 pub mod pty;
 
-use super::host::{Health, Host, Settings};
+use super::host::{Health, Host, HostSettings};
 use super::{Device, DeviceError, Identity, Report, Stimulus};
+use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -20,81 +23,113 @@ use study_base::limits::Limits;
 use study_haptics::model::Realization;
 use study_wire::message;
 
-/// A link that has ended.
+/// Why a link cannot be opened or has ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct LinkError(pub String);
+pub enum LinkError {
+    /// No port has this path.
+    #[error("there is no such port")]
+    NoSuchPort,
+    /// No connected USB device has this serial number.
+    #[error("no connected USB device has the serial number {0}")]
+    NoSuchUsbSerial(String),
+    /// The user may not open the port.
+    #[error("permission denied; the user needs access to serial ports")]
+    NoPermission,
+    /// Another program has opened the port.
+    #[error("another program is using it")]
+    InUse,
+    /// The path is not a serial port.
+    #[error("it is not a serial port")]
+    NotSerial,
+    /// The port does not support this rate, bits per second.
+    #[error("it does not support {0} baud")]
+    BaudRate(u32),
+    /// The device was disconnected.
+    #[error("unplugged")]
+    Unplugged,
+    /// The port accepts no bytes.
+    #[error("the port accepts no data")]
+    WriteTimeout,
+    /// The operating system has no support for serial devices in this program.
+    #[error("serial devices are not supported on this system; use Linux or macOS")]
+    Unsupported,
+    /// Any other error of the operating system.
+    #[error("the port fails: {0}")]
+    System(String),
+}
 
-/// Bytes both ways.
+/// A byte stream in both directions.
 pub trait Link: Send {
-    /// Waits at most about `wait` for bytes; how many came, possibly none.
+    /// Waits at most about `wait` for bytes and returns their number, possibly 0.
     ///
     /// # Errors
-    /// [`LinkError`]: the link has ended.
+    /// [`LinkError`] if the link has ended.
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, LinkError>;
 
-    /// Writes all bytes, in bounded time.
+    /// Writes all bytes in bounded time.
     ///
     /// # Errors
-    /// [`LinkError`]: the link has ended, or takes no bytes.
+    /// [`LinkError`] if the link has ended or accepts no bytes.
     fn write(&mut self, bytes: &[u8]) -> Result<(), LinkError>;
 }
 
-/// Opens links to one device, again and again.
+/// Opens links to one device repeatedly.
 pub trait Opener: Send {
-    /// A new link.
+    /// Opens a new link.
     ///
     /// # Errors
-    /// [`LinkError`]: there is none at the moment.
+    /// [`LinkError`] if no link is available at the moment.
     fn open(&mut self) -> Result<Box<dyn Link>, LinkError>;
 
-    /// Where it leads to, for messages.
-    fn place(&self) -> String;
+    /// Where the links lead, for messages.
+    fn address(&self) -> String;
 }
 
-/// How long one turn of the thread waits for bytes.
-const SLICE: Duration = Duration::from_millis(1);
-/// Between two attempts to open a link.
-const OPEN_AGAIN: Duration = Duration::from_millis(250);
-/// How long a device may take to introduce itself when a session is opened.
-const FIRST_WITHIN: Duration = Duration::from_secs(3);
-/// How long the thread may go on once nobody wants anything of it.
-const LAST_WORDS: Duration = Duration::from_millis(30);
+/// Longest single wait of the thread.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
+/// Time between two attempts to open a link.
+const REOPEN_INTERVAL: Duration = Duration::from_millis(250);
+/// Time that a device has to identify itself when a session opens.
+const IDENTITY_TIMEOUT: Duration = Duration::from_secs(3);
+/// Time that the thread waits for an answer to the last LIMP.
+const CLOSE_TIMEOUT: Duration = Duration::from_millis(30);
+/// Time between two updates of the status.
+const STATUS_INTERVAL: Duration = Duration::from_secs(1);
 
-/// What the thread is told.
+/// A command to the thread.
 enum Command {
-    Load(Box<Order>),
+    Load(Box<LoadOrder>),
     Start,
     Stop,
     Limp,
 }
 
-struct Order {
+struct LoadOrder {
     table: Realization,
-    permitted: bool,
+    allow_uncertified: bool,
     limits: Limits,
 }
 
-/// What both threads see.
+/// State shared by both threads.
 struct Shared {
     origin: Instant,
-    /// When the screen's loop was last alive, ns since `origin`.
-    fed_ns: AtomicU64,
+    /// When the user interface last polled, ns since `origin`.
+    alive_ns: AtomicU64,
     closing: AtomicBool,
-    facts: Mutex<Facts>,
+    status: Mutex<DeviceStatus>,
 }
 
-/// What is known of the device.
+/// What is known about the device.
 #[derive(Debug, Clone, Default)]
-pub struct Facts {
-    /// As it introduced itself last.
+pub struct DeviceStatus {
+    /// Its last identification on the wire.
     pub device: Option<message::Identity>,
     /// The same for a session.
     pub identity: Option<Identity>,
-    /// How the link is; brought up to date about once a second.
+    /// Quality of the link, updated about once per second.
     pub health: Health,
-    /// Why there is no link, or no answer.
-    pub trouble: Option<String>,
+    /// Why there is no link or no answer.
+    pub failure: Option<String>,
 }
 
 impl Shared {
@@ -102,253 +137,254 @@ impl Shared {
         self.origin.elapsed()
     }
 
-    fn feed(&self) {
+    fn keep_alive(&self) {
         let ns = u64::try_from(self.now().as_nanos()).unwrap_or(u64::MAX);
-        self.fed_ns.store(ns, Ordering::Relaxed);
+        self.alive_ns.store(ns, Ordering::Relaxed);
     }
 
-    fn facts(&self) -> MutexGuard<'_, Facts> {
-        self.facts.lock().unwrap_or_else(PoisonError::into_inner)
+    fn status(&self) -> MutexGuard<'_, DeviceStatus> {
+        self.status.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// A device behind a link that a thread looks after.
-pub struct Threaded {
+/// The thread that serves a link.
+struct LinkThread {
     shared: Arc<Shared>,
+    handle: Option<JoinHandle<()>>,
+}
+
+impl LinkThread {
+    fn ended(&self) -> bool {
+        self.handle.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// Waits until the device has identified itself; `None` if it does not in time.
+    fn wait_for_identity(&self) -> Option<Identity> {
+        let start = Instant::now();
+        while start.elapsed() < IDENTITY_TIMEOUT {
+            let identity = self.shared.status().identity.clone();
+            if identity.is_some() {
+                return identity;
+            }
+            std::thread::sleep(POLL_INTERVAL);
+        }
+        None
+    }
+}
+
+impl Drop for LinkThread {
+    /// Makes the thread send LIMP and end, also while a panic unwinds.
+    fn drop(&mut self) {
+        self.shared.closing.store(true, Ordering::SeqCst);
+        if let Some(handle) = self.handle.take() {
+            // A panic in the thread has been reported by the hook.
+            let _ = handle.join();
+        }
+    }
+}
+
+/// A device behind a link that is served by a thread.
+pub struct LinkedDevice {
+    thread: LinkThread,
     commands: Sender<(u64, Command)>,
     reports: Receiver<(u64, Report)>,
-    /// Counts the limps: what was said before the last one is old.
+    /// Number of LIMP commands; reports from before the last one are outdated.
     epoch: u64,
-    thread: Option<JoinHandle<()>>,
     identity: Identity,
-    /// Whether the end of the thread has been told.
-    told: bool,
+    /// Whether the end of the thread has been reported.
+    end_reported: bool,
 }
 
-impl Threaded {
-    /// Opens the first link and waits until the device has introduced itself. Zero
-    /// force is the first thing that it is told.
+impl LinkedDevice {
+    /// Opens the first link and waits until the device has identified itself. The first
+    /// command that it receives is LIMP.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] if there is no link, no answer or another version.
-    pub fn open(mut opener: Box<dyn Opener>, settings: Settings) -> Result<Self, DeviceError> {
-        let place = opener.place();
-        let lost = |why: &str| DeviceError::Lost(format!("{place}: {why}"));
-        let link = opener.open().map_err(|e| lost(&e.0))?;
+    /// [`DeviceError::Lost`] if there is no link, no answer, or an unsupported version.
+    pub fn open(mut opener: Box<dyn Opener>, settings: HostSettings) -> Result<Self, DeviceError> {
+        let address = opener.address();
+        let lost = |why: &dyn Display| DeviceError::Lost(format!("{address}: {why}"));
+        let link = opener.open().map_err(|e| lost(&e))?;
         let shared = Arc::new(Shared {
             origin: Instant::now(),
-            fed_ns: AtomicU64::new(0),
+            alive_ns: AtomicU64::new(0),
             closing: AtomicBool::new(false),
-            facts: Mutex::new(Facts::default()),
+            status: Mutex::new(DeviceStatus::default()),
         });
-        let (commands, todo) = channel();
-        let (say, reports) = channel();
-        let theirs = Arc::clone(&shared);
-        let thread = std::thread::Builder::new()
+        let (commands, commands_in) = channel();
+        let (reports_out, reports) = channel();
+        let worker_shared = Arc::clone(&shared);
+        let handle = std::thread::Builder::new()
             .name("device".to_owned())
             .spawn(move || {
-                let mut keeper = Keeper {
+                let mut worker = LinkWorker {
                     host: Host::new(nonce(), settings),
-                    shared: theirs,
-                    todo,
-                    say,
+                    shared: worker_shared,
+                    commands_in,
+                    reports_out,
                     opener,
                     link: None,
-                    again: Duration::ZERO,
-                    noted: Duration::ZERO,
+                    reopen_at: Duration::ZERO,
+                    status_at: Duration::ZERO,
                     epoch: 0,
                 };
-                keeper.link(link);
-                keeper.keep();
+                worker.use_link(link);
+                worker.run();
             })
-            .map_err(|e| lost(&e.to_string()))?;
-        let mut device = Self {
+            .map_err(|e| lost(&e))?;
+        let thread = LinkThread {
             shared,
+            handle: Some(handle),
+        };
+        let Some(identity) = thread.wait_for_identity() else {
+            let failure = thread.shared.status().failure.clone();
+            return Err(lost(
+                &failure.as_deref().unwrap_or("no device answers there"),
+            ));
+        };
+        Ok(Self {
+            thread,
             commands,
             reports,
             epoch: 0,
-            thread: Some(thread),
-            identity: nobody(),
-            told: false,
-        };
-        device.introduce().map_err(|why| lost(&why))?;
-        Ok(device)
+            identity,
+            end_reported: false,
+        })
     }
 
-    fn introduce(&mut self) -> Result<(), String> {
-        let start = Instant::now();
-        while start.elapsed() < FIRST_WITHIN {
-            if let Some(identity) = self.shared.facts().identity.clone() {
-                self.identity = identity;
-                return Ok(());
-            }
-            std::thread::sleep(SLICE);
-        }
-        let said = self.shared.facts().trouble.clone();
-        Err(said.unwrap_or_else(|| "no device answers there".to_owned()))
+    /// What is known about the device and the link.
+    pub fn status(&self) -> DeviceStatus {
+        self.thread.shared.status().clone()
     }
 
-    /// What is known of the device and of the link.
-    pub fn facts(&self) -> Facts {
-        self.shared.facts().clone()
-    }
-
-    fn tell(&self, command: Command) -> Result<(), DeviceError> {
+    fn send(&self, command: Command) -> Result<(), DeviceError> {
         let sent = self.commands.send((self.epoch, command));
-        sent.map_err(|_| DeviceError::Lost(ENDED.to_owned()))
+        sent.map_err(|_| DeviceError::Lost(THREAD_ENDED.to_owned()))
     }
 }
 
-/// Different for each start of the program: the time and the address space are.
-fn nonce() -> u32 {
+/// A number for a connection that differs between runs of the program.
+pub fn nonce() -> u32 {
     use std::hash::{BuildHasher as _, RandomState};
     RandomState::new().hash_one(std::process::id()) as u32
 }
 
-/// Before a device has said who it is; never seen outside.
-fn nobody() -> Identity {
-    let limit = |value| study_base::limits::Limit::new(value).expect("a positive constant");
-    Identity {
-        id: String::new(),
-        simulated: false,
-        telemetry: false,
-        limits: Limits {
-            force_n: limit(1.0),
-            velocity_mm_s: limit(1.0),
-        },
-    }
-}
-
-impl Device for Threaded {
+impl Device for LinkedDevice {
     fn identity(&self) -> Identity {
         self.identity.clone()
     }
 
-    /// What the device itself objects to comes as a [`Report::Fault`].
+    /// A refusal by the device itself follows as [`Report::Fault`].
     fn load(
         &mut self,
         what: &Stimulus<'_>,
         limits: Limits,
         _: Duration,
     ) -> Result<(), DeviceError> {
-        self.shared.feed();
-        let order = Order {
+        self.thread.shared.keep_alive();
+        let order = LoadOrder {
             table: what.need_table()?.clone(),
-            permitted: what.permitted,
+            allow_uncertified: what.allow_uncertified,
             limits,
         };
-        self.tell(Command::Load(Box::new(order)))
+        self.send(Command::Load(Box::new(order)))
     }
 
     fn start(&mut self, _: Duration) -> Result<(), DeviceError> {
-        self.tell(Command::Start)
+        self.send(Command::Start)
     }
 
     fn stop(&mut self, _: Duration) -> Result<(), DeviceError> {
-        self.tell(Command::Stop)
+        self.send(Command::Stop)
     }
 
     fn limp(&mut self, _: Duration) {
-        // what is still said of the playback so far is not heard any more
+        // Later reports about the present playback are discarded.
         self.epoch += 1;
-        // a thread that has ended has left the device limp
-        let _ = self.tell(Command::Limp);
+        // A thread that has ended has left the device limp.
+        let _ = self.send(Command::Limp);
     }
 
     fn poll(&mut self, _: Duration) -> Vec<Report> {
-        self.shared.feed();
-        let ended = self.thread.as_ref().is_none_or(JoinHandle::is_finished);
+        self.thread.shared.keep_alive();
+        // Checked first, so that all reports of an ended thread are received.
+        let ended = self.thread.ended();
         let now = self.epoch;
-        let heard = self.reports.try_iter();
-        let mut reports: Vec<Report> = heard
-            .filter(|(epoch, report)| *epoch == now || lasting(report))
+        let mut reports: Vec<Report> = self
+            .reports
+            .try_iter()
+            .filter(|(epoch, report)| *epoch == now || report.survives_limp())
             .map(|(_, report)| report)
             .collect();
-        if ended && !self.told {
-            self.told = true;
-            reports.push(Report::Lost(ENDED.to_owned()));
+        if ended && !self.end_reported {
+            self.end_reported = true;
+            reports.push(Report::Lost(THREAD_ENDED.to_owned()));
         }
         reports
     }
 }
 
-impl Drop for Threaded {
-    /// Also while a panic unwinds. The thread makes the device limp and ends.
-    fn drop(&mut self) {
-        self.shared.closing.store(true, Ordering::SeqCst);
-        if let Some(thread) = self.thread.take() {
-            // a panic in it has been reported by the hook
-            let _ = thread.join();
-        }
-    }
-}
+const THREAD_ENDED: &str = "the program's device thread has ended";
 
-const ENDED: &str = "the thread that talks to it has ended";
-
-/// Whether a report outlives a limp.
-fn lasting(report: &Report) -> bool {
-    matches!(report, Report::Fault(_) | Report::Lost(_) | Report::Ready)
-}
-
-/// The thread's own.
-struct Keeper {
+/// The thread's side.
+struct LinkWorker {
     host: Host,
     shared: Arc<Shared>,
-    todo: Receiver<(u64, Command)>,
-    say: Sender<(u64, Report)>,
+    commands_in: Receiver<(u64, Command)>,
+    reports_out: Sender<(u64, Report)>,
     opener: Box<dyn Opener>,
     link: Option<Box<dyn Link>>,
-    /// When a link is opened again.
-    again: Duration,
-    /// When the facts were last brought up to date.
-    noted: Duration,
+    /// When opening a link is tried again.
+    reopen_at: Duration,
+    /// Time of the last update of the status.
+    status_at: Duration,
     epoch: u64,
 }
 
-impl Keeper {
-    fn keep(&mut self) {
+impl LinkWorker {
+    fn run(&mut self) {
         loop {
             let closing = self.shared.closing.load(Ordering::SeqCst);
             if closing {
                 return self.close();
             }
-            self.obey();
-            let fed = Duration::from_nanos(self.shared.fed_ns.load(Ordering::Relaxed));
-            self.host.fed(fed);
-            self.turn();
-            self.note();
+            self.run_commands();
+            let alive_at = Duration::from_nanos(self.shared.alive_ns.load(Ordering::Relaxed));
+            self.host.keep_alive(alive_at);
+            self.transfer();
+            self.update_status();
             for report in self.host.take_reports() {
                 if let Report::Lost(why) = &report {
-                    self.shared.facts().trouble = Some(why.clone());
+                    self.shared.status().failure = Some(why.clone());
                 }
-                if self.say.send((self.epoch, report)).is_err() {
+                if self.reports_out.send((self.epoch, report)).is_err() {
                     return self.close();
                 }
             }
         }
     }
 
-    fn link(&mut self, link: Box<dyn Link>) {
+    fn use_link(&mut self, link: Box<dyn Link>) {
         self.link = Some(link);
-        self.host.linked(self.shared.now());
+        self.host.connected(self.shared.now());
         self.write();
     }
 
-    /// Reads for a slice, lets the host work, writes.
-    fn turn(&mut self) {
+    /// Reads, lets the host process the bytes, writes its output.
+    fn transfer(&mut self) {
         let Some(link) = &mut self.link else {
-            std::thread::sleep(SLICE);
-            return self.open_again();
+            std::thread::sleep(POLL_INTERVAL);
+            return self.reopen();
         };
         let mut buffer = [0; 4096];
-        match link.read(&mut buffer, SLICE) {
+        match link.read(&mut buffer, POLL_INTERVAL) {
             Ok(n) => {
                 let now = self.shared.now();
                 self.host.receive(&buffer[..n], now);
                 self.host.advance(now);
                 self.write();
             }
-            Err(why) => self.unlink(&why),
+            Err(why) => self.close_link(&why),
         }
     }
 
@@ -357,39 +393,40 @@ impl Keeper {
         if let (false, Some(link)) = (bytes.is_empty(), &mut self.link)
             && let Err(why) = link.write(&bytes)
         {
-            self.unlink(&why);
+            self.close_link(&why);
         }
     }
 
-    fn unlink(&mut self, why: &LinkError) {
+    fn close_link(&mut self, why: &LinkError) {
         self.link = None;
-        self.host.unlinked(&why.0);
-        self.shared.facts().trouble = Some(why.0.clone());
-        self.again = self.shared.now() + OPEN_AGAIN;
+        let why = why.to_string();
+        self.host.disconnected(&why);
+        self.shared.status().failure = Some(why);
+        self.reopen_at = self.shared.now() + REOPEN_INTERVAL;
     }
 
-    fn open_again(&mut self) {
-        if self.shared.now() < self.again {
+    fn reopen(&mut self) {
+        if self.shared.now() < self.reopen_at {
             return;
         }
         match self.opener.open() {
-            Ok(link) => self.link(link),
-            Err(_) => self.again = self.shared.now() + OPEN_AGAIN,
+            Ok(link) => self.use_link(link),
+            Err(_) => self.reopen_at = self.shared.now() + REOPEN_INTERVAL,
         }
     }
 
-    fn obey(&mut self) {
-        while let Ok((epoch, command)) = self.todo.try_recv() {
-            // what was said before belongs to the time before
+    fn run_commands(&mut self) {
+        while let Ok((epoch, command)) = self.commands_in.try_recv() {
+            // Reports from before the command belong to the old epoch.
             for report in self.host.take_reports() {
-                let _ = self.say.send((self.epoch, report));
+                let _ = self.reports_out.send((self.epoch, report));
             }
             self.epoch = epoch;
             let now = self.shared.now();
             let done = match command {
                 Command::Load(order) => {
                     let stimulus = Stimulus {
-                        permitted: order.permitted,
+                        allow_uncertified: order.allow_uncertified,
                         ..Stimulus::of_table(&order.table)
                     };
                     self.host.load(&stimulus, order.limits, now)
@@ -406,40 +443,40 @@ impl Keeper {
                     DeviceError::Lost(why) => Report::Lost(why),
                     why => Report::Fault(why.to_string()),
                 };
-                let _ = self.say.send((self.epoch, report));
+                let _ = self.reports_out.send((self.epoch, report));
             }
             self.write();
         }
     }
 
-    fn note(&mut self) {
+    fn update_status(&mut self) {
         let now = self.shared.now();
-        let mut facts = self.shared.facts();
-        if let Some(why) = self.host.trouble()
-            && facts.trouble.is_none()
+        let mut status = self.shared.status();
+        if let Some(why) = self.host.failure()
+            && status.failure.is_none()
         {
-            facts.trouble = Some(why.to_owned());
+            status.failure = Some(why.to_owned());
         }
-        let first = facts.identity.is_none() && self.host.identity().is_some();
-        if first || now.saturating_sub(self.noted) > Duration::from_secs(1) {
-            self.noted = now;
-            facts.device = self.host.device().copied();
-            facts.identity = self.host.identity();
-            facts.health = self.host.health().clone();
+        let first = status.identity.is_none() && self.host.identity().is_some();
+        if first || now.saturating_sub(self.status_at) > STATUS_INTERVAL {
+            self.status_at = now;
+            status.device = self.host.device().copied();
+            status.identity = self.host.identity();
+            status.health = self.host.health().clone();
         }
     }
 
-    /// Zero force, and a moment for it to arrive.
+    /// Sends LIMP and waits a moment for the answer.
     fn close(&mut self) {
         self.host.limp(self.shared.now());
         self.write();
-        let until = self.shared.now() + LAST_WORDS;
+        let until = self.shared.now() + CLOSE_TIMEOUT;
         let mut buffer = [0; 512];
         while let Some(link) = &mut self.link
             && self.shared.now() < until
         {
-            // an answer says that it was heard
-            match link.read(&mut buffer, SLICE) {
+            // An answer confirms that LIMP was received.
+            match link.read(&mut buffer, POLL_INTERVAL) {
                 Ok(0) => {}
                 Ok(_) | Err(_) => return,
             }
@@ -447,8 +484,8 @@ impl Keeper {
     }
 }
 
-impl Drop for Keeper {
-    /// A panic of this thread: the device is told to be limp, if anything still goes.
+impl Drop for LinkWorker {
+    /// If this thread panics, LIMP is sent directly.
     fn drop(&mut self) {
         if std::thread::panicking()
             && let Some(link) = &mut self.link

@@ -1,12 +1,12 @@
-//! An experimenter who mounts samples: the oldest playback device.
+//! An experimenter who mounts physical samples.
 //!
-//! A load asks for the sample with a code ([`Report::Mount`]); the session starts
-//! the playback once somebody says that it is mounted. Nothing is measured but how
-//! long it was felt.
+//! A load asks for the sample with a code ([`Report::Mount`]), and the session starts the
+//! playback once the experimenter confirms that it is mounted. Only the duration of the
+//! exploration is measured.
 //!
-//! The codes are three digits, as samples are labelled in sensory tests: they say
-//! nothing about what is mounted. [`Beside`] joins a person to a device, for studies
-//! in which only some samples are physical.
+//! The codes have three digits, like the labels in sensory tests, and say nothing about
+//! the sample. [`WithManual`] combines a device with an experimenter, for studies in
+//! which only some samples are physical.
 
 use super::{Device, DeviceError, Identity, Report, Stimulus};
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,11 +16,11 @@ use study_base::rng::Stream;
 use study_base::text::ModelId;
 use study_core::outcome::Playback;
 
-/// Codes of three digits that there are, 100 to 999.
+/// Number of codes with three digits, 100 to 999.
 const CODES: u64 = 900;
 
-/// A code for each realization, distinct, from the study's seed and the order of
-/// the ids: one that is added at the end changes no other. Studies of more than 450
+/// A distinct code for each realization, determined by the study's seed and the order
+/// of the ids. Adding an id at the end changes no other code. Studies with more than 450
 /// realizations get more digits. A code is never part of an id.
 pub fn codes(seed: u64, ids: &[&ModelId]) -> BTreeMap<ModelId, String> {
     let mut stream = Stream::new(seed, &["manual", "codes"]);
@@ -35,12 +35,12 @@ pub fn codes(seed: u64, ids: &[&ModelId]) -> BTreeMap<ModelId, String> {
     for id in ids {
         let code = loop {
             let code = from + stream.below(range);
-            let told = ids.iter().any(|id| id.as_str().contains(&code.to_string()));
-            // ids that hold every number cannot keep it from ending
-            if !taken.contains(&code) && (!told || taken.len() as u64 * 4 > range) {
+            let in_id = ids.iter().any(|id| id.as_str().contains(&code.to_string()));
+            // The last condition ends the search if the ids contain too many numbers.
+            if !taken.contains(&code) && (!in_id || taken.len() as u64 * 4 > range) {
                 break code;
             }
-            if told {
+            if in_id {
                 taken.insert(code);
             }
         };
@@ -50,36 +50,30 @@ pub fn codes(seed: u64, ids: &[&ModelId]) -> BTreeMap<ModelId, String> {
     codes
 }
 
-/// A person who mounts what they are asked to.
-#[derive(Debug)]
+/// An experimenter who mounts the requested samples.
+#[derive(Debug, Default)]
 pub struct Manual {
     phase: Phase,
     reports: Vec<Report>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 enum Phase {
+    #[default]
     Idle,
     Mounting,
-    Felt { since: Duration },
+    Exploring {
+        since: Duration,
+    },
 }
 
-impl Default for Manual {
-    fn default() -> Self {
-        Self {
-            phase: Phase::Idle,
-            reports: Vec::new(),
-        }
-    }
-}
-
-/// A sample exerts no force of its own: these bound nothing.
-const UNBOUNDED: [f64; 2] = [1e3, 1e5];
+/// Force, N, and velocity, mm/s: no limit in practice, because a sample has no motor.
+const UNLIMITED: [f64; 2] = [1e3, 1e5];
 
 impl Device for Manual {
     fn identity(&self) -> Identity {
         let [force_n, velocity_mm_s] =
-            UNBOUNDED.map(|value| Limit::new(value).expect("a positive constant"));
+            UNLIMITED.map(|value| Limit::new(value).expect("a positive constant"));
         Identity {
             id: "manual".to_owned(),
             simulated: false,
@@ -101,19 +95,19 @@ impl Device for Manual {
         if self.phase != Phase::Mounting {
             return Err(DeviceError::WrongState {
                 command: "start",
-                state: "nothing is mounted",
+                state: "no sample is mounted",
             });
         }
-        self.phase = Phase::Felt { since: at };
+        self.phase = Phase::Exploring { since: at };
         self.reports.push(Report::Started);
         Ok(())
     }
 
     fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
-        let Phase::Felt { since } = self.phase else {
+        let Phase::Exploring { since } = self.phase else {
             return Err(DeviceError::WrongState {
                 command: "stop",
-                state: "nothing is felt",
+                state: "no sample is being explored",
             });
         };
         self.phase = Phase::Idle;
@@ -134,15 +128,16 @@ impl Device for Manual {
     }
 }
 
-/// A device, and a person for the samples that it cannot play.
-pub struct Beside {
+/// A device combined with an experimenter for the physical samples.
+pub struct WithManual {
     device: Box<dyn Device>,
     person: Manual,
+    /// Whether the current stimulus is a physical sample.
     by_hand: bool,
 }
 
-impl Beside {
-    /// Joins a person to a device.
+impl WithManual {
+    /// Combines a device with an experimenter.
     pub fn new(device: Box<dyn Device>) -> Self {
         Self {
             device,
@@ -152,7 +147,7 @@ impl Beside {
     }
 }
 
-impl Device for Beside {
+impl Device for WithManual {
     fn identity(&self) -> Identity {
         self.device.identity()
     }
@@ -163,7 +158,7 @@ impl Device for Beside {
         limits: Limits,
         at: Duration,
     ) -> Result<(), DeviceError> {
-        // whatever played before: no force while somebody has their hands in it
+        // No force while the experimenter mounts a sample.
         self.limp(at);
         self.by_hand = what.by_hand;
         if what.by_hand {
@@ -210,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_are_distinct_stable_and_say_nothing() {
+    fn codes_are_distinct_stable_and_opaque() {
         let names: Vec<ModelId> = (0..400).map(|i| id(&format!("m{i}"))).collect();
         let all: Vec<&ModelId> = names.iter().collect();
         let codes_of_all = codes(2007, &all);
@@ -235,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_is_asked_for_by_its_code_and_felt_from_the_start_on() {
+    fn a_sample_is_requested_by_its_code_and_its_exploration_is_timed() {
         let at = Duration::from_secs;
         let limits = Manual::default().identity().limits;
         let what = Stimulus {
@@ -243,7 +238,7 @@ mod tests {
             table: None,
             code: "417",
             by_hand: true,
-            permitted: false,
+            allow_uncertified: false,
         };
         let mut person = Manual::default();
         assert!(person.start(at(0)).is_err(), "nothing is mounted");
@@ -257,7 +252,7 @@ mod tests {
             panic!("{reports:?}");
         };
         assert_eq!(playback.exploration_s, 12.0);
-        // a limp takes everything back
+        // LIMP cancels the request.
         person.load(&what, limits, at(40)).unwrap();
         person.limp(at(41));
         assert_eq!(person.poll(at(41)), []);

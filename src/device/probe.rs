@@ -1,135 +1,142 @@
-//! A real probe over the wire: a path goes up, what was measured comes back.
+//! Recording with a probe over the wire format: upload of a path, samples in return.
 //!
-//! The device follows the path by itself; nothing here closes a loop. Samples are
-//! neither acknowledged nor repeated, so a recording with a gap is refused and has to
-//! be made again.
+//! The device follows the path by itself; the host closes no control loop. Samples are
+//! neither acknowledged nor repeated, so a recording with a gap is rejected and has to be
+//! repeated.
 
-use super::check::Wire;
-use super::check::talk::{Broken, Talk};
+use super::check::CheckFailure;
+use super::check::Connection;
+use super::check::exchange::Exchange;
 use std::time::Duration;
 use study_wire::message::{
-    Commit, Few, Happening, Identity, PathBegin, PathChunk, PathCrc, RecordedPoint, Request, State,
-    fixed,
+    Commit, DeviceState, EventKind, FixedVec, Identity, PathBegin, PathChunk, PathCrc,
+    RecordedPoint, Request, fixed,
 };
 
-/// Between two looks at how far it is.
-const LOOK: Duration = Duration::from_millis(50);
-/// How long a probe may take beyond the time of its path: the way to its begin.
-const EXTRA: Duration = Duration::from_secs(20);
+/// Time between two requests for the state.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Additional time for the approach to the first point.
+const APPROACH_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// What a probe shall do.
+/// A path for a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Path {
+pub struct ProbePath {
     /// Positions, mm.
     pub x_mm: Vec<f64>,
     /// Positions per second.
     pub rate_hz: f64,
-    /// The largest force, N; the device's own where that is lower.
+    /// Largest force, N; the device's own limit applies if it is lower.
     pub force_n: f64,
 }
 
-/// What it measured, one value for each position.
+/// Samples of a recording, one for each position.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Recording {
-    /// mm.
+pub struct ProbeRecording {
+    /// Position, mm.
     pub x_mm: Vec<f64>,
-    /// N, that the probe applies.
+    /// Force that the probe applies, N.
     pub f_n: Vec<f64>,
-    /// m/s².
+    /// Acceleration, m/s².
     pub a_m_s2: Vec<f64>,
 }
 
-/// Follows a path. `tell` hears the share that is done.
+/// Records along a path. `progress` receives the completed fraction, 0 to 1.
 ///
 /// # Errors
-/// In words: no device, no probe, a path that it refuses, a trip, a gap.
+/// [`CheckFailure`] if there is no device or no probe, if the path is refused, and after
+/// a trip or with missing samples.
 pub fn record(
-    wire: &mut dyn Wire,
+    connection: &mut dyn Connection,
     nonce: u32,
-    path: &Path,
-    tell: &mut dyn FnMut(f64),
-) -> Result<(Identity, Recording), String> {
-    let mut talk = Talk::new(wire, nonce);
-    let done = follow(&mut talk, path, tell);
-    // whatever came of it
-    let _ = talk.limp();
-    done.map_err(|broken| match broken {
-        Broken::Seen(why) | Broken::Gone(why) => why,
-    })
+    path: &ProbePath,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(Identity, ProbeRecording), CheckFailure> {
+    let mut exchange = Exchange::new(connection, nonce);
+    let result = follow(&mut exchange, path, progress);
+    // Also after a failure, which is reported first.
+    let _ = exchange.limp();
+    result
 }
 
 fn follow(
-    talk: &mut Talk<'_>,
-    path: &Path,
-    tell: &mut dyn FnMut(f64),
-) -> Result<(Identity, Recording), Broken> {
-    talk.hello()?;
-    talk.ready()?;
-    let device = talk.identity()?;
+    exchange: &mut Exchange<'_>,
+    path: &ProbePath,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(Identity, ProbeRecording), CheckFailure> {
+    exchange.hello()?;
+    exchange.reset()?;
+    let device = exchange.identity()?;
     if !device.flags.probe {
-        return Err(Broken::seen("it has no probe mode"));
+        return Err(CheckFailure::violation("it has no probe mode"));
     }
-    if path.x_mm.len() as u64 > u64::from(device.most_points) {
-        return Err(Broken::seen(format!(
-            "the path has {} points, and it has room for {}: record it at {} samples a second \
-             or fewer (--rate)",
+    if path.x_mm.len() as u64 > u64::from(device.max_points) {
+        return Err(CheckFailure::violation(format!(
+            "the path has {} points, but the device accepts {}: use a rate of at most {} samples \
+             per second (--rate)",
             path.x_mm.len(),
-            device.most_points,
-            (path.rate_hz * f64::from(device.most_points) / path.x_mm.len() as f64).floor()
+            device.max_points,
+            (path.rate_hz * f64::from(device.max_points) / path.x_mm.len() as f64).floor()
         )));
     }
     let x_nm: Vec<i32> = path.x_mm.iter().map(|x| fixed::nm(*x)).collect();
-    let crc = upload(talk, path, &x_nm, &device)?;
-    let playback = talk.next_playback();
-    talk.recorded.clear();
-    talk.done(Request::Record(study_wire::message::Record {
+    let crc = upload(exchange, path, &x_nm, &device)?;
+    let playback = exchange.next_playback();
+    exchange.recorded.clear();
+    exchange.expect_done(Request::Record(study_wire::message::Record {
         playback,
         crc,
     }))?;
-    let lasts = Duration::from_secs_f64(path.x_mm.len() as f64 / path.rate_hz);
-    let until = talk.now() + lasts + EXTRA;
+    let duration = Duration::from_secs_f64(path.x_mm.len() as f64 / path.rate_hz);
+    let until = exchange.now() + duration + APPROACH_TIMEOUT;
     loop {
-        talk.pass(LOOK)?;
-        let came: usize = talk
+        exchange.wait(POLL_INTERVAL)?;
+        let received: usize = exchange
             .recorded
             .iter()
             .map(|r| r.points.as_slice().len())
             .sum();
-        tell(came as f64 / path.x_mm.len() as f64);
-        let latched = talk.events.iter().find(|e| e.what == Happening::Latched);
+        progress(received as f64 / path.x_mm.len() as f64);
+        let latched = exchange
+            .events
+            .iter()
+            .find(|e| e.kind == EventKind::Latched);
         if let Some(event) = latched {
-            return Err(Broken::seen(event.fault.as_str()));
+            return Err(CheckFailure::violation(event.fault.as_str()));
         }
-        let outcome = talk.outcome()?;
+        let outcome = exchange.outcome()?;
         if outcome.state.latched() {
-            return Err(Broken::seen(outcome.fault.as_str()));
+            return Err(CheckFailure::violation(outcome.fault.as_str()));
         }
-        if outcome.state == State::Loaded {
+        if outcome.state == DeviceState::Loaded {
             break;
         }
-        if talk.now() > until {
-            return Err(Broken::seen("it does not come to the end of the path"));
+        if exchange.now() > until {
+            return Err(CheckFailure::violation(
+                "it does not reach the end of the path",
+            ));
         }
     }
     let mut points: Vec<RecordedPoint> = Vec::with_capacity(x_nm.len());
-    for message in &talk.recorded {
+    for message in &exchange.recorded {
         if message.playback == playback && message.first as usize == points.len() {
             points.extend_from_slice(message.points.as_slice());
         }
     }
     if points.len() != x_nm.len() {
-        return Err(Broken::seen(format!(
-            "{} of {} samples were lost on the way",
+        return Err(CheckFailure::violation(format!(
+            "{} of {} samples were lost on the link",
             x_nm.len() - points.len().min(x_nm.len()),
             x_nm.len()
         )));
     }
-    if points.iter().any(|p| p.force_un == fixed::NONE) {
-        return Err(Broken::seen("it measures no force"));
-    }
-    let recording = Recording {
+    let forces: Option<Vec<f64>> = points
+        .iter()
+        .map(|p| p.force_un.map(fixed::from_un))
+        .collect();
+    let f_n = forces.ok_or_else(|| CheckFailure::violation("it has no force sensor"))?;
+    let recording = ProbeRecording {
         x_mm: points.iter().map(|p| fixed::from_nm(p.x_nm)).collect(),
-        f_n: points.iter().map(|p| fixed::from_un(p.force_un)).collect(),
+        f_n,
         a_m_s2: points
             .iter()
             .map(|p| fixed::from_um_s2(p.a_um_s2))
@@ -139,13 +146,13 @@ fn follow(
 }
 
 fn upload(
-    talk: &mut Talk<'_>,
-    path: &Path,
+    exchange: &mut Exchange<'_>,
+    path: &ProbePath,
     x_nm: &[i32],
     device: &Identity,
-) -> Result<u32, Broken> {
+) -> Result<u32, CheckFailure> {
     let begin = PathBegin {
-        // not more than the device has room for, which is a u32
+        // At most the device's capacity, which is a u32.
         points: x_nm.len() as u32,
         rate_hz: path.rate_hz,
         force_n: path.force_n.min(device.force_n),
@@ -156,13 +163,13 @@ fn upload(
         crc.point(*x_nm);
     }
     let crc = crc.value();
-    talk.done(Request::PathBegin(begin))?;
-    for (i, x_nm) in x_nm.chunks(PathChunk::MOST).enumerate() {
-        talk.done(Request::PathChunk(PathChunk {
-            first: (i * PathChunk::MOST) as u32,
-            x_nm: Few::of(x_nm),
+    exchange.expect_done(Request::PathBegin(begin))?;
+    for (i, x_nm) in x_nm.chunks(PathChunk::MAX_POINTS).enumerate() {
+        exchange.expect_done(Request::PathChunk(PathChunk {
+            first: (i * PathChunk::MAX_POINTS) as u32,
+            x_nm: FixedVec::of(x_nm),
         }))?;
     }
-    talk.done(Request::PathCommit(Commit { crc }))?;
+    exchange.expect_done(Request::PathCommit(Commit { crc }))?;
     Ok(crc)
 }

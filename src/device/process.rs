@@ -1,54 +1,56 @@
-//! A child program that plays: a lab keeps its own controller, in any language.
+//! A controller program of the lab as a device, in any programming language.
 //!
-//! It speaks JSON, one object a line, on its standard streams; `docs/devices.md`
-//! is the description. Threads of their own read and write, so that nothing waits
-//! for the child: a child that does not read, says something else than what is
-//! described, says too much or ends is killed, and that is a lost device. A new one
-//! is started after a second. `child` has the threads, `words` the language.
+//! The program exchanges JSON, one object per line, on its standard streams;
+//! `docs/devices.md` is the specification. Separate threads read and write, so nothing
+//! waits for the program. A program that does not read, violates the specification,
+//! sends too much or ends is killed and counts as a lost device; it is restarted after a
+//! second. `child` contains the threads, `messages` the messages.
 //!
-//! The host cannot make limp what it cannot reach. It says `limp`, it says `alive`
-//! as long as it polls, and it closes the child's input when it ends: the child has
-//! to go limp at the first, without the second and at the third.
+//! The host cannot switch off the force of a program that it cannot reach. It therefore
+//! sends `limp`, sends `alive` as long as it polls, and closes the program's input when
+//! it ends. The program has to go limp when it receives `limp`, when `alive` stays away,
+//! and at the end of its input.
 
 mod child;
-mod words;
+mod messages;
 
 use super::{Device, DeviceError, Identity, Report, Stimulus};
-use child::{Running, Why};
+use child::{ChildFailure, Running};
+use messages::{ChildMessage, Hello, MessageError};
 use std::time::{Duration, Instant};
 use study_base::limits::Limits;
-use study_base::text::Untrusted;
 use study_core::outcome::Playback;
-use words::{Hello, Say};
 
-pub use words::FORMAT;
+pub use messages::FORMAT;
 
-/// Lines that one poll takes in.
-const A_POLL: usize = 2048;
-/// Between two `alive`.
-const ALIVE: Duration = Duration::from_millis(20);
-/// How long a child may take from its start to its `hello`.
-pub const HELLO_WITHIN: Duration = Duration::from_secs(10);
-/// How long after a loss a new child is started.
-const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// A controller of the lab's, behind its standard streams.
+/// Largest number of lines processed per poll.
+const MAX_LINES_PER_POLL: usize = 2048;
+/// Time between two `alive` messages.
+const ALIVE_INTERVAL: Duration = Duration::from_millis(20);
+/// Time that a program has from its start to its `hello`.
+pub const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time between the loss of a program and its restart.
+const RESTART_DELAY: Duration = Duration::from_secs(1);
+
+/// A controller program, connected by its standard streams.
 #[derive(Debug)]
 pub struct ProcessDevice {
     command: Vec<String>,
     identity: Identity,
     child: Option<Running>,
     phase: Phase,
-    /// Numbers the loads: what the child says of an earlier one is not heard.
+    /// Number of the current load; messages about earlier loads are ignored.
     load: u64,
-    /// Samples of the present playback.
+    /// Samples of the current playback.
     samples: u64,
-    told_alive: Duration,
+    /// When `alive` was last sent.
+    alive_at: Duration,
     reports: Vec<Report>,
-    /// Why there is no child, as it was last told.
-    told: Option<String>,
+    /// Last reported reason why no program is running.
+    reported_loss: Option<String>,
 }
 
-/// A child that was started and has not said who it is.
+/// A program that was started and has not sent its `hello`.
 #[derive(Debug)]
 pub struct Opening {
     command: Vec<String>,
@@ -57,14 +59,14 @@ pub struct Opening {
 }
 
 impl Opening {
-    /// Starts the child.
+    /// Starts the program.
     ///
-    /// `command` is the program and its arguments; no shell is in between.
+    /// `command` is the program and its arguments; no shell is involved.
     ///
     /// # Errors
     /// [`DeviceError::Lost`] if it cannot be started.
     pub fn begin(command: Vec<String>) -> Result<Self, DeviceError> {
-        let child = Running::start(&command).map_err(DeviceError::Lost)?;
+        let child = Running::start(&command).map_err(|e| DeviceError::Lost(e.to_string()))?;
         Ok(Self {
             command,
             child,
@@ -72,20 +74,20 @@ impl Opening {
         })
     }
 
-    /// Waits at most so long for its `hello`. From its start a child may take
-    /// [`HELLO_WITHIN`].
+    /// Waits at most `wait` for the `hello`, which has to come within
+    /// [`HELLO_TIMEOUT`] after the start.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] if it ends, says something else or takes too long.
-    pub fn hello(mut self, within: Duration) -> Result<Opened, DeviceError> {
-        let heard = match self.child.listen(within) {
-            Ok(None) if self.since.elapsed() < HELLO_WITHIN => return Ok(Opened::NotYet(self)),
-            Ok(None) => Err(Why::no_hello()),
-            Ok(Some(say)) => say.hello().map_err(Why::Wrong),
-            Err(why) => Err(why),
+    /// [`DeviceError::Lost`] if the program ends, sends something else or is too slow.
+    pub fn hello(mut self, wait: Duration) -> Result<Opened, DeviceError> {
+        let hello = match self.child.receive(wait) {
+            Ok(None) if self.since.elapsed() < HELLO_TIMEOUT => return Ok(Opened::NotYet(self)),
+            Ok(None) => Err(ChildFailure::no_hello()),
+            Ok(Some(message)) => message.hello().map_err(ChildFailure::from),
+            Err(failure) => Err(failure),
         };
-        match heard {
-            Err(why) => Err(DeviceError::Lost(self.child.end(&why))),
+        match hello {
+            Err(failure) => Err(DeviceError::Lost(self.child.end(&failure))),
             Ok(hello) => Ok(Opened::Device(Box::new(ProcessDevice {
                 identity: identity(hello),
                 command: self.command,
@@ -93,20 +95,20 @@ impl Opening {
                 phase: Phase::Idle,
                 load: 0,
                 samples: 0,
-                told_alive: Duration::ZERO,
+                alive_at: Duration::ZERO,
                 reports: Vec::new(),
-                told: None,
+                reported_loss: None,
             }))),
         }
     }
 }
 
-/// What came of waiting for a `hello`.
+/// Result of waiting for a `hello`.
 #[derive(Debug)]
 pub enum Opened {
-    /// It is there.
+    /// The program is ready.
     Device(Box<ProcessDevice>),
-    /// It has not said anything.
+    /// The program has sent nothing so far.
     NotYet(Opening),
 }
 
@@ -118,11 +120,11 @@ enum Phase {
     Starting,
     Playing,
     Stopping,
-    /// Limp, and no child; a new one is started then.
+    /// Limp, without a program, which is restarted at `restart`.
     Lost {
-        again: Duration,
+        restart: Duration,
     },
-    /// A new child has not said who it is.
+    /// The restarted program has not sent its `hello`.
     Opening {
         since: Duration,
     },
@@ -132,25 +134,25 @@ impl Phase {
     fn as_str(self) -> &'static str {
         match self {
             Self::Idle => "nothing is loaded",
-            Self::Loading => "it loads",
-            Self::Loaded => "it waits for its start",
-            Self::Starting => "it is about to play",
-            Self::Playing => "it plays",
-            Self::Stopping => "it is about to stop",
+            Self::Loading => "it is loading",
+            Self::Loaded => "it is waiting for the start",
+            Self::Starting => "it is starting",
+            Self::Playing => "it is playing",
+            Self::Stopping => "it is stopping",
             Self::Lost { .. } | Self::Opening { .. } => "it does not answer",
         }
     }
 }
 
 impl ProcessDevice {
-    /// Starts the child and waits for its `hello`.
+    /// Starts the program and waits for its `hello`.
     ///
     /// # Errors
     /// As [`Opening::begin`] and [`Opening::hello`].
     pub fn open(command: Vec<String>) -> Result<Self, DeviceError> {
         let mut opening = Opening::begin(command)?;
         loop {
-            opening = match opening.hello(HELLO_WITHIN)? {
+            opening = match opening.hello(HELLO_TIMEOUT)? {
                 Opened::Device(device) => return Ok(*device),
                 Opened::NotYet(opening) => opening,
             };
@@ -162,112 +164,112 @@ impl ProcessDevice {
         &self.command
     }
 
-    fn say(&mut self, words: String, at: Duration) {
+    fn send(&mut self, line: String, at: Duration) {
         let Some(child) = &mut self.child else { return };
-        if let Err(why) = child.tell(words) {
-            let why = child.end(&why);
-            self.lose(why, at);
+        if let Err(failure) = child.send(line) {
+            let reason = child.end(&failure);
+            self.lose(reason, at);
         }
     }
 
-    /// No child is better than one that is not understood. While none is there, only
-    /// what is new is told.
-    fn lose(&mut self, why: String, at: Duration) {
+    /// Ends the program. Repeated failures to restart it are reported only once.
+    fn lose(&mut self, reason: String, at: Duration) {
         self.child = None;
-        let away = matches!(self.phase, Phase::Lost { .. } | Phase::Opening { .. });
-        if !away || self.told.as_ref() != Some(&why) {
-            self.reports.push(Report::Lost(why.clone()));
-            self.told = Some(why);
+        let absent = matches!(self.phase, Phase::Lost { .. } | Phase::Opening { .. });
+        if !absent || self.reported_loss.as_ref() != Some(&reason) {
+            self.reports.push(Report::Lost(reason.clone()));
+            self.reported_loss = Some(reason);
         }
         self.phase = Phase::Lost {
-            again: at + AGAIN_AFTER,
+            restart: at + RESTART_DELAY,
         };
     }
 
-    fn hear(&mut self, at: Duration) {
-        for _ in 0..A_POLL {
+    fn receive(&mut self, at: Duration) {
+        for _ in 0..MAX_LINES_PER_POLL {
             let Some(child) = &mut self.child else { return };
-            let taken = match child.listen(Duration::ZERO) {
+            let result = match child.receive(Duration::ZERO) {
                 Ok(None) => return,
-                Ok(Some(say)) => self.take(say).map_err(Why::Wrong),
-                Err(why) => Err(why),
+                Ok(Some(message)) => self.handle(message).map_err(ChildFailure::from),
+                Err(failure) => Err(failure),
             };
-            if let (Err(why), Some(child)) = (taken, &mut self.child) {
-                let why = child.end(&why);
-                return self.lose(why, at);
+            if let (Err(failure), Some(child)) = (result, &mut self.child) {
+                let reason = child.end(&failure);
+                return self.lose(reason, at);
             }
         }
     }
 
-    fn take(&mut self, say: Say) -> Result<(), String> {
+    fn handle(&mut self, message: ChildMessage) -> Result<(), MessageError> {
         if let Phase::Opening { .. } = self.phase {
-            let identity = identity(say.hello()?);
+            let identity = identity(message.hello()?);
             if identity.id != self.identity.id {
-                return Err(format!(
-                    "it is another device than before, `{}`",
-                    Untrusted(&identity.id)
-                ));
+                return Err(MessageError::OtherDevice(identity.id));
             }
             self.identity = identity;
-            self.told = None;
+            self.reported_loss = None;
             self.phase = Phase::Idle;
             self.reports.push(Report::Ready);
             return Ok(());
         }
-        if say.load().is_some_and(|load| load != self.load) {
+        if message.load().is_some_and(|load| load != self.load) {
             return Ok(());
         }
-        match (say, self.phase) {
-            (Say::Fault { what, .. }, _) => {
+        match (message, self.phase) {
+            (ChildMessage::Fault { what, .. }, _) => {
                 self.phase = Phase::Idle;
                 self.reports.push(Report::Fault(what));
             }
-            // a load that was taken back
+            // Messages about a load that was cancelled.
             (_, Phase::Idle) => {}
-            (Say::Loaded { .. }, Phase::Loading) => {
+            (ChildMessage::Loaded { .. }, Phase::Loading) => {
                 self.phase = Phase::Loaded;
                 self.reports.push(Report::Loaded);
             }
-            (Say::Refused { why, .. }, Phase::Loading) => {
+            (ChildMessage::Refused { why, .. }, Phase::Loading) => {
                 self.phase = Phase::Idle;
-                self.reports
-                    .push(Report::Fault(format!("the device refuses it: {why}")));
+                self.reports.push(Report::Fault(format!(
+                    "the device refuses the table: {why}"
+                )));
             }
-            (Say::Started { .. }, Phase::Starting) => {
+            (ChildMessage::Started { .. }, Phase::Starting) => {
                 self.phase = Phase::Playing;
                 self.reports.push(Report::Started);
             }
-            // a stop may have been asked for before the start was confirmed
-            (Say::Started { .. }, Phase::Stopping) => {}
-            (Say::Samples { samples, .. }, Phase::Playing | Phase::Stopping) => {
+            // STOP may have been sent before the start was confirmed.
+            (ChildMessage::Started { .. }, Phase::Stopping) => {}
+            (ChildMessage::Samples { samples, .. }, Phase::Playing | Phase::Stopping) => {
                 self.samples += samples.len() as u64;
                 let samples = samples.into_iter().map(Into::into).collect();
                 self.reports.push(Report::Telemetry(samples));
             }
             (
-                Say::Progress {
+                ChildMessage::Progress {
                     strokes, clamps, ..
                 },
                 Phase::Playing | Phase::Stopping,
             ) => self.reports.push(Report::Progress { strokes, clamps }),
-            (Say::Stopped { outcome, .. }, Phase::Playing | Phase::Stopping) => {
+            (ChildMessage::Stopped { outcome, .. }, Phase::Playing | Phase::Stopping) => {
                 self.phase = Phase::Idle;
                 self.reports.push(Report::Stopped(Playback {
                     samples: self.samples,
                     ..outcome.into()
                 }));
             }
-            (say, phase) => {
-                return Err(format!("it says `{}` while {}", say.word(), phase.as_str()));
+            (message, phase) => {
+                return Err(MessageError::WrongState {
+                    message: message.as_str(),
+                    state: phase.as_str(),
+                });
             }
         }
         Ok(())
     }
 
-    fn wrong(&self, command: &'static str) -> DeviceError {
+    fn wrong_state(&self, command: &'static str) -> DeviceError {
         match self.phase {
             Phase::Lost { .. } | Phase::Opening { .. } => {
-                DeviceError::Lost("the program is being started again".to_owned())
+                DeviceError::Lost("the program is being restarted".to_owned())
             }
             phase => DeviceError::WrongState {
                 command,
@@ -276,20 +278,20 @@ impl ProcessDevice {
         }
     }
 
-    /// A new child in place of a lost one.
-    fn reopen(&mut self, at: Duration) {
+    /// Restarts a lost program when it is due.
+    fn restart(&mut self, at: Duration) {
         match self.phase {
-            Phase::Lost { again } if at >= again => match Running::start(&self.command) {
+            Phase::Lost { restart } if at >= restart => match Running::start(&self.command) {
                 Ok(child) => {
                     self.child = Some(child);
                     self.phase = Phase::Opening { since: at };
                 }
-                Err(why) => self.lose(why, at),
+                Err(error) => self.lose(error.to_string(), at),
             },
-            Phase::Opening { since } if at.saturating_sub(since) > HELLO_WITHIN => {
+            Phase::Opening { since } if at.saturating_sub(since) > HELLO_TIMEOUT => {
                 if let Some(child) = &mut self.child {
-                    let why = child.end(&Why::no_hello());
-                    self.lose(why, at);
+                    let reason = child.end(&ChildFailure::no_hello());
+                    self.lose(reason, at);
                 }
             }
             _ => {}
@@ -318,25 +320,25 @@ impl Device for ProcessDevice {
         at: Duration,
     ) -> Result<(), DeviceError> {
         if !matches!(self.phase, Phase::Idle | Phase::Loading | Phase::Loaded) {
-            return Err(self.wrong("load"));
+            return Err(self.wrong_state("load"));
         }
         self.load += 1;
         self.samples = 0;
         self.phase = Phase::Loading;
         let limits = limits.capped_at(self.identity.limits);
-        self.say(words::load(self.load, what, limits), at);
+        self.send(messages::load(self.load, what, limits), at);
         match self.phase {
             Phase::Loading => Ok(()),
-            _ => Err(self.wrong("load")),
+            _ => Err(self.wrong_state("load")),
         }
     }
 
     fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
         if self.phase != Phase::Loaded {
-            return Err(self.wrong("start"));
+            return Err(self.wrong_state("start"));
         }
         self.phase = Phase::Starting;
-        self.say(words::short("start", self.load), at);
+        self.send(messages::command("start", self.load), at);
         Ok(())
     }
 
@@ -344,32 +346,31 @@ impl Device for ProcessDevice {
         match self.phase {
             Phase::Starting | Phase::Playing => {
                 self.phase = Phase::Stopping;
-                self.say(words::short("stop", self.load), at);
+                self.send(messages::command("stop", self.load), at);
                 Ok(())
             }
-            // on its way, or its end has been told
+            // `stop` has been sent, or the end has been reported.
             Phase::Stopping | Phase::Idle | Phase::Lost { .. } => Ok(()),
-            _ => Err(self.wrong("stop")),
+            _ => Err(self.wrong_state("stop")),
         }
     }
 
     fn limp(&mut self, at: Duration) {
-        self.say(words::short("limp", self.load), at);
-        // what it still says of this load is not heard any more
+        self.send(messages::command("limp", self.load), at);
+        // Later messages about this load are ignored.
         self.load += 1;
         if !matches!(self.phase, Phase::Lost { .. } | Phase::Opening { .. }) {
             self.phase = Phase::Idle;
         }
-        self.reports
-            .retain(|r| matches!(r, Report::Fault(_) | Report::Lost(_) | Report::Ready));
+        self.reports.retain(Report::survives_limp);
     }
 
     fn poll(&mut self, at: Duration) -> Vec<Report> {
-        self.reopen(at);
-        self.hear(at);
-        if at.saturating_sub(self.told_alive) >= ALIVE {
-            self.told_alive = at;
-            self.say(words::short("alive", self.load), at);
+        self.restart(at);
+        self.receive(at);
+        if at.saturating_sub(self.alive_at) >= ALIVE_INTERVAL {
+            self.alive_at = at;
+            self.send(messages::command("alive", self.load), at);
         }
         std::mem::take(&mut self.reports)
     }

@@ -1,74 +1,113 @@
-//! What a device demands of a table before it plays it.
+//! Checks of a table before it is sent to a device.
 //!
-//! A device does not trust its host: a table with a hole in it would reach the
-//! motor. This says nothing about how the table feels or whether it is passive.
+//! A device with an invalid table could apply any force. These checks say nothing
+//! about how the table feels or whether it is passive.
 
 use study_haptics::model::{Branch, Realization};
 use study_wire::predict::Direction;
 
-/// Checks that a table can be evaluated everywhere.
+/// Why a table cannot be played.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// Fewer than two nodes.
+    #[error("it has fewer than two nodes")]
+    TooFewNodes,
+    /// More nodes than the wire format can carry.
+    #[error("it has {0} nodes; at most 65535 can be sent")]
+    TooManyNodes(usize),
+    /// A position is NaN or infinite.
+    #[error("a position is not a finite number")]
+    PositionNotFinite,
+    /// Two consecutive positions are not in ascending order, mm.
+    #[error("positions do not ascend: {0} mm is followed by {1} mm")]
+    NotAscending(f64, f64),
+    /// The identified range is empty or not finite, mm.
+    #[error("the trained range {0} to {1} mm is invalid")]
+    Range(f64, f64),
+    /// The trained speed is not finite and positive, mm/s.
+    #[error("the trained speed {0} mm/s is invalid")]
+    Speed(f64),
+    /// The length of the direction rule is not finite and positive, mm.
+    #[error("the direction's delta_mm {0} is invalid")]
+    Delta(f64),
+    /// A parameter does not have one value per node.
+    #[error("{branch} {parameter} has {values} values for {nodes} nodes")]
+    Length {
+        /// `positive` or `negative`.
+        branch: &'static str,
+        /// Name of the parameter.
+        parameter: &'static str,
+        /// Number of its values.
+        values: usize,
+        /// Number of nodes.
+        nodes: usize,
+    },
+    /// A parameter is NaN or infinite.
+    #[error("{branch} {parameter} is not a finite number at node {node}")]
+    ParameterNotFinite {
+        /// `positive` or `negative`.
+        branch: &'static str,
+        /// Name of the parameter.
+        parameter: &'static str,
+        /// Number of the node, from 1.
+        node: usize,
+    },
+}
+
+/// Checks that the force of a table is defined everywhere.
 ///
 /// # Errors
-/// A short sentence that says what is wrong, for [`super::DeviceError::Refused`].
-pub fn check(realization: &Realization) -> Result<(), String> {
+/// [`TableError`] with the first problem.
+pub fn check(realization: &Realization) -> Result<(), TableError> {
     let nodes = &realization.x_mm;
     if nodes.len() < 2 {
-        return Err("it has fewer than two nodes".to_owned());
+        return Err(TableError::TooFewNodes);
     }
     if nodes.iter().any(|x| !x.is_finite()) {
-        return Err("a position is not a finite number".to_owned());
+        return Err(TableError::PositionNotFinite);
     }
-    if let Some(i) = nodes.windows(2).position(|w| w[0] >= w[1]) {
-        return Err(format!(
-            "positions do not ascend: {} mm is followed by {} mm",
-            nodes[i],
-            nodes[i + 1]
-        ));
+    if let Some(pair) = nodes.windows(2).find(|pair| pair[0] >= pair[1]) {
+        return Err(TableError::NotAscending(pair[0], pair[1]));
     }
-    for (name, branch) in [
-        ("positive", &realization.positive),
-        ("negative", &realization.negative),
-    ] {
-        check_branch(name, branch, nodes.len())?;
-    }
+    check_branch("positive", &realization.positive, nodes.len())?;
+    check_branch("negative", &realization.negative, nodes.len())?;
     let [low, high] = realization.trained.x_mm;
     if !(low.is_finite() && high.is_finite() && low < high) {
-        return Err(format!("the trained range {low} to {high} mm is none"));
+        return Err(TableError::Range(low, high));
     }
-    let fastest = realization.trained.v_mm_s;
-    if !(fastest.is_finite() && fastest > 0.0) {
-        return Err(format!("the trained speed {fastest} mm/s is none"));
+    let positive = |value: f64| value.is_finite() && value > 0.0;
+    if !positive(realization.trained.v_mm_s) {
+        return Err(TableError::Speed(realization.trained.v_mm_s));
     }
     match realization.direction {
-        Direction::Sign => Ok(()),
-        Direction::Play { delta_mm } | Direction::Dahl { delta_mm } => {
-            if delta_mm.is_finite() && delta_mm > 0.0 {
-                Ok(())
-            } else {
-                Err(format!("the direction's delta_mm {delta_mm} is no length"))
-            }
+        Direction::Play { delta_mm } | Direction::Dahl { delta_mm } if !positive(delta_mm) => {
+            Err(TableError::Delta(delta_mm))
         }
+        _ => Ok(()),
     }
 }
 
-fn check_branch(name: &str, branch: &Branch, nodes: usize) -> Result<(), String> {
+fn check_branch(branch: &'static str, values: &Branch, nodes: usize) -> Result<(), TableError> {
     for (parameter, values) in [
-        ("m_kg", &branch.m_kg),
-        ("b_n_s_per_mm", &branch.b_n_s_per_mm),
-        ("k_n_per_mm", &branch.k_n_per_mm),
-        ("f0_n", &branch.f0_n),
+        ("m_kg", &values.m_kg),
+        ("b_n_s_per_mm", &values.b_n_s_per_mm),
+        ("k_n_per_mm", &values.k_n_per_mm),
+        ("f0_n", &values.f0_n),
     ] {
         if values.len() != nodes {
-            return Err(format!(
-                "{name} {parameter} has {} values for {nodes} nodes",
-                values.len()
-            ));
+            return Err(TableError::Length {
+                branch,
+                parameter,
+                values: values.len(),
+                nodes,
+            });
         }
-        if let Some(node) = values.iter().position(|v| !v.is_finite()) {
-            return Err(format!(
-                "{name} {parameter} is not a finite number at node {}",
-                node + 1
-            ));
+        if let Some(node) = values.iter().position(|value| !value.is_finite()) {
+            return Err(TableError::ParameterNotFinite {
+                branch,
+                parameter,
+                node: node + 1,
+            });
         }
     }
     Ok(())

@@ -1,18 +1,17 @@
-//! The simulated device in this process, in virtual time: the host's side of the
-//! wire, a line of memory, and the simulated device's side at its end.
+//! The simulated device in virtual time: a [`Host`], a simulated line in each
+//! direction, and the simulated [`Firmware`].
 //!
-//! The bytes are those of a serial port. What it measures, plays and reports follows
-//! from its options, the tables and the instants it is called at; how often it is
-//! polled changes nothing, because everything in between happens at whole
-//! milliseconds. A jump of virtual time is no stalled screen, unless
-//! [`Options::stall`] says that it is.
+//! The bytes are the same as on a serial port. All reports follow from the options, the
+//! tables and the times of the calls. The frequency of polling has no influence, because
+//! everything happens at whole milliseconds. A jump of virtual time does not count as a
+//! stalled user interface unless [`Options::supervision_timeout`] is set.
 //!
-//! Parameters and formulas are in `docs/simulation.md`. Nothing it reports is
+//! `docs/simulation.md` gives parameters and formulas. Nothing in the reports is
 //! measured.
 
-use super::faults::{Fate, FaultPlan, Injected};
+use super::faults::{FaultPlan, InjectedFault, PlannedFault};
 use super::firmware::{self, Firmware};
-use super::host::{Health, Host, Settings};
+use super::host::{Health, Host, HostSettings};
 use super::link::memory::{Line, Noise};
 use super::{Device, DeviceError, Identity, Report, Stimulus};
 use std::time::Duration;
@@ -20,43 +19,43 @@ use study_base::limits::Limits;
 use study_haptics::plant::HandParameters;
 use study_wire::message::Fault;
 
-/// Each way: about what a USB serial adapter takes.
+/// Latency in each direction, about that of a USB serial adapter.
 const LATENCY: Duration = Duration::from_micros(500);
-/// Everything happens at multiples of it.
+/// Everything happens at multiples of this step.
 const STEP: Duration = Duration::from_millis(1);
-/// The device is powered up and greeted so long before the beginning.
-const BEFORE: Duration = Duration::from_secs(1);
-/// How long a cable is out.
-const UNPLUGGED: Duration = Duration::from_secs(2);
-/// How long the line is dead when a playback is lost.
-const DEAD: Duration = Duration::from_millis(1500);
+/// The device is powered up and connected this long before time zero.
+const POWER_UP_LEAD: Duration = Duration::from_secs(1);
+/// How long the cable is unplugged.
+const UNPLUGGED_FOR: Duration = Duration::from_secs(2);
+/// How long the line is dead after a lost playback.
+const DEAD_FOR: Duration = Duration::from_millis(1500);
 
-/// What a simulated device is like.
+/// Options of a simulated device.
 #[derive(Debug)]
 pub struct Options {
-    /// Decides how the hand moves in each playback.
+    /// Seed of the hand's motion in each playback.
     pub seed: u64,
-    /// Servo periods per second, held to 500 … 20,000; no number reads as 4000.
+    /// Servo periods per second, limited to 500 … 20,000; 4000 for NaN.
     pub servo_hz: f64,
-    /// Telemetry samples per second, at most one a servo period.
+    /// Telemetry samples per second, at most one per servo period.
     pub telemetry_hz: f64,
-    /// What the device never exceeds.
+    /// Limits of the device.
     pub limits: Limits,
-    /// What it does wrong on purpose.
+    /// Injected faults of the device.
     pub faults: FaultPlan,
-    /// What the line does wrong on purpose, both ways.
+    /// Injected faults of the line, in both directions.
     pub noise: Noise,
-    /// Without a poll for so long the screen counts as stalled; `None`: never.
-    pub stall: Option<Duration>,
+    /// See [`HostSettings::supervision_timeout`].
+    pub supervision_timeout: Option<Duration>,
     /// Hand and slider.
     pub hand: HandParameters,
-    /// Smallest mass that is rendered, kg: minus infinity plays every table as it
-    /// is, which no hand may be able to hold.
+    /// Smallest mass that is rendered, kg. Minus infinity renders every table unchanged,
+    /// which may be unstable with any hand.
     pub least_mass_kg: f64,
 }
 
 impl Default for Options {
-    /// That of [`firmware::Options`], 1 kHz telemetry, no faults.
+    /// The defaults of [`firmware::Options`], 1 kHz telemetry, no faults.
     fn default() -> Self {
         let device = firmware::Options::default();
         Self {
@@ -66,7 +65,7 @@ impl Default for Options {
             limits: device.limits,
             faults: FaultPlan::none(),
             noise: Noise::default(),
-            stall: None,
+            supervision_timeout: None,
             hand: device.hand,
             least_mass_kg: device.least_mass_kg,
         }
@@ -78,30 +77,30 @@ impl Default for Options {
 pub struct VirtualDevice {
     host: Host,
     firmware: Firmware,
-    there: Line,
-    back: Line,
+    to_device: Line,
+    to_host: Line,
     faults: FaultPlan,
     loads: u32,
-    /// What the present load meets.
-    fate: Option<Fate>,
-    /// When its playback meets it.
-    strikes: Option<(Duration, Injected)>,
-    /// When the cable is put back, or the line heals.
-    heals: Option<Duration>,
+    /// Fault of the present load, until its playback starts.
+    planned_fault: Option<PlannedFault>,
+    /// Fault of the present playback and its time.
+    fault_at: Option<(Duration, InjectedFault)>,
+    /// When the cable is plugged in again, or the line works again.
+    dead_until: Option<Duration>,
     unplugged: bool,
-    /// How far everything has come, on the device's time: [`BEFORE`] ahead.
+    /// Current time of the simulation, [`POWER_UP_LEAD`] ahead of the caller's time.
     now: Duration,
     reports: Vec<Report>,
 }
 
 impl VirtualDevice {
-    /// A device that is limp and waits for a table.
+    /// A connected device, limp and without a table.
     pub fn new(options: Options) -> Self {
         let telemetry_hz = options.telemetry_hz.max(0.1);
         let host = Host::new(
             0,
-            Settings {
-                stall: options.stall,
+            HostSettings {
+                supervision_timeout: options.supervision_timeout,
                 telemetry_hz,
             },
         );
@@ -118,49 +117,49 @@ impl VirtualDevice {
         let mut device = Self {
             host,
             firmware,
-            there: line("there"),
-            back: line("back"),
+            to_device: line("there"),
+            to_host: line("back"),
             faults: options.faults,
             loads: 0,
-            fate: None,
-            strikes: None,
-            heals: None,
+            planned_fault: None,
+            fault_at: None,
+            dead_until: None,
             unplugged: false,
             now: Duration::ZERO,
             reports: Vec::new(),
         };
-        device.host.linked(device.now);
+        device.host.connected(device.now);
         device.pump();
-        device.run(BEFORE);
-        // that it is there is no news
+        device.run(POWER_UP_LEAD);
+        // The first connection is not reported.
         device.reports.clear();
-        device.there.set_noise(options.noise);
-        device.back.set_noise(options.noise);
+        device.to_device.set_noise(options.noise);
+        device.to_host.set_noise(options.noise);
         device
     }
 
-    /// The force that it holds, N; zero unless it plays.
+    /// The commanded force, N; zero unless it is playing.
     pub fn held_n(&self) -> f64 {
         self.firmware.held_n()
     }
 
-    /// What the link has been like.
+    /// Quality of the link.
     pub fn health(&self) -> &Health {
         self.host.health()
     }
 
-    /// Lets time pass up to `until`, on the device's time.
+    /// Simulates up to `until`, on the simulation's time.
     fn run(&mut self, until: Duration) {
         loop {
             let next = self.now + STEP;
             let next = if self.host.armed() {
                 next
             } else {
-                next.max(whole(self.due().min(until)))
+                next.max(round_up(self.due().map_or(until, |due| due.min(until))))
             };
             if next > until {
-                // nothing happens until then
-                self.now = self.now.max(whole(until.saturating_sub(STEP)));
+                // Nothing happens until then.
+                self.now = self.now.max(round_up(until.saturating_sub(STEP)));
                 return;
             }
             self.now = next;
@@ -168,78 +167,80 @@ impl VirtualDevice {
         }
     }
 
-    /// When something happens next while nothing plays.
-    fn due(&self) -> Duration {
+    /// When something happens next while nothing is playing; `None` if nothing is due.
+    fn due(&self) -> Option<Duration> {
         [
             self.host.next(),
-            self.there.next(),
-            self.back.next(),
-            self.heals.unwrap_or(Duration::MAX),
+            self.to_device.next(),
+            self.to_host.next(),
+            self.dead_until,
         ]
         .into_iter()
+        .flatten()
         .min()
-        .unwrap_or(Duration::MAX)
     }
 
     fn step(&mut self) {
         let now = self.now;
-        if let Some((_, fault)) = self.strikes.take_if(|(at, _)| *at <= now) {
-            self.strike(fault);
+        if let Some((_, fault)) = self.fault_at.take_if(|(at, _)| *at <= now) {
+            self.inject(fault);
         }
-        if self.heals.take_if(|at| *at <= now).is_some() {
-            self.there.set_dead(false);
-            self.back.set_dead(false);
+        if self.dead_until.take_if(|at| *at <= now).is_some() {
+            self.to_device.set_dead(false);
+            self.to_host.set_dead(false);
             if std::mem::take(&mut self.unplugged) {
-                self.host.linked(now);
+                self.host.connected(now);
             }
         }
-        let bytes = self.there.arrived(now);
+        let bytes = self.to_device.arrived(now);
         self.firmware.receive(&bytes, now);
-        self.back.send(self.firmware.take_output(), now);
-        let bytes = self.back.arrived(now);
+        self.to_host.send(self.firmware.take_output(), now);
+        let bytes = self.to_host.arrived(now);
         self.host.receive(&bytes, now);
         self.host.advance(now);
         self.pump();
     }
 
-    /// What the host has to say goes onto the line, and to whoever polls.
+    /// Sends the host's bytes and collects its reports.
     fn pump(&mut self) {
-        self.there.send(self.host.take_output(), self.now);
+        self.to_device.send(self.host.take_output(), self.now);
         for report in self.host.take_reports() {
             if report == Report::Started
-                && let Some(fate) = self.fate.take()
+                && let Some(planned) = self.planned_fault.take()
             {
-                let after = Duration::from_secs_f64(fate.after_s);
-                self.strikes = Some((self.now + after, fate.fault));
+                let after = Duration::from_secs_f64(planned.after_s);
+                self.fault_at = Some((self.now + after, planned.fault));
             }
             self.reports.push(report);
         }
     }
 
-    fn strike(&mut self, fault: Injected) {
+    fn inject(&mut self, fault: InjectedFault) {
         match fault {
-            Injected::Trip | Injected::RefuseLoad => self.firmware.trip(Fault::External, self.now),
-            Injected::LosePlayback => {
-                self.there.set_dead(true);
-                self.back.set_dead(true);
-                self.heals = Some(self.now + DEAD);
+            InjectedFault::Trip | InjectedFault::RefuseLoad => {
+                self.firmware.trip(Fault::External, self.now)
             }
-            Injected::Unplug => {
-                self.there.set_dead(true);
-                self.back.set_dead(true);
+            InjectedFault::LosePlayback => {
+                self.to_device.set_dead(true);
+                self.to_host.set_dead(true);
+                self.dead_until = Some(self.now + DEAD_FOR);
+            }
+            InjectedFault::Unplug => {
+                self.to_device.set_dead(true);
+                self.to_host.set_dead(true);
                 self.unplugged = true;
-                self.host.unlinked("unplugged");
-                self.heals = Some(self.now + UNPLUGGED);
+                self.host.disconnected("unplugged");
+                self.dead_until = Some(self.now + UNPLUGGED_FOR);
             }
         }
     }
 
-    /// Takes a command at `at`: everything before it has happened.
+    /// Executes a command at `at`, after simulating everything before it.
     fn command<T>(&mut self, at: Duration, command: impl FnOnce(&mut Host, Duration) -> T) -> T {
-        let at = at + BEFORE;
+        let at = at + POWER_UP_LEAD;
         self.run(at);
-        self.host.fed(at);
-        // between two steps: its bytes go now
+        self.host.keep_alive(at);
+        // The command's bytes are sent now, even between two steps.
         let step = self.now;
         self.now = at.max(step);
         let done = command(&mut self.host, self.now);
@@ -250,7 +251,7 @@ impl VirtualDevice {
 }
 
 /// The next multiple of [`STEP`].
-fn whole(at: Duration) -> Duration {
+fn round_up(at: Duration) -> Duration {
     let step = STEP.as_nanos() as u64;
     let steps = at.as_nanos().div_ceil(u128::from(step));
     Duration::from_nanos((steps as u64).saturating_mul(step))
@@ -273,11 +274,11 @@ impl Device for VirtualDevice {
         at: Duration,
     ) -> Result<(), DeviceError> {
         self.loads += 1;
-        self.fate = self.faults.fate(self.loads);
-        self.strikes = None;
+        self.planned_fault = self.faults.for_load(self.loads);
+        self.fault_at = None;
         if self
-            .fate
-            .is_some_and(|fate| fate.fault == Injected::RefuseLoad)
+            .planned_fault
+            .is_some_and(|planned| planned.fault == InjectedFault::RefuseLoad)
         {
             return Err(DeviceError::Refused("an injected fault".to_owned()));
         }
@@ -293,16 +294,15 @@ impl Device for VirtualDevice {
     }
 
     fn limp(&mut self, at: Duration) {
-        self.strikes = None;
+        self.fault_at = None;
         self.command(at, Host::limp);
-        self.reports
-            .retain(|r| matches!(r, Report::Fault(_) | Report::Lost(_) | Report::Ready));
+        self.reports.retain(Report::survives_limp);
     }
 
     fn poll(&mut self, at: Duration) -> Vec<Report> {
-        let until = at + BEFORE;
+        let until = at + POWER_UP_LEAD;
         self.run(until);
-        self.host.fed(until);
+        self.host.keep_alive(until);
         std::mem::take(&mut self.reports)
     }
 }

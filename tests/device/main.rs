@@ -1,10 +1,15 @@
 //! Playback devices: simulated, behind a program, checked, commanded to stop.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod check;
+#[path = "../support/designs.rs"]
+mod designs;
 mod playback;
 mod process;
 mod safety;
 mod shipped;
+mod supervision;
 #[path = "../support/mod.rs"]
 mod support;
 mod target;

@@ -5,7 +5,7 @@
 
 use proptest::prelude::*;
 use std::time::Duration;
-use study::device::faults::{FaultPlan, Injected};
+use study::device::faults::{FaultPlan, InjectedFault};
 use study::device::virtual_device::{Options, VirtualDevice};
 use study::device::{Device, DeviceError, Report, Stimulus};
 use study_base::limits::{Limit, Limits};
@@ -295,10 +295,10 @@ fn a_table_with_a_hole_is_refused_naming_it() {
             r.x_mm[5] = 3.0;
         }),
         ("fewer than two nodes", &|r| r.x_mm.truncate(1)),
-        ("the trained speed inf mm/s is none", &|r| {
+        ("the trained speed inf mm/s is invalid", &|r| {
             r.trained.v_mm_s = f64::INFINITY;
         }),
-        ("the direction's delta_mm 0 is no length", &|r| {
+        ("the direction's delta_mm 0 is invalid", &|r| {
             r.direction = Direction::Dahl { delta_mm: 0.0 };
         }),
     ];
@@ -321,7 +321,7 @@ fn each_injected_fault_does_what_it_says() {
         faults: FaultPlan::none().with(1, fault),
         ..Options::default()
     };
-    let mut device = VirtualDevice::new(with(Injected::RefuseLoad));
+    let mut device = VirtualDevice::new(with(InjectedFault::RefuseLoad));
     let refused = device.load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(0));
     assert!(matches!(refused, Err(DeviceError::Refused(_))));
     assert!(
@@ -330,7 +330,7 @@ fn each_injected_fault_does_what_it_says() {
             .is_ok()
     );
 
-    let mut device = playing(with(Injected::Trip), &ordinary());
+    let mut device = playing(with(InjectedFault::Trip), &ordinary());
     let reports = device.poll(ms(3000));
     assert!(matches!(reports.last(), Some(Report::Fault(_))));
     assert_eq!(device.held_n(), 0.0);
@@ -341,7 +341,7 @@ fn each_injected_fault_does_what_it_says() {
             .is_ok()
     );
 
-    let mut device = playing(with(Injected::LosePlayback), &ordinary());
+    let mut device = playing(with(InjectedFault::LosePlayback), &ordinary());
     let reports = device.poll(ms(1500));
     let before = samples(&reports).len();
     assert!(
@@ -350,7 +350,7 @@ fn each_injected_fault_does_what_it_says() {
     );
     assert_eq!(
         reports.last(),
-        Some(&Report::Lost("it does not answer any more".to_owned()))
+        Some(&Report::Lost("it no longer answers".to_owned()))
     );
     assert_eq!(device.held_n(), 0.0, "its watchdog");
     device.stop(ms(1500)).unwrap();
@@ -365,7 +365,7 @@ fn each_injected_fault_does_what_it_says() {
             .is_ok()
     );
 
-    let mut device = playing(with(Injected::Unplug), &ordinary());
+    let mut device = playing(with(InjectedFault::Unplug), &ordinary());
     let reports = device.poll(ms(1000));
     assert!(matches!(reports.last(), Some(Report::Lost(_))));
     let gone = device.load(&Stimulus::of_table(&ordinary()), limits(12.0), ms(1000));

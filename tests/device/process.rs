@@ -172,13 +172,13 @@ fn the_example_can_be_loaded_without_a_table_and_says_no() {
         table: None,
         code: "",
         by_hand: false,
-        permitted: false,
+        allow_uncertified: false,
     };
     bench.device.load(&what, limits(), at).unwrap();
     let fault = bench.until("refusal", |r| matches!(r, Report::Fault(_)));
     assert_eq!(
         fault,
-        Report::Fault("the device refuses it: no table".to_owned())
+        Report::Fault("the device refuses the table: no table".to_owned())
     );
     bench.load().unwrap();
     bench.until("table", |r| *r == Report::Loaded);
@@ -187,18 +187,18 @@ fn the_example_can_be_loaded_without_a_table_and_says_no() {
 #[test]
 fn a_child_that_cannot_be_understood_is_lost_and_started_again() {
     for (script, why) in [
-        ("echo rubbish; sleep 60", "its line 2 is wrong: "),
+        ("echo rubbish; sleep 60", "its line 2 is invalid: "),
         (
             "echo '{\"say\":\"started\",\"load\":1}'; sleep 60",
-            "it says `started` while it loads",
+            "it sends `started` while it is loading",
         ),
         (
             "echo '{\"say\":\"loaded\",\"load\":1'; sleep 60",
-            "its line 2 is wrong: EOF",
+            "its line 2 is invalid: EOF",
         ),
         (
             "echo ready >&2; printf 'motor on \\033[31mfire\n\n' >&2; exit 3",
-            " has ended with exit status 3; its last words: motor on \\u{1b}[31mfire",
+            " has ended with exit status 3; its last error message: motor on \\u{1b}[31mfire",
         ),
         ("kill -9 $$", " has ended by signal: 9 (SIGKILL)"),
         ("exec >&-; sleep 60", " has closed its standard streams"),
@@ -236,12 +236,12 @@ fn a_child_that_is_no_controller_is_refused_before_the_session() {
     };
     let ended = refusal("echo no encoder >&2; exit 4");
     assert!(
-        ended.ends_with("` has ended with exit status 4; its last words: no encoder"),
+        ended.ends_with("` has ended with exit status 4; its last error message: no encoder"),
         "{ended}"
     );
     assert!(refusal("echo '{\"say\":\"loaded\",\"load\":1}'; sleep 60").contains("before `hello`"));
     let other = HELLO.replace("process/1", "process/7");
-    assert!(refusal(&format!("{other} sleep 60")).contains("speaks `study-process/7`"));
+    assert!(refusal(&format!("{other} sleep 60")).contains("uses the format `study-process/7`"));
     let missing = ProcessDevice::open(vec!["/no/such/program".to_owned()]);
     assert!(
         missing
@@ -266,7 +266,7 @@ fn what_keeps_a_child_from_coming_back_is_told_once() {
     assert!(bench.lost().contains("exit status 1"));
     let again = bench.lost();
     assert!(
-        again.contains("exit status 2; its last words: no port"),
+        again.contains("exit status 2; its last error message: no port"),
         "{again}"
     );
     let until = bench.at() + Duration::from_millis(2500);

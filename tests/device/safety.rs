@@ -5,12 +5,12 @@
 
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
-use study::device::host::{Host, STALL, Settings};
+use study::device::host::{Host, HostSettings, SUPERVISION_TIMEOUT};
 use study::device::link::memory::{Line, Noise};
 use study::device::{Report, Stimulus};
 use study_base::limits::{Limit, Limits};
 use study_haptics::model::{Branch, Realization, Trained};
-use study_wire::message::{Fault, State};
+use study_wire::message::{DeviceState, Fault};
 use study_wire::predict::{Direction, Lookup};
 
 const TICK: Duration = Duration::from_micros(250);
@@ -76,7 +76,7 @@ impl Bench {
             ..Options::default()
         });
         let mut bench = Self {
-            host: Host::new(1, Settings::default()),
+            host: Host::new(1, HostSettings::default()),
             firmware,
             there: line("there"),
             back: line("back"),
@@ -86,7 +86,7 @@ impl Bench {
             heard: Vec::new(),
         };
         bench.pass(ms(200));
-        bench.host.linked(bench.now);
+        bench.host.connected(bench.now);
         bench.pass(ms(300));
         bench
     }
@@ -100,7 +100,7 @@ impl Bench {
         if self.runs {
             let came = self.back.arrived(self.now);
             if self.screen {
-                self.host.fed(self.now);
+                self.host.keep_alive(self.now);
             }
             self.host.receive(&came, self.now);
             self.host.advance(self.now);
@@ -199,7 +199,7 @@ fn a_host_that_is_stopped_and_continued_does_not_resume() {
         bench.runs = true;
         bench.until("fault", |r| matches!(r, Report::Fault(_)));
         bench.latched();
-        assert_ne!(bench.firmware.state(), State::Run);
+        assert_ne!(bench.firmware.state(), DeviceState::Run);
         bench.play();
     }
 }
@@ -219,7 +219,10 @@ fn a_screen_that_stalls_is_zero_force_within_150_ms_latched() {
         assert!(told, "{:?}", bench.heard);
     }
     assert!(worst <= ms(150), "{worst:?}");
-    assert!(worst >= STALL, "a screen may take its time: {worst:?}");
+    assert!(
+        worst >= SUPERVISION_TIMEOUT,
+        "a screen may take its time: {worst:?}"
+    );
 }
 
 /// At every millisecond from the load to long after the stop: zero force in time,
@@ -245,7 +248,7 @@ fn a_cable_that_is_pulled_at_any_moment() {
         }
         let confirmed = bench.heard.iter().any(|r| matches!(r, Report::Stopped(_)));
         bench.heard.clear();
-        bench.host.unlinked("unplugged");
+        bench.host.disconnected("unplugged");
         bench.there.set_dead(true);
         bench.back.set_dead(true);
         assert!(bench.zero_after() <= ms(50), "{pulled:?}");
@@ -258,7 +261,7 @@ fn a_cable_that_is_pulled_at_any_moment() {
         bench.latched();
         bench.there.set_dead(false);
         bench.back.set_dead(false);
-        bench.host.linked(bench.now);
+        bench.host.connected(bench.now);
         bench.heard.clear();
         bench.until("return", |r| *r == Report::Ready);
         bench.play();
@@ -300,7 +303,7 @@ fn a_bad_line_is_safe_and_usable() {
         duplicate: share,
         reorder: share,
         delay: share,
-        late: ms(25),
+        extra_delay: ms(25),
     };
     let mut ended = 0;
     for seed in 0..12 {

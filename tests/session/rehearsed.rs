@@ -60,7 +60,7 @@ fn a_study_with_a_failing_device_ends_and_is_whole() {
     for met in [
         "device-fault",
         "the device refuses the table",
-        "it does not answer any more",
+        "it no longer answers",
         "unplugged",
     ] {
         assert!(attempts.contains(met), "`{met}` was never met");

@@ -83,7 +83,8 @@ pub(crate) fn constrained(
     protocol
 }
 
-fn model(id: &str) -> ModelEntry {
+/// An entry without a file.
+pub(crate) fn model(id: &str) -> ModelEntry {
     ModelEntry {
         id: ModelId::new(id).expect("an identifier"),
         file: None,

@@ -3,10 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::support::{Host, begin, detents, ms};
+use std::num::NonZeroU16;
 use study::device::firmware::Options;
 use study_wire::message::{
-    Commit, Event, Fault, Few, Happening, Hello, Loaded, Node, Play, Refusal, Reply, Request,
-    State, Stop, TableBegin, TableChunk, TelemetrySample, fixed,
+    Commit, DeviceState, Event, EventKind, Fault, FixedVec, Hello, Loaded, Node, Play, Refusal,
+    Reply, Request, Stop, TableBegin, TableChunk, TelemetrySample, fixed,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -32,23 +33,29 @@ fn samples(host: &Host) -> Vec<TelemetrySample> {
 #[test]
 fn a_session_from_power_up_to_an_outcome() {
     let mut host = Host::new(Options::default());
-    assert_eq!(host.device.state(), State::Boot);
+    assert_eq!(host.device.state(), DeviceState::Boot);
     assert_eq!(host.ack(Request::Rearm).refusal, Refusal::NoHello);
     host.open(1);
     let nodes = detents(0.05, 0.02);
     let (ack, crc) = host.upload(begin(&nodes), &nodes);
-    assert_eq!((ack.refusal, ack.state), (Refusal::None, State::Loaded));
+    assert_eq!(
+        (ack.refusal, ack.state),
+        (Refusal::None, DeviceState::Loaded)
+    );
     let ack = host.play(7, crc);
-    assert_eq!((ack.refusal, ack.state), (Refusal::None, State::Ramp));
+    assert_eq!((ack.refusal, ack.state), (Refusal::None, DeviceState::Ramp));
     host.live(ms(399));
-    assert_eq!(host.device.state(), State::Ramp);
+    assert_eq!(host.device.state(), DeviceState::Ramp);
     host.live(ms(11_601));
-    assert_eq!(host.device.state(), State::Run);
+    assert_eq!(host.device.state(), DeviceState::Run);
     let ack = host.stop(7);
-    assert_eq!((ack.refusal, ack.state), (Refusal::None, State::Stopping));
+    assert_eq!(
+        (ack.refusal, ack.state),
+        (Refusal::None, DeviceState::Stopping)
+    );
     assert_eq!(host.device.held_n(), 0.0);
     host.wait(ms(1));
-    assert_eq!(host.device.state(), State::Loaded);
+    assert_eq!(host.device.state(), DeviceState::Loaded);
     let outcome = host.outcome();
     assert_eq!(outcome.fault, Fault::None);
     assert_eq!(outcome.loaded, Loaded::Table);
@@ -57,7 +64,7 @@ fn a_session_from_power_up_to_an_outcome() {
     assert_eq!(outcome.samples, 12_000);
     assert!(outcome.strokes > 4, "{outcome:?}");
     assert!(outcome.energy_j > 0.1, "{outcome:?}");
-    assert!(outcome.most_force_n > 3.0 && outcome.most_force_n <= 12.0);
+    assert!(outcome.peak_force_n > 3.0 && outcome.peak_force_n <= 12.0);
     assert!(outcome.rough_n2 > 0.0);
     assert_eq!(outcome.limit_n, 12.0);
     assert_eq!(outcome.bad_frames, 0);
@@ -72,14 +79,14 @@ fn a_session_from_power_up_to_an_outcome() {
     );
     let happened: Vec<_> = events(&host)
         .iter()
-        .map(|event| (event.what, event.state, event.tick))
+        .map(|event| (event.kind, event.state, event.tick))
         .collect();
     assert_eq!(
         happened,
         [
-            (Happening::Latched, State::Limp, 0),
-            (Happening::Started, State::Ramp, 0),
-            (Happening::Stopped, State::Loaded, 48_000),
+            (EventKind::Latched, DeviceState::Limp, 0),
+            (EventKind::Started, DeviceState::Ramp, 0),
+            (EventKind::Stopped, DeviceState::Loaded, 48_000),
         ]
     );
 }
@@ -93,20 +100,20 @@ fn without_a_heartbeat_the_force_is_zero_after_the_watchdog_time() {
             ..Options::default()
         };
         let mut host = Host::playing(options, ms(1000));
-        assert_eq!(host.beat().state, State::Run);
+        assert_eq!(host.beat().state, DeviceState::Run);
         host.wait(ms(29));
-        assert_eq!(host.device.state(), State::Run);
+        assert_eq!(host.device.state(), DeviceState::Run);
         host.wait(ms(2));
         assert_eq!(host.device.held_n(), 0.0);
-        assert_eq!(host.device.state(), State::Limp);
+        assert_eq!(host.device.state(), DeviceState::Limp);
         assert_eq!(host.device.fault(), Fault::Watchdog);
         // coming back does not go on with it
         assert!(host.beat().fresh);
         host.live(ms(500));
-        assert_eq!(host.device.state(), State::Limp);
+        assert_eq!(host.device.state(), DeviceState::Limp);
         assert_eq!(host.stop(7).refusal, Refusal::None);
         assert_eq!(host.play(8, 0).refusal, Refusal::WrongState);
-        assert_eq!(host.ack(Request::Rearm).state, State::Idle);
+        assert_eq!(host.ack(Request::Rearm).state, DeviceState::Idle);
         assert_eq!(host.outcome().loaded, Loaded::Nothing);
     }
 }
@@ -120,7 +127,7 @@ fn a_queue_of_old_heartbeats_does_not_keep_it_alive() {
     for count in 0..1000 {
         host.wait(ms(1));
         host.beat_as(1_000_000 + count, deadline);
-        if host.device.state() == State::Limp {
+        if host.device.state() == DeviceState::Limp {
             break;
         }
     }
@@ -176,9 +183,9 @@ fn limp_is_zero_force_at_once_in_every_state_and_every_version() {
             assert_eq!(ack.refusal, Refusal::None);
             assert_eq!(host.device.held_n(), 0.0, "{name}");
             let expected = if name == "fault" {
-                State::Fault
+                DeviceState::Fault
             } else {
-                State::Limp
+                DeviceState::Limp
             };
             assert_eq!(host.device.state(), expected, "{name}");
             assert_eq!(host.outcome().loaded, Loaded::Nothing);
@@ -195,10 +202,10 @@ fn only_rest_re_arms() {
     host.device.trip(Fault::External, host.at);
     let ack = host.ack(Request::Rearm);
     assert_eq!((ack.refusal, ack.fault), (Refusal::Moving, Fault::External));
-    assert_eq!(ack.state, State::Fault);
+    assert_eq!(ack.state, DeviceState::Fault);
     host.wait(ms(400));
     let ack = host.ack(Request::Rearm);
-    assert_eq!((ack.refusal, ack.state), (Refusal::None, State::Idle));
+    assert_eq!((ack.refusal, ack.state), (Refusal::None, DeviceState::Idle));
     assert_eq!(host.ack(Request::Rearm).refusal, Refusal::None, "and again");
 }
 
@@ -216,13 +223,13 @@ fn a_request_is_done_once_however_often_it_comes() {
             playback,
             crc,
             longest_ms: 1000,
-            every: 0,
+            every: NonZeroU16::new(0),
         })
     };
     assert!(host.ask_as(5001, play(8)).is_some());
     // a stop that was held up somewhere says nothing any more
     assert_eq!(host.ask_as(5000, stop), None);
-    assert_eq!(host.device.state(), State::Ramp);
+    assert_eq!(host.device.state(), DeviceState::Ramp);
     // one number, two requests
     let Some(Reply::Ack(ack)) = host.ask_as(5001, play(9)) else {
         panic!();
@@ -254,7 +261,7 @@ fn sequence_numbers_and_the_clock_wrap() {
         },
         ms(5000),
     );
-    assert_eq!(host.device.state(), State::Run);
+    assert_eq!(host.device.state(), DeviceState::Run);
     assert!(host.beat().clock_ms < 10_000);
 }
 
@@ -270,20 +277,20 @@ fn the_longest_duration_ends_a_playback() {
             playback: 8,
             crc,
             longest_ms,
-            every: 40,
+            every: NonZeroU16::new(40),
         }))
     };
     assert_eq!(play(0).refusal, Refusal::Duration);
     assert_eq!(play(600_001).detail, 600_000);
     assert_eq!(play(1000).refusal, Refusal::None);
     host.live(ms(990));
-    assert_eq!(host.device.state(), State::Run);
+    assert_eq!(host.device.state(), DeviceState::Run);
     host.live(ms(20));
-    assert_eq!(host.device.state(), State::Loaded);
+    assert_eq!(host.device.state(), DeviceState::Loaded);
     let last = *events(&host).last().unwrap();
     assert_eq!(
-        (last.what, last.fault),
-        (Happening::Stopped, Fault::Longest)
+        (last.kind, last.fault),
+        (EventKind::Stopped, Fault::Longest)
     );
     assert_eq!(host.outcome().ticks, 4000);
 }
@@ -294,11 +301,15 @@ fn another_host_makes_it_limp_and_forgets_the_table() {
     let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1 })) else {
         panic!();
     };
-    assert_eq!(identity.state, State::Run, "the same one changes nothing");
+    assert_eq!(
+        identity.state,
+        DeviceState::Run,
+        "the same one changes nothing"
+    );
     let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 2 })) else {
         panic!();
     };
-    assert_eq!(identity.state, State::Limp);
+    assert_eq!(identity.state, DeviceState::Limp);
     assert_eq!(identity.fault, Fault::NewConnection);
     assert_eq!(host.device.held_n(), 0.0);
 }
@@ -414,7 +425,7 @@ fn a_table_that_must_not_be_played_is_refused() {
         }
         let (ack, crc) = host.upload(begin, &nodes);
         assert_eq!((ack.refusal, ack.detail), (refusal, detail), "{name}");
-        assert_eq!(ack.state, State::Idle, "{name}");
+        assert_eq!(ack.state, DeviceState::Idle, "{name}");
         assert_eq!(host.play(1, crc).refusal, Refusal::WrongState, "{name}");
     }
 }
@@ -442,7 +453,7 @@ fn armed_it_is_played_with_the_force_capped_but_never_with_a_hole() {
     host.play(1, crc);
     host.live(ms(3000));
     let outcome = host.outcome();
-    assert_eq!(outcome.most_force_n, 9.0);
+    assert_eq!(outcome.peak_force_n, 9.0);
     assert!(outcome.clamps > 0);
     let force = samples(&host).iter().map(|s| s.command_un.abs()).max();
     assert_eq!(force, Some(fixed::un(9.0)));
@@ -463,7 +474,7 @@ fn an_upload_takes_its_pieces_in_order_and_whole() {
     let chunk = |first: u16, count: usize| {
         Request::TableChunk(TableChunk {
             first,
-            nodes: Few::of(&nodes[usize::from(first)..usize::from(first) + count]),
+            nodes: FixedVec::of(&nodes[usize::from(first)..usize::from(first) + count]),
         })
     };
     assert_eq!(host.ack(chunk(0, 3)).refusal, Refusal::WrongState);
@@ -526,7 +537,7 @@ fn a_reset_a_stall_and_a_missed_period_end_without_force() {
     let mut host = Host::playing(Options::default(), ms(2000));
     host.device.reset(host.at);
     assert_eq!(host.device.held_n(), 0.0);
-    assert_eq!(host.device.state(), State::Boot);
+    assert_eq!(host.device.state(), DeviceState::Boot);
 
     let mut host = Host::playing(Options::default(), ms(2000));
     host.device.stall(host.at, ms(3));
@@ -541,7 +552,7 @@ fn a_reset_a_stall_and_a_missed_period_end_without_force() {
     assert_eq!(host.device.held_n(), held, "nobody is there to change it");
     host.wait(ms(2));
     assert_eq!(host.device.held_n(), 0.0);
-    assert_eq!(host.device.state(), State::Boot);
+    assert_eq!(host.device.state(), DeviceState::Boot);
 }
 
 #[test]

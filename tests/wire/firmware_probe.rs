@@ -6,7 +6,8 @@ use crate::support::{Host, ms};
 use study::device::firmware::Options;
 use study_wire::message::probe::PathCrc;
 use study_wire::message::{
-    Commit, Fault, Few, Loaded, PathBegin, PathChunk, Record, Refusal, Reply, Request, State, fixed,
+    Commit, DeviceState, Fault, FixedVec, Loaded, PathBegin, PathChunk, Record, Refusal, Reply,
+    Request, fixed,
 };
 
 #[test]
@@ -25,23 +26,26 @@ fn a_path_is_followed_and_recorded() {
     x_nm.iter().for_each(|x| crc.point(*x));
     let crc = crc.value();
     assert_eq!(host.ack(Request::PathBegin(begin)).refusal, Refusal::None);
-    for (i, some) in x_nm.chunks(PathChunk::MOST).enumerate() {
+    for (i, some) in x_nm.chunks(PathChunk::MAX_POINTS).enumerate() {
         let ack = host.ack(Request::PathChunk(PathChunk {
-            first: (i * PathChunk::MOST) as u32,
-            x_nm: Few::of(some),
+            first: (i * PathChunk::MAX_POINTS) as u32,
+            x_nm: FixedVec::of(some),
         }));
         assert_eq!(ack.refusal, Refusal::None);
     }
     host.beat();
     let ack = host.ack(Request::PathCommit(Commit { crc }));
-    assert_eq!((ack.refusal, ack.state), (Refusal::None, State::Loaded));
+    assert_eq!(
+        (ack.refusal, ack.state),
+        (Refusal::None, DeviceState::Loaded)
+    );
     assert_eq!(host.play(3, crc).refusal, Refusal::OtherTable);
     let ack = host.ack(Request::Record(Record { playback: 3, crc }));
-    assert_eq!((ack.refusal, ack.state), (Refusal::None, State::Ramp));
+    assert_eq!((ack.refusal, ack.state), (Refusal::None, DeviceState::Ramp));
     host.live(ms(2000));
     assert_eq!(
         host.device.state(),
-        State::Loaded,
+        DeviceState::Loaded,
         "{:?}",
         host.device.fault()
     );
@@ -58,7 +62,11 @@ fn a_path_is_followed_and_recorded() {
         // the encoder, and a servo period of 63 mm/s
         assert!((point.x_nm - x_nm).abs() < 25_000, "{i} {point:?} {x_nm}");
     }
-    let most = points.iter().map(|p| p.force_un.abs()).max().unwrap();
+    let most = points
+        .iter()
+        .map(|p| p.force_un.unwrap().abs())
+        .max()
+        .unwrap();
     assert!((2_000_000..14_000_000).contains(&most), "{most}");
     assert_eq!(host.outcome().samples, 1000);
 }
@@ -77,9 +85,9 @@ fn recording(x_mm: impl Fn(f64) -> f64, force_n: f64) -> (Host, u32) {
     let mut crc = PathCrc::of(&begin);
     x_nm.iter().for_each(|x| crc.point(*x));
     host.ack(Request::PathBegin(begin));
-    for (i, some) in x_nm.chunks(PathChunk::MOST).enumerate() {
-        let first = (i * PathChunk::MOST) as u32;
-        let x_nm = Few::of(some);
+    for (i, some) in x_nm.chunks(PathChunk::MAX_POINTS).enumerate() {
+        let first = (i * PathChunk::MAX_POINTS) as u32;
+        let x_nm = FixedVec::of(some);
         host.ack(Request::PathChunk(PathChunk { first, x_nm }));
     }
     host.beat();
@@ -107,9 +115,9 @@ fn a_path_that_cannot_be_followed_is_refused_and_a_recording_can_be_stopped() {
     host.ack(Request::PathCommit(Commit { crc }));
     host.ack(Request::Record(Record { playback: 4, crc }));
     host.live(ms(700));
-    assert_eq!(host.device.state(), State::Run);
+    assert_eq!(host.device.state(), DeviceState::Run);
     assert_ne!(host.device.held_n(), 0.0);
-    assert_eq!(host.stop(4).state, State::Stopping);
+    assert_eq!(host.stop(4).state, DeviceState::Stopping);
     assert_eq!(host.device.held_n(), 0.0);
     host.wait(ms(1));
     let outcome = host.outcome();

@@ -2,13 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use std::num::NonZeroU16;
 use std::time::Duration;
 
 use crate::support::{Host, begin, detents, ms};
 use study::device::firmware::{Flaw, Options};
 use study_wire::message::{
-    Commit, Fault, Few, Hello, PathBegin, PathChunk, Play, Record, Refusal, Reply, Request, State,
-    Stop, TableBegin, TableChunk,
+    Commit, DeviceState, Fault, FixedVec, Hello, PathBegin, PathChunk, Play, Record, Refusal,
+    Reply, Request, Stop, TableBegin, TableChunk,
 };
 use study_wire::predict::Direction;
 
@@ -38,7 +39,7 @@ fn held(direction: Direction, servo_hz: f64, half_n: f64) -> f64 {
     let before = host.outcome();
     host.live(ms(10_000));
     let after = host.outcome();
-    assert_eq!(after.state, State::Run);
+    assert_eq!(after.state, DeviceState::Run);
     f64::from(after.switches - before.switches) / 10.0
 }
 
@@ -81,8 +82,8 @@ fn every_flaw_shows() {
     assert_eq!((ack.refusal, ack.detail), (Refusal::Version, 2));
 
     let mut host = playing(Flaw::DeafToLimp);
-    assert_eq!(host.ack(Request::Limp).state, State::Limp);
-    assert_eq!(host.device.state(), State::Run);
+    assert_eq!(host.ack(Request::Limp).state, DeviceState::Limp);
+    assert_eq!(host.device.state(), DeviceState::Run);
 
     let mut host = playing(Flaw::Repeats);
     let first = host.ask_as(5000, Request::Rearm).unwrap();
@@ -91,8 +92,8 @@ fn every_flaw_shows() {
 
     let mut host = playing(Flaw::Unlatched);
     host.wait(ms(100));
-    assert_eq!(host.outcome().state, State::Idle);
-    assert_eq!(host.device.state(), State::Limp);
+    assert_eq!(host.outcome().state, DeviceState::Idle);
+    assert_eq!(host.device.state(), DeviceState::Limp);
 
     let mut host = playing(Flaw::TakesStale);
     let clock = host.clock_ms();
@@ -101,7 +102,7 @@ fn every_flaw_shows() {
     let mut host = playing(Flaw::LateWatchdog);
     host.beat();
     host.wait(ms(250));
-    assert_eq!(host.device.state(), State::Run);
+    assert_eq!(host.device.state(), DeviceState::Run);
     let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1 })) else {
         panic!();
     };
@@ -115,12 +116,12 @@ fn every_flaw_shows() {
         let mut nodes = detents(0.05, 0.02);
         nodes[3].positive[0] = spoil;
         assert_eq!(host.upload(begin(&nodes), &nodes).0.refusal, Refusal::None);
-        assert_eq!(host.device.state(), State::Idle);
+        assert_eq!(host.device.state(), DeviceState::Idle);
     }
 
     let most = |flaw| {
         let mut host = Host::playing(flawed(flaw), ms(3000));
-        (host.outcome().most_force_n, host)
+        (host.outcome().peak_force_n, host)
     };
     let (plain, _) = most(Flaw::SlowStop);
     let (more, _) = most(Flaw::NoClamp);
@@ -150,9 +151,9 @@ fn every_flaw_shows() {
     let stop = Request::Stop(Stop { playback: 7 });
     assert!(host.send(stop.frame(9000).as_bytes()).is_none());
     host.live(ms(190));
-    assert_eq!(host.device.state(), State::Run);
+    assert_eq!(host.device.state(), DeviceState::Run);
     host.live(ms(20));
-    assert_eq!(host.device.state(), State::Loaded);
+    assert_eq!(host.device.state(), DeviceState::Loaded);
 }
 
 /// A host that dies at any moment, over a link that takes its time: in virtual
@@ -179,7 +180,7 @@ fn whenever_the_host_dies_the_force_is_zero_within_50_ms() {
         let deadline = host.clock_ms() + 40;
         host.wait(Duration::from_micros(1000 * late + 37 * death % 1000));
         host.beat_as(2_000_000, deadline);
-        while host.device.state().forceful() {
+        while host.device.state().applies_force() {
             host.wait(Duration::from_micros(250));
             assert!(host.at - made <= ms(50), "{death}");
         }
@@ -190,7 +191,7 @@ fn whenever_the_host_dies_the_force_is_zero_within_50_ms() {
     assert!(worst > ms(30) && worst <= ms(41), "{worst:?}");
 }
 
-fn in_state(state: State) -> Host {
+fn in_state(state: DeviceState) -> Host {
     let loaded = || {
         let mut host = Host::opened(Options::default());
         let nodes = detents(0.05, 0.02);
@@ -198,19 +199,19 @@ fn in_state(state: State) -> Host {
         host
     };
     let mut host = match state {
-        State::Boot => Host::new(Options::default()),
-        State::Idle => Host::opened(Options::default()),
-        State::Loaded => loaded(),
-        State::Ramp => Host::playing(Options::default(), ms(200)),
-        State::Run => Host::playing(Options::default(), ms(1000)),
+        DeviceState::Boot => Host::new(Options::default()),
+        DeviceState::Idle => Host::opened(Options::default()),
+        DeviceState::Loaded => loaded(),
+        DeviceState::Ramp => Host::playing(Options::default(), ms(200)),
+        DeviceState::Run => Host::playing(Options::default(), ms(1000)),
         // nothing can come in between a stop and the end of its telemetry
-        State::Stopping => unreachable!(),
-        State::Limp => {
+        DeviceState::Stopping => unreachable!(),
+        DeviceState::Limp => {
             let mut host = loaded();
             host.ask(Request::Limp);
             host
         }
-        State::Fault => {
+        DeviceState::Fault => {
             let mut host = loaded();
             host.device.trip(Fault::External, host.at);
             host
@@ -224,8 +225,8 @@ fn in_state(state: State) -> Host {
 /// The table of states in the document: every state, every request.
 #[test]
 fn every_request_in_every_state_does_what_the_document_says() {
+    use DeviceState::{Boot, Fault, Idle, Limp, Loaded, Ramp, Run};
     use Refusal::{NoHeartbeat, NoHello, None as Done, OtherPlayback, WrongState};
-    use State::{Boot, Fault, Idle, Limp, Loaded, Ramp, Run};
 
     let nodes = detents(0.05, 0.02);
     let begin = begin(&nodes);
@@ -240,17 +241,17 @@ fn every_request_in_every_state_does_what_the_document_says() {
     };
     let chunk = Request::TableChunk(TableChunk {
         first: 0,
-        nodes: Few::of(&nodes[..3]),
+        nodes: FixedVec::of(&nodes[..3]),
     });
     let points = Request::PathChunk(PathChunk {
         first: 0,
-        x_nm: Few::of(&[0, 0]),
+        x_nm: FixedVec::of(&[0, 0]),
     });
     let play = Request::Play(Play {
         playback: 7,
         crc,
         longest_ms: 1000,
-        every: 4,
+        every: NonZeroU16::new(4),
     });
     let stop = Request::Stop(Stop { playback: 7 });
     let hello = Request::Hello(Hello { nonce: 2 });
@@ -265,7 +266,7 @@ fn every_request_in_every_state_does_what_the_document_says() {
             }
         })
     };
-    let cases: [(Request, [(Refusal, State); 7]); 14] = [
+    let cases: [(Request, [(Refusal, DeviceState); 7]); 14] = [
         (
             Request::TableBegin(begin),
             [
@@ -324,8 +325,8 @@ fn every_request_in_every_state_does_what_the_document_says() {
                 (NoHello, Boot),
                 (OtherPlayback, Idle),
                 (OtherPlayback, Loaded),
-                (Done, State::Stopping),
-                (Done, State::Stopping),
+                (Done, DeviceState::Stopping),
+                (Done, DeviceState::Stopping),
                 (OtherPlayback, Limp),
                 (OtherPlayback, Fault),
             ],
@@ -373,7 +374,7 @@ fn every_request_in_every_state_does_what_the_document_says() {
                 Reply::Pulse(pulse) => assert_eq!(pulse.state, after, "{context}"),
                 other => panic!("{other:?}"),
             }
-            if !after.forceful() {
+            if !after.applies_force() {
                 assert_eq!(host.device.held_n(), 0.0, "{context}");
             }
         }
@@ -389,14 +390,14 @@ fn every_request_in_every_state_does_what_the_document_says() {
     host.upload(begin, &nodes[..31]);
     host.ask(Request::TableChunk(TableChunk {
         first: 30,
-        nodes: Few::of(&nodes[30..]),
+        nodes: FixedVec::of(&nodes[30..]),
     }));
     host.wait(ms(50));
     let ack = host.ack(Request::TableCommit(Commit { crc }));
     assert_eq!((ack.refusal, ack.detail), (Refusal::Incomplete, 31));
     host.ask(Request::TableChunk(TableChunk {
         first: 31,
-        nodes: Few::of(&nodes[31..]),
+        nodes: FixedVec::of(&nodes[31..]),
     }));
     assert_eq!(
         host.ack(Request::TableCommit(Commit { crc })).refusal,
@@ -410,30 +411,34 @@ fn every_request_in_every_state_does_what_the_document_says() {
 #[test]
 fn every_state_ends_without_force_when_something_breaks() {
     for state in [
-        State::Boot,
-        State::Idle,
-        State::Loaded,
-        State::Ramp,
-        State::Run,
-        State::Limp,
-        State::Fault,
+        DeviceState::Boot,
+        DeviceState::Idle,
+        DeviceState::Loaded,
+        DeviceState::Ramp,
+        DeviceState::Run,
+        DeviceState::Limp,
+        DeviceState::Fault,
     ] {
         let mut host = in_state(state);
         host.device.reset(host.at);
         assert_eq!(host.device.held_n(), 0.0, "{state:?}");
-        assert_eq!(host.device.state(), State::Boot, "{state:?}");
+        assert_eq!(host.device.state(), DeviceState::Boot, "{state:?}");
 
         let mut host = in_state(state);
         host.device.stall(host.at, ms(60_000));
         host.wait(ms(11));
         assert_eq!(host.device.held_n(), 0.0, "{state:?}");
-        assert_eq!(host.device.state(), State::Boot, "{state:?}");
+        assert_eq!(host.device.state(), DeviceState::Boot, "{state:?}");
 
         // unplugged: nothing comes any more
         let mut host = in_state(state);
         host.wait(ms(41));
         assert_eq!(host.device.held_n(), 0.0, "{state:?}");
-        let expected = if state.armed() { State::Limp } else { state };
+        let expected = if state.armed() {
+            DeviceState::Limp
+        } else {
+            state
+        };
         assert_eq!(host.device.state(), expected, "{state:?}");
 
         // noise: nothing of it is done, and the next frame is understood
@@ -451,7 +456,7 @@ fn every_state_ends_without_force_when_something_breaks() {
     host.device.reset(host.at);
     let chunk = Request::TableChunk(TableChunk {
         first: 0,
-        nodes: Few::of(&nodes[..3]),
+        nodes: FixedVec::of(&nodes[..3]),
     });
     assert_eq!(host.ack(chunk).refusal, Refusal::NoHello);
 }

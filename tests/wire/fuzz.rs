@@ -7,13 +7,14 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::support::{begin, detents};
+use std::num::NonZeroU16;
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
 use study_wire::frame::{Decoder, Frame, MAX_BODY};
 use study_wire::message::probe::PathCrc;
 use study_wire::message::{
-    Commit, Few, Heartbeat, Hello, PathBegin, PathChunk, Play, Record, Reply, Request, State, Stop,
-    TableBegin, TableChunk, TableCrc, kind,
+    Commit, DeviceState, FixedVec, Heartbeat, Hello, PathBegin, PathChunk, Play, Record, Reply,
+    Request, Stop, TableBegin, TableChunk, TableCrc, kind,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -111,14 +112,14 @@ impl Fuzz {
             }),
             2 => Request::TableChunk(TableChunk {
                 first: small,
-                nodes: Few::of(&detents(self.float(), self.float())[..3]),
+                nodes: FixedVec::of(&detents(self.float(), self.float())[..3]),
             }),
             3 => Request::TableCommit(Commit { crc: self.crc }),
             4..=6 => Request::Play(Play {
                 playback: word,
                 crc: self.crc,
                 longest_ms: word % 1_000_000,
-                every: small,
+                every: NonZeroU16::new(small),
             }),
             7 => Request::Stop(Stop { playback: word }),
             8 => Request::Limp,
@@ -139,7 +140,7 @@ impl Fuzz {
             }),
             17 => Request::PathChunk(PathChunk {
                 first: u32::from(small),
-                x_nm: Few::of(&[word as i32; 56][..usize::from(small) + 1]),
+                x_nm: FixedVec::of(&[word as i32; 56][..usize::from(small) + 1]),
             }),
             18 => Request::PathCommit(Commit { crc: word }),
             _ => Request::Record(Record {
@@ -172,8 +173,11 @@ impl Fuzz {
         let (force_n, limit_n) = (self.device.held_n(), self.device.limit_n());
         let state = self.device.state();
         assert!(force_n.abs() <= limit_n && limit_n <= 15.0, "{force_n}");
-        assert!(force_n == 0.0 || state.forceful(), "{force_n} {state:?}");
-        self.count.playing += u64::from(state.forceful());
+        assert!(
+            force_n == 0.0 || state.applies_force(),
+            "{force_n} {state:?}"
+        );
+        self.count.playing += u64::from(state.applies_force());
         if limit_n > 0.0 {
             self.count.most_share = self.count.most_share.max(force_n.abs() / limit_n);
         }
@@ -208,7 +212,11 @@ impl Fuzz {
             self.beat();
             self.at += Duration::from_millis(10);
         }
-        assert!(self.device.state().forceful(), "{:?}", self.device.fault());
+        assert!(
+            self.device.state().applies_force(),
+            "{:?}",
+            self.device.fault()
+        );
     }
 
     /// To one that plays a table that pushes hard.
@@ -227,10 +235,10 @@ impl Fuzz {
         nodes.iter().for_each(|node| crc.node(node));
         self.crc = crc.value();
         self.say(Request::TableBegin(begin));
-        for (i, some) in nodes.chunks(TableChunk::MOST).enumerate() {
+        for (i, some) in nodes.chunks(TableChunk::MAX_NODES).enumerate() {
             self.say(Request::TableChunk(TableChunk {
-                first: (i * TableChunk::MOST) as u16,
-                nodes: Few::of(some),
+                first: (i * TableChunk::MAX_NODES) as u16,
+                nodes: FixedVec::of(some),
             }));
         }
         self.beat();
@@ -239,7 +247,7 @@ impl Fuzz {
             playback: 1,
             crc: self.crc,
             longest_ms: 60_000,
-            every: 1,
+            every: NonZeroU16::new(1),
         }));
         self.live();
     }
@@ -258,10 +266,10 @@ impl Fuzz {
         x_nm.iter().for_each(|x| crc.point(*x));
         self.crc = crc.value();
         self.say(Request::PathBegin(begin));
-        for (i, some) in x_nm.chunks(PathChunk::MOST).enumerate() {
+        for (i, some) in x_nm.chunks(PathChunk::MAX_POINTS).enumerate() {
             self.say(Request::PathChunk(PathChunk {
-                first: (i * PathChunk::MOST) as u32,
-                x_nm: Few::of(some),
+                first: (i * PathChunk::MAX_POINTS) as u32,
+                x_nm: FixedVec::of(some),
             }));
         }
         self.beat();
@@ -397,7 +405,7 @@ fn mutated_frames() {
         fuzz.count
     );
     assert_eq!(fuzz.count.most_share, 1.0, "the limit was never reached");
-    assert_ne!(fuzz.device.state(), State::Boot);
+    assert_ne!(fuzz.device.state(), DeviceState::Boot);
 }
 
 /// What a device may send a host: any bytes behind a header that is one. What is a

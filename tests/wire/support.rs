@@ -3,12 +3,13 @@
 #![allow(dead_code, reason = "each test uses its part")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use std::num::NonZeroU16;
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
 use study_wire::frame::Decoder;
 use study_wire::message::{
-    Ack, Commit, Few, Heartbeat, Hello, Node, Outcome, Play, Pulse, Refusal, Reply, Request, Stop,
-    TableBegin, TableChunk, TableCrc,
+    Ack, Commit, FixedVec, Heartbeat, Hello, Node, Outcome, Play, Pulse, Refusal, Reply, Request,
+    Stop, TableBegin, TableChunk, TableCrc,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -89,7 +90,7 @@ impl Host {
         self.device.receive(bytes, self.at);
         let mut answer = None;
         for reply in self.read() {
-            if reply.answers() && answer.is_none() {
+            if reply.is_answer() && answer.is_none() {
                 answer = Some(reply);
             } else {
                 self.heard.push(reply);
@@ -152,10 +153,10 @@ impl Host {
         if first.refusal != Refusal::None {
             return (first, crc.value());
         }
-        for (i, some) in nodes.chunks(TableChunk::MOST).enumerate() {
+        for (i, some) in nodes.chunks(TableChunk::MAX_NODES).enumerate() {
             let ack = self.ack(Request::TableChunk(TableChunk {
-                first: (i * TableChunk::MOST) as u16,
-                nodes: Few::of(some),
+                first: (i * TableChunk::MAX_NODES) as u16,
+                nodes: FixedVec::of(some),
             }));
             if ack.refusal != Refusal::None {
                 return (ack, crc.value());
@@ -172,7 +173,7 @@ impl Host {
             playback,
             crc,
             longest_ms: 60_000,
-            every: 4,
+            every: NonZeroU16::new(4),
         }))
     }
 

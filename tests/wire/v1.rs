@@ -11,17 +11,18 @@ mod requests;
 
 use self::replies::replies;
 use self::requests::requests;
+use std::num::NonZeroU16;
 use study_wire::frame::{Decoder, crc32};
 use study_wire::handler::{Bounds, Handler, Measured, Profile};
 use study_wire::message::probe::PathCrc;
 use study_wire::message::{
-    Ack, Commit, Event, Fault, Few, Flags, Happening, Heartbeat, Hello, Identity, Loaded, Name,
-    Node, Outcome, PathBegin, PathChunk, Play, Pulse, Record, Recorded, RecordedPoint, Refusal,
-    Reply, Request, State, Stop, TableBegin, TableChunk, TableCrc, Telemetry, TelemetrySample,
-    WireError, fixed, kind,
+    Ack, Commit, DeviceState, Event, EventKind, Fault, FixedVec, Flags, Heartbeat, Hello, Identity,
+    Loaded, Name, Node, Outcome, PathBegin, PathChunk, Play, Pulse, Record, Recorded,
+    RecordedPoint, Refusal, Reply, Request, Stop, TableBegin, TableChunk, TableCrc, Telemetry,
+    TelemetrySample, WireError, fixed, kind,
 };
 use study_wire::predict::{Direction, Lookup, Motion};
-use study_wire::servo::Settings;
+use study_wire::servo::ServoSettings;
 
 /// Of the four nodes of [`chunk`] under [`begin`].
 const TABLE_CRC: u32 = 0xDDE60A90;
@@ -71,7 +72,7 @@ fn chunk(first: u16, count: usize) -> Request {
     let from = usize::from(first);
     Request::TableChunk(TableChunk {
         first,
-        nodes: Few::of(&nodes()[from..from + count]),
+        nodes: FixedVec::of(&nodes()[from..from + count]),
     })
 }
 
@@ -79,7 +80,7 @@ fn identity() -> Identity {
     Identity {
         nonce: 0xC0FF_EE01,
         versions: [1, 1],
-        state: State::Idle,
+        state: DeviceState::Idle,
         fault: Fault::None,
         flags: Flags {
             simulated: true,
@@ -88,8 +89,8 @@ fn identity() -> Identity {
         },
         clock_ms: 12,
         watchdog_ms: 30,
-        most_nodes: 512,
-        most_points: 0,
+        max_nodes: 512,
+        max_points: 0,
         longest_ms: 600_000,
         servo_hz: 4000.0,
         telemetry_hz: 1000.0,
@@ -105,7 +106,7 @@ fn identity() -> Identity {
 
 fn outcome() -> Outcome {
     Outcome {
-        state: State::Loaded,
+        state: DeviceState::Loaded,
         fault: Fault::None,
         loaded: Loaded::Table,
         clock_ms: 20_000,
@@ -120,7 +121,7 @@ fn outcome() -> Outcome {
         mass_held: 0,
         energy_j: 0.75,
         least_energy_j: -0.0625,
-        most_force_n: 12.0,
+        peak_force_n: 12.0,
         rough_n2: 0.125,
         limit_n: 12.0,
         bad_frames: 1,
@@ -129,12 +130,12 @@ fn outcome() -> Outcome {
 }
 
 fn telemetry() -> Telemetry {
-    let sample = |tick, x_mm, v_mm_s, command_n, measured_n| TelemetrySample {
+    let sample = |tick, x_mm, v_mm_s, command_n, measured_n: Option<f64>| TelemetrySample {
         tick,
         x_nm: fixed::nm(x_mm),
         v_um_s: fixed::um_s(v_mm_s),
         command_un: fixed::un(command_n),
-        measured_un: fixed::maybe_un(measured_n),
+        measured_un: measured_n.map(fixed::un),
     };
     Telemetry {
         playback: 7,
@@ -142,7 +143,7 @@ fn telemetry() -> Telemetry {
         clock_ms: 123_483,
         strokes: 1,
         clamps: 0,
-        samples: Few::of(&[
+        samples: FixedVec::of(&[
             sample(80, 17.205, -120.5, -1.25, Some(-1.2)),
             sample(84, 17.085, -120.0, -1.3, None),
         ]),
@@ -325,7 +326,7 @@ fn documented() -> Box<Handler<8, 0>> {
             damping_n_s_per_mm: identity.damping_n_s_per_mm,
             stroke_mm: identity.stroke_mm,
         },
-        servo: Settings::default(),
+        servo: ServoSettings::default(),
         rest_mm_s: 5.0,
         rest_s: 0.05,
     }))
@@ -351,7 +352,7 @@ fn conversation() -> Vec<(u32, u16, Request)> {
                 playback: 7,
                 crc: TABLE_CRC,
                 longest_ms: 60_000,
-                every: 40,
+                every: NonZeroU16::new(40),
             }),
         ),
         (140, 0, beat(3, 180)),
@@ -397,7 +398,7 @@ fn exchange() -> Vec<String> {
                     what = format!("Ack {:?} {:?}", ack.refusal, ack.state);
                 }
                 Reply::Event(event) => {
-                    what = format!("Event {:?} {:?} {:?}", event.what, event.state, event.fault);
+                    what = format!("Event {:?} {:?} {:?}", event.kind, event.state, event.fault);
                 }
                 _ => {}
             }
@@ -448,7 +449,7 @@ fn the_document_lists_every_code() {
     assert_eq!(listed("### Refusals\n"), refusals);
     let faults: Vec<u8> = Fault::ALL.iter().map(|f| f.code()).collect();
     assert_eq!(listed("### Faults\n"), faults);
-    let states: Vec<u8> = State::ALL.iter().map(|s| s.code()).collect();
+    let states: Vec<u8> = DeviceState::ALL.iter().map(|s| s.code()).collect();
     assert_eq!(listed("## 5. States\n"), states);
     for golden in requests() {
         let name = golden.name.split(' ').next().unwrap();

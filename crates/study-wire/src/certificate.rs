@@ -1,53 +1,55 @@
-//! Whether a table can put energy into the hand that moves it.
+//! Passivity certificate: whether a table can supply energy to the hand.
 //!
-//! Only `core` and slices, so that a device can check a table before it takes it.
-//! Nothing here allocates or fails on a valid table (see [`super::predict`]).
+//! The code uses only `core` and slices, so that a device can check a table before it
+//! accepts it. It does not allocate and does not fail on a valid table (see
+//! [`super::predict`]).
 //!
 //! A table with parameters interpolated in x is passive in continuous time if
 //!
-//! 1. m±(x) ≥ 0: kinetic energy is not negative;
-//! 2. b±(x) ≥ ½ max(0, ±dm±/dx) v, up to the fastest v: what a growing mass takes
-//!    from the motion, damping gives up. A direction state changes m as well, by
-//!    |m⁺ − m⁻|/δ for each mm, and a blend has both branches whichever way it
-//!    moves: then the larger of both signs counts, and that is added;
-//! 3. S⁺(x) ≥ S⁻(x), S = k x + F0: a stroke there and back does not gain energy.
+//! 1. m±(x) ≥ 0, so the kinetic energy is not negative;
+//! 2. b±(x) ≥ ½ max(0, ±dm±/dx) v up to the largest v, so the damping dissipates the
+//!    energy that a mass growing along the motion would supply. With a direction
+//!    state both branches contribute in either direction of motion, so the larger
+//!    slope of both signs counts, and the change of m with the state, |m⁺ − m⁻|/δ per
+//!    mm, is added;
+//! 3. S⁺(x) ≥ S⁻(x) with S = k x + F0, so a closed stroke does not gain energy.
 //!
-//! A negative k is no fault: it is the detent itself. m and b are linear between
-//! nodes, so 1 and 2 hold there if they hold at the nodes with the slopes on both
-//! sides. S is quadratic between nodes, because k and F0 are interpolated each by
-//! itself: its least is at a node or at the vertex, which is computed, and so is the
-//! steepest |dS/dx|, K.
+//! A negative k is allowed; it is the detent itself. Since m and b are linear between
+//! nodes, conditions 1 and 2 hold there if they hold at the nodes with the slopes on
+//! both sides. S is quadratic between nodes because k and F0 are interpolated
+//! separately: its minimum is at a node or at the vertex, which is computed, as is the
+//! largest |dS/dx|, K.
 //!
-//! A sampled device wants more: b_device > K T/2 + |B| (Colgate & Schenkel 1997),
-//! with n periods of delay K T (½ + n) + |B|, and 2 m/T for a mass unless the
-//! acceleration is low-passed.
+//! A sampled device needs additional damping: b_device > K T/2 + |B| (Colgate &
+//! Schenkel 1997), with n periods of delay K T (½ + n) + |B|, and 2 m/T for a mass
+//! unless the acceleration is low-pass filtered.
 //!
-//! Where parameters jump at nodes (look-ups `floor` and `nearest`), a mass that
-//! grows along the motion cannot be paid for by damping: condition 2 has no margin,
-//! and K has no bound.
+//! Where parameters jump at nodes (look-ups `floor` and `nearest`), no damping can
+//! compensate a mass that grows along the motion: condition 2 then has the margin −∞,
+//! and K is infinite.
 
 use super::predict::{BranchView, Direction, Lookup, TableView};
 use core::fmt;
 
-/// A margin below this much under zero is a failure; what is above it is rounding.
+/// Margins down to minus this value count as rounding errors.
 const ROUNDING: f64 = 1e-9;
 
-/// The servo rates that are told, Hz.
+/// Servo rates for which reports state the required device damping, Hz.
 pub const SERVO_RATES_HZ: [f64; 3] = [1000.0, 4000.0, 10_000.0];
 
-/// The conditions.
+/// The conditions of the certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
     /// m ≥ 0; the margin is in kg.
     Mass,
-    /// b pays for a growing mass; the margin is in N·s/mm.
+    /// b dissipates what a growing mass supplies; the margin is in N·s/mm.
     Damping,
     /// S⁺ ≥ S⁻; the margin is in N.
     Hysteresis,
 }
 
 impl Condition {
-    /// Unit of its margin.
+    /// Unit of the margin.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Mass => "kg",
@@ -56,8 +58,8 @@ impl Condition {
         }
     }
 
-    /// As it stands in documents of `--json`.
-    pub fn word(self) -> &'static str {
+    /// Identifier in JSON documents.
+    pub fn as_str(self) -> &'static str {
         match self {
             Self::Mass => "mass",
             Self::Damping => "damping",
@@ -66,23 +68,26 @@ impl Condition {
     }
 }
 
-/// How far a table is from breaking a condition, where it is nearest.
+/// Smallest margin of a condition over the table, and its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margin {
-    /// Below 0 the condition is broken; −∞ where nothing can mend it.
+    /// Negative if the condition is violated; −∞ at a jump of the mass.
     pub value: f64,
-    /// Where, mm.
+    /// Position of the smallest margin, mm.
     pub at_mm: f64,
 }
 
 impl Margin {
-    const NONE: Self = Self {
-        value: f64::INFINITY,
-        at_mm: f64::NAN,
-    };
+    /// No value so far.
+    fn at(at_mm: f64) -> Self {
+        Self {
+            value: f64::INFINITY,
+            at_mm,
+        }
+    }
 
-    fn see(&mut self, value: f64, at_mm: f64) {
-        // not `<` alone: a NaN has to show
+    fn include(&mut self, value: f64, at_mm: f64) {
+        // A NaN is kept, so that the condition fails.
         if value < self.value || value.is_nan() {
             *self = Self { value, at_mm };
         }
@@ -94,18 +99,18 @@ impl Margin {
     }
 }
 
-/// What is known of a table's energy.
+/// Passivity margins and bounds of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Certificate {
-    /// m ≥ 0.
+    /// Margin of [`Condition::Mass`].
     pub mass: Margin,
-    /// b pays for a growing mass.
+    /// Margin of [`Condition::Damping`].
     pub damping: Margin,
-    /// S⁺ ≥ S⁻.
+    /// Margin of [`Condition::Hysteresis`].
     pub hysteresis: Margin,
-    /// Share of the nodes of both directions with m < 0, 0 to 1.
+    /// Fraction of the nodes of both directions with m < 0, 0 to 1.
     pub negative_mass: f64,
-    /// Share of the nodes of both directions with b < 0, 0 to 1.
+    /// Fraction of the nodes of both directions with b < 0, 0 to 1.
     pub negative_damping: f64,
     /// K = max |dS/dx|, N/mm; infinite where S jumps.
     pub stiffness_n_per_mm: f64,
@@ -115,21 +120,21 @@ pub struct Certificate {
     pub mass_kg: f64,
 }
 
-/// Where a table was identified, as far as it matters here.
+/// Range of motion for which a table is certified.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
-    /// Lowest and highest position, mm: outside the nodes the edge parameters hold.
+    /// Lowest and highest position, mm. Outside the nodes the edge parameters apply.
     pub x_mm: [f64; 2],
-    /// Fastest motion, mm/s.
+    /// Largest speed, mm/s.
     pub v_mm_s: f64,
 }
 
-/// Examines a table.
+/// Computes the certificate of a valid table.
 pub fn certify(table: &TableView<'_>, direction: Direction, range: Range) -> Certificate {
     let mut c = Certificate {
-        mass: Margin::NONE,
-        damping: Margin::NONE,
-        hysteresis: Margin::NONE,
+        mass: Margin::at(table.x_mm[0]),
+        damping: Margin::at(table.x_mm[0]),
+        hysteresis: Margin::at(table.x_mm[0]),
         negative_mass: 0.0,
         negative_damping: 0.0,
         stiffness_n_per_mm: 0.0,
@@ -144,19 +149,19 @@ pub fn certify(table: &TableView<'_>, direction: Direction, range: Range) -> Cer
     for (branch, sign) in [(&table.positive, 1.0), (&table.negative, -1.0)] {
         for i in 0..nodes {
             let (m, b) = (branch.m_kg[i], branch.b_n_s_per_mm[i]);
-            c.mass.see(m, table.x_mm[i]);
-            c.negative_mass += share(m < 0.0, nodes);
-            c.negative_damping += share(b < 0.0, nodes);
+            c.mass.include(m, table.x_mm[i]);
+            c.negative_mass += node_fraction(m < 0.0, nodes);
+            c.negative_damping += node_fraction(b < 0.0, nodes);
             c.mass_kg = c.mass_kg.max(libm::fabs(m));
             c.damping_n_s_per_mm = c.damping_n_s_per_mm.max(libm::fabs(b));
             let growth = growth(table, branch, i, sign, delta_mm);
             // kg/mm · mm/s = N·s/m
-            let due = if growth > 0.0 {
+            let required = if growth > 0.0 {
                 0.5 * growth * range.v_mm_s / 1000.0
             } else {
                 0.0
             };
-            c.damping.see(b - due, table.x_mm[i]);
+            c.damping.include(b - required, table.x_mm[i]);
         }
     }
     for i in 0..nodes - 1 {
@@ -170,18 +175,18 @@ pub fn certify(table: &TableView<'_>, direction: Direction, range: Range) -> Cer
             x > table.x_mm[i]
         };
         let gap = |x: f64| spring(&table.positive, i, x) - spring(&table.negative, i, x);
-        c.hysteresis.see(gap(table.x_mm[i]), table.x_mm[i]);
+        c.hysteresis.include(gap(table.x_mm[i]), table.x_mm[i]);
         if outside {
-            c.hysteresis.see(gap(x), x);
+            c.hysteresis.include(gap(x), x);
             for branch in [&table.positive, &table.negative] {
-                c.steep(libm::fabs(branch.k_n_per_mm[i]));
+                c.include_stiffness(libm::fabs(branch.k_n_per_mm[i]));
             }
         }
     }
     c
 }
 
-fn share(counts: bool, nodes: usize) -> f64 {
+fn node_fraction(counts: bool, nodes: usize) -> f64 {
     if counts { 0.5 / nodes as f64 } else { 0.0 }
 }
 
@@ -189,7 +194,7 @@ fn spring(branch: &BranchView<'_>, i: usize, x: f64) -> f64 {
     branch.k_n_per_mm[i] * x + branch.f0_n[i]
 }
 
-/// How fast m grows along the motion around node `i`, kg/mm, at worst.
+/// Largest growth of m along the motion around node `i`, kg/mm.
 fn growth(
     table: &TableView<'_>,
     branch: &BranchView<'_>,
@@ -206,7 +211,7 @@ fn growth(
         let rise = branch.m_kg[left + 1] - branch.m_kg[left];
         let slope = rise / (table.x_mm[left + 1] - table.x_mm[left]);
         let along = match delta_mm {
-            // a blend uses both branches whichever way it moves
+            // With a direction state both branches contribute in either direction.
             Some(_) => libm::fabs(slope),
             None => sign * slope,
         };
@@ -222,15 +227,15 @@ fn growth(
     }
 }
 
-/// S⁺ − S⁻ and |dS/dx| between node `i` and the next.
+/// Includes S⁺ − S⁻ and |dS/dx| between node `i` and the next.
 fn between(table: &TableView<'_>, i: usize, c: &mut Certificate) {
     let (x, h) = (table.x_mm[i], table.x_mm[i + 1] - table.x_mm[i]);
     if table.lookup != Lookup::Linear {
-        // S is straight between jumps; each node's line is read on both sides of it
+        // S is linear between jumps; each node's line is evaluated at both ends.
         let reach = |x: f64, c: &mut Certificate| {
             for node in [i, i + 1] {
                 let gap = spring(&table.positive, node, x) - spring(&table.negative, node, x);
-                c.hysteresis.see(gap, x);
+                c.hysteresis.include(gap, x);
             }
         };
         reach(x, c);
@@ -238,10 +243,10 @@ fn between(table: &TableView<'_>, i: usize, c: &mut Certificate) {
         for branch in [&table.positive, &table.negative] {
             let line = |node: usize| spring(branch, node, x + h);
             if line(i) != line(i + 1) {
-                c.steep(f64::INFINITY);
+                c.include_stiffness(f64::INFINITY);
             }
-            c.steep(libm::fabs(branch.k_n_per_mm[i]));
-            c.steep(libm::fabs(branch.k_n_per_mm[i + 1]));
+            c.include_stiffness(libm::fabs(branch.k_n_per_mm[i]));
+            c.include_stiffness(libm::fabs(branch.k_n_per_mm[i + 1]));
         }
         return;
     }
@@ -253,21 +258,21 @@ fn between(table: &TableView<'_>, i: usize, c: &mut Certificate) {
     };
     let (plus, minus) = (quadratic(&table.positive), quadratic(&table.negative));
     for [_, p, q] in [plus, minus] {
-        c.steep(libm::fabs(p) / h);
-        c.steep(libm::fabs(p + 2.0 * q) / h);
+        c.include_stiffness(libm::fabs(p) / h);
+        c.include_stiffness(libm::fabs(p + 2.0 * q) / h);
     }
     let [s, p, q] = [plus[0] - minus[0], plus[1] - minus[1], plus[2] - minus[2]];
     let gap = |t: f64| s + (p + q * t) * t;
-    c.hysteresis.see(gap(0.0), x);
-    c.hysteresis.see(gap(1.0), x + h);
+    c.hysteresis.include(gap(0.0), x);
+    c.hysteresis.include(gap(1.0), x + h);
     let vertex = -p / (2.0 * q);
     if q > 0.0 && vertex > 0.0 && vertex < 1.0 {
-        c.hysteresis.see(gap(vertex), x + vertex * h);
+        c.hysteresis.include(gap(vertex), x + vertex * h);
     }
 }
 
 impl Certificate {
-    fn steep(&mut self, n_per_mm: f64) {
+    fn include_stiffness(&mut self, n_per_mm: f64) {
         if n_per_mm > self.stiffness_n_per_mm || n_per_mm.is_nan() {
             self.stiffness_n_per_mm = n_per_mm;
         }
@@ -278,7 +283,7 @@ impl Certificate {
         self.conditions().iter().all(|(_, margin)| margin.holds())
     }
 
-    /// The conditions and their margins.
+    /// Each condition with its margin.
     pub fn conditions(&self) -> [(Condition, Margin); 3] {
         [
             (Condition::Mass, self.mass),
@@ -287,26 +292,26 @@ impl Certificate {
         ]
     }
 
-    /// Damping that a device needs of its own to render the springs and dampers of
-    /// this table at `rate_hz` with `delay` periods of delay, N·s/m.
+    /// Damping that the device itself needs to render the springs and dampers of this
+    /// table at `rate_hz` with `delay` periods of delay, N·s/m.
     pub fn device_damping_n_s_per_m(&self, rate_hz: f64, delay: f64) -> f64 {
         spring_damping_n_s_per_m(self.stiffness_n_per_mm, rate_hz, delay)
             + 1000.0 * self.damping_n_s_per_mm
     }
 }
 
-/// K T (½ + n) in N·s/m: what a device needs of its own to render a spring.
+/// Damping that the device itself needs to render a spring, K T (½ + n), N·s/m.
 pub fn spring_damping_n_s_per_m(stiffness_n_per_mm: f64, rate_hz: f64, delay: f64) -> f64 {
     1000.0 * stiffness_n_per_mm * (0.5 + delay) / rate_hz
 }
 
-/// 2 m/T in N·s/m: what a device needs of its own to render a mass from an
-/// acceleration that is not low-passed.
+/// Damping that the device itself needs to render a mass without low-pass filtering of
+/// the acceleration, 2 m/T, N·s/m.
 pub fn mass_damping_n_s_per_m(mass_kg: f64, rate_hz: f64) -> f64 {
     2.0 * mass_kg * rate_hz
 }
 
-/// The stiffest spring that encoder and friction leave quiet, N/mm:
+/// Largest stiffness without limit cycles from the encoder's resolution, N/mm:
 /// min(2b/T, 2 f_c/Δ) (Abbott & Okamura 2005), with damping b in N·s/m, Coulomb
 /// friction f_c in N and resolution Δ in mm.
 pub fn stiffest_n_per_mm(
@@ -320,7 +325,7 @@ pub fn stiffest_n_per_mm(
 }
 
 impl fmt::Display for Certificate {
-    /// `PASS` or `FAIL` and every margin that is broken, or the nearest ones.
+    /// `PASS` with all margins, or `FAIL` with the negative ones.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let passes = self.passes();
         f.write_str(if passes { "PASS" } else { "FAIL" })?;

@@ -4,41 +4,39 @@
 //! 0x00 | COBS( body | crc32(body), little-endian ) | 0x00
 //! ```
 //!
-//! A zero byte never stands inside a frame, so whoever listens in the middle of
-//! one is back in step at the next zero. Each frame has a zero of its own on both
-//! sides: noise before it spoils the noise, not the frame. Zeros in a row mean
-//! nothing.
+//! A frame contains no zero byte, so a receiver that starts in the middle of a frame
+//! is synchronized at the next zero. Each frame has a zero on both sides, so noise
+//! before a frame does not damage it. Repeated zeros have no meaning.
 //!
-//! Only `core` and slices, so that the same source runs on a device. The buffer
-//! of [`Decoder`] is bounded: whatever comes in, it neither grows nor fails.
+//! The code uses only `core` and slices. The buffer of [`Decoder`] has a fixed size.
 
 use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-/// Longest body of a frame. With the CRC it is 254 bytes, the most that COBS
-/// encodes with one byte more.
+/// Longest body of a frame, bytes. With the CRC it has 254 bytes, the most that COBS
+/// encodes with one additional byte.
 pub const MAX_BODY: usize = 250;
-/// Bytes of the CRC.
+/// Length of the CRC, bytes.
 pub const FRAME_CRC_LEN: usize = 4;
-/// Longest encoded content, between the zeros.
+/// Longest encoded content between the zeros, bytes.
 const MAX_ENCODED: usize = 1 + MAX_BODY + FRAME_CRC_LEN;
-/// Longest frame with both zeros.
+/// Longest frame with both zeros, bytes.
 pub const MAX_FRAME: usize = MAX_ENCODED + 2;
 
 /// CRC-32 as in Ethernet, zip and PNG: polynomial 0x04C11DB7, bits reflected,
-/// start and final exclusive-or 0xFFFFFFFF. Of `123456789` it is 0xCBF43926.
+/// start and final exclusive-or 0xFFFFFFFF. The CRC of `123456789` is 0xCBF43926.
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Why bytes between two zeros were no frame, or a body cannot become one.
+/// Why bytes between two zeros are not a frame, or a body cannot be framed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameError {
-    /// More bytes than a frame can have.
+    /// Longer than a frame can be.
     TooLong,
-    /// Fewer bytes than a CRC.
+    /// Shorter than a CRC.
     TooShort,
     /// A COBS code byte points beyond the end.
     Cobs,
-    /// The CRC does not fit the body.
+    /// The CRC does not match the body.
     Crc,
 }
 
@@ -47,8 +45,8 @@ impl fmt::Display for FrameError {
         f.write_str(match self {
             Self::TooLong => "longer than a frame can be",
             Self::TooShort => "shorter than a frame can be",
-            Self::Cobs => "not COBS",
-            Self::Crc => "the CRC does not fit",
+            Self::Cobs => "invalid COBS encoding",
+            Self::Crc => "the CRC does not match",
         })
     }
 }
@@ -58,20 +56,20 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }
 
-/// CRC-32 of bytes that come in pieces.
+/// CRC-32 of bytes that arrive in pieces.
 #[derive(Clone)]
 pub struct RunningCrc(crc::Digest<'static, u32>);
 
-/// One table for all of them.
+/// Look-up table shared by all running CRCs.
 static SHARED: Crc<u32> = CRC;
 
 impl RunningCrc {
-    /// Nothing so far.
+    /// The CRC of no bytes.
     pub fn new() -> Self {
         Self(SHARED.digest())
     }
 
-    /// Takes in the next piece.
+    /// Adds the next piece.
     pub fn update(&mut self, bytes: &[u8]) {
         self.0.update(bytes);
     }
@@ -94,7 +92,7 @@ impl fmt::Debug for RunningCrc {
     }
 }
 
-/// A frame ready to be sent.
+/// An encoded frame.
 #[derive(Clone, Copy)]
 pub struct Frame {
     bytes: [u8; MAX_FRAME],
@@ -102,7 +100,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Wraps a body.
+    /// Encodes a body.
     ///
     /// # Errors
     /// [`FrameError::TooLong`] for a body of more than [`MAX_BODY`] bytes.
@@ -131,7 +129,7 @@ impl Frame {
         })
     }
 
-    /// Two zeros, which mean nothing.
+    /// Two zeros, which a receiver ignores.
     pub(super) fn empty() -> Self {
         Self {
             bytes: [0; MAX_FRAME],
@@ -139,7 +137,7 @@ impl Frame {
         }
     }
 
-    /// Both zeros included.
+    /// The bytes to send, including both zeros.
     pub fn as_bytes(&self) -> &[u8] {
         &self.bytes[..self.len]
     }
@@ -156,7 +154,7 @@ impl fmt::Debug for Frame {
 pub struct Decoder {
     buffer: [u8; MAX_ENCODED],
     len: usize,
-    /// What stands in the buffer is no frame; wait for the next zero.
+    /// The content is too long for a frame; the decoder waits for the next zero.
     overlong: bool,
 }
 
@@ -167,7 +165,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// Waits for a frame.
+    /// A decoder without content.
     pub fn new() -> Self {
         Self {
             buffer: [0; MAX_ENCODED],
@@ -176,8 +174,8 @@ impl Decoder {
         }
     }
 
-    /// Takes in a byte. `Some` at the end of a frame: its body, or why there is
-    /// none. Either way the next byte begins anew.
+    /// Processes a byte. Returns `Some` at the end of a frame: its body, or why it is
+    /// invalid. The next byte then starts a new frame.
     pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], FrameError>> {
         if byte != 0 {
             if self.len < MAX_ENCODED {
@@ -199,7 +197,7 @@ impl Decoder {
     }
 }
 
-/// Undoes COBS in place and checks the CRC.
+/// Decodes COBS in place and checks the CRC.
 fn body(encoded: &mut [u8]) -> Result<&[u8], FrameError> {
     let mut read = 0;
     let mut written = 0;
@@ -209,7 +207,7 @@ fn body(encoded: &mut [u8]) -> Result<&[u8], FrameError> {
         if end > encoded.len() {
             return Err(FrameError::Cobs);
         }
-        // what is written never overtakes what is read
+        // Writing never overtakes reading.
         encoded.copy_within(read + 1..end, written);
         written += code - 1;
         read = end;
@@ -234,7 +232,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Everything that a decoder makes of a stream.
+    /// All results of a decoder for a stream.
     fn decoded(stream: &[u8]) -> Vec<Result<Vec<u8>, FrameError>> {
         let mut decoder = Decoder::new();
         let mut found = Vec::new();
@@ -247,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn the_crc_is_the_one_that_the_document_names() {
+    fn the_crc_is_that_of_the_specification() {
         assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
         assert_eq!(crc32(b""), 0);
         let mut pieces = RunningCrc::new();
@@ -258,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_has_its_zeros_outside_only() {
+    fn a_frame_contains_no_zeros() {
         let frame = Frame::of(b"123456789").unwrap();
         let mut expected = vec![0, 14];
         expected.extend_from_slice(b"123456789");
@@ -286,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_is_named() {
+    fn invalid_frames_are_reported_with_their_error() {
         for (bytes, expected) in [
             (&[9, 1, 0][..], FrameError::Cobs),
             (&[2, 1, 0], FrameError::TooShort),
@@ -314,15 +312,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_body_comes_back(body in proptest::collection::vec(any::<u8>(), 0..=MAX_BODY)) {
+        fn every_body_survives_encoding_and_decoding(body in proptest::collection::vec(any::<u8>(), 0..=MAX_BODY)) {
             let frame = Frame::of(&body).unwrap();
             prop_assert!(frame.as_bytes()[1..frame.as_bytes().len() - 1].iter().all(|b| *b != 0));
             prop_assert_eq!(decoded(frame.as_bytes()), [Ok(body)]);
         }
 
-        /// Noise of any kind costs at most itself.
         #[test]
-        fn noise_does_not_cost_the_frame_after_it(noise in proptest::collection::vec(any::<u8>(), 0..600)) {
+        fn noise_does_not_damage_the_next_frame(noise in proptest::collection::vec(any::<u8>(), 0..600)) {
             let mut stream = noise;
             stream.extend_from_slice(Frame::of(b"the next").unwrap().as_bytes());
             let found = decoded(&stream);

@@ -1,101 +1,108 @@
-//! The device's side of the wire: bytes in, bytes out, time as an argument.
+//! The device's side of the protocol: bytes in, bytes out, time as an argument.
 //!
-//! A [`Handler`] is all of a device but its hardware: state machine, upload,
-//! watchdog, servo. A firmware gives it what its serial port received, calls
-//! [`Handler::servo`] once a servo period with what its sensors say, puts the
-//! force that comes back on the motor, and sends the bytes that come out. The
-//! simulated device does the same. `docs/wire.md` is the specification.
+//! A [`Handler`] is a complete device except for its hardware: state machine,
+//! upload, watchdog and servo. A firmware
 //!
-//! Only `core`, `libm`, `crc` and slices: no clock, no allocation, no panic,
-//! whatever bytes come in. `NODES` is the room for a table's nodes, 72 bytes each,
-//! `POINTS` that for a path's points, 4 bytes each.
+//! - passes the bytes that its serial port received to [`Handler::receive`],
+//! - calls [`Handler::servo`] once per servo period with the [`Measured`] values,
+//! - applies the [`Drive`] that this call returns to the motor,
+//! - and sends the bytes that the handler writes to its [`Out`] argument.
 //!
-//! All calls have to come from one context, or exclude each other.
+//! The simulated device does the same. `docs/wire.md` is the specification.
 //!
-//! The invariants: force only in [`State::Ramp`] and [`State::Run`], never above
-//! the limit that the table was accepted with; into those only by PLAY or RECORD
-//! and only while the host is alive; out of [`State::Limp`] and [`State::Fault`]
-//! only by REARM at rest.
+//! The code uses only `core`, `libm`, `crc` and slices: no clock, no allocation and
+//! no panic, whatever bytes it receives. `NODES` is the capacity for the nodes of a
+//! table, 72 bytes each; `POINTS` is the capacity for the points of a path, 4 bytes
+//! each. All calls must come from one context or exclude each other.
+//!
+//! Invariants:
+//!
+//! - There is force only in [`DeviceState::Ramp`] and [`DeviceState::Run`], and never
+//!   more than the limit that the upload was accepted with.
+//! - Only PLAY and RECORD lead into those states, and only while the host is alive.
+//! - Only REARM at rest leads out of [`DeviceState::Limp`] and [`DeviceState::Fault`].
 
 mod path;
+mod requests;
 mod run;
 mod table;
-mod talk;
 
 use super::frame::{Decoder, Frame, MAX_BODY};
-use super::message::{Ack, Event, Fault, Flags, Happening, Loaded, Name, Refusal, Reply, State};
-use super::servo::{Core, Rendering, Settings, State as Servo, Trip};
+use super::message::{
+    Ack, DeviceState, Event, EventKind, Fault, Flags, Loaded, Name, Refusal, Reply,
+};
+use super::servo::{Rendering, Servo, ServoSettings, ServoState, Trip};
 use crate::predict::Motion;
-use path::Path;
+use path::PathBuffer;
 use run::Run;
 pub use table::Bounds;
-use table::Table;
+use table::TableBuffer;
 
-/// Where a handler's bytes go. They have to be taken whole, and without waiting.
+/// Receives the bytes that a handler sends. It must take all bytes without waiting.
 pub type Out<'a> = &'a mut dyn FnMut(&[u8]);
 
-/// What a device is.
+/// Properties and limits of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Profile {
-    /// Its firmware and version.
+    /// Name and version of the firmware.
     pub firmware: Name,
-    /// Its serial number.
+    /// Serial number of the device.
     pub serial: Name,
-    /// What it has. [`Flags::probe`] needs room for points.
+    /// Optional features. [`Flags::probe`] needs `POINTS` > 0.
     pub flags: Flags,
-    /// Time without a fresh heartbeat after which it goes limp, ms.
+    /// Time without a fresh heartbeat after which the device goes limp, ms.
     pub watchdog_ms: u16,
     /// Longest playback, ms.
     pub longest_ms: u32,
-    /// Most telemetry samples per second that its link carries.
+    /// Highest telemetry rate of the link, samples per second.
     pub telemetry_hz: f64,
-    /// What it renders stably and reaches.
+    /// Limits for uploads.
     pub bounds: Bounds,
-    /// The servo; force and velocity limits come from the table.
-    pub servo: Settings,
-    /// Below this speed the handle is at rest, mm/s.
+    /// Settings of the servo; the upload gives its force and velocity limits.
+    pub servo: ServoSettings,
+    /// Largest speed at which the handle counts as at rest, mm/s.
     pub rest_mm_s: f64,
-    /// For so long it has to be to re-arm, s.
+    /// Time at rest that REARM requires, s.
     pub rest_s: f64,
 }
 
-/// What the sensors say at the beginning of a servo period.
+/// Sensor values at the beginning of a servo period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// Of the handle.
+    /// Motion of the handle.
     pub motion: Motion,
-    /// The force that it takes, N, where there is a sensor.
+    /// Measured force, N; `None` without a force sensor.
     pub force_n: Option<f64>,
 }
 
-/// What the motor has to do in a servo period.
+/// Command for the motor until the next servo period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Drive {
-    /// Hold this force, N, as the hand has to apply it; 0 is limp.
+    /// Render this force, N, with the sign of the force that the hand applies.
     Force(f64),
-    /// Be there: a probe on its path.
+    /// Control the position: a probe follows its path.
     Position {
-        /// mm.
+        /// Target position, mm.
         x_mm: f64,
-        /// mm/s.
+        /// Target speed, mm/s.
         v_mm_s: f64,
-        /// With at most so much force, N.
+        /// Largest force, N.
         force_n: f64,
     },
 }
 
-/// Since when the host counts as alive, and for how long.
+/// The period for which the last fresh heartbeat keeps the host alive.
 #[derive(Debug, Clone, Copy)]
 struct Alive {
     since_ms: u32,
     for_ms: u32,
 }
 
-/// The request that was done last.
+/// The last request that was executed.
 #[derive(Debug, Clone, Copy)]
-struct Done {
+struct LastRequest {
     sequence: u16,
-    /// CRC of its body and the reply to it; none of HELLO.
+    /// CRC of its body and the reply; `None` for HELLO, which has no repeats.
     request: Option<(u32, Frame)>,
 }
 
@@ -104,31 +111,31 @@ struct Done {
 pub struct Handler<const NODES: usize, const POINTS: usize> {
     profile: Profile,
     decoder: Decoder,
-    state: State,
+    state: DeviceState,
     fault: Fault,
-    /// The connection's nonce.
+    /// Nonce of the connection.
     connection: Option<u32>,
-    done: Option<Done>,
+    last_request: Option<LastRequest>,
     /// Count of the newest heartbeat.
-    beat: Option<u32>,
+    heartbeat: Option<u32>,
     alive: Option<Alive>,
-    table: Table<NODES>,
-    path: Path<POINTS>,
+    table: TableBuffer<NODES>,
+    path: PathBuffer<POINTS>,
     loaded: Loaded,
-    /// Of what is loaded.
+    /// CRC of what is loaded.
     crc: u32,
     /// Largest force of what is loaded, N.
     limit_n: f64,
-    core: Core,
+    servo: Servo,
     run: Run,
     /// Accepted uploads since power-up.
     uploads: u32,
-    /// Number of the next message that nobody asked for.
-    unasked: u16,
-    /// To be told after the reply.
+    /// Sequence number of the next unsolicited message.
+    unsolicited: u16,
+    /// Event to send after the reply.
     event: Option<Event>,
-    /// Servo periods that the handle has been at rest for.
-    rested: u32,
+    /// Servo periods for which the handle has been at rest.
+    rest_periods: u32,
     bad_frames: u32,
     stale_beats: u32,
 }
@@ -137,36 +144,36 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     /// A device that has just been powered up.
     pub fn new(profile: Profile) -> Self {
         Self {
-            core: Core::new(profile.servo),
+            servo: Servo::new(profile.servo),
             profile,
             decoder: Decoder::new(),
-            state: State::Boot,
+            state: DeviceState::Boot,
             fault: Fault::None,
             connection: None,
-            done: None,
-            beat: None,
+            last_request: None,
+            heartbeat: None,
             alive: None,
-            table: Table::new(),
-            path: Path::new(),
+            table: TableBuffer::new(),
+            path: PathBuffer::new(),
             loaded: Loaded::Nothing,
             crc: 0,
             limit_n: 0.0,
             run: Run::default(),
             uploads: 0,
-            unasked: 0,
+            unsolicited: 0,
             event: None,
-            rested: 0,
+            rest_periods: 0,
             bad_frames: 0,
             stale_beats: 0,
         }
     }
 
-    /// What it is doing.
-    pub fn state(&self) -> State {
+    /// The current state.
+    pub fn state(&self) -> DeviceState {
         self.state
     }
 
-    /// Why it is limp, or why the last playback ended.
+    /// Why the device is limp, or why the last playback ended.
     pub fn fault(&self) -> Fault {
         self.fault
     }
@@ -181,34 +188,34 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         self.loaded
     }
 
-    /// Where what is loaded was identified, mm.
+    /// Identified range of the loaded table, mm.
     pub fn range_mm(&self) -> Option<[f64; 2]> {
         let begin = self.table.begin?;
         (self.loaded == Loaded::Table).then_some(begin.range_mm)
     }
 
-    /// The force that it holds, N.
+    /// The commanded force, N.
     pub fn held_n(&self) -> f64 {
-        if self.state.forceful() {
-            self.core.held_n()
+        if self.state.applies_force() {
+            self.servo.held_n()
         } else {
             0.0
         }
     }
 
-    /// The largest force that what is loaded may have, N.
+    /// Force limit of what is loaded, N; 0 if nothing is.
     pub fn limit_n(&self) -> f64 {
         self.limit_n
     }
 
-    /// Takes in what the link has received.
+    /// Processes bytes that the link has received.
     pub fn receive(&mut self, bytes: &[u8], now_ms: u32, out: Out<'_>) {
         self.supervise(now_ms, out);
         for byte in bytes {
             match self.decoder.push(*byte) {
                 None => {}
                 Some(Ok(body)) => {
-                    // what is done with it may need all of the device
+                    // The decoder owns the body, and handling needs all of `self`.
                     let mut copy = [0; MAX_BODY];
                     let len = body.len();
                     copy[..len].copy_from_slice(body);
@@ -219,34 +226,34 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         }
     }
 
-    /// Lets time pass; to be called at least once a millisecond. [`Handler::servo`]
-    /// does it as well.
+    /// Checks watchdog and playback duration. Call it at least once per millisecond;
+    /// [`Handler::servo`] and [`Handler::receive`] include it.
     pub fn supervise(&mut self, now_ms: u32, out: Out<'_>) {
         if self.state.armed() && !self.alive(now_ms) {
-            self.latch(State::Limp, Fault::Watchdog, now_ms);
-        } else if self.state.forceful() && self.run.over(now_ms) {
+            self.latch(DeviceState::Limp, Fault::Watchdog, now_ms);
+        } else if self.state.applies_force() && self.run.over(now_ms) {
             self.fault = Fault::Longest;
             self.end();
         }
-        if self.state == State::Stopping {
+        if self.state == DeviceState::Stopping {
             self.flush(out);
-            self.state = State::Loaded;
-            self.happened(Happening::Stopped, now_ms);
+            self.state = DeviceState::Loaded;
+            self.queue_event(EventKind::Stopped, now_ms);
         }
-        self.tell(out);
+        self.send_event(out);
     }
 
-    /// One servo period: what the motor does until the next.
+    /// Runs one servo period and returns the command for the motor.
     pub fn servo(&mut self, measured: Measured, now_ms: u32, out: Out<'_>) -> Drive {
         let motion = measured.motion;
         let still = libm::fabs(motion.v_mm_s) <= self.profile.rest_mm_s;
-        self.rested = if still {
-            self.rested.saturating_add(1)
+        self.rest_periods = if still {
+            self.rest_periods.saturating_add(1)
         } else {
             0
         };
         self.supervise(now_ms, out);
-        if !self.state.forceful() {
+        if !self.state.applies_force() {
             return Drive::Force(0.0);
         }
         match self.loaded {
@@ -256,11 +263,11 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         }
     }
 
-    /// Goes limp and stays so: what only the hardware can know, such as
-    /// [`Fault::Overrun`] or [`Fault::External`].
+    /// Switches the force off and latches this state. The firmware reports faults of
+    /// the hardware this way, such as [`Fault::Overrun`] or [`Fault::External`].
     pub fn trip(&mut self, fault: Fault, now_ms: u32, out: Out<'_>) {
-        self.latch(State::Fault, fault, now_ms);
-        self.tell(out);
+        self.latch(DeviceState::Fault, fault, now_ms);
+        self.send_event(out);
     }
 
     fn play(&mut self, measured: Measured, now_ms: u32, out: Out<'_>) -> Drive {
@@ -273,38 +280,39 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             range_mm: begin.range_mm,
             trained_mm_s: begin.trained_mm_s,
         };
-        let force_n = self.core.step(&what, measured.motion);
-        if let Servo::Tripped(why) = self.core.state() {
-            self.latch(State::Fault, fault_of(why), now_ms);
-            self.tell(out);
+        let force_n = self.servo.step(&what, measured.motion);
+        if let ServoState::Tripped(trip) = self.servo.state() {
+            self.latch(DeviceState::Fault, fault_of(trip), now_ms);
+            self.send_event(out);
             return Drive::Force(0.0);
         }
-        if self.run.sampled(measured, force_n, now_ms) {
+        if self.run.add_period(measured, force_n, now_ms) {
             self.flush(out);
         }
         let full = self.profile.servo.ramp_s * self.profile.servo.servo_hz;
-        if self.state == State::Ramp && f64::from(self.run.ticks) >= full {
-            self.state = State::Run;
+        if self.state == DeviceState::Ramp && f64::from(self.run.ticks) >= full {
+            self.state = DeviceState::Run;
         }
         Drive::Force(force_n)
     }
 
-    /// Zero force, latched. The first cause stays, but a trip tops a limp.
-    fn latch(&mut self, state: State, fault: Fault, now_ms: u32) {
-        self.core.limp();
+    /// Sets the force to zero and latches. The first cause is kept, except that a
+    /// fault replaces a limp.
+    fn latch(&mut self, state: DeviceState, fault: Fault, now_ms: u32) {
+        self.servo.limp();
         self.unload();
-        if self.state == State::Fault || self.state == state {
+        if self.state == DeviceState::Fault || self.state == state {
             return;
         }
         self.state = state;
         self.fault = fault;
-        self.happened(Happening::Latched, now_ms);
+        self.queue_event(EventKind::Latched, now_ms);
     }
 
-    /// Zero force; what is loaded stays.
+    /// Sets the force to zero; what is loaded is kept.
     fn end(&mut self) {
-        self.core.limp();
-        self.state = State::Stopping;
+        self.servo.limp();
+        self.state = DeviceState::Stopping;
     }
 
     fn unload(&mut self) {
@@ -321,12 +329,12 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 
     fn at_rest(&self) -> bool {
-        f64::from(self.rested) >= self.profile.rest_s * self.profile.servo.servo_hz
+        f64::from(self.rest_periods) >= self.profile.rest_s * self.profile.servo.servo_hz
     }
 
-    fn happened(&mut self, what: Happening, now_ms: u32) {
+    fn queue_event(&mut self, kind: EventKind, now_ms: u32) {
         self.event = Some(Event {
-            what,
+            kind,
             state: self.state,
             fault: self.fault,
             playback: self.run.playback,
@@ -335,26 +343,26 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         });
     }
 
-    /// What is left of the stream, then the event.
-    fn tell(&mut self, out: Out<'_>) {
+    /// Sends the remaining samples, then the event.
+    fn send_event(&mut self, out: Out<'_>) {
         if let Some(event) = self.event.take() {
             self.flush(out);
             self.send(Reply::Event(event), out);
         }
     }
 
-    /// The samples that wait.
+    /// Sends the samples collected so far.
     fn flush(&mut self, out: Out<'_>) {
-        let tally = self.core.tally();
+        let tally = self.servo.tally();
         if let Some(stream) = self.run.take(&tally) {
             self.send(stream, out);
         }
     }
 
-    /// Sends what nobody asked for.
+    /// Sends an unsolicited message.
     fn send(&mut self, reply: Reply, out: Out<'_>) {
-        out(reply.frame(self.unasked).as_bytes());
-        self.unasked = self.unasked.wrapping_add(1);
+        out(reply.frame(self.unsolicited).as_bytes());
+        self.unsolicited = self.unsolicited.wrapping_add(1);
     }
 
     fn ack(&self, request: u8, result: Result<(), (Refusal, u32)>, now_ms: u32) -> Reply {
@@ -376,6 +384,5 @@ fn fault_of(trip: Trip) -> Fault {
         Trip::Stroke => Fault::Stroke,
         Trip::NotANumber => Fault::NotANumber,
         Trip::Encoder => Fault::Encoder,
-        Trip::Told => Fault::External,
     }
 }

@@ -1,12 +1,42 @@
-//! The device's side of a haptic playback: what a motor's firmware and the host share.
+//! Playback of haptic realizations on a device: wire format, servo, force prediction
+//! and passivity certificate, shared by a motor's firmware and the host.
 //!
-//! No `std`, no allocator, `f64` throughout: a table is judged and played on the
-//! device bit for bit as on the host. `docs/wire.md` specifies the bytes.
+//! The crate is `no_std`, does not allocate and calculates in `f64`, so that a device
+//! validates and renders a table with exactly the same results as the host.
 //!
-//! A byte from the serial port goes to a [`frame::Decoder`], a frame becomes a
-//! [`message`], the [`handler`] keeps the device's state, the [`servo`] turns a
-//! measured motion into a force, and [`predict`] is the model's force.
-//! [`certificate`] says whether a table is passive.
+//! # For firmware authors
+//!
+//! A firmware provides a millisecond clock, a serial port that never blocks, sensors
+//! and a motor. Everything else is [`handler::Handler`]:
+//!
+//! 1. Describe the device with a [`handler::Profile`]: its limits, its servo rate and
+//!    the settings of the [`servo`].
+//! 2. Put a `Handler<NODES, POINTS>` into a `static`; a table node takes 72 bytes, a
+//!    point of a probe's path 4 bytes. `POINTS` is 0 without probe mode.
+//! 3. In the servo's timer interrupt call [`handler::Handler::servo`] with the measured
+//!    motion, apply the returned [`handler::Drive`] to the motor, and pass received
+//!    bytes to [`handler::Handler::receive`].
+//! 4. Report faults of the hardware with [`handler::Handler::trip`].
+//!
+//! The crate `study-firmware` of the same repository is this loop, and
+//! `docs/wire.md` specifies the bytes, states and time limits. `study device check`
+//! tests a finished device against that specification.
+//!
+//! # Modules, in reading order
+//!
+//! - [`predict`]: the force of a table at a given motion. Start here; `examples/servo.rs`
+//!   plays a small table.
+//! - [`certificate`]: whether a table is passive.
+//! - [`servo`]: one servo period, with trips, slew limit, ramp and clamp.
+//! - [`frame`] and [`message`]: the wire format.
+//! - [`handler`]: the device's state machine, watchdog and uploads.
+//!
+//! # Units and signs
+//!
+//! Positions are in mm, speeds in mm/s, accelerations in m/s², forces in N, masses in
+//! kg, damping in N·s/mm, stiffness in N/mm, energy in J and times in s or ms, as the
+//! suffix of each name says. A force is the one that the hand has to apply, positive
+//! in the direction of +x.
 
 #![cfg_attr(not(test), no_std)]
 

@@ -1,12 +1,12 @@
-//! Version 1 of the wire format: every message, as a type and as bytes.
+//! Version 1 of the wire format: every message as a type and as bytes.
 //!
-//! `docs/wire.md` is the specification; this is what host and device share, and
-//! the only thing. Fields are little-endian and packed. What is set once is an
-//! f64 in the program's units; what streams is a 32-bit integer in nm, µm/s, µN
-//! and µm/s² ([`fixed`]), exact for an encoder's counts and never "no number".
+//! `docs/wire.md` is the specification. Host and device both use this module.
+//! Fields are little-endian and packed. Settings are f64 in mm, N and s; streamed
+//! quantities are 32-bit integers in nm, µm/s, µN and µm/s² ([`fixed`]), which are
+//! exact for encoder counts and always finite.
 //!
-//! A body is `version, type, sequence number (u16), fields`, and travels in a
-//! [`frame`](super::frame). Only `core` and slices.
+//! A body is `version, type, sequence number (u16), fields` and is sent in a
+//! [`frame`](super::frame). The code uses only `core` and slices.
 
 mod bytes;
 pub mod code;
@@ -19,14 +19,15 @@ pub mod table;
 use super::frame::{Frame, MAX_BODY};
 use bytes::{Reader, Writer};
 use core::fmt;
+use core::num::NonZeroU16;
 
-pub use code::{Fault, Happening, Loaded, Refusal, State};
+pub use code::{DeviceState, EventKind, Fault, Loaded, Refusal};
 pub use probe::{PathBegin, PathChunk, PathCrc};
 pub use reply::{Ack, Flags, Identity, Name, Outcome, Pulse};
 pub use stream::{Event, Recorded, RecordedPoint, Telemetry, TelemetrySample};
 pub use table::{Node, TableBegin, TableChunk, TableCrc};
 
-/// The version that this is.
+/// The version of the wire format that this module implements.
 pub const VERSION: u8 = 1;
 
 /// Why a body is no message.
@@ -34,13 +35,13 @@ pub const VERSION: u8 = 1;
 pub enum WireError {
     /// Shorter than a header.
     Header,
-    /// Another version than [`VERSION`]: this one.
+    /// Another version than [`VERSION`], with its number.
     Version(u8),
-    /// The type is none of this direction.
+    /// The type is unknown or belongs to the other direction.
     UnknownType(u8),
-    /// Not as long as its type.
+    /// The length does not fit the type.
     Length,
-    /// A field has a value that it cannot have.
+    /// A field has an invalid value.
     Field,
 }
 
@@ -49,27 +50,27 @@ impl fmt::Display for WireError {
         match self {
             Self::Header => f.write_str("shorter than a header"),
             Self::Version(version) => write!(f, "wire format version {version}, not {VERSION}"),
-            Self::UnknownType(kind) => write!(f, "unknown type of message 0x{kind:02x}"),
-            Self::Length => f.write_str("a message of the wrong length"),
-            Self::Field => f.write_str("a field has a value that it cannot have"),
+            Self::UnknownType(kind) => write!(f, "unknown message type 0x{kind:02x}"),
+            Self::Length => f.write_str("the message has the wrong length"),
+            Self::Field => f.write_str("a field has an invalid value"),
         }
     }
 }
 
-/// What every body begins with, in this and every later version.
+/// The first bytes of every body, in this and every later version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
-    /// Of the wire format.
+    /// Version of the wire format.
     pub version: u8,
-    /// Type of the message.
+    /// Type of the message, see [`kind`].
     pub kind: u8,
-    /// Of a request, chosen by the host; of a reply, the request's; of what the
-    /// device sends by itself, counted from 0 at HELLO, wrapping.
+    /// For a request chosen by the host; for a reply the request's; for unsolicited
+    /// messages counted from 0 after HELLO, wrapping.
     pub sequence: u16,
 }
 
 impl Header {
-    /// Its length in bytes.
+    /// Length in bytes.
     pub const LEN: usize = 4;
 
     /// The first four bytes of a body, of whatever version.
@@ -83,15 +84,15 @@ impl Header {
     }
 }
 
-/// A few values, without an allocation.
+/// A list of up to `N` values without allocation.
 #[derive(Debug, Clone, Copy)]
-pub struct Few<T, const N: usize> {
+pub struct FixedVec<T, const N: usize> {
     items: [T; N],
     len: usize,
 }
 
-impl<T: Copy + Default, const N: usize> Few<T, N> {
-    /// None.
+impl<T: Copy + Default, const N: usize> FixedVec<T, N> {
+    /// An empty list.
     pub fn new() -> Self {
         Self {
             items: [T::default(); N],
@@ -99,23 +100,23 @@ impl<T: Copy + Default, const N: usize> Few<T, N> {
         }
     }
 
-    /// The first [`Few::MOST`] of `items`.
+    /// The first [`FixedVec::CAPACITY`] of `items`.
     pub fn of(items: &[T]) -> Self {
-        let mut few = Self::new();
+        let mut list = Self::new();
         for item in items {
-            few.push(*item);
+            list.push(*item);
         }
-        few
+        list
     }
 
-    /// How many it can hold.
-    pub const MOST: usize = N;
+    /// The largest number of values.
+    pub const CAPACITY: usize = N;
 
-    /// Adds one; false if it is full.
+    /// Appends a value; false if the list is full.
     pub fn push(&mut self, item: T) -> bool {
         match self.items.get_mut(self.len) {
-            Some(place) => {
-                *place = item;
+            Some(free) => {
+                *free = item;
                 self.len += 1;
                 true
             }
@@ -123,29 +124,24 @@ impl<T: Copy + Default, const N: usize> Few<T, N> {
         }
     }
 
-    /// Whether no more fits.
+    /// Whether the list is full.
     pub fn is_full(&self) -> bool {
         self.len == N
     }
 
-    /// Takes all of them out.
-    pub fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    /// What it holds.
+    /// The values.
     pub fn as_slice(&self) -> &[T] {
         &self.items[..self.len]
     }
 }
 
-impl<T: Copy + Default, const N: usize> Default for Few<T, N> {
+impl<T: Copy + Default, const N: usize> Default for FixedVec<T, N> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<T: Copy + Default + PartialEq, const N: usize> PartialEq for Few<T, N> {
+impl<T: Copy + Default + PartialEq, const N: usize> PartialEq for FixedVec<T, N> {
     fn eq(&self, other: &Self) -> bool {
         self.as_slice() == other.as_slice()
     }
@@ -154,14 +150,14 @@ impl<T: Copy + Default + PartialEq, const N: usize> PartialEq for Few<T, N> {
 /// Opens a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hello {
-    /// Different for each connection; the device gives it back.
+    /// Different for each connection; the device returns it.
     pub nonce: u32,
 }
 
 /// Completes an upload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Commit {
-    /// Over the fields of BEGIN and all nodes or points, as they were sent.
+    /// CRC over the fields of BEGIN and all nodes or points in the order sent.
     pub crc: u32,
 }
 
@@ -170,102 +166,102 @@ pub struct Commit {
 pub struct Play {
     /// The host's number for this playback, not 0.
     pub playback: u32,
-    /// Of the table that has to be loaded.
+    /// CRC of the table that has to be loaded.
     pub crc: u32,
-    /// After so long the device stops by itself, ms.
+    /// Duration after which the device stops by itself, ms.
     pub longest_ms: u32,
-    /// One telemetry sample in so many servo periods; 0: none. The device takes
-    /// fewer samples if this is more than its telemetry can carry.
-    pub every: u16,
+    /// Servo periods per telemetry sample; `None` without telemetry. A device whose
+    /// link is slower takes fewer samples.
+    pub every: Option<NonZeroU16>,
 }
 
-/// Starts to follow a path and to record.
+/// Starts a recording along a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record {
     /// The host's number for this recording, not 0.
     pub playback: u32,
-    /// Of the path that has to be loaded.
+    /// CRC of the path that has to be loaded.
     pub crc: u32,
 }
 
 /// Ends a playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stop {
-    /// Which.
+    /// The host's number of the playback or recording to stop.
     pub playback: u32,
 }
 
-/// The host is alive.
+/// Shows that the host is alive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Heartbeat {
-    /// Higher than that of every heartbeat before, wrapping.
+    /// Higher than in every earlier heartbeat, wrapping.
     pub count: u32,
-    /// By the device's clock, ms, wrapping: from then on it says nothing.
+    /// Time on the device's clock at which the heartbeat expires, ms, wrapping.
     pub deadline_ms: u32,
 }
 
-/// From the host to the device. Each but a heartbeat is answered by exactly one
-/// [`Reply`] of its sequence number; a heartbeat by a [`Reply::Pulse`].
+/// A message from the host to the device. Each request gets exactly one [`Reply`]
+/// with its sequence number; the reply to a heartbeat is a [`Reply::Pulse`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "no allocation on a device; one of them at a time"
+    reason = "a device does not allocate and holds one message at a time"
 )]
 pub enum Request {
-    /// Who are you? Ends whatever another host had begun.
+    /// Opens a connection and ends that of another host.
     Hello(Hello),
-    /// A table begins.
+    /// Begins the upload of a table.
     TableBegin(TableBegin),
-    /// Some of its nodes.
+    /// Carries nodes of the table.
     TableChunk(TableChunk),
-    /// It is complete.
+    /// Ends the upload of a table.
     TableCommit(Commit),
-    /// Play it.
+    /// Plays the loaded table.
     Play(Play),
-    /// Stop playing or recording.
+    /// Stops playing or recording.
     Stop(Stop),
-    /// Zero force at once, latched; in every state.
+    /// Sets the force to zero at once and latches, in every state.
     Limp,
-    /// The host is alive.
+    /// Shows that the host is alive.
     Heartbeat(Heartbeat),
-    /// Leave `Limp` or `Fault`; only at rest.
+    /// Leaves `Limp` or `Fault`, only at rest.
     Rearm,
-    /// How are you, and what came of the last playback?
+    /// Asks for the state and the outcome of the last playback.
     State,
-    /// A path begins.
+    /// Begins the upload of a path.
     PathBegin(PathBegin),
-    /// Some of its points.
+    /// Carries points of the path.
     PathChunk(PathChunk),
-    /// It is complete.
+    /// Ends the upload of a path.
     PathCommit(Commit),
-    /// Follow it and record.
+    /// Records along the loaded path.
     Record(Record),
 }
 
-/// From the device to the host.
+/// A message from the device to the host.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "no allocation on a device; one of them at a time"
+    reason = "a device does not allocate and holds one message at a time"
 )]
 pub enum Reply {
-    /// To every request that has no reply of its own.
+    /// Reply to every request without a reply of its own.
     Ack(Ack),
-    /// To HELLO.
+    /// Reply to HELLO.
     Identity(Identity),
-    /// To STATE.
+    /// Reply to STATE.
     Outcome(Outcome),
-    /// To a heartbeat.
+    /// Reply to a heartbeat.
     Pulse(Pulse),
-    /// Samples of a playback; not asked for.
+    /// Samples of a playback; unsolicited.
     Telemetry(Telemetry),
-    /// Something has happened; not asked for.
+    /// A change of state; unsolicited.
     Event(Event),
-    /// Samples of a recording; not asked for.
+    /// Samples of a recording; unsolicited.
     Recorded(Recorded),
 }
 
-/// Types of messages. Below 0x80 to the device, from there on to the host.
+/// Message types: below 0x80 to the device, from 0x80 to the host.
 pub mod kind {
     /// [`super::Request::Hello`]
     pub const HELLO: u8 = 0x01;
@@ -312,7 +308,7 @@ pub mod kind {
 }
 
 impl Request {
-    /// Its type.
+    /// The message type, see [`kind`].
     pub fn kind(&self) -> u8 {
         match self {
             Self::Hello(_) => kind::HELLO,
@@ -332,8 +328,8 @@ impl Request {
         }
     }
 
-    /// Whether the device does it only once for a sequence number. The others can
-    /// be sent at any time, by anyone, with any number.
+    /// Whether the device executes it only once per sequence number. All other
+    /// requests may be sent at any time with any number.
     pub fn sequenced(&self) -> bool {
         !matches!(
             self,
@@ -341,7 +337,7 @@ impl Request {
         )
     }
 
-    /// As a frame.
+    /// Encodes the message as a frame.
     pub fn frame(&self, sequence: u16) -> Frame {
         let mut out = header(self.kind(), sequence);
         match self {
@@ -353,7 +349,7 @@ impl Request {
                 out.u32(play.playback);
                 out.u32(play.crc);
                 out.u32(play.longest_ms);
-                out.u16(play.every);
+                out.u16(play.every.map_or(0, NonZeroU16::get));
             }
             Self::Record(record) => {
                 out.u32(record.playback);
@@ -368,15 +364,15 @@ impl Request {
             Self::PathChunk(chunk) => chunk.write(&mut out),
             Self::Limp | Self::Rearm | Self::State => {}
         }
-        framed(&out)
+        to_frame(&out)
     }
 
-    /// From a frame's body.
+    /// Decodes the body of a frame.
     ///
     /// # Errors
-    /// [`WireError`], with which a device refuses it.
+    /// [`WireError`]; a device refuses such a request.
     pub fn decode(body: &[u8]) -> Result<(Header, Self), WireError> {
-        let (header, mut from) = opened(body)?;
+        let (header, mut from) = split_header(body)?;
         let request = match header.kind {
             kind::HELLO => Self::Hello(Hello { nonce: from.u32()? }),
             kind::TABLE_BEGIN => Self::TableBegin(TableBegin::read(&mut from)?),
@@ -386,7 +382,7 @@ impl Request {
                 playback: from.u32()?,
                 crc: from.u32()?,
                 longest_ms: from.u32()?,
-                every: from.u16()?,
+                every: NonZeroU16::new(from.u16()?),
             }),
             kind::STOP => Self::Stop(Stop {
                 playback: from.u32()?,
@@ -413,7 +409,7 @@ impl Request {
 }
 
 impl Reply {
-    /// Its type.
+    /// The message type, see [`kind`].
     pub fn kind(&self) -> u8 {
         match self {
             Self::Ack(_) => kind::ACK,
@@ -427,11 +423,11 @@ impl Reply {
     }
 
     /// Whether it answers a request.
-    pub fn answers(&self) -> bool {
+    pub fn is_answer(&self) -> bool {
         self.kind() < kind::TELEMETRY
     }
 
-    /// As a frame.
+    /// Encodes the message as a frame.
     pub fn frame(&self, sequence: u16) -> Frame {
         let mut out = header(self.kind(), sequence);
         match self {
@@ -443,16 +439,16 @@ impl Reply {
             Self::Event(event) => event.write(&mut out),
             Self::Recorded(recorded) => recorded.write(&mut out),
         }
-        framed(&out)
+        to_frame(&out)
     }
 
-    /// From a frame's body.
+    /// Decodes the body of a frame.
     ///
     /// # Errors
-    /// [`WireError`]: a host takes it for a damaged frame, but [`WireError::Version`]
-    /// for a device that it cannot talk to.
+    /// [`WireError`]. A host treats such a reply as a damaged frame, except for
+    /// [`WireError::Version`], which means that the device is incompatible.
     pub fn decode(body: &[u8]) -> Result<(Header, Self), WireError> {
-        let (header, mut from) = opened(body)?;
+        let (header, mut from) = split_header(body)?;
         let reply = match header.kind {
             kind::ACK => Self::Ack(Ack::read(&mut from)?),
             kind::IDENTITY => Self::Identity(Identity::read(&mut from)?),
@@ -476,7 +472,7 @@ fn header(kind: u8, sequence: u16) -> Writer {
     out
 }
 
-fn opened(body: &[u8]) -> Result<(Header, Reader<'_>), WireError> {
+fn split_header(body: &[u8]) -> Result<(Header, Reader<'_>), WireError> {
     let header = Header::read(body).ok_or(WireError::Header)?;
     if header.version != VERSION {
         return Err(WireError::Version(header.version));
@@ -484,19 +480,19 @@ fn opened(body: &[u8]) -> Result<(Header, Reader<'_>), WireError> {
     Ok((header, Reader::new(&body[Header::LEN..])))
 }
 
-/// Every message fits its frame: the sizes below are checked when this compiles.
-fn framed(out: &Writer) -> Frame {
+/// Every message fits into a frame; the assertions below check the sizes.
+fn to_frame(out: &Writer) -> Frame {
     let body = out.done().unwrap_or_default();
     Frame::of(body).unwrap_or_else(|_| Frame::empty())
 }
 
 const _: () = {
     assert!(Header::LEN + TableBegin::LEN <= MAX_BODY);
-    assert!(Header::LEN + TableChunk::MOST_LEN <= MAX_BODY);
+    assert!(Header::LEN + TableChunk::MAX_LEN <= MAX_BODY);
     assert!(Header::LEN + PathBegin::LEN <= MAX_BODY);
-    assert!(Header::LEN + PathChunk::MOST_LEN <= MAX_BODY);
+    assert!(Header::LEN + PathChunk::MAX_LEN <= MAX_BODY);
     assert!(Header::LEN + Identity::LEN <= MAX_BODY);
     assert!(Header::LEN + Outcome::LEN <= MAX_BODY);
-    assert!(Header::LEN + Telemetry::MOST_LEN <= MAX_BODY);
-    assert!(Header::LEN + Recorded::MOST_LEN <= MAX_BODY);
+    assert!(Header::LEN + Telemetry::MAX_LEN <= MAX_BODY);
+    assert!(Header::LEN + Recorded::MAX_LEN <= MAX_BODY);
 };

@@ -1,23 +1,23 @@
-//! The force of a realization: equation 1 with interpolated parameters.
+//! The force of a realization: F = m·a + b·v + k·x + F0 with interpolated parameters.
 //!
-//! Only `core` and slices, so that the same source runs on a device. Nothing here
-//! allocates, panics on a valid table, or fails: a table is valid when its slices
-//! are equally long, have at least two nodes, and `x_mm` ascends strictly.
+//! The code uses only `core` and slices, so the same source runs on a device. It does
+//! not allocate and does not panic on a valid table: all slices have the same length
+//! of at least two, and `x_mm` is strictly ascending.
 //!
-//! The two branches are joined by a direction z in [−1, 1]:
-//! F = (1+z)/2 · F⁺ + (1−z)/2 · F⁻. With [`Direction::Sign`] z is the sign of v,
-//! which is the paper's model.
+//! A direction state z in [−1, 1] combines the branches for the two directions:
+//! F = (1+z)/2 · F⁺ + (1−z)/2 · F⁻. With [`Direction::Sign`] z is the sign of v, as
+//! in Colton & Hollerbach (2007).
 
 /// A table as borrowed slices.
 #[derive(Debug, Clone, Copy)]
 pub struct TableView<'a> {
     /// Positions of the nodes, mm, strictly ascending.
     pub x_mm: &'a [f64],
-    /// For v > 0.
+    /// Parameters for v > 0.
     pub positive: BranchView<'a>,
-    /// For v < 0.
+    /// Parameters for v < 0.
     pub negative: BranchView<'a>,
-    /// How parameters between nodes are found.
+    /// Interpolation between nodes.
     pub lookup: Lookup,
 }
 
@@ -34,21 +34,21 @@ pub struct BranchView<'a> {
     pub f0_n: &'a [f64],
 }
 
-/// How parameters between nodes are found.
+/// Interpolation of parameters between nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lookup {
-    /// Interpolated.
+    /// Linear interpolation.
     Linear,
-    /// The node to the left.
+    /// The values of the node to the left.
     Floor,
-    /// The nearest node, the left one at the middle.
+    /// The values of the nearest node, of the left one at the midpoint.
     Nearest,
 }
 
-/// How the branch follows from the motion.
+/// Rule that gives the direction state z from the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Direction {
-    /// The sign of v; at v = 0 the sign before.
+    /// The sign of v; at v = 0 the previous sign.
     Sign,
     /// z ← clip(z + 2Δx/δ, −1, 1).
     Play {
@@ -65,15 +65,15 @@ pub enum Direction {
 /// Position, velocity and acceleration at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// mm.
+    /// Position, mm.
     pub x_mm: f64,
-    /// mm/s.
+    /// Velocity, mm/s.
     pub v_mm_s: f64,
-    /// m/s².
+    /// Acceleration, m/s².
     pub a_m_s2: f64,
 }
 
-/// The direction state z, carried from sample to sample.
+/// The direction state z with its memory of the last position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DirectionState {
     z: f64,
@@ -81,7 +81,7 @@ pub struct DirectionState {
 }
 
 impl Default for DirectionState {
-    /// Moving in +: what the paper's model does before anything has moved.
+    /// z = 1, the positive direction, before any motion.
     fn default() -> Self {
         Self {
             z: 1.0,
@@ -91,7 +91,7 @@ impl Default for DirectionState {
 }
 
 impl DirectionState {
-    /// Takes in a motion and gives the direction z, in [−1, 1].
+    /// Updates the state with the next motion and returns z in [−1, 1].
     pub fn step(&mut self, rule: Direction, motion: Motion) -> f64 {
         let dx = self.last_x_mm.map_or(0.0, |last| motion.x_mm - last);
         self.last_x_mm = Some(motion.x_mm);
@@ -121,8 +121,8 @@ impl DirectionState {
     }
 }
 
-/// The force of the table, N. Outside the nodes the edge parameters apply to the
-/// actual position; a device adds its wall there.
+/// The force of the table for direction z, N. Outside the nodes the parameters of the
+/// first or last node apply at the actual position.
 pub fn force_n(table: &TableView<'_>, z: f64, motion: Motion) -> f64 {
     let (left, weight) = locate(table.x_mm, table.lookup, motion.x_mm);
     let plus = 0.5 * (1.0 + z);
@@ -137,7 +137,7 @@ pub fn force_n(table: &TableView<'_>, z: f64, motion: Motion) -> f64 {
     force
 }
 
-/// m a + b v + k x + F0 with each parameter interpolated by itself.
+/// m a + b v + k x + F0 with each parameter interpolated separately.
 fn branch_force_n(branch: &BranchView<'_>, left: usize, weight: f64, motion: Motion) -> f64 {
     let at = |p: &[f64]| {
         if weight == 0.0 {
@@ -152,10 +152,10 @@ fn branch_force_n(branch: &BranchView<'_>, left: usize, weight: f64, motion: Mot
         + at(branch.f0_n)
 }
 
-/// The node to the left of x and how far x lies towards the next, in [0, 1).
+/// Index of the node to the left of x and the weight of the next node, in [0, 1).
 fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
     let last = nodes.len() - 1;
-    // a NaN reads the first node
+    // NaN uses the first node.
     if x_mm.is_nan() || x_mm <= nodes[0] {
         return (0, 0.0);
     }
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn at_rest_the_sign_stays_and_play_follows_the_distance() {
+    fn at_rest_the_sign_is_kept_and_play_follows_the_distance() {
         let motion = |x_mm, v_mm_s| Motion {
             x_mm,
             v_mm_s,
@@ -243,14 +243,14 @@ mod tests {
     }
 
     #[test]
-    fn a_position_that_is_no_number_reads_the_edge() {
+    fn a_position_that_is_not_finite_uses_the_edge() {
         let (x, ..) = table(Lookup::Linear);
         for lookup in [Lookup::Linear, Lookup::Floor, Lookup::Nearest] {
             assert_eq!(locate(&x, lookup, f64::NAN), (0, 0.0));
             assert_eq!(locate(&x, lookup, f64::NEG_INFINITY), (0, 0.0));
             assert_eq!(locate(&x, lookup, f64::INFINITY), (2, 0.0));
         }
-        // the force is then no number either, which a limit's clamp makes 0
+        // The force is NaN as well, and the servo trips.
         assert!(force(Lookup::Linear, 1.0, f64::NAN).is_nan());
     }
 }

@@ -1,21 +1,23 @@
 //! `study device info` and `study device check`.
 
-use super::nonce;
-use super::port::PortWire;
-use crate::cli::playback::{COMMISSIONED, COMMISSIONED_FILE, Commissioned, Place, Port, Waiting};
+use super::port::PortConnection;
+use crate::cli::device_selection::{
+    COMMISSIONED, COMMISSIONED_FILE, Commissioned, DeviceAddress, SerialPortArgs, WaitDisplay,
+};
 use crate::cli::{Console, Failure, Kind};
 use crate::device::check::{self, Commissioning, Verdict};
-use crate::device::host::name;
+use crate::device::host::display_name;
+use crate::device::link::nonce;
 use crate::device::{Device as _, process};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
-use study_wire::message::Identity;
+use study_wire::message::{Fault, Identity};
 
 /// Arguments of `study device info`.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct InfoArgs {
     #[command(flatten)]
-    place: Place,
+    address: DeviceAddress,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -25,12 +27,12 @@ pub(in crate::cli) struct InfoArgs {
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct CheckArgs {
     #[command(flatten)]
-    place: Port,
-    /// Play each table of this study as well, and compare what was rendered with it
+    port: SerialPortArgs,
+    /// Also play each table of this study and compare the rendered force with the table
     #[arg(long, value_name = "PROTOCOL")]
     models: Option<PathBuf>,
-    /// Keep the verdict in device-check.json, so that it stands in every session that
-    /// is started in this folder on this device
+    /// Save the result in device-check.json; sessions with this device that are started
+    /// in this folder record it
     #[arg(long)]
     save: bool,
     /// Print one JSON document
@@ -38,23 +40,22 @@ pub(in crate::cli) struct CheckArgs {
     json: bool,
 }
 
-/// Says who is there.
+/// Prints identity and limits of a device.
 pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
-    if args.place.is_program()? {
+    if args.address.is_program()? {
         return program(args, console);
     }
-    let mut wire = PortWire::open(&args.place.serial)?;
-    let place = wire.place.clone();
-    let found = check::greet(&mut wire, nonce());
-    let device = found.map_err(|why| {
-        let place = Untrusted(&place);
-        Failure::new(Kind::Device, format!("{place}: {}", Untrusted(&why)))
-            .hint("is it powered, and does it speak docs/wire.md at this baud rate?")
+    let mut connection = PortConnection::open(&args.address.serial)?;
+    let address = connection.address.clone();
+    let device = check::identify(&mut connection, nonce()).map_err(|error| {
+        let (address, error) = (Untrusted(&address), error.to_string());
+        Failure::new(Kind::Device, format!("{address}: {}", Untrusted(&error)))
+            .hint("check its power, the baud rate, and that it implements docs/wire.md")
     })?;
     if args.json {
         let document = serde_json::json!({
             "format": "study-device-info/1",
-            "port": place,
+            "port": address,
             "device": described(&device),
         });
         return console.out(format!("{document:#}\n"));
@@ -68,13 +69,13 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
     ];
     let flags: Vec<&str> = flags.iter().filter(|f| f.0).map(|f| f.1).collect();
     let mut lines = vec![
-        ("serial number", name(&device.serial)),
-        ("firmware", name(&device.firmware)),
+        ("serial number", display_name(&device.serial)),
+        ("firmware", display_name(&device.firmware)),
         (
             "wire format",
             format!("{} to {}", device.versions[0], device.versions[1]),
         ),
-        ("has", flags.join(", ")),
+        ("features", flags.join(", ")),
         ("force", format!("at most {} N", device.force_n)),
         ("velocity", format!("at most {} mm/s", device.velocity_mm_s)),
         ("stroke", format!("{low} to {high} mm")),
@@ -89,22 +90,24 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
         ("servo", format!("{} Hz", device.servo_hz)),
         ("telemetry", format!("at most {} Hz", device.telemetry_hz)),
         ("watchdog", format!("{} ms", device.watchdog_ms)),
-        ("tables", format!("at most {} nodes", device.most_nodes)),
+        ("tables", format!("at most {} nodes", device.max_nodes)),
         (
             "playbacks",
             format!("at most {} s", f64::from(device.longest_ms) / 1e3),
         ),
         ("state", device.state.as_str().to_owned()),
     ];
-    if device.fault.code() != 0 {
-        lines.push(("because", device.fault.as_str().to_owned()));
+    if device.fault != Fault::None {
+        lines.push(("fault", device.fault.as_str().to_owned()));
     }
     console.out(aligned(&lines))
 }
 
-/// What a program says of itself.
+/// Prints identity and limits of a controller program.
 fn program(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
-    let opened = args.place.open_program(&mut Waiting::in_a_line(console))?;
+    let opened = args
+        .address
+        .open_program(&mut WaitDisplay::in_a_line(console))?;
     let Some(device) = opened else { return Ok(()) };
     let (command, device) = (device.command().join(" "), device.identity());
     let [force_n, velocity_mm_s] = [device.limits.force_n, device.limits.velocity_mm_s];
@@ -131,8 +134,8 @@ fn program(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
     let lines = [
         ("program", Untrusted(&command).to_string()),
         ("id", Untrusted(&device.id).to_string()),
-        ("language", process::FORMAT.to_owned()),
-        ("has", flags.join(", ")),
+        ("messages", process::FORMAT.to_owned()),
+        ("features", flags.join(", ")),
         ("force", format!("at most {} N", force_n.get())),
         ("velocity", format!("at most {} mm/s", velocity_mm_s.get())),
     ];
@@ -146,8 +149,8 @@ fn aligned(lines: &[(&str, String)]) -> String {
 
 fn described(device: &Identity) -> serde_json::Value {
     serde_json::json!({
-        "serial": name(&device.serial),
-        "firmware": name(&device.firmware),
+        "serial": display_name(&device.serial),
+        "firmware": display_name(&device.firmware),
         "versions": device.versions,
         "simulated": device.flags.simulated,
         "telemetry": device.flags.telemetry,
@@ -161,75 +164,75 @@ fn described(device: &Identity) -> serde_json::Value {
         "servo_hz": device.servo_hz,
         "telemetry_hz": device.telemetry_hz,
         "watchdog_ms": device.watchdog_ms,
-        "most_nodes": device.most_nodes,
+        "most_nodes": device.max_nodes,
         "longest_ms": device.longest_ms,
     })
 }
 
-/// Looks at a device, clause by clause.
+/// Tests a device against the clauses of the wire format.
 pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(), Failure> {
-    let mut wire = PortWire::open(&args.place)?;
-    let place = wire.place.clone();
+    let mut connection = PortConnection::open(&args.port)?;
+    let address = connection.address.clone();
     if !args.json {
         console.say(format!(
-            "the device plays with up to {} N: hold the handle near the middle of its stroke",
+            "the device will apply up to {} N: hold the handle near the middle of its stroke",
             check::FORCE_N
         ));
     }
     let json = args.json;
-    let mut unsaid = Ok(());
-    let found = check::commission(&mut wire, nonce(), &mut |verdict| {
-        if !json && unsaid.is_ok() {
-            unsaid = console.out(line(verdict));
+    let mut printed = Ok(());
+    let result = check::commission(&mut connection, nonce(), &mut |verdict| {
+        if !json && printed.is_ok() {
+            printed = console.out(line(verdict));
         }
     });
-    unsaid?;
-    // the port has one owner at a time
-    drop(wire);
+    printed?;
+    // The port can be opened only once at a time.
+    drop(connection);
     let rendered = match &args.models {
-        Some(protocol) if found.passes() => {
-            Some(super::rendered::look(protocol, &args.place, console, json)?)
-        }
+        Some(protocol) if result.passes() => Some(super::rendered::compare_all(
+            protocol, &args.port, console, json,
+        )?),
         _ => None,
     };
     if args.save {
-        save(&found)?;
+        save(&result)?;
     }
-    let passes = found.passes();
+    let passes = result.passes();
     if json {
         let document = serde_json::json!({
             "format": "study-device-check/1",
-            "port": place,
-            "device": found.device.as_ref().map(described),
+            "port": address,
+            "device": result.device.as_ref().map(described),
             "pass": passes,
-            "verdicts": found.verdicts,
-            "latency_ms": found.latency_ms,
+            "verdicts": result.verdicts,
+            "latency_ms": result.latency_ms,
             "models": rendered,
         });
         console.out(format!("{document:#}\n"))?;
     } else {
-        console.out(format!("{}\n", found.summary()))?;
+        console.out(format!("{}\n", result.summary()))?;
     }
     if passes {
         return Ok(());
     }
-    Err(refused(&place, &found))
+    Err(failed(&address, &result))
 }
 
-fn save(found: &Commissioning) -> Result<(), Failure> {
-    let Some(device) = &found.device else {
+fn save(result: &Commissioning) -> Result<(), Failure> {
+    let Some(device) = &result.device else {
         return Ok(());
     };
-    let kept = Commissioned {
+    let stored = Commissioned {
         format: COMMISSIONED.to_owned(),
-        device: name(&device.serial),
+        device: display_name(&device.serial),
         at: chrono::Local::now()
             .format("%Y-%m-%dT%H:%M:%S%:z")
             .to_string(),
-        summary: found.summary(),
+        summary: result.summary(),
     };
     let path = Path::new(COMMISSIONED_FILE);
-    let text = serde_json::to_string_pretty(&kept).map_err(|e| Failure::new(Kind::Bug, e))?;
+    let text = serde_json::to_string_pretty(&stored).map_err(|e| Failure::new(Kind::Bug, e))?;
     std::fs::write(path, text + "\n").map_err(|e| Failure::file(path, &e))
 }
 
@@ -243,20 +246,14 @@ fn line(verdict: &Verdict) -> String {
     )
 }
 
-fn refused(place: &str, found: &Commissioning) -> Failure {
-    let broken: Vec<&str> = found
-        .verdicts
-        .iter()
-        .filter(|v| !v.pass)
-        .map(|v| v.clause)
-        .collect();
+fn failed(address: &str, result: &Commissioning) -> Failure {
+    let clauses = result.failed_clauses().join(", ");
     Failure::new(
         Kind::Device,
         format!(
-            "{}: it does not keep clause {} of docs/wire.md",
-            Untrusted(place),
-            broken.join(", ")
+            "{}: it violates clause {clauses} of docs/wire.md",
+            Untrusted(address)
         ),
     )
-    .hint("nobody should have it in their hand before that is put right")
+    .hint("do not use it with participants before this is corrected")
 }

@@ -1,12 +1,12 @@
-//! `study device hold`, hidden: plays one table for long, without a session.
+//! `study device hold`, hidden: plays one table without a session.
 //!
-//! For measurements of the link: telemetry over minutes, memory, what becomes of the
-//! force when this program is killed.
+//! For measurements of the link: telemetry over minutes, memory, and the force after
+//! this program is killed.
 
-use crate::cli::playback::{Place, Waiting};
+use crate::cli::device_selection::{DeviceAddress, WaitDisplay};
 use crate::cli::{Console, Failure, Kind, load};
-use crate::device::host::Settings;
-use crate::device::link::Threaded;
+use crate::device::host::HostSettings;
+use crate::device::link::LinkedDevice;
 use crate::device::process::ProcessDevice;
 use crate::device::{Device, Report, Stimulus};
 use std::io::BufRead as _;
@@ -17,27 +17,27 @@ use study_base::limits::{Limit, Limits};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::predict::{Direction, Lookup};
 
-/// The line of standard input that makes the loop stand still for a second.
+/// A line of standard input with this text stalls the loop for a second.
 pub(super) const STALL: &str = "stall";
-/// How long a load or a stop may take.
-const ANSWER_WITHIN: Duration = Duration::from_secs(10);
-/// Between two polls, as while a session plays.
-const TURN: Duration = Duration::from_millis(20);
+/// Time for a load or a stop.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time between two polls, as in a session.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Arguments of `study device hold`.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Args {
     #[command(flatten)]
-    place: Place,
-    /// For so long
+    address: DeviceAddress,
+    /// Duration, s
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=590))]
     seconds: u64,
-    /// The first table of this study; else a constant push of 1 N
+    /// Play the first table of this study instead of a constant force of 1 N
     #[arg(long, value_name = "PROTOCOL")]
     models: Option<PathBuf>,
 }
 
-/// Does it.
+/// Plays the table and prints the outcome.
 pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let table = match &args.models {
         Some(protocol) => {
@@ -45,37 +45,40 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             let table = loaded.models.into_values().next();
             table.ok_or_else(|| Failure::input("the study has no table"))?
         }
-        None => push(),
+        None => constant_force(),
     };
     let limit = |value| Limit::new(value).map_err(|e| Failure::new(Kind::Bug, e));
     let limits = Limits {
         force_n: limit(9.0)?,
         velocity_mm_s: limit(1000.0)?,
     };
-    let mut device = match args.place.is_program()? {
-        false => Held::Wire(args.place.serial.open_serial(Settings::default())?),
-        true => match args.place.open_program(&mut Waiting::in_a_line(console))? {
-            Some(device) => Held::Program(device),
+    let mut device = match args.address.is_program()? {
+        false => ActiveDevice::Linked(args.address.serial.open_serial(HostSettings::default())?),
+        true => match args
+            .address
+            .open_program(&mut WaitDisplay::in_a_line(console))?
+        {
+            Some(device) => ActiveDevice::Program(device),
             None => return Ok(()),
         },
     };
-    let failed = |why: String| Failure::new(Kind::Device, why);
-    let (say, lines) = channel();
+    let failed = |reason: String| Failure::new(Kind::Device, reason);
+    let (sender, lines) = channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if say.send(line).is_err() {
+            if sender.send(line).is_err() {
                 return;
             }
         }
     });
     let start = Instant::now();
     let at = || start.elapsed();
-    let told = |e: crate::device::DeviceError| failed(e.to_string());
+    let device_failure = |e: crate::device::DeviceError| failed(e.to_string());
     device
         .any()
         .load(&Stimulus::of_table(&table), limits, at())
-        .map_err(told)?;
-    let mut until = ANSWER_WITHIN;
+        .map_err(device_failure)?;
+    let mut until = ANSWER_TIMEOUT;
     let mut stopping = false;
     loop {
         if lines.try_recv().is_ok_and(|line| line.trim() == STALL) {
@@ -83,7 +86,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         }
         for report in device.any().poll(at()) {
             match report {
-                Report::Loaded => device.any().start(at()).map_err(told)?,
+                Report::Loaded => device.any().start(at()).map_err(device_failure)?,
                 Report::Started => until = at() + Duration::from_secs(args.seconds),
                 Report::Stopped(playback) => {
                     return console.out(format!(
@@ -98,7 +101,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
                         device.health(),
                     ));
                 }
-                Report::Fault(why) | Report::Lost(why) => return Err(failed(why)),
+                Report::Fault(reason) | Report::Lost(reason) => return Err(failed(reason)),
                 _ => {}
             }
         }
@@ -107,39 +110,39 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
                 return Err(failed("it does not answer in time".to_owned()));
             }
             stopping = true;
-            until = at() + ANSWER_WITHIN;
-            device.any().stop(at()).map_err(told)?;
+            until = at() + ANSWER_TIMEOUT;
+            device.any().stop(at()).map_err(device_failure)?;
         }
-        std::thread::sleep(TURN);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
-/// What is held.
-enum Held {
-    Wire(Threaded),
+/// The device, of either kind.
+enum ActiveDevice {
+    Linked(LinkedDevice),
     Program(ProcessDevice),
 }
 
-impl Held {
+impl ActiveDevice {
     fn any(&mut self) -> &mut dyn Device {
         match self {
-            Self::Wire(device) => device,
+            Self::Linked(device) => device,
             Self::Program(device) => device,
         }
     }
 
-    /// A line about the link, where there is one.
+    /// A line about the link, empty for a program.
     fn health(&self) -> String {
-        let Self::Wire(device) = self else {
+        let Self::Linked(device) = self else {
             return String::new();
         };
-        let health = device.facts().health;
+        let health = device.status().health;
         let number = |value: Option<f64>| match value {
             Some(value) => format!("{value:.1}"),
             None => "unknown".to_owned(),
         };
         format!(
-            "clock: {} ms ahead, {} ppm fast; {} bad frames, {} repeats\n",
+            "clock: offset {} ms, drift {} ppm; {} bad frames, {} repeats\n",
             number(health.clock.offset_ms()),
             number(health.clock.drift_ppm()),
             health.bad_frames,
@@ -148,8 +151,8 @@ impl Held {
     }
 }
 
-/// 1 N and some damping everywhere.
-fn push() -> Realization {
+/// A table of 1 N and some damping everywhere.
+fn constant_force() -> Realization {
     let x_mm: Vec<f64> = (0..=7).map(|i| 5.0 * f64::from(i)).collect();
     let branch = Branch {
         m_kg: vec![0.0; x_mm.len()],

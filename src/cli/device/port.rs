@@ -1,38 +1,38 @@
-//! A port as a wire with a clock.
+//! A serial port as the connection of a device test.
 
-use crate::cli::playback::Port;
+use crate::cli::device_selection::SerialPortArgs;
 use crate::cli::{Failure, Kind};
-use crate::device::check::Wire;
+use crate::device::check::Connection;
 use crate::device::link::{Link, LinkError, Opener as _};
 use std::time::{Duration, Instant};
 use study_base::text::Untrusted;
 
-/// An open port, and since when.
-pub(in crate::cli) struct PortWire {
+/// An open port with a clock.
+pub(in crate::cli) struct PortConnection {
     link: Box<dyn Link>,
     start: Instant,
-    /// Where it leads to.
-    pub(in crate::cli) place: String,
+    /// Path of the port.
+    pub(in crate::cli) address: String,
 }
 
-impl PortWire {
+impl PortConnection {
     /// Opens the port that the arguments or `device.toml` name.
-    pub(in crate::cli) fn open(port: &Port) -> Result<Self, Failure> {
+    pub(in crate::cli) fn open(port: &SerialPortArgs) -> Result<Self, Failure> {
         let mut opener = port.serial()?;
         let link = opener.open().map_err(|e| {
-            let place = opener.place();
-            Failure::new(Kind::Device, format!("{}: {e}", Untrusted(&place)))
-                .hint("`study device list` shows the ports")
+            let address = opener.address();
+            Failure::new(Kind::Device, format!("{}: {e}", Untrusted(&address)))
+                .hint("`study device list` lists the ports")
         })?;
         Ok(Self {
             link,
             start: Instant::now(),
-            place: opener.place(),
+            address: opener.address(),
         })
     }
 }
 
-impl Wire for PortWire {
+impl Connection for PortConnection {
     fn now(&mut self) -> Duration {
         self.start.elapsed()
     }

@@ -1,15 +1,14 @@
-//! What a device makes of each table of a study, against the table.
+//! Comparison of the rendered force with each table of a study.
 //!
-//! Somebody strokes the handle while the device plays. Position and force go through
-//! the filter that recordings go through, speed and acceleration are differences of
-//! the position: so a playback is compared as a recording is, and the VAF of what
-//! was rendered can stand beside the one that the table was identified with.
+//! Somebody strokes the handle while the device plays. Position and force are filtered
+//! like recordings, and speed and acceleration are differences of the position. The
+//! VAF of the rendered force is therefore comparable with that of the identification.
 
-use crate::cli::playback::Port;
+use crate::cli::device_selection::SerialPortArgs;
 use crate::cli::{Console, Failure, Kind, load};
-use crate::device::host::Settings;
-use crate::device::link::Threaded;
-use crate::device::{Device, Report, Stimulus};
+use crate::device::host::HostSettings;
+use crate::device::link::LinkedDevice;
+use crate::device::{Device, DeviceError, Report, Stimulus};
 use crate::runner::playback_limits;
 use serde::Serialize;
 use std::path::Path;
@@ -22,44 +21,64 @@ use study_haptics::identify::vaf::{self, Score};
 use study_haptics::model::Realization;
 use study_haptics::recording::{self, Columns};
 
-/// How long each is stroked.
-const STROKED: Duration = Duration::from_secs(8);
-/// The force comes up, and the filter's beginning is not compared, s.
-const LEFT_OUT_S: f64 = 0.6;
-/// That of the recordings of the documentation, Hz.
+/// Duration of each playback.
+const PLAYBACK: Duration = Duration::from_secs(8);
+/// The ramp and the start of the filter are not compared, s.
+const SKIPPED_S: f64 = 0.6;
+/// Corner frequency of the filter, as for the recordings in the documentation, Hz.
 const FILTER_HZ: f64 = 30.0;
-/// How long a load, a start or a stop may take.
-const ANSWER_WITHIN: Duration = Duration::from_secs(10);
+/// Samples needed for a comparison.
+const MIN_SAMPLES: usize = 2001;
+/// Time for a load, a start or a stop.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// What was rendered of one table.
+/// Why a table could not be compared.
+#[derive(Debug, thiserror::Error)]
+enum CompareError {
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// A fault or a loss, as reported by the device.
+    #[error("{0}")]
+    Playback(String),
+    #[error("it does not answer in time")]
+    Timeout,
+    #[error("it sent {0} samples; at least {MIN_SAMPLES} are needed")]
+    TooFewSamples(usize),
+    #[error("the playback ended before the force had risen")]
+    TooShort,
+    #[error("the samples cannot be filtered or compared: {0}")]
+    Signal(String),
+}
+
+/// Comparison of one table.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Rendered {
     model: String,
-    /// Against the table, of the force that was measured, or else commanded.
+    /// VAF of the table for the measured force, or for the commanded one without a sensor.
     vaf: f64,
     bias_n: f64,
     residual_n: f64,
-    /// What the table was identified with, if the study says so.
+    /// VAF in the study's protocol or model file.
     identified_vaf: Option<f64>,
     measured: bool,
     strokes: u32,
     clamps: u64,
 }
 
-/// Plays each table of a study.
-pub(super) fn look(
+/// Plays and compares each table of a study.
+pub(super) fn compare_all(
     protocol: &Path,
-    port: &Port,
+    port: &SerialPortArgs,
     console: &mut Console,
     json: bool,
 ) -> Result<Vec<Rendered>, Failure> {
     let loaded = load::load(protocol)?;
-    let mut device = port.open_serial(Settings::default())?;
+    let mut device = port.open_serial(HostSettings::default())?;
     let mut all = Vec::new();
     if !json {
         console.say(format!(
-            "stroke the handle from end to end, {} s for each table",
-            STROKED.as_secs()
+            "move the handle from end to end, {} s for each table",
+            PLAYBACK.as_secs()
         ));
         console.out("rendered        VAF   bias N   residual N   identified VAF\n")?;
     }
@@ -71,19 +90,15 @@ pub(super) fn look(
             continue;
         }
         let limits = playback_limits(&loaded.protocol, Some(table));
-        let permitted = loaded.protocol.device.uncertified.as_ref();
-        let played = play(
-            &mut device,
-            table,
-            permitted.is_some_and(|u| u.play),
-            limits,
-        );
-        let (samples, strokes, clamps) = played.map_err(|why| {
-            Failure::new(Kind::Device, format!("{}: {why}", entry.id))
-                .hint("hold the handle; the tables before it are above")
+        let uncertified = loaded.protocol.device.uncertified.as_ref();
+        let allow_uncertified = uncertified.is_some_and(|u| u.play);
+        let played = play(&mut device, table, allow_uncertified, limits);
+        let (samples, strokes, clamps) = played.map_err(|e| {
+            Failure::new(Kind::Device, format!("{}: {e}", entry.id))
+                .hint("hold the handle during the playback")
         })?;
         let (score, measured) = compare(table, &samples)
-            .map_err(|why| Failure::new(Kind::Device, format!("{}: {why}", entry.id)))?;
+            .map_err(|e| Failure::new(Kind::Device, format!("{}: {e}", entry.id)))?;
         let rendered = Rendered {
             model: entry.id.to_string(),
             vaf: score.vaf,
@@ -104,66 +119,69 @@ pub(super) fn look(
         all.push(rendered);
     }
     if !json && all.iter().all(|r| !r.measured) {
-        console.say("no force sensor: this is what was commanded, not what the hand felt");
+        console.say("no force sensor: the values are for the commanded force");
     }
     Ok(all)
 }
 
-/// The samples of a playback, strokes and clamps.
+/// Plays a table and returns the samples, strokes and clamps.
 fn play(
-    device: &mut Threaded,
+    device: &mut LinkedDevice,
     table: &Realization,
-    permitted: bool,
+    allow_uncertified: bool,
     limits: Limits,
-) -> Result<(Vec<Sample>, u32, u64), String> {
+) -> Result<(Vec<Sample>, u32, u64), CompareError> {
     let start = Instant::now();
     let stimulus = Stimulus {
-        permitted,
+        allow_uncertified,
         ..Stimulus::of_table(table)
     };
     let at = || start.elapsed();
-    let told = |e: crate::device::DeviceError| e.to_string();
-    device.load(&stimulus, limits, at()).map_err(told)?;
+    device.load(&stimulus, limits, at())?;
     let mut samples = Vec::new();
     let mut stop_at = None;
-    let mut due = ANSWER_WITHIN;
+    let mut due = ANSWER_TIMEOUT;
     loop {
         for report in device.poll(at()) {
             match report {
-                Report::Loaded => device.start(at()).map_err(told)?,
+                Report::Loaded => device.start(at())?,
                 Report::Started => {
-                    stop_at = Some(at() + STROKED);
-                    due = at() + STROKED + ANSWER_WITHIN;
+                    stop_at = Some(at() + PLAYBACK);
+                    due = at() + PLAYBACK + ANSWER_TIMEOUT;
                 }
                 Report::Telemetry(more) => samples.extend(more),
                 Report::Stopped(playback) => {
                     return Ok((samples, playback.strokes, playback.clamp_count));
                 }
-                Report::Fault(why) | Report::Lost(why) => return Err(why),
+                Report::Fault(reason) | Report::Lost(reason) => {
+                    return Err(CompareError::Playback(reason));
+                }
                 Report::Mount(_) | Report::Progress { .. } | Report::Ready => {}
             }
         }
         if stop_at.take_if(|stop_at| at() >= *stop_at).is_some() {
-            device.stop(at()).map_err(told)?;
+            device.stop(at())?;
         }
         if at() > due {
-            return Err("it does not answer in time".to_owned());
+            return Err(CompareError::Timeout);
         }
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
-/// The playback as a recording, and how much of it the table predicts.
-fn compare(table: &Realization, samples: &[Sample]) -> Result<(Score, bool), String> {
+/// Compares the playback with the table like a recording. Also returns whether the force
+/// was measured.
+fn compare(table: &Realization, samples: &[Sample]) -> Result<(Score, bool), CompareError> {
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
-        return Err("it sent no telemetry".to_owned());
+        return Err(CompareError::TooFewSamples(0));
     };
     let period_s = (last.t_s - first.t_s) / (samples.len().max(2) - 1) as f64;
-    if !(period_s > 0.0 && samples.len() > 2000) {
-        return Err(format!("{} samples are too few", samples.len()));
+    if !(period_s > 0.0 && samples.len() >= MIN_SAMPLES) {
+        return Err(CompareError::TooFewSamples(samples.len()));
     }
+    let signal = |e: &dyn std::fmt::Display| CompareError::Signal(e.to_string());
     let measured = samples.iter().all(|s| s.force_measured_n.is_some());
-    let filter = LowPass::new(FILTER_HZ, 1.0 / period_s).map_err(|e| e.to_string())?;
+    let filter = LowPass::new(FILTER_HZ, 1.0 / period_s).map_err(|e| signal(&e))?;
     let column = |of: fn(&Sample) -> f64| -> Vec<f64> {
         filter.zero_phase(&samples.iter().map(of).collect::<Vec<f64>>())
     };
@@ -175,10 +193,10 @@ fn compare(table: &Realization, samples: &[Sample]) -> Result<(Score, bool), Str
         .map(|a| a * 1e-3)
         .collect();
     let t_s: Vec<f64> = samples.iter().map(|s| s.t_s).collect();
-    let from = t_s.partition_point(|t| *t < LEFT_OUT_S);
+    let from = t_s.partition_point(|t| *t < SKIPPED_S);
     let to = samples.len().saturating_sub(100);
     if from >= to {
-        return Err("it ended before the force was up".to_owned());
+        return Err(CompareError::TooShort);
     }
     let columns = Columns {
         t_s: &t_s[from..to],
@@ -188,7 +206,7 @@ fn compare(table: &Realization, samples: &[Sample]) -> Result<(Score, bool), Str
         f_n: &f_n[from..to],
     };
     let mut bytes = Vec::new();
-    recording::write(&mut bytes, "rendered\n", columns).map_err(|e| e.to_string())?;
-    let recording = recording::read("the playback", bytes.as_slice()).map_err(|e| e.to_string())?;
+    recording::write(&mut bytes, "rendered\n", columns).map_err(|e| signal(&e))?;
+    let recording = recording::read("the playback", bytes.as_slice()).map_err(|e| signal(&e))?;
     Ok((vaf::score(table, &recording), measured))
 }

@@ -1,10 +1,9 @@
-//! `study device safety`, hidden: how long it takes to zero force on the wall clock.
+//! `study device safety`, hidden: measures the time to zero force in real time.
 //!
-//! A simulated device runs in this process at the end of a pseudo-terminal; a child
-//! of this program is the host and plays. Then the child is killed, stopped, its
-//! screen stalled, or the cable pulled, again and again, and the time until the
-//! device's motor has no force is told. It is a claim about the simulated device, on
-//! this machine, with whatever else it does.
+//! A simulated device runs in this process on a pseudo-terminal, and a child process is
+//! the host that plays. The child is killed, stopped or stalled, or the cable is
+//! unplugged, repeatedly, and the time until the device's force is zero is measured. The
+//! result holds for the simulated device on this machine under its present load.
 
 use super::hold;
 use crate::cli::{Console, Failure, Kind};
@@ -14,41 +13,41 @@ use crate::device::link::pty::{Control, Simulator};
 use std::io::Write as _;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use study_wire::message::State;
+use study_wire::message::DeviceState;
 
 /// Arguments of `study device safety`.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Args {
-    /// How often each
+    /// Repetitions of each accident
     #[arg(long, value_name = "N", default_value_t = 200)]
     times: u32,
-    /// Servo periods a second
+    /// Servo periods per second
     #[arg(long, value_name = "HZ", default_value_t = 4000)]
     rate: u32,
 }
 
-/// What becomes of the host.
+/// What happens to the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Accident {
     Killed,
     Stopped,
     Stalled,
-    Pulled,
+    Unplugged,
 }
 
 impl Accident {
-    const ALL: [Self; 4] = [Self::Killed, Self::Stopped, Self::Stalled, Self::Pulled];
+    const ALL: [Self; 4] = [Self::Killed, Self::Stopped, Self::Stalled, Self::Unplugged];
 
     fn as_str(self) -> &'static str {
         match self {
             Self::Killed => "host killed",
             Self::Stopped => "host stopped",
-            Self::Stalled => "its screen stalled",
-            Self::Pulled => "cable pulled",
+            Self::Stalled => "screen stalled",
+            Self::Unplugged => "unplugged",
         }
     }
 
-    /// What the device has to keep, ms.
+    /// Longest time to zero force, ms.
     fn allowed_ms(self) -> f64 {
         match self {
             Self::Stalled => 150.0,
@@ -57,42 +56,42 @@ impl Accident {
     }
 }
 
-/// How long a host may take to play.
-const PLAYS_WITHIN: Duration = Duration::from_secs(20);
-/// How often one is tried.
-const TRIES: u32 = 5;
-/// Zero force has to stay for so long.
-const STAYS: Duration = Duration::from_millis(100);
+/// Time for the host to start playing.
+const PLAY_TIMEOUT: Duration = Duration::from_secs(20);
+/// Number of attempts for one measurement.
+const MAX_TRIES: u32 = 5;
+/// The force has to stay zero for this time.
+const ZERO_FOR: Duration = Duration::from_millis(100);
 
 fn failed(why: impl std::fmt::Display) -> Failure {
     Failure::new(Kind::Device, why)
 }
 
-/// Does it.
+/// Measures every accident and prints the times.
 pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let (mut late, mut spoilt) = (0, 0);
+    let (mut late, mut repeated) = (0, 0);
     console.out("accident             n   median   99 %    most   allowed\n")?;
     for accident in Accident::ALL {
         let progress = crate::cli::console::progress(u64::from(args.times), accident.as_str());
         let mut times_ms = Vec::new();
         for n in 0..args.times {
-            // a busy machine may make the device limp before the accident does
+            // On a busy machine the device may go limp before the accident.
             let mut took = None;
-            for _ in 0..TRIES {
+            for _ in 0..MAX_TRIES {
                 took = once(accident, n, args.rate)?;
                 if took.is_some() {
                     break;
                 }
-                spoilt += 1;
+                repeated += 1;
             }
-            times_ms.push(took.ok_or_else(|| failed("the host does not play"))?);
+            times_ms.push(took.ok_or_else(|| failed("the host does not start to play"))?);
             progress.inc(1);
         }
         progress.finish_and_clear();
         times_ms.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            let place = (share * times_ms.len() as f64).ceil() as usize;
-            times_ms[place.saturating_sub(1).min(times_ms.len() - 1)]
+        let at = |fraction: f64| {
+            let rank = (fraction * times_ms.len() as f64).ceil() as usize;
+            times_ms[rank.saturating_sub(1).min(times_ms.len() - 1)]
         };
         let allowed = accident.allowed_ms();
         late += times_ms.iter().filter(|t| **t > allowed).count();
@@ -105,20 +104,20 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             at(1.0)
         ))?;
     }
-    if spoilt > 0 {
+    if repeated > 0 {
         console.say(format!(
-            "{spoilt} tries were spoilt before the accident: the machine is busy"
+            "{repeated} attempts were repeated because the device went limp before the accident: the machine is busy"
         ));
     }
     if late == 0 {
         return Ok(());
     }
-    Err(failed(format!("{late} times it took longer than allowed"))
-        .hint("is the machine busy? the simulated device needs a processor of its own"))
+    Err(failed(format!("{late} times exceed the allowed time"))
+        .hint("repeat the measurement on an idle machine; the simulated device needs a free processor"))
 }
 
-/// A host that plays, an accident, and the ms to zero force; nothing if the host ends
-/// before.
+/// Starts a host that plays, causes an accident and returns the time to zero force, ms;
+/// `None` if the host ends earlier.
 fn once(accident: Accident, seed: u32, rate: u32) -> Result<Option<f64>, Failure> {
     let firmware = Firmware::new(Options {
         seed: u64::from(seed),
@@ -127,43 +126,43 @@ fn once(accident: Accident, seed: u32, rate: u32) -> Result<Option<f64>, Failure
     });
     let mut device =
         Simulator::open(firmware, Noise::default(), u64::from(seed), None).map_err(failed)?;
-    let mut host = Host::start(device.path())?;
+    let mut host = Host::start(device.path().unwrap_or_default())?;
     let start = Instant::now();
-    while device.firmware().state() != State::Run {
-        device.turn();
-        if host.ended() || start.elapsed() > PLAYS_WITHIN {
+    while device.firmware().state() != DeviceState::Run {
+        device.step();
+        if host.ended() || start.elapsed() > PLAY_TIMEOUT {
             return Ok(None);
         }
     }
-    // the accident comes at any moment between two heartbeats, and under force
+    // The accident happens at any phase between two heartbeats, while there is force.
     let from = Instant::now();
     let wait = Duration::from_micros(20_000 + 397 * u64::from(seed % 100));
     while from.elapsed() < wait || device.firmware().held_n().abs() < 0.5 {
-        device.turn();
-        if host.ended() || start.elapsed() > PLAYS_WITHIN {
+        device.step();
+        if host.ended() || start.elapsed() > PLAY_TIMEOUT {
             return Ok(None);
         }
     }
-    host.befalls(accident, &mut device)?;
+    host.cause(accident, &mut device)?;
     let from = Instant::now();
     while device.firmware().held_n() != 0.0 {
-        device.turn();
-        if from.elapsed() > PLAYS_WITHIN {
-            return Err(failed("the force stays"));
+        device.step();
+        if from.elapsed() > PLAY_TIMEOUT {
+            return Err(failed("the force does not become zero"));
         }
     }
     let took_ms = from.elapsed().as_secs_f64() * 1e3;
     let from = Instant::now();
-    while from.elapsed() < STAYS {
-        device.turn();
+    while from.elapsed() < ZERO_FOR {
+        device.step();
         if device.firmware().held_n() != 0.0 || !device.firmware().state().latched() {
-            return Err(failed("it is not latched"));
+            return Err(failed("zero force is not latched"));
         }
     }
     Ok(Some(took_ms))
 }
 
-/// A child of this program that plays.
+/// A child process that plays.
 struct Host {
     child: Child,
 }
@@ -185,7 +184,7 @@ impl Host {
         self.child.try_wait().is_ok_and(|ended| ended.is_some())
     }
 
-    fn befalls(&mut self, accident: Accident, device: &mut Simulator) -> Result<(), Failure> {
+    fn cause(&mut self, accident: Accident, device: &mut Simulator) -> Result<(), Failure> {
         let signal = |signal| {
             let id = i32::try_from(self.child.id()).ok();
             let id = id.and_then(rustix::process::Pid::from_raw);
@@ -195,7 +194,7 @@ impl Host {
         match accident {
             Accident::Killed => signal(rustix::process::Signal::KILL),
             Accident::Stopped => signal(rustix::process::Signal::STOP),
-            Accident::Pulled => device.control(Control::Unplug).map_err(failed),
+            Accident::Unplugged => device.control(Control::Unplug).map_err(failed),
             Accident::Stalled => {
                 let stdin = self.child.stdin.as_mut();
                 let stdin = stdin.ok_or_else(|| failed("the host has no input"))?;
@@ -207,7 +206,7 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        // it may have ended already
+        // The child may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

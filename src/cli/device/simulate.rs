@@ -14,7 +14,7 @@ use std::time::Duration;
 /// Arguments of `study device simulate`.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Args {
-    /// Servo periods a second
+    /// Servo periods per second
     #[arg(long, value_name = "HZ", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(500..=20_000))]
     rate: u32,
     /// Seed of the simulated hand and of the faults
@@ -24,35 +24,43 @@ pub(in crate::cli) struct Args {
     /// slow link
     #[arg(long, value_name = "MS", default_value_t = 30, value_parser = clap::value_parser!(u16).range(10..=1000))]
     watchdog: u16,
-    /// Its serial number
+    /// Serial number
     #[arg(long, value_name = "NAME", default_value = "simulated-1")]
     serial: String,
-    /// Make this name a symbolic link to the port, wherever it is plugged in
+    /// Create a symbolic link with this name that always leads to the current port
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// Something that goes wrong: corrupt, drop, duplicate, reorder, delay with a
-    /// share of the frames (such as drop=0.01). May be given several times
+    /// Fault of the link: corrupt, drop, duplicate, reorder or delay, with the fraction of
+    /// frames, such as drop=0.01. May be repeated
     #[arg(long, value_name = "FAULT", value_parser = fault)]
     fault: Vec<FaultArg>,
-    /// A defect that it has all the time, to try `study device check` on it
+    /// Planted defect, to try out `study device check`
     #[arg(long, value_name = "DEFECT", value_parser = flaw)]
     flaw: Option<Flaw>,
 }
 
-fn flaw(given: &str) -> Result<Flaw, String> {
-    Flaw::named(given).ok_or_else(|| {
-        let names: Vec<&str> = Flaw::ALL.iter().map(|(_, name, _)| *name).collect();
-        format!("it is one of {}", names.join(", "))
-    })
+/// Why an argument is rejected.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum ArgumentError {
+    #[error("use one of {names}", names = Flaw::ALL.map(|(_, name, _)| name).join(", "))]
+    UnknownFlaw,
+    #[error("use one of corrupt, drop, duplicate, reorder, delay")]
+    UnknownFault,
+    #[error("the fraction of frames has to be between 0 and 1, not {0}")]
+    Fraction(String),
 }
 
-/// What stands on standard input, line by line.
+fn flaw(given: &str) -> Result<Flaw, ArgumentError> {
+    Flaw::named(given).ok_or(ArgumentError::UnknownFlaw)
+}
+
+/// Commands on standard input, one per line.
 const CONTROLS: &str = "unplug, plug, reset, trip, stall MS, quit";
-/// How late a frame with the fault `delay` is.
-const LATE: Duration = Duration::from_millis(20);
+/// Additional delay of a frame with the fault `delay`.
+const EXTRA_DELAY: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Bad {
+enum LineFault {
     Corrupt,
     Drop,
     Duplicate,
@@ -62,68 +70,68 @@ enum Bad {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct FaultArg {
-    what: Bad,
-    share: f64,
+    what: LineFault,
+    fraction: f64,
 }
 
-fn fault(given: &str) -> Result<FaultArg, String> {
-    let (name, share) = given.split_once('=').unwrap_or((given, "0.01"));
+fn fault(given: &str) -> Result<FaultArg, ArgumentError> {
+    let (name, fraction) = given.split_once('=').unwrap_or((given, "0.01"));
     let what = match name {
-        "corrupt" => Bad::Corrupt,
-        "drop" => Bad::Drop,
-        "duplicate" => Bad::Duplicate,
-        "reorder" => Bad::Reorder,
-        "delay" => Bad::Delay,
-        _ => return Err("it is one of corrupt, drop, duplicate, reorder, delay".to_owned()),
+        "corrupt" => LineFault::Corrupt,
+        "drop" => LineFault::Drop,
+        "duplicate" => LineFault::Duplicate,
+        "reorder" => LineFault::Reorder,
+        "delay" => LineFault::Delay,
+        _ => return Err(ArgumentError::UnknownFault),
     };
-    match share.parse() {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(FaultArg { what, share }),
-        _ => Err(format!("the share of frames is 0 to 1, not {share}")),
+    match fraction.parse() {
+        Ok(fraction) if (0.0..=1.0).contains(&fraction) => Ok(FaultArg { what, fraction }),
+        _ => Err(ArgumentError::Fraction(fraction.to_owned())),
     }
 }
 
 fn noise(faults: &[FaultArg]) -> Noise {
     let mut noise = Noise {
-        late: LATE,
+        extra_delay: EXTRA_DELAY,
         ..Noise::default()
     };
-    for FaultArg { what, share } in faults {
+    for FaultArg { what, fraction } in faults {
         *match what {
-            Bad::Corrupt => &mut noise.corrupt,
-            Bad::Drop => &mut noise.drop,
-            Bad::Duplicate => &mut noise.duplicate,
-            Bad::Reorder => &mut noise.reorder,
-            Bad::Delay => &mut noise.delay,
-        } = *share;
+            LineFault::Corrupt => &mut noise.corrupt,
+            LineFault::Drop => &mut noise.drop,
+            LineFault::Duplicate => &mut noise.duplicate,
+            LineFault::Reorder => &mut noise.reorder,
+            LineFault::Delay => &mut noise.delay,
+        } = *fraction;
     }
     noise
 }
 
-/// What a line of standard input asks for.
+/// A command on standard input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Word {
-    Do(Control),
+enum Command {
+    Control(Control),
     Quit,
 }
 
-fn word(line: &str) -> Option<Word> {
+fn command(line: &str) -> Option<Command> {
     let mut words = line.split_whitespace();
-    let word = match words.next()? {
-        "unplug" => Word::Do(Control::Unplug),
-        "plug" => Word::Do(Control::Plug),
-        "reset" => Word::Do(Control::Reset),
-        "trip" => Word::Do(Control::Trip),
+    let command = match words.next()? {
+        "unplug" => Command::Control(Control::Unplug),
+        "plug" => Command::Control(Control::Plug),
+        "reset" => Command::Control(Control::Reset),
+        "trip" => Command::Control(Control::Trip),
         "stall" => {
             let ms = words.next()?.parse().ok()?;
-            Word::Do(Control::Stall(Duration::from_millis(ms)))
+            Command::Control(Control::Stall(Duration::from_millis(ms)))
         }
-        "quit" => Word::Quit,
+        "quit" => Command::Quit,
         _ => return None,
     };
-    words.next().is_none().then_some(word)
+    words.next().is_none().then_some(command)
 }
 
-/// Does it, until it is told to end.
+/// Runs the device until it is told to end.
 pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let firmware = Firmware::new(Options {
         seed: args.seed,
@@ -136,56 +144,58 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
     let failed = |e: crate::device::link::LinkError| Failure::new(Kind::Device, e);
     let mut simulator = Simulator::open(firmware, noise(&args.fault), args.seed, args.link.clone())
         .map_err(failed)?;
-    console.out(format!("{}\n", simulator.path()))?;
+    console.out(format!("{}\n", simulator.path().unwrap_or_default()))?;
     console.say(format!(
-        "a simulated device of {} Hz; nothing that it reports is measured",
+        "simulated device with a servo rate of {} Hz; nothing that it reports is measured",
         args.rate
     ));
     console.say(format!(
         "in another terminal: study device check --port {}",
-        simulator.path()
+        simulator.path().unwrap_or_default()
     ));
     let lines = lines();
     let ended = ended();
     while !ended.load(Ordering::Relaxed) {
         for _ in 0..64 {
-            simulator.turn();
+            simulator.step();
         }
         while let Ok(line) = lines.try_recv() {
-            match word(&line) {
-                Some(Word::Quit) => ended.store(true, Ordering::Relaxed),
-                Some(Word::Do(what)) => {
+            match command(&line) {
+                Some(Command::Quit) => ended.store(true, Ordering::Relaxed),
+                Some(Command::Control(what)) => {
                     simulator.control(what).map_err(failed)?;
-                    // so that whoever asked knows when
+                    // Confirms that the command was executed.
                     match what {
-                        Control::Plug => console.out(format!("{}\n", simulator.path()))?,
+                        Control::Plug => {
+                            console.out(format!("{}\n", simulator.path().unwrap_or_default()))?
+                        }
                         _ => console.out(format!("{}\n", line.trim()))?,
                     }
                 }
-                None => console.say(format!("one of: {CONTROLS}")),
+                None => console.say(format!("unknown command; use one of: {CONTROLS}")),
             }
         }
     }
-    let punctuality = simulator.punctuality();
+    let timing = simulator.timing();
     console.say(format!(
-        "{} servo periods; late by at most {} us in 50 %, {} us in 99 %, {} us in 99.9 %; time stood still {} times, {:.0} ms in all",
-        punctuality.turns(),
-        punctuality.percentile_us(0.5),
-        punctuality.percentile_us(0.99),
-        punctuality.percentile_us(0.999),
-        punctuality.slips,
-        punctuality.slipped.as_secs_f64() * 1e3,
+        "{} servo periods; lateness at most {} us in 50 %, {} us in 99 %, {} us in 99.9 % of them; {} pauses, {:.0} ms in total",
+        timing.steps(),
+        timing.quantile_us(0.5),
+        timing.quantile_us(0.99),
+        timing.quantile_us(0.999),
+        timing.pauses,
+        timing.paused.as_secs_f64() * 1e3,
     ));
     Ok(())
 }
 
-/// Lines of standard input, as they come; its end means nothing.
+/// Lines of standard input; its end is ignored.
 fn lines() -> Receiver<String> {
-    let (say, lines) = channel();
+    let (sender, lines) = channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines() {
             let Ok(line) = line else { return };
-            if !line.trim().is_empty() && say.send(line).is_err() {
+            if !line.trim().is_empty() && sender.send(line).is_err() {
                 return;
             }
         }
@@ -193,7 +203,7 @@ fn lines() -> Receiver<String> {
     lines
 }
 
-/// Raised by the signals that ask a program to end.
+/// A flag that is set by the signals that ask a program to end.
 fn ended() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     for signal in [
@@ -201,7 +211,7 @@ fn ended() -> Arc<AtomicBool> {
         signal_hook::consts::SIGTERM,
         signal_hook::consts::SIGHUP,
     ] {
-        // where it cannot be caught it ends the program at once
+        // A signal that cannot be caught ends the program at once.
         let _ = signal_hook::flag::register(signal, Arc::clone(&flag));
     }
     flag
@@ -213,13 +223,13 @@ mod tests {
 
     #[test]
     fn lines_and_faults_are_read_strictly() {
-        assert_eq!(word("unplug"), Some(Word::Do(Control::Unplug)));
+        assert_eq!(command("unplug"), Some(Command::Control(Control::Unplug)));
         let stall = Control::Stall(Duration::from_millis(5));
-        assert_eq!(word(" stall 5 "), Some(Word::Do(stall)));
-        assert_eq!(word("stall"), None);
-        assert_eq!(word("unplug now"), None);
-        assert_eq!(fault("drop=0.1").unwrap().share, 0.1);
-        assert_eq!(fault("delay").unwrap().share, 0.01);
+        assert_eq!(command(" stall 5 "), Some(Command::Control(stall)));
+        assert_eq!(command("stall"), None);
+        assert_eq!(command("unplug now"), None);
+        assert_eq!(fault("drop=0.1").unwrap().fraction, 0.1);
+        assert_eq!(fault("delay").unwrap().fraction, 0.01);
         assert!(fault("drop=nan").is_err());
         assert!(fault("dorp").is_err());
         let noise = noise(&[fault("drop=0.1").unwrap(), fault("delay=1").unwrap()]);

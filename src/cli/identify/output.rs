@@ -125,7 +125,7 @@ fn certificate(certificate: &Certificate) -> Value {
             let document = json!({
                 "value": margin.value, "unit": condition.unit(), "at_mm": margin.at_mm,
             });
-            (condition.word().to_owned(), document)
+            (condition.as_str().to_owned(), document)
         })
         .collect();
     json!({

@@ -3,11 +3,11 @@
 
 use super::{Args, filter_line, finish, recording_bytes};
 use crate::cli::console::shell_command;
-use crate::cli::device::port::PortWire;
+use crate::cli::device::port::PortConnection;
 use crate::cli::trajectory::{read_trajectory, refuse_to_overwrite};
 use crate::cli::{Console, Failure, Kind};
-use crate::device::host::name;
-use crate::device::probe::{self, Path};
+use crate::device::host::display_name;
+use crate::device::probe::{self, ProbePath};
 use study_base::limits::Limit;
 use study_base::text::Untrusted;
 use study_haptics::plant::Measurement;
@@ -24,8 +24,8 @@ fn command_line(args: &Args) -> String {
         }
     };
     option("device", Some(args.device.clone()));
-    option("port", args.place.port.clone());
-    option("baud", args.place.baud.map(|b| b.to_string()));
+    option("port", args.port.port.clone());
+    option("baud", args.port.baud.map(|b| b.to_string()));
     option("rate", Some(args.rate.to_string()));
     option("max-force", Some(args.max_force.to_string()));
     option("filter", (!args.raw).then(|| args.filter.to_string()));
@@ -44,17 +44,17 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     // bounded by the longest trajectory and the highest sampling rate
     let samples = (trajectory.total_s() * args.rate + 1e-6).floor() as usize + 1;
     let t_s: Vec<f64> = (0..samples).map(|i| i as f64 / args.rate).collect();
-    let path = Path {
+    let path = ProbePath {
         x_mm: t_s.iter().map(|t| trajectory.at(*t).x_mm).collect(),
         rate_hz: args.rate,
         force_n,
     };
-    let mut port = PortWire::open(&args.place)?;
-    let place = port.place.clone();
+    let mut connection = PortConnection::open(&args.port)?;
+    let address = connection.address.clone();
     let progress = crate::cli::console::progress(100, "% of the path");
     let recorded = probe::record(
-        &mut port,
-        crate::cli::device::nonce(),
+        &mut connection,
+        crate::device::link::nonce(),
         &path,
         &mut |share| {
             progress.set_position((100.0 * share) as u64);
@@ -62,8 +62,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     );
     progress.finish_and_clear();
     let (device, recorded) = recorded.map_err(|why| {
-        let (place, why) = (Untrusted(&place), Untrusted(&why));
-        Failure::new(Kind::Device, format!("{place}: {why}")).hint(
+        let why = why.to_string();
+        let (address, why) = (Untrusted(&address), Untrusted(&why));
+        Failure::new(Kind::Device, format!("{address}: {why}")).hint(
             "nothing was recorded; `study device info` shows what the probe reaches, `study trajectory` what the path asks for",
         )
     })?;
@@ -80,8 +81,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     // model files keep the first line as their note
     let mut header = format!(
         "{what}, {} ({}); {} (study {})\n",
-        name(&device.serial),
-        name(&device.firmware),
+        display_name(&device.serial),
+        display_name(&device.firmware),
         Untrusted(&command_line(args)),
         env!("CARGO_PKG_VERSION"),
     );

@@ -1,90 +1,93 @@
-//! The clauses that can be seen from outside, in the order in which they are looked
-//! at: first what costs nothing, then uploads, then playbacks.
+//! The clauses that can be tested from outside, in the order of the tests: messages
+//! first, then uploads, then playbacks.
 
+use super::exchange::{Exchange, name};
 use super::playing;
-use super::talk::{Talk, name};
 use super::uploads::Upload;
-use super::{Broken, Clause, FORCE_N, Kept, percentile};
-use crate::device::host::RETRY;
+use super::{CheckFailure, Clause, ClauseResult, quantile};
+use crate::device::host::RETRY_INTERVAL;
 use std::time::Duration;
 use study_wire::frame::Frame;
 use study_wire::message::{
-    self, Fault, Heartbeat, Identity, Refusal, Reply, Request, State, TableChunk, kind,
+    self, DeviceState, Fault, Heartbeat, Identity, Refusal, Reply, Request, TableChunk, kind,
 };
 
 macro_rules! clauses {
-    ($($clause:literal $what:literal $look:expr;)+) => {
-        /// All of them.
+    ($($clause:literal $what:literal $test:expr;)+) => {
+        /// All tested clauses.
         pub(super) const ALL: &[Clause] = &[
-            $(Clause { clause: $clause, what: $what, look: $look },)+
+            $(Clause { clause: $clause, what: $what, test: $test },)+
         ];
     };
 }
 
 clauses! {
-    "14.3" "HELLO is answered by an IDENTITY that makes sense, in a common version" handshake;
-    "11.1" "round trips fit the watchdog" latency;
+    "14.3" "HELLO is answered by a valid IDENTITY in a common version" handshake;
+    "11.1" "round trips are short enough for the watchdog time" latency;
     "2.3" "a frame with a wrong CRC is dropped and counted" bad_frames;
-    "2.4" "after noise the next frame is understood" noise;
+    "2.4" "the next frame after noise is received" noise;
     "3.1" "a message of the wrong length is refused" malformed;
-    "3.2" "an unknown type is refused" unknown_type;
+    "3.2" "an unknown message type is refused" unknown_type;
     "3.3" "another version is refused" other_version;
-    "3.4" "LIMP is done whatever its version and length" any_limp;
-    "4.3" "a repeated request is answered again and not done again" repeats;
-    "4.5" "another connection makes it limp" another_connection;
-    "5.2" "limp is latched: only REARM leads out" latched;
-    "6.1" "an old heartbeat and one past its deadline are not fresh" stale_beats;
-    "6.4" "nothing is armed without a heartbeat" no_heartbeat;
-    "8.1" "chunks out of order and halves of tables are refused" order;
+    "3.4" "LIMP is executed in any version and with any length" any_limp;
+    "4.3" "a repeated request is answered again but executed only once" repeats;
+    "4.5" "another connection makes the device limp" another_connection;
+    "5.2" "limp is latched; only REARM leads out of it" latched;
+    "6.1" "old and expired heartbeats are not fresh" stale_heartbeats;
+    "6.4" "nothing can be loaded without a heartbeat" no_heartbeat;
+    "8.1" "chunks out of order and incomplete tables are refused" order;
     "8.2" "a table with a wrong CRC is refused" checksum;
-    "8.3" "tables that cannot be evaluated and limits above its own are refused" bad_tables;
-    "8.4" "a table that fails its certificate is refused unless armed, and then capped" uncertified;
-    "11.2" "the largest table goes up and is judged in time" largest;
-    "12" "PLAY of another table, or for no time, is refused" wrong_play;
-    "9.1" "telemetry is whole, at the rate that was asked for" playing::telemetry;
-    "7.5" "the force comes up slowly and never exceeds its limit" playing::clamp;
-    "11.3" "STOP is zero force at once" playing::stop;
-    "5.1" "LIMP is zero force at once" playing::limp;
-    "12" "a playback that nobody ends, ends" playing::longest;
-    "6.3" "without heartbeats it is limp in time, and stays so" playing::watchdog;
-    "6.2" "a heartbeat of a dead host is good until its deadline only" playing::deadline;
+    "8.3" "invalid tables and limits above the device's are refused" bad_tables;
+    "8.4" "an uncertified table is refused, or with permission its force is capped" uncertified;
+    "11.2" "the largest table is uploaded and validated in time" largest;
+    "12" "PLAY with another table or an invalid duration is refused" wrong_play;
+    "9.1" "telemetry is complete and has the requested rate" playing::telemetry;
+    "7.5" "the force rises slowly and never exceeds its limit" playing::clamp;
+    "11.3" "STOP switches the force off at once" playing::stop;
+    "5.1" "LIMP switches the force off at once" playing::limp;
+    "12" "a playback ends after its longest duration" playing::longest;
+    "6.3" "without heartbeats the device goes limp in time and stays limp" playing::watchdog;
+    "6.2" "heartbeats of a dead host expire at their deadline" playing::deadline;
 }
 
-/// How many round trips are measured.
+/// Number of round trips that are measured.
 const TRIPS: usize = 300;
 
-/// Whoever was there before: no force while we look around.
-pub(super) fn introduce(talk: &mut Talk<'_>) -> Result<Identity, Broken> {
+/// Makes the device limp, whatever it was doing, and identifies it.
+pub(super) fn identify(exchange: &mut Exchange<'_>) -> Result<Identity, CheckFailure> {
     let limp = Request::Limp.frame(0);
-    let _ = talk.send(limp.as_bytes(), 0, RETRY)?;
-    talk.hello()
+    let _ = exchange.send(limp.as_bytes(), 0, RETRY_INTERVAL)?;
+    exchange.hello()
 }
 
-fn handshake(talk: &mut Talk<'_>) -> Kept {
-    let device = introduce(talk)?;
+fn handshake(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = identify(exchange)?;
     let [oldest, newest] = device.versions;
     if !(oldest..=newest).contains(&message::VERSION) {
-        return Err(Broken::Gone(format!(
-            "it speaks versions {oldest} to {newest} and not {}",
+        return Err(CheckFailure::Disconnected(format!(
+            "it supports versions {oldest} to {newest}, not {}",
             message::VERSION
         )));
     }
     let [low, high] = device.stroke_mm;
-    let sense = [
+    let requirements = [
         (device.watchdog_ms >= 10, "watchdog time under 10 ms"),
         (device.watchdog_ms <= 200, "watchdog time over 200 ms"),
-        (device.servo_hz >= 4000.0, "servo under 4 kHz"),
-        (device.most_nodes >= 2, "no room for a table"),
-        (device.longest_ms > 0, "no playback may last"),
-        (low < high, "a stroke that is none"),
-        (device.state != State::Boot, "still in boot after HELLO"),
+        (device.servo_hz >= 4000.0, "servo rate under 4 kHz"),
+        (device.max_nodes >= 2, "fewer than two nodes per table"),
+        (device.longest_ms > 0, "longest playback of 0 ms"),
+        (low < high, "an empty stroke"),
+        (
+            device.state != DeviceState::Boot,
+            "still in boot after HELLO",
+        ),
         (
             !device.flags.telemetry || device.telemetry_hz >= 1.0,
             "telemetry without a rate",
         ),
     ];
-    match sense.iter().find(|(fine, _)| !fine) {
-        Some((_, what)) => Err(Broken::seen(*what)),
+    match requirements.iter().find(|(met, _)| !met) {
+        Some((_, what)) => Err(CheckFailure::violation(*what)),
         None => Ok(format!(
             "version {}, servo {} Hz, watchdog {} ms, {} N, {} mm/s, {} nodes",
             message::VERSION,
@@ -92,50 +95,54 @@ fn handshake(talk: &mut Talk<'_>) -> Kept {
             device.watchdog_ms,
             device.force_n,
             device.velocity_mm_s,
-            device.most_nodes
+            device.max_nodes
         )),
     }
 }
 
-fn latency(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
+fn latency(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
     let mut trips = Vec::new();
     for _ in 0..TRIPS {
-        let sent = talk.now();
-        let came = talk.ask(Request::State)?;
-        trips.push(came.at.saturating_sub(sent).as_secs_f64() * 1e3);
+        let sent = exchange.now();
+        let received = exchange.ask(Request::State)?;
+        trips.push(received.at.saturating_sub(sent).as_secs_f64() * 1e3);
     }
     trips.sort_by(f64::total_cmp);
-    let most = trips.last().copied().unwrap_or(f64::NAN);
-    let [median, p99] = [0.5, 0.99].map(|share| percentile(&trips, share));
-    talk.latency_ms = Some([median, p99, most]);
+    let quantiles = [0.5, 0.99, 1.0].map(|fraction| quantile(&trips, fraction));
+    let [Some(median), Some(p99), Some(max)] = quantiles else {
+        return Err(CheckFailure::violation("no round trips"));
+    };
+    exchange.latency_ms = Some([median, p99, max]);
     let allowed = f64::from(device.watchdog_ms) / 3.0;
-    let seen = format!("median {median:.2} ms, 99 % {p99:.2} ms, at most {most:.2} ms");
+    let seen = format!("median {median:.2} ms, 99 % {p99:.2} ms, at most {max:.2} ms");
     if p99 <= allowed {
         Ok(seen)
     } else {
-        Err(Broken::seen(format!(
-            "{seen}: more than a third of the watchdog time; an FTDI adapter wants its latency timer at 1 ms"
+        Err(CheckFailure::violation(format!(
+            "{seen}: more than a third of the watchdog time; set the latency timer of an FTDI adapter to 1 ms"
         )))
     }
 }
 
-fn bad_frames(talk: &mut Talk<'_>) -> Kept {
-    let before = talk.outcome()?.bad_frames;
-    let sequence = talk.next_sequence();
+fn bad_frames(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let before = exchange.outcome()?.bad_frames;
+    let sequence = exchange.next_sequence();
     let mut bytes = Request::State.frame(sequence).as_bytes().to_vec();
-    // the first byte of the body; no zero comes of it
+    // Changes the first byte of the body without producing a zero.
     bytes[2] ^= if bytes[2] == 0x40 { 0x20 } else { 0x40 };
-    if talk.send(&bytes, sequence, RETRY)?.is_some() {
-        return Err(Broken::seen("a frame with a wrong CRC was answered"));
+    if exchange.send(&bytes, sequence, RETRY_INTERVAL)?.is_some() {
+        return Err(CheckFailure::violation(
+            "a frame with a wrong CRC was answered",
+        ));
     }
-    match talk.outcome()?.bad_frames.wrapping_sub(before) {
+    match exchange.outcome()?.bad_frames.wrapping_sub(before) {
         1 => Ok("dropped, counted once".to_owned()),
-        n => Err(Broken::seen(format!("counted {n} times"))),
+        n => Err(CheckFailure::violation(format!("counted {n} times"))),
     }
 }
 
-fn noise(talk: &mut Talk<'_>) -> Kept {
+fn noise(exchange: &mut Exchange<'_>) -> ClauseResult {
     let pieces: [&[u8]; 5] = [
         &[0xFF; 700],
         &[0, 1, 0, 0, 5, 1, 0],
@@ -144,11 +151,11 @@ fn noise(talk: &mut Talk<'_>) -> Kept {
         &[0xAA; 300],
     ];
     for piece in pieces {
-        let sequence = talk.next_sequence();
+        let sequence = exchange.next_sequence();
         let mut bytes = piece.to_vec();
         bytes.extend_from_slice(Request::State.frame(sequence).as_bytes());
-        if talk.send(&bytes, sequence, RETRY)?.is_none() {
-            return Err(Broken::seen(format!(
+        if exchange.send(&bytes, sequence, RETRY_INTERVAL)?.is_none() {
+            return Err(CheckFailure::violation(format!(
                 "no answer to the frame after {} bytes of noise",
                 piece.len()
             )));
@@ -157,33 +164,41 @@ fn noise(talk: &mut Talk<'_>) -> Kept {
     Ok(format!("{} kinds of noise", pieces.len()))
 }
 
-/// A body sent as a frame of its own; the refusal that comes back.
-fn refusal_of(talk: &mut Talk<'_>, body: &[u8]) -> Result<Option<(Refusal, u32)>, Broken> {
-    let sequence = talk.next_sequence();
+/// Sends a body as a frame and returns the refusal, if there is an answer.
+fn refusal_of(
+    exchange: &mut Exchange<'_>,
+    body: &[u8],
+) -> Result<Option<(Refusal, u32)>, CheckFailure> {
+    let sequence = exchange.next_sequence();
     let mut body = body.to_vec();
     body[2..4].copy_from_slice(&sequence.to_le_bytes());
-    let frame = Frame::of(&body).map_err(|e| Broken::seen(e.to_string()))?;
-    let came = talk.send(frame.as_bytes(), sequence, RETRY)?;
-    Ok(match came.map(|came| came.reply) {
+    let frame = Frame::of(&body).map_err(|e| CheckFailure::violation(e.to_string()))?;
+    let received = exchange.send(frame.as_bytes(), sequence, RETRY_INTERVAL)?;
+    Ok(match received.map(|received| received.reply) {
         Some(Reply::Ack(ack)) => Some((ack.refusal, ack.detail)),
         Some(_) => Some((Refusal::None, 0)),
         None => None,
     })
 }
 
-fn has_to_be(talk: &mut Talk<'_>, body: &[u8], why: Refusal, what: &str) -> Result<(), Broken> {
-    match refusal_of(talk, body)? {
-        Some((refusal, _)) if refusal == why => Ok(()),
-        Some((refusal, _)) => Err(Broken::seen(format!(
-            "{what}: {}, and not: {}",
+fn expect_refusal_of(
+    exchange: &mut Exchange<'_>,
+    body: &[u8],
+    reason: Refusal,
+    what: &str,
+) -> Result<(), CheckFailure> {
+    match refusal_of(exchange, body)? {
+        Some((refusal, _)) if refusal == reason => Ok(()),
+        Some((refusal, _)) => Err(CheckFailure::violation(format!(
+            "{what}: {} instead of: {}",
             refusal.as_str(),
-            why.as_str()
+            reason.as_str()
         ))),
-        None => Err(Broken::seen(format!("{what}: no answer"))),
+        None => Err(CheckFailure::violation(format!("{what}: no answer"))),
     }
 }
 
-fn malformed(talk: &mut Talk<'_>) -> Kept {
+fn malformed(exchange: &mut Exchange<'_>) -> ClauseResult {
     for (what, body) in [
         ("REARM with a field", &[1, kind::REARM, 0, 0, 9][..]),
         ("STOP without its fields", &[1, kind::STOP, 0, 0]),
@@ -196,42 +211,42 @@ fn malformed(talk: &mut Talk<'_>) -> Kept {
             &[1, kind::HEARTBEAT, 0, 0, 1, 2, 3],
         ),
     ] {
-        has_to_be(talk, body, Refusal::Malformed, what)?;
+        expect_refusal_of(exchange, body, Refusal::Malformed, what)?;
     }
-    Ok("four of them".to_owned())
+    Ok("four messages".to_owned())
 }
 
-fn unknown_type(talk: &mut Talk<'_>) -> Kept {
+fn unknown_type(exchange: &mut Exchange<'_>) -> ClauseResult {
     for kind in [0x00, 0x0B, 0x7F] {
         let what = format!("type 0x{kind:02x}");
-        has_to_be(talk, &[1, kind, 0, 0], Refusal::UnknownType, &what)?;
+        expect_refusal_of(exchange, &[1, kind, 0, 0], Refusal::UnknownType, &what)?;
     }
-    match refusal_of(talk, &[1, 0xF0, 0, 0])? {
-        None => Ok("three of them; 0xf0 is dropped".to_owned()),
-        Some(_) => Err(Broken::seen("type 0xf0, which is for a host, is answered")),
+    match refusal_of(exchange, &[1, 0xF0, 0, 0])? {
+        None => Ok("three types refused; 0xf0 is dropped".to_owned()),
+        Some(_) => Err(CheckFailure::violation("type 0xf0, a reply, is answered")),
     }
 }
 
-fn other_version(talk: &mut Talk<'_>) -> Kept {
-    match refusal_of(talk, &[250, kind::STATE, 0, 0])? {
+fn other_version(exchange: &mut Exchange<'_>) -> ClauseResult {
+    match refusal_of(exchange, &[250, kind::STATE, 0, 0])? {
         Some((Refusal::Version, detail)) if (1..250).contains(&detail) => {
-            Ok(format!("version 250: it speaks {detail}"))
+            Ok(format!("version 250: it supports {detail}"))
         }
-        Some((refusal, detail)) => Err(Broken::seen(format!(
+        Some((refusal, detail)) => Err(CheckFailure::violation(format!(
             "version 250: {} ({detail})",
             refusal.as_str()
         ))),
-        None => Err(Broken::seen("version 250: no answer")),
+        None => Err(CheckFailure::violation("version 250: no answer")),
     }
 }
 
-fn any_limp(talk: &mut Talk<'_>) -> Kept {
+fn any_limp(exchange: &mut Exchange<'_>) -> ClauseResult {
     for body in [&[1, kind::LIMP, 0, 0, 1, 2, 3][..], &[77, kind::LIMP, 0, 0]] {
-        talk.ready()?;
-        refusal_of(talk, body)?;
-        let state = talk.outcome()?.state;
-        if state != State::Limp {
-            return Err(Broken::seen(format!(
+        exchange.reset()?;
+        refusal_of(exchange, body)?;
+        let state = exchange.outcome()?.state;
+        if state != DeviceState::Limp {
+            return Err(CheckFailure::violation(format!(
                 "after a LIMP of version {} and {} bytes {}",
                 body[0],
                 body.len(),
@@ -239,55 +254,60 @@ fn any_limp(talk: &mut Talk<'_>) -> Kept {
             )));
         }
     }
-    Ok("of version 77, and with three bytes behind it".to_owned())
+    Ok("in version 77, and with three additional bytes".to_owned())
 }
 
-fn repeats(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    let table = Upload::sound(&device, 0.0);
-    talk.done(Request::TableBegin(table.begin))?;
+fn repeats(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
+    let table = Upload::passive(&device, 0.0);
+    exchange.expect_done(Request::TableBegin(table.begin))?;
     let chunks = table.chunks();
-    let sequence = talk.next_sequence();
+    let sequence = exchange.next_sequence();
     let first = chunks[0].frame(sequence);
     let mut replies = Vec::new();
     for _ in 0..3 {
-        let came = talk.send(first.as_bytes(), sequence, RETRY)?;
-        let came = came.ok_or_else(|| Broken::seen("a repeat is not answered"))?;
-        replies.push(came.body);
+        let received = exchange.send(first.as_bytes(), sequence, RETRY_INTERVAL)?;
+        let received =
+            received.ok_or_else(|| CheckFailure::violation("a repeat is not answered"))?;
+        replies.push(received.body);
     }
     if replies.iter().any(|body| *body != replies[0]) {
-        return Err(Broken::seen("a repeat gets another reply"));
+        return Err(CheckFailure::violation("the reply to a repeat differs"));
     }
-    // other bytes under the same number
-    let came = talk.send(chunks[1].frame(sequence).as_bytes(), sequence, RETRY)?;
-    match came.map(|came| came.reply) {
+    // Other bytes with the same number.
+    let received = exchange.send(
+        chunks[1].frame(sequence).as_bytes(),
+        sequence,
+        RETRY_INTERVAL,
+    )?;
+    match received.map(|received| received.reply) {
         Some(Reply::Ack(ack)) if ack.refusal == Refusal::Reused => {}
         _ => {
-            return Err(Broken::seen(
-                "other bytes under a used number are not refused",
+            return Err(CheckFailure::violation(
+                "other bytes with a used number are not refused",
             ));
         }
     }
-    // and one that was overtaken
+    // A number that was overtaken.
     let old = sequence.wrapping_sub(1);
-    if talk
-        .send(chunks[1].frame(old).as_bytes(), old, RETRY)?
+    if exchange
+        .send(chunks[1].frame(old).as_bytes(), old, RETRY_INTERVAL)?
         .is_some()
     {
-        return Err(Broken::seen("an overtaken request is answered"));
+        return Err(CheckFailure::violation("an overtaken request is answered"));
     }
-    // done once: the table is whole now
-    talk.done(chunks[1])?;
-    talk.done(table.commit())?;
+    // If the chunk was executed once, the table is complete now.
+    exchange.expect_done(chunks[1])?;
+    exchange.expect_done(table.commit())?;
     Ok("the same bytes three times, other bytes, and an old number".to_owned())
 }
 
-fn another_connection(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    Upload::sound(&device, 0.0).load(talk)?;
-    let identity = talk.hello()?;
-    if identity.state != State::Limp || identity.fault != Fault::NewConnection {
-        return Err(Broken::seen(format!(
+fn another_connection(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
+    Upload::passive(&device, 0.0).load(exchange)?;
+    let identity = exchange.hello()?;
+    if identity.state != DeviceState::Limp || identity.fault != Fault::NewConnection {
+        return Err(CheckFailure::violation(format!(
             "{}: {}",
             identity.state.as_str(),
             identity.fault.as_str()
@@ -296,136 +316,141 @@ fn another_connection(talk: &mut Talk<'_>) -> Kept {
     Ok(identity.fault.as_str().to_owned())
 }
 
-fn latched(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    let table = Upload::sound(&device, 0.0);
-    table.load(talk)?;
-    talk.limp()?;
-    talk.refused(Request::TableBegin(table.begin), Refusal::WrongState)?;
-    let play = table.play(talk, 1000, 0);
-    talk.refused(play, Refusal::WrongState)?;
-    // nor does time lead out
-    talk.pass(Duration::from_secs(1))?;
-    let state = talk.outcome()?.state;
-    if state != State::Limp {
-        return Err(Broken::seen(format!("a second later {}", state.as_str())));
+fn latched(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
+    let table = Upload::passive(&device, 0.0);
+    table.load(exchange)?;
+    exchange.limp()?;
+    exchange.expect_refusal(Request::TableBegin(table.begin), Refusal::WrongState)?;
+    let play = Request::Play(table.play(exchange, 1000));
+    exchange.expect_refusal(play, Refusal::WrongState)?;
+    // Waiting does not lead out either.
+    exchange.wait(Duration::from_secs(1))?;
+    let state = exchange.outcome()?.state;
+    if state != DeviceState::Limp {
+        return Err(CheckFailure::violation(format!(
+            "a second later {}",
+            state.as_str()
+        )));
     }
-    talk.ready()?;
-    // the table is forgotten
-    let play = table.play(talk, 1000, 0);
-    talk.refused(play, Refusal::WrongState)?;
+    exchange.reset()?;
+    // The table is no longer loaded.
+    exchange.expect_refusal(play, Refusal::WrongState)?;
     Ok("upload and PLAY refused; after REARM the table is gone".to_owned())
 }
 
-/// A heartbeat that is answered: was it fresh?
-fn beat(talk: &mut Talk<'_>, count: u32, deadline_ms: u32) -> Result<bool, Broken> {
+/// Sends a heartbeat and returns whether the device counts it as fresh.
+fn beat(exchange: &mut Exchange<'_>, count: u32, deadline_ms: u32) -> Result<bool, CheckFailure> {
     let beat = Heartbeat { count, deadline_ms };
-    match talk.ask(Request::Heartbeat(beat))?.reply {
+    match exchange.ask(Request::Heartbeat(beat))?.reply {
         Reply::Pulse(pulse) => Ok(pulse.fresh),
-        other => Err(Broken::seen(format!(
+        other => Err(CheckFailure::violation(format!(
             "HEARTBEAT is answered by {}",
             name(other.kind())
         ))),
     }
 }
 
-fn stale_beats(talk: &mut Talk<'_>) -> Kept {
-    talk.beating = false;
-    let now_ms = talk.outcome()?.clock_ms;
-    let newest = talk.beat_count().wrapping_add(1000);
+fn stale_heartbeats(exchange: &mut Exchange<'_>) -> ClauseResult {
+    exchange.sends_heartbeats = false;
+    let now_ms = exchange.outcome()?.clock_ms;
+    let newest = exchange.beat_count().wrapping_add(1000);
     let soon = now_ms.wrapping_add(200);
     for (what, count, deadline_ms, fresh) in [
-        ("a new one", newest, soon, true),
-        ("the same again", newest, soon, false),
-        ("an older one", newest.wrapping_sub(1), soon, false),
+        ("a new heartbeat", newest, soon, true),
+        ("a repeated heartbeat", newest, soon, false),
+        ("an older heartbeat", newest.wrapping_sub(1), soon, false),
         (
-            "one past its deadline",
+            "an expired heartbeat",
             newest.wrapping_add(1),
             now_ms.wrapping_sub(1),
             false,
         ),
         (
-            "one of the far future",
+            "a heartbeat with a deadline in the far future",
             newest.wrapping_add(2),
             now_ms.wrapping_add(60_000),
             false,
         ),
-        ("the next", newest.wrapping_add(3), soon, true),
+        ("the next heartbeat", newest.wrapping_add(3), soon, true),
     ] {
-        if beat(talk, count, deadline_ms)? != fresh {
+        if beat(exchange, count, deadline_ms)? != fresh {
             let not = if fresh { "not " } else { "" };
-            return Err(Broken::seen(format!("{what} is {not}fresh")));
+            return Err(CheckFailure::violation(format!("{what} is {not}fresh")));
         }
     }
-    Ok("six of them".to_owned())
+    Ok("six heartbeats".to_owned())
 }
 
-fn no_heartbeat(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    let table = Upload::sound(&device, 0.0);
-    talk.beating = false;
-    // a new connection knows of no heartbeat
-    let hello = talk.hello()?;
-    if hello.state != State::Idle {
-        return Err(Broken::seen(hello.state.as_str()));
+fn no_heartbeat(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
+    let table = Upload::passive(&device, 0.0);
+    exchange.sends_heartbeats = false;
+    // A new connection has received no heartbeat.
+    let hello = exchange.hello()?;
+    if hello.state != DeviceState::Idle {
+        return Err(CheckFailure::violation(hello.state.as_str()));
     }
-    talk.pass(Duration::from_millis(u64::from(device.watchdog_ms) + 20))?;
-    table.send(talk)?;
-    talk.refused(table.commit(), Refusal::NoHeartbeat)?;
+    exchange.wait(Duration::from_millis(u64::from(device.watchdog_ms) + 20))?;
+    table.send(exchange)?;
+    exchange.expect_refusal(table.commit(), Refusal::NoHeartbeat)?;
     Ok("COMMIT refused".to_owned())
 }
 
-fn order(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
+fn order(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
     let table = Upload::with_nodes(&device, 0.0, 8);
-    talk.done(Request::TableBegin(table.begin))?;
+    exchange.expect_done(Request::TableBegin(table.begin))?;
     let chunks = table.chunks();
-    talk.done(chunks[0])?;
-    talk.refused(chunks[2], Refusal::Order)?;
-    talk.refused(chunks[0], Refusal::Order)?;
-    talk.refused(table.commit(), Refusal::Incomplete)?;
-    talk.done(chunks[1])?;
-    talk.done(chunks[2])?;
+    exchange.expect_done(chunks[0])?;
+    exchange.expect_refusal(chunks[2], Refusal::Order)?;
+    exchange.expect_refusal(chunks[0], Refusal::Order)?;
+    exchange.expect_refusal(table.commit(), Refusal::Incomplete)?;
+    exchange.expect_done(chunks[1])?;
+    exchange.expect_done(chunks[2])?;
     if let Request::TableChunk(last) = chunks[2] {
         let one_more = TableChunk {
             first: table.begin.nodes,
             ..last
         };
-        talk.refused(Request::TableChunk(one_more), Refusal::TooMany)?;
+        exchange.expect_refusal(Request::TableChunk(one_more), Refusal::TooMany)?;
     }
-    talk.done(table.commit())?;
-    Ok("what came before stays".to_owned())
+    exchange.expect_done(table.commit())?;
+    Ok("the nodes before are kept".to_owned())
 }
 
-fn checksum(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    let table = Upload::sound(&device, 0.0);
-    table.send(talk)?;
+fn checksum(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
+    let table = Upload::passive(&device, 0.0);
+    table.send(exchange)?;
     let wrong = message::Commit {
         crc: table.crc() ^ 1,
     };
-    talk.refused(Request::TableCommit(wrong), Refusal::Checksum)?;
-    let state = talk.outcome()?.state;
-    if state != State::Idle {
-        return Err(Broken::seen(state.as_str()));
+    exchange.expect_refusal(Request::TableCommit(wrong), Refusal::Checksum)?;
+    let state = exchange.outcome()?.state;
+    if state != DeviceState::Idle {
+        return Err(CheckFailure::violation(state.as_str()));
     }
-    table.load(talk)?;
-    Ok("refused, and taken at the second try".to_owned())
+    table.load(exchange)?;
+    Ok("refused, and accepted with the correct CRC".to_owned())
 }
 
-fn bad_tables(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    let sound = || Upload::sound(&device, 0.0);
+fn bad_tables(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
     let mut cases: Vec<(&str, Upload, Refusal)> = Vec::new();
-    let mut case = |what, why, damage: &dyn Fn(&mut Upload)| {
-        let mut table = sound();
+    let mut case = |what, reason, damage: &dyn Fn(&mut Upload)| {
+        let mut table = Upload::passive(&device, 0.0);
         damage(&mut table);
-        cases.push((what, table, why));
+        cases.push((what, table, reason));
     };
-    case("a parameter that is no number", Refusal::BadTable, &|t| {
-        t.nodes[1].positive[3] = f64::NAN;
-    });
-    case("an endless parameter", Refusal::BadTable, &|t| {
+    case(
+        "a parameter that is not a number",
+        Refusal::BadTable,
+        &|t| {
+            t.nodes[1].positive[3] = f64::NAN;
+        },
+    );
+    case("an infinite parameter", Refusal::BadTable, &|t| {
         t.nodes[2].negative[0] = f64::INFINITY;
     });
     case("positions that do not ascend", Refusal::BadTable, &|t| {
@@ -435,108 +460,110 @@ fn bad_tables(talk: &mut Talk<'_>) -> Kept {
         t.nodes.truncate(1);
         t.begin.nodes = 1;
     });
-    case("a range that is none", Refusal::BadTable, &|t| {
+    case("an empty range", Refusal::BadTable, &|t| {
         t.begin.range_mm.swap(0, 1);
     });
-    case("a force limit above its own", Refusal::Limit, &|t| {
+    case("a force limit above the device's", Refusal::Limit, &|t| {
         t.begin.force_n = 1.01 * device.force_n;
     });
-    case("a force limit that is no number", Refusal::Limit, &|t| {
+    case("a force limit that is not a number", Refusal::Limit, &|t| {
         t.begin.force_n = f64::NAN;
     });
-    case("a velocity limit above its own", Refusal::Limit, &|t| {
-        t.begin.velocity_mm_s = 1.01 * device.velocity_mm_s;
-    });
-    case("a range beyond its stroke", Refusal::Limit, &|t| {
+    case(
+        "a velocity limit above the device's",
+        Refusal::Limit,
+        &|t| {
+            t.begin.velocity_mm_s = 1.01 * device.velocity_mm_s;
+        },
+    );
+    case("a range beyond the stroke", Refusal::Limit, &|t| {
         t.begin.range_mm[1] = device.stroke_mm[1] + 1.0;
     });
-    case("more damping than it renders", Refusal::Limit, &|t| {
+    case("a damping above the device's", Refusal::Limit, &|t| {
         for node in &mut t.nodes {
             node.positive[1] = 2.0 * device.damping_n_s_per_mm;
             node.negative[1] = 2.0 * device.damping_n_s_per_mm;
         }
     });
     let count = cases.len();
-    for (what, table, why) in cases {
-        table.send(talk)?;
-        let ack = talk.ack(table.commit())?;
-        if ack.refusal != why {
-            return Err(Broken::seen(format!(
-                "{what}: {}, and not: {}",
+    for (what, table, reason) in cases {
+        table.send(exchange)?;
+        let ack = exchange.ack(table.commit())?;
+        if ack.refusal != reason {
+            return Err(CheckFailure::violation(format!(
+                "{what}: {} instead of: {}",
                 ack.refusal.as_str(),
-                why.as_str()
+                reason.as_str()
             )));
         }
     }
-    Ok(format!("{count} of them"))
+    Ok(format!("{count} tables"))
 }
 
-fn uncertified(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    let mut table = Upload::unsound(&device);
-    table.send(talk)?;
-    talk.refused(table.commit(), Refusal::Uncertified)?;
+fn uncertified(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
+    let mut table = Upload::uncertified(&device);
+    table.send(exchange)?;
+    exchange.expect_refusal(table.commit(), Refusal::Uncertified)?;
     let cap_n = 0.5 * table.begin.force_n;
     table.begin.uncertified_n = Some(cap_n);
-    table.load(talk)?;
-    let limit_n = talk.outcome()?.limit_n;
+    table.load(exchange)?;
+    let limit_n = exchange.outcome()?.limit_n;
     if (limit_n - cap_n).abs() > 1e-9 {
-        return Err(Broken::seen(format!(
-            "armed with a cap of {cap_n} N, it allows itself {limit_n} N"
+        return Err(CheckFailure::violation(format!(
+            "with a cap of {cap_n} N its limit is {limit_n} N"
         )));
     }
-    // one that passes is not capped
-    let mut table = Upload::sound(&device, 0.0);
+    // A table that passes is not capped.
+    let mut table = Upload::passive(&device, 0.0);
     table.begin.uncertified_n = Some(cap_n);
-    table.load(talk)?;
-    let limit_n = talk.outcome()?.limit_n;
+    table.load(exchange)?;
+    let limit_n = exchange.outcome()?.limit_n;
     if (limit_n - table.begin.force_n).abs() > 1e-9 {
-        return Err(Broken::seen(format!(
-            "a sound table has {limit_n} N of {} N",
+        return Err(CheckFailure::violation(format!(
+            "a passive table is limited to {limit_n} N instead of {} N",
             table.begin.force_n
         )));
     }
-    Ok(format!("refused; armed: capped at {cap_n} N"))
+    Ok(format!("refused; with permission capped at {cap_n} N"))
 }
 
-fn largest(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    let table = Upload::with_nodes(&device, 0.0, device.most_nodes);
-    let from = talk.now();
-    table.send(talk)?;
-    let up = talk.now();
-    talk.done(table.commit())?;
-    let judged = talk.now();
+fn largest(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
+    let table = Upload::with_nodes(&device, 0.0, device.max_nodes);
+    let begin = exchange.now();
+    table.send(exchange)?;
+    let sent = exchange.now();
+    exchange.expect_done(table.commit())?;
+    let validated = exchange.now();
     let seconds = |from: Duration, to: Duration| to.saturating_sub(from).as_secs_f64();
-    let (up_s, commit_ms) = (seconds(from, up), 1e3 * seconds(up, judged));
-    let [median_ms, ..] = talk.latency_ms.unwrap_or([0.0; 3]);
+    let (upload_s, commit_ms) = (seconds(begin, sent), 1e3 * seconds(sent, validated));
+    let [median_ms, ..] = exchange.latency_ms.unwrap_or([0.0; 3]);
     let seen = format!(
-        "{} nodes up in {up_s:.2} s, judged in {commit_ms:.1} ms",
-        device.most_nodes
+        "{} nodes uploaded in {upload_s:.2} s, validated in {commit_ms:.1} ms",
+        device.max_nodes
     );
-    // the link's own time is not the device's
+    // The round trip of the link is allowed in addition.
     if commit_ms <= 50.0 + 2.0 * median_ms + 2.0 {
         Ok(seen)
     } else {
-        Err(Broken::seen(seen))
+        Err(CheckFailure::violation(seen))
     }
 }
 
-fn wrong_play(talk: &mut Talk<'_>) -> Kept {
-    let device = talk.identity()?;
-    let table = Upload::sound(&device, 0.0);
-    table.load(talk)?;
-    let Request::Play(play) = table.play(talk, 1000, 0) else {
-        return Err(Broken::seen("no PLAY"));
-    };
+fn wrong_play(exchange: &mut Exchange<'_>) -> ClauseResult {
+    let device = exchange.identity()?;
+    let table = Upload::passive(&device, 0.0);
+    table.load(exchange)?;
+    let play = table.play(exchange, 1000);
     let other = message::Play {
         crc: play.crc ^ 1,
         ..play
     };
-    talk.refused(Request::Play(other), Refusal::OtherTable)?;
+    exchange.expect_refusal(Request::Play(other), Refusal::OtherTable)?;
     for longest_ms in [0, device.longest_ms.saturating_add(1)] {
         let endless = message::Play { longest_ms, ..play };
-        talk.refused(Request::Play(endless), Refusal::Duration)?;
+        exchange.expect_refusal(Request::Play(endless), Refusal::Duration)?;
     }
-    Ok(format!("never more than {FORCE_N} N was asked for"))
+    Ok("another table, 0 ms, and more than the longest duration".to_owned())
 }

@@ -1,16 +1,16 @@
-//! Tables for a commissioning: sound ones, and ones that a device has to refuse.
+//! Tables for the commissioning: valid ones, and ones that a device has to refuse.
 
-use super::talk::Talk;
-use super::{Broken, FORCE_N};
+use super::exchange::Exchange;
+use super::{CheckFailure, FORCE_N};
 use study_wire::message::{
-    Ack, Commit, Few, Identity, Node, Play, Request, TableBegin, TableChunk, TableCrc,
+    Ack, Commit, FixedVec, Identity, Node, Play, Request, TableBegin, TableChunk, TableCrc,
 };
 use study_wire::predict::{Direction, Lookup};
 
 /// Damping of the tables, N·s/mm.
 const DAMPING: f64 = 0.005;
 
-/// A table as it is uploaded.
+/// A table for upload.
 #[derive(Debug, Clone)]
 pub(super) struct Upload {
     pub(super) begin: TableBegin,
@@ -18,8 +18,8 @@ pub(super) struct Upload {
 }
 
 impl Upload {
-    /// Damping and a constant force, within what the device reaches.
-    pub(super) fn sound(device: &Identity, force_n: f64) -> Self {
+    /// A passive table of damping and a constant force, within the device's limits.
+    pub(super) fn passive(device: &Identity, force_n: f64) -> Self {
         Self::with_nodes(device, force_n, 4)
     }
 
@@ -51,9 +51,9 @@ impl Upload {
         }
     }
 
-    /// The same with a negative mass, which fails the certificate.
-    pub(super) fn unsound(device: &Identity) -> Self {
-        let mut upload = Self::sound(device, 0.0);
+    /// A table with a negative mass, which fails the certificate.
+    pub(super) fn uncertified(device: &Identity) -> Self {
+        let mut upload = Self::passive(device, 0.0);
         for node in &mut upload.nodes {
             node.positive[0] = -0.2;
             node.negative[0] = -0.2;
@@ -74,39 +74,39 @@ impl Upload {
     }
 
     pub(super) fn chunks(&self) -> Vec<Request> {
-        let chunks = self.nodes.chunks(TableChunk::MOST).enumerate();
+        let chunks = self.nodes.chunks(TableChunk::MAX_NODES).enumerate();
         chunks
             .map(|(i, nodes)| {
                 Request::TableChunk(TableChunk {
-                    // a table has fewer than 65,536 nodes
-                    first: (i * TableChunk::MOST) as u16,
-                    nodes: Few::of(nodes),
+                    // A table has fewer than 65,536 nodes.
+                    first: (i * TableChunk::MAX_NODES) as u16,
+                    nodes: FixedVec::of(nodes),
                 })
             })
             .collect()
     }
 
-    /// Up to COMMIT, which is left to the caller.
-    pub(super) fn send(&self, talk: &mut Talk<'_>) -> Result<(), Broken> {
-        talk.done(Request::TableBegin(self.begin))?;
+    /// Sends everything except COMMIT.
+    pub(super) fn send(&self, exchange: &mut Exchange<'_>) -> Result<(), CheckFailure> {
+        exchange.expect_done(Request::TableBegin(self.begin))?;
         for chunk in self.chunks() {
-            talk.done(chunk)?;
+            exchange.expect_done(chunk)?;
         }
         Ok(())
     }
 
-    pub(super) fn load(&self, talk: &mut Talk<'_>) -> Result<Ack, Broken> {
-        self.send(talk)?;
-        talk.done(self.commit())
+    pub(super) fn load(&self, exchange: &mut Exchange<'_>) -> Result<Ack, CheckFailure> {
+        self.send(exchange)?;
+        exchange.expect_done(self.commit())
     }
 
-    /// PLAY of it, for at most so long.
-    pub(super) fn play(&self, talk: &mut Talk<'_>, longest_ms: u32, every: u16) -> Request {
-        Request::Play(Play {
-            playback: talk.next_playback(),
+    /// A PLAY request for this table without telemetry, for at most `longest_ms`.
+    pub(super) fn play(&self, exchange: &mut Exchange<'_>, longest_ms: u32) -> Play {
+        Play {
+            playback: exchange.next_playback(),
             crc: self.crc(),
             longest_ms,
-            every,
-        })
+            every: None,
+        }
     }
 }

@@ -1,15 +1,15 @@
-//! What a simulated device is mounted to: a handle, its sensors, a hand or a probe.
+//! The simulated mechanics: a handle with its sensors, and a hand or a probe.
 
 use super::{Drive, Measured, Options};
 use study_base::rng::Stream;
 use study_haptics::plant::{DT_S, Hand, HandParameters, Parameters, Probe, Target};
 use study_wire::predict::Motion;
 
-/// Corner of the one-pole low-pass that the speed is taken through, Hz.
+/// Corner frequency of the one-pole low-pass of the speed, Hz.
 const SPEED_HZ: f64 = 200.0;
-/// A hand lets go so long after the end of a playback, s.
-const LETS_GO_S: f64 = 0.3;
-/// Where the handle is before anybody has moved it, mm.
+/// Time from the end of a playback to the release of the handle, s.
+const RELEASE_S: f64 = 0.3;
+/// Initial position of the handle, mm.
 const MIDDLE_MM: f64 = 17.5;
 
 #[derive(Debug)]
@@ -17,11 +17,11 @@ pub(super) struct Body {
     seed: u64,
     hand: HandParameters,
     target: Parameters,
-    /// Encoder, noise of the probe's sensors.
+    /// Resolution and noise of the sensors.
     probe: Probe,
     servo_hz: f64,
     sensor: Sensor,
-    /// On the motor, N.
+    /// Force of the motor, N.
     force_n: f64,
     holder: Holder,
 }
@@ -29,27 +29,28 @@ pub(super) struct Body {
 /// What moves the handle.
 #[derive(Debug)]
 enum Holder {
-    /// It rests there.
+    /// Nothing; the handle rests.
     Nobody { x_mm: f64 },
-    /// A hand; after the end of the playback for so many servo periods more.
+    /// A hand; after the end of the playback `left` is the number of servo periods until
+    /// it releases the handle.
     Hand { hand: Box<Hand>, left: Option<u32> },
     /// A probe on its path.
-    Probe(Box<Moved>),
+    Probe(Box<ProbeContact>),
 }
 
 /// The target under the probe.
 #[derive(Debug)]
-struct Moved {
-    /// No target if the parameters describe none.
+struct ProbeContact {
+    /// `None` if the parameters are invalid.
     target: Option<Target>,
     motion: Motion,
-    /// Where it is told to be next.
+    /// Commanded motion for the next period.
     next: Option<Motion>,
     force_n: f64,
-    /// The most that the motor may give, N.
-    most_n: f64,
+    /// Largest force of the motor, N.
+    max_n: f64,
     noise: [Stream; 2],
-    /// Steps of the simulation that are due, with the fraction left over.
+    /// Simulation steps that are due, including a fraction.
     due: f64,
 }
 
@@ -72,13 +73,13 @@ impl Body {
         self.force_n
     }
 
-    /// Whether somebody moves the handle.
+    /// Whether a hand or a probe moves the handle.
     pub(super) fn moving(&self) -> bool {
         !matches!(self.holder, Holder::Nobody { .. })
     }
 
-    /// Whether somebody does for what is played now.
-    pub(super) fn taken(&self) -> bool {
+    /// Whether a hand or a probe holds the handle for the current playback.
+    pub(super) fn is_held(&self) -> bool {
         match &self.holder {
             Holder::Nobody { .. } => false,
             Holder::Hand { left, .. } => left.is_none(),
@@ -86,8 +87,8 @@ impl Body {
         }
     }
 
-    /// A hand takes the handle to play over `range_mm`, or a probe without one.
-    /// `upload` gives each table a hand of its own.
+    /// A hand takes the handle for a table with the range `range_mm`, or a probe if it is
+    /// `None`. The number of the upload selects the random stream.
     pub(super) fn take(&mut self, range_mm: Option<[f64; 2]>, upload: u32) {
         let upload = upload.to_string();
         let stream = |name| Stream::new(self.seed, &["device", name, &upload]);
@@ -102,12 +103,12 @@ impl Body {
             }
             None => {
                 let x_mm = self.motion().x_mm;
-                Holder::Probe(Box::new(Moved {
+                Holder::Probe(Box::new(ProbeContact {
                     target: Target::new(self.target.clone(), x_mm).ok(),
                     motion: still(x_mm),
                     next: None,
                     force_n: 0.0,
-                    most_n: 0.0,
+                    max_n: 0.0,
                     noise: ["force", "acceleration"].map(stream),
                     due: 0.0,
                 }))
@@ -116,16 +117,16 @@ impl Body {
         self.sensor = Sensor::new(self.motion().x_mm, &self.probe, self.servo_hz);
     }
 
-    /// Zero force.
+    /// Sets the force to zero; the hand releases the handle later.
     pub(super) fn release(&mut self) {
         self.force_n = 0.0;
         match &mut self.holder {
             Holder::Nobody { .. } => {}
             Holder::Hand { left, .. } => {
-                left.get_or_insert((LETS_GO_S * self.servo_hz) as u32);
+                left.get_or_insert((RELEASE_S * self.servo_hz) as u32);
             }
-            Holder::Probe(moved) => {
-                let x_mm = moved.motion.x_mm;
+            Holder::Probe(contact) => {
+                let x_mm = contact.motion.x_mm;
                 self.rest(x_mm);
             }
         }
@@ -140,23 +141,23 @@ impl Body {
         match &self.holder {
             Holder::Nobody { x_mm } => still(*x_mm),
             Holder::Hand { hand, .. } => hand.motion(),
-            Holder::Probe(moved) => moved.motion,
+            Holder::Probe(contact) => contact.motion,
         }
     }
 
-    /// What the sensors say.
+    /// Reads the sensors.
     pub(super) fn measure(&mut self) -> Measured {
         let mut motion = self.sensor.read(self.motion());
         let mut force_n = None;
-        if let Holder::Probe(moved) = &mut self.holder {
-            let [force, acceleration] = &mut moved.noise;
-            force_n = Some(moved.force_n + self.probe.force_noise_n * force.normal());
+        if let Holder::Probe(contact) = &mut self.holder {
+            let [force, acceleration] = &mut contact.noise;
+            force_n = Some(contact.force_n + self.probe.force_noise_n * force.normal());
             motion.a_m_s2 += self.probe.acceleration_noise_m_s2 * acceleration.normal();
         }
         Measured { motion, force_n }
     }
 
-    /// What the motor does from now on.
+    /// Applies a motor command.
     pub(super) fn drive(&mut self, drive: Drive) {
         match drive {
             Drive::Force(force_n) => self.force_n = force_n,
@@ -165,20 +166,20 @@ impl Body {
                 v_mm_s,
                 force_n,
             } => {
-                if let Holder::Probe(moved) = &mut self.holder {
-                    self.force_n = moved.force_n;
-                    moved.most_n = force_n;
-                    moved.next = Some(Motion {
+                if let Holder::Probe(contact) = &mut self.holder {
+                    self.force_n = contact.force_n;
+                    contact.max_n = force_n;
+                    contact.next = Some(Motion {
                         x_mm,
                         v_mm_s,
-                        a_m_s2: (v_mm_s - moved.motion.v_mm_s) * self.servo_hz * 1e-3,
+                        a_m_s2: (v_mm_s - contact.motion.v_mm_s) * self.servo_hz * 1e-3,
                     });
                 }
             }
         }
     }
 
-    /// Lets a servo period pass.
+    /// Simulates one servo period.
     pub(super) fn pass(&mut self) {
         let period_s = 1.0 / self.servo_hz;
         match &mut self.holder {
@@ -194,14 +195,14 @@ impl Body {
                     Some(left) => *left -= 1,
                 }
             }
-            Holder::Probe(moved) => moved.pass(period_s),
+            Holder::Probe(contact) => contact.pass(period_s),
         }
     }
 }
 
-impl Moved {
-    /// The probe is where it was told to be: it is ideal, up to its force limit.
-    /// There it stays where it is, and the handler will miss it on its path.
+impl ProbeContact {
+    /// Moves the ideal probe to the commanded position. At its force limit it stays where
+    /// it is, and the handler detects the deviation from the path.
     fn pass(&mut self, period_s: f64) {
         let Some(next) = self.next.take() else {
             return;
@@ -211,8 +212,8 @@ impl Moved {
         let steps = self.due as u32;
         self.due -= f64::from(steps);
         for step in 1..=steps {
-            let share = f64::from(step) / f64::from(steps);
-            let between = |from: f64, to: f64| from + share * (to - from);
+            let fraction = f64::from(step) / f64::from(steps);
+            let between = |from: f64, to: f64| from + fraction * (to - from);
             let at = Motion {
                 x_mm: between(from.x_mm, next.x_mm),
                 v_mm_s: between(from.v_mm_s, next.v_mm_s),
@@ -222,10 +223,10 @@ impl Moved {
                 self.force_n = target.step(at);
             }
         }
-        if self.force_n.abs() <= self.most_n {
+        if self.force_n.abs() <= self.max_n {
             self.motion = next;
         } else {
-            self.force_n = self.force_n.clamp(-self.most_n, self.most_n);
+            self.force_n = self.force_n.clamp(-self.max_n, self.max_n);
             self.motion = still(from.x_mm);
         }
     }
@@ -239,15 +240,15 @@ fn still(x_mm: f64) -> Motion {
     }
 }
 
-/// Encoder, speed from its differences, accelerometer.
+/// Encoder, speed from position differences, and accelerometer.
 #[derive(Debug)]
 struct Sensor {
     encoder_mm: f64,
     x_mm: f64,
     v_mm_s: f64,
     servo_hz: f64,
-    /// Of the one-pole low-pass, a period.
-    share: f64,
+    /// Smoothing factor of the one-pole low-pass.
+    smoothing: f64,
 }
 
 impl Sensor {
@@ -257,7 +258,7 @@ impl Sensor {
             x_mm: 0.0,
             v_mm_s: 0.0,
             servo_hz,
-            share: 1.0 - libm::exp(-std::f64::consts::TAU * SPEED_HZ / servo_hz),
+            smoothing: 1.0 - libm::exp(-std::f64::consts::TAU * SPEED_HZ / servo_hz),
         };
         sensor.x_mm = sensor.quantised(x_mm);
         sensor
@@ -266,7 +267,7 @@ impl Sensor {
     fn read(&mut self, motion: Motion) -> Motion {
         let x_mm = self.quantised(motion.x_mm);
         let difference = (x_mm - self.x_mm) * self.servo_hz;
-        self.v_mm_s += self.share * (difference - self.v_mm_s);
+        self.v_mm_s += self.smoothing * (difference - self.v_mm_s);
         self.x_mm = x_mm;
         Motion {
             x_mm,

@@ -1,49 +1,48 @@
-//! Defects that a simulated device can be given, so that what finds them can be
-//! shown to find them.
+//! Planted defects of the simulated device, to show that the commissioning finds them.
 //!
-//! A flaw sits between the link and the handler and spoils what goes by. The
-//! handler behind it stays as it is, so the force stays within its limit.
+//! A flaw changes messages between the link and the handler. The handler itself is not
+//! changed, so the force stays within its limit.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 use study_wire::frame::{Decoder, FRAME_CRC_LEN, Frame};
 use study_wire::message::{
-    Ack, Fault, Few, Header, Heartbeat, Refusal, Reply, Request, State, kind,
+    Ack, DeviceState, Fault, FixedVec, Header, Heartbeat, Refusal, Reply, Request, kind,
 };
 
-/// What is wrong with a device, and the clause of `docs/wire.md` that it breaks.
+/// A planted defect, with the clause of `docs/wire.md` that it violates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flaw {
-    /// 2.3: does what damaged frames say.
+    /// 2.3: executes damaged frames.
     TakesDamaged,
-    /// 3.3: speaks only version 2. No defect: a device of another time.
+    /// 3.3: supports only version 2. This is not a defect but an incompatible device.
     OtherVersion,
-    /// 3.4: says that it is limp and is not.
+    /// 3.4: acknowledges LIMP without executing it.
     DeafToLimp,
-    /// 4.3: does what it has done once again when it comes again.
+    /// 4.3: executes repeated requests again.
     Repeats,
-    /// 5.2: says after a while that it is idle again, without REARM.
+    /// 5.2: reports after a while that it is idle, without REARM.
     Unlatched,
-    /// 6.1: takes heartbeats whose deadline has passed.
+    /// 6.1: accepts expired heartbeats.
     TakesStale,
-    /// 6.3: goes limp 300 ms after the last heartbeat, whatever it states.
+    /// 6.3: goes limp only 300 ms after the last heartbeat.
     LateWatchdog,
-    /// 7.5: commands half as much force again as it may.
+    /// 7.5: reports 1.5 times the commanded force.
     NoClamp,
-    /// 8.3: says yes to tables that cannot be evaluated and to limits that are none.
+    /// 8.3: accepts invalid tables and limits.
     TakesBadTables,
-    /// 8.4: says yes to tables that fail their certificate and are not armed.
+    /// 8.4: accepts uncertified tables without permission.
     TakesUncertified,
-    /// 9.1: loses every tenth message of telemetry.
+    /// 9.1: loses every tenth telemetry message.
     LosesTelemetry,
     /// 11.1: answers after 50 ms.
     SlowReplies,
-    /// 11.3: stops 200 ms after it is told so.
+    /// 11.3: stops 200 ms after STOP.
     SlowStop,
 }
 
 impl Flaw {
-    /// Every flaw, its name on a command line, and the clause.
+    /// Every flaw with its name on the command line and its clause.
     pub const ALL: [(Self, &'static str, &'static str); 13] = [
         (Self::TakesDamaged, "takes-damaged", "2.3"),
         (Self::OtherVersion, "other-version", "3.3"),
@@ -60,37 +59,38 @@ impl Flaw {
         (Self::SlowStop, "slow-stop", "11.3"),
     ];
 
-    /// By its name on a command line.
+    /// The flaw with this name on the command line.
     pub fn named(name: &str) -> Option<Self> {
         let (flaw, ..) = Self::ALL.into_iter().find(|(_, own, _)| *own == name)?;
         Some(flaw)
     }
 }
 
-/// What the watchdog time is with [`Flaw::LateWatchdog`], ms.
+/// Actual watchdog time with [`Flaw::LateWatchdog`], ms.
 pub(super) const LATE_MS: u16 = 300;
 const SLOW_REPLY: Duration = Duration::from_millis(50);
 const SLOW_STOP: Duration = Duration::from_millis(200);
 
-/// A flaw at work.
+/// Changes messages according to a flaw.
 #[derive(Debug)]
-pub(super) struct Tamper {
+pub(super) struct FlawInjector {
     flaw: Flaw,
-    /// Of the watchdog that it states.
+    /// Watchdog time that the device states, ms.
     stated_ms: u16,
     /// Bytes since the last zero.
     raw: Vec<u8>,
-    /// To be heard later.
+    /// Received frames to be handled later.
     held_in: VecDeque<(Duration, Vec<u8>)>,
-    /// To be said later.
+    /// Frames to be sent later.
     held_out: VecDeque<(Duration, Vec<u8>)>,
-    /// Sequence numbers of its own, and which one they stand for.
+    /// Substituted sequence number.
     sequence: u16,
+    /// Original sequence number.
     stands_for: u16,
     telemetry: u32,
 }
 
-impl Tamper {
+impl FlawInjector {
     pub(super) fn new(flaw: Flaw, stated_ms: u16) -> Self {
         Self {
             flaw,
@@ -104,10 +104,10 @@ impl Tamper {
         }
     }
 
-    /// What the handler hears of what has come, and what is answered in its place.
+    /// The bytes for the handler, and the answers sent in its place.
     pub(super) fn inbound(&mut self, bytes: &[u8], at: Duration, clock_ms: u32) -> [Vec<u8>; 2] {
-        let mut heard = Vec::new();
-        let mut answered = Vec::new();
+        let mut received = Vec::new();
+        let mut answers = Vec::new();
         for byte in bytes {
             if *byte != 0 {
                 self.raw.push(*byte);
@@ -118,29 +118,29 @@ impl Tamper {
                 continue;
             }
             let Some(body) = self.body(&raw) else {
-                // as it came: the handler counts it
-                heard.push(0);
-                heard.extend_from_slice(&raw);
-                heard.push(0);
+                // Unchanged, so that the handler counts it.
+                received.push(0);
+                received.extend_from_slice(&raw);
+                received.push(0);
                 continue;
             };
             let Some(header) = Header::read(&body) else {
                 continue;
             };
             if self.flaw == Flaw::OtherVersion {
-                answered.extend(other_version(header, clock_ms));
+                answers.extend(other_version(header, clock_ms));
             } else if self.flaw == Flaw::DeafToLimp && header.kind == kind::LIMP {
-                answered.extend(ack(header, Refusal::None, State::Limp, clock_ms));
+                answers.extend(ack(header, Refusal::None, DeviceState::Limp, clock_ms));
             } else if self.flaw == Flaw::SlowStop && header.kind == kind::STOP {
                 self.held_in.push_back((at + SLOW_STOP, framed(&body)));
-            } else if let Some(body) = self.spoilt(header, body, clock_ms) {
-                heard.extend(framed(&body));
+            } else if let Some(body) = self.change_request(header, body, clock_ms) {
+                received.extend(framed(&body));
             }
         }
-        [heard, answered]
+        [received, answers]
     }
 
-    /// What was to be heard by `at`.
+    /// The next delayed frame that is due at `at`.
     pub(super) fn overdue(&mut self, at: Duration) -> Option<Vec<u8>> {
         let (due, _) = self.held_in.front()?;
         if *due > at {
@@ -149,7 +149,7 @@ impl Tamper {
         self.held_in.pop_front().map(|(_, bytes)| bytes)
     }
 
-    /// A frame's body; of a damaged one too, with [`Flaw::TakesDamaged`].
+    /// The body of a frame; with [`Flaw::TakesDamaged`] also that of a damaged one.
     fn body(&self, raw: &[u8]) -> Option<Vec<u8>> {
         let mut decoder = Decoder::new();
         for byte in raw {
@@ -166,8 +166,13 @@ impl Tamper {
         }
     }
 
-    /// A request as the handler gets it; `None`: not at all.
-    fn spoilt(&mut self, header: Header, mut body: Vec<u8>, clock_ms: u32) -> Option<Vec<u8>> {
+    /// The body of the request for the handler; `None` if it is dropped.
+    fn change_request(
+        &mut self,
+        header: Header,
+        mut body: Vec<u8>,
+        clock_ms: u32,
+    ) -> Option<Vec<u8>> {
         let request = Request::decode(&body).ok().map(|(_, request)| request);
         match (self.flaw, request) {
             (Flaw::Repeats, Some(request)) if request.sequenced() => {
@@ -193,9 +198,9 @@ impl Tamper {
         Some(body)
     }
 
-    /// What leaves of what the handler has said by `at`.
+    /// The bytes to send at `at` for the handler's output.
     pub(super) fn outbound(&mut self, bytes: &[u8], at: Duration) -> Vec<u8> {
-        let mut said = Vec::new();
+        let mut sent = Vec::new();
         let mut decoder = Decoder::new();
         for byte in bytes {
             let Some(Ok(body)) = decoder.push(*byte) else {
@@ -204,24 +209,24 @@ impl Tamper {
             let Ok((header, reply)) = Reply::decode(body) else {
                 continue;
             };
-            let Some((sequence, reply)) = self.distorted(header.sequence, reply) else {
+            let Some((sequence, reply)) = self.change_reply(header.sequence, reply) else {
                 continue;
             };
             let frame = reply.frame(sequence).as_bytes().to_vec();
             if self.flaw == Flaw::SlowReplies {
                 self.held_out.push_back((at + SLOW_REPLY, frame));
             } else {
-                said.extend(frame);
+                sent.extend(frame);
             }
         }
         while self.held_out.front().is_some_and(|(due, _)| *due <= at) {
-            said.extend(self.held_out.pop_front().into_iter().flat_map(|(_, f)| f));
+            sent.extend(self.held_out.pop_front().into_iter().flat_map(|(_, f)| f));
         }
-        said
+        sent
     }
 
-    /// A reply as it leaves; `None`: not at all.
-    fn distorted(&mut self, mut sequence: u16, mut reply: Reply) -> Option<(u16, Reply)> {
+    /// The reply to send; `None` if it is dropped.
+    fn change_reply(&mut self, mut sequence: u16, mut reply: Reply) -> Option<(u16, Reply)> {
         match (self.flaw, &mut reply) {
             (Flaw::Repeats, Reply::Ack(_)) if sequence == self.sequence => {
                 sequence = self.stands_for;
@@ -240,11 +245,11 @@ impl Tamper {
                 if taken.contains(&ack.refusal) {
                     ack.refusal = Refusal::None;
                     ack.detail = 0;
-                    ack.state = State::Loaded;
+                    ack.state = DeviceState::Loaded;
                 }
             }
             (Flaw::NoClamp, Reply::Telemetry(telemetry)) => {
-                let mut samples = Few::new();
+                let mut samples = FixedVec::new();
                 for sample in telemetry.samples.as_slice() {
                     let mut more = *sample;
                     more.command_un = sample.command_un.saturating_add(sample.command_un / 2);
@@ -252,16 +257,18 @@ impl Tamper {
                 }
                 telemetry.samples = samples;
             }
-            (Flaw::NoClamp, Reply::Outcome(outcome)) => outcome.most_force_n *= 1.5,
+            (Flaw::NoClamp, Reply::Outcome(outcome)) => outcome.peak_force_n *= 1.5,
             (Flaw::LosesTelemetry, Reply::Telemetry(_)) => {
                 self.telemetry += 1;
                 if self.telemetry.is_multiple_of(10) {
                     return None;
                 }
             }
-            (Flaw::Unlatched, Reply::Pulse(pulse)) => awake(&mut pulse.state, &mut pulse.fault),
+            (Flaw::Unlatched, Reply::Pulse(pulse)) => {
+                pretend_idle(&mut pulse.state, &mut pulse.fault)
+            }
             (Flaw::Unlatched, Reply::Outcome(outcome)) => {
-                awake(&mut outcome.state, &mut outcome.fault);
+                pretend_idle(&mut outcome.state, &mut outcome.fault);
             }
             _ => {}
         }
@@ -269,24 +276,24 @@ impl Tamper {
     }
 }
 
-fn awake(state: &mut State, fault: &mut Fault) {
-    if *state == State::Limp {
-        *state = State::Idle;
+fn pretend_idle(state: &mut DeviceState, fault: &mut Fault) {
+    if *state == DeviceState::Limp {
+        *state = DeviceState::Idle;
         *fault = Fault::None;
     }
 }
 
-/// The refusal of a device that speaks version 2 only.
+/// The refusal of a device that supports only version 2.
 fn other_version(header: Header, clock_ms: u32) -> Vec<u8> {
     let refusal = if header.kind == kind::LIMP {
         Refusal::None
     } else {
         Refusal::Version
     };
-    ack(header, refusal, State::Boot, clock_ms)
+    ack(header, refusal, DeviceState::Boot, clock_ms)
 }
 
-fn ack(header: Header, refusal: Refusal, state: State, clock_ms: u32) -> Vec<u8> {
+fn ack(header: Header, refusal: Refusal, state: DeviceState, clock_ms: u32) -> Vec<u8> {
     let fault = Fault::None;
     let reply = Reply::Ack(Ack {
         request: header.kind,
@@ -330,7 +337,7 @@ mod tests {
     use study_wire::frame::crc32;
 
     #[test]
-    fn every_flaw_has_a_name_and_a_clause_of_the_document() {
+    fn every_flaw_has_a_name_and_a_clause_of_the_specification() {
         let document = include_str!("../../../docs/wire.md");
         for (flaw, name, clause) in Flaw::ALL {
             assert_eq!(Flaw::named(name), Some(flaw));
@@ -345,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_frame_can_be_undone_without_its_crc() {
+    fn a_damaged_frame_can_be_decoded_without_its_crc() {
         let frame = Frame::of(&[1, 9, 0, 0]).unwrap();
         let raw = &frame.as_bytes()[1..frame.as_bytes().len() - 1];
         let plain = without_cobs(raw).unwrap();

@@ -1,56 +1,50 @@
-//! The device's clock as the host knows it: offset and drift, from round trips.
+//! Estimate of the device's clock, its offset and drift, from round trips.
 //!
-//! A reply carries the device's clock at some moment between request and reply; the
-//! middle is taken, so the error is at most half the round trip. Of each second the
-//! quickest round trip counts.
+//! A reply contains the device's time at some moment between request and reply. The
+//! midpoint is used, so the error is at most half of the round trip. Only the shortest
+//! round trip of each second counts.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Seconds of which the quickest round trips are kept for the drift.
+/// Number of seconds used for the drift.
 const SECONDS: usize = 600;
-/// Round trips that are kept for their median and percentiles.
-const TRIPS: usize = 4096;
 
-/// What is known of the device's clock.
+/// Estimate of the device's clock.
 #[derive(Debug, Clone, Default)]
 pub struct DeviceClock {
-    /// The last reading without the wraps of 32 bits, ms.
+    /// Last reading, extended beyond 32 bits, ms.
     last_ms: Option<u64>,
-    /// Of each second the quickest trip; the last is still open.
+    /// Reading with the shortest round trip of each second, the current one included.
     best: VecDeque<Reading>,
-    trips: VecDeque<Duration>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Reading {
     second: u64,
     trip: Duration,
-    /// Middle of the trip by the host's clock, ms.
+    /// Midpoint of the round trip on the host's clock, ms.
     host_ms: f64,
     /// Device minus host, ms.
     offset_ms: f64,
 }
 
 impl DeviceClock {
-    /// Takes in a reply that came at `received` to what went out at `sent`.
-    pub fn note(&mut self, sent: Duration, received: Duration, clock_ms: u32) {
+    /// Adds the time in a reply received at `received` to a request sent at `sent`.
+    pub fn add(&mut self, sent: Duration, received: Duration, clock_ms: u32) {
         let last_ms = self.last_ms.unwrap_or(u64::from(clock_ms));
-        // the step since the last reading, backwards at most half the range
+        // The signed step since the last reading.
         let step = clock_ms.wrapping_sub(last_ms as u32) as i32;
         let device_ms = last_ms.saturating_add_signed(i64::from(step));
         self.last_ms = Some(device_ms.max(last_ms));
         let trip = received.saturating_sub(sent);
-        if self.trips.len() == TRIPS {
-            self.trips.pop_front();
-        }
-        self.trips.push_back(trip);
+
         let host_ms = ms(sent) + 0.5 * ms(trip);
         let reading = Reading {
             second: received.as_secs(),
             trip,
             host_ms,
-            // the clock shows whole ms that have passed
+            // The clock counts completed ms.
             offset_ms: device_ms as f64 + 0.5 - host_ms,
         };
         match self.best.back_mut() {
@@ -68,20 +62,21 @@ impl DeviceClock {
         }
     }
 
-    /// Device minus host, ms, by the quickest trip of the last two seconds.
+    /// Device time minus host time, ms, from the shortest round trip of the last two
+    /// seconds.
     pub fn offset_ms(&self) -> Option<f64> {
         let recent = self.best.iter().rev().take(2);
         recent.min_by_key(|r| r.trip).map(|r| r.offset_ms)
     }
 
-    /// The device's clock at a moment, ms, wrapping; `None` before the first reading.
+    /// The device's time at `at`, ms, wrapping; `None` before the first reading.
     pub fn at(&self, at: Duration) -> Option<u32> {
         let device_ms = ms(at) + self.offset_ms()?;
         Some(device_ms.max(0.0) as u64 as u32)
     }
 
-    /// How much faster than the host's it runs, parts in a million, by least squares
-    /// over at least ten seconds.
+    /// Drift relative to the host's clock, parts per million, by least squares; `None`
+    /// before ten seconds.
     pub fn drift_ppm(&self) -> Option<f64> {
         let span_ms = self.best.back()?.host_ms - self.best.front()?.host_ms;
         if span_ms < 10_000.0 {
@@ -97,11 +92,6 @@ impl DeviceClock {
         }
         Some(1e6 * xy / xx)
     }
-
-    /// Round trips of late, in the order in which they were made.
-    pub fn trips(&self) -> impl Iterator<Item = Duration> + '_ {
-        self.trips.iter().copied()
-    }
 }
 
 fn ms(time: Duration) -> f64 {
@@ -112,8 +102,8 @@ fn ms(time: Duration) -> f64 {
 mod tests {
     use super::*;
 
-    /// Reads a clock that is `ahead_ms` ahead and `ppm` fast, every 100 ms for
-    /// `seconds`; trips of 2 ms, every seventh of 20 ms with a late reply.
+    /// Reads a clock that is `ahead_ms` ahead and `ppm` fast every 100 ms for `seconds`.
+    /// Round trips take 2 ms, every seventh 20 ms.
     fn read(ahead_ms: f64, ppm: f64, seconds: u64) -> DeviceClock {
         let mut clock = DeviceClock::default();
         for i in 0..10 * seconds {
@@ -121,7 +111,7 @@ mod tests {
             let device = |at: Duration| (ms(at) * (1.0 + ppm * 1e-6) + ahead_ms) as u64 as u32;
             let there = sent + Duration::from_millis(1);
             let late = if i % 7 == 0 { 18 } else { 0 };
-            clock.note(sent, there + Duration::from_millis(1 + late), device(there));
+            clock.add(sent, there + Duration::from_millis(1 + late), device(there));
         }
         clock
     }
@@ -140,7 +130,7 @@ mod tests {
 
     /// 32 bits of ms last 49.7 days.
     #[test]
-    fn a_clock_that_wraps_goes_on() {
+    fn a_clock_that_wraps_continues() {
         let clock = read(f64::from(u32::MAX) - 5_000.0, 0.0, 20);
         let at = Duration::from_secs(20);
         assert!(

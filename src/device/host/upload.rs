@@ -1,32 +1,39 @@
-//! A table as the requests that carry it.
+//! Upload of a table as a sequence of requests.
 
+use crate::device::table::{self, TableError};
 use study_base::limits::Limits;
 use study_haptics::model::{Branch, Realization};
-use study_wire::message::{Commit, Few, Identity, Node, Request, TableBegin, TableChunk, TableCrc};
+use study_wire::message::{
+    Commit, FixedVec, Identity, Node, Request, TableBegin, TableChunk, TableCrc,
+};
 
-/// The requests of an upload, in their order, and the CRC over the whole.
+/// The requests of an upload in order, and the CRC of the table.
 #[derive(Debug)]
 pub(super) struct Upload {
     pub(super) requests: Vec<Request>,
     pub(super) crc: u32,
 }
 
-/// A table that was checked, under limits. One that fails its certificate or is
-/// stiffer than the device renders is armed for the force limit if that is
-/// permitted; else the device refuses it.
+/// Builds the upload of a table. If the table fails its certificate or is stiffer than
+/// the device's limit, `allow_uncertified` requests its playback anyway, within the
+/// force limit; otherwise the device refuses it.
+///
+/// # Errors
+/// [`TableError`] if the table is invalid or too large.
 pub(super) fn of(
     table: &Realization,
     limits: Limits,
-    permitted: bool,
+    allow_uncertified: bool,
     device: &Identity,
-) -> Result<Upload, String> {
+) -> Result<Upload, TableError> {
+    table::check(table)?;
     let count = table.x_mm.len();
-    let nodes = u16::try_from(count).map_err(|_| format!("it has {count} nodes"))?;
+    let nodes = u16::try_from(count).map_err(|_| TableError::TooManyNodes(count))?;
     let certificate = table.certificate();
-    let sound = certificate.passes()
+    let certified = certificate.passes()
         && certificate.stiffness_n_per_mm <= device.stiffness_n_per_mm
         && certificate.damping_n_s_per_mm <= device.damping_n_s_per_mm;
-    let armed = permitted && !sound;
+    let armed = allow_uncertified && !certified;
     let begin = TableBegin {
         nodes,
         lookup: table.lookup,
@@ -50,11 +57,11 @@ pub(super) fn of(
     }
     let crc = crc.value();
     let mut requests = vec![Request::TableBegin(begin)];
-    for (i, nodes) in all.chunks(TableChunk::MOST).enumerate() {
+    for (i, nodes) in all.chunks(TableChunk::MAX_NODES).enumerate() {
         requests.push(Request::TableChunk(TableChunk {
             // fewer than 65,536 nodes
-            first: (i * TableChunk::MOST) as u16,
-            nodes: Few::of(nodes),
+            first: (i * TableChunk::MAX_NODES) as u16,
+            nodes: FixedVec::of(nodes),
         }));
     }
     requests.push(Request::TableCommit(Commit { crc }));
@@ -71,17 +78,17 @@ fn parameters(branch: &Branch, node: usize) -> [f64; 4] {
     .map(|values| values[node])
 }
 
-/// A request in words.
-pub(super) fn word(request: &Request) -> &'static str {
+/// Describes a request in messages.
+pub(super) fn describe(request: &Request) -> &'static str {
     match request {
-        Request::Hello(_) => "the greeting",
+        Request::Hello(_) => "the connection",
         Request::TableBegin(_) | Request::TableChunk(_) | Request::TableCommit(_) => "the table",
         Request::Play(_) => "the start",
         Request::Stop(_) => "the stop",
-        Request::Limp => "the command to be limp",
+        Request::Limp => "the command LIMP",
         Request::Heartbeat(_) => "a heartbeat",
-        Request::Rearm => "to be armed again",
-        Request::State => "the question how it is",
+        Request::Rearm => "to re-arm",
+        Request::State => "the request for its state",
         Request::PathBegin(_) | Request::PathChunk(_) | Request::PathCommit(_) => "the path",
         Request::Record(_) => "the recording",
     }

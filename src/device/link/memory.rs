@@ -1,32 +1,31 @@
-//! A link without a port: two queues, virtual time, and faults on purpose.
+//! A simulated line in virtual time, with injected faults.
 //!
-//! What goes in at a moment comes out after the latency, in pieces as it was
-//! written. Faults strike single writes, by a seed; a line that is dead takes bytes
-//! and gives none.
+//! Bytes arrive after the latency, in the pieces in which they were sent. Faults affect
+//! single pieces, chosen by a seed. A dead line loses all bytes.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 use study_base::rng::Stream;
 
-/// Shares of the writes that meet a fault, each 0 … 1.
+/// Fractions of the sent pieces that are affected by each fault, 0 to 1.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Noise {
     /// A bit is flipped.
     pub corrupt: f64,
-    /// Nothing arrives.
+    /// The piece is lost.
     pub drop: f64,
-    /// It arrives twice.
+    /// The piece arrives twice.
     pub duplicate: f64,
-    /// It overtakes the one before, if that is still on its way.
+    /// The piece overtakes the previous one, if that has not arrived yet.
     pub reorder: f64,
-    /// It takes [`Noise::late`] longer, and what follows waits for it.
+    /// The piece and all later ones arrive later by [`Noise::extra_delay`].
     pub delay: f64,
-    /// How much longer.
-    pub late: Duration,
+    /// Additional latency of a delayed piece.
+    pub extra_delay: Duration,
 }
 
 impl Noise {
-    fn shares(&self) -> [f64; 5] {
+    fn fractions(&self) -> [f64; 5] {
         [
             self.corrupt,
             self.drop,
@@ -48,7 +47,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// A line that takes so long; `name` keeps its faults apart from another's.
+    /// A line with a latency. `name` selects the random stream of its faults.
     pub fn new(latency: Duration, noise: Noise, seed: u64, name: &str) -> Self {
         Self {
             latency,
@@ -59,41 +58,41 @@ impl Line {
         }
     }
 
-    /// Other faults from now on.
+    /// Changes the faults.
     pub fn set_noise(&mut self, noise: Noise) {
         self.noise = noise;
     }
 
-    /// A dead line takes bytes and gives none; what was on its way is lost.
+    /// Makes the line dead or usable; bytes in transit are lost.
     pub fn set_dead(&mut self, dead: bool) {
         self.dead = dead;
         self.queue.clear();
     }
 
-    /// Takes bytes.
+    /// Sends one piece at time `at`.
     pub fn send(&mut self, mut bytes: Vec<u8>, at: Duration) {
         if bytes.is_empty() || self.dead {
             return;
         }
         let mut due = at + self.latency;
-        let shares = self.noise.shares();
-        if shares.iter().all(|share| *share <= 0.0) {
+        let fractions = self.noise.fractions();
+        if fractions.iter().all(|fraction| *fraction <= 0.0) {
             self.queue.push_back((due, bytes));
             return;
         }
-        // always the same draws, so that one fault does not move the next
+        // Always the same number of draws, so that one fault does not change the next.
         let [corrupt, drop, duplicate, reorder, delay] =
-            shares.map(|share| self.stream.unit() < share);
+            fractions.map(|fraction| self.stream.unit() < fraction);
         let bit = self.stream.below(8 * bytes.len() as u64);
         if corrupt {
-            // below the length, which is a usize
+            // The bit is within the piece, whose length is a usize.
             bytes[(bit / 8) as usize] ^= 1 << (bit % 8);
         }
         if drop {
             return;
         }
         if delay {
-            due += self.noise.late;
+            due += self.noise.extra_delay;
         }
         if let Some((last, _)) = self.queue.back() {
             due = due.max(*last);
@@ -111,7 +110,7 @@ impl Line {
         }
     }
 
-    /// What has arrived by now.
+    /// Takes the bytes that have arrived by `at`.
     pub fn arrived(&mut self, at: Duration) -> Vec<u8> {
         let mut bytes = Vec::new();
         while let Some((due, _)) = self.queue.front()
@@ -124,9 +123,9 @@ impl Line {
         bytes
     }
 
-    /// When the next bytes arrive.
-    pub fn next(&self) -> Duration {
-        self.queue.front().map_or(Duration::MAX, |(due, _)| *due)
+    /// When the next bytes arrive; `None` if the line is empty.
+    pub fn next(&self) -> Option<Duration> {
+        self.queue.front().map(|(due, _)| *due)
     }
 }
 
@@ -142,7 +141,7 @@ mod tests {
         line.send(vec![1, 2], MS);
         line.send(vec![3], 2 * MS);
         assert!(line.arrived(2 * MS).is_empty());
-        assert_eq!(line.next(), 3 * MS);
+        assert_eq!(line.next(), Some(3 * MS));
         assert_eq!(line.arrived(3 * MS), [1, 2]);
         line.send(vec![4], 4 * MS);
         assert_eq!(line.arrived(9 * MS), [3, 4]);
@@ -161,7 +160,7 @@ mod tests {
                 line.send(vec![1], i * 10 * MS);
                 line.send(vec![2], i * 10 * MS);
                 came.push(line.arrived((i * 10 + 5) * MS));
-                // what was late does not count for the next
+                // Discard what arrives later, so that it does not count for the next.
                 line.arrived((i * 10 + 9) * MS);
             }
             came
@@ -190,7 +189,7 @@ mod tests {
         assert!((part(&broken, &|c| c != [1, 2]) - 0.19).abs() < 0.02);
         let late = through(Noise {
             delay: 0.1,
-            late: 6 * MS,
+            extra_delay: 6 * MS,
             ..none
         });
         assert!((part(&late, &|c| c.len() < 2) - 0.19).abs() < 0.02);

@@ -1,12 +1,11 @@
-//! The simulated device at the end of a pseudo-terminal, in real time.
+//! The simulated device on a pseudo-terminal, in real time.
 //!
-//! For another program it is a device on a serial port: [`Simulator`] runs the
-//! firmware side by the clock, gives it what comes in and sends what comes out. The
-//! cable can be pulled and put back, and the line can be bad.
+//! To another program it is a device on a serial port. [`Simulator`] runs the simulated
+//! firmware in real time and transfers the bytes. The cable can be unplugged and plugged
+//! in again, and the line can have faults.
 //!
-//! The device's time is the clock's, but a turn is at most [`LONGEST_TURN`] long: a
-//! machine that is busy elsewhere stops the device with the program, as if time
-//! stood still. How often that was is counted.
+//! The device's time follows the clock, but one step is at most [`MAX_STEP`] long. On a
+//! busy machine the device's time then falls behind; the simulator counts these pauses.
 
 use super::LinkError;
 use super::memory::{Line, Noise};
@@ -21,14 +20,14 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use study_wire::message::Fault;
 
-/// A turn that took longer has made time stand still.
-pub const LONGEST_TURN: Duration = Duration::from_millis(5);
-/// What waits for a host that does not read, bytes; more is lost.
-const WAITING: usize = 1 << 16;
-/// Late turns are counted up to here, µs.
-const LATEST_US: usize = 10_000;
+/// Longest step of the device's time.
+pub const MAX_STEP: Duration = Duration::from_millis(5);
+/// Largest number of bytes that wait for a host that does not read; more are lost.
+const MAX_WAITING: usize = 1 << 16;
+/// Largest lateness that is distinguished, µs.
+const MAX_LATE_US: usize = 10_000;
 
-/// One end of a pseudo-terminal; a host opens the other.
+/// The device's end of a pseudo-terminal.
 #[derive(Debug)]
 pub struct Pty {
     master: OwnedFd,
@@ -37,12 +36,12 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// Opens one.
+    /// Opens a pseudo-terminal.
     ///
     /// # Errors
-    /// [`LinkError`]: the system has none.
+    /// [`LinkError`] if the system provides none.
     pub fn open() -> Result<Self, LinkError> {
-        let failed = |e: Errno| LinkError(format!("no pseudo-terminal: {e}"));
+        let failed = |e: Errno| LinkError::System(format!("no pseudo-terminal: {e}"));
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
         let master = openpt(flags).map_err(failed)?;
         grantpt(&master).map_err(failed)?;
@@ -60,12 +59,12 @@ impl Pty {
         })
     }
 
-    /// Where a host finds it.
+    /// Path of the host's end.
     pub fn path(&self) -> &str {
         &self.path
     }
 
-    /// What has come; nothing as well while no host is there.
+    /// The bytes received so far; none without a host.
     fn read(&mut self) -> Vec<u8> {
         let mut bytes = vec![0; 4096];
         let n = rustix::io::read(&self.master, &mut bytes).unwrap_or(0);
@@ -74,7 +73,7 @@ impl Pty {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        if self.waiting.len() + bytes.len() <= WAITING {
+        if self.waiting.len() + bytes.len() <= MAX_WAITING {
             self.waiting.extend_from_slice(bytes);
         }
         while !self.waiting.is_empty() {
@@ -86,51 +85,51 @@ impl Pty {
         }
     }
 
-    /// Waits for bytes, no longer than `wait`.
+    /// Waits at most `wait` for bytes.
     fn wait(&self, wait: Duration) {
         let Ok(wait) = Timespec::try_from(wait) else {
             return;
         };
         let mut master = [PollFd::new(&self.master, PollFlags::IN)];
-        let come = poll(&mut master, Some(&wait));
-        // without a host it is always "ready"
-        if come.is_ok_and(|n| n > 0) && master[0].revents().contains(PollFlags::HUP) {
+        let ready = poll(&mut master, Some(&wait));
+        // Without a host the terminal is always ready.
+        if ready.is_ok_and(|n| n > 0) && master[0].revents().contains(PollFlags::HUP) {
             std::thread::sleep(Duration::from_millis(1));
         }
     }
 }
 
-/// Something that is done to a simulated device.
+/// An action on a simulated device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Control {
-    /// The cable is pulled.
+    /// Unplugs the cable.
     Unplug,
-    /// It is put back: the port is another one.
+    /// Plugs the cable in again, on a new port.
     Plug,
-    /// The device loses its power for a moment.
+    /// Restarts the device.
     Reset,
-    /// Its supervision trips.
+    /// Trips the device's safety circuit.
     Trip,
-    /// Its processor hangs.
+    /// Stops the device's processor for a time.
     Stall(Duration),
 }
 
-/// How punctual the simulator was.
+/// Timing of the simulator.
 #[derive(Debug, Clone)]
-pub struct Punctuality {
-    /// Turns by how late they began, in whole µs; the last has all later ones.
+pub struct StepTiming {
+    /// Number of steps by lateness in whole µs; the last entry includes later ones.
     late_us: Vec<u64>,
-    /// Turns that were longer than [`LONGEST_TURN`], and what time stood still.
-    pub slips: u64,
-    /// See above.
-    pub slipped: Duration,
+    /// Number of steps that were longer than [`MAX_STEP`].
+    pub pauses: u64,
+    /// Total time by which the device's time is behind.
+    pub paused: Duration,
 }
 
-impl Punctuality {
-    /// How late a turn began at most, of the share `share` of all turns, µs.
-    pub fn percentile_us(&self, share: f64) -> usize {
+impl StepTiming {
+    /// Quantile of the lateness over all steps, µs; `fraction` is between 0 and 1.
+    pub fn quantile_us(&self, fraction: f64) -> usize {
         let total: u64 = self.late_us.iter().sum();
-        let wanted = (share * total as f64).ceil() as u64;
+        let wanted = (fraction * total as f64).ceil() as u64;
         let mut seen = 0;
         for (us, count) in self.late_us.iter().enumerate() {
             seen += count;
@@ -138,11 +137,11 @@ impl Punctuality {
                 return us;
             }
         }
-        LATEST_US
+        MAX_LATE_US
     }
 
-    /// Turns.
-    pub fn turns(&self) -> u64 {
+    /// Number of steps.
+    pub fn steps(&self) -> u64 {
         self.late_us.iter().sum()
     }
 }
@@ -152,22 +151,21 @@ impl Punctuality {
 pub struct Simulator {
     firmware: Firmware,
     pty: Option<Pty>,
-    /// A name that always leads to the present port.
+    /// Symbolic link that always leads to the current port.
     name: Option<PathBuf>,
-    there: Line,
-    back: Line,
+    to_device: Line,
+    to_host: Line,
     start: Instant,
-    punctuality: Punctuality,
-    /// The device's time.
+    timing: StepTiming,
+    /// Current time of the device.
     now: Duration,
 }
 
 impl Simulator {
-    /// A device with its port. `name` becomes a symbolic link to it, wherever it is
-    /// plugged in.
+    /// A device on a new port. `name` becomes a symbolic link to the current port.
     ///
     /// # Errors
-    /// [`LinkError`]: no pseudo-terminal, or the link cannot be made.
+    /// [`LinkError`] if there is no pseudo-terminal or the link cannot be created.
     pub fn open(
         firmware: Firmware,
         noise: Noise,
@@ -179,13 +177,13 @@ impl Simulator {
             firmware,
             pty: None,
             name,
-            there: line("there"),
-            back: line("back"),
+            to_device: line("there"),
+            to_host: line("back"),
             start: Instant::now(),
-            punctuality: Punctuality {
-                late_us: vec![0; LATEST_US + 1],
-                slips: 0,
-                slipped: Duration::ZERO,
+            timing: StepTiming {
+                late_us: vec![0; MAX_LATE_US + 1],
+                pauses: 0,
+                paused: Duration::ZERO,
             },
             now: Duration::ZERO,
         };
@@ -193,25 +191,25 @@ impl Simulator {
         Ok(simulator)
     }
 
-    /// Where a host finds it; empty while it is unplugged.
-    pub fn path(&self) -> &str {
-        self.pty.as_ref().map_or("", Pty::path)
+    /// Path of the port; `None` while it is unplugged.
+    pub fn path(&self) -> Option<&str> {
+        self.pty.as_ref().map(Pty::path)
     }
 
-    /// The device.
+    /// The simulated firmware.
     pub fn firmware(&self) -> &Firmware {
         &self.firmware
     }
 
-    /// How punctual it was so far.
-    pub fn punctuality(&self) -> &Punctuality {
-        &self.punctuality
+    /// Timing so far.
+    pub fn timing(&self) -> &StepTiming {
+        &self.timing
     }
 
-    /// Does something to it.
+    /// Performs an action on the device.
     ///
     /// # Errors
-    /// [`LinkError`]: it cannot be plugged in.
+    /// [`LinkError`] if it cannot be plugged in.
     pub fn control(&mut self, what: Control) -> Result<(), LinkError> {
         match what {
             Control::Unplug => self.pty = None,
@@ -229,41 +227,41 @@ impl Simulator {
         }
         let pty = Pty::open()?;
         if let Some(name) = &self.name {
-            point(name, pty.path()).map_err(|e| LinkError(format!("{}: {e}", name.display())))?;
+            replace_symlink(name, pty.path())
+                .map_err(|e| LinkError::System(format!("{}: {e}", name.display())))?;
         }
         self.pty = Some(pty);
         Ok(())
     }
 
-    /// One turn: waits for the next servo period or for bytes, then lets the device
-    /// do what is due.
-    pub fn turn(&mut self) {
-        let slipped = self.punctuality.slipped;
+    /// Waits for the next servo period or for bytes, then simulates up to now.
+    pub fn step(&mut self) {
+        let paused = self.timing.paused;
         let due = self.now + self.firmware.period();
-        let wait = (due + slipped).saturating_sub(self.start.elapsed());
+        let wait = (due + paused).saturating_sub(self.start.elapsed());
         match &self.pty {
             Some(pty) => pty.wait(wait),
             None => std::thread::sleep(wait),
         }
-        let mut now = self.start.elapsed().saturating_sub(slipped);
+        let mut now = self.start.elapsed().saturating_sub(paused);
         let late_us = now.saturating_sub(due).as_micros() as usize;
-        self.punctuality.late_us[late_us.min(LATEST_US)] += 1;
-        let longest = self.now + LONGEST_TURN;
+        self.timing.late_us[late_us.min(MAX_LATE_US)] += 1;
+        let longest = self.now + MAX_STEP;
         if now > longest {
-            self.punctuality.slips += 1;
-            self.punctuality.slipped += now - longest;
+            self.timing.pauses += 1;
+            self.timing.paused += now - longest;
             now = longest;
         }
         if let Some(pty) = &mut self.pty {
             for frame in frames(&pty.read()) {
-                self.there.send(frame.to_vec(), now);
+                self.to_device.send(frame.to_vec(), now);
             }
         }
-        self.firmware.receive(&self.there.arrived(now), now);
+        self.firmware.receive(&self.to_device.arrived(now), now);
         for frame in frames(&self.firmware.take_output()) {
-            self.back.send(frame.to_vec(), now);
+            self.to_host.send(frame.to_vec(), now);
         }
-        let bytes = self.back.arrived(now);
+        let bytes = self.to_host.arrived(now);
         if let Some(pty) = &mut self.pty {
             pty.write(&bytes);
         }
@@ -273,7 +271,7 @@ impl Simulator {
 
 impl Drop for Simulator {
     fn drop(&mut self) {
-        // a file of somebody else's stays, and it may never have been made
+        // Only a symbolic link is removed, never another file.
         if let Some(name) = &self.name
             && std::fs::symlink_metadata(name).is_ok_and(|found| found.is_symlink())
         {
@@ -282,8 +280,8 @@ impl Drop for Simulator {
     }
 }
 
-/// Makes `name` a symbolic link, in place of an earlier one but of nothing else.
-fn point(name: &Path, path: &str) -> std::io::Result<()> {
+/// Creates a symbolic link; replaces an earlier link but no other file.
+fn replace_symlink(name: &Path, path: &str) -> std::io::Result<()> {
     match std::fs::symlink_metadata(name) {
         Ok(found) if found.file_type().is_symlink() => std::fs::remove_file(name)?,
         Ok(_) => return Err(std::io::ErrorKind::AlreadyExists.into()),
@@ -292,7 +290,7 @@ fn point(name: &Path, path: &str) -> std::io::Result<()> {
     std::os::unix::fs::symlink(path, name)
 }
 
-/// Pieces that end where a frame does: faults strike single frames.
+/// Splits bytes at the ends of frames, so that faults affect single frames.
 fn frames(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     bytes.split_inclusive(|byte| *byte == 0)
 }
@@ -305,7 +303,7 @@ mod tests {
     use crate::device::serial::SerialLink;
 
     #[test]
-    fn bytes_go_both_ways_and_a_pulled_cable_is_an_end() {
+    fn bytes_pass_in_both_directions_and_unplugging_ends_the_link() {
         let mut pty = Pty::open().unwrap();
         let mut link = SerialLink::open(pty.path(), 460_800).unwrap();
         link.write(&[0, 1, 255, 3, 17, 19, 0]).unwrap();
@@ -316,30 +314,29 @@ mod tests {
         assert_eq!(buffer[..n], [13, 10, 4, 0]);
         assert_eq!(link.read(&mut buffer, Duration::from_millis(1)), Ok(0));
         let taken = SerialLink::open(pty.path(), 460_800).unwrap_err();
-        assert_eq!(taken.0, "another program has it");
+        assert_eq!(taken, LinkError::InUse);
         drop(pty);
         let end = link.read(&mut buffer, Duration::from_secs(5)).unwrap_err();
-        assert_eq!(end.0, "unplugged");
+        assert_eq!(end, LinkError::Unplugged);
     }
 
-    /// Whoever does not read cannot hold whoever writes.
+    /// A side that does not read cannot block the other.
     #[test]
-    fn a_device_that_reads_nothing_ends_the_link_and_a_host_that_does_not_costs_nothing() {
+    fn a_device_that_does_not_read_ends_the_link_and_a_host_that_does_not_read_loses_bytes() {
         let mut pty = Pty::open().unwrap();
         let mut link = SerialLink::open(pty.path(), 460_800).unwrap();
         let full = (0..10_000).find_map(|_| link.write(&[7; 100]).err());
-        assert_eq!(full.unwrap().0, "the port takes no bytes");
+        assert_eq!(full, Some(LinkError::WriteTimeout));
         for _ in 0..10_000 {
             pty.write(&[7; 100]);
         }
-        assert!(pty.waiting.len() <= WAITING);
+        assert!(pty.waiting.len() <= MAX_WAITING);
     }
 
     #[test]
-    fn a_name_leads_to_the_port_wherever_it_is_plugged_in() {
+    fn a_name_leads_to_the_current_port() {
         let folder = tempfile::tempdir().unwrap();
         let name = folder.path().join("port");
-        let firmware = Firmware::new(Options::default());
         let open = |name: &Path| {
             Simulator::open(
                 Firmware::new(Options::default()),
@@ -348,19 +345,18 @@ mod tests {
                 Some(name.to_owned()),
             )
         };
-        let mut simulator =
-            Simulator::open(firmware, Noise::default(), 1, Some(name.clone())).unwrap();
+        let mut simulator = open(&name).unwrap();
         let leads = || std::fs::read_link(&name).unwrap();
-        assert_eq!(leads(), Path::new(simulator.path()));
-        // somebody keeps the old port open: the new one has another number
-        let _held = SerialLink::open(simulator.path(), 460_800).unwrap();
+        assert_eq!(leads(), Path::new(simulator.path().unwrap()));
+        // With the old port still open the new one has another number.
+        let _held = SerialLink::open(simulator.path().unwrap(), 460_800).unwrap();
         simulator.control(Control::Unplug).unwrap();
         simulator.control(Control::Plug).unwrap();
-        assert_eq!(leads(), Path::new(simulator.path()));
+        assert_eq!(leads(), Path::new(simulator.path().unwrap()));
         drop(simulator);
         assert!(!name.exists());
         std::fs::write(&name, "mine").unwrap();
-        assert!(open(&name).is_err(), "a file is not overwritten");
+        assert!(open(&name).is_err(), "a file must not be replaced");
         assert_eq!(std::fs::read(&name).unwrap(), b"mine");
     }
 }

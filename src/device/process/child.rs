@@ -1,7 +1,7 @@
-//! A running child with the threads that read and write, and how it ended.
+//! A running program with the threads that read and write, and how it ended.
 
-use super::HELLO_WITHIN;
-use super::words::{self, Say};
+use super::HELLO_TIMEOUT;
+use super::messages::{self, ChildMessage, MessageError};
 use std::io::{BufRead as _, BufReader, Read, Write as _};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
@@ -10,206 +10,223 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use study_base::text::Untrusted;
 
-/// Longest line of a child, bytes.
+/// Longest line of a program, bytes.
 const MAX_LINE: u64 = 256 * 1024;
-/// Lines that wait to be taken in, and to be read by the child.
-const WAITING: usize = 256;
-/// How long a child may take to end by itself once its input is closed.
-const END_WITHIN: Duration = Duration::from_millis(300);
-/// How long its exit status is waited for once its output is closed: a busy machine
-/// takes a moment between the two.
-const STATUS_WITHIN: Duration = Duration::from_secs(2);
-/// How long its standard error is read on after it has ended: whom it has started may
-/// hold it open.
-const LAST_WORDS_WITHIN: Duration = Duration::from_secs(1);
-/// What is kept of the child's standard error, bytes.
-const LAST_WORDS: usize = 1024;
-/// Between two looks whether something has ended.
-const SLICE: Duration = Duration::from_millis(5);
-/// As much of the command as is told, characters.
+/// Largest number of queued lines in each direction.
+const QUEUE_LINES: usize = 256;
+/// Time that a program has to end by itself once its input is closed.
+const EXIT_TIMEOUT: Duration = Duration::from_millis(300);
+/// Time to wait for the exit status once the output is closed; a busy machine needs a
+/// moment between the two.
+const STATUS_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long standard error is read after the program has ended; programs that it has
+/// started may keep it open.
+const STDERR_TIMEOUT: Duration = Duration::from_secs(1);
+/// Number of bytes of standard error that are kept.
+const STDERR_KEPT: usize = 1024;
+/// Time between two checks whether something has ended.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
+/// Longest part of the command in messages, characters.
 const MAX_NAME: usize = 60;
 
-/// Why a child is no device any more.
+/// Why a program is no longer usable.
 #[derive(Debug)]
-pub(super) enum Why {
-    /// It reads or says nothing any more.
-    Gone,
-    /// What it did that is not described.
-    Wrong(String),
+pub(super) enum ChildFailure {
+    /// It has closed its input or output.
+    Closed,
+    /// It violates the specification; how.
+    Violation(String),
 }
 
-impl Why {
+impl ChildFailure {
     pub(super) fn no_hello() -> Self {
-        let within = HELLO_WITHIN.as_secs();
-        Self::Wrong(format!("it has not said hello within {within} s"))
+        let timeout = HELLO_TIMEOUT.as_secs();
+        Self::Violation(format!("it has sent no hello within {timeout} s"))
     }
 }
 
-/// A child with the threads that read and write.
+impl From<MessageError> for ChildFailure {
+    fn from(error: MessageError) -> Self {
+        Self::Violation(error.to_string())
+    }
+}
+
+/// Why a program cannot be started.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum StartError {
+    #[error("the command is empty")]
+    NoProgram,
+    #[error("the program `{program}` cannot be started: {reason}", program = Untrusted(.0), reason = spawn_failure(.1))]
+    Spawn(String, std::io::Error),
+    #[error("the program has no standard streams")]
+    NoStreams,
+}
+
+fn spawn_failure(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "there is no such program".to_owned(),
+        std::io::ErrorKind::PermissionDenied => "it is not executable".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+/// A running program with the threads that read and write.
 #[derive(Debug)]
 pub(super) struct Running {
-    /// The command, as it is told.
+    /// The command, as shown in messages.
     name: String,
     child: Child,
-    lines: Receiver<Said>,
-    /// Dropped to close the child's input.
-    words: SyncSender<String>,
-    last_words: Arc<Mutex<Vec<u8>>>,
-    /// Ends when its standard error does.
-    errors: JoinHandle<()>,
-    /// Lines so far.
-    heard: u64,
+    lines: Receiver<OutputLine>,
+    /// Dropped to close the program's input.
+    input: SyncSender<String>,
+    /// End of the standard error.
+    stderr: Arc<Mutex<Vec<u8>>>,
+    /// Ends with the program's standard error.
+    stderr_thread: JoinHandle<()>,
+    /// Lines received so far.
+    lines_read: u64,
 }
 
 #[derive(Debug)]
-enum Said {
+enum OutputLine {
     Line(Vec<u8>),
-    /// There is nothing after it.
-    Last(Why),
+    /// The output ends here.
+    Last(ChildFailure),
 }
 
 impl Running {
-    pub(super) fn start(command: &[String]) -> Result<Self, String> {
-        let (program, arguments) = command.split_first().ok_or("no program is named")?;
-        let cannot = |e: std::io::Error| {
-            let why = match e.kind() {
-                std::io::ErrorKind::NotFound => "there is no such program".to_owned(),
-                std::io::ErrorKind::PermissionDenied => "it is not executable".to_owned(),
-                _ => e.to_string(),
-            };
-            format!(
-                "the program `{}` cannot be started: {why}",
-                Untrusted(program)
-            )
-        };
+    pub(super) fn start(command: &[String]) -> Result<Self, StartError> {
+        let (program, arguments) = command.split_first().ok_or(StartError::NoProgram)?;
         let mut child = Command::new(program)
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
-            .map_err(cannot)?;
+            .map_err(|e| StartError::Spawn(program.clone(), e))?;
         let (Some(mut input), Some(output), Some(mut error)) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take())
         else {
-            return Err("the program has no standard streams".to_owned());
+            return Err(StartError::NoStreams);
         };
-        let (say, lines) = sync_channel(WAITING);
+        let (line_sender, lines) = sync_channel(QUEUE_LINES);
         std::thread::spawn(move || {
             let mut output = BufReader::new(output);
             loop {
-                let said = next_line(&mut output);
-                let over = matches!(said, Said::Last(_));
-                if say.send(said).is_err() || over {
+                let line = next_line(&mut output);
+                let last = matches!(line, OutputLine::Last(_));
+                if line_sender.send(line).is_err() || last {
                     return;
                 }
             }
         });
-        let (words, to_write) = sync_channel::<String>(WAITING);
+        let (input_sender, to_write) = sync_channel::<String>(QUEUE_LINES);
         std::thread::spawn(move || {
             while let Ok(line) = to_write.recv() {
-                // a child that has ended shows on its output
+                // The end of a program is noticed at its output.
                 if input.write_all(line.as_bytes()).is_err() || input.flush().is_err() {
                     return;
                 }
             }
         });
-        let last_words = Arc::new(Mutex::new(Vec::new()));
-        let kept = Arc::clone(&last_words);
-        let errors = std::thread::spawn(move || {
+        let stderr = Arc::new(Mutex::new(Vec::new()));
+        let kept = Arc::clone(&stderr);
+        let stderr_thread = std::thread::spawn(move || {
             let mut bytes = [0; 512];
             while let Ok(n @ 1..) = error.read(&mut bytes) {
                 let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
                 kept.extend_from_slice(&bytes[..n]);
-                let excess = kept.len().saturating_sub(LAST_WORDS);
+                let excess = kept.len().saturating_sub(STDERR_KEPT);
                 kept.drain(..excess);
             }
         });
         Ok(Self {
-            name: words::beginning(&command.join(" "), MAX_NAME),
+            name: messages::beginning(&command.join(" "), MAX_NAME),
             child,
             lines,
-            words,
-            last_words,
-            errors,
-            heard: 0,
+            input: input_sender,
+            stderr,
+            stderr_thread,
+            lines_read: 0,
         })
     }
 
-    /// The next thing that it says, if there is one within that time.
-    pub(super) fn listen(&mut self, within: Duration) -> Result<Option<Say>, Why> {
-        let line = match self.lines.recv_timeout(within) {
-            Ok(Said::Line(line)) => line,
-            Ok(Said::Last(why)) => return Err(why),
+    /// Waits at most `wait` for the next message.
+    pub(super) fn receive(&mut self, wait: Duration) -> Result<Option<ChildMessage>, ChildFailure> {
+        let line = match self.lines.recv_timeout(wait) {
+            Ok(OutputLine::Line(line)) => line,
+            Ok(OutputLine::Last(failure)) => return Err(failure),
             Err(RecvTimeoutError::Timeout) => return Ok(None),
-            Err(RecvTimeoutError::Disconnected) => return Err(Why::Gone),
+            Err(RecvTimeoutError::Disconnected) => return Err(ChildFailure::Closed),
         };
-        self.heard += 1;
-        match words::read(&line) {
-            Ok(say) => Ok(Some(say)),
-            Err(why) => Err(Why::Wrong(format!(
-                "its line {} is wrong: {why}",
-                self.heard
-            ))),
-        }
-    }
-
-    /// Says something to it, without waiting for it.
-    pub(super) fn tell(&mut self, line: String) -> Result<(), Why> {
-        self.words.try_send(line).map_err(|e| match e {
-            TrySendError::Full(_) => Why::Wrong("it does not read what it is told".to_owned()),
-            TrySendError::Disconnected(_) => Why::Gone,
+        self.lines_read += 1;
+        messages::read(&line).map(Some).map_err(|e| {
+            ChildFailure::Violation(format!("its line {} is invalid: {e}", self.lines_read))
         })
     }
 
-    /// Ends it, if it has not ended by itself; says why, how, and what it had to say
-    /// itself. Safe to print.
-    pub(super) fn end(&mut self, why: &Why) -> String {
-        let within = match why {
-            Why::Gone => STATUS_WITHIN,
-            Why::Wrong(_) => Duration::ZERO,
+    /// Queues a line for the program without waiting.
+    pub(super) fn send(&mut self, line: String) -> Result<(), ChildFailure> {
+        self.input.try_send(line).map_err(|e| match e {
+            TrySendError::Full(_) => {
+                ChildFailure::Violation("it does not read its input".to_owned())
+            }
+            TrySendError::Disconnected(_) => ChildFailure::Closed,
+        })
+    }
+
+    /// Ends the program if necessary. Returns a description of the failure with the exit
+    /// status and the last line of its standard error, safe to print.
+    pub(super) fn end(&mut self, failure: &ChildFailure) -> String {
+        let wait = match failure {
+            ChildFailure::Closed => STATUS_TIMEOUT,
+            ChildFailure::Violation(_) => Duration::ZERO,
         };
-        let ended = self.ended_within(within);
-        // it may have ended by itself
+        let ended = self.wait_for_exit(wait);
+        // The program may have ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
         let name = Untrusted(&self.name);
-        let mut text = match (why, ended) {
-            (Why::Gone, Some(status)) => {
+        let mut text = match (failure, ended) {
+            (ChildFailure::Closed, Some(status)) => {
                 format!("the program `{name}` has ended {}", how(status))
             }
-            (Why::Gone, None) => format!("the program `{name}` has closed its standard streams"),
-            (Why::Wrong(why), Some(status)) => {
-                let why = Untrusted(why);
-                format!("the program `{name}` has ended {}: {why}", how(status))
+            (ChildFailure::Closed, None) => {
+                format!("the program `{name}` has closed its standard streams")
             }
-            (Why::Wrong(why), None) => format!("the program `{name}`: {}", Untrusted(why)),
+            (ChildFailure::Violation(reason), Some(status)) => {
+                let reason = Untrusted(reason);
+                format!("the program `{name}` has ended {}: {reason}", how(status))
+            }
+            (ChildFailure::Violation(reason), None) => {
+                format!("the program `{name}`: {}", Untrusted(reason))
+            }
         };
         if let Some(last) = self.last_line() {
-            let last = words::short_text(&last);
-            text.push_str(&format!("; its last words: {}", Untrusted(&last)));
+            let last = messages::short_text(&last);
+            text.push_str(&format!("; its last error message: {}", Untrusted(&last)));
         }
         text
     }
 
-    fn ended_within(&mut self, within: Duration) -> Option<ExitStatus> {
-        let until = Instant::now() + within;
+    fn wait_for_exit(&mut self, wait: Duration) -> Option<ExitStatus> {
+        let until = Instant::now() + wait;
         loop {
             match self.child.try_wait() {
-                Ok(None) if Instant::now() < until => std::thread::sleep(SLICE),
+                Ok(None) if Instant::now() < until => std::thread::sleep(POLL_INTERVAL),
                 Ok(status) => return status,
                 Err(_) => return None,
             }
         }
     }
 
-    /// The last line of its standard error with something in it.
+    /// The last line of standard error that is not blank.
     fn last_line(&self) -> Option<String> {
-        let until = Instant::now() + LAST_WORDS_WITHIN;
-        while !self.errors.is_finished() && Instant::now() < until {
-            std::thread::sleep(SLICE);
+        let until = Instant::now() + STDERR_TIMEOUT;
+        while !self.stderr_thread.is_finished() && Instant::now() < until {
+            std::thread::sleep(POLL_INTERVAL);
         }
-        let last = self.last_words.lock();
+        let last = self.stderr.lock();
         let last = last.unwrap_or_else(PoisonError::into_inner);
         let last = String::from_utf8_lossy(&last);
         let line = last.lines().rev().find(|l| !l.trim().is_empty());
@@ -225,15 +242,15 @@ fn how(status: ExitStatus) -> String {
 }
 
 impl Drop for Running {
-    /// Limp, then a moment to end by itself with its input closed, then none.
+    /// Sends `limp`, closes the input, and kills the program if it does not end.
     fn drop(&mut self) {
         if self.child.try_wait().is_ok_and(|ended| ended.is_some()) {
             return;
         }
-        let _ = self.words.try_send(words::short("limp", u64::MAX));
+        let _ = self.input.try_send(messages::command("limp", u64::MAX));
         let (closed, _) = sync_channel(0);
-        self.words = closed;
-        if self.ended_within(END_WITHIN).is_some() {
+        self.input = closed;
+        if self.wait_for_exit(EXIT_TIMEOUT).is_some() {
             return;
         }
         let _ = self.child.kill();
@@ -241,15 +258,15 @@ impl Drop for Running {
     }
 }
 
-fn next_line(output: &mut impl std::io::BufRead) -> Said {
+fn next_line(output: &mut impl std::io::BufRead) -> OutputLine {
     let mut line = Vec::new();
     match output.take(MAX_LINE).read_until(b'\n', &mut line) {
-        Err(e) => Said::Last(Why::Wrong(format!("it cannot be read: {e}"))),
-        Ok(0) => Said::Last(Why::Gone),
-        Ok(_) if line.last() == Some(&b'\n') => Said::Line(line),
-        Ok(n) if n as u64 == MAX_LINE => Said::Last(Why::Wrong(format!(
+        Err(e) => OutputLine::Last(ChildFailure::Violation(format!("it cannot be read: {e}"))),
+        Ok(0) => OutputLine::Last(ChildFailure::Closed),
+        Ok(_) if line.last() == Some(&b'\n') => OutputLine::Line(line),
+        Ok(n) if n as u64 == MAX_LINE => OutputLine::Last(ChildFailure::Violation(format!(
             "a line is longer than {MAX_LINE} bytes"
         ))),
-        Ok(_) => Said::Last(Why::Gone),
+        Ok(_) => OutputLine::Last(ChildFailure::Closed),
     }
 }

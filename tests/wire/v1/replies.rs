@@ -10,7 +10,7 @@ pub(super) fn replies() -> Vec<Golden<Reply>> {
             message: Reply::Ack(Ack {
                 request: kind::PLAY,
                 refusal: Refusal::None,
-                state: State::Ramp,
+                state: DeviceState::Ramp,
                 fault: Fault::None,
                 clock_ms: 123_456,
                 detail: 0,
@@ -35,7 +35,7 @@ pub(super) fn replies() -> Vec<Golden<Reply>> {
             message: Reply::Ack(Ack {
                 request: kind::TABLE_COMMIT,
                 refusal: Refusal::Uncertified,
-                state: State::Idle,
+                state: DeviceState::Idle,
                 fault: Fault::None,
                 clock_ms: 1,
                 detail: 1,
@@ -131,7 +131,7 @@ pub(super) fn replies() -> Vec<Golden<Reply>> {
             message: Reply::Pulse(Pulse {
                 count: 258,
                 fresh: true,
-                state: State::Run,
+                state: DeviceState::Run,
                 fault: Fault::None,
                 clock_ms: 4_294_967_260,
             }),
@@ -180,8 +180,8 @@ pub(super) fn replies() -> Vec<Golden<Reply>> {
             name: "EVENT",
             sequence: 4,
             message: Reply::Event(Event {
-                what: Happening::Latched,
-                state: State::Fault,
+                kind: EventKind::Latched,
+                state: DeviceState::Fault,
                 fault: Fault::Velocity,
                 playback: 7,
                 tick: 48_000,
@@ -208,9 +208,9 @@ pub(super) fn replies() -> Vec<Golden<Reply>> {
                 playback: 8,
                 first: 0,
                 clock_ms: 200_000,
-                points: Few::of(&[RecordedPoint {
+                points: FixedVec::of(&[RecordedPoint {
                     x_nm: 17_500_000,
-                    force_un: 850_000,
+                    force_un: Some(850_000),
                     a_um_s2: -9_810_000,
                 }]),
             }),

@@ -156,7 +156,7 @@ pub(super) fn requests() -> Vec<Golden<Request>> {
                 playback: 7,
                 crc: TABLE_CRC,
                 longest_ms: 60_000,
-                every: 4,
+                every: NonZeroU16::new(4),
             }),
             body: &[
                 ("01", "version"),
@@ -262,7 +262,7 @@ pub(super) fn requests() -> Vec<Golden<Request>> {
             sequence: 10,
             message: Request::PathChunk(PathChunk {
                 first: 0,
-                x_nm: Few::of(&[17_500_000, 17_500_250, -1]),
+                x_nm: FixedVec::of(&[17_500_000, 17_500_250, -1]),
             }),
             body: &[
                 ("01", "version"),

@@ -1,32 +1,33 @@
-//! Probe mode: a path that the handle is moved along while its force is measured.
+//! Probe mode: the motor moves the handle along a path while the force is measured.
 
 use super::table::{Bounds, Refused};
 use super::{Drive, Handler, Measured, Out};
 use crate::message::probe::PathCrc;
-use crate::message::{Fault, PathBegin, PathChunk, RecordedPoint, Refusal, State, fixed};
+use crate::message::{DeviceState, Fault, PathBegin, PathChunk, RecordedPoint, Refusal, fixed};
 
-/// Further from its path than this the probe has lost it, mm.
-const LOST_MM: f64 = 5.0;
-/// Mean speed at which it goes to where the path begins, mm/s.
+/// Largest deviation from the path, mm.
+const MAX_DEVIATION_MM: f64 = 5.0;
+/// Mean speed of the approach to the first point, mm/s.
 const APPROACH_MM_S: f64 = 20.0;
-/// It takes at least so long, s.
-const APPROACH_S: f64 = 0.5;
+/// Shortest duration of the approach, s.
+const MIN_APPROACH_S: f64 = 0.5;
 
-/// Room for `N` points.
+/// A path with a capacity of `N` points.
 #[derive(Debug, Clone)]
-pub(super) struct Path<const N: usize> {
+pub(super) struct PathBuffer<const N: usize> {
     x_nm: [i32; N],
     len: usize,
     begin: Option<PathBegin>,
     crc: PathCrc,
-    /// Where the handle was when it began.
+    /// Position of the handle at the start of the approach.
     from_mm: Option<f64>,
-    /// Servo periods of the approach, and so far of it or of the path.
+    /// Duration of the approach, servo periods.
     approach: u32,
+    /// Servo periods since the start of the approach or of the path.
     ticks: u32,
 }
 
-impl<const N: usize> Path<N> {
+impl<const N: usize> PathBuffer<N> {
     pub(super) fn new() -> Self {
         Self {
             x_nm: [0; N],
@@ -73,8 +74,13 @@ impl<const N: usize> Path<N> {
         Ok(())
     }
 
-    /// Whether it is whole and can be followed: with which largest force, N.
-    pub(super) fn judge(&self, crc: u32, bounds: &Bounds, servo_hz: f64) -> Result<f64, Refused> {
+    /// Checks that the path is complete and within the bounds; its force limit, N.
+    pub(super) fn validate(
+        &self,
+        crc: u32,
+        bounds: &Bounds,
+        servo_hz: f64,
+    ) -> Result<f64, Refused> {
         let Some(begin) = &self.begin else {
             return Err((Refusal::WrongState, 0));
         };
@@ -111,20 +117,20 @@ impl<const N: usize> Path<N> {
         self.begin.map_or(0.0, |begin| begin.velocity_mm_s)
     }
 
-    /// To the beginning, from wherever the handle is.
+    /// Starts again with the approach from the current position.
     pub(super) fn rewind(&mut self) {
         self.from_mm = None;
         self.ticks = 0;
     }
 
-    /// mm and mm/s of the approach; `None` when it is over.
+    /// Position, mm, and speed, mm/s, of the approach; `None` when it is over.
     fn approach(&mut self, x_mm: f64, servo_hz: f64) -> Option<(f64, f64)> {
         let first_mm = fixed::from_nm(self.x_nm.first().copied().unwrap_or_default());
         let from_mm = match self.from_mm {
             Some(from_mm) => from_mm,
             None => {
-                let way_s = libm::fabs(first_mm - x_mm) / APPROACH_MM_S;
-                self.approach = libm::ceil(way_s.max(APPROACH_S) * servo_hz) as u32;
+                let approach_s = libm::fabs(first_mm - x_mm) / APPROACH_MM_S;
+                self.approach = libm::ceil(approach_s.max(MIN_APPROACH_S) * servo_hz) as u32;
                 self.from_mm = Some(x_mm);
                 x_mm
             }
@@ -132,21 +138,20 @@ impl<const N: usize> Path<N> {
         if self.ticks >= self.approach {
             return None;
         }
-        let share = f64::from(self.ticks) / f64::from(self.approach);
-        let turn = core::f64::consts::PI;
-        let by_mm = first_mm - from_mm;
-        let rate = turn * servo_hz / f64::from(self.approach);
+        let phase = core::f64::consts::PI * f64::from(self.ticks) / f64::from(self.approach);
+        let distance_mm = first_mm - from_mm;
+        let rate = core::f64::consts::PI * servo_hz / f64::from(self.approach);
         Some((
-            from_mm + by_mm * (0.5 - 0.5 * libm::cos(turn * share)),
-            by_mm * 0.5 * libm::sin(turn * share) * rate,
+            from_mm + distance_mm * (0.5 - 0.5 * libm::cos(phase)),
+            distance_mm * 0.5 * libm::sin(phase) * rate,
         ))
     }
 
-    /// mm and mm/s on the path, and whether a point has just been reached; `None`
-    /// behind the last one.
+    /// Position, mm, and speed, mm/s, on the path, and whether a point has just been
+    /// reached; `None` after the last point.
     fn along(&self, servo_hz: f64) -> Option<(f64, f64, bool)> {
         let rate_hz = self.begin?.rate_hz;
-        // the hair keeps a point that is due now from coming a period late
+        // The small offset keeps rounding from delaying a point by one period.
         let at = |tick: u32| f64::from(tick) * rate_hz / servo_hz + 1e-9;
         let now = at(self.ticks);
         let point = now as usize;
@@ -155,13 +160,12 @@ impl<const N: usize> Path<N> {
         }
         let reached = self.ticks == 0 || at(self.ticks - 1) as usize != point;
         let near = |offset: usize| {
-            // the point itself is 1 away, the ends stand still
+            // Offset 1 is the point itself; the ends are repeated.
             let at = (point + offset).saturating_sub(1).min(self.len - 1);
             fixed::from_nm(self.x_nm[at])
         };
         let [before, x, next, after] = [near(0), near(1), near(2), near(3)];
-        // a cubic with the slopes of the central differences, so that the speed has
-        // no steps
+        // A cubic with central differences as slopes, so that the speed is continuous.
         let (slope, next_slope) = (0.5 * (next - before), 0.5 * (after - x));
         let square = 3.0 * (next - x) - 2.0 * slope - next_slope;
         let cube = slope + next_slope - 2.0 * (next - x);
@@ -175,19 +179,19 @@ impl<const N: usize> Path<N> {
 }
 
 impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
-    /// One servo period of a recording.
+    /// Runs one servo period of a recording.
     pub(super) fn follow(&mut self, measured: Measured, now_ms: u32, out: Out<'_>) -> Drive {
         let servo_hz = self.profile.servo.servo_hz;
         let motion = measured.motion;
         let bounds = self.profile.bounds;
-        let known = motion.x_mm.is_finite()
+        let finite = motion.x_mm.is_finite()
             && motion.v_mm_s.is_finite()
             && motion.a_m_s2.is_finite()
             && measured.force_n.unwrap_or(0.0).is_finite();
-        // asked this way round, a limit that is no number trips
+        // With `<=` a limit that is NaN trips.
         let slow = libm::fabs(motion.v_mm_s) <= self.path.velocity_mm_s();
         let inside = motion.x_mm >= bounds.stroke_mm[0] && motion.x_mm <= bounds.stroke_mm[1];
-        let fault = if !known {
+        let fault = if !finite {
             Fault::NotANumber
         } else if !slow {
             Fault::Velocity
@@ -200,13 +204,13 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             self.trip(fault, now_ms, out);
             return Drive::Force(0.0);
         }
-        if self.state == State::Ramp {
+        if self.state == DeviceState::Ramp {
             if let Some((x_mm, v_mm_s)) = self.path.approach(motion.x_mm, servo_hz) {
                 self.path.ticks += 1;
-                return self.go(motion.x_mm, x_mm, v_mm_s, now_ms, out);
+                return self.drive_to(motion.x_mm, x_mm, v_mm_s, now_ms, out);
             }
             self.path.ticks = 0;
-            self.state = State::Run;
+            self.state = DeviceState::Run;
         }
         let Some((x_mm, v_mm_s, reached)) = self.path.along(servo_hz) else {
             self.end();
@@ -218,18 +222,26 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         if reached {
             let point = RecordedPoint {
                 x_nm: fixed::nm(motion.x_mm),
-                force_un: fixed::maybe_un(measured.force_n),
+                force_un: measured.force_n.map(fixed::un),
                 a_um_s2: fixed::um_s2(motion.a_m_s2),
             };
-            if self.run.recorded(point, now_ms) {
+            if self.run.add_point(point, now_ms) {
                 self.flush(out);
             }
         }
-        self.go(motion.x_mm, x_mm, v_mm_s, now_ms, out)
+        self.drive_to(motion.x_mm, x_mm, v_mm_s, now_ms, out)
     }
 
-    fn go(&mut self, is_mm: f64, x_mm: f64, v_mm_s: f64, now_ms: u32, out: Out<'_>) -> Drive {
-        if libm::fabs(x_mm - is_mm) > LOST_MM {
+    /// Commands a position on the path, or trips if the handle is too far from it.
+    fn drive_to(
+        &mut self,
+        actual_mm: f64,
+        x_mm: f64,
+        v_mm_s: f64,
+        now_ms: u32,
+        out: Out<'_>,
+    ) -> Drive {
+        if libm::fabs(x_mm - actual_mm) > MAX_DEVIATION_MM {
             self.trip(Fault::Following, now_ms, out);
             return Drive::Force(0.0);
         }

@@ -1,29 +1,29 @@
-//! The table that a device has been given, and whether it may be played.
+//! The uploaded table and the checks before it may be played.
 
 use crate::certificate::{self, Certificate};
 use crate::message::{Node, Refusal, TableBegin, TableChunk, TableCrc};
 use crate::predict::{BranchView, Direction, Lookup, TableView};
 
-/// What a device renders stably and reaches, whatever is asked.
+/// Limits of a device for every upload.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// Largest force, N.
     pub force_n: f64,
-    /// Speed above which it trips, mm/s.
+    /// Largest velocity limit, mm/s.
     pub velocity_mm_s: f64,
-    /// Stiffest table, N/mm.
+    /// Largest stiffness of a table that the device renders stably, N/mm.
     pub stiffness_n_per_mm: f64,
-    /// Strongest damping of a table, N·s/mm.
+    /// Largest damping of a table that the device renders stably, N·s/mm.
     pub damping_n_s_per_mm: f64,
-    /// Lowest and highest position that the handle can reach, mm.
+    /// Lowest and highest position of the handle, mm.
     pub stroke_mm: [f64; 2],
 }
 
-/// Room for `N` nodes.
+/// A table with a capacity of `N` nodes.
 #[derive(Debug, Clone)]
-pub(super) struct Table<const N: usize> {
+pub(super) struct TableBuffer<const N: usize> {
     x_mm: [f64; N],
-    /// m, b, k, F0 of v > 0 and of v < 0.
+    /// m, b, k, F0 for v > 0; below for v < 0.
     positive: [[f64; N]; 4],
     negative: [[f64; N]; 4],
     len: usize,
@@ -31,10 +31,10 @@ pub(super) struct Table<const N: usize> {
     crc: TableCrc,
 }
 
-/// A refusal and its detail.
+/// A refusal and its detail, see [`Refusal`].
 pub(super) type Refused = (Refusal, u32);
 
-impl<const N: usize> Table<N> {
+impl<const N: usize> TableBuffer<N> {
     pub(super) fn new() -> Self {
         Self {
             x_mm: [0.0; N],
@@ -46,7 +46,7 @@ impl<const N: usize> Table<N> {
         }
     }
 
-    /// Forgets what is there and takes in the next.
+    /// Begins a new upload in place of the old one.
     pub(super) fn begin(&mut self, begin: &TableBegin) -> Result<(), Refused> {
         self.clear();
         if usize::from(begin.nodes) > N {
@@ -104,8 +104,8 @@ impl<const N: usize> Table<N> {
         }
     }
 
-    /// Whether it is whole and may be played: with which largest force, N.
-    pub(super) fn judge(&self, crc: u32, bounds: &Bounds) -> Result<f64, Refused> {
+    /// Checks that the table is complete and may be played; its force limit, N.
+    pub(super) fn validate(&self, crc: u32, bounds: &Bounds) -> Result<f64, Refused> {
         let Some(begin) = &self.begin else {
             return Err((Refusal::WrongState, 0));
         };
@@ -115,22 +115,22 @@ impl<const N: usize> Table<N> {
         if self.crc() != crc {
             return Err((Refusal::Checksum, self.crc()));
         }
-        self.evaluable(begin)?;
-        limits(begin, bounds)?;
+        self.check_evaluable(begin)?;
+        check_limits(begin, bounds)?;
         let range = certificate::Range {
             x_mm: begin.range_mm,
             v_mm_s: begin.trained_mm_s,
         };
         let certificate = certificate::certify(&self.view(), begin.direction, range);
-        match (physics(&certificate, bounds), begin.uncertified_n) {
+        match (check_physics(&certificate, bounds), begin.uncertified_n) {
             (Ok(()), _) => Ok(begin.force_n),
             (Err(_), Some(cap_n)) => Ok(cap_n.min(begin.force_n)),
             (Err(refused), None) => Err(refused),
         }
     }
 
-    /// Whether every position has a force.
-    fn evaluable(&self, begin: &TableBegin) -> Result<(), Refused> {
+    /// Checks that the force is defined at every position.
+    fn check_evaluable(&self, begin: &TableBegin) -> Result<(), Refused> {
         let bad = |node: usize| Err((Refusal::BadTable, node as u32));
         if self.len < 2 {
             return bad(self.len);
@@ -168,8 +168,8 @@ fn branch<const N: usize>(parameters: &[[f64; N]; 4], len: usize) -> BranchView<
     }
 }
 
-/// Every limit is a finite positive number and not above the device's.
-fn limits(begin: &TableBegin, bounds: &Bounds) -> Result<(), Refused> {
+/// Checks that every limit is finite, positive and not above the device's.
+fn check_limits(begin: &TableBegin, bounds: &Bounds) -> Result<(), Refused> {
     let within = |value: f64, most: f64| positive(value) && value <= most;
     let cap_fits = begin
         .uncertified_n
@@ -186,8 +186,9 @@ fn limits(begin: &TableBegin, bounds: &Bounds) -> Result<(), Refused> {
     }
 }
 
-/// What a table has to keep to be played without being armed.
-fn physics(certificate: &Certificate, bounds: &Bounds) -> Result<(), Refused> {
+/// Conditions for playing a table without the explicit permission to play it
+/// uncertified.
+fn check_physics(certificate: &Certificate, bounds: &Bounds) -> Result<(), Refused> {
     if !certificate.mass.holds() {
         Err((Refusal::Uncertified, 1))
     } else if !certificate.damping.holds() {
@@ -203,7 +204,7 @@ fn physics(certificate: &Certificate, bounds: &Bounds) -> Result<(), Refused> {
     }
 }
 
-/// Asked this way round, what is no number is too much.
+/// False if `value` is NaN.
 fn at_most(value: f64, most: f64) -> bool {
     value <= most
 }

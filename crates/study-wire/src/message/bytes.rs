@@ -1,10 +1,10 @@
-//! Little-endian fields in and out of slices.
+//! Writing and reading of little-endian fields.
 
 use super::WireError;
 use crate::frame::MAX_BODY;
 
-/// A body under construction. Every message of version 1 fits; what would not is
-/// cut off and told by [`Writer::done`].
+/// Writes a body. Every message of version 1 fits; [`Writer::done`] reports an
+/// overflow.
 #[derive(Debug, Clone)]
 pub(super) struct Writer {
     bytes: [u8; MAX_BODY],
@@ -23,8 +23,8 @@ impl Writer {
 
     pub(super) fn bytes(&mut self, bytes: &[u8]) {
         match self.bytes.get_mut(self.len..self.len + bytes.len()) {
-            Some(place) => {
-                place.copy_from_slice(bytes);
+            Some(free) => {
+                free.copy_from_slice(bytes);
                 self.len += bytes.len();
             }
             None => self.overflow = true,
@@ -51,13 +51,13 @@ impl Writer {
         self.bytes(&value.to_le_bytes());
     }
 
-    /// What has been written, unless it was too much.
+    /// The body; `None` after an overflow.
     pub(super) fn done(&self) -> Option<&[u8]> {
         (!self.overflow).then(|| &self.bytes[..self.len])
     }
 }
 
-/// What is left of a body.
+/// Reads the rest of a body.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reader<'a>(&'a [u8]);
 
@@ -88,12 +88,12 @@ impl<'a> Reader<'a> {
         Ok(i32::from_le_bytes(self.array()?))
     }
 
-    /// Any float, also one that is no number.
+    /// Any float, including NaN and infinities.
     pub(super) fn f64(&mut self) -> Result<f64, WireError> {
         Ok(f64::from_le_bytes(self.array()?))
     }
 
-    /// A float that is a number.
+    /// A finite float.
     pub(super) fn finite(&mut self) -> Result<f64, WireError> {
         let value = self.f64()?;
         if value.is_finite() {
@@ -103,7 +103,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Nothing may be left over.
+    /// Checks that nothing is left.
     pub(super) fn done(self) -> Result<(), WireError> {
         if self.0.is_empty() {
             Ok(())

@@ -1,32 +1,32 @@
-//! The upload of a path for a probe: PATH_BEGIN, PATH_CHUNK.
+//! Upload of a path for a probe: PATH_BEGIN, PATH_CHUNK.
 
 use super::bytes::{Reader, Writer};
-use super::{Few, WireError};
+use super::{FixedVec, WireError};
 use crate::frame::RunningCrc;
 
-/// What a path is.
+/// Properties of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathBegin {
-    /// How many points follow.
+    /// Number of points that follow.
     pub points: u32,
-    /// Points per second; the recording has as many samples.
+    /// Points per second, and samples per second of the recording.
     pub rate_hz: f64,
-    /// The largest force asked for, N.
+    /// Requested force limit, N.
     pub force_n: f64,
-    /// The speed above which it trips asked for, mm/s.
+    /// Requested velocity limit, mm/s.
     pub velocity_mm_s: f64,
 }
 
-/// Some points.
+/// Consecutive points of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathChunk {
-    /// Number of the first, from 0.
+    /// Index of the first point, from 0.
     pub first: u32,
     /// One to 56 positions, nm.
-    pub x_nm: Few<i32, 56>,
+    pub x_nm: FixedVec<i32, 56>,
 }
 
-/// The CRC over a whole path.
+/// Accumulates the CRC of a path.
 #[derive(Debug, Clone, Default)]
 pub struct PathCrc(RunningCrc);
 
@@ -51,9 +51,9 @@ impl PathBegin {
 }
 
 impl PathChunk {
-    /// Most points in one chunk.
-    pub const MOST: usize = 56;
-    pub(super) const MOST_LEN: usize = 4 + 1 + Self::MOST * 4;
+    /// Largest number of points in one chunk.
+    pub const MAX_POINTS: usize = 56;
+    pub(super) const MAX_LEN: usize = 4 + 1 + Self::MAX_POINTS * 4;
 
     pub(super) fn write(&self, out: &mut Writer) {
         let points = self.x_nm.as_slice();
@@ -67,10 +67,10 @@ impl PathChunk {
     pub(super) fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
         let first = from.u32()?;
         let count = usize::from(from.u8()?);
-        if !(1..=Self::MOST).contains(&count) {
+        if !(1..=Self::MAX_POINTS).contains(&count) {
             return Err(WireError::Field);
         }
-        let mut x_nm = Few::new();
+        let mut x_nm = FixedVec::new();
         for _ in 0..count {
             x_nm.push(from.i32()?);
         }
@@ -79,7 +79,7 @@ impl PathChunk {
 }
 
 impl PathCrc {
-    /// Of a path that begins so.
+    /// Starts with the fields of PATH_BEGIN.
     pub fn of(begin: &PathBegin) -> Self {
         let mut crc = RunningCrc::new();
         let mut out = Writer::new();
@@ -88,12 +88,12 @@ impl PathCrc {
         Self(crc)
     }
 
-    /// Takes in the next point.
+    /// Adds the next point.
     pub fn point(&mut self, x_nm: i32) {
         self.0.update(&x_nm.to_le_bytes());
     }
 
-    /// Of everything so far.
+    /// The CRC of everything so far.
     pub fn value(&self) -> u32 {
         self.0.value()
     }

@@ -1,148 +1,148 @@
-//! What a device answers: ACK, IDENTITY, OUTCOME, PULSE.
+//! Replies of a device: ACK, IDENTITY, OUTCOME, PULSE.
 
 use super::WireError;
 use super::bytes::{Reader, Writer};
-use super::code::{Fault, Loaded, Refusal, State};
+use super::code::{DeviceState, Fault, Loaded, Refusal};
 
-/// How a request ended.
+/// Result of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ack {
     /// Type of the request.
     pub request: u8,
-    /// [`Refusal::None`] if it was done.
+    /// [`Refusal::None`] if the request was executed.
     pub refusal: Refusal,
-    /// The device's state after it.
-    pub state: State,
-    /// Why it is limp, if it is.
+    /// State of the device after the request.
+    pub state: DeviceState,
+    /// Why the device is limp, or why the last playback ended.
     pub fault: Fault,
-    /// The device's clock, ms, wrapping.
+    /// Clock of the device, ms, wrapping.
     pub clock_ms: u32,
-    /// What [`Refusal`] says of it; else 0.
+    /// Detail of the refusal, see [`Refusal`]; else 0.
     pub detail: u32,
 }
 
-/// What a device has.
+/// Optional features of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Flags {
-    /// Measures the force that it gives.
+    /// Measures the force on the handle.
     pub force_sensor: bool,
-    /// No motor and no hand is behind it.
+    /// Simulated, without motor and hand.
     pub simulated: bool,
     /// Sends TELEMETRY.
     pub telemetry: bool,
-    /// Can follow a path and record.
+    /// Can record along a path.
     pub probe: bool,
 }
 
-/// Text of a device: UTF-8, padded with zeros. Not to be trusted.
+/// Text of a device: UTF-8, padded with zeros. It is untrusted input.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 pub struct Name([u8; Name::LEN]);
 
-/// Who a device is and what it never exceeds.
+/// Identity and limits of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Identity {
-    /// That of HELLO.
+    /// The nonce of HELLO.
     pub nonce: u32,
-    /// Oldest and newest version that the device speaks.
+    /// Oldest and newest supported version.
     pub versions: [u8; 2],
-    /// What it is doing.
-    pub state: State,
-    /// Why it is limp, if it is.
+    /// State of the device.
+    pub state: DeviceState,
+    /// Why the device is limp, or why the last playback ended.
     pub fault: Fault,
-    /// What it has.
+    /// Optional features.
     pub flags: Flags,
-    /// Its clock, ms, wrapping.
+    /// Clock of the device, ms, wrapping.
     pub clock_ms: u32,
-    /// Time without a fresh heartbeat after which it goes limp, ms.
+    /// Time without a fresh heartbeat after which the device goes limp, ms.
     pub watchdog_ms: u16,
-    /// Most nodes of a table.
-    pub most_nodes: u16,
-    /// Most points of a path; 0 without probe mode.
-    pub most_points: u32,
+    /// Largest number of nodes of a table.
+    pub max_nodes: u16,
+    /// Largest number of points of a path; 0 without probe mode.
+    pub max_points: u32,
     /// Longest duration of a playback or recording, ms.
     pub longest_ms: u32,
     /// Servo periods per second.
     pub servo_hz: f64,
-    /// Telemetry samples per second.
+    /// Highest telemetry rate, samples per second.
     pub telemetry_hz: f64,
     /// Largest force, N.
     pub force_n: f64,
-    /// Speed above which it trips, mm/s.
+    /// Largest velocity limit, mm/s.
     pub velocity_mm_s: f64,
-    /// Stiffest table that it renders stably, N/mm.
+    /// Largest stiffness that it renders stably, N/mm.
     pub stiffness_n_per_mm: f64,
-    /// Strongest damping that it renders stably, N·s/mm.
+    /// Largest damping that it renders stably, N·s/mm.
     pub damping_n_s_per_mm: f64,
-    /// Lowest and highest position that the handle can reach, mm.
+    /// Lowest and highest position of the handle, mm.
     pub stroke_mm: [f64; 2],
-    /// Its firmware and version.
+    /// Name and version of the firmware.
     pub firmware: Name,
-    /// Its serial number: names the device wherever it is plugged in.
+    /// Serial number, the same on every port.
     pub serial: Name,
 }
 
-/// How a device is, and what came of the last playback or recording.
+/// State of the device and outcome of the last playback or recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// What it is doing.
-    pub state: State,
-    /// Why it is limp or the playback ended; [`Fault::None`] if by STOP.
+    /// State of the device.
+    pub state: DeviceState,
+    /// Why the device is limp, or why the playback ended; [`Fault::None`] after STOP.
     pub fault: Fault,
     /// What is loaded.
     pub loaded: Loaded,
-    /// Its clock, ms, wrapping.
+    /// Clock of the device, ms, wrapping.
     pub clock_ms: u32,
     /// CRC of what is loaded; 0 if nothing is.
     pub crc: u32,
-    /// The last playback's number; 0 before the first.
+    /// The host's number of the last playback; 0 before the first.
     pub playback: u32,
-    /// Servo periods that it has lasted.
+    /// Duration of that playback, servo periods.
     pub ticks: u32,
-    /// Samples that were taken for the stream.
+    /// Samples taken for the stream.
     pub samples: u32,
     /// Full strokes.
     pub strokes: u32,
-    /// Changes of the direction's sign.
+    /// Sign changes of the direction state.
     pub switches: u32,
-    /// How often the force ran into its limit.
+    /// How often the force reached its limit.
     pub clamps: u32,
-    /// Servo periods in which the change of force was limited.
+    /// Servo periods in which the slew limit was active.
     pub slewed: u32,
-    /// Servo periods in which the mass was held to the least one.
+    /// Servo periods in which the mass was raised to the smallest one.
     pub mass_held: u32,
     /// Energy that the hand has put in, J.
     pub energy_j: f64,
-    /// Its least value, J.
+    /// Smallest value of that energy, J.
     pub least_energy_j: f64,
-    /// Largest size of the commanded force, N.
-    pub most_force_n: f64,
+    /// Largest magnitude of the commanded force, N.
+    pub peak_force_n: f64,
     /// Mean square of the commanded force above 20 Hz, N².
     pub rough_n2: f64,
-    /// The largest force it may have: after every cap, N; 0 if nothing is loaded.
+    /// Force limit of what is loaded, with every cap applied, N; 0 if nothing is.
     pub limit_n: f64,
-    /// Frames thrown away since power-up: CRC, length, type, fields.
+    /// Frames discarded since power-up because of CRC, length, type or fields.
     pub bad_frames: u32,
     /// Heartbeats since power-up that were old or past their deadline.
     pub stale_beats: u32,
 }
 
-/// The answer to a heartbeat.
+/// Reply to a heartbeat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pulse {
-    /// That of the heartbeat.
+    /// Count of the heartbeat.
     pub count: u32,
     /// Whether the heartbeat was fresh.
     pub fresh: bool,
-    /// What the device is doing.
-    pub state: State,
-    /// Why it is limp, if it is.
+    /// State of the device.
+    pub state: DeviceState,
+    /// Why the device is limp, or why the last playback ended.
     pub fault: Fault,
-    /// Its clock, ms, wrapping.
+    /// Clock of the device, ms, wrapping.
     pub clock_ms: u32,
 }
 
-fn state(from: &mut Reader<'_>) -> Result<State, WireError> {
-    State::from_code(from.u8()?).ok_or(WireError::Field)
+fn state(from: &mut Reader<'_>) -> Result<DeviceState, WireError> {
+    DeviceState::from_code(from.u8()?).ok_or(WireError::Field)
 }
 
 fn fault(from: &mut Reader<'_>) -> Result<Fault, WireError> {
@@ -228,8 +228,8 @@ impl Identity {
         out.u8(self.flags.bits());
         out.u32(self.clock_ms);
         out.u16(self.watchdog_ms);
-        out.u16(self.most_nodes);
-        out.u32(self.most_points);
+        out.u16(self.max_nodes);
+        out.u32(self.max_points);
         out.u32(self.longest_ms);
         out.f64(self.servo_hz);
         out.f64(self.telemetry_hz);
@@ -252,8 +252,8 @@ impl Identity {
             flags: Flags::from_bits(from.u8()?).ok_or(WireError::Field)?,
             clock_ms: from.u32()?,
             watchdog_ms: from.u16()?,
-            most_nodes: from.u16()?,
-            most_points: from.u32()?,
+            max_nodes: from.u16()?,
+            max_points: from.u32()?,
             longest_ms: from.u32()?,
             servo_hz: positive(from)?,
             telemetry_hz: from.finite()?,
@@ -301,7 +301,7 @@ impl Outcome {
         for quantity in [
             self.energy_j,
             self.least_energy_j,
-            self.most_force_n,
+            self.peak_force_n,
             self.rough_n2,
             self.limit_n,
         ] {
@@ -328,7 +328,7 @@ impl Outcome {
             mass_held: from.u32()?,
             energy_j: from.finite()?,
             least_energy_j: from.finite()?,
-            most_force_n: from.finite()?,
+            peak_force_n: from.finite()?,
             rough_n2: from.finite()?,
             limit_n: from.finite()?,
             bad_frames: from.u32()?,

@@ -1,11 +1,14 @@
-//! What a device sends by itself: TELEMETRY, EVENT, RECORDED.
+//! Unsolicited messages of a device: TELEMETRY, EVENT, RECORDED.
 //!
-//! Nothing of it is acknowledged or repeated. Samples are counted from the start
-//! of the playback, so that a host sees how many it has missed.
+//! They are neither acknowledged nor repeated. Samples are numbered from the start
+//! of the playback, so that a host can count lost ones.
 
 use super::bytes::{Reader, Writer};
-use super::code::{Fault, Happening, State};
-use super::{Few, WireError};
+use super::code::{DeviceState, EventKind, Fault};
+use super::{FixedVec, WireError};
+
+/// Code on the wire for a force without a sensor.
+const NO_SENSOR: i32 = i32::MIN;
 
 /// One servo period of a playback. See [`super::fixed`] for the units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -18,72 +21,72 @@ pub struct TelemetrySample {
     pub v_um_s: i32,
     /// Commanded force, µN, after every limit.
     pub command_un: i32,
-    /// Measured force, µN, or [`super::fixed::NONE`].
-    pub measured_un: i32,
+    /// Measured force, µN; `None` without a force sensor.
+    pub measured_un: Option<i32>,
 }
 
-/// Some samples of a playback.
+/// Consecutive samples of a playback.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Telemetry {
-    /// Which playback.
+    /// The host's number of the playback.
     pub playback: u32,
-    /// How many samples of it came before, whether they arrived or not.
+    /// Number of earlier samples of this playback, received or lost.
     pub first: u32,
-    /// The device's clock when the last of the samples was taken, ms, wrapping.
+    /// Clock of the device when the last of the samples was taken, ms, wrapping.
     pub clock_ms: u32,
     /// Full strokes so far.
     pub strokes: u32,
     /// Clamps so far.
     pub clamps: u32,
     /// One to ten.
-    pub samples: Few<TelemetrySample, 10>,
+    pub samples: FixedVec<TelemetrySample, 10>,
 }
 
-/// Something has happened. If it gets lost, the next PULSE or OUTCOME says it.
+/// A change of state. If it is lost, the next PULSE or OUTCOME shows the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Event {
-    /// What.
-    pub what: Happening,
-    /// The device's state from then on.
-    pub state: State,
-    /// Why.
+    /// Kind of the event.
+    pub kind: EventKind,
+    /// State of the device after the event.
+    pub state: DeviceState,
+    /// Cause of the event.
     pub fault: Fault,
-    /// The playback's number.
+    /// The host's number of the playback.
     pub playback: u32,
-    /// Servo periods since the start.
+    /// Servo periods since the start of the playback.
     pub tick: u32,
-    /// The device's clock, ms, wrapping.
+    /// Clock of the device, ms, wrapping.
     pub clock_ms: u32,
 }
 
-/// What the probe measured at one point of its path.
+/// Measurement of the probe at one point of its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RecordedPoint {
     /// Position, nm.
     pub x_nm: i32,
-    /// Force that the probe applies, µN.
-    pub force_un: i32,
+    /// Force that the probe applies, µN; `None` without a force sensor.
+    pub force_un: Option<i32>,
     /// Acceleration, µm/s².
     pub a_um_s2: i32,
 }
 
-/// Some samples of a recording: the n-th belongs to the n-th point of the path.
+/// Consecutive samples of a recording; sample n belongs to point n of the path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recorded {
-    /// Which recording.
+    /// The host's number of the recording.
     pub playback: u32,
-    /// Number of the first, from 0.
+    /// Number of the first sample, from 0.
     pub first: u32,
-    /// The device's clock when the last of them was taken, ms, wrapping.
+    /// Clock of the device when the last of the samples was taken, ms, wrapping.
     pub clock_ms: u32,
     /// One to 18.
-    pub points: Few<RecordedPoint, 18>,
+    pub points: FixedVec<RecordedPoint, 18>,
 }
 
 impl Telemetry {
-    /// Most samples in one message.
-    pub const MOST: usize = 10;
-    pub(super) const MOST_LEN: usize = 4 * 5 + 1 + Self::MOST * 20;
+    /// Largest number of samples in one message.
+    pub const MAX_SAMPLES: usize = 10;
+    pub(super) const MAX_LEN: usize = 4 * 5 + 1 + Self::MAX_SAMPLES * 20;
 
     pub(super) fn write(&self, out: &mut Writer) {
         let samples = self.samples.as_slice();
@@ -102,7 +105,7 @@ impl Telemetry {
             out.i32(sample.x_nm);
             out.i32(sample.v_um_s);
             out.i32(sample.command_un);
-            out.i32(sample.measured_un);
+            out.i32(sample.measured_un.unwrap_or(NO_SENSOR));
         }
     }
 
@@ -113,15 +116,15 @@ impl Telemetry {
             clock_ms: from.u32()?,
             strokes: from.u32()?,
             clamps: from.u32()?,
-            samples: Few::new(),
+            samples: FixedVec::new(),
         };
-        for _ in 0..count(from, Self::MOST)? {
+        for _ in 0..count(from, Self::MAX_SAMPLES)? {
             telemetry.samples.push(TelemetrySample {
                 tick: from.u32()?,
                 x_nm: from.i32()?,
                 v_um_s: from.i32()?,
                 command_un: from.i32()?,
-                measured_un: from.i32()?,
+                measured_un: force(from)?,
             });
         }
         Ok(telemetry)
@@ -130,7 +133,7 @@ impl Telemetry {
 
 impl Event {
     pub(super) fn write(&self, out: &mut Writer) {
-        out.u8(self.what.code());
+        out.u8(self.kind.code());
         out.u8(self.state.code());
         out.u8(self.fault.code());
         out.u32(self.playback);
@@ -140,8 +143,8 @@ impl Event {
 
     pub(super) fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
         Ok(Self {
-            what: Happening::from_code(from.u8()?).ok_or(WireError::Field)?,
-            state: State::from_code(from.u8()?).ok_or(WireError::Field)?,
+            kind: EventKind::from_code(from.u8()?).ok_or(WireError::Field)?,
+            state: DeviceState::from_code(from.u8()?).ok_or(WireError::Field)?,
             fault: Fault::from_code(from.u8()?).ok_or(WireError::Field)?,
             playback: from.u32()?,
             tick: from.u32()?,
@@ -151,9 +154,9 @@ impl Event {
 }
 
 impl Recorded {
-    /// Most samples in one message.
-    pub const MOST: usize = 18;
-    pub(super) const MOST_LEN: usize = 4 * 3 + 1 + Self::MOST * 12;
+    /// Largest number of samples in one message.
+    pub const MAX_POINTS: usize = 18;
+    pub(super) const MAX_LEN: usize = 4 * 3 + 1 + Self::MAX_POINTS * 12;
 
     pub(super) fn write(&self, out: &mut Writer) {
         let points = self.points.as_slice();
@@ -163,7 +166,7 @@ impl Recorded {
         out.u8(points.len() as u8);
         for point in points {
             out.i32(point.x_nm);
-            out.i32(point.force_un);
+            out.i32(point.force_un.unwrap_or(NO_SENSOR));
             out.i32(point.a_um_s2);
         }
     }
@@ -173,12 +176,12 @@ impl Recorded {
             playback: from.u32()?,
             first: from.u32()?,
             clock_ms: from.u32()?,
-            points: Few::new(),
+            points: FixedVec::new(),
         };
-        for _ in 0..count(from, Self::MOST)? {
+        for _ in 0..count(from, Self::MAX_POINTS)? {
             recorded.points.push(RecordedPoint {
                 x_nm: from.i32()?,
-                force_un: from.i32()?,
+                force_un: force(from)?,
                 a_um_s2: from.i32()?,
             });
         }
@@ -186,9 +189,14 @@ impl Recorded {
     }
 }
 
-fn count(from: &mut Reader<'_>, most: usize) -> Result<usize, WireError> {
+fn force(from: &mut Reader<'_>) -> Result<Option<i32>, WireError> {
+    let force_un = from.i32()?;
+    Ok((force_un != NO_SENSOR).then_some(force_un))
+}
+
+fn count(from: &mut Reader<'_>, max: usize) -> Result<usize, WireError> {
     let count = usize::from(from.u8()?);
-    if (1..=most).contains(&count) {
+    if (1..=max).contains(&count) {
         Ok(count)
     } else {
         Err(WireError::Field)

@@ -1,39 +1,39 @@
-//! The upload of a table: TABLE_BEGIN, TABLE_CHUNK.
+//! Upload of a table: TABLE_BEGIN, TABLE_CHUNK.
 //!
-//! Nothing is judged here: limits and nodes are whatever the bytes say, and the
-//! device refuses what it cannot play with a code of its own.
+//! Values are not checked here. The handler checks limits and nodes and refuses an
+//! invalid table with its own code.
 
 use super::bytes::{Reader, Writer};
-use super::{Few, WireError};
+use super::{FixedVec, WireError};
 use crate::frame::RunningCrc;
 use crate::predict::{Direction, Lookup};
 
-/// What a table is and how it is to be played.
+/// Properties and limits of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableBegin {
-    /// How many nodes follow.
+    /// Number of nodes that follow.
     pub nodes: u16,
-    /// How parameters between nodes are found.
+    /// Interpolation between nodes.
     pub lookup: Lookup,
-    /// How the two branches are joined.
+    /// How the branches for the two directions are combined.
     pub direction: Direction,
-    /// Where it was identified, mm: beyond is the wall.
+    /// Identified range, mm; the wall begins at its ends.
     pub range_mm: [f64; 2],
-    /// The largest speed that it was identified at, mm/s.
+    /// Largest speed in the identification, mm/s.
     pub trained_mm_s: f64,
-    /// The largest force asked for, N.
+    /// Requested force limit, N.
     pub force_n: f64,
-    /// The speed above which it trips asked for, mm/s.
+    /// Requested velocity limit, mm/s.
     pub velocity_mm_s: f64,
-    /// Armed: to be played although its certificate may fail, then with this
-    /// largest force, N.
+    /// If `Some`, the table may be played although its certificate fails, then with at
+    /// most this force, N.
     pub uncertified_n: Option<f64>,
 }
 
 /// The parameters at one position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Node {
-    /// mm.
+    /// Position, mm.
     pub x_mm: f64,
     /// Mass, kg; damping, N·s/mm; stiffness, N/mm; offset force, N, for v > 0.
     pub positive: [f64; 4],
@@ -41,16 +41,16 @@ pub struct Node {
     pub negative: [f64; 4],
 }
 
-/// Some nodes, in the order of their positions.
+/// Consecutive nodes of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableChunk {
-    /// Number of the first, from 0.
+    /// Index of the first node, from 0.
     pub first: u16,
     /// One to three.
-    pub nodes: Few<Node, 3>,
+    pub nodes: FixedVec<Node, 3>,
 }
 
-/// The CRC over a whole table.
+/// Accumulates the CRC of a table.
 #[derive(Debug, Clone, Default)]
 pub struct TableCrc(RunningCrc);
 
@@ -146,9 +146,9 @@ impl Node {
 }
 
 impl TableChunk {
-    /// Most nodes in one chunk.
-    pub const MOST: usize = 3;
-    pub(super) const MOST_LEN: usize = 2 + 1 + Self::MOST * Node::LEN;
+    /// Largest number of nodes in one chunk.
+    pub const MAX_NODES: usize = 3;
+    pub(super) const MAX_LEN: usize = 2 + 1 + Self::MAX_NODES * Node::LEN;
 
     pub(super) fn write(&self, out: &mut Writer) {
         let nodes = self.nodes.as_slice();
@@ -162,10 +162,10 @@ impl TableChunk {
     pub(super) fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
         let first = from.u16()?;
         let count = usize::from(from.u8()?);
-        if !(1..=Self::MOST).contains(&count) {
+        if !(1..=Self::MAX_NODES).contains(&count) {
             return Err(WireError::Field);
         }
-        let mut nodes = Few::new();
+        let mut nodes = FixedVec::new();
         for _ in 0..count {
             nodes.push(Node::read(from)?);
         }
@@ -174,7 +174,7 @@ impl TableChunk {
 }
 
 impl TableCrc {
-    /// Of a table that begins so.
+    /// Starts with the fields of TABLE_BEGIN.
     pub fn of(begin: &TableBegin) -> Self {
         let mut crc = RunningCrc::new();
         let mut out = Writer::new();
@@ -183,14 +183,14 @@ impl TableCrc {
         Self(crc)
     }
 
-    /// Takes in the next node.
+    /// Adds the next node.
     pub fn node(&mut self, node: &Node) {
         let mut out = Writer::new();
         node.write(&mut out);
         self.0.update(out.done().unwrap_or_default());
     }
 
-    /// Of everything so far.
+    /// The CRC of everything so far.
     pub fn value(&self) -> u32 {
         self.0.value()
     }

@@ -1,10 +1,10 @@
-//! The filter that acceleration goes through.
+//! The low-pass filter of acceleration and force.
 
-/// Butterworth, two poles, bilinear transform.
+/// Butterworth low-pass with two poles, by the bilinear transform.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LowPass {
     gain: f64,
-    back: [f64; 2],
+    feedback: [f64; 2],
     /// Transposed direct form II.
     memory: [f64; 2],
 }
@@ -15,7 +15,7 @@ impl LowPass {
         let norm = 1.0 / (1.0 + core::f64::consts::SQRT_2 * k + k * k);
         Self {
             gain: k * k * norm,
-            back: [
+            feedback: [
                 2.0 * (k * k - 1.0) * norm,
                 (1.0 - core::f64::consts::SQRT_2 * k + k * k) * norm,
             ],
@@ -24,10 +24,10 @@ impl LowPass {
     }
 
     pub(super) fn step(&mut self, input: f64) -> f64 {
-        let fed = self.gain * input;
-        let output = fed + self.memory[0];
-        self.memory[0] = 2.0 * fed - self.back[0] * output + self.memory[1];
-        self.memory[1] = fed - self.back[1] * output;
+        let scaled = self.gain * input;
+        let output = scaled + self.memory[0];
+        self.memory[0] = 2.0 * scaled - self.feedback[0] * output + self.memory[1];
+        self.memory[1] = scaled - self.feedback[1] * output;
         output
     }
 }
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn the_corner_is_at_minus_3_db_and_a_decade_on_at_minus_40() {
+    fn gain_is_minus_3_db_at_the_corner_and_minus_40_a_decade_above() {
         assert!((gain_at(0.5) - 1.0).abs() < 1e-3);
         assert!((gain_at(20.0) - 0.5f64.sqrt()).abs() < 1e-3);
         assert!((0.008..0.011).contains(&gain_at(200.0)));

@@ -1,44 +1,44 @@
-//! What comes together while a device plays: energy, strokes, counts.
+//! Totals of a playback: energy, strokes, counts.
 
-/// What has come together since the start.
+/// Totals since the start of a playback.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
     /// Servo periods.
     pub steps: u64,
     /// Energy that the hand has put in, J.
     pub energy_j: f64,
-    /// Its least value, zero or negative, J.
+    /// Smallest value of that energy, zero or negative, J.
     pub least_energy_j: f64,
-    /// Changes of the direction's sign.
+    /// Sign changes of the direction state.
     pub switches: u64,
-    /// How often the force ran into its limit, each run once.
+    /// How often the force reached its limit; each run into the limit counts once.
     pub clamps: u64,
-    /// Servo periods in which the change of force was limited.
+    /// Servo periods in which the slew limit was active.
     pub slewed: u64,
-    /// Servo periods in which the mass was held to the least one.
+    /// Servo periods in which the mass was raised to the smallest one.
     pub mass_held: u64,
     /// Full strokes, each from one end of the range to the other.
     pub strokes: u32,
-    /// Largest size of the force, N.
-    pub most_force_n: f64,
+    /// Largest magnitude of the force, N.
+    pub peak_force_n: f64,
     /// Sum of the squares of the force above 20 Hz, N².
     rough_sum: f64,
     last_x_mm: Option<f64>,
     last_end: Option<End>,
 }
 
-/// Where a full stroke begins or ends.
+/// End of the range, where a full stroke begins or ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum End {
     Low,
     High,
 }
 
-/// Share of the range at either side that counts as its end.
-const END_SHARE: f64 = 0.2;
+/// Fraction of the range at either side that counts as its end.
+const END_FRACTION: f64 = 0.2;
 
 impl Tally {
-    /// Mean square of the force above 20 Hz, N²: how rough it feels.
+    /// Mean square of the force above 20 Hz, N², a measure of roughness.
     pub fn rough_n2(&self) -> f64 {
         if self.steps == 0 {
             0.0
@@ -47,20 +47,20 @@ impl Tally {
         }
     }
 
-    /// Where the handle was last, mm.
+    /// Position in the previous period, mm.
     pub(super) fn last_x_mm(&self) -> Option<f64> {
         self.last_x_mm
     }
 
-    /// Counts a servo period in which `held_n` is held, `rough_n` of it above 20 Hz.
-    pub(super) fn held(&mut self, held_n: f64, rough_n: f64) {
+    /// Adds a servo period with the force `held_n`, of which `rough_n` is above 20 Hz.
+    pub(super) fn add_force(&mut self, held_n: f64, rough_n: f64) {
         self.steps += 1;
-        self.most_force_n = self.most_force_n.max(libm::fabs(held_n));
+        self.peak_force_n = self.peak_force_n.max(libm::fabs(held_n));
         self.rough_sum += rough_n * rough_n;
     }
 
-    /// Takes in where the handle is after a period in which `held_n` was held.
-    pub(super) fn account(&mut self, held_n: f64, x_mm: f64, range_mm: [f64; 2]) {
+    /// Adds the motion to `x_mm` in a period with the force `held_n`.
+    pub(super) fn add_motion(&mut self, held_n: f64, x_mm: f64, range_mm: [f64; 2]) {
         if let Some(last) = self.last_x_mm {
             self.energy_j += held_n * (x_mm - last) * 1e-3;
             self.least_energy_j = self.least_energy_j.min(self.energy_j);
@@ -68,7 +68,7 @@ impl Tally {
         self.last_x_mm = Some(x_mm);
 
         let [low, high] = range_mm;
-        let zone = END_SHARE * (high - low);
+        let zone = END_FRACTION * (high - low);
         let end = if x_mm <= low + zone {
             End::Low
         } else if x_mm >= high - zone {
@@ -93,25 +93,25 @@ mod tests {
         for i in 0..16_000 {
             let phase = core::f64::consts::TAU * f64::from(i) / 4000.0;
             let x_mm = centre_mm + amplitude_mm * libm::sin(phase);
-            tally.account(0.0, x_mm, [0.0, 30.0]);
+            tally.add_motion(0.0, x_mm, [0.0, 30.0]);
         }
         tally.strokes
     }
 
     /// From the middle up, then down and up three times and down once more.
     #[test]
-    fn full_strokes_are_counted_and_half_ones_are_not() {
+    fn only_full_strokes_are_counted() {
         assert_eq!(strokes(15.0, 14.0), 7);
         assert_eq!(strokes(8.0, 8.0), 0);
         assert_eq!(strokes(15.0, 8.0), 0);
     }
 
-    /// 2 N over 10 mm and back, then 3 N over the same way back only.
+    /// 2 N over 10 mm, 3 N over the same distance back, 3 N forwards again.
     #[test]
-    fn energy_is_what_the_hand_has_put_in_and_its_least_value_stays() {
+    fn energy_counts_from_the_hand_and_its_smallest_value_is_kept() {
         let mut tally = Tally::default();
         for (held_n, x_mm) in [(0.0, 10.0), (2.0, 20.0), (3.0, 10.0), (3.0, 20.0)] {
-            tally.account(held_n, x_mm, [0.0, 30.0]);
+            tally.add_motion(held_n, x_mm, [0.0, 30.0]);
         }
         assert!((tally.energy_j - 0.020).abs() < 1e-12);
         assert!((tally.least_energy_j + 0.010).abs() < 1e-12);

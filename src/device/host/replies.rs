@@ -1,87 +1,89 @@
-//! What the host does with each reply.
+//! Processing of the replies.
 
-use super::{GREET_AGAIN, Host, RETRY, Stage, upload};
+use super::{Host, RECONNECT_INTERVAL, RETRY_INTERVAL, RearmRetry, Stage, upload};
 use crate::device::Report;
 use crate::device::host::DeviceClock;
 use std::time::Duration;
 use study_core::outcome::{Playback, Sample};
 use study_wire::message::{
-    self, Fault, Happening, Outcome, Pulse, Refusal, Reply, Request, State, Telemetry,
+    self, DeviceState, EventKind, Fault, Outcome, Pulse, Refusal, Reply, Request, Telemetry,
 };
 
 impl Host {
     pub(super) fn take(&mut self, sequence: u16, reply: Reply, at: Duration) {
-        self.unheard = None;
+        self.silent_since = None;
         match reply {
-            Reply::Identity(identity) => self.greeted(sequence, identity, at),
-            Reply::Ack(ack) if self.stage == Stage::Greeting && ack.refusal == Refusal::Version => {
-                // all that a device of another time says to HELLO
+            Reply::Identity(identity) => self.identified(sequence, identity, at),
+            Reply::Ack(ack)
+                if self.stage == Stage::Connecting && ack.refusal == Refusal::Version =>
+            {
+                // The answer to HELLO of a device with another version.
                 let version = u8::try_from(ack.detail).unwrap_or(u8::MAX);
                 self.other_version(version, at);
             }
             _ if !self.stage.known() => {}
             Reply::Ack(ack) => {
-                let Some(flight) = self.flight else { return };
-                if flight.sequence != sequence || flight.request.kind() != ack.request {
+                let Some(pending) = self.pending else { return };
+                if pending.sequence != sequence || pending.request.kind() != ack.request {
                     return;
                 }
-                self.flight = None;
-                if flight.tries == 1 {
-                    self.health.clock.note(flight.sent, at, ack.clock_ms);
+                self.pending = None;
+                if pending.tries == 1 {
+                    self.health.clock.add(pending.sent, at, ack.clock_ms);
                 }
                 match ack.refusal {
-                    Refusal::None => self.done(flight.request, ack.state, at),
-                    refusal => self.refused(flight.request, refusal, &ack, at),
+                    Refusal::None => self.request_done(pending.request, ack.state, at),
+                    refusal => self.request_refused(pending.request, refusal, &ack, at),
                 }
             }
             Reply::Outcome(outcome) => {
-                if self.flight.is_some_and(|f| f.sequence == sequence) {
-                    self.flight = None;
-                    self.ended(outcome, at);
+                if self.pending.is_some_and(|f| f.sequence == sequence) {
+                    self.pending = None;
+                    self.take_outcome(outcome, at);
                 }
             }
             Reply::Pulse(pulse) => self.pulse(pulse, at),
             Reply::Telemetry(telemetry) => self.telemetry(&telemetry),
-            Reply::Event(event) if event.playback == self.playback => match event.what {
-                Happening::Started => {}
-                Happening::Stopped => self.over(at),
-                Happening::Latched => self.latched(event.fault, at),
+            Reply::Event(event) if event.playback == self.playback => match event.kind {
+                EventKind::Started => {}
+                EventKind::Stopped => self.ask_outcome(at),
+                EventKind::Latched => self.latched(event.fault, at),
             },
             Reply::Event(_) | Reply::Recorded(_) => {}
         }
     }
 
-    fn greeted(&mut self, sequence: u16, identity: message::Identity, at: Duration) {
+    fn identified(&mut self, sequence: u16, identity: message::Identity, at: Duration) {
         let asked = self
-            .flight
-            .filter(|f| self.stage == Stage::Greeting && f.sequence == sequence);
-        let Some(flight) = asked.filter(|_| identity.nonce == self.nonce) else {
+            .pending
+            .filter(|f| self.stage == Stage::Connecting && f.sequence == sequence);
+        let Some(pending) = asked.filter(|_| identity.nonce == self.nonce) else {
             return;
         };
-        self.flight = None;
+        self.pending = None;
         let [oldest, newest] = identity.versions;
         if !(oldest..=newest).contains(&message::VERSION) {
             return self.other_version(newest, at);
         }
         let before = self.identity.map(|before| before.serial);
         if before.is_some_and(|serial| serial != identity.serial) {
-            self.stage = Stage::Mute {
-                again: at + GREET_AGAIN,
+            self.stage = Stage::Silent {
+                retry: at + RECONNECT_INTERVAL,
             };
             return;
         }
         self.identity = Some(identity);
         self.health.clock = DeviceClock::default();
-        self.health.clock.note(flight.sent, at, identity.clock_ms);
-        self.next_beat = at;
+        self.health.clock.add(pending.sent, at, identity.clock_ms);
+        self.next_heartbeat = Some(at);
         self.stage = Stage::Idle;
         self.reports.push(Report::Ready);
     }
 
-    /// A request was done.
-    fn done(&mut self, request: Request, state: State, at: Duration) {
+    /// A request was executed.
+    fn request_done(&mut self, request: Request, state: DeviceState, at: Duration) {
         match (request, self.stage) {
-            (Request::Rearm, _) => self.rest = None,
+            (Request::Rearm, _) => self.rearm_retry = None,
             (Request::TableCommit(_), Stage::Loading { .. }) => {
                 self.stage = Stage::Loaded { since: at };
                 self.reports.push(Report::Loaded);
@@ -89,32 +91,38 @@ impl Host {
             (Request::Play(_), Stage::Starting) => {
                 self.reports.push(Report::Started);
                 self.stage = Stage::Playing { since: at };
-                if self.todo.pop_front().is_some() {
+                if self.queue.pop_front().is_some() {
                     return self.ask_to_stop(at);
                 }
             }
-            (Request::Stop(_), Stage::Stopping { .. }) if state == State::Loaded => {
-                return self.over(at);
+            (Request::Stop(_), Stage::Stopping { .. }) if state == DeviceState::Loaded => {
+                return self.ask_outcome(at);
             }
             _ => {}
         }
-        if self.flight.is_none() {
+        if self.pending.is_none() {
             self.next_request(at);
         }
     }
 
-    fn refused(&mut self, request: Request, why: Refusal, ack: &message::Ack, at: Duration) {
-        match (request, why) {
+    fn request_refused(
+        &mut self,
+        request: Request,
+        reason: Refusal,
+        ack: &message::Ack,
+        at: Duration,
+    ) {
+        match (request, reason) {
             (Request::Rearm, Refusal::Moving) => {
-                if let Some((again, until)) = &mut self.rest
+                if let Some(RearmRetry { next, until }) = &mut self.rearm_retry
                     && at < *until
                 {
-                    *again = at + RETRY;
-                    self.todo.push_front(request);
+                    *next = at + RETRY_INTERVAL;
+                    self.queue.push_front(request);
                     return;
                 }
             }
-            (_, Refusal::NoHello) => return self.lose("it has started anew", at),
+            (_, Refusal::NoHello) => return self.lose_device("it has restarted", at),
             (Request::Limp, _) => return,
             _ => {}
         }
@@ -122,26 +130,27 @@ impl Host {
             0 => String::new(),
             detail => format!(" ({detail})"),
         };
-        let what = upload::word(&request);
-        let words = why.as_str();
-        self.reports
-            .push(Report::Fault(format!("it refuses {what}: {words}{detail}")));
-        self.settle(at);
+        let what = upload::describe(&request);
+        let reason = reason.as_str();
+        self.reports.push(Report::Fault(format!(
+            "it refuses {what}: {reason}{detail}"
+        )));
+        self.make_idle(at);
     }
 
-    /// Nothing plays any more, and nothing shall.
-    fn settle(&mut self, at: Duration) {
-        self.todo.clear();
-        self.rest = None;
+    /// Clears the queue and makes the device limp.
+    fn make_idle(&mut self, at: Duration) {
+        self.queue.clear();
+        self.rearm_retry = None;
         self.stage = Stage::Idle;
         self.send(Request::Limp, at);
     }
 
-    /// The playback has ended by itself or by STOP: how?
-    fn over(&mut self, at: Duration) {
+    /// Asks for the outcome of a playback that has ended by itself or by STOP.
+    fn ask_outcome(&mut self, at: Duration) {
         if matches!(self.stage, Stage::Playing { .. } | Stage::Stopping { .. }) {
-            self.stage = Stage::Asking;
-            self.todo.clear();
+            self.stage = Stage::AwaitingOutcome;
+            self.queue.clear();
             self.send(Request::State, at);
         }
     }
@@ -153,21 +162,20 @@ impl Host {
                 | Stage::Starting
                 | Stage::Playing { .. }
                 | Stage::Stopping { .. }
-                | Stage::Asking
+                | Stage::AwaitingOutcome
         );
         if playing {
             self.reports.push(Report::Fault(fault.as_str().to_owned()));
-            self.settle(at);
+            self.make_idle(at);
         }
     }
 
-    fn ended(&mut self, outcome: Outcome, at: Duration) {
-        self.health.outcome = Some(outcome);
-        if self.stage != Stage::Asking {
+    fn take_outcome(&mut self, outcome: Outcome, at: Duration) {
+        if self.stage != Stage::AwaitingOutcome {
             return;
         }
         let (Some(device), true) = (self.identity, outcome.playback == self.playback) else {
-            return self.lose("it knows nothing of the playback", at);
+            return self.lose_device("it does not know the playback", at);
         };
         if outcome.state.latched() {
             return self.latched(outcome.fault, at);
@@ -188,17 +196,18 @@ impl Host {
             samples: self.received,
             samples_lost,
         }));
-        self.settle(at);
+        self.make_idle(at);
     }
 
     fn pulse(&mut self, pulse: Pulse, at: Duration) {
-        let Some(place) = self.beats.iter().position(|(n, _)| *n == pulse.count) else {
+        let counts = &mut self.pending_heartbeats.iter();
+        let Some(index) = counts.position(|(count, _)| *count == pulse.count) else {
             return;
         };
-        let (_, sent) = self.beats[place];
-        self.beats.drain(..=place);
-        self.health.clock.note(sent, at, pulse.clock_ms);
-        // what was asked before a change says nothing about what came of it
+        let (_, sent) = self.pending_heartbeats[index];
+        self.pending_heartbeats.drain(..=index);
+        self.health.clock.add(sent, at, pulse.clock_ms);
+        // A heartbeat that was sent before a change does not reflect its result.
         let since = match self.stage {
             Stage::Loaded { since }
             | Stage::Playing { since }
@@ -210,13 +219,15 @@ impl Host {
             return;
         }
         match (self.stage, pulse.state) {
-            (_, State::Boot) => self.lose("it has started anew", at),
+            (_, DeviceState::Boot) => self.lose_device("it has restarted", at),
             (Stage::Loaded { .. } | Stage::Playing { .. } | Stage::Stopping { .. }, state)
                 if state.latched() =>
             {
                 self.latched(pulse.fault, at);
             }
-            (Stage::Playing { .. } | Stage::Stopping { .. }, State::Loaded) => self.over(at),
+            (Stage::Playing { .. } | Stage::Stopping { .. }, DeviceState::Loaded) => {
+                self.ask_outcome(at)
+            }
             _ => {}
         }
     }
@@ -224,7 +235,10 @@ impl Host {
     fn telemetry(&mut self, telemetry: &Telemetry) {
         let playing = matches!(
             self.stage,
-            Stage::Starting | Stage::Playing { .. } | Stage::Stopping { .. } | Stage::Asking
+            Stage::Starting
+                | Stage::Playing { .. }
+                | Stage::Stopping { .. }
+                | Stage::AwaitingOutcome
         );
         let (true, Some(device)) = (playing, &self.identity) else {
             return;
@@ -235,7 +249,7 @@ impl Host {
         let samples = telemetry.samples.as_slice();
         let first = u64::from(telemetry.first);
         let due = self.received + self.lost;
-        // what comes twice or late has been counted
+        // Repeated and late samples have been counted already.
         if first < due {
             return;
         }
@@ -251,13 +265,13 @@ impl Host {
                 x_mm: message::fixed::from_nm(sample.x_nm),
                 v_mm_s: message::fixed::from_um_s(sample.v_um_s),
                 force_command_n: message::fixed::from_un(sample.command_un),
-                force_measured_n: message::fixed::from_maybe_un(sample.measured_un),
+                force_measured_n: sample.measured_un.map(message::fixed::from_un),
             })
             .collect();
         self.reports.push(Report::Telemetry(samples));
         let now = (telemetry.strokes, telemetry.clamps);
-        if self.told != now {
-            self.told = now;
+        if self.reported != now {
+            self.reported = now;
             self.reports.push(Report::Progress {
                 strokes: now.0,
                 clamps: u64::from(now.1),

@@ -1,61 +1,60 @@
-//! A conversation with a device that may say anything.
+//! An exchange of messages with a device whose answers may be wrong.
 
-pub(in crate::device) use super::Broken;
-use super::Wire;
-use crate::device::host::{BEAT, DeviceClock, RETRY, TRIES};
+use super::{CheckFailure, Connection};
+use crate::device::host::{DeviceClock, HEARTBEAT_INTERVAL, MAX_TRIES, RETRY_INTERVAL};
 use std::collections::VecDeque;
 use std::time::Duration;
 use study_wire::frame::{Decoder, Frame};
 use study_wire::message::{
-    Ack, Event, Heartbeat, Hello, Identity, Outcome, Pulse, Recorded, Refusal, Reply, Request,
-    State, Telemetry, VERSION, kind,
+    Ack, DeviceState, Event, Heartbeat, Hello, Identity, Outcome, Pulse, Recorded, Refusal, Reply,
+    Request, Telemetry, VERSION, kind,
 };
 
-/// One wait for bytes.
-const SLICE: Duration = Duration::from_millis(1);
-/// How long a handle may take to come to rest.
-const REST_WITHIN: Duration = Duration::from_secs(5);
+/// Longest single wait for bytes.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
+/// Time for the handle to come to rest.
+const REST_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A reply as it came.
+/// A reply with its time of arrival.
 #[derive(Debug, Clone)]
-pub(in crate::device) struct Came {
-    pub(in crate::device) sequence: u16,
-    pub(in crate::device) reply: Reply,
-    pub(in crate::device) body: Vec<u8>,
-    pub(in crate::device) at: Duration,
+pub(crate) struct ReceivedReply {
+    pub(crate) sequence: u16,
+    pub(crate) reply: Reply,
+    pub(crate) body: Vec<u8>,
+    pub(crate) at: Duration,
 }
 
-/// What goes on between the check and the device.
-pub(in crate::device) struct Talk<'w> {
-    wire: &'w mut dyn Wire,
+/// The tester's side of a connection, with heartbeats and collected messages.
+pub(crate) struct Exchange<'w> {
+    connection: &'w mut dyn Connection,
     nonce: u32,
     decoder: Decoder,
     sequence: u16,
-    /// Whether heartbeats go out by themselves.
-    pub(in crate::device) beating: bool,
+    /// Whether heartbeats are sent automatically.
+    pub(crate) sends_heartbeats: bool,
     beat_count: u32,
     next_beat: Duration,
     beats: VecDeque<(u32, Duration)>,
-    pub(in crate::device) clock: DeviceClock,
-    pub(in crate::device) device: Option<Identity>,
-    /// Replies that nobody has looked at.
-    replies: Vec<Came>,
-    pub(in crate::device) telemetry: Vec<(Duration, Telemetry)>,
-    pub(in crate::device) events: Vec<Event>,
-    pub(in crate::device) recorded: Vec<Recorded>,
-    pub(in crate::device) pulses: Vec<Pulse>,
-    pub(in crate::device) latency_ms: Option<[f64; 3]>,
+    pub(crate) clock: DeviceClock,
+    pub(crate) device: Option<Identity>,
+    /// Replies that have not been used.
+    replies: Vec<ReceivedReply>,
+    pub(crate) telemetry: Vec<(Duration, Telemetry)>,
+    pub(crate) events: Vec<Event>,
+    pub(crate) recorded: Vec<Recorded>,
+    pub(crate) pulses: Vec<Pulse>,
+    pub(crate) latency_ms: Option<[f64; 3]>,
     playback: u32,
 }
 
-impl<'w> Talk<'w> {
-    pub(in crate::device) fn new(wire: &'w mut dyn Wire, nonce: u32) -> Self {
+impl<'w> Exchange<'w> {
+    pub(crate) fn new(connection: &'w mut dyn Connection, nonce: u32) -> Self {
         Self {
-            wire,
+            connection,
             nonce,
             decoder: Decoder::new(),
             sequence: 0,
-            beating: false,
+            sends_heartbeats: false,
             beat_count: 0,
             next_beat: Duration::ZERO,
             beats: VecDeque::new(),
@@ -71,40 +70,40 @@ impl<'w> Talk<'w> {
         }
     }
 
-    pub(in crate::device) fn now(&mut self) -> Duration {
-        self.wire.now()
+    pub(crate) fn now(&mut self) -> Duration {
+        self.connection.now()
     }
 
-    pub(in crate::device) fn identity(&self) -> Result<Identity, Broken> {
+    pub(crate) fn identity(&self) -> Result<Identity, CheckFailure> {
         self.device
-            .ok_or_else(|| Broken::Gone("it has not said who it is".to_owned()))
+            .ok_or_else(|| CheckFailure::Disconnected("it has not identified itself".to_owned()))
     }
 
-    pub(in crate::device) fn next_sequence(&mut self) -> u16 {
-        // 0 is that of the heartbeats
+    pub(crate) fn next_sequence(&mut self) -> u16 {
+        // Heartbeats use 0.
         self.sequence = self.sequence.wrapping_add(1).max(1);
         self.sequence
     }
 
-    pub(in crate::device) fn next_playback(&mut self) -> u32 {
+    pub(crate) fn next_playback(&mut self) -> u32 {
         self.playback += 1;
         self.playback
     }
 
-    /// Sends bytes and takes in what comes within `wait`.
-    fn turn(&mut self, bytes: &[u8], wait: Duration) -> Result<(), Broken> {
+    /// Sends bytes and processes what arrives within `wait`.
+    fn turn(&mut self, bytes: &[u8], wait: Duration) -> Result<(), CheckFailure> {
         let now = self.now();
         let mut bytes = bytes.to_vec();
-        if self.beating && now >= self.next_beat {
-            self.next_beat = now + BEAT;
+        if self.sends_heartbeats && now >= self.next_beat {
+            self.next_beat = now + HEARTBEAT_INTERVAL;
             bytes.extend_from_slice(self.heartbeat(now).as_bytes());
         }
-        let came = self
-            .wire
+        let received = self
+            .connection
             .exchange(&bytes, wait)
-            .map_err(|e| Broken::Gone(e.0))?;
+            .map_err(|e| CheckFailure::Disconnected(e.to_string()))?;
         let at = self.now();
-        for byte in came {
+        for byte in received {
             if let Some(Ok(body)) = self.decoder.push(byte) {
                 let body = body.to_vec();
                 if let Ok((header, reply)) = Reply::decode(&body) {
@@ -123,11 +122,11 @@ impl<'w> Talk<'w> {
             Reply::Pulse(pulse) if sequence == 0 => {
                 let sent = self.beats.iter().find(|(count, _)| *count == pulse.count);
                 if let Some((_, sent)) = sent {
-                    self.clock.note(*sent, at, pulse.clock_ms);
+                    self.clock.add(*sent, at, pulse.clock_ms);
                 }
                 self.pulses.push(pulse);
             }
-            _ => self.replies.push(Came {
+            _ => self.replies.push(ReceivedReply {
                 sequence,
                 reply,
                 body,
@@ -136,7 +135,7 @@ impl<'w> Talk<'w> {
         }
     }
 
-    /// A heartbeat of now, counted.
+    /// The next heartbeat, made at `now`.
     fn heartbeat(&mut self, now: Duration) -> Frame {
         self.beat_count += 1;
         let watchdog = self.device.map_or(30, |d| u32::from(d.watchdog_ms));
@@ -152,33 +151,34 @@ impl<'w> Talk<'w> {
         .frame(0)
     }
 
-    pub(in crate::device) fn beat_count(&self) -> u32 {
+    pub(crate) fn beat_count(&self) -> u32 {
         self.beat_count
     }
 
-    /// Lets time pass.
-    pub(in crate::device) fn pass(&mut self, time: Duration) -> Result<(), Broken> {
+    /// Waits; heartbeats and received messages are processed meanwhile.
+    pub(crate) fn wait(&mut self, time: Duration) -> Result<(), CheckFailure> {
         let until = self.now() + time;
         loop {
             let left = until.saturating_sub(self.now());
             if left.is_zero() {
                 return Ok(());
             }
-            self.turn(&[], left.min(SLICE))?;
+            self.turn(&[], left.min(POLL_INTERVAL))?;
         }
     }
 
-    /// Bytes that may or may not be answered: the reply with this number, if it
-    /// comes in time.
-    pub(in crate::device) fn send(
+    /// Sends bytes and returns the reply with this sequence number, if it arrives within
+    /// `wait`.
+    pub(crate) fn send(
         &mut self,
         bytes: &[u8],
         sequence: u16,
         wait: Duration,
-    ) -> Result<Option<Came>, Broken> {
-        self.replies.retain(|came| came.sequence != sequence);
+    ) -> Result<Option<ReceivedReply>, CheckFailure> {
+        self.replies
+            .retain(|received| received.sequence != sequence);
         let until = self.now() + wait;
-        self.turn(bytes, SLICE)?;
+        self.turn(bytes, POLL_INTERVAL)?;
         loop {
             let found = self.replies.iter().position(|c| c.sequence == sequence);
             if let Some(place) = found {
@@ -187,29 +187,29 @@ impl<'w> Talk<'w> {
             if self.now() >= until {
                 return Ok(None);
             }
-            self.turn(&[], SLICE)?;
+            self.turn(&[], POLL_INTERVAL)?;
         }
     }
 
-    /// A request until it is answered.
-    pub(in crate::device) fn ask(&mut self, request: Request) -> Result<Came, Broken> {
+    /// Sends a request, with repeats, until it is answered.
+    pub(crate) fn ask(&mut self, request: Request) -> Result<ReceivedReply, CheckFailure> {
         let sequence = self.next_sequence();
         let frame = request.frame(sequence);
-        for _ in 0..TRIES {
-            if let Some(came) = self.send(frame.as_bytes(), sequence, RETRY)? {
-                return Ok(came);
+        for _ in 0..MAX_TRIES {
+            if let Some(received) = self.send(frame.as_bytes(), sequence, RETRY_INTERVAL)? {
+                return Ok(received);
             }
         }
-        Err(Broken::Gone(format!(
-            "no answer to {} after {TRIES} tries",
+        Err(CheckFailure::Disconnected(format!(
+            "no answer to {} after {MAX_TRIES} tries",
             name(request.kind())
         )))
     }
 
-    pub(in crate::device) fn ack(&mut self, request: Request) -> Result<Ack, Broken> {
+    pub(crate) fn ack(&mut self, request: Request) -> Result<Ack, CheckFailure> {
         match self.ask(request)?.reply {
             Reply::Ack(ack) if ack.request == request.kind() => Ok(ack),
-            other => Err(Broken::seen(format!(
+            other => Err(CheckFailure::violation(format!(
                 "{} is answered by {}",
                 name(request.kind()),
                 name(other.kind())
@@ -217,12 +217,12 @@ impl<'w> Talk<'w> {
         }
     }
 
-    /// A request that has to be done.
-    pub(in crate::device) fn done(&mut self, request: Request) -> Result<Ack, Broken> {
+    /// Sends a request that has to be executed.
+    pub(crate) fn expect_done(&mut self, request: Request) -> Result<Ack, CheckFailure> {
         let ack = self.ack(request)?;
         match ack.refusal {
             Refusal::None => Ok(ack),
-            refusal => Err(Broken::seen(format!(
+            refusal => Err(CheckFailure::violation(format!(
                 "{} is refused: {} ({})",
                 name(request.kind()),
                 refusal.as_str(),
@@ -231,17 +231,17 @@ impl<'w> Talk<'w> {
         }
     }
 
-    /// A request that has to be refused, and why.
-    pub(in crate::device) fn refused(
+    /// Sends a request that has to be refused for the given reason.
+    pub(crate) fn expect_refusal(
         &mut self,
         request: Request,
         why: Refusal,
-    ) -> Result<Ack, Broken> {
+    ) -> Result<Ack, CheckFailure> {
         let ack = self.ack(request)?;
         if ack.refusal == why {
             Ok(ack)
         } else {
-            Err(Broken::seen(format!(
+            Err(CheckFailure::violation(format!(
                 "{}: {}, and not: {}",
                 name(request.kind()),
                 ack.refusal.as_str(),
@@ -250,63 +250,67 @@ impl<'w> Talk<'w> {
         }
     }
 
-    pub(in crate::device) fn outcome(&mut self) -> Result<Outcome, Broken> {
+    pub(crate) fn outcome(&mut self) -> Result<Outcome, CheckFailure> {
         match self.ask(Request::State)?.reply {
             Reply::Outcome(outcome) => Ok(outcome),
-            other => Err(Broken::seen(format!(
+            other => Err(CheckFailure::violation(format!(
                 "STATE is answered by {}",
                 name(other.kind())
             ))),
         }
     }
 
-    pub(in crate::device) fn limp(&mut self) -> Result<(), Broken> {
-        self.done(Request::Limp).map(drop)
+    pub(crate) fn limp(&mut self) -> Result<(), CheckFailure> {
+        self.expect_done(Request::Limp).map(drop)
     }
 
     /// Opens a new connection.
-    pub(in crate::device) fn hello(&mut self) -> Result<Identity, Broken> {
+    ///
+    /// # Errors
+    /// [`CheckFailure`] if the device does not answer, or uses another version.
+    pub(crate) fn hello(&mut self) -> Result<Identity, CheckFailure> {
         self.nonce = self.nonce.wrapping_add(1);
         let sent = self.now();
-        let came = self.ask(Request::Hello(Hello { nonce: self.nonce }))?;
-        if let Reply::Ack(ack) = came.reply
+        let received = self.ask(Request::Hello(Hello { nonce: self.nonce }))?;
+        if let Reply::Ack(ack) = received.reply
             && ack.refusal == Refusal::Version
         {
-            return Err(Broken::Gone(format!(
-                "it speaks version {} of the wire format and not {VERSION}",
+            return Err(CheckFailure::Disconnected(format!(
+                "it uses version {} of the wire format, not {VERSION}",
                 ack.detail
             )));
         }
-        let Reply::Identity(identity) = came.reply else {
-            return Err(Broken::seen(format!(
+        let Reply::Identity(identity) = received.reply else {
+            return Err(CheckFailure::violation(format!(
                 "HELLO is answered by {}",
-                name(came.reply.kind())
+                name(received.reply.kind())
             )));
         };
         if identity.nonce != self.nonce {
-            return Err(Broken::seen("the nonce is not the one of HELLO"));
+            return Err(CheckFailure::violation("its nonce is not that of HELLO"));
         }
         self.clock = DeviceClock::default();
-        self.clock.note(sent, came.at, identity.clock_ms);
+        self.clock.add(sent, received.at, identity.clock_ms);
         self.device = Some(identity);
         Ok(identity)
     }
 
-    /// Limp, at rest, idle, with heartbeats, and nothing left of before.
-    pub(in crate::device) fn ready(&mut self) -> Result<(), Broken> {
-        self.beating = true;
+    /// Brings the device to idle with a new connection and heartbeats, and discards all
+    /// earlier messages.
+    pub(crate) fn reset(&mut self) -> Result<(), CheckFailure> {
+        self.sends_heartbeats = true;
         self.limp()?;
         self.hello()?;
-        let until = self.now() + REST_WITHIN;
+        let until = self.now() + REST_TIMEOUT;
         loop {
             let ack = self.ack(Request::Rearm)?;
             match ack.refusal {
-                Refusal::None if ack.state == State::Idle => break,
+                Refusal::None if ack.state == DeviceState::Idle => break,
                 Refusal::Moving if self.now() < until => {
-                    self.pass(Duration::from_millis(50))?;
+                    self.wait(Duration::from_millis(50))?;
                 }
                 refusal => {
-                    return Err(Broken::seen(format!(
+                    return Err(CheckFailure::violation(format!(
                         "REARM: {}, {}",
                         refusal.as_str(),
                         ack.state.as_str()
@@ -318,20 +322,20 @@ impl<'w> Talk<'w> {
         self.events.clear();
         self.pulses.clear();
         self.replies.clear();
-        // the new connection has not heard one yet
+        // The new connection has received no heartbeat so far.
         self.next_beat = self.now();
-        let until = self.now() + RETRY;
+        let until = self.now() + RETRY_INTERVAL;
         while !self.pulses.iter().any(|pulse| pulse.fresh) {
             if self.now() > until {
-                return Err(Broken::seen("no heartbeat is fresh after HELLO"));
+                return Err(CheckFailure::violation("no heartbeat is fresh after HELLO"));
             }
-            self.pass(SLICE)?;
+            self.wait(POLL_INTERVAL)?;
         }
         Ok(())
     }
 }
 
-/// What docs/wire.md calls a message.
+/// Name of a message type in docs/wire.md.
 pub(super) fn name(kind: u8) -> &'static str {
     match kind {
         kind::HELLO => "HELLO",

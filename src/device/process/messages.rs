@@ -1,4 +1,4 @@
-//! What host and child say to each other, one JSON object a line.
+//! Messages between host and program, one JSON object per line.
 
 use crate::device::Stimulus;
 use serde::Deserialize;
@@ -8,20 +8,43 @@ use study_base::text::Untrusted;
 use study_core::outcome::{Playback, Sample};
 use study_wire::predict::{Direction, Lookup};
 
-/// Version of the language, in the child's `hello`.
+/// Version of the messages, stated in the program's `hello`.
 pub const FORMAT: &str = "study-process/1";
 
-/// Longest text of a child that is kept, characters.
+/// Longest text of a program that is kept, characters.
 const MAX_TEXT: usize = 200;
-/// Longest id of a device, characters.
+/// Longest device id, characters.
 const MAX_ID: usize = 64;
-/// Most samples in one line.
+/// Largest number of samples in one line.
 const MAX_SAMPLES: usize = 4096;
 
-/// What a child says.
+/// Why a message of a program is rejected.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum MessageError {
+    /// Not valid JSON of a known message; the error and the line.
+    #[error("{0}: {1}")]
+    Json(serde_json::Error, String),
+    #[error("more than {MAX_SAMPLES} samples in one line")]
+    TooManySamples,
+    #[error("it uses the format `{format}`; this program supports {FORMAT}", format = Untrusted(.0))]
+    Format(String),
+    #[error("its id needs 1 to {MAX_ID} characters")]
+    Id,
+    #[error("it sends `{0}` before `hello`")]
+    NoHello(&'static str),
+    #[error("it is another device than before, `{id}`", id = Untrusted(.0))]
+    OtherDevice(String),
+    #[error("it sends `{message}` while {state}")]
+    WrongState {
+        message: &'static str,
+        state: &'static str,
+    },
+}
+
+/// A message of a program.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "say", rename_all = "kebab-case")]
-pub(super) enum Say {
+pub(super) enum ChildMessage {
     Hello(Hello),
     Loaded {
         load: u64,
@@ -35,7 +58,7 @@ pub(super) enum Say {
     },
     Samples {
         load: u64,
-        samples: Vec<Row>,
+        samples: Vec<SampleRow>,
     },
     Progress {
         load: u64,
@@ -45,28 +68,28 @@ pub(super) enum Say {
     Stopped {
         load: u64,
         #[serde(flatten)]
-        outcome: Outcome,
+        outcome: PlaybackOutcome,
     },
     Fault {
         what: String,
     },
 }
 
-/// Who a child is.
+/// Identity and limits of a program.
 #[derive(Debug, Deserialize)]
 pub(super) struct Hello {
     pub(super) format: String,
     pub(super) id: String,
     pub(super) telemetry: bool,
-    /// Whether no motor and no hand is behind it.
+    /// Whether it is simulated, without motor and hand.
     #[serde(default)]
     pub(super) simulated: bool,
     pub(super) limits: Limits,
 }
 
-/// What a playback came to.
+/// Outcome of a playback.
 #[derive(Debug, Deserialize)]
-pub(super) struct Outcome {
+pub(super) struct PlaybackOutcome {
     duration_s: f64,
     strokes: u32,
     least_energy_j: f64,
@@ -76,10 +99,10 @@ pub(super) struct Outcome {
 
 /// t in s, x in mm, v in mm/s, commanded force in N, measured force in N or null.
 #[derive(Debug, Deserialize)]
-pub(super) struct Row(f64, f64, f64, f64, Option<f64>);
+pub(super) struct SampleRow(f64, f64, f64, f64, Option<f64>);
 
-impl From<Row> for Sample {
-    fn from(row: Row) -> Self {
+impl From<SampleRow> for Sample {
+    fn from(row: SampleRow) -> Self {
         Self {
             t_s: row.0,
             x_mm: row.1,
@@ -90,8 +113,8 @@ impl From<Row> for Sample {
     }
 }
 
-impl From<Outcome> for Playback {
-    fn from(outcome: Outcome) -> Self {
+impl From<PlaybackOutcome> for Playback {
+    fn from(outcome: PlaybackOutcome) -> Self {
         Self {
             exploration_s: outcome.duration_s,
             strokes: outcome.strokes,
@@ -104,21 +127,21 @@ impl From<Outcome> for Playback {
     }
 }
 
-impl Say {
-    pub(super) fn hello(self) -> Result<Hello, String> {
+impl ChildMessage {
+    pub(super) fn hello(self) -> Result<Hello, MessageError> {
         match self {
-            Self::Hello(hello) if hello.format != FORMAT => Err(format!(
-                "it speaks `{}`, and this version speaks {FORMAT}",
-                Untrusted(&short_text(&hello.format))
-            )),
+            Self::Hello(hello) if hello.format != FORMAT => {
+                Err(MessageError::Format(short_text(&hello.format)))
+            }
             Self::Hello(hello) if hello.id.is_empty() || hello.id.chars().count() > MAX_ID => {
-                Err(format!("its id has to have 1 to {MAX_ID} characters"))
+                Err(MessageError::Id)
             }
             Self::Hello(hello) => Ok(hello),
-            other => Err(format!("it says `{}` before `hello`", other.word())),
+            other => Err(MessageError::NoHello(other.as_str())),
         }
     }
 
+    /// Number of the load that the message is about, if it is about one.
     pub(super) fn load(&self) -> Option<u64> {
         match self {
             Self::Hello(_) | Self::Fault { .. } => None,
@@ -131,7 +154,7 @@ impl Say {
         }
     }
 
-    pub(super) fn word(&self) -> &'static str {
+    pub(super) fn as_str(&self) -> &'static str {
         match self {
             Self::Hello(_) => "hello",
             Self::Loaded { .. } => "loaded",
@@ -145,30 +168,32 @@ impl Say {
     }
 }
 
-/// A line of a child.
-pub(super) fn read(line: &[u8]) -> Result<Say, String> {
-    let mut say: Say = serde_json::from_slice(line).map_err(|e| {
+/// Reads a line of a program.
+pub(super) fn read(line: &[u8]) -> Result<ChildMessage, MessageError> {
+    let mut message: ChildMessage = serde_json::from_slice(line).map_err(|e| {
         let shown = String::from_utf8_lossy(line);
-        format!("{e}: {}", short_text(shown.trim_end()))
+        MessageError::Json(e, short_text(shown.trim_end()))
     })?;
-    match &mut say {
-        Say::Samples { samples, .. } if samples.len() > MAX_SAMPLES => {
-            return Err(format!("more than {MAX_SAMPLES} samples"));
+    match &mut message {
+        ChildMessage::Samples { samples, .. } if samples.len() > MAX_SAMPLES => {
+            return Err(MessageError::TooManySamples);
         }
-        Say::Refused { why: text, .. } | Say::Fault { what: text } => *text = short_text(text),
+        ChildMessage::Refused { why: text, .. } | ChildMessage::Fault { what: text } => {
+            *text = short_text(text);
+        }
         _ => {}
     }
-    Ok(say)
+    Ok(message)
 }
 
-/// The beginning of somebody's text.
+/// The beginning of a program's text.
 pub(super) fn short_text(text: &str) -> String {
     beginning(text, MAX_TEXT)
 }
 
-/// At most so many characters of it.
-pub(super) fn beginning(text: &str, most: usize) -> String {
-    let mut short: String = text.chars().take(most).collect();
+/// The first `max` characters of a text.
+pub(super) fn beginning(text: &str, max: usize) -> String {
+    let mut short: String = text.chars().take(max).collect();
     if short.len() < text.len() {
         short.push('…');
     }
@@ -179,12 +204,12 @@ fn line(value: &Value) -> String {
     format!("{value}\n")
 }
 
-/// `start`, `stop`, `limp`, `alive`.
-pub(super) fn short(word: &str, load: u64) -> String {
-    line(&json!({"do": word, "load": load}))
+/// The command `start`, `stop`, `limp` or `alive`.
+pub(super) fn command(name: &str, load: u64) -> String {
+    line(&json!({"do": name, "load": load}))
 }
 
-/// `load`, with everything that is to be played.
+/// The command `load` with table and limits.
 pub(super) fn load(number: u64, what: &Stimulus<'_>, limits: Limits) -> String {
     let table = what.table.map(|table| {
         let branch = |b: &study_haptics::model::Branch| {
@@ -213,7 +238,7 @@ pub(super) fn load(number: u64, what: &Stimulus<'_>, limits: Limits) -> String {
         })
     });
     line(&json!({
-        "do": "load", "load": number, "model": what.model, "uncertified": what.permitted,
+        "do": "load", "load": number, "model": what.model, "uncertified": what.allow_uncertified,
         "limits": {"force_n": limits.force_n.get(), "velocity_mm_s": limits.velocity_mm_s.get()},
         "table": table,
     }))
@@ -224,7 +249,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_described_is_refused() {
+    fn messages_that_violate_the_specification_are_rejected() {
         for (line, why) in [
             ("no json", "expected"),
             (r#"{"say":"hallo"}"#, "unknown variant"),
@@ -242,18 +267,19 @@ mod tests {
                 "above zero",
             ),
         ] {
-            let error = read(line.as_bytes()).unwrap_err();
+            let error = read(line.as_bytes()).unwrap_err().to_string();
             assert!(error.contains(why), "{line}: {error}");
         }
         let other = r#"{"say":"hello","format":"study-process/2","id":"a","telemetry":true,"limits":{"force_n":1,"velocity_mm_s":1}}"#;
         let error = read(other.as_bytes()).unwrap().hello().unwrap_err();
+        let error = error.to_string();
         assert!(error.contains("study-process/1"), "{error}");
     }
 
     #[test]
     fn a_long_text_is_cut() {
         let line = format!(r#"{{"say":"fault","what":"{}"}}"#, "x".repeat(5000));
-        let Say::Fault { what } = read(line.as_bytes()).unwrap() else {
+        let ChildMessage::Fault { what } = read(line.as_bytes()).unwrap() else {
             panic!("no fault");
         };
         assert_eq!(what.chars().count(), MAX_TEXT + 1);

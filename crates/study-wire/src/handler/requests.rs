@@ -1,41 +1,44 @@
-//! What a device does with each message.
+//! Execution of the requests.
 
 use super::run::{Run, count};
-use super::{Alive, Done, Handler, Out};
+use super::table::Refused;
+use super::{Alive, Handler, LastRequest, Out};
 use crate::frame::crc32;
 use crate::message::{
-    Fault, Happening, Header, Heartbeat, Hello, Identity, Loaded, Outcome, Play, Pulse, Record,
-    Refusal, Reply, Request, State, Stop, VERSION, WireError, kind,
+    DeviceState, EventKind, Fault, Header, Heartbeat, Hello, Identity, Loaded, Outcome, Play,
+    Pulse, Record, Refusal, Reply, Request, Stop, VERSION, WireError, kind,
 };
-use crate::servo::{Core, Settings};
+use crate::servo::{Servo, ServoSettings};
+use core::num::NonZeroU32;
 
-/// A deadline further ahead than this is no deadline, ms.
-const FURTHEST_MS: u32 = 1000;
+/// A heartbeat with a deadline further ahead than this is not fresh, ms.
+const MAX_DEADLINE_MS: u32 = 1000;
 
-type Answer = Result<(), (Refusal, u32)>;
+/// Success, or a refusal and its detail.
+type Answer = Result<(), Refused>;
 
 impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
-    /// A body whose CRC fits.
+    /// Handles the body of a valid frame.
     pub(super) fn handle(&mut self, body: &[u8], now_ms: u32, out: Out<'_>) {
         let Some(header) = Header::read(body) else {
             self.bad_frames = self.bad_frames.wrapping_add(1);
             return;
         };
-        // LIMP is the same in every version and with anything behind it
+        // LIMP is executed in every version and with any length.
         if header.kind == kind::LIMP {
-            self.latch(State::Limp, Fault::Told, now_ms);
+            self.latch(DeviceState::Limp, Fault::LimpCommand, now_ms);
             self.answer(header, Ok(()), now_ms, out);
-            return self.tell(out);
+            return self.send_event(out);
         }
         match Request::decode(body) {
             Ok((header, request)) if request.sequenced() => {
-                self.once(header, &request, crc32(body), now_ms, out);
+                self.handle_sequenced(header, &request, crc32(body), now_ms, out);
             }
-            Ok((header, request)) => self.at_any_time(header, &request, now_ms, out),
+            Ok((header, request)) => self.handle_unsequenced(header, &request, now_ms, out),
             Err(error) => {
                 self.bad_frames = self.bad_frames.wrapping_add(1);
                 let refusal = match error {
-                    // what a device sends is not for a device
+                    // Replies are addressed to a host.
                     WireError::UnknownType(kind) if kind >= kind::ACK => return,
                     WireError::UnknownType(_) => (Refusal::UnknownType, 0),
                     WireError::Version(_) => (Refusal::Version, u32::from(VERSION)),
@@ -44,7 +47,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
                 self.answer(header, Err(refusal), now_ms, out);
             }
         }
-        self.tell(out);
+        self.send_event(out);
     }
 
     fn answer(&self, header: Header, answer: Answer, now_ms: u32, out: Out<'_>) {
@@ -52,8 +55,8 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         out(reply.frame(header.sequence).as_bytes());
     }
 
-    /// HELLO, HEARTBEAT, STATE: nothing is remembered of them.
-    fn at_any_time(&mut self, header: Header, request: &Request, now_ms: u32, out: Out<'_>) {
+    /// Handles HELLO, HEARTBEAT and STATE, which may be repeated.
+    fn handle_unsequenced(&mut self, header: Header, request: &Request, now_ms: u32, out: Out<'_>) {
         let reply = match request {
             Request::Hello(hello) => self.hello(header, *hello, now_ms),
             Request::Heartbeat(beat) => self.heartbeat(*beat, now_ms),
@@ -62,26 +65,33 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         out(reply.frame(header.sequence).as_bytes());
     }
 
-    /// Everything that must not be done twice.
-    fn once(&mut self, header: Header, request: &Request, crc: u32, now_ms: u32, out: Out<'_>) {
-        let (Some(_), Some(done)) = (self.connection, self.done) else {
+    /// Handles the requests that are executed only once per sequence number.
+    fn handle_sequenced(
+        &mut self,
+        header: Header,
+        request: &Request,
+        crc: u32,
+        now_ms: u32,
+        out: Out<'_>,
+    ) {
+        let (Some(_), Some(last)) = (self.connection, self.last_request) else {
             return self.answer(header, Err((Refusal::NoHello, 0)), now_ms, out);
         };
-        match header.sequence.wrapping_sub(done.sequence) {
-            0 => match done.request {
+        match header.sequence.wrapping_sub(last.sequence) {
+            0 => match last.request {
                 Some((same, reply)) if same == crc => out(reply.as_bytes()),
                 _ => self.answer(header, Err((Refusal::Reused, 0)), now_ms, out),
             },
             1..0x8000 => {
                 let answer = self.perform(request, now_ms);
                 let reply = self.ack(header.kind, answer, now_ms).frame(header.sequence);
-                self.done = Some(Done {
+                self.last_request = Some(LastRequest {
                     sequence: header.sequence,
                     request: Some((crc, reply)),
                 });
                 out(reply.as_bytes());
             }
-            // overtaken by a later one: its sender no longer waits
+            // An older request: its sender no longer waits for a reply.
             _ => {}
         }
     }
@@ -93,13 +103,13 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
                 self.table.begin(begin)
             }
             Request::TableChunk(chunk) => {
-                self.loading()?;
+                self.may_continue()?;
                 self.table.chunk(chunk)
             }
             Request::TableCommit(commit) => {
-                self.loading()?;
-                let judged = self.table.judge(commit.crc, &self.profile.bounds);
-                self.arm(judged, Loaded::Table, commit.crc, now_ms)
+                self.may_continue()?;
+                let validated = self.table.validate(commit.crc, &self.profile.bounds);
+                self.accept_upload(validated, Loaded::Table, commit.crc, now_ms)
             }
             Request::PathBegin(begin) => {
                 self.may_probe()?;
@@ -108,46 +118,46 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             }
             Request::PathChunk(chunk) => {
                 self.may_probe()?;
-                self.loading()?;
+                self.may_continue()?;
                 self.path.chunk(chunk)
             }
             Request::PathCommit(commit) => {
                 self.may_probe()?;
-                self.loading()?;
-                let judged = self.path.judge(
+                self.may_continue()?;
+                let validated = self.path.validate(
                     commit.crc,
                     &self.profile.bounds,
                     self.profile.servo.servo_hz,
                 );
-                self.arm(judged, Loaded::Path, commit.crc, now_ms)
+                self.accept_upload(validated, Loaded::Path, commit.crc, now_ms)
             }
-            Request::Play(play) => self.play_it(*play, now_ms),
-            Request::Record(record) => self.record_it(*record, now_ms),
+            Request::Play(play) => self.start_playback(*play, now_ms),
+            Request::Record(record) => self.start_recording(*record, now_ms),
             Request::Stop(stop) => self.stop(*stop),
             Request::Rearm => self.rearm(),
-            // not sequenced
+            // These are handled in `handle` and `handle_unsequenced`.
             Request::Hello(_) | Request::Limp | Request::Heartbeat(_) | Request::State => {
                 Err((Refusal::Malformed, 0))
             }
         }
     }
 
-    /// An upload takes the place of what is loaded.
+    /// Whether an upload may begin; it replaces what is loaded.
     fn may_load(&mut self) -> Answer {
         match self.state {
-            State::Idle => Ok(()),
-            State::Loaded => {
+            DeviceState::Idle => Ok(()),
+            DeviceState::Loaded => {
                 self.unload();
-                self.state = State::Idle;
+                self.state = DeviceState::Idle;
                 Ok(())
             }
             _ => Err((Refusal::WrongState, 0)),
         }
     }
 
-    /// What follows a BEGIN: it replaces nothing.
-    fn loading(&self) -> Answer {
-        if self.state == State::Idle {
+    /// Whether an upload may go on.
+    fn may_continue(&self) -> Answer {
+        if self.state == DeviceState::Idle {
             Ok(())
         } else {
             Err((Refusal::WrongState, 0))
@@ -162,18 +172,19 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         }
     }
 
-    fn arm(
+    /// Loads a valid upload if the host is alive.
+    fn accept_upload(
         &mut self,
-        judged: Result<f64, (Refusal, u32)>,
+        validated: Result<f64, Refused>,
         loaded: Loaded,
         crc: u32,
         now_ms: u32,
     ) -> Answer {
-        let limit_n = match judged {
+        let limit_n = match validated {
             Ok(limit_n) if self.alive(now_ms) => limit_n,
             Ok(_) => return Err((Refusal::NoHeartbeat, 0)),
             Err(refused) => {
-                // half an upload stays, so that a chunk can be sent again
+                // An incomplete upload is kept, so that a chunk can be sent again.
                 if !matches!(refused.0, Refusal::Incomplete | Refusal::WrongState) {
                     self.unload();
                 }
@@ -184,7 +195,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             Loaded::Path => self.path.velocity_mm_s(),
             _ => self.table.begin.map_or(0.0, |begin| begin.velocity_mm_s),
         };
-        self.core = Core::new(Settings {
+        self.servo = Servo::new(ServoSettings {
             force_n: limit_n,
             velocity_mm_s,
             ..self.profile.servo
@@ -193,14 +204,14 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         self.limit_n = limit_n;
         self.loaded = loaded;
         self.crc = crc;
-        self.state = State::Loaded;
+        self.state = DeviceState::Loaded;
         self.fault = Fault::None;
         self.uploads = self.uploads.wrapping_add(1);
         Ok(())
     }
 
     fn may_start(&self, loaded: Loaded, playback: u32, crc: u32, now_ms: u32) -> Answer {
-        if self.state != State::Loaded {
+        if self.state != DeviceState::Loaded {
             Err((Refusal::WrongState, 0))
         } else if self.loaded != loaded || self.crc != crc {
             Err((Refusal::OtherTable, self.crc))
@@ -213,24 +224,22 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         }
     }
 
-    fn play_it(&mut self, play: Play, now_ms: u32) -> Answer {
+    fn start_playback(&mut self, play: Play, now_ms: u32) -> Answer {
         self.may_start(Loaded::Table, play.playback, play.crc, now_ms)?;
         if !(1..=self.profile.longest_ms).contains(&play.longest_ms) {
             return Err((Refusal::Duration, self.profile.longest_ms));
         }
         let servo_hz = self.profile.servo.servo_hz;
         let least = libm::ceil(servo_hz / self.profile.telemetry_hz) as u32;
-        let every = match play.every {
-            0 => 0,
-            _ if !self.profile.flags.telemetry => 0,
-            every => u32::from(every).max(least).max(1),
-        };
+        let least = NonZeroU32::new(least).unwrap_or(NonZeroU32::MIN);
+        let asked = play.every.filter(|_| self.profile.flags.telemetry);
+        let every = asked.map(|every| NonZeroU32::from(every).max(least));
         self.run = Run::play(play.playback, now_ms, play.longest_ms, every, servo_hz);
         self.start(now_ms);
         Ok(())
     }
 
-    fn record_it(&mut self, record: Record, now_ms: u32) -> Answer {
+    fn start_recording(&mut self, record: Record, now_ms: u32) -> Answer {
         self.may_start(Loaded::Path, record.playback, record.crc, now_ms)?;
         self.run = Run::record(record.playback, now_ms);
         self.path.rewind();
@@ -239,18 +248,18 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 
     fn start(&mut self, now_ms: u32) {
-        self.core.start();
+        self.servo.start();
         self.fault = Fault::None;
-        self.state = State::Ramp;
-        self.happened(Happening::Started, now_ms);
+        self.state = DeviceState::Ramp;
+        self.queue_event(EventKind::Started, now_ms);
     }
 
     fn stop(&mut self, stop: Stop) -> Answer {
         if stop.playback == 0 || stop.playback != self.run.playback {
             return Err((Refusal::OtherPlayback, self.run.playback));
         }
-        // what has ended by itself in the meantime has ended
-        if self.state.forceful() {
+        // The playback may have ended by itself in the meantime.
+        if self.state.applies_force() {
             self.end();
         }
         Ok(())
@@ -263,7 +272,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         if !self.at_rest() {
             return Err((Refusal::Moving, 0));
         }
-        self.state = State::Idle;
+        self.state = DeviceState::Idle;
         self.fault = Fault::None;
         Ok(())
     }
@@ -271,20 +280,20 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     fn hello(&mut self, header: Header, hello: Hello, now_ms: u32) -> Reply {
         if self.connection != Some(hello.nonce) {
             if self.state.armed() {
-                self.latch(State::Limp, Fault::NewConnection, now_ms);
+                self.latch(DeviceState::Limp, Fault::NewConnection, now_ms);
             }
             self.unload();
-            if self.state == State::Boot {
-                self.state = State::Idle;
+            if self.state == DeviceState::Boot {
+                self.state = DeviceState::Idle;
             }
             self.connection = Some(hello.nonce);
-            self.done = Some(Done {
+            self.last_request = Some(LastRequest {
                 sequence: header.sequence,
                 request: None,
             });
-            self.beat = None;
+            self.heartbeat = None;
             self.alive = None;
-            self.unasked = 0;
+            self.unsolicited = 0;
         }
         let profile = &self.profile;
         let flags = profile.flags;
@@ -296,8 +305,8 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             flags,
             clock_ms: now_ms,
             watchdog_ms: profile.watchdog_ms,
-            most_nodes: NODES.min(usize::from(u16::MAX)) as u16,
-            most_points: if flags.probe { POINTS as u32 } else { 0 },
+            max_nodes: NODES.min(usize::from(u16::MAX)) as u16,
+            max_points: if flags.probe { POINTS as u32 } else { 0 },
             longest_ms: profile.longest_ms,
             servo_hz: profile.servo.servo_hz,
             telemetry_hz: profile.telemetry_hz,
@@ -314,12 +323,12 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     fn heartbeat(&mut self, beat: Heartbeat, now_ms: u32) -> Reply {
         let ahead = beat.deadline_ms.wrapping_sub(now_ms);
         let newer = self
-            .beat
+            .heartbeat
             .is_none_or(|last| (1..0x8000_0000).contains(&beat.count.wrapping_sub(last)));
-        // a deadline that has passed is far ahead, modulo 2³²
-        let fresh = self.connection.is_some() && newer && (1..=FURTHEST_MS).contains(&ahead);
+        // A deadline in the past is far ahead modulo 2³².
+        let fresh = self.connection.is_some() && newer && (1..=MAX_DEADLINE_MS).contains(&ahead);
         if fresh {
-            self.beat = Some(beat.count);
+            self.heartbeat = Some(beat.count);
             self.alive = Some(Alive {
                 since_ms: now_ms,
                 for_ms: ahead.min(u32::from(self.profile.watchdog_ms)),
@@ -337,7 +346,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 
     fn outcome(&self, now_ms: u32) -> Reply {
-        let tally = self.core.tally();
+        let tally = self.servo.tally();
         Reply::Outcome(Outcome {
             state: self.state,
             fault: self.fault,
@@ -354,7 +363,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             mass_held: count(tally.mass_held),
             energy_j: finite(tally.energy_j),
             least_energy_j: finite(tally.least_energy_j),
-            most_force_n: finite(tally.most_force_n),
+            peak_force_n: finite(tally.peak_force_n),
             rough_n2: finite(tally.rough_n2()),
             limit_n: self.limit_n,
             bad_frames: self.bad_frames,
@@ -363,7 +372,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 }
 
-/// A quantity of the wire is a number.
+/// Quantities on the wire are finite.
 fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
 }

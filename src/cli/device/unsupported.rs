@@ -1,0 +1,17 @@
+//! The simulated device on systems without pseudo-terminals.
+
+use crate::cli::{Failure, Kind};
+use crate::device::link::LinkError;
+
+/// Arguments of a command that is not supported; all are ignored.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct Args {
+    #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    ignored: Vec<String>,
+}
+
+/// The error of every such command.
+pub(in crate::cli) fn failure() -> Failure {
+    Failure::new(Kind::Device, LinkError::Unsupported)
+        .hint("`study rehearse` and the simulated device of `study run` work on every system")
+}

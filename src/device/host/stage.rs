@@ -1,0 +1,63 @@
+//! The stages of a connection and a playback.
+
+use std::time::Duration;
+
+/// The host's view of the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// There is no port.
+    Disconnected,
+    /// LIMP and HELLO have been sent.
+    Connecting,
+    /// The device does not answer or answers incorrectly; the host reconnects at `retry`.
+    Silent { retry: Duration },
+    /// Limp, nothing loaded.
+    Idle,
+    /// A table is being uploaded.
+    Loading { since: Duration },
+    /// A table is loaded.
+    Loaded { since: Duration },
+    /// PLAY has been sent.
+    Starting,
+    /// Playing.
+    Playing { since: Duration },
+    /// STOP has been sent, or the end of the playback has been reported.
+    Stopping { since: Duration },
+    /// The playback has ended and STATE asks for its outcome.
+    AwaitingOutcome,
+}
+
+impl Stage {
+    /// Text for messages about a command in the wrong state.
+    pub(super) fn as_str(self) -> &'static str {
+        match self {
+            Self::Disconnected | Self::Connecting | Self::Silent { .. } => "it does not answer",
+            Self::Idle => "nothing is loaded",
+            Self::Loading { .. } => "the table is being loaded",
+            Self::Loaded { .. } => "a table is loaded",
+            Self::Starting => "it is starting",
+            Self::Playing { .. } => "it is playing",
+            Self::Stopping { .. } | Self::AwaitingOutcome => "it is stopping",
+        }
+    }
+
+    /// Whether the device's watchdog is or will be active.
+    pub(super) fn armed(self) -> bool {
+        matches!(
+            self,
+            Self::Loading { .. }
+                | Self::Loaded { .. }
+                | Self::Starting
+                | Self::Playing { .. }
+                | Self::Stopping { .. }
+        )
+    }
+
+    /// Whether the device has identified itself.
+    pub(super) fn known(self) -> bool {
+        !matches!(
+            self,
+            Self::Disconnected | Self::Connecting | Self::Silent { .. }
+        )
+    }
+}
