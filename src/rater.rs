@@ -1,18 +1,17 @@
 //! The simulated participant.
 //!
-//! A [`Rater`] answers the questions of a study so that the study can be
-//! rehearsed: the runner, the files and the analysis, before a person is asked.
-//! It judges a realization by its [`Impression`]: how far the force is from the
-//! target's and how active the table is, seen through a bias, a gain, noise and
-//! lapses of its own.
+//! A [`Rater`] answers the questions of a study, so that runner, files and analysis can
+//! be rehearsed before people take part. It judges a realization by its [`Impression`]:
+//! the deviation of the force from the target's and the activeness of the table, modified
+//! by the rater's bias, gain, noise and lapses.
 //!
-//! **The effect is built in.** What comes out of a rehearsal shows that the
-//! analysis finds what was put in. It is no evidence about people, and none for
-//! the paper's claim. With [`Effect::None`] nothing depends on the realization.
+//! **The effect is built in.** A rehearsal shows that the analysis finds the effect that
+//! was built in. It is no evidence about people or for the paper's claim. With
+//! [`Effect::None`] nothing depends on the realization.
 //!
-//! Formulas and constants are in `docs/simulation.md`. Everything follows from
-//! the seed, the rater's number and the order of the calls. How many numbers an
-//! answer draws never depends on what was felt.
+//! `docs/simulation.md` gives formulas and constants. Everything is determined by the
+//! seed, the rater's number and the order of the calls. The number of random draws of an
+//! answer never depends on the realization.
 
 mod impression;
 mod remarks;
@@ -25,9 +24,9 @@ use study_core::protocol::{Answer, Question, QuestionKind};
 /// Whether ratings depend on the realization.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
-    /// As in `docs/simulation.md`.
+    /// With the effect described in `docs/simulation.md`.
     BuiltIn,
-    /// Not at all.
+    /// Ratings do not depend on the realization.
     None,
 }
 
@@ -40,14 +39,15 @@ pub struct Rater {
     gain: f64,
     noise: f64,
     lapse_rate: f64,
-    talks: f64,
+    /// Probability of a comment.
+    comment_rate: f64,
 }
 
-/// Middle of the 1-to-7 scale that opinions are formed on.
-const MIDDLE: f64 = 4.0;
+/// Midpoint of the scale of opinions, which goes from 1 to 7.
+const MIDPOINT: f64 = 4.0;
 
 impl Rater {
-    /// The rater of that number in the study with this seed.
+    /// Rater number `number` in the study with this seed.
     pub fn new(seed: u64, number: u32, effect: Effect) -> Self {
         let mut stream = Stream::new(seed, &["rater", &number.to_string()]);
         Self {
@@ -55,51 +55,47 @@ impl Rater {
             gain: libm::exp(0.2 * stream.normal()),
             noise: 0.75 * libm::exp(0.15 * stream.normal()),
             lapse_rate: 0.04 * stream.unit(),
-            talks: 0.1 + 0.4 * stream.unit(),
+            comment_rate: 0.1 + 0.4 * stream.unit(),
             stream,
             effect,
         }
     }
 
-    /// How long it tries the reference, s.
+    /// Duration of an exploration of the reference, s.
     pub fn reference_s(&mut self) -> f64 {
         self.duration_s(4.0, 0.3, [2.0, 15.0])
     }
 
-    /// How long it explores a realization, s: mostly 6 to 15.
+    /// Duration of an exploration of a realization, s, mostly 6 to 15.
     pub fn exploration_s(&mut self) -> f64 {
         self.duration_s(9.5, 0.25, [5.0, 20.0])
     }
 
-    /// How long it takes to answer the questions of a trial, s.
+    /// Time to answer the questions of a trial, s.
     pub fn response_s(&mut self) -> f64 {
         self.duration_s(4.0, 0.4, [1.0, 30.0])
     }
 
-    /// How long it rests in a break of at least `at_least_s`, s.
-    pub fn takes_break_s(&mut self, at_least_s: f64) -> f64 {
-        at_least_s + self.duration_s(15.0, 0.6, [2.0, 120.0])
+    /// A log-normal duration with the given median and logarithmic standard deviation,
+    /// limited to `range_s`.
+    fn duration_s(&mut self, median_s: f64, spread: f64, range_s: [f64; 2]) -> f64 {
+        let [min, max] = range_s;
+        (median_s * libm::exp(spread * self.stream.normal())).clamp(min, max)
     }
 
-    /// A log-normal time about a median.
-    fn duration_s(&mut self, median_s: f64, spread: f64, within_s: [f64; 2]) -> f64 {
-        let [least, most] = within_s;
-        (median_s * libm::exp(spread * self.stream.normal())).clamp(least, most)
-    }
-
-    /// Answers a question so that [`Question::accepts`] it; `felt` is what was
-    /// played, for the questions of a trial.
+    /// Answers a question so that [`Question::accepts`] the answer. For the questions of a
+    /// trial `felt` is the impression of the realization.
     pub fn answer(&mut self, question: &Question, felt: Option<&Impression>) -> Answer {
         let felt = felt.filter(|_| self.effect == Effect::BuiltIn);
         match &question.kind {
             QuestionKind::Rating { from, to, .. } => {
                 let span = (*to - *from) as f64;
-                let steps = (self.share(question, felt) * span).round() as i64;
+                let steps = (self.position(question, felt) * span).round() as i64;
                 Answer::Rating((from + steps).clamp(*from, *to))
             }
             QuestionKind::Slider { from, to, step, .. } => {
-                let along = self.share(question, felt) * (to - from);
-                // as the keys move it
+                let along = self.position(question, felt) * (to - from);
+                // Rounded to the steps of the slider.
                 let along = if *step > 0.0 {
                     (along / step).round() * step
                 } else {
@@ -109,20 +105,20 @@ impl Rater {
             }
             QuestionKind::Choice { options, multiple } => self.choose(options, *multiple),
             QuestionKind::Number { min, max, .. } => self.number(*min, *max),
-            QuestionKind::Text => self.say(question.required, felt),
+            QuestionKind::Text => self.comment(question.required, felt),
         }
     }
 
-    /// Where on a scale it answers, from 0 at the one end to 1 at the other.
-    fn share(&mut self, question: &Question, felt: Option<&Impression>) -> f64 {
+    /// Position of the answer on a scale, from 0 to 1.
+    fn position(&mut self, question: &Question, felt: Option<&Impression>) -> f64 {
         let noise = self.noise * self.stream.normal();
         let lapses = self.stream.unit() < self.lapse_rate;
         let anywhere = self.stream.unit();
         if lapses {
             return anywhere;
         }
-        let opinion = felt.map_or(MIDDLE, |felt| felt.opinion(question.id.as_str()));
-        let judged = MIDDLE + self.gain * (opinion - MIDDLE) + self.bias + noise;
+        let opinion = felt.map_or(MIDPOINT, |felt| felt.opinion(question.id.as_str()));
+        let judged = MIDPOINT + self.gain * (opinion - MIDPOINT) + self.bias + noise;
         ((judged - 1.0) / 6.0).clamp(0.0, 1.0)
     }
 
@@ -140,8 +136,7 @@ impl Rater {
         Answer::Choice(chosen)
     }
 
-    /// A whole number within the bounds where one fits; without bounds one that
-    /// could be an age.
+    /// A number within the bounds, whole if possible; without bounds a plausible age.
     fn number(&mut self, min: Option<f64>, max: Option<f64>) -> Answer {
         let low = min.unwrap_or_else(|| max.map_or(18.0, |max| max - 40.0));
         let high = max.unwrap_or(low + 40.0);
@@ -154,18 +149,18 @@ impl Rater {
         })
     }
 
-    fn say(&mut self, required: bool, felt: Option<&Impression>) -> Answer {
-        let silent = self.stream.unit() >= self.talks;
+    fn comment(&mut self, required: bool, felt: Option<&Impression>) -> Answer {
+        let silent = self.stream.unit() >= self.comment_rate;
         let draw = self.stream.unit();
         if silent && !required {
             return Answer::Text(String::new());
         }
-        let said = felt.map_or_else(|| remarks::general(draw), |felt| remarks::about(felt, draw));
-        Answer::Text(said.to_owned())
+        let text = felt.map_or_else(|| remarks::general(draw), |felt| remarks::about(felt, draw));
+        Answer::Text(text.to_owned())
     }
 
     fn pick(&mut self, count: usize) -> usize {
-        // an empty list has no first either; the draw is made all the same
+        // The number is drawn also for an empty list, to keep the stream aligned.
         let drawn = self.stream.below(count.max(1) as u64);
         usize::try_from(drawn).expect("below a length")
     }
@@ -235,20 +230,20 @@ mod tests {
     }
 
     #[test]
-    fn without_an_effect_the_realization_changes_nothing() {
+    fn without_an_effect_ratings_do_not_depend_on_the_realization() {
         let one = ratings(Effect::None, &felt(0.1));
         let other = ratings(Effect::None, &felt(9.0));
         assert_eq!(one, other);
     }
 
     #[test]
-    fn ratings_spread_by_about_one() {
+    fn the_standard_deviation_of_ratings_is_about_one() {
         let (_, sd) = ratings(Effect::BuiltIn, &felt(2.0));
         assert!((0.8..1.3).contains(&sd), "{sd}");
     }
 
     #[test]
-    fn the_seed_and_the_number_alone_decide() {
+    fn answers_depend_only_on_seed_and_number() {
         let answers = |seed, number| {
             let mut rater = Rater::new(seed, number, Effect::BuiltIn);
             (0..40)
@@ -261,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_felt_moves_no_later_draw() {
+    fn the_impression_does_not_change_later_draws() {
         let after = |first: f64| {
             let mut rater = Rater::new(3, 1, Effect::BuiltIn);
             rater.answer(&realism(), Some(&felt(first)));
@@ -275,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn explorations_last_six_to_fifteen_seconds_mostly() {
+    fn most_explorations_last_six_to_fifteen_seconds() {
         let mut rater = Rater::new(5, 1, Effect::BuiltIn);
         let within = (0..1000)
             .map(|_| rater.exploration_s())

@@ -299,6 +299,16 @@ impl ProcessDevice {
     }
 }
 
+impl Drop for ProcessDevice {
+    /// Sends `limp` before the input is closed.
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.child {
+            // A program that has ended cannot receive it.
+            let _ = child.send(messages::command("limp", self.load));
+        }
+    }
+}
+
 fn identity(hello: Hello) -> Identity {
     Identity {
         id: hello.id,

@@ -1,10 +1,10 @@
-//! What a realization is like beside the target, as a rater feels it.
+//! A rater's impression of a realization, relative to the target.
 //!
-//! One fixed exploration, the same for all: x = 17.5 + 15·sin 2πφ(t) mm with
-//! φ' = 1 − 0.5·cos(2πt/6) Hz for 6 s, from slow to 1.5 Hz and back. The target's
-//! force under it is simulated once; a realization's force is predicted from the
-//! same motion. Both are smoothed over 21 ms, as the recordings are filtered,
-//! because the target's impacts last a millisecond and no table has them.
+//! All impressions use one fixed exploration: x = 17.5 + 15·sin 2πφ(t) mm with
+//! φ' = 1 − 0.5·cos(2πt/6) Hz for 6 s, from 0.5 to 1.5 Hz and back. The target's force is
+//! simulated once, and the realization's force is predicted for the same motion. Both are
+//! smoothed over 21 ms, similar to the filter of recordings, because the target's impacts
+//! last a millisecond and no table contains them.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -12,20 +12,21 @@ use study_haptics::model::Realization;
 use study_haptics::plant::{DT_S, HandParameters, Parameters, Target};
 use study_wire::predict::{DirectionState, Motion, force_n};
 
-/// How a realization compares with the target B, of which the shipped ones are. Deterministic.
+/// Comparison of a realization with target B, from which the shipped realizations were
+/// identified. Deterministic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impression {
     /// Root mean square difference from the target's force, N.
     pub force_error_n: f64,
     /// The same within 3 mm of the ends of the exploration, N.
     pub end_error_n: f64,
-    /// How much the table pushes on its own: mean over nodes and directions of the
-    /// negative part of m over the slider's mass plus that of b over the hand's
-    /// damping. 0: never; 1: all of either taken away.
+    /// Mean over nodes and directions of the negative part of m relative to the slider's
+    /// mass plus that of b relative to the hand's damping. 0 for no negative parameters,
+    /// 1 if all of the mass or the damping is compensated.
     pub activeness: f64,
-    /// Largest force, as a share of the target's.
+    /// Largest force relative to the target's.
     pub detent: f64,
-    /// Standard deviation of the rate of force, as a share of the target's.
+    /// Root mean square of the rate of force relative to the target's.
     pub crispness: f64,
 }
 
@@ -33,12 +34,12 @@ const SECONDS: f64 = 6.0;
 const CENTRE_MM: f64 = 17.5;
 const AMPLITUDE_MM: f64 = 15.0;
 const END_MM: f64 = 3.0;
-/// Plant steps between two samples: 1 kHz.
-const EVERY: usize = 40;
-/// Samples to either side that a sample is averaged with.
-const SMOOTH: usize = 10;
+/// Simulation steps per sample, for 1 kHz.
+const STEPS_PER_SAMPLE: usize = 40;
+/// Number of samples on either side in the moving average.
+const SMOOTHING: usize = 10;
 
-/// The target under the exploration.
+/// The target's force during the exploration.
 static REFERENCE: LazyLock<Reference> = LazyLock::new(Reference::new);
 
 struct Reference {
@@ -53,12 +54,12 @@ impl Reference {
         let mut target = Target::new(Parameters::b(), CENTRE_MM)
             .expect("a unit test checks the built-in parameters");
         let steps = (SECONDS / DT_S) as usize;
-        let mut sampled = Vec::with_capacity(steps / EVERY + 1);
-        let mut felt = Vec::with_capacity(steps / EVERY + 1);
+        let mut sampled = Vec::with_capacity(steps / STEPS_PER_SAMPLE + 1);
+        let mut felt = Vec::with_capacity(steps / STEPS_PER_SAMPLE + 1);
         for i in 0..steps {
             let motion = exploration(i as f64 * DT_S);
             let force_n = target.step(motion);
-            if i % EVERY == 0 {
+            if i % STEPS_PER_SAMPLE == 0 {
                 sampled.push(motion);
                 felt.push(force_n);
             }
@@ -73,10 +74,10 @@ impl Reference {
     }
 }
 
-/// The fixed exploration at `t_s`.
+/// Motion of the fixed exploration at `t_s`.
 fn exploration(t_s: f64) -> Motion {
     let turn = TAU / SECONDS;
-    // φ and its two derivatives, in radians
+    // 2πφ and its two derivatives, rad.
     let phase = TAU * t_s - 0.5 * SECONDS * libm::sin(turn * t_s);
     let rate = TAU * (1.0 - 0.5 * libm::cos(turn * t_s));
     let change = TAU * 0.5 * turn * libm::sin(turn * t_s);
@@ -89,8 +90,8 @@ fn exploration(t_s: f64) -> Motion {
 }
 
 impl Impression {
-    /// What a realization is like. Takes about a millisecond, and once a process
-    /// the time to simulate the target.
+    /// Computes the impression of a realization. This takes about a millisecond, and the
+    /// first call also simulates the target.
     pub fn of(realization: &Realization) -> Self {
         let reference = &*REFERENCE;
         let table = realization.table();
@@ -102,13 +103,13 @@ impl Impression {
             .iter()
             .map(|motion| {
                 let z = state.step(realization.direction, *motion);
-                // as the device plays it: nothing is known beyond what was trained
-                let known = Motion {
+                // Limited to the trained range, as on the device.
+                let limited = Motion {
                     x_mm: motion.x_mm.max(low).min(high),
                     v_mm_s: motion.v_mm_s.max(-trained).min(trained),
                     ..*motion
                 };
-                force_n(&table, z, known)
+                force_n(&table, z, limited)
             })
             .collect();
         let predicted = smoothed(&predicted);
@@ -133,10 +134,10 @@ impl Impression {
         }
     }
 
-    /// What a rater without bias or noise would say on a scale from 1 to 7.
+    /// Opinion of a rater without bias and noise, on a scale from 1 to 7.
     ///
-    /// A question whose id speaks of crispness or detents is about that alone, 5
-    /// being as in the target; every other is about the whole.
+    /// A question whose id contains `crisp` or `detent` is about that property, with 5 for
+    /// the target's value; all other questions are about the overall impression.
     pub(super) fn opinion(&self, question: &str) -> f64 {
         if question.contains("crisp") {
             1.0 + 4.0 * self.crispness
@@ -150,9 +151,9 @@ impl Impression {
 
 /// Opinion of the target itself.
 const BEST: f64 = 6.0;
-/// What a newton of difference costs.
+/// Decrease of the opinion per newton of force error.
 const PER_NEWTON: f64 = 0.7;
-/// What full activeness costs.
+/// Decrease of the opinion per unit of activeness.
 const PER_ACTIVENESS: f64 = 0.5;
 
 fn activeness(realization: &Realization) -> f64 {
@@ -171,12 +172,12 @@ fn activeness(realization: &Realization) -> f64 {
         / 2.0
 }
 
-/// Moving average, shorter at the ends.
+/// Moving average, over fewer samples at the ends.
 fn smoothed(values: &[f64]) -> Vec<f64> {
     (0..values.len())
         .map(|i| {
-            let from = i.saturating_sub(SMOOTH);
-            let to = (i + SMOOTH + 1).min(values.len());
+            let from = i.saturating_sub(SMOOTHING);
+            let to = (i + SMOOTHING + 1).min(values.len());
             values[from..to].iter().sum::<f64>() / (to - from) as f64
         })
         .collect()
@@ -186,7 +187,7 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |most, v| most.max(v.abs()))
 }
 
-/// Root mean square of the change from sample to sample.
+/// Root mean square of the difference between consecutive samples.
 fn rate(values: &[f64]) -> f64 {
     let squares: f64 = values.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
     (squares / (values.len() - 1) as f64).sqrt()
@@ -199,8 +200,8 @@ mod tests {
     use study_haptics::model::{Branch, Provenance, Trained};
     use study_wire::predict::{Direction, Lookup};
 
-    /// A table of nothing but the given mass and the target's quasi-static force
-    /// of each direction, scaled.
+    /// A table with a constant mass and the scaled quasi-static force of the target in
+    /// each direction.
     fn table(scale: f64, mass: f64) -> Realization {
         let nodes: Vec<f64> = (4..=66).map(|i| f64::from(i) * 0.5).collect();
         let branch = |direction: f64| {
@@ -259,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn the_targets_own_profile_is_near_and_half_of_it_is_far() {
+    fn the_targets_profile_has_a_smaller_error_than_half_of_it() {
         let own = Impression::of(&table(1.0, 0.0));
         let half = Impression::of(&table(0.5, 0.0));
         assert!(own.force_error_n < 1.6, "{own:?}");

@@ -1,9 +1,8 @@
-//! What simulated participants say: a fixed list of plain remarks.
+//! Comments of simulated participants: a fixed list.
 
 use super::Impression;
 
-/// A remark about what stands out most, `draw` in [0, 1) choosing among its
-/// wordings.
+/// A comment about the most prominent property; `draw` in [0, 1) selects the wording.
 pub(super) fn about(felt: &Impression, draw: f64) -> &'static str {
     let remarks = [
         (
@@ -51,14 +50,14 @@ pub(super) fn about(felt: &Impression, draw: f64) -> &'static str {
             &["quite close", "felt like the real one", "crisp, good force"],
         ),
     ];
-    let loudest = remarks
+    let most_prominent = remarks
         .iter()
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map_or(&GENERAL, |(_, wordings)| *wordings);
-    pick(loudest, draw)
+    pick(most_prominent, draw)
 }
 
-/// A remark about nothing in particular.
+/// A general comment.
 pub(super) fn general(draw: f64) -> &'static str {
     pick(&GENERAL, draw)
 }
@@ -78,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_remark_speaks_of_what_stands_out() {
+    fn a_comment_is_about_the_most_prominent_property() {
         let good = Impression {
             force_error_n: 0.2,
             end_error_n: 0.2,

@@ -1,5 +1,5 @@
-//! Commissioning in virtual time: passes on the simulated device, and names the
-//! clause on one with a planted defect.
+//! Commissioning in virtual time: the simulated device passes, and with a planted defect
+//! the violated clause is named.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -9,7 +9,7 @@ use study::device::firmware::{Firmware, Flaw, Options};
 use study::device::link::LinkError;
 use study::device::link::memory::{Line, Noise};
 
-/// A simulated device behind a line of half a millisecond.
+/// A simulated device on a line with a latency of half a millisecond.
 struct Bench {
     firmware: Firmware,
     there: Line,
@@ -100,7 +100,7 @@ fn each_planted_defect_is_named_by_its_clause() {
             .filter(|v| !v.pass)
             .map(|v| v.clause)
             .collect();
-        // a device of another version never gets beyond the greeting
+        // a device with another version is rejected at HELLO
         let expected = if flaw == Flaw::OtherVersion {
             "14.3"
         } else {
@@ -112,7 +112,7 @@ fn each_planted_defect_is_named_by_its_clause() {
 }
 
 #[test]
-fn nobody_there_is_one_verdict() {
+fn without_a_device_there_is_one_verdict() {
     struct Nobody(Duration);
     impl Connection for Nobody {
         fn now(&mut self) -> Duration {
@@ -129,10 +129,10 @@ fn nobody_there_is_one_verdict() {
     assert!(found.verdicts[0].seen.contains("no answer"), "{found:?}");
 }
 
-/// The probe of the simulated device follows a path and measures the target: what
-/// comes back is the path, a period late, and a force of the target's size.
+/// The simulated probe follows a path and measures the target. The recording contains the
+/// path, one period late, and a force of the target's magnitude.
 #[test]
-fn a_path_is_followed_and_recorded_whole() {
+fn a_path_is_followed_and_recorded_completely() {
     use study::device::probe::{ProbePath, record};
     let rate_hz = 1000.0;
     let x_mm: Vec<f64> = (0..3000)
@@ -156,7 +156,7 @@ fn a_path_is_followed_and_recorded_whole() {
     let most_n = recording.f_n.iter().fold(0.0f64, |m, f| m.max(f.abs()));
     assert!((3.0..12.0).contains(&most_n), "{most_n}");
     assert_eq!(bench.firmware.held_n(), 0.0);
-    // beyond its stroke, and faster than it may
+    // beyond the stroke, and above the velocity limit
     let refusal = |path: &ProbePath| {
         let mut bench = Bench::new(Options::default());
         record(&mut bench, 4, path, &mut |_| {}).unwrap_err()

@@ -1,4 +1,4 @@
-//! Playback devices: simulated, behind a program, checked, commanded to stop.
+//! Playback devices: simulated, as a program, commissioning, safety.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

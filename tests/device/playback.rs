@@ -1,5 +1,5 @@
-//! The simulated device as the runner sees it: what it confirms, in which order,
-//! and that nothing but playing ever has force.
+//! The simulated device as seen by the runner: its reports and their order, and no force
+//! except during playback.
 
 #![allow(clippy::unwrap_used)]
 
@@ -13,7 +13,7 @@ use study_core::outcome::{Playback, Sample};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::predict::{Direction, Lookup};
 
-/// A name and what to do to a `T`.
+/// A name and an action on a `T`.
 type Case<'a, T> = (&'static str, &'a dyn Fn(&mut T));
 
 fn limits(force_n: f64) -> Limits {
@@ -23,8 +23,8 @@ fn limits(force_n: f64) -> Limits {
     }
 }
 
-/// Three detents of about 6 N, 1 mm apart nodes, with friction of 1 N and the
-/// given mass and damping everywhere.
+/// Three detents of about 6 N with nodes 1 mm apart, a friction of 1 N and a constant mass
+/// and damping.
 fn detents(mass: f64, damping: f64, direction: Direction) -> Realization {
     let nodes: Vec<f64> = (2..=33).map(f64::from).collect();
     let branch = |friction: f64| Branch {
@@ -60,8 +60,8 @@ fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
 
-/// Loads and starts; the device plays from 32 ms on: 15 requests of 1 ms each carry
-/// the table, one starts it.
+/// Loads and starts. The playback begins at 32 ms, after 15 requests of 1 ms each for the
+/// table and one for the start.
 fn playing(options: Options, realization: &Realization) -> VirtualDevice {
     let mut device = VirtualDevice::new(options);
     device
@@ -102,7 +102,7 @@ fn played(realization: &Realization, seed: u64) -> (Playback, Vec<Sample>) {
 }
 
 #[test]
-fn a_confirmed_start_comes_before_any_telemetry_and_a_stop_after_all_of_it() {
+fn a_start_is_confirmed_before_the_telemetry_and_a_stop_after_it() {
     let mut device = VirtualDevice::new(Options::default());
     assert_eq!(device.poll(ms(0)), []);
     device
@@ -141,7 +141,7 @@ fn a_playback_of_twelve_seconds_has_strokes_telemetry_and_no_loss() {
 }
 
 #[test]
-fn how_often_it_is_polled_changes_nothing() {
+fn the_frequency_of_polling_has_no_influence() {
     let once = played(&ordinary(), 7);
     let mut device = playing(
         Options {
@@ -161,12 +161,12 @@ fn how_often_it_is_polled_changes_nothing() {
 }
 
 #[test]
-fn another_seed_is_another_hand() {
+fn another_seed_gives_another_hand() {
     assert_eq!(played(&ordinary(), 1), played(&ordinary(), 1));
     assert_ne!(played(&ordinary(), 1).1, played(&ordinary(), 2).1);
 }
 
-/// A table that takes all of the hand's damping away, and one that adds some.
+/// A table that compensates the hand's damping, and one that adds damping.
 #[test]
 fn an_active_table_shows_in_the_energy_and_the_switches() {
     let (passive, _) = played(&detents(0.0, 0.02, Direction::Play { delta_mm: 0.5 }), 3);
@@ -179,8 +179,8 @@ fn an_active_table_shows_in_the_energy_and_the_switches() {
     );
 }
 
-/// The paper's realizations have m down to −1.9 kg; the device holds it to the
-/// slider's mass, so that a session is not one fault after the other.
+/// The paper's realizations have m down to −1.9 kg. The device limits the mass to that of
+/// the slider, which avoids faults.
 #[test]
 fn a_table_of_negative_mass_can_be_played_without_a_fault() {
     for seed in 0..5 {
@@ -251,7 +251,7 @@ fn limp_is_no_force_and_no_report_in_every_state() {
             assert_ne!(device.held_n(), 0.0);
         }
         device.limp(ms(2001));
-        // half a millisecond each way
+        // half a millisecond in each direction
         device.poll(ms(2002));
         assert_eq!(device.held_n(), 0.0, "{name}");
         assert_eq!(device.poll(ms(9000)), [], "{name}");
@@ -265,7 +265,7 @@ fn limp_is_no_force_and_no_report_in_every_state() {
 }
 
 #[test]
-fn commands_out_of_turn_are_refused_with_the_state() {
+fn commands_in_the_wrong_state_are_refused() {
     let mut device = VirtualDevice::new(Options::default());
     let refused = device.start(ms(0)).unwrap_err();
     assert_eq!(
@@ -283,7 +283,7 @@ fn commands_out_of_turn_are_refused_with_the_state() {
 }
 
 #[test]
-fn a_table_with_a_hole_is_refused_naming_it() {
+fn an_invalid_table_is_refused_with_the_reason() {
     let damage: [Case<'_, Realization>; 6] = [
         ("positive m_kg is not a finite number at node 4", &|r| {
             r.positive.m_kg[3] = f64::NAN;
@@ -316,7 +316,30 @@ fn a_table_with_a_hole_is_refused_naming_it() {
 }
 
 #[test]
-fn each_injected_fault_does_what_it_says() {
+fn a_table_that_fails_its_certificate_needs_a_permission() {
+    let table = detents(-0.2, 0.01, Direction::Sign);
+    for allow_uncertified in [false, true] {
+        let what = Stimulus {
+            allow_uncertified,
+            ..Stimulus::of_table(&table)
+        };
+        let mut device = VirtualDevice::new(Options::default());
+        device.load(&what, limits(12.0), ms(0)).unwrap();
+        let reports = device.poll(ms(100));
+        if allow_uncertified {
+            assert_eq!(reports, [Report::Loaded]);
+        } else {
+            let [Report::Fault(reason)] = &reports[..] else {
+                panic!("{reports:?}");
+            };
+            assert!(reason.contains("fails its certificate"), "{reason}");
+        }
+        assert_eq!(device.start(ms(100)).is_ok(), allow_uncertified);
+    }
+}
+
+#[test]
+fn each_injected_fault_has_its_effect() {
     let with = |fault| Options {
         faults: FaultPlan::none().with(1, fault),
         ..Options::default()
@@ -391,7 +414,7 @@ fn the_lower_of_the_two_force_limits_holds() {
 }
 
 prop_compose! {
-    /// Any table a host could send, physical or not.
+    /// Any table that a host could send.
     fn any_table()(
         nodes in 2usize..40,
         dx in 0.2..4.0f64,
@@ -444,7 +467,7 @@ proptest! {
         let mut device = VirtualDevice::new(Options { seed, ..Options::default() });
         device.load(&Stimulus::of_table(&table), limits(force_n), ms(0)).unwrap();
         device.poll(ms(100));
-        // a table beyond the device's reach is refused
+        // a table beyond the device's stroke is refused
         let beyond = table.trained.x_mm[0] < -20.0 || table.trained.x_mm[1] > 60.0;
         prop_assert_eq!(device.start(ms(100)).is_err(), beyond);
         let allowed = force_n.min(15.0) + 1e-6;

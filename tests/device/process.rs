@@ -1,5 +1,5 @@
-//! A child program as the playback device: the documented example, and children
-//! that do what they should not.
+//! Controller programs: the documented example, and programs that violate the
+//! specification.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::print_stderr, reason = "what is skipped is told")]
@@ -11,7 +11,7 @@ use study_base::limits::Limits;
 use study_core::outcome::Sample;
 use study_haptics::model::Realization;
 
-/// Generous: the machine may be busy; nothing is asserted about time.
+/// Long, because the machine may be busy; the tests do not depend on it.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 fn table() -> Realization {
@@ -68,7 +68,7 @@ impl Bench {
         self.device.load(&Stimulus::of_table(&table), limits(), at)
     }
 
-    /// Polls until a report is as wanted; it.
+    /// Polls until a report satisfies the condition and returns it.
     fn until(&mut self, what: &str, fine: impl Fn(&Report) -> bool) -> Report {
         while self.at() < PATIENCE {
             let at = self.at();
@@ -93,8 +93,7 @@ impl Bench {
 
 const HELLO: &str = r#"echo '{"say":"hello","format":"study-process/1","id":"sh","telemetry":true,"limits":{"force_n":5,"velocity_mm_s":100}}'; "#;
 
-/// Only after the load has come: the child shall not be faster than the test, and what
-/// comes first may be `alive`.
+/// A program that waits for `load` before it does anything; `alive` may come first.
 const UNTIL_LOAD: &str =
     r#"while read line; do case "$line" in *'"do":"load"'*) break;; esac; done; "#;
 
@@ -134,7 +133,7 @@ fn the_documented_example_plays() {
         assert!(samples.iter().all(|s| s.force_command_n.abs() <= 9.0));
         assert!(samples.iter().any(|s| s.force_command_n.abs() > 1.0));
     }
-    // a limp takes a load back
+    // LIMP cancels a load
     bench.load().unwrap();
     let at = bench.at();
     bench.device.limp(at);
@@ -145,14 +144,14 @@ fn the_documented_example_plays() {
     assert_eq!(loads.count(), 1, "{:?}", bench.heard);
 }
 
-/// A host that has stopped is not a host that has gone: its child goes limp by itself.
+/// A stopped host does not close the program's input: the program goes limp by itself.
 #[test]
-fn the_documented_example_ends_when_it_is_not_told_that_somebody_is_there() {
+fn the_documented_example_ends_without_alive() {
     let Some(command) = example() else { return };
     let mut bench = Bench::new(command);
     bench.load().unwrap();
     bench.until("table", |r| *r == Report::Loaded);
-    // what does not play needs nobody
+    // without a playback no `alive` is needed
     std::thread::sleep(Duration::from_millis(700));
     let at = bench.at();
     bench.device.start(at).unwrap();
@@ -163,7 +162,7 @@ fn the_documented_example_ends_when_it_is_not_told_that_somebody_is_there() {
 }
 
 #[test]
-fn the_example_can_be_loaded_without_a_table_and_says_no() {
+fn the_example_refuses_a_load_without_a_table() {
     let Some(command) = example() else { return };
     let mut bench = Bench::new(command);
     let at = bench.at();
@@ -185,7 +184,7 @@ fn the_example_can_be_loaded_without_a_table_and_says_no() {
 }
 
 #[test]
-fn a_child_that_cannot_be_understood_is_lost_and_started_again() {
+fn a_program_that_violates_the_specification_is_lost_and_restarted() {
     for (script, why) in [
         ("echo rubbish; sleep 60", "its line 2 is invalid: "),
         (
@@ -215,7 +214,7 @@ fn a_child_that_cannot_be_understood_is_lost_and_started_again() {
 }
 
 #[test]
-fn a_child_that_does_not_read_is_lost_and_nothing_waits_for_it() {
+fn a_program_that_does_not_read_is_lost_without_blocking_the_host() {
     let mut bench = Bench::shell(&format!("{HELLO} sleep 60"));
     for _ in 0..2000 {
         let at = bench.at();
@@ -229,7 +228,7 @@ fn a_child_that_does_not_read_is_lost_and_nothing_waits_for_it() {
 }
 
 #[test]
-fn a_child_that_is_no_controller_is_refused_before_the_session() {
+fn a_program_that_is_not_a_controller_is_refused_before_the_session() {
     let refusal = |script: &str| {
         let command = ["sh", "-c", script].map(str::to_owned).to_vec();
         ProcessDevice::open(command).unwrap_err().to_string()
@@ -251,10 +250,9 @@ fn a_child_that_is_no_controller_is_refused_before_the_session() {
     );
 }
 
-/// A child that does not come back, and why not, which may be another reason than
-/// that of the first loss.
+/// A program that cannot be restarted. The reason may differ from that of the loss.
 #[test]
-fn what_keeps_a_child_from_coming_back_is_told_once() {
+fn why_a_program_cannot_be_restarted_is_reported_once() {
     let folder = tempfile::tempdir().unwrap();
     let flag = folder.path().join("flag");
     let script = format!(
@@ -280,10 +278,10 @@ fn what_keeps_a_child_from_coming_back_is_told_once() {
 }
 
 #[test]
-fn a_hello_can_be_waited_for_in_turns() {
+fn waiting_for_a_hello_can_be_interrupted() {
     let command = ["sh", "-c", &format!("read go; {HELLO} sleep 60")].map(str::to_owned);
     let mut command = command.to_vec();
-    // it waits for a line that never comes
+    // it waits for a line that is never sent
     let opening = Opening::begin(command.clone()).unwrap();
     let waited = opening.hello(Duration::from_millis(50)).unwrap();
     assert!(matches!(waited, Opened::NotYet(_)), "{waited:?}");
@@ -302,7 +300,7 @@ fn a_hello_can_be_waited_for_in_turns() {
 }
 
 #[test]
-fn a_child_ends_with_its_host() {
+fn a_program_ends_with_its_host() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ended");
     let script = format!(

@@ -1,5 +1,5 @@
-//! Deadlines of the safety chain, in virtual time: host and simulated device with a
-//! line of half a millisecond in between.
+//! Time limits of the safety measures in virtual time, with host and simulated device on
+//! a line with a latency of half a millisecond.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -10,7 +10,8 @@ use study::device::link::memory::{Line, Noise};
 use study::device::{Report, Stimulus};
 use study_base::limits::{Limit, Limits};
 use study_haptics::model::{Branch, Realization, Trained};
-use study_wire::message::{DeviceState, Fault};
+use study_wire::frame::Decoder;
+use study_wire::message::{DeviceState, Fault, Request};
 use study_wire::predict::{Direction, Lookup};
 
 const TICK: Duration = Duration::from_micros(250);
@@ -26,7 +27,7 @@ fn limits() -> Limits {
     }
 }
 
-/// 3 N everywhere: force as soon as it plays.
+/// A constant force of 3 N.
 fn table() -> Realization {
     let nodes: Vec<f64> = (0..=7).map(|i| 5.0 * f64::from(i)).collect();
     let branch = Branch {
@@ -51,18 +52,20 @@ fn table() -> Realization {
     }
 }
 
-/// Host, line, device. What is not there any more is told by flags.
+/// Host, line and device. Flags say which parts are running.
 struct Bench {
     host: Host,
     firmware: Firmware,
     there: Line,
     back: Line,
     now: Duration,
-    /// The host's process runs.
+    /// Whether the host's process runs.
     runs: bool,
-    /// The screen's loop turns.
+    /// Whether the user interface polls.
     screen: bool,
     heard: Vec<Report>,
+    /// Bytes that the host has sent.
+    sent: Vec<u8>,
 }
 
 impl Bench {
@@ -71,7 +74,7 @@ impl Bench {
         let firmware = Firmware::new(Options {
             seed,
             watchdog_ms,
-            // the clock wraps while it plays
+            // the clock wraps during the playback
             clock_ms: u32::MAX - 3000,
             ..Options::default()
         });
@@ -84,6 +87,7 @@ impl Bench {
             runs: true,
             screen: true,
             heard: Vec::new(),
+            sent: Vec::new(),
         };
         bench.pass(ms(200));
         bench.host.connected(bench.now);
@@ -96,7 +100,7 @@ impl Bench {
         let came = self.there.arrived(self.now);
         self.firmware.receive(&came, self.now);
         self.back.send(self.firmware.take_output(), self.now);
-        // a host that does not run leaves its bytes in the driver
+        // the bytes for a host that does not run stay in the driver
         if self.runs {
             let came = self.back.arrived(self.now);
             if self.screen {
@@ -104,7 +108,9 @@ impl Bench {
             }
             self.host.receive(&came, self.now);
             self.host.advance(self.now);
-            self.there.send(self.host.take_output(), self.now);
+            let output = self.host.take_output();
+            self.sent.extend_from_slice(&output);
+            self.there.send(output, self.now);
             self.heard.extend(self.host.take_reports());
         }
     }
@@ -155,7 +161,7 @@ impl Bench {
         self.now - from
     }
 
-    /// Zero force stays, whatever the host does; it only comes back by a new start.
+    /// The force stays zero until a new start.
     fn latched(&mut self) {
         for _ in 0..4000 {
             self.step();
@@ -170,7 +176,7 @@ fn phases() -> impl Iterator<Item = Duration> {
 }
 
 #[test]
-fn a_host_that_is_killed_is_zero_force_within_50_ms_latched() {
+fn the_force_is_zero_50_ms_after_the_host_is_killed() {
     let mut worst = Duration::ZERO;
     for phase in phases() {
         let mut bench = Bench::new(Noise::default(), 1, 30);
@@ -182,13 +188,13 @@ fn a_host_that_is_killed_is_zero_force_within_50_ms_latched() {
         bench.latched();
     }
     assert!(worst <= ms(50), "{worst:?}");
-    // and it is the heartbeat that holds it: not at once either
+    // not at once either, because the heartbeats keep the device alive
     assert!(worst >= ms(20), "{worst:?}");
 }
 
-/// Stopped and continued: what waits in the driver does not make it play on.
+/// After the host is continued, heartbeats that waited in the driver have no effect.
 #[test]
-fn a_host_that_is_stopped_and_continued_does_not_resume() {
+fn a_playback_does_not_resume_when_a_stopped_host_continues() {
     for phase in phases().step_by(7) {
         let mut bench = Bench::new(Noise::default(), 2, 30);
         bench.play();
@@ -205,7 +211,7 @@ fn a_host_that_is_stopped_and_continued_does_not_resume() {
 }
 
 #[test]
-fn a_screen_that_stalls_is_zero_force_within_150_ms_latched() {
+fn the_force_is_zero_150_ms_after_the_screen_stalls() {
     let mut worst = Duration::ZERO;
     for phase in phases() {
         let mut bench = Bench::new(Noise::default(), 3, 30);
@@ -225,10 +231,10 @@ fn a_screen_that_stalls_is_zero_force_within_150_ms_latched() {
     );
 }
 
-/// At every millisecond from the load to long after the stop: zero force in time,
-/// no outcome that the device did not confirm, and everything works again after.
+/// At any time from the load to long after the stop: zero force in time, no unconfirmed
+/// outcome, and the device is usable afterwards.
 #[test]
-fn a_cable_that_is_pulled_at_any_moment() {
+fn the_cable_can_be_unplugged_at_any_time() {
     for pulled in (0..1500).step_by(9).map(ms) {
         let mut bench = Bench::new(Noise::default(), 4, 30);
         let begin = bench.now;
@@ -268,9 +274,9 @@ fn a_cable_that_is_pulled_at_any_moment() {
     }
 }
 
-/// A device that loses its power in the middle, at any moment.
+/// The device loses its power at any time.
 #[test]
-fn a_device_that_starts_anew_is_noticed_and_used_again() {
+fn a_restarted_device_is_noticed_and_used_again() {
     for after in (0..1200).step_by(37).map(ms) {
         let mut bench = Bench::new(Noise::default(), 5, 30);
         let begin = bench.now;
@@ -291,11 +297,11 @@ fn a_device_that_starts_anew_is_noticed_and_used_again() {
     }
 }
 
-/// Damage, loss, repetition, reordering and delay of single frames: the force is
-/// never above its limit, no playback is confirmed that was not, and with a patient
-/// watchdog most playbacks come to their end.
+/// Damaged, lost, repeated, reordered and delayed frames: the force never exceeds its
+/// limit, outcomes are correct, and with a long watchdog time most playbacks end
+/// regularly.
 #[test]
-fn a_bad_line_is_safe_and_usable() {
+fn a_faulty_line_is_safe_and_usable() {
     let share = 0.01;
     let noise = Noise {
         corrupt: share,
@@ -340,16 +346,61 @@ fn a_bad_line_is_safe_and_usable() {
     assert!(ended >= 8, "{ended} of 12");
 }
 
-/// A deadline may not be further ahead than a second, whatever the watchdog time.
+/// A heartbeat that waits in a driver must not outlive its host for long.
 #[test]
-fn a_device_with_a_watchdog_of_a_second_can_be_armed() {
+fn heartbeats_expire_40_ms_after_they_were_made() {
+    let mut bench = Bench::new(Noise::default(), 9, 30);
+    bench.play();
+    let mut decoder = Decoder::new();
+    let mut count = 0;
+    for _ in 0..4000 {
+        bench.sent.clear();
+        bench.step();
+        let device_ms = (bench.now.as_millis() as u32).wrapping_add(u32::MAX - 3000);
+        for byte in &bench.sent {
+            let Some(Ok(body)) = decoder.push(*byte) else {
+                continue;
+            };
+            if let Ok((_, Request::Heartbeat(heartbeat))) = Request::decode(body) {
+                let ahead_ms = heartbeat.deadline_ms.wrapping_sub(device_ms);
+                assert!((38..=42).contains(&ahead_ms), "{ahead_ms} ms");
+                count += 1;
+            }
+        }
+    }
+    assert!((95..=105).contains(&count), "{count} in a second");
+}
+
+/// Without a user interface that polls there are no heartbeats, so nothing is loaded.
+#[test]
+fn nothing_can_be_loaded_without_a_responding_screen() {
+    let mut bench = Bench::new(Noise::default(), 10, 30);
+    bench.screen = false;
+    bench.pass(ms(500));
+    bench.load();
+    bench.until("refusal", |r| matches!(r, Report::Fault(_)));
+    assert_eq!(bench.firmware.limit_n(), 0.0);
+
+    // a screen that has never polled
+    bench.host = Host::new(2, HostSettings::default());
+    bench.host.connected(bench.now);
+    bench.pass(ms(300));
+    bench.heard.clear();
+    bench.load();
+    bench.until("refusal", |r| matches!(r, Report::Fault(_)));
+    assert_eq!(bench.firmware.limit_n(), 0.0);
+}
+
+/// A deadline may be at most a second ahead, with any watchdog time.
+#[test]
+fn a_device_with_a_watchdog_time_of_a_second_can_play() {
     let mut bench = Bench::new(Noise::default(), 8, 1000);
     bench.play();
 }
 
-/// The clock of the device is known to a millisecond, and its telemetry is whole.
+/// The device's clock is known to a millisecond, and its telemetry is complete.
 #[test]
-fn clock_and_telemetry_are_accounted_for() {
+fn the_clock_is_estimated_and_the_telemetry_is_complete() {
     let mut bench = Bench::new(Noise::default(), 6, 30);
     bench.play();
     bench.pass(ms(12_000));

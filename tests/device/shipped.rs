@@ -1,5 +1,4 @@
-//! The shipped realizations in the simulated device: whoever rehearses or tries a
-//! session shall not meet one fault after the other.
+//! The shipped realizations on the simulated device play without faults.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -12,7 +11,7 @@ use study_base::limits::{Limit, Limits};
 use study_core::outcome::Playback;
 use study_haptics::model::{Realization, file};
 
-/// What the protocols allow for tables without a certificate.
+/// Force limit of the protocols for uncertified tables.
 const UNCERTIFIED_N: f64 = 9.0;
 
 fn shipped() -> BTreeMap<String, Realization> {
@@ -28,7 +27,7 @@ fn shipped() -> BTreeMap<String, Realization> {
         .collect()
 }
 
-/// Twelve seconds of it; `Err` is the fault.
+/// A playback of twelve seconds; `Err` is the fault.
 fn played(realization: &Realization, options: Options, force_n: f64) -> Result<Playback, String> {
     let ms = Duration::from_millis;
     let limits = Limits {
@@ -54,7 +53,7 @@ fn played(realization: &Realization, options: Options, force_n: f64) -> Result<P
 }
 
 #[test]
-fn every_shipped_realization_plays_without_a_fault_and_gives_no_energy_to_speak_of() {
+fn every_shipped_realization_plays_without_faults_and_supplies_little_energy() {
     let shipped = shipped();
     assert_eq!(shipped.len(), 16);
     for (id, realization) in shipped {
@@ -64,7 +63,7 @@ fn every_shipped_realization_plays_without_a_fault_and_gives_no_energy_to_speak_
                 ..Options::default()
             };
             let playback = played(&realization, options, UNCERTIFIED_N).unwrap();
-            // a table that starts on a detent's flank gives a few mJ
+            // a table that starts on the flank of a detent supplies a few mJ
             assert!(
                 playback.least_energy_j > -0.01,
                 "{id}, {seed}: {playback:?}"
@@ -75,10 +74,10 @@ fn every_shipped_realization_plays_without_a_fault_and_gives_no_energy_to_speak_
 }
 
 /// The table of docs/simulation.md.
-/// `cargo test --release --test device_shipped -- --ignored --nocapture`
+/// `cargo test --release --test device shipped -- --ignored --nocapture`
 #[test]
 #[ignore = "prints a table"]
-fn what_the_device_makes_of_each() {
+fn playbacks_of_each_realization() {
     for (id, realization) in shipped() {
         let branches = [&realization.positive, &realization.negative];
         let masses = branches.iter().flat_map(|branch| &branch.m_kg);

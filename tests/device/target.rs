@@ -1,5 +1,5 @@
-//! The simulated target against a recording of the same switch by another
-//! implementation.
+//! The simulated target compared with a recording of another implementation of the same
+//! switch.
 
 #![allow(clippy::unwrap_used)]
 
@@ -13,7 +13,7 @@ fn position_mm(t_s: f64) -> f64 {
     17.5 + fade * 15.0 * (TAU * 1.5 * t_s).sin()
 }
 
-/// Zero-phase Butterworth of two poles, as the recording went through.
+/// Zero-phase Butterworth filter with two poles, as used for the recording.
 fn filtered(mut values: Vec<f64>, corner_hz: f64, rate_hz: f64) -> Vec<f64> {
     let k = (PI * corner_hz / rate_hz).tan();
     let norm = 1.0 / (1.0 + SQRT_2 * k + k * k);
@@ -35,7 +35,7 @@ fn filtered(mut values: Vec<f64>, corner_hz: f64, rate_hz: f64) -> Vec<f64> {
     values
 }
 
-/// Noise of 0.05 N rms leaves about 0.013 N behind the filter.
+/// Noise of 0.05 N rms leaves about 0.013 N after the filter.
 #[test]
 fn the_simulated_switch_gives_the_recorded_force() {
     let recording = include_str!("../data/plant/switch_a_1.5hz.csv");

@@ -1,4 +1,4 @@
-//! The simulated device at the end of its wire: states, watchdog, uploads.
+//! The simulated device on its link: states, watchdog, uploads.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -91,7 +91,7 @@ fn a_session_from_power_up_to_an_outcome() {
     );
 }
 
-/// Nobody is heard from any more, at any time since the last heartbeat.
+/// The host falls silent at any phase after the last heartbeat.
 #[test]
 fn without_a_heartbeat_the_force_is_zero_after_the_watchdog_time() {
     for clock_ms in [0, u32::MAX - 1020] {
@@ -107,7 +107,7 @@ fn without_a_heartbeat_the_force_is_zero_after_the_watchdog_time() {
         assert_eq!(host.device.held_n(), 0.0);
         assert_eq!(host.device.state(), DeviceState::Limp);
         assert_eq!(host.device.fault(), Fault::Watchdog);
-        // coming back does not go on with it
+        // new heartbeats do not resume the playback
         assert!(host.beat().fresh);
         host.live(ms(500));
         assert_eq!(host.device.state(), DeviceState::Limp);
@@ -119,11 +119,11 @@ fn without_a_heartbeat_the_force_is_zero_after_the_watchdog_time() {
 }
 
 #[test]
-fn a_queue_of_old_heartbeats_does_not_keep_it_alive() {
+fn a_queue_of_old_heartbeats_does_not_keep_the_device_alive() {
     let mut host = Host::playing(Options::default(), ms(1000));
     let died = host.at;
     let deadline = host.clock_ms() + 40;
-    // a thousand heartbeats that a driver still had, one a millisecond
+    // a thousand heartbeats from a driver's queue, one per millisecond
     for count in 0..1000 {
         host.wait(ms(1));
         host.beat_as(1_000_000 + count, deadline);
@@ -133,7 +133,7 @@ fn a_queue_of_old_heartbeats_does_not_keep_it_alive() {
     }
     assert!(host.at - died <= ms(40), "{:?}", host.at - died);
     assert!(host.outcome().stale_beats <= 1);
-    // neither an old number, nor the same, nor a deadline out of all reason
+    // neither an old count, nor the same one, nor an absurd deadline
     let clock = host.clock_ms();
     assert!(!host.beat_as(5, clock + 30).fresh);
     assert!(host.beat_as(2_000_000, clock + 30).fresh);
@@ -194,7 +194,7 @@ fn limp_is_zero_force_at_once_in_every_state_and_every_version() {
 }
 
 #[test]
-fn only_rest_re_arms() {
+fn a_device_can_be_re_armed_only_at_rest() {
     let mut host = Host::playing(Options::default(), ms(1200));
     while host.device.held_n().abs() < 2.0 {
         host.live(ms(10));
@@ -210,12 +210,12 @@ fn only_rest_re_arms() {
 }
 
 #[test]
-fn a_request_is_done_once_however_often_it_comes() {
+fn a_repeated_request_is_executed_once() {
     let mut host = Host::playing(Options::default(), ms(500));
     let stop = Request::Stop(Stop { playback: 7 });
     let first = host.ask_as(5000, stop);
     host.live(ms(20));
-    // the very same reply, with the state and clock of then
+    // the same reply, with the earlier state and clock
     assert_eq!(host.ask_as(5000, stop), first);
     let crc = host.outcome().crc;
     let play = |playback| {
@@ -227,7 +227,7 @@ fn a_request_is_done_once_however_often_it_comes() {
         })
     };
     assert!(host.ask_as(5001, play(8)).is_some());
-    // a stop that was held up somewhere says nothing any more
+    // a delayed stop is ignored
     assert_eq!(host.ask_as(5000, stop), None);
     assert_eq!(host.device.state(), DeviceState::Ramp);
     // one number, two requests
@@ -296,7 +296,7 @@ fn the_longest_duration_ends_a_playback() {
 }
 
 #[test]
-fn another_host_makes_it_limp_and_forgets_the_table() {
+fn another_host_makes_the_device_limp_and_discards_the_table() {
     let mut host = Host::playing(Options::default(), ms(500));
     let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1 })) else {
         panic!();
@@ -314,7 +314,7 @@ fn another_host_makes_it_limp_and_forgets_the_table() {
     assert_eq!(host.device.held_n(), 0.0);
 }
 
-/// What is wrong, the refusal and its detail.
+/// A defect of a table, the refusal and its detail.
 type Case = (
     &'static str,
     fn(&mut TableBegin, &mut Vec<Node>),
@@ -431,7 +431,7 @@ fn a_table_that_must_not_be_played_is_refused() {
 }
 
 #[test]
-fn armed_it_is_played_with_the_force_capped_but_never_with_a_hole() {
+fn an_uncertified_table_is_played_with_capped_force_but_an_invalid_one_never() {
     let upload = |nodes: &[Node], uncertified_n| {
         let mut host = Host::opened(Options::default());
         let begin = TableBegin {
@@ -458,7 +458,7 @@ fn armed_it_is_played_with_the_force_capped_but_never_with_a_hole() {
     let force = samples(&host).iter().map(|s| s.command_un.abs()).max();
     assert_eq!(force, Some(fixed::un(9.0)));
 
-    // a good table does not lose force by being armed
+    // the cap does not apply to a certified table
     let (mut host, _, _) = upload(&detents(0.05, 0.02), Some(9.0));
     assert_eq!(host.outcome().limit_n, 12.0);
 
@@ -468,7 +468,7 @@ fn armed_it_is_played_with_the_force_capped_but_never_with_a_hole() {
 }
 
 #[test]
-fn an_upload_takes_its_pieces_in_order_and_whole() {
+fn an_upload_accepts_only_complete_chunks_in_order() {
     let nodes = detents(0.05, 0.02);
     let mut host = Host::opened(Options::default());
     let chunk = |first: u16, count: usize| {
@@ -494,7 +494,7 @@ fn an_upload_takes_its_pieces_in_order_and_whole() {
     let ack = host.ack(Request::TableCommit(Commit { crc: 1 }));
     assert_eq!(ack.refusal, Refusal::Checksum);
     assert_eq!(host.ack(chunk(0, 1)).refusal, Refusal::WrongState, "gone");
-    // nothing is armed for a host that may be dead
+    // nothing is loaded for a host that may be dead
     host.wait(ms(100));
     let (mut begin, mut crc) = (begin(&nodes), None);
     begin.lookup = Lookup::Linear;
@@ -514,7 +514,7 @@ fn an_upload_takes_its_pieces_in_order_and_whole() {
 }
 
 #[test]
-fn versions_and_types_that_are_not_spoken_are_refused() {
+fn unsupported_versions_and_types_are_refused() {
     let mut host = Host::opened(Options::default());
     let mut refused = |body: &[u8]| {
         let frame = study_wire::frame::Frame::of(body).unwrap();
@@ -556,7 +556,7 @@ fn a_reset_a_stall_and_a_missed_period_end_without_force() {
 }
 
 #[test]
-fn how_often_it_is_looked_at_changes_nothing() {
+fn the_frequency_of_calls_has_no_influence() {
     let run = |step: u64| {
         let mut host = Host::playing(Options::default(), ms(20));
         for _ in 0..100 {

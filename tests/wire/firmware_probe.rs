@@ -1,4 +1,4 @@
-//! The simulated device as a probe: a path that is followed, recorded, refused.
+//! The simulated device as a probe: paths are followed, recorded, refused.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -59,7 +59,7 @@ fn a_path_is_followed_and_recorded() {
     }
     assert_eq!(points.len(), 1000);
     for (i, (point, x_nm)) in points.iter().zip(&x_nm).enumerate() {
-        // the encoder, and a servo period of 63 mm/s
+        // the encoder's resolution, and the motion in a servo period at 63 mm/s
         assert!((point.x_nm - x_nm).abs() < 25_000, "{i} {point:?} {x_nm}");
     }
     let most = points
@@ -123,7 +123,7 @@ fn a_path_that_cannot_be_followed_is_refused_and_a_recording_can_be_stopped() {
     let outcome = host.outcome();
     assert_eq!((outcome.loaded, outcome.fault), (Loaded::Path, Fault::None));
     assert!((190..=210).contains(&outcome.samples), "{outcome:?}");
-    // and the host's death
+    // the host dies
     host.beat();
     host.ack(Request::Record(Record { playback: 5, crc }));
     host.wait(ms(31));
@@ -133,7 +133,7 @@ fn a_path_that_cannot_be_followed_is_refused_and_a_recording_can_be_stopped() {
 
 #[test]
 fn a_probe_that_is_not_strong_enough_loses_its_path_and_trips() {
-    // out of the middle detent: the crest takes more than 3 N
+    // out of the middle detent, whose crest needs more than 3 N
     let (mut host, crc) = recording(|t| 17.5 + 20.0 * t, 3.0);
     host.ack(Request::PathCommit(Commit { crc }));
     host.ack(Request::Record(Record { playback: 4, crc }));

@@ -1,4 +1,4 @@
-//! The simulated device in every state: what it refuses, what breaks, what each flaw looks like.
+//! The simulated device in every state: requests, breakdowns and planted defects.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -13,14 +13,14 @@ use study_wire::message::{
 };
 use study_wire::predict::Direction;
 
-/// Switches a second of a hand that holds still for ten seconds against a table
-/// of two branches, `half_n` above and below zero.
+/// Switches per second while a hand rests for ten seconds against a table whose branches
+/// are `half_n` above and below zero.
 fn held(direction: Direction, servo_hz: f64, half_n: f64) -> f64 {
     let mut options = Options {
         servo_hz,
         ..Options::default()
     };
-    // one stroke, then a rest without end
+    // one stroke, then an infinite rest
     options.hand.rest_s = [1e9, 1e9];
     let mut host = Host::opened(options);
     let mut nodes = detents(0.05, 0.0);
@@ -43,11 +43,11 @@ fn held(direction: Direction, servo_hz: f64, half_n: f64) -> f64 {
     f64::from(after.switches - before.switches) / 10.0
 }
 
-/// The sign of v chatters at rest whatever the servo rate; a direction state does
-/// not. How fast depends on the hand, on the filter of the speed and on the step
-/// between the branches; another simulation found 140 switches a second.
+/// The sign of v chatters at rest with any servo rate; a direction state does not. The
+/// rate depends on the hand, the filter of the speed and the step between the branches;
+/// another simulation found 140 switches per second.
 #[test]
-fn held_still_the_sign_chatters_and_a_direction_state_does_not() {
+fn at_rest_the_sign_chatters_and_a_direction_state_does_not() {
     for servo_hz in [4000.0, 10_000.0] {
         for half_n in [0.5, 1.0, 4.0] {
             let sign = held(Direction::Sign, servo_hz, half_n);
@@ -63,9 +63,9 @@ fn held_still_the_sign_chatters_and_a_direction_state_does_not() {
     }
 }
 
-/// What each planted defect looks like from the other end of the wire.
+/// Each planted defect is visible on the link.
 #[test]
-fn every_flaw_shows() {
+fn every_flaw_is_visible() {
     let flawed = |flaw| Options {
         flaw: Some(flaw),
         ..Options::default()
@@ -156,13 +156,13 @@ fn every_flaw_shows() {
     assert_eq!(host.device.state(), DeviceState::Loaded);
 }
 
-/// A host that dies at any moment, over a link that takes its time: in virtual
-/// time, so this is the device's promise and not a computer's.
+/// A host that dies at any phase, with a slow link. In virtual time, so the result holds
+/// for the device and does not depend on the computer.
 #[test]
 fn whenever_the_host_dies_the_force_is_zero_within_50_ms() {
     let mut worst = ms(0);
     for death in 0..200u64 {
-        // a slow servo: many deaths in little time
+        // a slow servo, to simulate many deaths in a short time
         let options = Options {
             servo_hz: 1000.0,
             ..Options::default()
@@ -204,7 +204,7 @@ fn in_state(state: DeviceState) -> Host {
         DeviceState::Loaded => loaded(),
         DeviceState::Ramp => Host::playing(Options::default(), ms(200)),
         DeviceState::Run => Host::playing(Options::default(), ms(1000)),
-        // nothing can come in between a stop and the end of its telemetry
+        // no request can arrive between a stop and the end of its telemetry
         DeviceState::Stopping => unreachable!(),
         DeviceState::Limp => {
             let mut host = loaded();
@@ -222,9 +222,9 @@ fn in_state(state: DeviceState) -> Host {
     host
 }
 
-/// The table of states in the document: every state, every request.
+/// The table of states in the specification: every state, every request.
 #[test]
-fn every_request_in_every_state_does_what_the_document_says() {
+fn every_request_in_every_state_has_the_specified_result() {
     use DeviceState::{Boot, Fault, Idle, Limp, Loaded, Ramp, Run};
     use Refusal::{NoHeartbeat, NoHello, None as Done, OtherPlayback, WrongState};
 
@@ -379,7 +379,7 @@ fn every_request_in_every_state_does_what_the_document_says() {
             }
         }
     }
-    // PLAY for a host that has not been heard for as long as a watchdog lets it
+    // PLAY from a host that was silent for longer than the watchdog time
     let mut host = in_state(Loaded);
     host.wait(ms(100));
     let Reply::Ack(ack) = host.ask(play) else {
@@ -407,7 +407,7 @@ fn every_request_in_every_state_does_what_the_document_says() {
     assert_eq!(host.ack(Request::TableCommit(Commit { crc })).refusal, Done);
 }
 
-/// Each state met by a reset, a processor that hangs, an end of the cable, noise.
+/// In each state: a reset, a processor that hangs, an unplugged cable, noise.
 #[test]
 fn every_state_ends_without_force_when_something_breaks() {
     for state in [
@@ -430,7 +430,7 @@ fn every_state_ends_without_force_when_something_breaks() {
         assert_eq!(host.device.held_n(), 0.0, "{state:?}");
         assert_eq!(host.device.state(), DeviceState::Boot, "{state:?}");
 
-        // unplugged: nothing comes any more
+        // unplugged: no more bytes arrive
         let mut host = in_state(state);
         host.wait(ms(41));
         assert_eq!(host.device.held_n(), 0.0, "{state:?}");
@@ -441,7 +441,7 @@ fn every_state_ends_without_force_when_something_breaks() {
         };
         assert_eq!(host.device.state(), expected, "{state:?}");
 
-        // noise: nothing of it is done, and the next frame is understood
+        // noise: nothing is executed, and the next frame is received
         let mut host = in_state(state);
         let noise: Vec<u8> = (0..2000u32).map(|i| ((i * i) >> 3) as u8).collect();
         assert_eq!(host.send(&noise), None, "{state:?}");

@@ -1,8 +1,8 @@
-//! Random and mutated frames against a device that plays: no panic, no force above
-//! the limit, and the frame after the noise is understood.
+//! Random and mutated frames for a playing device: no panic, no force above the limit,
+//! and the next frame after the noise is received.
 //!
-//! In virtual time. A million of each kind; `STUDY_FUZZ_FRAMES` asks for another
-//! number, which is for a release build.
+//! In virtual time, with a million frames of each kind; `STUDY_FUZZ_FRAMES` sets another
+//! number, for a release build.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -18,7 +18,7 @@ use study_wire::message::{
 };
 use study_wire::predict::{Direction, Lookup};
 
-/// What went over the wire, and what it did.
+/// Counts of the frames and their effects.
 #[derive(Debug, Default)]
 struct Count {
     frames: u64,
@@ -31,14 +31,14 @@ struct Count {
 
 struct Fuzz {
     device: Firmware,
-    /// xorshift64*: millions of bytes are drawn.
+    /// State of xorshift64*, a fast generator.
     random: u64,
     at: Duration,
     decoder: Decoder,
     sequence: u16,
     beats: u32,
     nonce: u32,
-    /// Of the table that was uploaded last.
+    /// CRC of the last uploaded table.
     crc: u32,
     count: Count,
 }
@@ -89,7 +89,7 @@ impl Fuzz {
         }
     }
 
-    /// A message that a host may send, with fields that it should or should not.
+    /// A message of a host, with valid or invalid fields.
     fn request(&mut self) -> Request {
         let word = self.below(1 << 32) as u32;
         let small = self.below(40) as u16;
@@ -150,7 +150,7 @@ impl Fuzz {
         }
     }
 
-    /// Sends, lets up to two milliseconds pass, and looks at the force.
+    /// Sends bytes, waits up to two milliseconds and checks the force.
     fn send(&mut self, bytes: &[u8]) {
         self.device.receive(bytes, self.at);
         self.look();
@@ -162,7 +162,7 @@ impl Fuzz {
         }
         for byte in self.device.take_output() {
             if let Some(body) = self.decoder.push(byte) {
-                // whatever came in, what goes out is a message
+                // the device sends only valid messages
                 Reply::decode(body.unwrap()).unwrap();
                 self.count.replies += 1;
             }
@@ -197,7 +197,7 @@ impl Fuzz {
         }));
     }
 
-    /// From whatever state to idle, in a connection of its own.
+    /// From any state to idle, with a new connection.
     fn open(&mut self) {
         self.say(Request::Limp);
         self.at += Duration::from_millis(500);
@@ -219,7 +219,7 @@ impl Fuzz {
         );
     }
 
-    /// To one that plays a table that pushes hard.
+    /// Starts a playback with a large force.
     fn play(&mut self) {
         self.open();
         let mut nodes = detents(0.05, 0.02);
@@ -252,7 +252,7 @@ impl Fuzz {
         self.live();
     }
 
-    /// To one that moves the handle along a path.
+    /// Starts a recording.
     fn record(&mut self) {
         self.open();
         let begin = PathBegin {
@@ -281,7 +281,7 @@ impl Fuzz {
         self.live();
     }
 
-    /// After whatever came before: the next frame is understood.
+    /// After any noise the next frame is received.
     fn in_step(&mut self) {
         self.device.take_output();
         let at = self.at;
@@ -300,7 +300,7 @@ fn frames() -> u64 {
     std::env::var("STUDY_FUZZ_FRAMES").map_or(1_000_000, |frames| frames.parse().unwrap())
 }
 
-/// Valid frames of random bodies: the CRC fits, whatever is in them.
+/// Valid frames with random bodies and correct CRC.
 #[test]
 fn random_frames() {
     let mut fuzz = Fuzz::new(1);
@@ -316,7 +316,7 @@ fn random_frames() {
         }
         let body = match fuzz.below(4) {
             0 => fuzz.bytes(MAX_BODY as u64),
-            // any bytes behind a header that is one, except that of LIMP
+            // any bytes after a valid header, except that of LIMP
             1 => {
                 let mut body = vec![1, fuzz.below(0x14) as u8, 0, 0];
                 body.extend(fuzz.bytes(30));
@@ -354,7 +354,7 @@ fn random_frames() {
     assert_eq!(fuzz.count.most_share, 1.0, "the limit was never reached");
 }
 
-/// What a link does to frames: bits, bytes, pieces.
+/// Frames changed as by a faulty link: bits, bytes, pieces.
 #[test]
 fn mutated_frames() {
     let mut fuzz = Fuzz::new(2);
@@ -408,8 +408,8 @@ fn mutated_frames() {
     assert_ne!(fuzz.device.state(), DeviceState::Boot);
 }
 
-/// What a device may send a host: any bytes behind a header that is one. What is a
-/// message is the same message when it is sent on.
+/// Random replies of a device after a valid header. A reply that can be decoded is the
+/// same after encoding it again.
 #[test]
 fn random_replies() {
     let mut fuzz = Fuzz::new(3);
@@ -422,7 +422,7 @@ fn random_replies() {
         kind::EVENT,
         kind::RECORDED,
     ];
-    // the length of each, as far as it is fixed, so that most are not refused for it
+    // the fixed lengths, so that most replies are not rejected because of the length
     let lengths = [12, 153, 91, 11, 21, 15, 13];
     let mut messages = 0u64;
     for _ in 0..frames() {
@@ -436,7 +436,7 @@ fn random_replies() {
         };
         let small = fuzz.below(2) == 0;
         for i in 0..lengths[which] + more {
-            // small bytes are codes more often than not
+            // small bytes are more likely to be valid codes
             let byte = fuzz.below(if small && i < 12 { 9 } else { 256 });
             body.push(byte as u8);
         }

@@ -1,4 +1,4 @@
-//! The bytes between host and device, and the device at the end of them.
+//! The wire format, and the device that implements it.
 
 mod firmware;
 mod firmware_probe;

@@ -1,4 +1,4 @@
-//! A host of a few lines in front of a simulated device, in virtual time.
+//! A minimal host for a simulated device, in virtual time.
 
 #![allow(dead_code, reason = "each test uses its part")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -23,9 +23,9 @@ pub(crate) struct Host {
     decoder: Decoder,
     sequence: u16,
     beats: u32,
-    /// What the device's clock was, ms, when the host's was zero.
+    /// Time of the device's clock at the host's time zero, ms.
     offset_ms: u32,
-    /// Everything that was not a reply to a request.
+    /// Messages that were not a reply to a request.
     pub(crate) heard: Vec<Reply>,
 }
 
@@ -74,7 +74,7 @@ impl Host {
         replies
     }
 
-    /// Sends with the next sequence number; the reply to it.
+    /// Sends with the next sequence number and returns the reply.
     pub(crate) fn ask(&mut self, request: Request) -> Reply {
         self.sequence = self.sequence.wrapping_add(1);
         self.ask_as(self.sequence, request).unwrap()
@@ -85,7 +85,7 @@ impl Host {
         self.send(request.frame(sequence).as_bytes())
     }
 
-    /// Sends bytes; the first reply, if any.
+    /// Sends bytes and returns the first reply, if any.
     pub(crate) fn send(&mut self, bytes: &[u8]) -> Option<Reply> {
         self.device.receive(bytes, self.at);
         let mut answer = None;
@@ -128,7 +128,7 @@ impl Host {
         }
     }
 
-    /// Time passes without a word of the host.
+    /// Waits without sending anything.
     pub(crate) fn wait(&mut self, lasting: Duration) {
         self.at += lasting;
         self.device.advance(self.at);
@@ -136,7 +136,7 @@ impl Host {
         self.heard.extend(heard);
     }
 
-    /// Time passes with a heartbeat every 10 ms.
+    /// Waits with a heartbeat every 10 ms.
     pub(crate) fn live(&mut self, lasting: Duration) {
         let until = self.at + lasting;
         while self.at < until {
@@ -145,7 +145,7 @@ impl Host {
         }
     }
 
-    /// The whole upload; the reply to its end, or the first refusal.
+    /// Uploads a table; the reply to COMMIT or the first refusal, and the CRC.
     pub(crate) fn upload(&mut self, begin: TableBegin, nodes: &[Node]) -> (Ack, u32) {
         let mut crc = TableCrc::of(&begin);
         nodes.iter().for_each(|node| crc.node(node));

@@ -1,8 +1,8 @@
 //! Version 1 of the wire format, byte by byte.
 //!
-//! The bytes below were written by another implementation than the one that they
-//! test: Python's `struct` and `zlib.crc32`, from the tables of `docs/wire.md`. They
-//! never change: what would change them is version 2.
+//! The bytes were written by another implementation than the tested one, with Python's
+//! `struct` and `zlib.crc32` from the tables of `docs/wire.md`. They never change; a change
+//! would be version 2.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -24,20 +24,20 @@ use study_wire::message::{
 use study_wire::predict::{Direction, Lookup, Motion};
 use study_wire::servo::ServoSettings;
 
-/// Of the four nodes of [`chunk`] under [`begin`].
+/// CRC of the four nodes of [`chunk`] with [`begin`].
 const TABLE_CRC: u32 = 0xDDE60A90;
-/// Of the three points below.
+/// CRC of the three points below.
 const PATH_CRC: u32 = 0xD46CF557;
 
 struct Golden<M> {
     name: &'static str,
     sequence: u16,
     message: M,
-    /// Bytes of each field and what they say, in order: together the body.
+    /// Bytes and meaning of each field, in order; together the body.
     body: &'static [(&'static str, &'static str)],
-    /// Of the body, as it follows it.
+    /// CRC of the body, as sent.
     crc: &'static str,
-    /// What goes over the wire.
+    /// The encoded frame.
     frame: &'static str,
 }
 
@@ -184,7 +184,7 @@ fn joined<M>(golden: &Golden<M>) -> Vec<u8> {
     )
 }
 
-/// Frame, body and CRC of a message are those that are written down; the body.
+/// Checks frame, body and CRC of a message and returns the body.
 fn bytes_agree<M>(golden: &Golden<M>, frame: &[u8]) -> Vec<u8> {
     assert_eq!(hex(frame), golden.frame, "{}", golden.name);
     let body = body_of(frame);
@@ -195,7 +195,7 @@ fn bytes_agree<M>(golden: &Golden<M>, frame: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn every_request_is_the_bytes_of_the_document() {
+fn every_request_has_the_specified_bytes() {
     let mut kinds = Vec::new();
     for golden in requests() {
         let body = bytes_agree(&golden, golden.message.frame(golden.sequence).as_bytes());
@@ -211,7 +211,7 @@ fn every_request_is_the_bytes_of_the_document() {
 }
 
 #[test]
-fn every_reply_is_the_bytes_of_the_document() {
+fn every_reply_has_the_specified_bytes() {
     let mut kinds = Vec::new();
     for golden in replies() {
         let body = bytes_agree(&golden, golden.message.frame(golden.sequence).as_bytes());
@@ -226,7 +226,7 @@ fn every_reply_is_the_bytes_of_the_document() {
 }
 
 #[test]
-fn the_crc_over_a_whole_is_that_of_its_fields_in_a_row() {
+fn the_crc_of_an_upload_is_that_of_its_consecutive_fields() {
     let mut crc = TableCrc::of(&begin());
     nodes().iter().for_each(|node| crc.node(node));
     assert_eq!(crc.value(), TABLE_CRC);
@@ -271,7 +271,7 @@ fn a_message_of_any_other_length_is_refused() {
 }
 
 #[test]
-fn what_a_device_may_not_say_is_no_message() {
+fn invalid_replies_are_rejected() {
     let spoiled = |reply: Reply, at: usize, bytes: &[u8]| {
         let mut body = body_of(reply.frame(0).as_bytes());
         body[at..at + bytes.len()].copy_from_slice(bytes);
@@ -287,7 +287,7 @@ fn what_a_device_may_not_say_is_no_message() {
     // energy
     let spoilt = spoiled(Reply::Outcome(outcome()), 47, &nan);
     assert_eq!(spoilt, Err(WireError::Field));
-    // no sample, more samples than there can be
+    // no sample, and more samples than allowed
     for count in [0, 11] {
         let spoilt = spoiled(Reply::Telemetry(telemetry()), 24, &[count]);
         assert_eq!(spoilt, Err(WireError::Field));
@@ -332,7 +332,7 @@ fn documented() -> Box<Handler<8, 0>> {
     }))
 }
 
-/// What the host of the exchange sends, and at what time, ms.
+/// Times, ms, sequence numbers and requests of the host in the exchange.
 fn conversation() -> Vec<(u32, u16, Request)> {
     let beat = |count, deadline_ms| Request::Heartbeat(Heartbeat { count, deadline_ms });
     vec![
@@ -358,10 +358,10 @@ fn conversation() -> Vec<(u32, u16, Request)> {
         (140, 0, beat(3, 180)),
         (150, 0, beat(4, 190)),
         (160, 9, Request::Stop(Stop { playback: 7 })),
-        // the reply was lost: the same again
+        // the reply was lost: the same request again
         (162, 9, Request::Stop(Stop { playback: 7 })),
         (164, 10, Request::State),
-        // and then nothing more is heard of the host
+        // from now on the host is silent
         (185, 11, Request::State),
     ]
 }
@@ -371,7 +371,7 @@ fn word(message: &str) -> String {
     message[..end].to_owned()
 }
 
-/// What goes over the wire, a line each.
+/// The exchange, one line per frame.
 fn exchange() -> Vec<String> {
     let mut device = documented();
     let at_rest = Measured {
@@ -419,7 +419,7 @@ fn exchange() -> Vec<String> {
 }
 
 #[test]
-fn the_exchange_of_the_document_is_what_a_device_says() {
+fn the_documented_exchange_is_that_of_the_handler() {
     let document = include_str!("../../docs/wire.md");
     let (_, rest) = document.split_once("```exchange\n").unwrap();
     let (written, _) = rest.split_once("```").unwrap();
@@ -432,9 +432,9 @@ fn the_exchange_of_the_document_is_what_a_device_says() {
     );
 }
 
-/// Every code of the program stands in the document with its number.
+/// Every code of the program is in the specification with its number.
 #[test]
-fn the_document_lists_every_code() {
+fn the_specification_lists_every_code() {
     let document = include_str!("../../docs/wire.md");
     let listed = |heading: &str| {
         let (_, rest) = document.split_once(heading).unwrap();

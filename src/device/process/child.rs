@@ -242,12 +242,11 @@ fn how(status: ExitStatus) -> String {
 }
 
 impl Drop for Running {
-    /// Sends `limp`, closes the input, and kills the program if it does not end.
+    /// Closes the input and kills the program if it does not end.
     fn drop(&mut self) {
         if self.child.try_wait().is_ok_and(|ended| ended.is_some()) {
             return;
         }
-        let _ = self.input.try_send(messages::command("limp", u64::MAX));
         let (closed, _) = sync_channel(0);
         self.input = closed;
         if self.wait_for_exit(EXIT_TIMEOUT).is_some() {
