@@ -1,4 +1,4 @@
-//! Agreement: intraclass correlations and Krippendorff's alpha.
+//! Agreement of raters: intraclass correlations and Krippendorff's alpha.
 
 use super::describe::{Sum, sum};
 use super::distribution::{f_quantile, f_upper};
@@ -7,13 +7,15 @@ use super::{finite, rectangular};
 /// A coefficient with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficient {
-    /// The estimate.
+    /// The estimated coefficient.
     pub value: f64,
-    /// Its interval; an end that is infinite is `None` (only of ICC2k).
+    /// (lower, upper); `None` if there is no interval. A bound is `None` if it is
+    /// infinite, which occurs only for ICC2k.
     pub ci95: Option<(Option<f64>, Option<f64>)>,
 }
 
-/// Shrout & Fleiss's six intraclass correlations (1979).
+/// The six intraclass correlations of Shrout & Fleiss (1979). A coefficient is `None` if
+/// there is no variance of error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Icc {
     /// Mean square between targets.
@@ -22,33 +24,35 @@ pub struct Icc {
     pub ms_raters: f64,
     /// Residual mean square.
     pub ms_error: f64,
-    /// MST/MSW.
+    /// F of ICC1: mean square between targets over that within targets.
     pub f_1: Option<f64>,
-    /// Its p.
+    /// p of `f_1`.
     pub p_1: Option<f64>,
-    /// MST/MSE.
+    /// F of ICC3: mean square between targets over the residual one.
     pub f_3: Option<f64>,
-    /// Its p.
+    /// p of `f_3`.
     pub p_3: Option<f64>,
-    /// Each target by its own raters, one rating.
+    /// Each target has its own raters; reliability of a single rating.
     pub icc1: Option<Coefficient>,
-    /// The same, mean of k; no interval here.
+    /// The same for the mean of k ratings; without interval.
     pub icc1k: Option<f64>,
-    /// Random raters, absolute agreement, one rating.
+    /// Random raters, absolute agreement, single rating.
     pub icc2: Option<Coefficient>,
-    /// The same, mean of k; its interval is Spearman–Brown's of the single one's.
+    /// The same for the mean of k ratings; its interval is that of ICC2 transformed by
+    /// the Spearman–Brown formula.
     pub icc2k: Option<Coefficient>,
-    /// Fixed raters, consistency, one rating.
+    /// Fixed raters, consistency, single rating.
     pub icc3: Option<Coefficient>,
-    /// The same, mean of k.
+    /// The same for the mean of k ratings.
     pub icc3k: Option<Coefficient>,
 }
 
-/// Rows are targets, columns raters. With n targets, k raters and mean squares
-/// T, R, E and W (raters and residual together):
+/// Intraclass correlations of a table with a row for each target and a column for each
+/// rater. With n targets, k raters and mean squares T (targets), R (raters), E (residual)
+/// and W (raters and residual together):
 /// ICC1 = (T − W)/(T + (k−1)W), ICC2 = (T − E)/(T + (k−1)E + k(R − E)/n),
 /// ICC3 = (T − E)/(T + (k−1)E). Intervals as in Shrout & Fleiss (1979).
-/// `None` below two of either.
+/// `None` for fewer than two targets or raters.
 pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
     let rows = rectangular(rows)?;
     let (n, k) = (rows.len(), rows[0].len());
@@ -93,8 +97,8 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         ))
     };
     let icc2 = icc2(targets, raters, error, nf, kf);
-    // Spearman–Brown's formula has a pole at −1/(k − 1): an end there is infinite.
-    let brown = |c: f64| finite(kf * c / (1.0 + (kf - 1.0) * c));
+    // The Spearman–Brown formula has a pole at −1/(k − 1).
+    let spearman_brown = |c: f64| finite(kf * c / (1.0 + (kf - 1.0) * c));
     Some(Icc {
         ms_targets: targets,
         ms_raters: raters,
@@ -109,7 +113,9 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         icc2k: icc2.and_then(|c| {
             Some(Coefficient {
                 value: finite((targets - error) / (targets + (raters - error) / nf))?,
-                ci95: c.ci95.map(|(l, h)| (l.and_then(brown), h.and_then(brown))),
+                ci95: c
+                    .ci95
+                    .map(|(l, h)| (l.and_then(spearman_brown), h.and_then(spearman_brown))),
             })
         }),
         icc2,
@@ -128,17 +134,17 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
     })
 }
 
-/// ICC2 with Satterthwaite's degrees of freedom for its interval.
+/// ICC2, with an interval by Satterthwaite's degrees of freedom.
 fn icc2(t: f64, r: f64, e: f64, n: f64, k: f64) -> Option<Coefficient> {
-    let below = t + (k - 1.0) * e + k * (r - e) / n;
-    if below <= 0.0 || e <= 0.0 {
+    let denominator = t + (k - 1.0) * e + k * (r - e) / n;
+    if denominator <= 0.0 || e <= 0.0 {
         return None;
     }
-    let value = finite((t - e) / below)?;
+    let value = finite((t - e) / denominator)?;
     let f = r / e;
     let a = n * (1.0 + (k - 1.0) * value) - k * value;
-    let above = (k - 1.0) * (n - 1.0) * (k * value * f + a).powi(2);
-    let df = above / ((n - 1.0) * (k * value * f).powi(2) + a * a);
+    let numerator = (k - 1.0) * (n - 1.0) * (k * value * f + a).powi(2);
+    let df = numerator / ((n - 1.0) * (k * value * f).powi(2) + a * a);
     let interval = || {
         let upper = f_quantile(0.975, n - 1.0, df)?;
         let lower = f_quantile(0.975, df, n - 1.0)?;
@@ -154,25 +160,25 @@ fn icc2(t: f64, r: f64, e: f64, n: f64, k: f64) -> Option<Coefficient> {
     })
 }
 
-/// Krippendorff's alpha with three metrics.
+/// Krippendorff's alpha with three metrics; `None` if it is not defined.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alpha {
-    /// Equal or not.
+    /// Distance 0 or 1: equal or not.
     pub nominal: Option<f64>,
-    /// By the ratings that lie between.
+    /// Distance by the number of ratings in between.
     pub ordinal: Option<f64>,
-    /// Squared difference.
+    /// Distance by the squared difference.
     pub interval: Option<f64>,
 }
 
-/// Most distinct numbers for which alpha is computed: the work goes with the
-/// square.
+/// Most distinct numbers for which alpha is computed: the work grows with their square.
 const MAX_DISTINCT: usize = 1000;
 
-/// α = 1 − (n−1) Σ o(c,k) δ²(c,k) / Σ n(c) n(k) δ²(c,k), with o the coincidences
-/// within units (each pair weighs 1/(m − 1) in a unit of m ratings) and n the
-/// margins (Krippendorff 2011). Units of one rating do not count. Undefined if
-/// all ratings are equal.
+/// Krippendorff's alpha of units, each a slice of the ratings it received:
+/// α = 1 − (n−1) Σ o(c,k) δ²(c,k) / Σ n(c) n(k) δ²(c,k), with the coincidences o within
+/// units (a pair has the weight 1/(m − 1) in a unit of m ratings) and their margins n
+/// (Krippendorff 2011). Units with one rating do not contribute. `None` if all ratings
+/// are equal or more than 1000 are distinct.
 pub fn krippendorff<U: AsRef<[f64]>>(units: &[U]) -> Alpha {
     const NONE: Alpha = Alpha {
         nominal: None,
@@ -180,7 +186,7 @@ pub fn krippendorff<U: AsRef<[f64]>>(units: &[U]) -> Alpha {
         interval: None,
     };
     let units = || units.iter().map(AsRef::as_ref).filter(|u| u.len() >= 2);
-    // Ascending; there are few, so each rating is looked up among them.
+    // Ascending. There are few, so that a binary search for each rating is fast.
     let mut distinct: Vec<f64> = Vec::new();
     for x in units().flatten() {
         let x = *x;
@@ -202,11 +208,11 @@ pub fn krippendorff<U: AsRef<[f64]>>(units: &[U]) -> Alpha {
     let mut seen: Vec<usize> = Vec::new();
     for unit in units() {
         for x in unit {
-            let place = distinct.partition_point(|d| d < x);
-            if counts[place] == 0.0 {
-                seen.push(place);
+            let index = distinct.partition_point(|d| d < x);
+            if counts[index] == 0.0 {
+                seen.push(index);
             }
-            counts[place] += 1.0;
+            counts[index] += 1.0;
         }
         let others = unit.len() as f64 - 1.0;
         for &c in &seen {
@@ -246,7 +252,7 @@ pub fn krippendorff<U: AsRef<[f64]>>(units: &[U]) -> Alpha {
         nominal: alpha(&|c, k| f64::from(u8::from(c != k))),
         ordinal: alpha(&|c, k| {
             let (low, high) = (c.min(k), c.max(k));
-            // Σ of the margins from low to high, less half of the two ends.
+            // Sum of the margins from low to high, minus half of the first and last.
             let between = below[high] + margin[high] - below[low];
             (between - (margin[low] + margin[high]) / 2.0).powi(2)
         }),
@@ -260,7 +266,7 @@ mod tests {
 
     /// Shrout & Fleiss (1979), tables 2 to 4: .17, .29, .71, .44, .62, .91.
     #[test]
-    fn the_worked_example_of_shrout_and_fleiss_comes_out() {
+    fn the_worked_example_of_shrout_and_fleiss_is_reproduced() {
         let rows = [
             [9.0, 2.0, 5.0, 8.0],
             [6.0, 1.0, 3.0, 2.0],
@@ -280,7 +286,7 @@ mod tests {
     }
 
     /// krippendorff 0.9.0 (Python): nominal 0, ordinal 6/7, interval .9973371205.
-    /// Ratings are apart however small their unit is.
+    /// Ratings are distinct however small their unit is.
     #[test]
     fn alpha_does_not_round_small_ratings() {
         let units = [vec![1e-12, 2e-12], vec![7e-12, 8e-12], vec![3e-11, 3.1e-11]];
@@ -293,10 +299,10 @@ mod tests {
         assert!((a.ordinal.unwrap() - 6.0 / 7.0).abs() < 1e-12, "{a:?}");
     }
 
-    /// Spearman–Brown's formula has its pole at an ICC2 of −1/(k − 1); only the
-    /// end that lies there is lost.
+    /// The Spearman–Brown formula has its pole at an ICC2 of −1/(k − 1); only the bound
+    /// at the pole is undefined.
     #[test]
-    fn an_end_of_icc2k_at_the_pole_leaves_the_other() {
+    fn a_bound_of_icc2k_at_the_pole_is_none() {
         let i = icc(&[vec![5.0, 3.5], vec![4.5, 4.5]]).unwrap();
         let (lo, hi) = i.icc2k.unwrap().ci95.unwrap();
         assert!(lo.is_none() && hi.is_some(), "{lo:?} {hi:?}");

@@ -1,75 +1,78 @@
 //! Repeated-measures analysis of variance, one-way and two-way, balanced.
 //!
-//! Every effect is a set of orthonormal contrasts C (Helmert's, and Kronecker
-//! products of them). With yₛ = C·(subject s's row): SS = S·|ȳ|², its error
-//! Σ|yₛ − ȳ|², and sphericity is a matter of the covariance of y alone. The grand
-//! mean should be taken off the numbers beforehand, to keep their digits.
+//! An effect is tested by orthonormal contrasts C (Helmert contrasts, and Kronecker
+//! products of them). With yₛ = C·(row of subject s) and S subjects, SS = S·|ȳ|², its
+//! error is Σ|yₛ − ȳ|², and sphericity depends only on the covariance Σ of y. Subtract
+//! the grand mean from the numbers beforehand to keep their digits.
 
 use super::distribution::{chi2_upper, f_upper};
 use super::matrix::{Cholesky, SymmetricMatrix, dot};
 use super::{finite, rectangular};
 
-/// One effect and its error.
+/// The test of one effect; q is its number of contrasts, S the number of subjects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
-    /// Sum of squares.
+    /// Sum of squares of the effect.
     pub ss: f64,
     /// Sum of squares of its interaction with subjects.
     pub ss_error: f64,
-    /// Degrees of freedom of the effect.
+    /// Degrees of freedom of the effect: q.
     pub df1: f64,
-    /// Degrees of freedom of the error.
+    /// Degrees of freedom of the error: q(S − 1).
     pub df2: f64,
-    /// Undefined if there is no error variance.
+    /// The F statistic; `None` if the error variance is 0.
     pub f: Option<f64>,
-    /// Under sphericity.
+    /// p of F, assuming sphericity.
     pub p: Option<f64>,
-    /// Greenhouse & Geisser's ε = (tr Σ)²/(q tr Σ²).
+    /// Greenhouse & Geisser's (1959) ε = (tr Σ)²/(q tr Σ²).
     pub eps_gg: Option<f64>,
-    /// p with both df times ε.
+    /// p of F with both degrees of freedom multiplied by `eps_gg`.
     pub p_gg: Option<f64>,
-    /// Huynh & Feldt's ε = (S q ε − 2)/(q(S − 1 − qε)), not clipped.
+    /// Huynh & Feldt's (1976) ε = (S q ε − 2)/(q(S − 1 − qε)) from `eps_gg`; it can
+    /// exceed 1.
     pub eps_hf: Option<f64>,
-    /// p with that ε clipped at 1.
+    /// p of F with both degrees of freedom multiplied by min(`eps_hf`, 1).
     pub p_hf: Option<f64>,
-    /// Mauchly's test of sphericity.
+    /// Mauchly's test of sphericity; one-way only. `None` if q < 2, S − 1 < q or the
+    /// covariance is singular.
     pub mauchly: Option<Mauchly>,
 }
 
-/// Mauchly's test: W = det Σ/(tr Σ/q)^q.
+/// Mauchly's test of sphericity (1940): W = det Σ/(tr Σ/q)^q.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mauchly {
-    /// The statistic.
+    /// W.
     pub w: f64,
-    /// With Box's second-order term (Anderson 1958, §10.7.4).
+    /// p with Box's second-order term (Anderson 1958, §10.7.4).
     pub p: Option<f64>,
-    /// As R and car print it. That their term has 3(q + 1) for 3q was inferred from
-    /// a printed value, not read in their source; it then fits all sets tried.
+    /// p as printed by R. That its second-order term has 3(q + 1) for 3q was inferred
+    /// from a printed value, not read in its source; it reproduces all data sets tried.
     pub p_as_r: Option<f64>,
 }
 
-/// One-way: subjects × realizations.
+/// A one-way analysis: subjects × realizations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OneWay {
-    /// The realizations.
+    /// The effect of the realizations.
     pub effect: Effect,
-    /// Between subjects.
+    /// Sum of squares between subjects.
     pub ss_subject: f64,
-    /// SSm/(SSm + SSs + SSe) (Olejnik & Algina 2003).
+    /// Generalised η² = SSm/(SSm + SSs + SSe) (Olejnik & Algina 2003); `None` for 0/0.
     pub ges: Option<f64>,
-    /// SSm/(SSm + SSe).
+    /// Partial η² = SSm/(SSm + SSe); `None` for 0/0.
     pub pes: Option<f64>,
 }
 
-/// Two-way: subjects × realizations × repetitions.
+/// A two-way analysis: subjects × realizations × repetitions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwoWay {
-    /// Realizations, repetitions, their interaction, each with its generalised
-    /// eta squared: the effect over itself and every subject term.
+    /// Realizations, repetitions and their interaction, each with its generalised η²:
+    /// its sum of squares over itself plus those of all subject terms.
     pub effects: [(Effect, Option<f64>); 3],
 }
 
-/// One-way analysis. `None` below two subjects or realizations.
+/// One-way analysis of a table with a row for each subject and a column for each
+/// realization. `None` for fewer than two rows or columns.
 pub fn one_way<R: AsRef<[f64]>>(rows: &[R]) -> Option<OneWay> {
     let rows = &rectangular(rows)?;
     let k = rows[0].len();
@@ -87,8 +90,9 @@ pub fn one_way<R: AsRef<[f64]>>(rows: &[R]) -> Option<OneWay> {
     })
 }
 
-/// Two-way analysis; each row holds a subject's ratings, realization by
-/// realization, `repetitions` each. `None` below two of anything.
+/// Two-way analysis of a table with a row for each subject: the `repetitions` ratings of
+/// the first realization, then those of the second, and so on. `None` for fewer than two
+/// subjects, realizations or repetitions.
 pub fn two_way<R: AsRef<[f64]>>(rows: &[R], repetitions: usize) -> Option<TwoWay> {
     let rows = &rectangular(rows)?;
     let width = rows[0].len();
@@ -118,7 +122,7 @@ fn ratio(a: f64, b: f64) -> Option<f64> {
     if b > 0.0 { finite(a / b) } else { None }
 }
 
-/// q = k − 1 orthonormal contrasts: the j-th compares the first j with the next.
+/// q = k − 1 orthonormal contrasts: the j-th compares the first j columns with the next.
 fn helmert(k: usize) -> Vec<Vec<f64>> {
     (1..k)
         .map(|j| {
@@ -131,6 +135,7 @@ fn helmert(k: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// The contrast of the mean, of norm 1.
 fn unit(k: usize) -> Vec<f64> {
     vec![1.0 / (k as f64).sqrt(); k]
 }
@@ -147,7 +152,7 @@ fn kronecker(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Sum of squares, that of its error, and the centred contrasts by subject.
+/// Sum of squares of the effect and of its error, and the centred contrasts by subject.
 fn effect_sums(rows: &[&[f64]], contrasts: &[Vec<f64>]) -> (f64, f64, Vec<Vec<f64>>) {
     let n = rows.len() as f64;
     let mut y: Vec<Vec<f64>> = rows
@@ -172,7 +177,7 @@ fn effect(rows: &[&[f64]], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect
     let (ss, ss_error, y) = effect_sums(rows, contrasts);
     let (df1, df2) = (q, q * (n - 1.0));
     let size: f64 = rows.iter().map(|r| dot(r, r)).sum();
-    // Below this the error is what thirds leave behind.
+    // A smaller error is due to rounding.
     let defined = ss_error > 1e-24 * size && ss_error.is_finite();
     let f = if defined {
         finite((ss / df1) / (ss_error / df2))
@@ -187,10 +192,10 @@ fn effect(rows: &[&[f64]], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect
         finite(trace * trace / (q * squares))
     });
     let eps_hf = eps_gg.and_then(|e| {
-        let below = q * (n - 1.0 - q * e);
-        (below > 0.0).then(|| (n * q * e - 2.0) / below)
+        let denominator = q * (n - 1.0 - q * e);
+        (denominator > 0.0).then(|| (n * q * e - 2.0) / denominator)
     });
-    let with = |eps: Option<f64>| {
+    let corrected_p = |eps: Option<f64>| {
         let (f, e) = (f?, eps?);
         (e > 0.0).then(|| f_upper(f, df1 * e, df2 * e)).flatten()
     };
@@ -202,9 +207,9 @@ fn effect(rows: &[&[f64]], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect
         f,
         p: f.and_then(|f| f_upper(f, df1, df2)),
         eps_gg,
-        p_gg: with(eps_gg),
+        p_gg: corrected_p(eps_gg),
         eps_hf,
-        p_hf: with(eps_hf.map(|e| e.min(1.0))),
+        p_hf: corrected_p(eps_hf.map(|e| e.min(1.0))),
         mauchly: covariance
             .filter(|_| with_mauchly)
             .and_then(|s| mauchly(&s, n - 1.0)),
@@ -268,6 +273,12 @@ mod tests {
         assert!((a.effect.f.unwrap() - t * t).abs() < 1e-12);
         assert_eq!(a.effect.mauchly, None);
         assert!((a.effect.eps_gg.unwrap() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rows_of_different_lengths_have_no_analysis() {
+        assert_eq!(one_way(&[vec![1.0, 2.0], vec![2.0]]), None);
+        assert_eq!(two_way(&[[1.0; 5], [2.0; 5]], 2), None);
     }
 
     #[test]

@@ -1,14 +1,15 @@
-//! Bayes factors in closed or one-dimensional form.
+//! Bayes factors of a correlation and of a one-sample t.
 
 use super::finite;
 use statrs::function::gamma::ln_gamma;
 
-/// Bayes factor for a correlation against none, flat prior on (−1, 1)
-/// (Ly, Verhagen & Wagenmakers 2016, κ = 1):
+/// Bayes factor BF₁₀ of a correlation r of n pairs against no correlation, with a flat
+/// prior on (−1, 1) (Ly, Verhagen & Wagenmakers 2016, κ = 1):
 /// √π/2 · Γ((n+1)/2)/Γ((n+2)/2) · ₂F₁((n−1)/2, (n−1)/2; (n+2)/2; r²).
 ///
 /// By Euler's transformation ₂F₁ is (1−r²)^((4−n)/2) ₂F₁(3/2, 3/2; (n+2)/2; r²),
-/// whose series has only positive terms. `None` below three pairs or for |r| = 1.
+/// whose series has only positive terms. `None` for fewer than three pairs, for |r| = 1
+/// or if it overflows.
 pub fn correlation_bf10(r: f64, n: usize) -> Option<f64> {
     let z = r * r;
     if n < 3 || 1.0 - z < 1e-10 {
@@ -32,13 +33,14 @@ pub fn correlation_bf10(r: f64, n: usize) -> Option<f64> {
     finite(log.exp())
 }
 
-/// JZS Bayes factor of a one-sample t (Rouder et al. 2009) with Cauchy scale
-/// `scale`:
+/// JZS Bayes factor BF₁₀ of a one-sample t of n numbers (Rouder et al. 2009), with the
+/// scale s = `scale` of the Cauchy prior and ν = n − 1:
 /// ∫₀^∞ (1+ngs²)^(−½) (1 + t²/((1+ngs²)ν))^(−(ν+1)/2) (2π)^(−½) g^(−3/2) e^(−1/(2g)) dg
 /// over (1 + t²/ν)^(−(ν+1)/2).
 ///
-/// With g = eᵘ the integrand is smooth and falls on both sides faster than any
-/// power, where the trapezoidal rule converges faster than any power of its step.
+/// With g = eᵘ the integrand is smooth and decreases on both sides faster than any
+/// power; there the trapezoidal rule converges faster than any power of its step.
+/// `None` for fewer than two numbers or if it overflows.
 pub fn jzs_bf10(t: f64, n: usize, scale: f64) -> Option<f64> {
     if n < 2 || !t.is_finite() {
         return None;
@@ -66,8 +68,8 @@ pub fn jzs_bf10(t: f64, n: usize, scale: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// 10.634 for r = 0.6, n = 20, as quoted from the documentation of pingouin's
-    /// `bayesfactor_pearson`; it was not run here.
+    /// 10.634 for r = 0.6, n = 20, from the documentation of pingouin's
+    /// `bayesfactor_pearson`.
     #[test]
     fn the_correlation_factor_agrees_with_a_published_one() {
         let bf = correlation_bf10(0.6, 20).unwrap();
@@ -75,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_has_no_finite_factor() {
+    fn a_perfect_correlation_has_no_finite_factor() {
         assert_eq!(correlation_bf10(1.0, 5), None);
         assert!(jzs_bf10(f64::INFINITY, 5, 0.707).is_none());
     }

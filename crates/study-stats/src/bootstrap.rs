@@ -1,9 +1,9 @@
-//! The bootstrap of the correlation over subjects, exact where it is small.
+//! Bootstrap of a correlation over subjects, exact for few subjects.
 //!
-//! All C(2S−1, S) compositions of S draws from S subjects, each with its
-//! multinomial weight (Fisher & Hall 1991): no random numbers, no Monte Carlo
-//! error. It says how the correlation varies with the subjects; it says nothing
-//! about other realizations.
+//! The exact bootstrap enumerates all C(2S−1, S) compositions of S draws from S subjects,
+//! each with its multinomial weight (Fisher & Hall 1991), without Monte Carlo error. The
+//! bootstrap describes how the correlation varies with the subjects; it does not
+//! generalise to other realizations.
 
 use super::correlation::pearson;
 use super::describe::is_constant;
@@ -12,50 +12,53 @@ use super::matrix::{Cholesky, SymmetricMatrix};
 use super::random::RandomSource;
 use super::{finite, rectangular};
 
-/// Most subjects for which all compositions are visited.
+/// Most subjects for which all compositions are enumerated.
 pub const MAX_EXACT: usize = 10;
 
-/// Most subjects that are drawn one by one, and most numbers of a table that is.
-/// Above, means are drawn from the normal distribution that those of resamples
-/// tend to: with 500 subjects and a skewness of 1 its quantiles are off by .02
-/// standard errors, less than the .027 of 10,000 draws.
+/// Most subjects that are resampled one by one. For larger tables the column sums are
+/// drawn from their limiting normal distribution: with 500 subjects and a skewness of 1
+/// its quantiles are off by .02 standard errors, less than the .027 of 10,000 draws.
 pub const MAX_DRAWN: usize = 500;
+/// Most numbers of a table whose subjects are resampled one by one.
 const MAX_TABLE: usize = 50_000;
 
-/// Most realizations: the work goes with the square.
+/// Most columns: the work grows with their square.
 const MAX_COLUMNS: usize = 300;
 
-/// Resamples above [`MAX_EXACT`].
+/// Number of resamples above [`MAX_EXACT`].
 pub const DRAWS: u32 = 10_000;
 
-/// A bootstrap distribution of the correlation, summed up.
+/// Summary of a bootstrap distribution of the correlation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {
-    /// Mean over the resamples.
+    /// Mean of the resamples.
     pub mean: f64,
-    /// Standard deviation over them.
+    /// Standard error: standard deviation of the resamples.
     pub se: f64,
-    /// 95 % by percentiles: the smallest values with cdf ≥ .025 and ≥ .975.
+    /// 95 % percentile interval: the smallest values with cdf ≥ .025 and ≥ .975.
     pub percentile: (f64, f64),
-    /// 95 %, bias corrected and accelerated (Efron 1987).
+    /// 95 % interval, bias-corrected and accelerated (Efron 1987); `None` if its
+    /// constants are not defined.
     pub bca: Option<(f64, f64)>,
-    /// Bias: the normal quantile of P(r* < r), ties counted half.
+    /// Bias correction: the normal quantile of P(r* < r), with ties counted half; `None`
+    /// if that is 0 or 1.
     pub z0: Option<f64>,
-    /// Acceleration, from the jackknife.
+    /// Acceleration, by the jackknife; `None` if omitting a subject changes nothing.
     pub acceleration: Option<f64>,
     /// P(r* ≤ 0).
     pub p_le_zero: f64,
-    /// Probability of the resamples in which every realization is rated alike,
-    /// which have no correlation and are left out.
+    /// Probability of the resamples in which all columns have the same mean. They have no
+    /// correlation and are left out.
     pub undefined_probability: f64,
-    /// Whether all compositions were visited.
+    /// Whether all compositions were enumerated.
     pub exact: bool,
-    /// Whether means were drawn from their normal limit.
+    /// Whether column sums were drawn from their limiting normal distribution.
     pub normal_limit: bool,
 }
 
-/// Resamples the rows (subjects) of a table and correlates the column sums with
-/// `x`. `None` below two subjects or where the correlation is not defined.
+/// Resamples the rows (subjects) of a table and correlates the column sums with `x`, a
+/// number for each column. `None` for fewer than two subjects, fewer than three columns
+/// or more than 300, or if the correlation is not defined.
 pub fn correlation<R: AsRef<[f64]>>(
     rows: &[R],
     x: &[f64],
@@ -76,7 +79,7 @@ fn resample(
     if rows.len() < 2 || !(3..=MAX_COLUMNS).contains(&x.len()) {
         return None;
     }
-    let score = Score::new(x)?;
+    let score = CorrelationWith::new(x)?;
     let ones = vec![1; rows.len()];
     let observed = score.of(&weighted(rows, &ones))?;
     let exact = rows.len() <= MAX_EXACT && !normal_limit;
@@ -93,7 +96,7 @@ fn resample(
         let mut sums = vec![vec![0.0; x.len()]; rows.len() + 1];
         compose(rows, 0, rows.len(), 1, &mut sums, &mut count);
     } else if normal_limit {
-        let limit = Limit::of(rows)?;
+        let limit = NormalLimit::new(rows)?;
         for _ in 0..DRAWS {
             count(&limit.draw(random), 1);
         }
@@ -116,16 +119,16 @@ fn resample(
     })
 }
 
-/// The normal distribution that the column sums of resamples tend to.
-struct Limit {
+/// The limiting normal distribution of the column sums of resamples.
+struct NormalLimit {
     sums: Vec<f64>,
     /// Cholesky's factor of their covariance; a column that the others determine
     /// contributes nothing of its own.
     factor: Cholesky,
 }
 
-impl Limit {
-    fn of(rows: &[&[f64]]) -> Option<Self> {
+impl NormalLimit {
+    fn new(rows: &[&[f64]]) -> Option<Self> {
         let k = rows.first()?.len();
         let n = rows.len() as f64;
         let sums = weighted(rows, &vec![1; rows.len()]);
@@ -151,7 +154,7 @@ impl Limit {
 
 fn summary(
     rows: &[&[f64]],
-    score: &Score,
+    score: &CorrelationWith,
     observed: f64,
     resamples: &[(f64, u64)],
     undefined: u64,
@@ -193,7 +196,7 @@ fn summary(
         bca,
         z0,
         acceleration,
-        // A correlation that is 0 on paper may be 10⁻¹⁷ here.
+        // Rounding can turn a correlation of 0 into 10⁻¹⁷.
         p_le_zero: share(&|r| r <= TIE),
         undefined_probability: undefined as f64 / total as f64,
         exact: false,
@@ -201,8 +204,8 @@ fn summary(
     })
 }
 
-/// Quantiles of weighted correlations without sorting all of them: the weights
-/// are cumulated by class, and only the class that holds a quantile is sorted.
+/// Quantiles of weighted correlations without sorting all of them: the weights are
+/// accumulated in a histogram, and only the class that contains the quantile is sorted.
 struct Quantiles<'a> {
     resamples: &'a [(f64, u64)],
     /// Weight of each class of equal width over [−1, 1].
@@ -212,7 +215,7 @@ struct Quantiles<'a> {
 impl<'a> Quantiles<'a> {
     const CLASSES: usize = 4096;
 
-    /// Never falls with r.
+    /// Non-decreasing in r.
     fn class(r: f64) -> usize {
         // From 0 to CLASSES: r is a correlation.
         (((r + 1.0) * 0.5 * Self::CLASSES as f64) as usize).min(Self::CLASSES - 1)
@@ -226,8 +229,8 @@ impl<'a> Quantiles<'a> {
         Self { resamples, classes }
     }
 
-    /// The smallest value whose cumulated weight reaches `weight`; the largest if
-    /// rounding lets none reach it.
+    /// The smallest value whose cumulative weight is at least `weight`; the largest value
+    /// if, due to rounding, there is none.
     fn at(&self, weight: f64) -> Option<f64> {
         let mut sum = 0u64;
         for (class, own) in self.classes.iter().enumerate() {
@@ -249,7 +252,7 @@ impl<'a> Quantiles<'a> {
 }
 
 /// Σ(m − mᵢ)³/(6(Σ(m − mᵢ)²)^1.5) over the correlations mᵢ without subject i.
-fn acceleration(rows: &[&[f64]], score: &Score) -> Option<f64> {
+fn acceleration(rows: &[&[f64]], score: &CorrelationWith) -> Option<f64> {
     let mut without = Vec::with_capacity(rows.len());
     let all = weighted(rows, &vec![1; rows.len()]);
     for row in rows {
@@ -269,6 +272,7 @@ fn acceleration(rows: &[&[f64]], score: &Score) -> Option<f64> {
     finite(cubes / (6.0 * squares.powf(1.5)))
 }
 
+/// Column sums, each row taken as often as it was drawn.
 fn weighted(rows: &[&[f64]], draws: &[u32]) -> Vec<f64> {
     let mut sums = vec![0.0; rows.first().map_or(0, |row| row.len())];
     for (row, &n) in rows.iter().zip(draws) {
@@ -281,8 +285,8 @@ fn weighted(rows: &[&[f64]], draws: &[u32]) -> Vec<f64> {
     sums
 }
 
-/// Every way to draw `left` times from the rows from `row` on; `weight` counts
-/// the sequences that give it (S! / Π kᵢ!, at most 10¹⁰, exact).
+/// Enumerates the ways to draw `left` times from the rows from `row` on. `weight` is the
+/// number of sequences for each (S! / Π kᵢ!, at most 10¹⁰, exact).
 fn compose(
     rows: &[&[f64]],
     row: usize,
@@ -317,12 +321,13 @@ fn compose(
     }
 }
 
-/// Correlation with a fixed x, of column sums.
-struct Score {
+/// Correlation of column sums with a fixed x.
+struct CorrelationWith {
+    /// Centred, of norm 1.
     x: Vec<f64>,
 }
 
-impl Score {
+impl CorrelationWith {
     fn new(x: &[f64]) -> Option<Self> {
         if is_constant(x) {
             return None;
@@ -345,7 +350,7 @@ impl Score {
             yy += d * d;
             size = size.max(v.abs());
         }
-        // Sums that differ by the rounding of thirds are equal.
+        // Sums that differ only by rounding errors are equal.
         if !(yy.is_finite() && yy.sqrt() > 1e-12 * size) {
             return None;
         }
@@ -367,22 +372,22 @@ mod tests {
     }
 
     #[test]
-    fn all_compositions_are_visited_with_their_weights() {
+    fn all_compositions_are_enumerated_with_their_weights() {
         let rows: Vec<Vec<f64>> = (0..4).map(|i| vec![f64::from(i), 1.0, 2.0]).collect();
-        let (mut visited, mut weights) = (0, 0);
+        let (mut compositions, mut weights) = (0, 0);
         let mut sums = vec![vec![0.0; 3]; 5];
         compose(&slices(&rows), 0, 4, 1, &mut sums, &mut |s, w| {
             // Every composition draws four rows, so the constant columns are fixed.
             assert_eq!((s[1], s[2]), (4.0, 8.0));
-            visited += 1;
+            compositions += 1;
             weights += w;
         });
-        assert_eq!((visited, weights), (35, 256));
+        assert_eq!((compositions, weights), (35, 256));
     }
 
-    /// VAF on even steps: whether r > 0 is told by whole numbers, Σ (2j − 3)·yⱼ.
+    /// With equally spaced x, the sign of r is that of the whole number Σ (2j − 3)·yⱼ.
     #[test]
-    fn a_correlation_that_is_zero_on_paper_is_not_above_zero() {
+    fn a_correlation_of_zero_is_not_above_zero_by_rounding() {
         let rows: [[f64; 4]; 5] = [
             [1.0, 2.0, 2.0, 1.0],
             [3.0, 1.0, 2.0, 4.0],
@@ -409,7 +414,7 @@ mod tests {
     fn quantiles_are_those_of_the_sorted_resamples() {
         let mut random = SplitMix64::new(5);
         let resamples: Vec<(f64, u64)> = (0..3000)
-            // Many ties, and a class with hundreds of members.
+            // Many ties, and a class with hundreds of values.
             .map(|_| {
                 let r = (random.normal().sin() * 300.0).round() / 300.0;
                 (r * r * r, 1 + random.below(50))
@@ -432,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn the_normal_limit_agrees_with_drawing_subjects_one_by_one() {
+    fn the_normal_limit_agrees_with_resampling_subjects() {
         let mut noise = SplitMix64::new(3);
         let x = [0.1, 0.2, 0.4, 0.5];
         let rows: Vec<Vec<f64>> = (0..400)

@@ -1,8 +1,8 @@
-//! Proportional odds: the cumulative-link model with the logit link.
+//! Proportional-odds models: cumulative-link models with the logit link.
 //!
-//! logit P(Y ≤ j) = θⱼ − xβ for the categories j = 1 … J − 1, with rising θ
+//! logit P(Y ≤ j) = θⱼ − xβ for the categories j = 1 … J − 1, with increasing θ
 //! (McCullagh 1980; Agresti, *Analysis of Ordinal Categorical Data*, 2nd ed.,
-//! 2010, ch. 3). Not the mixed model: that is [`super::clmm`].
+//! 2010, ch. 3). [`super::clmm`] adds a random intercept for each subject.
 //!
 //! With F the logistic function, aⱼ = θⱼ − xβ and s(a) = ln(1 + eᵃ),
 //!
@@ -12,11 +12,11 @@
 //! κ(δ) = ln(1 − e^−δ)
 //! ```
 //!
-//! so nothing is lost where two thresholds are close or far out, and the
-//! likelihood of a table of counts n is Σ nₖaₖ − mₖs(aₖ) + Σ Nⱼκⱼ over the pairs
-//! k of a predictor and a threshold, m = nⱼ + nⱼ₊₁: logistic regressions side by
-//! side, and a term that keeps the thresholds apart. It is concave, and its
-//! derivatives are sums over k. The whole table is [`counts::CategoryCounts`].
+//! so that no digits cancel where two thresholds are close or extreme. The
+//! log-likelihood of counts n is Σ nₖaₖ − mₖs(aₖ) + Σ Nⱼκⱼ over the pairs k of a
+//! predictor and a threshold, m = nⱼ + nⱼ₊₁: one logistic regression for each
+//! threshold, and a term that keeps the thresholds apart. It is concave, and its
+//! derivatives are sums over k. [`CategoryCounts`] holds the counts.
 
 pub(crate) mod counts;
 pub(crate) mod newton;
@@ -27,37 +27,37 @@ use crate::matrix::{Cholesky, SymmetricMatrix};
 pub use counts::{CategoryCount, CategoryCounts, Predictor};
 use newton::{Evaluation, maximise};
 
-/// Why a model has no estimate.
+/// Why an ordinal model has no estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ClmError {
     /// All ratings fall in one category.
     #[error("all ratings are equal")]
     OneCategory,
-    /// Nothing varies beside the ratings.
+    /// The predictor does not vary.
     #[error("there are no two different predictors")]
     OnePredictor,
     /// A mixed model needs two subjects.
     #[error("one subject has no variance between subjects")]
     OneSubject,
-    /// The likelihood rises for ever: an estimate is infinite.
+    /// The likelihood has no maximum: an estimate is infinite.
     #[error(
         "complete separation: the ratings of some realizations do not overlap with others, so an estimate is infinite"
     )]
     Separated,
-    /// The standard deviation of the subjects rises for ever.
+    /// The standard deviation between subjects is infinite.
     #[error("the subjects' ratings do not overlap: their standard deviation is infinite")]
     SubjectsSeparated,
-    /// The search ended without a maximum, or at one without a curvature.
+    /// The search found no maximum, or one with a singular information matrix.
     #[error("the likelihood has no maximum that could be found")]
     NoMaximum,
 }
 
-/// Estimates of a model.
+/// Estimates of a proportional-odds model, in logits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClmFit {
-    /// θ, rising.
+    /// Thresholds θ, increasing; one less than there are categories.
     pub thresholds: Vec<f64>,
-    /// β, by column.
+    /// Coefficients β, by column of the design.
     pub beta: Vec<f64>,
     /// Standard errors of β, from the observed information.
     pub se: Vec<f64>,
@@ -65,14 +65,17 @@ pub struct ClmFit {
     pub loglik: f64,
 }
 
-/// Maximum likelihood by Newton's method, subjects ignored.
+/// Maximum-likelihood estimates; all ratings are treated as independent.
+///
+/// # Errors
+/// If the estimates do not exist (decided from the counts) or were not found.
 pub fn clm(table: &CategoryCounts) -> Result<ClmFit, ClmError> {
     table.estimable()?;
-    let found = maximise(start(table), |at| point(table, at)).ok_or(ClmError::NoMaximum)?;
+    let found = maximise(start(table), |at| evaluate(table, at)).ok_or(ClmError::NoMaximum)?;
     fit_of(table, &found.at, found.value, &found.information)
 }
 
-/// The estimates at a maximum; parameters after β are not reported.
+/// The estimates at a maximum. Parameters after β are not reported.
 pub(super) fn fit_of(
     table: &CategoryCounts,
     at: &[f64],
@@ -96,16 +99,15 @@ pub(super) fn fit_of(
     }
 }
 
-/// Thresholds at the logits of the cumulative shares, no effect.
+/// Starting values: thresholds at the logits of the cumulative shares, β = 0.
 fn start(table: &CategoryCounts) -> Vec<f64> {
     let mut at = table.marginal_logits();
     at.resize(table.parameters(), 0.0);
     at
 }
 
-/// Value, gradient and Hessian at (θ, β); `None` where the thresholds do not
-/// rise.
-pub(super) fn point(table: &CategoryCounts, at: &[f64]) -> Option<Evaluation> {
+/// Value, gradient and Hessian at (θ, β); `None` if the thresholds do not increase.
+pub(super) fn evaluate(table: &CategoryCounts, at: &[f64]) -> Option<Evaluation> {
     let mut point = table.spacing(at, table.parameters())?;
     let a = table.linear(at);
     let (mut first, mut second) = (Vec::new(), Vec::new());

@@ -1,22 +1,22 @@
-//! Proportional odds with a normal intercept for each subject.
+//! Proportional-odds models with a normal random intercept for each subject.
 //!
 //! logit P(Y ≤ j | b) = θⱼ − xβ − b, b ~ N(0, σ²). In the terms of [`super::clm`]
-//! one subject adds ln ∫ e^f(b) db/√(2π) with
+//! one subject contributes ln ∫ e^f(b) db/√(2π) with
 //!
 //! ```text
 //! f(b) = Σ (nₖaₖ − mₖs(aₖ)) − b²/(2σ²) − ln σ,   aₖ = θⱼ − xβ − b
 //! ```
 //!
-//! which is concave in b. Two integrals: `laplace`, f(b̂) − ½ ln H with H =
-//! −f″(b̂), which is what most software prints; and `quadrature`, adaptive
-//! Gauss–Hermite (Pinheiro & Bates 1995), which is the integral itself. Both are
+//! which is concave in b. The integral is computed in two ways: by Laplace's method,
+//! f(b̂) − ½ ln H with H = −f″(b̂), the default of most software, and by adaptive
+//! Gauss–Hermite quadrature (Pinheiro & Bates 1995), which is numerically exact. Both are
 //! maximised over (θ, β, ln σ) by Newton's method with second derivatives of the
 //! marginal likelihood, so that the standard errors are those of the observed
-//! information (Christensen 2019, `ordinal`, has the same model by quasi-Newton).
+//! information (R's `ordinal`, Christensen 2019, fits the same model by quasi-Newton).
 //!
-//! σ = 0 is a boundary: there the marginal likelihood is the fixed model's, and
-//! its slope in σ² is ½ Σᵢ (f₁² + f₂), f₁ and f₂ the derivatives in b at 0. If it
-//! falls there and no σ above does better, the standard deviation is 0.
+//! At the boundary σ = 0 the marginal likelihood is that of the fixed-effects model, and
+//! its derivative in σ² is ½ Σᵢ (f₁² + f₂), with f₁ and f₂ the derivatives in b at 0. If
+//! it is not positive and no σ > 0 has a higher likelihood, the estimate is 0.
 
 mod hermite;
 mod laplace;
@@ -30,43 +30,44 @@ use super::clm::newton::{Evaluation, Maximum, maximise};
 use super::clm::{ClmError, ClmFit, clm, fit_of, logistic};
 use std::sync::LazyLock;
 
-/// Nodes of the quadrature that is reported.
+/// Number of nodes of the reported quadrature.
 pub const NODES: usize = 60;
 
-/// Nodes on the way there.
+/// Number of nodes of the first steps.
 const FEW_NODES: usize = 12;
 
 static RULE: LazyLock<Vec<hermite::Node>> = LazyLock::new(|| hermite::rule(NODES));
 static FEW: LazyLock<Vec<hermite::Node>> = LazyLock::new(|| hermite::rule(FEW_NODES));
 
-/// From here up a standard deviation, in logits, is called infinite: between
-/// two standard deviations the odds differ by e¹⁰⁰.
+/// A larger standard deviation, in logits, is reported as infinite: one standard
+/// deviation changes the odds by e¹⁰⁰.
 const INFINITE_SD: f64 = 100.0;
 
-/// Below it σ is 0: it moves a probability by less than 10⁻⁴.
+/// A smaller σ is reported as 0: it changes a probability by less than 10⁻⁴.
 const SMALLEST_SD: f64 = 1e-4;
 
-/// Estimates of a mixed model.
+/// Estimates of a proportional-odds model with a random intercept.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClmmFit {
-    /// Of the fixed part. On the boundary those of the model without subjects.
+    /// Thresholds and coefficients; on the boundary those of [`clm`].
     pub fit: ClmFit,
-    /// σ, logits; 0 on the boundary.
+    /// Standard deviation σ between subjects, in logits; 0 on the boundary.
     pub sd: f64,
-    /// Whether the likelihood is greatest at σ = 0.
+    /// Whether the likelihood is largest at σ = 0.
     pub boundary: bool,
 }
 
-/// The estimates by Laplace's method, and by adaptive quadrature.
+/// The estimates by Laplace's method and by adaptive quadrature.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClmmFits {
     /// By Laplace's method.
     pub laplace: Result<ClmmFit, ClmError>,
-    /// With [`NODES`] nodes.
+    /// By adaptive Gauss–Hermite quadrature with [`NODES`] nodes.
     pub quadrature: Result<ClmmFit, ClmError>,
 }
 
-/// Fits the mixed model both ways.
+/// Fits the model by Laplace's method and by adaptive quadrature. Each result is an error
+/// if its estimates do not exist or were not found.
 pub fn clmm(table: &CategoryCounts) -> ClmmFits {
     let fixed = match clm(table) {
         Ok(_) if table.subjects() < 2 => Err(ClmError::OneSubject),
@@ -82,7 +83,7 @@ pub fn clmm(table: &CategoryCounts) -> ClmmFits {
         }
     };
     let mut modes = vec![0.0; table.subjects()];
-    let mut by_laplace = |at: &[f64]| laplace::point(table, at, &mut modes);
+    let mut by_laplace = |at: &[f64]| laplace::evaluate(table, at, &mut modes);
     let starts: Vec<Vec<f64>> = [0.3, 1.0, 3.0]
         .iter()
         .map(|&sd| marginal_to_conditional(&fixed, sd))
@@ -90,18 +91,18 @@ pub fn clmm(table: &CategoryCounts) -> ClmmFits {
     let start = best(&starts, &mut by_laplace);
     let slope = slope_at_zero(table, &fixed);
     let found = start.and_then(|at| maximise(at, &mut by_laplace));
-    let laplace = judge(table, &fixed, slope, found.as_ref());
-    // Laplace's maximum is near; where it is not, the integral is searched anew.
+    let laplace = estimates(table, &fixed, slope, found.as_ref());
+    // Start at Laplace's maximum; if that fails, start again from the initial values.
     let near = match (found, &laplace) {
         (Some(found), Ok(mixed)) if !mixed.boundary => integrate(table, found.at, &mut modes),
         _ => None,
     };
-    let near = judge(table, &fixed, slope, near.as_ref());
+    let near = estimates(table, &fixed, slope, near.as_ref());
     let quadrature = near.or_else(|_| {
-        let few = &mut |at: &[f64]| quadrature::point(table, at, &FEW, &mut modes);
+        let few = &mut |at: &[f64]| quadrature::evaluate(table, at, &FEW, &mut modes);
         let start = best(&starts, few);
         let found = start.and_then(|at| integrate(table, at, &mut modes));
-        judge(table, &fixed, slope, found.as_ref())
+        estimates(table, &fixed, slope, found.as_ref())
     });
     ClmmFits {
         laplace,
@@ -109,25 +110,26 @@ pub fn clmm(table: &CategoryCounts) -> ClmmFits {
     }
 }
 
-/// The maximum of the integral: with few nodes first, since each step costs as
-/// many passes as there are nodes.
+/// The maximum of the integral: first with few nodes, because the cost of a step is
+/// proportional to their number.
 fn integrate(table: &CategoryCounts, start: Vec<f64>, modes: &mut [f64]) -> Option<Maximum> {
     let near = maximise(start.clone(), |at| {
-        quadrature::point(table, at, &FEW, modes)
+        quadrature::evaluate(table, at, &FEW, modes)
     });
     maximise(near.map_or(start, |near| near.at), |at| {
-        quadrature::point(table, at, &RULE, modes)
+        quadrature::evaluate(table, at, &RULE, modes)
     })
 }
 
-/// Effects given a subject are larger than marginal ones by about √(1 + 0.346σ²)
-/// (Zeger, Liang & Albert 1988).
+/// Starting values with this standard deviation. Effects given the subject are larger
+/// than marginal ones by about √(1 + 0.346σ²) (Zeger, Liang & Albert 1988).
 fn marginal_to_conditional(fixed: &ClmFit, sd: f64) -> Vec<f64> {
     let factor = (1.0 + 0.346 * sd * sd).sqrt();
     let fixed = fixed.thresholds.iter().chain(&fixed.beta);
     fixed.map(|v| v * factor).chain([sd.ln()]).collect()
 }
 
+/// The starting values with the highest likelihood.
 fn best(
     starts: &[Vec<f64>],
     at: &mut impl FnMut(&[f64]) -> Option<Evaluation>,
@@ -139,7 +141,7 @@ fn best(
         .map(|(_, s)| s.clone())
 }
 
-/// The slope of the marginal log-likelihood in σ² at the fixed model.
+/// The derivative of the marginal log-likelihood in σ² at σ = 0.
 fn slope_at_zero(table: &CategoryCounts, fixed: &ClmFit) -> f64 {
     let at: Vec<f64> = fixed
         .thresholds
@@ -160,7 +162,8 @@ fn slope_at_zero(table: &CategoryCounts, fixed: &ClmFit) -> f64 {
     by_subject.sum()
 }
 
-fn judge(
+/// The estimates from the maximum found, if any; `slope` is that at σ = 0.
+fn estimates(
     table: &CategoryCounts,
     fixed: &ClmFit,
     slope: f64,

@@ -1,12 +1,12 @@
-//! Correlation of two columns: Pearson, Spearman, Kendall, within subjects.
+//! Correlation of two columns: Pearson, Spearman, Kendall, repeated measures.
 
 use super::describe::{is_constant, mean, products_about, squares_about};
 use super::distribution::{normal_quantile, t_two_sided};
 use super::finite;
 use super::rank::{doubled_ranks, mid_ranks};
 
-/// Pearson's r = Sxy/√(Sxx Syy). `None` if a column is constant or shorter
-/// than 2.
+/// Pearson's r = Sxy/√(Sxx Syy). `None` if a column is constant, for fewer than two
+/// pairs or unequal lengths.
 pub fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() < 2 || x.len() != y.len() || is_constant(x) || is_constant(y) {
         return None;
@@ -19,15 +19,15 @@ pub fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
     finite(products_about(x, mx, y, my)? / (xx.sqrt() * yy.sqrt())).map(|r| r.clamp(-1.0, 1.0))
 }
 
-/// Spearman's rho: Pearson's r of the mid-ranks.
+/// Spearman's rho: Pearson's r of the mid-ranks. `None` as for [`pearson`].
 pub fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
     pearson(&mid_ranks(x), &mid_ranks(y))
 }
 
 /// Kendall's tau-b: (concordant − discordant)/√((n₀ − n₁)(n₀ − n₂)), with
 /// n₀ = n(n−1)/2 and n₁, n₂ the tied pairs of either column (Kendall 1945).
-/// `None` if a column is constant, or above 5000 pairs: the work goes with the
-/// square.
+/// `None` if a column is constant, for unequal lengths, or for more than 5000 pairs: the
+/// work grows with their square.
 pub fn kendall(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() > 5000 || x.len() != y.len() {
         return None;
@@ -42,11 +42,12 @@ pub fn kendall(x: &[f64], y: &[f64]) -> Option<f64> {
             untied_y += b.abs();
         }
     }
-    let below = (untied_x as f64).sqrt() * (untied_y as f64).sqrt();
-    finite(score as f64 / below)
+    let pairs = (untied_x as f64).sqrt() * (untied_y as f64).sqrt();
+    finite(score as f64 / pairs)
 }
 
-/// Two-sided p of r by t = r√(df/(1 − r²)). `None` for |r| = 1 or df < 1.
+/// Two-sided p of a correlation r, from t = r√(df/(1 − r²)); `df` is n − 2 for a plain
+/// correlation. `None` for |r| = 1 or `df` < 1.
 pub fn p_of_r(r: f64, df: f64) -> Option<f64> {
     if df < 1.0 || r.abs() >= 1.0 {
         return None;
@@ -54,8 +55,8 @@ pub fn p_of_r(r: f64, df: f64) -> Option<f64> {
     t_two_sided(r * (df / ((1.0 - r) * (1.0 + r))).sqrt(), df)
 }
 
-/// Fisher's 95 % interval: tanh(atanh r ± z/√`weight`), where `weight` is n − 3
-/// for a plain correlation. `None` for |r| = 1 or a weight not above 0.
+/// Fisher's 95 % interval of a correlation: tanh(atanh r ± 1.96/√`weight`), where
+/// `weight` is n − 3 for a plain correlation. `None` for |r| = 1 or unless `weight` > 0.
 pub fn fisher_interval(r: f64, weight: f64) -> Option<(f64, f64)> {
     if r.abs() >= 1.0 || weight <= 0.0 {
         return None;
@@ -65,23 +66,24 @@ pub fn fisher_interval(r: f64, weight: f64) -> Option<(f64, f64)> {
     Some(((z - half).tanh(), (z + half).tanh()))
 }
 
-/// The correlation within subjects.
+/// A repeated-measures correlation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WithinSubjects {
     /// The correlation.
     pub r: f64,
-    /// N − S − 1.
+    /// Degrees of freedom: N − S − 1 for N pairs of S subjects.
     pub df: f64,
-    /// Two-sided, by t; undefined for |r| = 1.
+    /// Two-sided p by t; `None` for |r| = 1.
     pub p: Option<f64>,
-    /// By Fisher's z with df − 1.
+    /// 95 % interval by Fisher's z with weight df − 1; `None` for |r| = 1 or df = 1.
     pub ci95: Option<(f64, f64)>,
 }
 
 /// Repeated-measures correlation (Bakdash & Marusich 2017): Pearson's r of the
 /// deviations from each subject's own means, with N − S − 1 degrees of freedom.
-/// Each subject's numbers stand together; `lengths` says how many there are of
-/// each.
+/// The pairs of a subject are adjacent; `lengths` holds the number of pairs of each
+/// subject. `None` if r is not defined, if there is no degree of freedom left, or if
+/// `lengths` exceeds the columns.
 pub fn within_subjects(x: &[f64], y: &[f64], lengths: &[usize]) -> Option<WithinSubjects> {
     let (mut dx, mut dy) = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
     let mut subjects = 0;
@@ -92,7 +94,7 @@ pub fn within_subjects(x: &[f64], y: &[f64], lengths: &[usize]) -> Option<Within
         subjects += 1;
         for (own, deviations) in [(own_x, &mut dx), (own_y, &mut dy)] {
             let m = mean(own)?;
-            // Deviations of a constant are rounding, not data.
+            // Deviations of a constant column would be rounding errors.
             let same = is_constant(own);
             deviations.extend(own.iter().map(|v| if same { 0.0 } else { v - m }));
         }
@@ -132,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn ties_lower_tau_b_as_kendall_has_it() {
+    fn ties_lower_tau_b_as_in_kendalls_formula() {
         // 5 concordant of 6 pairs, one tie in y: 5/√(6·5).
         let tau = kendall(&[1.0, 2.0, 3.0, 4.0], &[1.0, 2.0, 2.0, 3.0]).unwrap();
         assert!((tau - 5.0 / 30f64.sqrt()).abs() < 1e-15);

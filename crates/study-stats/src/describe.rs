@@ -1,13 +1,12 @@
 //! Sums, means, standard deviations, quantiles, counts.
 //!
-//! Sums are carried in two doubles (Neumaier 1974), and deviations are taken
-//! from the carried mean before they are squared, so that ratings of 10⁹ ± 1 keep
-//! every digit that their doubles have.
+//! Sums are compensated (Neumaier 1974), and deviations from the mean are taken before
+//! they are squared, so that ratings of 10⁹ ± 1 keep every digit of their doubles.
 
 use super::finite;
 
-/// A sum that carries what each addition rounds off (Neumaier's variant of
-/// Kahan's).
+/// A compensated sum: it accumulates the rounding error of each addition and adds it
+/// at the end (Neumaier 1974).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sum {
     high: f64,
@@ -26,7 +25,7 @@ impl Sum {
         self.high = t;
     }
 
-    /// The sum.
+    /// The sum of the numbers added so far; 0 for none.
     pub fn get(self) -> f64 {
         self.high + self.low
     }
@@ -42,18 +41,17 @@ impl FromIterator<f64> for Sum {
     }
 }
 
-/// The compensated sum.
+/// The compensated sum Σx; 0 for no numbers.
 pub fn sum(x: &[f64]) -> f64 {
     x.iter().copied().collect::<Sum>().get()
 }
 
-/// The arithmetic mean, Σx/n, or Σ(x/n) where the sum overflows. `None` for no
-/// numbers.
+/// The arithmetic mean, Σx/n, or Σ(x/n) if the sum overflows. `None` for no numbers.
 pub fn mean(x: &[f64]) -> Option<f64> {
     mean_of(x.iter().copied())
 }
 
-/// The same of numbers that come one by one.
+/// [`mean`] of the numbers of an iterator.
 pub fn mean_of(x: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     let (mut sum, mut n) = (Sum::default(), 0.0);
     for v in x.clone() {
@@ -66,31 +64,35 @@ pub fn mean_of(x: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     finite(sum.get() / n).or_else(|| finite(x.map(|v| v / n).collect::<Sum>().get()))
 }
 
-/// Sum of squared deviations from the mean, Σd² − (Σd)²/n with d taken from the
-/// rounded mean: the second term takes back what the rounding of the mean put
-/// in (Chan, Golub & LeVeque 1983).
+/// Sum of squared deviations from the mean: Σd² − (Σd)²/n with the deviations d from the
+/// rounded mean. The second term corrects for that rounding (Chan, Golub & LeVeque
+/// 1983). `None` for no numbers, or if it overflows.
 pub fn sum_of_squares(x: &[f64]) -> Option<f64> {
     squares_about(x, mean(x)?)
 }
 
-/// The same where the rounded mean is known already.
+/// [`sum_of_squares`] with the mean already computed.
 pub fn squares_about(x: &[f64], mean: f64) -> Option<f64> {
-    let (mut squares, mut rest) = (Sum::default(), Sum::default());
+    let (mut squares, mut deviations) = (Sum::default(), Sum::default());
     for v in x {
         let d = v - mean;
         squares.add(d * d);
-        rest.add(d);
+        deviations.add(d);
     }
-    finite(squares.get() - rest.get() * rest.get() / x.len() as f64)
+    finite(squares.get() - deviations.get() * deviations.get() / x.len() as f64)
 }
 
-/// Σ(x − x̄)(y − ȳ), by the same correction.
+/// Σ(x − x̄)(y − ȳ), with the same correction. `None` for no numbers or unequal
+/// lengths, or if it overflows.
 pub fn sum_of_products(x: &[f64], y: &[f64]) -> Option<f64> {
     products_about(x, mean(x)?, y, mean(y)?)
 }
 
-/// The same where the rounded means are known already.
+/// [`sum_of_products`] with the means already computed.
 pub fn products_about(x: &[f64], mx: f64, y: &[f64], my: f64) -> Option<f64> {
+    if x.len() != y.len() {
+        return None;
+    }
     let (mut xy, mut dx, mut dy) = (Sum::default(), Sum::default(), Sum::default());
     for (a, b) in x.iter().zip(y) {
         xy.add((a - mx) * (b - my));
@@ -100,7 +102,8 @@ pub fn products_about(x: &[f64], mx: f64, y: &[f64], my: f64) -> Option<f64> {
     finite(xy.get() - dx.get() * dy.get() / x.len() as f64)
 }
 
-/// Variance with n − 1. `None` below two numbers.
+/// The variance Σ(x − x̄)²/(n − 1), in squared units of x. `None` for fewer than two
+/// numbers.
 pub fn variance(x: &[f64]) -> Option<f64> {
     if x.len() < 2 {
         return None;
@@ -108,13 +111,14 @@ pub fn variance(x: &[f64]) -> Option<f64> {
     finite(sum_of_squares(x)?.max(0.0) / (x.len() - 1) as f64)
 }
 
-/// Standard deviation with n − 1. `None` below two numbers.
+/// The standard deviation √(Σ(x − x̄)²/(n − 1)). `None` for fewer than two numbers.
 pub fn sd(x: &[f64]) -> Option<f64> {
     variance(x).map(f64::sqrt)
 }
 
-/// Quantile of type 7 (Hyndman & Fan 1996, R's default): with the numbers sorted
-/// and h = (n − 1)p, linear between those at ⌊h⌋ and ⌊h⌋ + 1. `sorted` has to be.
+/// The p-quantile of ascending numbers, 0 ≤ p ≤ 1, of type 7 (Hyndman & Fan 1996, R's
+/// default): with h = (n − 1)p, linear interpolation between the numbers at ⌊h⌋ and
+/// ⌊h⌋ + 1, counted from 0. `None` for no numbers.
 pub fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let h = last as f64 * p.clamp(0.0, 1.0);
@@ -126,14 +130,15 @@ pub fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
     finite(low + (h - below) * (high - low))
 }
 
-/// The numbers in ascending order. They must hold no NaN.
+/// The numbers in ascending order.
 pub fn sorted(x: &[f64]) -> Vec<f64> {
     let mut s = x.to_vec();
     s.sort_by(f64::total_cmp);
     s
 }
 
-/// How often each whole number from `from` to `to` occurs.
+/// How often each of the whole numbers `from`, `from` + 1, … `to` occurs. Other numbers
+/// are not counted.
 pub fn counts(x: &[f64], from: f64, to: f64) -> Vec<f64> {
     let bins = (to - from).max(0.0) as usize + 1;
     let mut counts = vec![0.0; bins];
@@ -146,20 +151,21 @@ pub fn counts(x: &[f64], from: f64, to: f64) -> Vec<f64> {
     counts
 }
 
-/// Correlation of each number with the next:
-/// Σ(xᵢ − x̄)(xᵢ₊₁ − x̄) / Σ(xᵢ − x̄)², as NIST's StRD defines it.
+/// Lag-1 autocorrelation Σ(xᵢ − x̄)(xᵢ₊₁ − x̄) / Σ(xᵢ − x̄)², as defined by NIST's StRD.
+/// `None` if all numbers are equal.
 pub fn lag1_autocorrelation(x: &[f64]) -> Option<f64> {
     let m = mean(x)?;
-    let below: Sum = x.iter().map(|v| (v - m) * (v - m)).collect();
-    let above: Sum = x.windows(2).map(|w| (w[0] - m) * (w[1] - m)).collect();
-    if below.get() <= 0.0 {
+    let denominator: Sum = x.iter().map(|v| (v - m) * (v - m)).collect();
+    let numerator: Sum = x.windows(2).map(|w| (w[0] - m) * (w[1] - m)).collect();
+    if denominator.get() <= 0.0 {
         return None;
     }
-    finite(above.get() / below.get())
+    finite(numerator.get() / denominator.get())
 }
 
-/// Rounded to 10⁻¹⁰, so that thirds which are equal on paper are equal here.
-/// Above 10⁵ a double has no such digits and the number stays.
+/// The number rounded to 10⁻¹⁰, so that means that differ only by rounding errors are
+/// equal. Numbers of 10⁵ or more are returned unchanged: a double does not have enough
+/// digits.
 pub fn rounded(x: f64) -> f64 {
     if x.abs() < 1e5 {
         // The addition turns −0 into 0.
@@ -169,8 +175,8 @@ pub fn rounded(x: f64) -> f64 {
     }
 }
 
-/// Whether all numbers are the same, but for the rounding of thirds: within
-/// 10⁻¹² of the largest, or of 1.
+/// Whether all numbers are equal except for rounding errors: their range is at most
+/// 10⁻¹² times the largest absolute value, or 10⁻¹² if that is below 1.
 pub fn is_constant(x: &[f64]) -> bool {
     let low = x.iter().copied().fold(f64::INFINITY, f64::min);
     let high = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -197,8 +203,8 @@ mod tests {
     #[test]
     fn an_offset_of_a_billion_changes_no_digit_of_the_sd() {
         let x = [1.0, 2.0, 4.0, 4.0, 7.0];
-        let far: Vec<f64> = x.iter().map(|v| v + 1e9).collect();
-        assert_eq!(sd(&x), sd(&far));
+        let shifted: Vec<f64> = x.iter().map(|v| v + 1e9).collect();
+        assert_eq!(sd(&x), sd(&shifted));
     }
 
     #[test]
@@ -212,10 +218,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_defined_is_none() {
+    fn undefined_results_are_none() {
         assert_eq!(mean(&[]), None);
         assert_eq!(sd(&[1.0]), None);
         assert_eq!(sd(&[1e308, -1e308]), None);
         assert_eq!(lag1_autocorrelation(&[2.0, 2.0]), None);
+        assert_eq!(sum_of_products(&[1.0, 2.0], &[1.0]), None);
     }
 }

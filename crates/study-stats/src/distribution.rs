@@ -1,31 +1,31 @@
 //! Tails and quantiles of the normal, t, F and χ² distributions.
 //!
-//! Tails come from the regularised incomplete beta and gamma functions of
-//! statrs, always of the small side, so that a p of 10⁻²⁰ keeps its digits, and
-//! from `libm::erfc` for the normal, where statrs has 11 digits. Quantiles are
-//! roots of these tails: the inverses of statrs are reported wrong far out (t with one
-//! degree of freedom at 10⁻¹⁰ is off by 97 %).
+//! Tail probabilities are the regularised incomplete beta and gamma functions of
+//! `statrs`, always evaluated for the smaller tail, so that a p of 10⁻²⁰ keeps its
+//! digits; the normal tail is `libm::erfc`, because `statrs` has only 11 digits there.
+//! Quantiles are roots of the tail probabilities: the inverses of `statrs` are reported
+//! to be inaccurate in the tails (t with one degree of freedom at 10⁻¹⁰ by 97 %).
 
 use super::finite;
 use statrs::function::{beta::checked_beta_reg, gamma::checked_gamma_ur};
 use std::f64::consts::{PI, SQRT_2};
 
-/// P(Z > z) of the standard normal.
+/// P(Z > z) for the standard normal Z.
 pub fn normal_upper(z: f64) -> f64 {
     0.5 * libm::erfc(z / SQRT_2)
 }
 
-/// P(Z ≤ z) of the standard normal.
+/// P(Z ≤ z) for the standard normal Z.
 pub fn normal_cdf(z: f64) -> f64 {
     normal_upper(-z)
 }
 
-/// z with P(Z ≤ z) = p; `None` unless 0 < p < 1.
+/// The z with P(Z ≤ z) = p for the standard normal Z. `None` unless 0 < p < 1.
 pub fn normal_quantile(p: f64) -> Option<f64> {
     if !(p > 0.0 && p < 1.0) {
         return None;
     }
-    // On the small side, where the tail has its relative precision.
+    // Search in the smaller tail, which has full relative precision.
     let (tail, sign) = if p < 0.5 { (p, -1.0) } else { (1.0 - p, 1.0) };
     let (mut low, mut high) = (0.0, 40.0);
     let mut z = (-2.0 * tail.ln()).sqrt().min(39.0);
@@ -51,7 +51,8 @@ pub fn normal_quantile(p: f64) -> Option<f64> {
     Some(sign * z)
 }
 
-/// P(T > t), one-sided, of Student's t: I(ν/(ν + t²); ν/2, ½)/2.
+/// P(T > t) for Student's T with ν = `df` degrees of freedom:
+/// I(ν/(ν + t²); ν/2, ½)/2 for t ≥ 0. `None` unless `df` > 0 and t is finite.
 pub fn t_upper(t: f64, df: f64) -> Option<f64> {
     if !(df > 0.0 && t.is_finite()) {
         return None;
@@ -60,7 +61,7 @@ pub fn t_upper(t: f64, df: f64) -> Option<f64> {
     Some(if t >= 0.0 { half } else { 1.0 - half })
 }
 
-/// P(|T| ≥ |t|) of Student's t.
+/// P(|T| ≥ |t|) for Student's T. `None` unless `df` > 0 and t is finite.
 pub fn t_two_sided(t: f64, df: f64) -> Option<f64> {
     if !(df > 0.0 && t.is_finite()) {
         return None;
@@ -68,7 +69,8 @@ pub fn t_two_sided(t: f64, df: f64) -> Option<f64> {
     beta_of(df / 2.0, 0.5, df, t * t)
 }
 
-/// P(F > f): I(d₂/(d₂ + d₁f); d₂/2, d₁/2).
+/// P(F > f) for F with d₁ and d₂ degrees of freedom: I(d₂/(d₂ + d₁f); d₂/2, d₁/2).
+/// `None` unless both are above 0 and f is finite.
 pub fn f_upper(f: f64, df1: f64, df2: f64) -> Option<f64> {
     if !(df1 > 0.0 && df2 > 0.0 && f.is_finite()) {
         return None;
@@ -79,7 +81,7 @@ pub fn f_upper(f: f64, df1: f64, df2: f64) -> Option<f64> {
     beta_of(df2 / 2.0, df1 / 2.0, df2, df1 * f)
 }
 
-/// P(X > x) of χ².
+/// P(X > x) for χ² with `df` degrees of freedom. `None` unless `df` > 0 and x is finite.
 pub fn chi2_upper(x: f64, df: f64) -> Option<f64> {
     if !(df > 0.0 && x.is_finite()) {
         return None;
@@ -90,7 +92,7 @@ pub fn chi2_upper(x: f64, df: f64) -> Option<f64> {
     checked_gamma_ur(df / 2.0, x / 2.0).ok().and_then(finite)
 }
 
-/// I(p/(p + q); a, b) without losing the small one of p/(p+q) and its complement.
+/// I(p/(p + q); a, b), evaluated at the smaller of p/(p + q) and its complement.
 fn beta_of(a: f64, b: f64, p: f64, q: f64) -> Option<f64> {
     let x = p / (p + q);
     let value = if x <= 0.5 {
@@ -98,7 +100,7 @@ fn beta_of(a: f64, b: f64, p: f64, q: f64) -> Option<f64> {
     } else {
         1.0 - checked_beta_reg(b, a, q / (p + q)).ok()?
     };
-    // Where 1 − I has lost its digits, the direct form has more of them.
+    // Where 1 − I cancels, the direct form is more accurate.
     let value = if x > 0.5 && value < 1e-3 {
         checked_beta_reg(a, b, x).ok()?
     } else {
@@ -107,7 +109,7 @@ fn beta_of(a: f64, b: f64, p: f64, q: f64) -> Option<f64> {
     finite(value).map(|v| v.clamp(0.0, 1.0))
 }
 
-/// t with P(T ≤ t) = p; `None` unless 0 < p < 1 and df > 0.
+/// The t with P(T ≤ t) = p for Student's T. `None` unless 0 < p < 1 and `df` > 0.
 pub fn t_quantile(p: f64, df: f64) -> Option<f64> {
     if !(p > 0.0 && p < 1.0 && df > 0.0) {
         return None;
@@ -117,7 +119,8 @@ pub fn t_quantile(p: f64, df: f64) -> Option<f64> {
     Some(sign * root)
 }
 
-/// f with P(F ≤ f) = p; `None` unless 0 < p < 1 and the df are above 0.
+/// The f with P(F ≤ f) = p. `None` unless 0 < p < 1 and both degrees of freedom are
+/// above 0.
 pub fn f_quantile(p: f64, df1: f64, df2: f64) -> Option<f64> {
     if !(p > 0.0 && p < 1.0 && df1 > 0.0 && df2 > 0.0) {
         return None;
@@ -125,9 +128,9 @@ pub fn f_quantile(p: f64, df1: f64, df2: f64) -> Option<f64> {
     root_of_tail(1.0 - p, |f| f_upper(f, df1, df2))
 }
 
-/// The x > 0 at which a falling tail has a value: bracketed by doubling, then
-/// the secant through the bracket's ends on a log scale with bisection as the
-/// fallback (Illinois variant of regula falsi).
+/// The x ≥ 0 at which a decreasing tail probability has the value `target`: bracketed
+/// by doubling, then the Illinois variant of regula falsi on the logarithms, with
+/// bisection as the fallback.
 fn root_of_tail(target: f64, tail: impl Fn(f64) -> Option<f64>) -> Option<f64> {
     let error = |x: f64| tail(x).map(|v| v.ln() - target.ln());
     if target >= tail(0.0)? {
@@ -181,8 +184,8 @@ mod tests {
         assert!((a - b).abs() <= relative * b.abs(), "{a} is not {b}");
     }
 
-    /// Points of printed tables, to the digits that are commonly quoted; no peer was
-    /// run for them here. The independent check is tests/analyze_golden.rs.
+    /// Values of printed tables. `tests/analyze/golden.rs` of the repository compares
+    /// with independent programs.
     #[test]
     fn tails_and_quantiles_agree_with_tables() {
         close(t_quantile(0.975, 9.0).unwrap(), 2.262157162798205, 1e-12);
@@ -198,15 +201,15 @@ mod tests {
         close(chi2_upper(3.841458820694124, 1.0).unwrap(), 0.05, 1e-12);
     }
 
-    /// t with one degree of freedom is Cauchy: −cot(πp) far out.
+    /// t with one degree of freedom is Cauchy, with the quantile −cot(πp).
     #[test]
-    fn the_t_quantile_holds_far_out() {
+    fn the_t_quantile_is_accurate_far_in_the_tail() {
         let exact = -1.0 / (PI * 1e-10f64).tan();
         close(t_quantile(1e-10, 1.0).unwrap(), exact, 1e-9);
     }
 
     #[test]
-    fn nonsense_is_not_defined() {
+    fn arguments_outside_the_domain_give_none() {
         assert_eq!(t_quantile(0.975, 0.0), None);
         assert_eq!(t_two_sided(f64::NAN, 3.0), None);
         assert_eq!(f_upper(f64::INFINITY, 1.0, 1.0), None);

@@ -1,4 +1,5 @@
-//! Friedman's and Page's rank tests over a subjects × realizations table.
+//! Friedman's and Page's rank tests of a table with a row for each subject and a column
+//! for each realization.
 
 mod exact;
 
@@ -6,30 +7,31 @@ use super::distribution::{chi2_upper, f_upper, normal_upper};
 use super::rank::{doubled_ranks, mid_ranks};
 use super::{finite, rectangular};
 
-/// Friedman's test.
+/// Friedman's test (1937) of n rows and k columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Friedman {
     /// Mean mid-rank of each column.
     pub mean_ranks: Vec<f64>,
-    /// k − 1.
+    /// Degrees of freedom of χ²: k − 1.
     pub df: f64,
-    /// Tie-corrected statistic; undefined if every row is constant.
+    /// The statistic, corrected for ties; `None` if every row is constant.
     pub chi2: Option<f64>,
-    /// By χ².
+    /// p by the χ² approximation.
     pub p: Option<f64>,
     /// Kendall's W = χ²/(n(k − 1)).
     pub kendall_w: Option<f64>,
-    /// Iman & Davenport's F = (n−1)χ²/(n(k−1) − χ²), on k − 1 and (k−1)(n−1).
+    /// Iman & Davenport's (1980) F = (n−1)χ²/(n(k−1) − χ²), on k − 1 and (k−1)(n−1)
+    /// degrees of freedom; `None` also if the rows agree perfectly.
     pub iman_davenport: Option<f64>,
-    /// By F.
+    /// p of Iman & Davenport's F.
     pub iman_davenport_p: Option<f64>,
-    /// P(statistic ≥ observed) over all orders within rows, where they are few enough.
+    /// Exact P(statistic ≥ observed) over all orders within rows; `None` for tables that
+    /// are too large, which depends on size and ties, not on the statistic.
     pub exact_p: Option<f64>,
 }
 
-/// χ² = (k−1) Σⱼ(Rⱼ − n(k+1)/2)² / (Σᵢⱼ rᵢⱼ² − nk(k+1)²/4), which is Friedman's
-/// with the correction for ties (Conover 1999, §5.8). `None` below two rows or
-/// columns.
+/// Friedman's test: χ² = (k−1) Σⱼ(Rⱼ − n(k+1)/2)² / (Σᵢⱼ rᵢⱼ² − nk(k+1)²/4), with the
+/// correction for ties (Conover 1999, §5.8). `None` for fewer than two rows or columns.
 pub fn friedman<R: AsRef<[f64]>>(rows: &[R]) -> Option<Friedman> {
     let rows = rectangular(rows)?;
     let (n, k) = (rows.len(), rows[0].len());
@@ -39,15 +41,15 @@ pub fn friedman<R: AsRef<[f64]>>(rows: &[R]) -> Option<Friedman> {
     let ranks: Vec<Vec<i64>> = rows.iter().map(|r| doubled_ranks(r)).collect();
     let sums: Vec<i64> = (0..k).map(|j| ranks.iter().map(|r| r[j]).sum()).collect();
     let (nf, kf) = (n as f64, k as f64);
-    // In doubled ranks everything is a whole number: centre n(k+1).
+    // Doubled ranks are whole numbers; the expected rank sum is n(k+1).
     let centre = n as i64 * (k as i64 + 1);
-    let above: i64 = sums.iter().map(|s| (s - centre) * (s - centre)).sum();
-    let below: i64 = ranks
+    let between: i64 = sums.iter().map(|s| (s - centre) * (s - centre)).sum();
+    let within: i64 = ranks
         .iter()
         .flatten()
         .map(|r| (r - (k as i64 + 1)) * (r - (k as i64 + 1)))
         .sum();
-    let chi2 = (below > 0).then(|| (kf - 1.0) * above as f64 / below as f64);
+    let chi2 = (within > 0).then(|| (kf - 1.0) * between as f64 / within as f64);
     let (df1, df2) = (kf - 1.0, (kf - 1.0) * (nf - 1.0));
     let iman_davenport =
         chi2.and_then(|c| finite((nf - 1.0) * c / (nf * (kf - 1.0) - c)).filter(|f| *f >= 0.0));
@@ -59,27 +61,29 @@ pub fn friedman<R: AsRef<[f64]>>(rows: &[R]) -> Option<Friedman> {
         kendall_w: chi2.map(|c| c / (nf * (kf - 1.0))),
         iman_davenport,
         iman_davenport_p: iman_davenport.and_then(|f| f_upper(f, df1, df2)),
-        exact_p: chi2.and_then(|_| exact::upper_tail(&ranks, above)),
+        exact_p: chi2.and_then(|_| exact::upper_tail(&ranks, between)),
     })
 }
 
-/// Page's trend test.
+/// Page's trend test (1963).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Page {
-    /// Σⱼ score ⱼ × rank sum ⱼ.
+    /// L = Σⱼ score ⱼ × rank sum ⱼ.
     pub l: f64,
-    /// (L − E)/√V with the permutation variance, which keeps the ties.
+    /// (L − E)/√V with the permutation variance, which accounts for ties; `None` if
+    /// every row is constant.
     pub z: Option<f64>,
-    /// One-sided, by the normal.
+    /// One-sided p of z, for an increasing trend.
     pub p_greater: Option<f64>,
-    /// The same with Page's own variance, which knows no ties (Page 1963);
-    /// undefined where the scores are tied.
+    /// The same with Page's own variance, which assumes no ties; `None` if the scores
+    /// are tied.
     pub p_greater_no_tie_correction: Option<f64>,
 }
 
-/// L = Σⱼ Yⱼ Rⱼ, Y the mid-ranks of `order`; E = nk(k+1)²/4;
-/// V = Σᵢ Σⱼ(Yⱼ − Ȳ)² Σⱼ(rᵢⱼ − r̄)²/(k − 1). `None` below two rows or columns, or
-/// where all scores are equal.
+/// Page's test for an increasing trend in the order of `order`, a number for each column:
+/// L = Σⱼ Yⱼ Rⱼ with Y the mid-ranks of `order`, E = nk(k+1)²/4,
+/// V = Σᵢ Σⱼ(Yⱼ − Ȳ)² Σⱼ(rᵢⱼ − r̄)²/(k − 1). `None` for fewer than two rows or columns, or
+/// if all scores are equal.
 pub fn page<R: AsRef<[f64]>>(rows: &[R], order: &[f64]) -> Option<Page> {
     let rows = rectangular(rows).filter(|rows| rows[0].len() == order.len())?;
     let (n, k) = (rows.len(), order.len());
@@ -116,7 +120,7 @@ pub fn page<R: AsRef<[f64]>>(rows: &[R], order: &[f64]) -> Option<Page> {
 mod tests {
     use super::*;
 
-    /// With k = 3 and n = 3 untied the perfect order has 6 of 216 arrangements.
+    /// With k = 3 and n = 3 without ties, 6 of 216 arrangements agree perfectly.
     #[test]
     fn three_perfect_rows_of_three_have_exact_p_one_in_36() {
         let rows = vec![vec![1.0, 2.0, 3.0]; 3];
@@ -124,12 +128,12 @@ mod tests {
         assert_eq!(f.chi2, Some(6.0));
         assert!((f.exact_p.unwrap() - 6.0 / 216.0).abs() < 1e-15);
         assert_eq!(f.kendall_w, Some(1.0));
-        // F would divide by zero.
+        // Its denominator is 0.
         assert_eq!(f.iman_davenport, None);
     }
 
     #[test]
-    fn constant_rows_have_ranks_and_no_statistic() {
+    fn constant_rows_have_mean_ranks_and_no_statistic() {
         let f = friedman(&vec![vec![4.0; 5]; 5]).unwrap();
         assert_eq!(f.mean_ranks, [3.0; 5]);
         assert_eq!((f.chi2, f.p, f.exact_p), (None, None, None));

@@ -1,28 +1,27 @@
-//! Which data can give a printed mean and standard deviation.
+//! Consistency of a printed mean and standard deviation with whole-number ratings.
 //!
 //! Ratings are whole numbers, so their sum T and the sum of their squares Q are
-//! whole too, and few pairs (T, Q) print as a given mean and SD: the GRIM test of
-//! the mean (Brown & Heathers 2017), the GRIMMER test of the SD (Anaya 2016;
-//! Allard 2018). The arithmetic is exact, in whole numbers: no printed digit is
-//! ever turned into a binary fraction.
+//! whole too, and few pairs (T, Q) are rounded to a given mean and SD: the GRIM test of
+//! the mean (Brown & Heathers 2017) and the GRIMMER test of the SD (Anaya 2016;
+//! Allard 2018). The arithmetic is exact, in whole numbers.
 //!
-//! For n whole numbers from `low` to `high` with sum T, Q lies between that of the
-//! most even spread and that of the widest, and has T's parity, since x² and x
-//! have the same. Not every such Q exists; a search settles each.
+//! For n whole numbers from `low` to `high` with sum T, Q lies between its values for the
+//! narrowest and the widest distribution, and has the parity of T, because x² and x
+//! have the same parity. Not every such Q exists; a search decides each case.
 
-/// A printed number: all it says is that the true one rounds to it.
+/// A printed decimal number, to which the true number was rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PrintedNumber {
-    /// Its digits as a whole number, 4.800 as 4800.
+    /// Its digits as a whole number: 4800 for 4.800.
     pub digits: i128,
     /// Digits after the point.
     pub decimals: u32,
 }
 
-/// Most digits of a printed number: squares of them fit a whole number here.
+/// Most digits of a printed number, so that squares do not overflow.
 const MAX_DIGITS: usize = 12;
 
-/// Why a text is no printed number.
+/// The text is not a plain decimal number of at most 12 digits, 9 of them decimals.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("not a plain decimal number, such as 4.80")]
 pub struct NotADecimal;
@@ -31,16 +30,17 @@ impl std::str::FromStr for PrintedNumber {
     type Err = NotADecimal;
 
     fn from_str(text: &str) -> Result<Self, NotADecimal> {
-        let wrong = || NotADecimal;
         let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
         let unsigned = whole.strip_prefix('-').unwrap_or(whole);
         let plain = |t: &str| t.bytes().all(|b| b.is_ascii_digit());
         let many = decimals.len() > 9 || unsigned.len() + decimals.len() > MAX_DIGITS;
         if unsigned.is_empty() || !plain(unsigned) || !plain(decimals) || many {
-            return Err(wrong());
+            return Err(NotADecimal);
         }
         Ok(Self {
-            digits: format!("{whole}{decimals}").parse().map_err(|_| wrong())?,
+            digits: format!("{whole}{decimals}")
+                .parse()
+                .map_err(|_| NotADecimal)?,
             // At most 9.
             decimals: decimals.len() as u32,
         })
@@ -48,18 +48,18 @@ impl std::str::FromStr for PrintedNumber {
 }
 
 impl PrintedNumber {
-    /// The scale: 10 to the decimals.
+    /// 10 to the power of the number of decimals.
     fn unit(self) -> i128 {
         10i128.pow(self.decimals)
     }
 
-    /// Whether a/b, b > 0, rounds to it; halves may have gone either way.
+    /// Whether a/b, b > 0, is rounded to it; a half may be rounded either way.
     fn rounds_from(self, a: i128, b: i128) -> bool {
         // |a/b − digits/unit| ≤ 1/(2 unit)
         (2 * (a * self.unit() - self.digits * b)).abs() <= b
     }
 
-    /// Whether √(a/b), a ≥ 0, b > 0, rounds to it.
+    /// Whether √(a/b), a ≥ 0, b > 0, is rounded to it.
     fn rounds_from_root(self, a: i128, b: i128) -> bool {
         let square = 4 * a * self.unit() * self.unit();
         let (low, high) = (2 * self.digits - 1, 2 * self.digits + 1);
@@ -68,14 +68,14 @@ impl PrintedNumber {
     }
 }
 
-/// What the standard deviation may have been taken over.
+/// The numbers of which the standard deviation was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SdOver {
     /// All ratings.
     Ratings,
-    /// The means of the subjects, each of so many ratings.
+    /// The means of the subjects.
     SubjectMeans {
-        /// Ratings of each.
+        /// Number of ratings of each subject.
         each: u32,
     },
 }
@@ -83,66 +83,66 @@ pub enum SdOver {
 /// A definition of the standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SdDefinition {
-    /// Over what.
+    /// The numbers of which it was computed.
     pub over: SdOver,
-    /// Whether the divisor is one less than their number.
+    /// Whether the divisor is n − 1, not n.
     pub n_minus_1: bool,
 }
 
-/// A pair of sums that prints as asked.
+/// A sum and a sum of squares that are rounded to the printed numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PossibleSums {
-    /// Of the ratings.
+    /// Sum of the ratings.
     pub sum: i128,
-    /// Of the squares: of the ratings, or of the subjects' sums.
+    /// Sum of the squares of the ratings, or of the subjects' sums.
     pub squares: i128,
-    /// Numerator of the sum of squared deviations, over n.
+    /// n times the sum of squared deviations.
     pub deviations: i128,
 }
 
-/// What a definition can give.
+/// Whether a definition of the SD is consistent with the printed numbers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SdCheck {
-    /// Which definition.
+    /// The definition.
     pub definition: SdDefinition,
-    /// How many numbers it goes over: ratings, or subjects.
+    /// Number of ratings, or of subjects.
     pub n: u32,
-    /// Sums that print as asked, up to [`MAX_SHOWN`].
+    /// Sums of possible ratings, at most [`MAX_SHOWN`].
     pub sums: Vec<PossibleSums>,
-    /// How many there are; at [`MAX_COUNTED`] the count stops.
+    /// Number of such sums; counted up to [`MAX_COUNTED`]. 0: not consistent.
     pub count: usize,
-    /// Sums that would print as asked, but that no ratings have, up to
-    /// [`MAX_SHOWN`].
+    /// Sums that would be rounded to the printed numbers but that no ratings on the
+    /// scale have, at most [`MAX_SHOWN`].
     pub unattainable: Vec<PossibleSums>,
 }
 
-/// Most sums that are kept for showing.
+/// Most sums that are returned.
 pub const MAX_SHOWN: usize = 5;
 
 /// Most sums that are counted.
 pub const MAX_COUNTED: usize = 100;
 
-/// Most ratings that are examined, and the furthest end of a scale.
+/// Most ratings that are supported.
 pub const MAX_N: u32 = 1000;
-/// See [`MAX_N`].
+/// Largest absolute value of a rating that is supported.
 pub const MAX_SCALE: i128 = 10_000;
 
-/// What was printed.
+/// The published numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Published {
     /// The mean.
     pub mean: PrintedNumber,
     /// The standard deviation.
     pub sd: PrintedNumber,
-    /// Ratings.
+    /// Number of ratings.
     pub n: u32,
-    /// Ratings of each subject; not known: every divisor of n is tried.
+    /// Number of ratings of each subject; if `None`, every divisor of n is tried.
     pub each: Option<u32>,
-    /// Lowest and highest whole rating.
+    /// Lowest and highest rating.
     pub scale: (i128, i128),
 }
 
-/// Sums whose mean rounds to what was printed.
+/// The sums of ratings whose mean is rounded to the printed one.
 pub fn possible_sums(q: &Published) -> Vec<i128> {
     let n = i128::from(q.n);
     let near = q.mean.digits * n / q.mean.unit();
@@ -153,8 +153,8 @@ pub fn possible_sums(q: &Published) -> Vec<i128> {
         .collect()
 }
 
-/// Every definition with what it can give. Subject means come in where the
-/// ratings of each divide n and leave two subjects or more. n has to be from 1 to
+/// Checks every definition of the SD. Subject means are considered if the number of
+/// ratings of each divides n and there are at least two subjects. n has to be from 1 to
 /// [`MAX_N`], the scale within ±[`MAX_SCALE`].
 pub fn check(q: &Published) -> Vec<SdCheck> {
     let sums = possible_sums(q);
@@ -173,8 +173,8 @@ pub fn check(q: &Published) -> Vec<SdCheck> {
     all
 }
 
-/// Over subject means the numbers are the subjects' sums, whole again, on a scale
-/// `each` times as wide; the SD is that of the sums over `each`.
+/// Checks one definition. For subject means the numbers are the subjects' sums, which are
+/// whole, on a scale `each` times as wide; the SD is that of the sums divided by `each`.
 fn find(q: &Published, sums: &[i128], definition: SdDefinition) -> SdCheck {
     let each = match definition.over {
         SdOver::Ratings => 1,
@@ -185,7 +185,7 @@ fn find(q: &Published, sums: &[i128], definition: SdDefinition) -> SdCheck {
     let divisor = if definition.n_minus_1 { n - 1 } else { n };
     let mut found = SdCheck {
         definition,
-        // n was a u32 and became no larger.
+        // At most the n of the ratings, which is a u32.
         n: n as u32,
         sums: Vec::new(),
         count: 0,
@@ -196,24 +196,24 @@ fn find(q: &Published, sums: &[i128], definition: SdDefinition) -> SdCheck {
     }
     for &sum in sums {
         // variance = (nQ − T²)/(n · divisor · each²)
-        let below = n * divisor * each * each;
-        let wide = |squares: i128| n * squares - sum * sum;
-        // Q at both ends of what rounds to the SD, and a little beyond.
+        let denominator = n * divisor * each * each;
+        let deviations = |squares: i128| n * squares - sum * sum;
+        // Q at both ends of the interval that is rounded to the SD, and a little beyond.
         let unit = 2 * q.sd.unit();
         let at = |digits: i128| {
             let digits = digits.max(0);
-            (digits * digits * below / (unit * unit) + sum * sum) / n
+            (digits * digits * denominator / (unit * unit) + sum * sum) / n
         };
         for squares in at(2 * q.sd.digits - 1) - 2..=at(2 * q.sd.digits + 1) + 2 {
-            if wide(squares) < 0 || !q.sd.rounds_from_root(wide(squares), below) {
+            if deviations(squares) < 0 || !q.sd.rounds_from_root(deviations(squares), denominator) {
                 continue;
             }
             let sums = PossibleSums {
                 sum,
                 squares,
-                deviations: wide(squares),
+                deviations: deviations(squares),
             };
-            if reachable(n, sum, squares, low, high) {
+            if is_attainable(n, sum, squares, low, high) {
                 found.count += 1;
                 if found.sums.len() < MAX_SHOWN {
                     found.sums.push(sums);
@@ -229,8 +229,8 @@ fn find(q: &Published, sums: &[i128], definition: SdDefinition) -> SdCheck {
     found
 }
 
-/// Smallest and largest sum of squares of n whole numbers from low to high with a
-/// sum: as even as can be, and as many at the ends as can be.
+/// Smallest and largest sum of squares of n whole numbers from low to high with a given
+/// sum: all as equal as possible, or as many as possible at the ends.
 fn extremes(n: i128, sum: i128, low: i128, high: i128) -> (i128, i128) {
     let (even, rest) = (sum.div_euclid(n), sum.rem_euclid(n));
     let least = (n - rest) * even * even + rest * (even + 1) * (even + 1);
@@ -246,12 +246,11 @@ fn extremes(n: i128, sum: i128, low: i128, high: i128) -> (i128, i128) {
     (least, most)
 }
 
-/// Whether n whole numbers from low to high have this sum and sum of squares: the
-/// largest of them is tried downwards, each with what is left for the others.
-/// What is left is nearly always within its extremes and of the right parity, so
-/// the first try leads through; the depth is n. A search that would take too long
-/// excludes nothing.
-fn reachable(n: i128, sum: i128, squares: i128, low: i128, high: i128) -> bool {
+/// Whether n whole numbers from low to high exist with this sum and sum of squares. The
+/// search tries values of the largest number in descending order, and recursively the
+/// others. The first value nearly always succeeds, and the depth is n. A search that
+/// would take too long counts as success.
+fn is_attainable(n: i128, sum: i128, squares: i128, low: i128, high: i128) -> bool {
     let mut budget = 20_000u32;
     search(n, sum, squares, low, high, &mut budget)
 }
@@ -267,7 +266,7 @@ fn search(n: i128, sum: i128, squares: i128, low: i128, high: i128, budget: &mut
     if squares < least || squares > most {
         return false;
     }
-    // Both extremes are made of whole numbers.
+    // Both extremes are attained.
     if squares == least || squares == most {
         return true;
     }
@@ -301,7 +300,7 @@ mod tests {
 
     /// Colton & Hollerbach (2007): mean 4.800, SD 0.997, ten subjects three times.
     #[test]
-    fn only_the_sd_over_all_ratings_with_n_less_one_gives_the_papers_numbers() {
+    fn only_the_sd_of_all_ratings_with_n_minus_1_gives_the_papers_numbers() {
         let q = question("4.800", "0.997", 30, Some(3));
         assert_eq!(possible_sums(&q), [144]);
         let found = check(&q);
@@ -310,12 +309,12 @@ mod tests {
         let s = found[0].sums[0];
         // Q = 720: 720 − 144²/30 = 28.8, here times n.
         assert_eq!((s.sum, s.squares, s.deviations), (144, 720, 864));
-        // With n = 30 in the denominator it would have to be 721, which is odd.
+        // With the divisor n = 30, Q would have to be 721, which is odd.
         assert_eq!(found[1].unattainable[0].squares, 721);
     }
 
     #[test]
-    fn a_mean_that_no_whole_ratings_have_is_impossible() {
+    fn a_mean_that_no_ratings_have_is_inconsistent() {
         // 3.45 · 28 = 96.6; 96/28 = 3.43, 97/28 = 3.46.
         let q = question("3.45", "1.00", 28, None);
         assert_eq!(possible_sums(&q), [] as [i128; 0]);
@@ -323,16 +322,16 @@ mod tests {
     }
 
     #[test]
-    fn an_sd_beyond_the_ends_of_the_scale_is_impossible() {
-        // Mean 6.9 of ten on 1…7: the widest is nine 7 and one 6.
+    fn an_sd_too_large_for_the_scale_is_inconsistent() {
+        // Ten ratings on 1…7 with mean 6.9 are nine 7 and one 6.
         let q = question("6.9", "1.5", 10, None);
         assert_eq!(possible_sums(&q), [69]);
         assert_eq!(check(&q)[0].count, 0);
     }
 
-    /// Every multiset of four ratings on 1…4 against the search.
+    /// The search agrees with the enumeration of four ratings on 1…4.
     #[test]
-    fn reachable_sums_are_those_of_some_ratings_and_no_others() {
+    fn sums_are_attainable_if_some_ratings_have_them() {
         let mut real = std::collections::BTreeSet::new();
         for code in 0..256i128 {
             let x: Vec<i128> = (0..4).map(|i| 1 + code / 4i128.pow(i) % 4).collect();
@@ -343,7 +342,7 @@ mod tests {
         }
         for sum in 0..20 {
             for squares in 0..80 {
-                let found = reachable(4, sum, squares, 1, 4);
+                let found = is_attainable(4, sum, squares, 1, 4);
                 assert_eq!(found, real.contains(&(sum, squares)), "{sum} {squares}");
             }
         }

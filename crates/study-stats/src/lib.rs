@@ -1,14 +1,41 @@
-//! Numbers in, estimates out.
+//! Statistics for rating studies: subjects rate realizations, often several times.
+//! (A realization is one of the things that are rated; other fields say item,
+//! stimulus or condition.) Numbers in, estimates out: no files, no names.
 //!
-//! Plain functions over slices: no subjects, no realizations, no files. A
-//! function whose result is not defined for its input returns `None`; it never
-//! returns NaN, an infinity or an invented 0 or 1. `docs/statistics.md` derives
-//! the formulas and names their sources; here each stands above its code.
+//! | question | module |
+//! |---|---|
+//! | Means, standard deviations, quantiles | [`describe`] |
+//! | Do the realizations differ? | [`anova`], [`friedman`] (rank test), [`lmm`] (unbalanced data), [`clm`] and [`clmm`] (ordered categories) |
+//! | Do the ratings follow a given order? | [`friedman::page`] |
+//! | Which pairs differ? Are they equivalent? | [`paired`] |
+//! | Are the ratings correlated with a covariate? | [`correlation`], [`permutation`] (exact p), [`bootstrap`] (interval), [`bayes`] |
+//! | What is the slope on a covariate? | [`regression`], [`two_way_slope`] (beside two fixed factors), [`lmm`] (random effects) |
+//! | Do the raters agree? | [`agreement`] |
+//! | How large is a share of trials? | [`proportion`] |
+//! | Can a printed mean and standard deviation be right? | [`grim`] |
+//! | Tail probabilities, quantiles, ranks | [`distribution`], [`rank`] |
+//!
+//! # Conventions
+//!
+//! * Columns are slices of `f64`; paired columns have to be equally long. A table is a
+//!   slice of rows of equal length, one row for each subject (or target, or unit).
+//! * A result that is not defined for its input is `None`: too few numbers, no variation,
+//!   unequal lengths, an overflow. No function returns NaN, an infinity or an invented
+//!   0 or 1. [`lmm`], [`clm`] and [`clmm`] give the reason as an error. Input has to be
+//!   finite.
+//! * Estimates are in the units of the input, variances in their squares. p values are
+//!   two-sided unless the name says otherwise; intervals are (lower, upper) with 95 %
+//!   coverage, `ci90` with 90 %.
+//! * Numbers that agree to 10⁻¹⁰ are tied ([`describe::rounded`]).
+//! * Random numbers come from the caller ([`random`]).
+//!
+//! The formula and its source stand above each function; `docs/statistics.md` of the
+//! repository collects them, and says what every result was compared with.
+//! `examples/ratings.rs` is a short analysis.
 
 pub mod agreement;
 pub mod anova;
 pub mod bayes;
-
 pub mod bootstrap;
 pub mod clm;
 pub mod clmm;
@@ -21,14 +48,13 @@ pub mod lmm;
 mod matrix;
 pub mod paired;
 pub mod permutation;
-
 pub mod proportion;
 pub mod random;
 pub mod rank;
 pub mod regression;
 pub mod two_way_slope;
 
-/// The number, if it is one that can be printed.
+/// The number, unless it is infinite or NaN.
 pub(crate) fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
 }

@@ -1,21 +1,23 @@
 //! Gaussian mixed models, by profiled maximum likelihood (ML or REML).
 //!
 //! y = Xβ + Zb + ε, ε ~ N(0, σ²), b ~ N(0, σ²Γ). The random effects are a subject
-//! intercept (with a correlated slope of the covariate, if asked for), a
-//! realization intercept, and an intercept of each subject × realization cell.
-//! Trials of one cell differ only by noise, so n, mean and sum of squares of
-//! each cell are all that the models need; subjects with the same pattern of
-//! cells share their algebra ([`LmmData`]). Subjects and cells are eliminated by
-//! the Woodbury identity, realizations, which are few, by a dense Cholesky
-//! factor. A variance on the boundary is 0 exactly.
+//! intercept (optionally with a correlated slope of the covariate), a realization
+//! intercept, and an intercept of each subject × realization cell. Trials of one cell
+//! differ only by noise, so that n, mean and sum of squares of each cell are sufficient;
+//! subjects with the same pattern of cells share their algebra ([`LmmData`]). Subjects
+//! and cells are eliminated by the Woodbury identity, realizations, which are few, by a
+//! dense Cholesky factor. A variance on the boundary is exactly 0.
+//!
+//! Usage: [`LmmData::new`], then [`fit`], then the tests of [`LmmFit`] or
+//! [`kenward_roger`].
 //!
 //! `docs/statistics-mixed.md` derives the formulas. Sources: Bates, Mächler,
 //! Bolker & Walker (2015) for the profiled criterion; Satterthwaite (1946) and
 //! Kuznetsova, Brockhoff & Christensen (2017) for the degrees of freedom;
 //! Kenward & Roger (1997) for the adjusted F.
 //!
-//! Not here: observations with effects of their own (order, carry-over), random
-//! slopes of anything else, weights.
+//! Not supported: effects of single observations (order, carry-over), other random
+//! slopes, weights.
 
 mod data;
 mod differences;
@@ -50,23 +52,23 @@ pub enum LmmError {
     /// The table has no ratings, or they overflow.
     #[error("there are no ratings, or they overflow")]
     NoData,
-    /// One subject.
+    /// There is only one subject.
     #[error("fewer than two subjects")]
     OneSubject,
-    /// One realization.
+    /// There is only one realization.
     #[error("fewer than two realizations")]
     OneRealization,
-    /// The slope and the realization effects cannot be told apart.
-    #[error("fewer than three realizations with a VAF")]
+    /// The slope and the realization effects cannot be separated.
+    #[error("fewer than three realizations with a covariate")]
     FewRealizations,
     /// The covariate does not vary, or overflows.
-    #[error("VAF does not vary, or overflows")]
+    #[error("the covariate does not vary, or overflows")]
     ConstantCovariate,
     /// All ratings are equal.
     #[error("all ratings are equal")]
     ConstantRatings,
     /// No subject has two values of the covariate.
-    #[error("no subject rated two realizations with different VAF")]
+    #[error("no subject has two values of the covariate")]
     NoSlope,
     /// No cell has two ratings.
     #[error("no cell has two ratings")]
@@ -74,10 +76,10 @@ pub enum LmmError {
     /// Fixed and random effects together explain every rating.
     #[error("the effects explain every rating: there is no variance of error")]
     NoError,
-    /// Larger than the engine is bounded to.
+    /// The work would exceed the bounds of [`LmmData`].
     #[error("too many realizations, or too many different patterns of cells")]
     TooLarge,
-    /// The search did not end at a minimum.
+    /// The search did not converge.
     #[error("the likelihood has no minimum that the search could find")]
     NotConverged,
 }

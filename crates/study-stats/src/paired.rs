@@ -1,31 +1,32 @@
-//! Paired and one-sample comparisons: t, Wilcoxon's signed ranks, Holm.
+//! Paired and one-sample comparisons: t, Wilcoxon's signed-rank test, equivalence, and
+//! Holm's correction.
 
 use super::describe::{is_constant, mean, rounded, sd};
 use super::distribution::{normal_upper, t_quantile, t_two_sided, t_upper};
 use super::finite;
-use super::rank::{doubled_ranks, tie_term_of};
+use super::rank::{doubled_ranks, tie_term_of_ranks};
 
-/// Most non-zero differences for which Wilcoxon's exact distribution is built.
+/// Most non-zero differences for which Wilcoxon's exact distribution is computed.
 pub const MAX_EXACT: usize = 500;
 
 /// A one-sample t test against 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OneSample {
-    /// How many numbers.
+    /// Number of numbers.
     pub n: usize,
-    /// Their mean.
+    /// Mean of the numbers.
     pub mean: f64,
-    /// Their standard deviation, n − 1.
+    /// Standard deviation, with n − 1; 0 if all numbers are equal.
     pub sd: f64,
-    /// mean·√n/sd; undefined for sd 0.
+    /// mean·√n/sd; `None` if the standard deviation is 0.
     pub t: Option<f64>,
-    /// Two-sided.
+    /// Two-sided p of t, with n − 1 degrees of freedom.
     pub p: Option<f64>,
     /// mean ± t(.975, n−1)·sd/√n.
     pub ci95: (f64, f64),
 }
 
-/// The t test. `None` below two numbers.
+/// One-sample t test of the mean against 0. `None` for fewer than two numbers.
 pub fn one_sample(x: &[f64]) -> Option<OneSample> {
     let n = x.len();
     let (m, s) = (mean(x)?, sd(x)?);
@@ -44,21 +45,21 @@ pub fn one_sample(x: &[f64]) -> Option<OneSample> {
     })
 }
 
-/// Two one-sided t tests (Schuirmann 1987): whether a mean lies within ±margin.
+/// Equivalence test by two one-sided t tests (Schuirmann 1987).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Equivalence {
-    /// t of "the mean is above −margin".
+    /// t of the test that the mean is above −margin.
     pub t_lower: f64,
-    /// t of "the mean is below +margin".
+    /// t of the test that the mean is below +margin.
     pub t_upper: f64,
-    /// The larger of the two p: below .05 the mean is within the margin.
+    /// The larger of the two p; below .05 the mean is shown to lie within ±margin.
     pub p: f64,
     /// mean ± t(.95, n−1)·sd/√n; within ±margin where p is below .05.
     pub ci90: (f64, f64),
 }
 
-/// The tests of x against ±`margin`. `None` below two numbers, where all are
-/// equal, or for a margin that is not above 0.
+/// Tests whether the mean of x lies within ±`margin`. `None` for fewer than two numbers,
+/// if all are equal, or unless `margin` > 0.
 pub fn equivalence(x: &[f64], margin: f64) -> Option<Equivalence> {
     let test = one_sample(x)?;
     let sem = test.sd / (test.n as f64).sqrt();
@@ -67,43 +68,47 @@ pub fn equivalence(x: &[f64], margin: f64) -> Option<Equivalence> {
     }
     let df = test.n as f64 - 1.0;
     let t_lower = finite((test.mean + margin) / sem)?;
-    let below = finite((test.mean - margin) / sem)?;
+    let t_upper_margin = finite((test.mean - margin) / sem)?;
     let half = t_quantile(0.95, df)? * sem;
     Some(Equivalence {
         t_lower,
-        t_upper: below,
-        p: t_upper(t_lower, df)?.max(t_upper(-below, df)?),
+        t_upper: t_upper_margin,
+        p: t_upper(t_lower, df)?.max(t_upper(-t_upper_margin, df)?),
         ci90: (test.mean - half, test.mean + half),
     })
 }
 
-/// One pair of realizations, a minus b.
+/// Comparison of two columns, a minus b.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Paired {
     /// Mean difference.
     pub mean_diff: f64,
-    /// Paired t; undefined if all differences are equal.
+    /// Paired t; `None` if all differences are equal.
     pub t: Option<f64>,
-    /// Two-sided.
+    /// Two-sided p of t.
     pub p_t: Option<f64>,
-    /// mean/sd of the differences.
+    /// Cohen's d_z: mean/standard deviation of the differences.
     pub dz: Option<f64>,
-    /// mean/√((s²a + s²b)/2) (Cumming 2012).
+    /// Cohen's d_av: mean difference/√((s²a + s²b)/2) (Cumming 2012).
     pub d_av: Option<f64>,
-    /// Sum of the ranks of the positive differences.
+    /// Wilcoxon's W₊: sum of the ranks of the positive differences. The following
+    /// fields are `None` if all differences are 0.
     pub w_plus: Option<f64>,
-    /// Differences that are not zero.
+    /// Number of differences that are not 0.
     pub wilcoxon_n: usize,
-    /// Exact, conditional on the ties, min(1, 2·smaller tail).
+    /// Exact two-sided p of W₊, conditional on the ties: min(1, 2·smaller tail); `None`
+    /// above [`MAX_EXACT`].
     pub p_exact: Option<f64>,
-    /// Normal, with continuity and tie corrections.
+    /// Two-sided p of W₊ by the normal approximation, with continuity and tie
+    /// corrections.
     pub p_normal: Option<f64>,
-    /// (W⁺ − W⁻)/(W⁺ + W⁻) (Kerby 2014).
+    /// Rank-biserial correlation (W₊ − W₋)/(W₊ + W₋) (Kerby 2014).
     pub rank_biserial: Option<f64>,
 }
 
-/// Compares two columns of the same subjects. Differences are rounded to 10⁻¹⁰,
-/// so that thirds cancel. `None` below two subjects.
+/// Compares two columns of the same subjects, a minus b. Differences are rounded to
+/// 10⁻¹⁰, so that rounding errors cancel. `None` for fewer than two subjects or unequal
+/// lengths.
 pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
     if a.len() != b.len() {
         return None;
@@ -134,7 +139,7 @@ pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
     })
 }
 
-/// Wilcoxon's signed ranks without the zeros, in doubled mid-ranks.
+/// Wilcoxon's signed ranks without zeros, as doubled mid-ranks.
 struct Wilcoxon {
     ranks: Vec<i64>,
     plus: i64,
@@ -156,14 +161,14 @@ impl Wilcoxon {
             .map(|(r, _)| r)
             .sum();
         Some(Self {
-            ties: tie_term_of(&ranks),
+            ties: tie_term_of_ranks(&ranks),
             ranks,
             plus,
         })
     }
 
-    /// Every subset of the ranks is equally likely to be the positive one: the
-    /// distribution of its sum is the product of ½(1 + x^rank) over the ranks.
+    /// Every subset of the ranks is equally likely to be positive: the generating
+    /// function of its sum is the product of ½(1 + x^rank) over the ranks.
     fn exact(&self) -> Option<f64> {
         if self.ranks.len() > MAX_EXACT {
             return None;
@@ -191,8 +196,8 @@ impl Wilcoxon {
     fn normal(&self) -> Option<f64> {
         let n = self.ranks.len() as f64;
         let variance = n * (n + 1.0) * (2.0 * n + 1.0) / 24.0 - self.ties / 48.0;
-        let away = self.plus as f64 / 2.0 - n * (n + 1.0) / 4.0;
-        let corrected = (away.abs() - 0.5).max(0.0);
+        let distance = self.plus as f64 / 2.0 - n * (n + 1.0) / 4.0;
+        let corrected = (distance.abs() - 0.5).max(0.0);
         if variance <= 0.0 {
             return None;
         }
@@ -200,8 +205,9 @@ impl Wilcoxon {
     }
 }
 
-/// Holm's adjustment (1979) over those that are defined: sorted ascending, the
-/// i-th of m is multiplied by m − i + 1, then made monotone and cut at 1.
+/// Holm's (1979) adjusted p values, in the given order: of the m defined ones, the i-th
+/// smallest is multiplied by m − i + 1, then made monotone and limited to 1. Undefined
+/// ones stay `None`.
 pub fn holm(p: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut order: Vec<(usize, f64)> = p
         .iter()
@@ -230,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_columns_have_a_difference_and_nothing_else() {
+    fn equal_columns_have_only_a_mean_difference() {
         let p = paired(&[4.0; 3], &[4.0; 3]).unwrap();
         assert_eq!((p.mean_diff, p.t, p.p_exact, p.dz), (0.0, None, None, None));
     }

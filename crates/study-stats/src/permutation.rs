@@ -1,28 +1,28 @@
-//! Exact and Monte Carlo permutation of one column against another.
+//! Permutation tests of a correlation, exact or by Monte Carlo.
 //!
-//! H₀: the pairing of the two columns is arbitrary, all M! pairings equally
-//! likely. The p is the share of pairings, the observed one included, whose
-//! statistic is at least as extreme; equal to 10⁻⁹ counts as extreme (Pitman
-//! 1937). Nothing of either column's distribution is assumed.
+//! H₀: all M! pairings of the two columns are equally likely. p is the share of pairings,
+//! the observed one included, whose statistic is at least as extreme, where values
+//! within 10⁻⁹ count as equal (Pitman 1937). No distribution of either column is assumed.
 
 use super::correlation::{kendall, pearson, spearman};
 use super::describe::{mean, sum_of_squares};
 use super::rank::{doubled_ranks, mid_ranks};
 use crate::random::RandomSource;
 
-/// Largest number of pairs whose M! pairings are all visited.
+/// Largest number of pairs for which all M! pairings are enumerated.
 pub const MAX_EXACT: usize = 9;
 
-/// Pairings drawn above [`MAX_EXACT`].
+/// Number of random pairings above [`MAX_EXACT`].
 pub const DRAWS: u64 = 9_999;
 
-/// Most pairs for Monte Carlo; of Kendall's tau, whose work goes with the
-/// square, a tenth.
+/// Most pairs for Monte Carlo; a tenth of it for Kendall's tau, whose work grows with
+/// their square.
 const MAX_DRAWN: usize = 1000;
 
+/// Values that differ by less are equal.
 const TIE: f64 = 1e-9;
 
-/// Which correlation is permuted.
+/// The correlation that is tested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Statistic {
     /// Pearson's r.
@@ -33,22 +33,23 @@ pub enum Statistic {
     Kendall,
 }
 
-/// A permutation test.
+/// The p values of a permutation test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PermutationTest {
-    /// P(stat ≥ observed).
+    /// One-sided: P(statistic ≥ observed).
     pub greater: f64,
-    /// P(|stat| ≥ |observed|).
+    /// P(|statistic| ≥ |observed|).
     pub two_sided: f64,
-    /// Smallest two-sided p that any ratings could have had with these x.
+    /// Smallest two-sided p that any y could have had with these x.
     pub smallest: f64,
-    /// Whether all pairings were visited; else it is Monte Carlo,
-    /// (b + 1)/(B + 1), with [`DRAWS`] draws (Davison & Hinkley 1997).
+    /// Whether all pairings were enumerated. Otherwise p is (b + 1)/(B + 1), with b
+    /// extreme pairings among B = [`DRAWS`] random ones (Davison & Hinkley 1997).
     pub exact: bool,
 }
 
-/// The test. `None` where the statistic is not defined, there are fewer than
-/// three pairs, or more than 1000 (Kendall: 100). `random` serves only above [`MAX_EXACT`].
+/// Permutation test of the correlation of x and y. `random` is used only above
+/// [`MAX_EXACT`] pairs. `None` if the correlation is not defined, for unequal lengths,
+/// fewer than three pairs or more than 1000 (Kendall: 100).
 pub fn test(
     statistic: Statistic,
     x: &[f64],
@@ -71,8 +72,8 @@ pub fn test(
     let mut order: Vec<usize> = (0..x.len()).collect();
     let mut tally = Tally::new(observed);
     if x.len() <= MAX_EXACT {
-        visit(&mut order, |order| tally.count(kernel.value(order)));
-        let all = tally.visited as f64;
+        enumerate_orders(&mut order, |order| tally.count(kernel.value(order)));
+        let all = tally.counted as f64;
         return Some(PermutationTest {
             greater: tally.greater as f64 / all,
             two_sided: tally.two_sided as f64 / all,
@@ -93,9 +94,9 @@ pub fn test(
     })
 }
 
-/// The smallest two-sided p within reach: for ranks that of a perfect order; for
-/// Pearson 1/M!, or 2/M! where x is symmetric about its mean, since the mirrored
-/// pairing is then as extreme. Ties in x multiply by the orders within them.
+/// The smallest attainable two-sided p of `all` pairings: for ranks that of a perfect
+/// order; for Pearson 1/M!, or 2/M! if x is symmetric about its mean, because the mirrored
+/// pairing is then equally extreme. Ties in x multiply it by the orders within them.
 fn smallest(statistic: Statistic, x: &[f64], all: f64) -> f64 {
     let mut ranks = doubled_ranks(x);
     ranks.sort_unstable();
@@ -110,8 +111,8 @@ fn smallest(statistic: Statistic, x: &[f64], all: f64) -> f64 {
             .iter()
             .zip(sorted.iter().rev())
             .all(|(a, b)| (a + b - sorted[0] - sorted[sorted.len() - 1]).abs() <= 1e-9 * span),
-        // A perfect order and its reverse are as extreme as each other whenever
-        // the ties of x lie symmetrically.
+        // A perfect order and its reverse are equally extreme if the ties of x are
+        // symmetric.
         Statistic::Spearman | Statistic::Kendall => {
             let ends = ranks[0] + ranks[ranks.len() - 1];
             ranks
@@ -123,11 +124,12 @@ fn smallest(statistic: Statistic, x: &[f64], all: f64) -> f64 {
     (within * if mirrored { 2.0 } else { 1.0 } / all).min(1.0)
 }
 
+/// Counts of extreme pairings.
 struct Tally {
     observed: f64,
     greater: u64,
     two_sided: u64,
-    visited: u64,
+    counted: u64,
 }
 
 impl Tally {
@@ -136,23 +138,23 @@ impl Tally {
             observed,
             greater: 0,
             two_sided: 0,
-            visited: 0,
+            counted: 0,
         }
     }
 
     fn count(&mut self, value: f64) {
-        self.visited += 1;
+        self.counted += 1;
         self.greater += u64::from(value >= self.observed - TIE);
         self.two_sided += u64::from(value.abs() >= self.observed.abs() - TIE);
     }
 }
 
-/// The statistic of a pairing, with everything that no pairing changes done
-/// beforehand: a table of what x\[i\] with y\[j\] contributes.
+/// The statistic of a pairing, with everything computed beforehand that is the same for
+/// all pairings.
 enum Kernel {
-    /// Σ table\[i\]\[order\[i\]\] is r.
+    /// r is Σ table\[i\]\[order\[i\]\]: what x\[i\] paired with y\[j\] contributes.
     Products { n: usize, table: Vec<f64> },
-    /// Signs of all pairs, and one over the root of the untied counts.
+    /// Doubled ranks, and one over the root of the numbers of untied pairs.
     Signs {
         x: Vec<i64>,
         y: Vec<i64>,
@@ -206,8 +208,8 @@ impl Kernel {
     }
 }
 
-/// Visits every order once (Heap 1963).
-fn visit(order: &mut [usize], mut each: impl FnMut(&[usize])) {
+/// Calls `each` once for every order (Heap 1963).
+fn enumerate_orders(order: &mut [usize], mut each: impl FnMut(&[usize])) {
     let n = order.len();
     let mut stack = vec![0; n];
     each(order);
@@ -236,10 +238,10 @@ mod tests {
     }
 
     #[test]
-    fn every_order_is_visited_once() {
+    fn every_order_is_enumerated_once() {
         let mut seen = BTreeSet::new();
         let mut order: Vec<usize> = (0..5).collect();
-        visit(&mut order, |o| assert!(seen.insert(o.to_vec())));
+        enumerate_orders(&mut order, |o| assert!(seen.insert(o.to_vec())));
         assert_eq!(seen.len(), 120);
     }
 
@@ -255,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn evenly_spaced_vaf_halves_what_pearson_can_reach() {
+    fn evenly_spaced_x_doubles_the_smallest_p_of_pearson() {
         let x = [1.0, 2.0, 3.0, 4.0, 5.0];
         let y = [1.0, 2.0, 3.0, 4.0, 7.0];
         let r = test(Statistic::Pearson, &x, &y, &mut seeded(1)).unwrap();

@@ -1,4 +1,4 @@
-//! A share of trials that come in clusters.
+//! The share of trials with some property, where trials are clustered in subjects.
 
 use super::distribution::t_quantile;
 use super::finite;
@@ -8,18 +8,18 @@ use super::finite;
 pub struct Share {
     /// Hits over trials.
     pub share: f64,
-    /// So many independent trials would know it as well.
+    /// Number of independent trials that would be equally informative.
     pub n_effective: f64,
-    /// Wilson's (1927), over the effective number; none for one cluster.
+    /// Wilson's interval (1927) with the effective number; `None` for one cluster.
     pub ci95: Option<(f64, f64)>,
 }
 
-/// The share of hits, where each cluster (hits, trials) is a subject and subjects
-/// are what was sampled. Its variance is that of a ratio over clusters,
-/// v = S/(S−1) Σ(hᵢ − p nᵢ)²/N² (Cochran 1977, §6.3), the effective number
-/// p(1 − p)/v, at most N (Korn & Graubard 1998); where all clusters agree, v = 0
-/// and it is the number of clusters, since no more is known. Wilson's interval
-/// has t(.975, S−1) for z. `None` without trials.
+/// The share of hits over clusters (hits, trials), such as subjects, that are the
+/// sampling units. Its variance is that of a ratio over S clusters,
+/// v = S/(S−1) Σ(hᵢ − p nᵢ)²/N² (Cochran 1977, §6.3). The effective number of trials is
+/// p(1 − p)/v, at most N (Korn & Graubard 1998), or S where all clusters agree, because
+/// v = 0 does not mean certainty. Wilson's interval uses t(.975, S−1) in place of z.
+/// `None` without trials.
 pub fn share(clusters: &[(f64, f64)]) -> Option<Share> {
     let clusters = || clusters.iter().filter(|c| c.1 > 0.0);
     let trials: f64 = clusters().map(|c| c.1).sum();
@@ -41,7 +41,7 @@ pub fn share(clusters: &[(f64, f64)]) -> Option<Share> {
     Some(Share {
         share: p,
         n_effective,
-        ci95: ci95.filter(|_| s > 1.0),
+        ci95,
     })
 }
 
@@ -50,8 +50,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn subjects_that_repeat_themselves_count_once() {
-        // Five who always hit and five who never do, three trials each.
+    fn repeated_identical_trials_count_once() {
+        // Five subjects with three hits and five with none, three trials each.
         let clusters = [(3.0, 3.0); 5].iter().chain(&[(0.0, 3.0); 5]).copied();
         let found = share(&clusters.collect::<Vec<_>>()).unwrap();
         // v = 10/9 · 10 · 2.25/900 = 1/36, p(1−p)/v = 9.
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn agreement_of_all_is_not_certainty() {
+    fn unanimous_clusters_are_not_certain() {
         let found = share(&[(3.0, 3.0); 10]).unwrap();
         let (low, high) = found.ci95.unwrap();
         assert_eq!((found.share, high), (1.0, 1.0));

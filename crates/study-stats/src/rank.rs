@@ -1,13 +1,13 @@
-//! Mid-ranks and ties.
+//! Ranks with ties.
 
 use super::describe::rounded;
 
-/// Ranks from 1; numbers that are equal to 10⁻¹⁰ share the mean of their ranks.
+/// Mid-ranks, from 1: numbers that agree to 10⁻¹⁰ share the mean of their ranks.
 pub fn mid_ranks(x: &[f64]) -> Vec<f64> {
     doubled_ranks(x).iter().map(|&r| r as f64 / 2.0).collect()
 }
 
-/// Twice the mid-ranks, which are whole numbers: sums of them are exact.
+/// Twice the mid-ranks, which are whole numbers, so that sums are exact.
 pub fn doubled_ranks(x: &[f64]) -> Vec<i64> {
     let mut order: Vec<(f64, usize)> = x.iter().map(|&v| rounded(v)).zip(0..).collect();
     order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
@@ -24,13 +24,13 @@ pub fn doubled_ranks(x: &[f64]) -> Vec<i64> {
     ranks
 }
 
-/// Σ(t³ − t) over the groups of equal numbers of size t.
+/// Σ(t³ − t) over the groups of t tied numbers; 0 without ties.
 pub fn tie_term(x: &[f64]) -> f64 {
-    tie_term_of(&doubled_ranks(x))
+    tie_term_of_ranks(&doubled_ranks(x))
 }
 
-/// The same of doubled ranks.
-pub fn tie_term_of(ranks: &[i64]) -> f64 {
+/// [`tie_term`] from [`doubled_ranks`].
+pub fn tie_term_of_ranks(ranks: &[i64]) -> f64 {
     let mut ranks = ranks.to_vec();
     ranks.sort_unstable();
     ranks
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn thirds_that_are_equal_on_paper_are_ties() {
+    fn numbers_that_differ_by_rounding_are_tied() {
         let a = 1.0 / 3.0 + 1.0 / 3.0 + 1.0 / 3.0 + 4.0;
         let b = 0.1 + 0.2 + 4.7;
         assert_eq!(mid_ranks(&[a, b]), [1.5, 1.5]);

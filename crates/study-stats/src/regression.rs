@@ -1,32 +1,33 @@
-//! Least squares: a line, and a parabola beside it.
+//! Least-squares lines and parabolas.
 
 use super::correlation::pearson;
 use super::describe::{Sum, is_constant, mean, sum_of_products, sum_of_squares};
 use super::distribution::{f_upper, t_two_sided};
 use super::finite;
 
-/// y = intercept + slope·x.
+/// A least-squares line y = intercept + slope·x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// At x = 0.
+    /// Value of the line at x = 0.
     pub intercept: f64,
-    /// Per unit of x.
+    /// Change of y per unit of x.
     pub slope: f64,
     /// Standard error of the intercept.
     pub intercept_se: f64,
     /// Standard error of the slope.
     pub slope_se: f64,
-    /// √(residual sum of squares/(n − 2)).
+    /// Residual standard deviation: √(residual sum of squares/(n − 2)).
     pub residual_sd: f64,
-    /// 1 − residual/total sum of squares.
+    /// R²: 1 − residual/total sum of squares.
     pub r2: f64,
-    /// On 1 and n − 2.
+    /// F of the slope on 1 and n − 2 degrees of freedom; `None` if the residuals are 0.
     pub f: Option<f64>,
-    /// Pearson's.
+    /// Pearson's correlation of x and y.
     pub r: f64,
 }
 
-/// The line through three points or more; `None` if x or y is constant.
+/// The least-squares line. `None` for fewer than three points, unequal lengths, or if x
+/// or y is constant.
 pub fn line(x: &[f64], y: &[f64]) -> Option<Line> {
     let n = x.len() as f64;
     if x.len() < 3 || x.len() != y.len() || is_constant(x) || is_constant(y) {
@@ -36,7 +37,7 @@ pub fn line(x: &[f64], y: &[f64]) -> Option<Line> {
     let (xx, yy) = (sum_of_squares(x)?, sum_of_squares(y)?);
     let slope = finite(sum_of_products(x, y)? / xx)?;
     let intercept = my - slope * mx;
-    // From the residuals, not as a difference of large sums.
+    // From the residuals, because the difference of large sums would lose digits.
     let residual: Sum = x
         .iter()
         .zip(y)
@@ -62,7 +63,8 @@ pub fn line(x: &[f64], y: &[f64]) -> Option<Line> {
     })
 }
 
-/// Slope of y on x where y does not vary: 0; `None` where x does not.
+/// The least-squares slope of y on x; 0 if y is constant. `None` for fewer than two
+/// points, unequal lengths, or if x is constant.
 pub fn slope(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() < 2 || x.len() != y.len() || is_constant(x) {
         return None;
@@ -73,31 +75,32 @@ pub fn slope(x: &[f64], y: &[f64]) -> Option<f64> {
     finite(sum_of_products(x, y)? / sum_of_squares(x)?)
 }
 
-/// y = a + b·x + c·x².
+/// A least-squares parabola y = a + b·x + c·x².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parabola {
-    /// c.
+    /// The quadratic coefficient c.
     pub square: f64,
-    /// Its standard error.
+    /// Standard error of c.
     pub se: f64,
-    /// c/se on n − 3; undefined if nothing is left to explain.
+    /// c/se, with n − 3 degrees of freedom; `None` if the residuals are 0.
     pub t: Option<f64>,
-    /// Two-sided.
+    /// Two-sided p of t.
     pub p: Option<f64>,
-    /// n − 3.
+    /// Residual degrees of freedom, n − 3.
     pub df: f64,
-    /// Of x and x² together, on 2 and n − 3.
+    /// F of x and x² together, on 2 and n − 3 degrees of freedom.
     pub f: Option<f64>,
-    /// Its p.
+    /// p of F.
     pub p_f: Option<f64>,
-    /// 1 − residual/total sum of squares.
+    /// R²: 1 − residual/total sum of squares.
     pub r2: f64,
-    /// Where it turns, if it is not straight.
+    /// The x of the vertex; `None` if c is 0.
     pub turn: Option<f64>,
 }
 
-/// The parabola through four points or more. What x leaves of (x − x̄)² carries
-/// the curvature. `None` if y is constant or x has fewer than three values.
+/// The least-squares parabola. The curvature is the coefficient of the part of
+/// (x − x̄)² that is orthogonal to x. `None` for fewer than four points, unequal lengths,
+/// if y is constant or x has fewer than three distinct values.
 pub fn parabola(x: &[f64], y: &[f64]) -> Option<Parabola> {
     let n = x.len();
     if n < 4 || n != y.len() || is_constant(x) || is_constant(y) {
@@ -109,32 +112,32 @@ pub fn parabola(x: &[f64], y: &[f64]) -> Option<Parabola> {
     let zz = sum_of_squares(&z)?;
     let along = finite(sum_of_products(&z, &squares)? / zz)?;
     let ms = mean(&squares)?;
-    let bent: Vec<f64> = z
+    let curved: Vec<f64> = z
         .iter()
         .zip(&squares)
         .map(|(z, s)| s - ms - along * z)
         .collect();
-    let bb: f64 = bent.iter().map(|v| v * v).sum();
+    let bb: f64 = curved.iter().map(|v| v * v).sum();
     if bb <= 1e-18 * squares.iter().map(|v| v * v).sum::<f64>() {
         return None;
     }
-    let straight = finite(sum_of_products(&z, y)? / zz)?;
-    let square = finite(bent.iter().zip(y).map(|(w, v)| w * (v - my)).sum::<f64>() / bb)?;
+    let linear = finite(sum_of_products(&z, y)? / zz)?;
+    let square = finite(curved.iter().zip(y).map(|(w, v)| w * (v - my)).sum::<f64>() / bb)?;
     let residual: Sum = (0..n)
-        .map(|i| (y[i] - my - straight * z[i] - square * bent[i]).powi(2))
+        .map(|i| (y[i] - my - linear * z[i] - square * curved[i]).powi(2))
         .collect();
     let (residual, total) = (residual.get(), sum_of_squares(y)?);
     let df = n as f64 - 3.0;
-    let left = residual > 1e-24 * total;
+    let imperfect = residual > 1e-24 * total;
     let se = finite((residual / df / bb).sqrt())?;
-    let t = if left { finite(square / se) } else { None };
-    let f = if left {
+    let t = if imperfect { finite(square / se) } else { None };
+    let f = if imperfect {
         finite((total - residual) / 2.0 / (residual / df))
     } else {
         None
     };
-    // y = … + (straight − square·along)·z + square·z²
-    let turn = finite(mx - (straight - square * along) / (2.0 * square));
+    // y = … + (linear − square·along)·z + square·z²
+    let turn = finite(mx - (linear - square * along) / (2.0 * square));
     Some(Parabola {
         square,
         se,
@@ -153,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_parabola_turns_where_its_slope_is_zero() {
+    fn a_parabola_has_its_vertex_where_its_slope_is_zero() {
         let x = [1.0, 2.0, 3.0, 4.0, 5.0];
         let y = x.map(|v: f64| 5.0 - (v - 3.4).powi(2));
         let p = parabola(&x, &y).unwrap();

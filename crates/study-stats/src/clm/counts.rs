@@ -1,47 +1,47 @@
-//! The counts that an ordinal model sees: how often each subject, under each
-//! predictor, used each category. All else of the ratings is without effect on
-//! the likelihood, so a fit costs the same however many trials lie behind.
+//! The counts for an ordinal model: how often each subject used each category under each
+//! predictor. They are sufficient for the likelihood, so the cost of a fit does not
+//! depend on the number of trials.
 
 use super::ClmError;
 use super::newton::Evaluation;
 use crate::matrix::SymmetricMatrix;
 use std::ops::Range;
 
-/// The row of the design of one predictor. It has one column beside zeros: a
-/// dummy, or a covariate.
+/// A row of the design matrix. It has at most one non-zero column: a dummy variable or a
+/// covariate. A reference level has x = 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Predictor {
-    /// Of β.
+    /// Index of the column, and of its coefficient in β.
     pub column: usize,
-    /// The design's value there.
+    /// Value in that column.
     pub x: f64,
 }
 
-/// A number of equal ratings.
+/// The number of equal ratings of a subject under a predictor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CategoryCount {
-    /// Any number.
+    /// Any number that identifies the subject.
     pub subject: u32,
-    /// Index of a [`Predictor`].
+    /// Index of the [`Predictor`].
     pub predictor: u32,
-    /// From 0; none may be unused by all.
+    /// Category, from 0; every category has to be used by somebody.
     pub category: u32,
-    /// How many.
+    /// Number of ratings.
     pub n: u32,
 }
 
-/// A predictor and a threshold, as one subject's ratings meet them.
+/// The counts of one subject for a predictor and a threshold.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Term {
     /// predictor · (J − 1) + threshold.
     pub(crate) place: usize,
     /// Ratings in the category below the threshold.
     pub(crate) n: f64,
-    /// Ratings in the two categories beside it.
+    /// Ratings in the two categories adjacent to it.
     pub(crate) m: f64,
 }
 
-/// Counts, ready to be fitted.
+/// Counts, prepared for fitting.
 #[derive(Debug, Clone)]
 pub struct CategoryCounts {
     thresholds: usize,
@@ -58,8 +58,9 @@ pub struct CategoryCounts {
 }
 
 impl CategoryCounts {
-    /// Counts over predictors of `columns` columns and `categories` categories,
-    /// in any order. Counts of places that are out of range are left out.
+    /// Prepares counts, in any order, for the rows `predictors` of a design with
+    /// `columns` columns, and `categories` categories. Counts whose predictor or category
+    /// is out of range are left out.
     pub fn new(
         predictors: Vec<Predictor>,
         columns: usize,
@@ -93,7 +94,7 @@ impl CategoryCounts {
                 cell.fill((0.0, 0.0));
                 let g = group[0].predictor as usize;
                 for c in group {
-                    table.note(g, c.category as usize, f64::from(c.n), &mut cell);
+                    table.tally(g, c.category as usize, f64::from(c.n), &mut cell);
                 }
                 for (j, &(n, m)) in cell.iter().enumerate().filter(|(_, (_, m))| *m > 0.0) {
                     let place = g * t + j;
@@ -107,7 +108,8 @@ impl CategoryCounts {
         table
     }
 
-    fn note(&mut self, g: usize, category: usize, n: f64, cell: &mut [(f64, f64)]) {
+    /// Adds a count to the totals and to the `cell` of its subject and predictor.
+    fn tally(&mut self, g: usize, category: usize, n: f64, cell: &mut [(f64, f64)]) {
         self.used[category] += n;
         if let Some((below, beside)) = cell.get_mut(category) {
             *below += n;
@@ -120,31 +122,34 @@ impl CategoryCounts {
         self.extent[g] = Some((low.min(category), high.max(category)));
     }
 
-    /// J − 1.
+    /// Number of thresholds, J − 1.
     pub fn thresholds(&self) -> usize {
         self.thresholds
     }
 
-    /// Thresholds and columns.
+    /// Number of thresholds and coefficients.
     pub fn parameters(&self) -> usize {
         self.thresholds + self.columns
     }
 
-    /// How many subjects there are.
+    /// Number of subjects.
     pub fn subjects(&self) -> usize {
         self.subjects.len()
     }
 
-    /// Whether a finite maximum exists, by the directions in which the
-    /// likelihood never falls (after Albert & Anderson 1984).
+    /// Whether finite estimates exist, from the directions in which the likelihood never
+    /// decreases (after Albert & Anderson 1984).
     ///
-    /// Moving θ by t, rising with j, and xβ by d keeps ln P(Y = j) from falling
-    /// for ever if and only if tⱼ₋₁ ≤ d ≤ tⱼ. For a predictor whose ratings span
-    /// low … high this is t_high−1 ≤ d ≤ t_low. With a dummy for each predictor
-    /// but the first every d is free: the estimates are finite if the spans chain
-    /// all thresholds together and no predictor stands wholly in an outer
-    /// category. With one column d = ±x: such a t exists if for every j the
-    /// greatest d with low ≤ j is no more than the smallest with high > j.
+    /// If θ moves by t, increasing in j, and xβ by d, then ln P(Y = j) never decreases if
+    /// and only if tⱼ₋₁ ≤ d ≤ tⱼ. For a predictor whose ratings span low … high this means
+    /// t_high−1 ≤ d ≤ t_low. With a dummy for each predictor but the first every d is free:
+    /// the estimates are finite if the spans link all thresholds together and no predictor
+    /// has all its ratings in the lowest or all in the highest category. With one column
+    /// d = ±x: such a t exists if for every j the largest d with low ≤ j is at most the
+    /// smallest d with high > j.
+    ///
+    /// # Errors
+    /// The reason why an estimate does not exist.
     pub fn estimable(&self) -> Result<(), ClmError> {
         if self.thresholds == 0 {
             return Err(ClmError::OneCategory);
@@ -180,16 +185,16 @@ impl CategoryCounts {
 
     fn dummies_separate(&self, seen: &[(Predictor, (usize, usize))]) -> bool {
         let top = self.thresholds;
-        // Whether threshold j moves as j − 1 does.
-        let mut chained = vec![false; top];
+        // Whether threshold j has to move with threshold j − 1.
+        let mut linked = vec![false; top];
         for (_, (low, high)) in seen.iter().filter(|(_, e)| e.0 < e.1) {
-            chained[low + 1..*high].fill(true);
+            linked[low + 1..*high].fill(true);
         }
         let outer = |e: &(usize, usize)| *e == (0, 0) || *e == (top, top);
-        chained[1..].iter().any(|c| !c) || seen.iter().any(|(_, e)| outer(e))
+        linked[1..].iter().any(|c| !c) || seen.iter().any(|(_, e)| outer(e))
     }
 
-    /// ln of the odds of the cumulative shares.
+    /// Logits of the cumulative shares.
     pub(super) fn marginal_logits(&self) -> Vec<f64> {
         let all: f64 = self.used.iter().sum();
         let mut below = 0.0;
@@ -202,7 +207,7 @@ impl CategoryCounts {
             .collect()
     }
 
-    /// aₖ of every place, without a subject's intercept.
+    /// aₖ of every place, without the random intercept.
     pub(crate) fn linear(&self, at: &[f64]) -> Vec<f64> {
         let t = self.thresholds;
         let mut a = Vec::with_capacity(self.pooled.len());
@@ -213,7 +218,7 @@ impl CategoryCounts {
         a
     }
 
-    /// (n, m) of every place over all subjects.
+    /// (n, m) of every place, over all subjects.
     pub(crate) fn pooled(&self) -> &[(f64, f64)] {
         &self.pooled
     }
@@ -224,7 +229,7 @@ impl CategoryCounts {
     }
 
     /// Σ Nⱼκ(θⱼ − θⱼ₋₁) with κ′ = 1/(e^δ − 1), κ″ = −κ′(1 + κ′), among `size`
-    /// parameters; `None` where the thresholds do not rise.
+    /// parameters; `None` if the thresholds do not increase.
     pub(crate) fn spacing(&self, at: &[f64], size: usize) -> Option<Evaluation> {
         let mut point = Evaluation::zero(size);
         for j in 1..self.thresholds {
@@ -245,7 +250,7 @@ impl CategoryCounts {
         Some(point)
     }
 
-    /// Adds Σ wₖ ∂aₖ, the weights by place.
+    /// Adds Σ wₖ ∂aₖ, with a weight for every place.
     pub(crate) fn add_gradient(&self, weights: &[f64], to: &mut [f64]) {
         let t = self.thresholds;
         for (p, weights) in self.predictors.iter().zip(weights.chunks_exact(t)) {
@@ -256,7 +261,7 @@ impl CategoryCounts {
         }
     }
 
-    /// Adds Σ wₖ ∂aₖ of one subject's terms.
+    /// Adds Σ wₖ ∂aₖ, with a weight for each term of one subject.
     pub(crate) fn add_terms(&self, terms: &[Term], weights: &[f64], to: &mut [f64]) {
         let t = self.thresholds;
         for (term, w) in terms.iter().zip(weights) {
@@ -266,7 +271,7 @@ impl CategoryCounts {
         }
     }
 
-    /// Adds Σ wₖ ∂aₖ∂aₖᵀ, the weights by place.
+    /// Adds Σ wₖ ∂aₖ∂aₖᵀ, with a weight for every place.
     pub(crate) fn add_hessian(&self, weights: &[f64], to: &mut SymmetricMatrix) {
         let t = self.thresholds;
         for (p, weights) in self.predictors.iter().zip(weights.chunks_exact(t)) {

@@ -1,8 +1,8 @@
-//! Newton's method for a likelihood of few parameters, with step halving.
+//! Newton's method with step halving for a log-likelihood of few parameters.
 
 use crate::matrix::{Cholesky, SymmetricMatrix, dot};
 
-/// A log-likelihood with its derivatives at some parameters.
+/// A log-likelihood and its derivatives at given parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Evaluation {
     /// The log-likelihood.
@@ -14,7 +14,7 @@ pub(crate) struct Evaluation {
 }
 
 impl Evaluation {
-    /// Nothing yet.
+    /// All zero.
     pub(crate) fn zero(size: usize) -> Self {
         Self {
             value: 0.0,
@@ -24,65 +24,65 @@ impl Evaluation {
     }
 }
 
-/// Where the search ended.
+/// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Maximum {
     /// The parameters.
     pub(crate) at: Vec<f64>,
     /// The log-likelihood.
     pub(crate) value: f64,
-    /// Less the second derivatives.
+    /// Observed information: the negative Hessian.
     pub(crate) information: SymmetricMatrix,
 }
 
-/// No parameter moves further in one step: the scale is that of logits.
+/// Largest change of a parameter in one step, in logits.
 const LONGEST_STEP: f64 = 2.0;
 
 const MOST_STEPS: usize = 100;
 
-/// A step that promises less than this of log-likelihood is the last one.
-const PROMISE: f64 = 1e-9;
+/// The step whose predicted gain of log-likelihood is smaller is the last one.
+const SMALLEST_GAIN: f64 = 1e-9;
 
 /// The maximum of a smooth log-likelihood; `None` if the search finds none.
 ///
 /// A step solves (−H + ρ·diag|H|)·δ = g with the smallest ρ of 0, 10⁻³, 10⁻² …
 /// that makes the matrix positive definite, and is halved until the value does
-/// not fall. `at` is `None` where the parameters are not admissible. The last
-/// step, once the promise ½gᵀδ is small, squares what is left of the error.
+/// not decrease. `evaluate` is `None` if the parameters are not admissible. The last
+/// step, once the predicted gain ½gᵀδ is small, squares the remaining error.
 pub(crate) fn maximise(
     start: Vec<f64>,
-    mut at: impl FnMut(&[f64]) -> Option<Evaluation>,
+    mut evaluate: impl FnMut(&[f64]) -> Option<Evaluation>,
 ) -> Option<Maximum> {
-    let mut here = start;
-    let mut point = at(&here)?;
+    let mut at = start;
+    let mut point = evaluate(&at)?;
     for _ in 0..MOST_STEPS {
         let (step, newton) = direction(&point)?;
-        let promise = 0.5 * dot(&step, &point.gradient);
-        let last = newton && promise < PROMISE;
+        let gain = 0.5 * dot(&step, &point.gradient);
+        let last = newton && gain < SMALLEST_GAIN;
         let longest = step.iter().fold(0.0f64, |a, b| a.max(b.abs()));
         let mut share = (LONGEST_STEP / longest).min(1.0);
         let slack = 1e-13 * point.value.abs();
         let mut found = None;
         while share > 1e-10 {
-            let there: Vec<f64> = here.iter().zip(&step).map(|(x, d)| x + share * d).collect();
-            match at(&there) {
+            let candidate: Vec<f64> = at.iter().zip(&step).map(|(x, d)| x + share * d).collect();
+            match evaluate(&candidate) {
                 Some(next) if next.value >= point.value - slack => {
-                    found = Some((there, next));
+                    found = Some((candidate, next));
                     break;
                 }
-                // The promise is below the rounding of the value.
+                // The gain is smaller than the rounding error of the value.
                 _ if last => break,
                 _ => share *= 0.5,
             }
         }
         match found {
-            Some((there, next)) => (here, point) = (there, next),
+            Some(better) => (at, point) = better,
             None if last => {}
             None => return None,
         }
         if last {
             return Some(Maximum {
-                at: here,
+                at,
                 value: point.value,
                 information: point.hessian.negated(),
             });
@@ -91,7 +91,7 @@ pub(crate) fn maximise(
     None
 }
 
-/// The step, and whether it is Newton's own.
+/// The step, and whether it is a plain Newton step.
 fn direction(point: &Evaluation) -> Option<(Vec<f64>, bool)> {
     let information = point.hessian.negated();
     let mut ridge = 0.0;

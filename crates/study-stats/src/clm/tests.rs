@@ -5,8 +5,8 @@ use super::newton::Evaluation;
 use super::*;
 use proptest::prelude::*;
 
-/// A table of dummies against the first predictor: for each subject and
-/// predictor the ratings, from 0.
+/// Counts with a dummy variable for each predictor but the first, from (subject,
+/// predictor, ratings from 0).
 pub(crate) fn dummies(categories: usize, cells: &[(u32, u32, &[u32])]) -> CategoryCounts {
     let groups = cells.iter().map(|c| c.1 as usize + 1).max().unwrap_or(0);
     let predictors = (0..groups)
@@ -32,7 +32,7 @@ pub(crate) fn counts(cells: &[(u32, u32, &[u32])]) -> Vec<CategoryCount> {
     counts
 }
 
-/// A table with one covariate.
+/// Counts with one covariate.
 pub(crate) fn covariate(
     x: &[f64],
     categories: usize,
@@ -42,22 +42,21 @@ pub(crate) fn covariate(
     CategoryCounts::new(predictors, 1, categories, &counts(cells))
 }
 
-/// Gradient and Hessian against central differences of the value and of the
-/// gradient.
+/// Checks gradient and Hessian against central differences of value and gradient.
 pub(crate) fn derivatives_hold(
     at: &[f64],
     tolerance: f64,
-    mut point: impl FnMut(&[f64]) -> Option<Evaluation>,
+    mut evaluate: impl FnMut(&[f64]) -> Option<Evaluation>,
 ) {
-    let here = point(at).unwrap();
+    let here = evaluate(at).unwrap();
     let step = 1e-4;
     for i in 0..at.len() {
         let mut moved = |by: f64| {
             let mut at = at.to_vec();
             at[i] += by;
-            point(&at).unwrap()
+            evaluate(&at).unwrap()
         };
-        // Fourth order: the truncation is far below the tolerance.
+        // Fourth order: the truncation error is far below the tolerance.
         let near = (moved(step), moved(-step));
         let far = (moved(2.0 * step), moved(-2.0 * step));
         let slope = |v: &dyn Fn(&Evaluation) -> f64| {
@@ -94,12 +93,11 @@ const CELLS: [(u32, u32, &[u32]); 6] = [
 #[test]
 fn the_derivatives_are_those_of_the_likelihood() {
     let at = [-1.2, 0.3, 1.7, 0.8, -0.4];
-    derivatives_hold(&at, 1e-8, |at| point(&dummies(4, &CELLS), at));
+    derivatives_hold(&at, 1e-8, |at| evaluate(&dummies(4, &CELLS), at));
     let table = covariate(&[-1.0, 0.2, 1.0], 4, &CELLS);
-    derivatives_hold(&at[..4], 1e-8, |at| point(&table, at));
+    derivatives_hold(&at[..4], 1e-8, |at| evaluate(&table, at));
 }
 
-/// The value is that of the definition, probability by probability.
 #[test]
 fn the_likelihood_is_the_product_of_the_probabilities() {
     let (theta, beta) = ([-1.2, 0.3, 1.7], [0.0, 0.8, -0.4]);
@@ -114,14 +112,14 @@ fn the_likelihood_is_the_product_of_the_probabilities() {
             sum += (below(c + 1) - below(c)).ln();
         }
     }
-    let value = point(&dummies(4, &CELLS), &[-1.2, 0.3, 1.7, 0.8, -0.4]);
+    let value = evaluate(&dummies(4, &CELLS), &[-1.2, 0.3, 1.7, 0.8, -0.4]);
     assert!((value.unwrap().value - sum).abs() < 1e-12);
 }
 
-/// Two categories and two predictors are a table of four: β is the log odds
-/// ratio, its variance the sum of the reciprocals (Woolf 1955).
+/// With two categories and two predictors β is the log odds ratio, and its variance the
+/// sum of the reciprocal counts (Woolf 1955).
 #[test]
-fn a_table_of_four_has_the_log_odds_ratio() {
+fn a_two_by_two_table_has_the_log_odds_ratio() {
     let table = dummies(2, &[(0, 0, &[0, 0, 0, 1]), (0, 1, &[0, 0, 1, 1, 1, 1, 1])]);
     let fit = clm(&table).unwrap();
     let exact = (3.0f64 * 5.0 / (1.0 * 2.0)).ln();
@@ -132,33 +130,33 @@ fn a_table_of_four_has_the_log_odds_ratio() {
 }
 
 #[test]
-fn separation_is_seen_and_overlap_is_not_called_so() {
-    let says = |table: CategoryCounts| clm(&table).err();
+fn separation_is_recognized_and_overlap_is_not() {
+    let error = |table: CategoryCounts| clm(&table).err();
     let separated = Some(ClmError::Separated);
-    // A realization wholly in the highest category.
+    // A realization with all ratings in the highest category.
     assert_eq!(
-        says(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[2, 2])])),
+        error(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[2, 2])])),
         separated
     );
-    // Wholly in a middle one: finite.
+    // With all ratings in a middle category: finite.
     assert_eq!(
-        says(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[1, 1])])),
+        error(dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[1, 1])])),
         None
     );
     // One never in the highest, the other never in the lowest.
     assert_eq!(
-        says(dummies(3, &[(0, 0, &[0, 1]), (0, 1, &[1, 2])])),
+        error(dummies(3, &[(0, 0, &[0, 1]), (0, 1, &[1, 2])])),
         separated
     );
-    // No realization links the lower categories with the upper; then one does.
+    // No realization links the lower categories with the upper ones; then one does.
     let unlinked: [(u32, u32, &[u32]); 3] = [(0, 0, &[0, 1]), (0, 1, &[2, 3]), (0, 2, &[0, 1])];
-    assert_eq!(says(dummies(4, &unlinked)), separated);
+    assert_eq!(error(dummies(4, &unlinked)), separated);
     let linked: [(u32, u32, &[u32]); 3] = [(0, 0, &[0, 1]), (0, 1, &[2, 3]), (0, 2, &[0, 3])];
-    assert_eq!(says(dummies(4, &linked)), None);
-    // A covariate may order them although no two have a category in common.
+    assert_eq!(error(dummies(4, &linked)), None);
+    // A covariate can order realizations that have no category in common.
     let x = [-1.0, 0.0, 1.0];
     assert_eq!(
-        says(covariate(
+        error(covariate(
             &x,
             3,
             &[(0, 0, &[0]), (0, 1, &[1, 1]), (0, 2, &[2])]
@@ -166,16 +164,16 @@ fn separation_is_seen_and_overlap_is_not_called_so() {
         separated
     );
     assert_eq!(
-        says(covariate(
+        error(covariate(
             &x,
             3,
             &[(0, 0, &[1]), (0, 1, &[0, 0]), (0, 2, &[2])]
         )),
         None
     );
-    // Ratings that touch in one category only are still ordered.
+    // Ratings that share only one category are still ordered.
     assert_eq!(
-        says(covariate(
+        error(covariate(
             &x,
             2,
             &[(0, 0, &[0]), (0, 1, &[0, 1]), (0, 2, &[1])]
@@ -185,7 +183,7 @@ fn separation_is_seen_and_overlap_is_not_called_so() {
 }
 
 #[test]
-fn what_does_not_vary_has_no_model() {
+fn constant_ratings_or_predictors_have_no_model() {
     assert_eq!(
         clm(&dummies(1, &[(0, 0, &[0]), (0, 1, &[0])])),
         Err(ClmError::OneCategory)
@@ -199,7 +197,7 @@ fn what_does_not_vary_has_no_model() {
     assert!(clm(&CategoryCounts::new(Vec::new(), 0, 0, &[])).is_err());
 }
 
-/// A small table in which every category occurs, and the first predictors.
+/// Small tables in which every category occurs, with consecutive predictors.
 pub(crate) fn any_counts() -> impl Strategy<Value = (usize, Vec<CategoryCount>)> {
     let count = (0u32..4, 0u32..3, 0u32..5, 1u32..4);
     prop::collection::vec(count, 1..16).prop_map(|list| {
@@ -227,8 +225,8 @@ pub(crate) fn any_counts() -> impl Strategy<Value = (usize, Vec<CategoryCount>)>
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Either the estimates are infinite by the exact criterion, or Newton finds
-    /// them: it never gives up, and never stops half way.
+    /// Either the estimates are infinite by the exact criterion, or Newton's method finds
+    /// them.
     #[test]
     fn every_table_is_separated_or_fitted((categories, counts) in any_counts()) {
         let covariate = [-1.0, 0.1, 1.0].map(|x| Predictor { column: 0, x });
@@ -243,7 +241,7 @@ proptest! {
             match clm(&table) {
                 Ok(fit) => {
                     let at: Vec<f64> = fit.thresholds.iter().chain(&fit.beta).copied().collect();
-                    let slope = point(&table, &at).unwrap().gradient;
+                    let slope = evaluate(&table, &at).unwrap().gradient;
                     prop_assert!(slope.iter().all(|g| g.abs() < 1e-6), "{slope:?}");
                     prop_assert!(fit.thresholds.windows(2).all(|w| w[0] < w[1]));
                     prop_assert!(fit.se.iter().all(|s| s.is_finite() && *s > 0.0));
@@ -254,15 +252,15 @@ proptest! {
     }
 
     #[test]
-    fn a_scale_turned_round_changes_the_sign((categories, counts) in any_counts()) {
+    fn reversing_the_scale_changes_the_sign((categories, counts) in any_counts()) {
         let x = [-1.0, 0.1, 1.0].map(|x| Predictor { column: 0, x }).to_vec();
-        let turned: Vec<CategoryCount> = counts
+        let reversed: Vec<CategoryCount> = counts
             .iter()
             .rev()
             .map(|c| CategoryCount { category: categories as u32 - 1 - c.category, ..*c })
             .collect();
         let a = clm(&CategoryCounts::new(x.clone(), 1, categories, &counts));
-        let b = clm(&CategoryCounts::new(x, 1, categories, &turned));
+        let b = clm(&CategoryCounts::new(x, 1, categories, &reversed));
         match (a, b) {
             (Ok(a), Ok(b)) => {
                 prop_assert!((a.loglik - b.loglik).abs() < 1e-9);

@@ -1,19 +1,18 @@
 //! Nodes and weights of Gauss–Hermite quadrature.
 //!
-//! The nodes are the eigenvalues of the Jacobi matrix with √(k/2) beside a zero
-//! diagonal (Golub & Welsch 1969), found by counting sign changes of its
-//! characteristic polynomials; the weights are Christoffel's, 1/Σ p_k(z)² over the
-//! orthonormal polynomials, which keeps the digits of the smallest, where
-//! eigenvectors lose them.
+//! The nodes are the eigenvalues of the Jacobi matrix with a zero diagonal and the
+//! off-diagonal elements √(k/2) (Golub & Welsch 1969), found by bisection with Sturm
+//! sequences. The weights are Christoffel's, 1/Σ p_k(z)² over the orthonormal
+//! polynomials, which are accurate also for the smallest weights.
 
 use std::f64::consts::PI;
 
 /// A node with the logarithm of its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Node {
-    /// Of ∫ e^(−z²) g(z) dz.
+    /// Node of ∫ e^(−z²) g(z) dz.
     pub(super) z: f64,
-    /// ln w + z²: of ∫ h(z) dz.
+    /// ln w + z²: logarithm of the weight in ∫ h(z) dz.
     pub(super) ln_weight: f64,
 }
 
@@ -36,7 +35,7 @@ pub(super) fn rule(n: usize) -> Vec<Node> {
 
 /// The i-th root, ascending, by bisection on the number of roots below.
 fn root(n: usize, i: usize) -> f64 {
-    // All lie within √(2n).
+    // All roots lie within ±√(2n).
     let (mut low, mut high) = (-(2.0 * n as f64).sqrt() - 1.0, 0.0);
     loop {
         let middle = 0.5 * (low + high);
@@ -51,7 +50,7 @@ fn root(n: usize, i: usize) -> f64 {
     }
 }
 
-/// How many eigenvalues lie below x: negative pivots of J − xI (Sturm).
+/// Number of eigenvalues below x: that of the negative pivots of J − xI (Sturm).
 fn roots_below(n: usize, x: f64) -> usize {
     let mut pivot = 1.0;
     let mut negative = 0;
@@ -105,7 +104,7 @@ mod tests {
 
     /// Abramowitz & Stegun (1964), table 25.10, n = 5.
     #[test]
-    fn five_nodes_are_those_of_the_tables() {
+    fn five_nodes_agree_with_printed_tables() {
         let nodes = rule(5);
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} is not {b}");
         near(nodes[4].z, 2.020_182_870_456);

@@ -1,7 +1,7 @@
 //! Laplace's method with exact first and second derivatives.
 //!
-//! A subject adds l = f(b̂) − ½ ln H, f over (b, φ) with φ = (θ, β, τ = ln σ). Let
-//! subscripts be partial derivatives at the mode, v = f_bφ/H = ∂b̂/∂φ, u = f_bbφ,
+//! A subject contributes l = f(b̂) − ½ ln H, with f a function of b and φ = (θ, β,
+//! τ = ln σ). With subscripts for partial derivatives at the mode, v = f_bφ/H = ∂b̂/∂φ, u = f_bbφ,
 //! t = f_bbbφ, w = u + f_bbb v = −∂H/∂φ. Differentiating f_b(b̂(φ), φ) = 0 once and
 //! twice,
 //!
@@ -12,14 +12,14 @@
 //! ```
 //!
 //! The matrices f_φφ, f_bφφ, f_bbφφ are sums over the terms, so their weights are
-//! gathered by place over all subjects before a matrix is made of them.
+//! accumulated by place over all subjects before the matrices are formed.
 
 use super::mode::mode;
 use crate::clm::counts::{CategoryCounts, Term};
 use crate::clm::newton::Evaluation;
 use crate::clm::{logistic, softplus};
 
-/// Derivatives of one subject's f at its mode.
+/// Derivatives of the terms of one subject at its mode.
 #[derive(Default)]
 struct Weights {
     first: Vec<f64>,
@@ -28,9 +28,13 @@ struct Weights {
     fourth: Vec<f64>,
 }
 
-/// Value, gradient and Hessian of the approximate likelihood at (θ, β, ln σ);
-/// the modes are where the search for them starts, and ends.
-pub(super) fn point(table: &CategoryCounts, at: &[f64], modes: &mut [f64]) -> Option<Evaluation> {
+/// Value, gradient and Hessian of the approximate log-likelihood at (θ, β, ln σ). `modes`
+/// are the starting points of the search for the modes, and are updated.
+pub(super) fn evaluate(
+    table: &CategoryCounts,
+    at: &[f64],
+    modes: &mut [f64],
+) -> Option<Evaluation> {
     let size = table.parameters() + 1;
     let precision = (-2.0 * at[size - 1]).exp();
     if !(precision.is_finite() && precision > 0.0) {
@@ -38,8 +42,8 @@ pub(super) fn point(table: &CategoryCounts, at: &[f64], modes: &mut [f64]) -> Op
     }
     let mut point = table.spacing(at, size)?;
     let a = table.linear(at);
-    let mut flat = vec![0.0; a.len()];
-    let mut curved = vec![0.0; a.len()];
+    let mut first = vec![0.0; a.len()];
+    let mut second = vec![0.0; a.len()];
     let mut k = Weights::default();
     let (mut v, mut u, mut t) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
     let (mut y, mut w) = (vec![0.0; size], vec![0.0; size]);
@@ -47,7 +51,7 @@ pub(super) fn point(table: &CategoryCounts, at: &[f64], modes: &mut [f64]) -> Op
         let b = mode(terms, &a, precision, *start)?;
         *start = b;
         let q = b * b * precision;
-        let (value, sums) = k.of(terms, &a, b);
+        let (value, sums) = k.set(terms, &a, b);
         let h = precision - sums[0];
         let (bbb, bbbb) = (-sums[1], sums[2]);
         point.value += value - 0.5 * q - at[size - 1] - 0.5 * h.ln();
@@ -69,23 +73,23 @@ pub(super) fn point(table: &CategoryCounts, at: &[f64], modes: &mut [f64]) -> Op
         point.gradient[tau] += q - 1.0;
         for (i, term) in terms.iter().enumerate() {
             let place = term.place;
-            flat[place] += k.first[i];
-            curved[place] += k.second[i] + 0.5 / h * (k.fourth[i] - bbb / h * k.third[i]);
+            first[place] += k.first[i];
+            second[place] += k.second[i] + 0.5 / h * (k.fourth[i] - bbb / h * k.third[i]);
         }
         point.hessian.add_mixed(&v, &y);
         point.hessian.add_outer(0.5 / (h * h), &w);
         let own = -2.0 * q - 0.5 / h * (4.0 * precision + bbb / h * 4.0 * b * precision);
         point.hessian.add(tau, tau, own);
     }
-    table.add_gradient(&flat, &mut point.gradient);
-    table.add_hessian(&curved, &mut point.hessian);
+    table.add_gradient(&first, &mut point.gradient);
+    table.add_hessian(&second, &mut point.hessian);
     point.value.is_finite().then_some(point)
 }
 
 impl Weights {
-    /// The derivatives of each term in a up to the fourth; the value without the
-    /// prior, and the sums of the second to the fourth.
-    fn of(&mut self, terms: &[Term], a: &[f64], b: f64) -> (f64, [f64; 3]) {
+    /// Sets the first four derivatives of each term in a. Returns the value without the
+    /// prior, and the sums of the second to fourth derivatives.
+    fn set(&mut self, terms: &[Term], a: &[f64], b: f64) -> (f64, [f64; 3]) {
         for list in [
             &mut self.first,
             &mut self.second,

@@ -1,16 +1,16 @@
-//! The mode of one subject's intercept, given all parameters.
+//! The mode of a subject's random intercept, given all parameters.
 
 use crate::clm::counts::Term;
 use crate::clm::logistic;
 
-/// Steps are no longer taken when shorter than this share of the width 1/√H.
+/// The search ends when a step is shorter than this share of the width 1/√H.
 const PRECISION: f64 = 1e-8;
 
-/// b̂, the root of f′, from a guess.
+/// The mode b̂, the root of f′, starting from a guess. `None` if f′ overflows.
 ///
-/// f′(b) = −Σ (nₖ − mₖF(aₖ)) − b/σ² falls, and its sum lies between −Σn and
-/// Σ(m − n): the root is bracketed by σ² times these. Newton, with bisection
-/// where a step would leave the bracket, which shrinks with every step.
+/// f′(b) = −Σ (nₖ − mₖF(aₖ)) − b/σ² decreases, and its sum lies between −Σn and
+/// Σ(m − n): the root is bracketed by σ² times these. Newton's method, with bisection if
+/// a step would leave the bracket, which shrinks with every step.
 pub(super) fn mode(terms: &[Term], a: &[f64], precision: f64, guess: f64) -> Option<f64> {
     let (mut low, mut high) = (0.0, 0.0);
     for t in terms {

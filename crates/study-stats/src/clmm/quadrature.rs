@@ -1,13 +1,13 @@
 //! Adaptive Gauss–Hermite quadrature (Liu & Pierce 1994; Pinheiro & Bates 1995).
 //!
-//! With the nodes laid about the mode, b_r = b̂ + √2 z_r/√H,
+//! With the nodes placed around the mode, b_r = b̂ + √2 z_r/√H,
 //!
 //! ```text
 //! ln ∫ e^f db/√(2π) ≈ f(b̂) − ½ ln H + ln Σ_r w_r e^(z_r²) e^(f(b_r) − f(b̂)) / √π
 //! ```
 //!
 //! One node is Laplace's method. The terms, scaled to sum to 1, are the posterior
-//! π_r of b; by Fisher's and Louis's (1982) identities, with s the derivative of f
+//! π_r of b. By the identities of Fisher and Louis (1982), with s the derivative of f
 //! in the parameters, the gradient is E s and the Hessian E ∂²f + E ssᵀ − E s E sᵀ.
 
 use super::hermite::Node;
@@ -17,11 +17,12 @@ use crate::clm::logistic;
 use crate::clm::newton::Evaluation;
 use std::f64::consts::{PI, SQRT_2};
 
-/// A node whose share of the integral is smaller adds nothing to a derivative.
+/// A node with a smaller share of the integral is left out of the derivatives.
 const NEGLIGIBLE: f64 = 1e-17;
 
-/// Value, gradient and Hessian of the likelihood at (θ, β, ln σ).
-pub(super) fn point(
+/// Value, gradient and Hessian of the log-likelihood at (θ, β, ln σ), with the nodes of
+/// `rule`. `modes` are the starting points of the search for the modes, and are updated.
+pub(super) fn evaluate(
     table: &CategoryCounts,
     at: &[f64],
     rule: &[Node],
@@ -35,8 +36,8 @@ pub(super) fn point(
     }
     let mut point = table.spacing(at, size)?;
     let a = table.linear(at);
-    let mut flat = vec![0.0; a.len()];
-    let mut curved = vec![0.0; a.len()];
+    let mut first = vec![0.0; a.len()];
+    let mut second = vec![0.0; a.len()];
     let mut ln_share = vec![0.0; rule.len()];
     let odds = Odds::of(&a);
     // F of every node and term.
@@ -80,7 +81,7 @@ pub(super) fn point(
                 let r = t.n - t.m * f;
                 residual.push(r);
                 mean_residual[i] += share * r;
-                curved[place] -= share * t.m * f * (1.0 - f);
+                second[place] -= share * t.m * f * (1.0 - f);
             }
             let q = b * b * precision;
             score.fill(0.0);
@@ -93,24 +94,25 @@ pub(super) fn point(
             point.hessian.add(tau, tau, -2.0 * share * q);
         }
         for (t, r) in terms.iter().zip(&mean_residual) {
-            flat[t.place] += r;
+            first[t.place] += r;
         }
         point.gradient[tau] += mean[tau];
         point.hessian.add_outer(-1.0, &mean);
     }
-    table.add_gradient(&flat, &mut point.gradient);
-    table.add_hessian(&curved, &mut point.hessian);
+    table.add_gradient(&first, &mut point.gradient);
+    table.add_hessian(&second, &mut point.hessian);
     point.value.is_finite().then_some(point)
 }
 
-/// e^a of every place: with it e^(a−b) costs a product and no exponential.
+/// e^a of every place, so that e^(a−b) is a product instead of an exponential.
 struct Odds<'a> {
     a: &'a [f64],
     exp: Vec<f64>,
-    /// Whether no product of them with a moderate e^−b overflows.
+    /// Whether their products with a moderate e^−b cannot overflow.
     moderate: bool,
 }
 
+/// Largest |a| and |b| whose exponentials are multiplied.
 const MODERATE: f64 = 300.0;
 
 impl<'a> Odds<'a> {
@@ -122,8 +124,8 @@ impl<'a> Odds<'a> {
         }
     }
 
-    /// Σ mₖs(aₖ − b); appends F(aₖ − b) of each term. With G = max(F, 1 − F),
-    /// s(x) = max(x, 0) − ln G, and one logarithm serves a product of many G.
+    /// Σ mₖs(aₖ − b); appends F(aₖ − b) of each term to `below`. With G = max(F, 1 − F),
+    /// s(x) = max(x, 0) − ln G; one logarithm of the product of many G suffices.
     fn at(&self, terms: &[Term], b: f64, below: &mut Vec<f64>) -> f64 {
         let shared = (self.moderate && b.abs() < MODERATE).then(|| (-b).exp());
         let (mut sum, mut product) = (0.0, 1.0);
@@ -143,7 +145,7 @@ impl<'a> Odds<'a> {
             }
             let larger = f.max(1.0 - f);
             if t.m <= 8.0 {
-                // At least 2^−8 each time.
+                // At least 2^−8 per term.
                 for _ in 0..t.m as u32 {
                     product *= larger;
                 }

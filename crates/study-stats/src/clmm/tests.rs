@@ -20,34 +20,34 @@ const CELLS: [(u32, u32, &[u32]); 9] = [
 const AT: [f64; 6] = [-1.2, 0.3, 1.7, 0.8, -0.4, 0.2];
 
 #[test]
-fn laplaces_derivatives_are_those_of_its_value() {
+fn laplaces_derivatives_agree_with_differences() {
     let table = dummies(4, &CELLS);
     for ln_sd in [-3.0, 0.2, 1.5] {
         let mut at = AT;
         at[5] = ln_sd;
         let mut modes = [0.0; 3];
-        derivatives_hold(&at, 1e-7, |at| laplace::point(&table, at, &mut modes));
+        derivatives_hold(&at, 1e-7, |at| laplace::evaluate(&table, at, &mut modes));
     }
 }
 
 #[test]
-fn the_derivatives_of_the_integral_are_those_of_its_value() {
+fn the_derivatives_of_the_integral_agree_with_differences() {
     let table = covariate(&[-1.0, 0.3, 1.0], 4, &CELLS);
     let at = [-1.2, 0.3, 1.7, 0.8, 0.2];
     derivatives_hold(&at, 1e-7, |at| {
-        quadrature::point(&table, at, &RULE, &mut [0.0; 3])
+        quadrature::evaluate(&table, at, &RULE, &mut [0.0; 3])
     });
 }
 
 #[test]
 fn laplace_is_quadrature_with_one_node() {
     let table = dummies(4, &CELLS);
-    let one = quadrature::point(&table, &AT, &hermite::rule(1), &mut [0.0; 3]).unwrap();
-    let laplace = laplace::point(&table, &AT, &mut [0.0; 3]).unwrap();
+    let one = quadrature::evaluate(&table, &AT, &hermite::rule(1), &mut [0.0; 3]).unwrap();
+    let laplace = laplace::evaluate(&table, &AT, &mut [0.0; 3]).unwrap();
     assert!((one.value - laplace.value).abs() < 1e-12);
 }
 
-/// The definition: probabilities, the normal density, a fine trapezoid.
+/// Compared with the definition, by a fine trapezoidal rule.
 #[test]
 fn the_quadrature_is_the_integral() {
     let table = dummies(4, &CELLS);
@@ -74,12 +74,12 @@ fn the_quadrature_is_the_integral() {
         }
         sum += integral.ln();
     }
-    let found = quadrature::point(&table, &AT, &RULE, &mut [0.0; 3]).unwrap();
+    let found = quadrature::evaluate(&table, &AT, &RULE, &mut [0.0; 3]).unwrap();
     assert!((found.value - sum).abs() < 1e-10, "{} {sum}", found.value);
 }
 
 #[test]
-fn alike_subjects_lie_on_the_boundary() {
+fn equal_subjects_give_a_standard_deviation_of_zero() {
     let alike: &[u32] = &[0, 1, 1, 2];
     let other: &[u32] = &[0, 1, 2, 2];
     let cells: Vec<(u32, u32, &[u32])> = (0..6)
@@ -94,13 +94,13 @@ fn alike_subjects_lie_on_the_boundary() {
 }
 
 #[test]
-fn a_subject_alone_has_no_mixed_model() {
+fn one_subject_has_no_mixed_model() {
     let both = clmm(&dummies(3, &[(0, 0, &[0, 1, 2]), (0, 1, &[0, 1, 2])]));
     assert_eq!(both.laplace, Err(ClmError::OneSubject));
     assert_eq!(both.quadrature, Err(ClmError::OneSubject));
 }
 
-/// Each always says the same, so that any standard deviation is too small.
+/// Every subject always gives the same rating, so that σ is infinite.
 #[test]
 fn subjects_that_never_overlap_have_no_standard_deviation() {
     let cells: Vec<(u32, u32, Vec<u32>)> = (0..8)
@@ -119,7 +119,7 @@ fn subjects_that_never_overlap_have_no_standard_deviation() {
     }
 }
 
-fn of(categories: usize, counts: &[CategoryCount]) -> ClmmFits {
+fn fitted(categories: usize, counts: &[CategoryCount]) -> ClmmFits {
     let x = [-1.0, 0.1, 1.0].map(|x| Predictor { column: 0, x });
     clmm(&CategoryCounts::new(x.to_vec(), 1, categories, counts))
 }
@@ -128,8 +128,8 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_table_gives_a_number_that_is_none((categories, counts) in any_counts()) {
-        let both = of(categories, &counts);
+    fn all_estimates_are_finite((categories, counts) in any_counts()) {
+        let both = fitted(categories, &counts);
         for mixed in [both.laplace, both.quadrature].into_iter().flatten() {
             let fit = &mixed.fit;
             let all = fit.thresholds.iter().chain(&fit.beta).chain(&fit.se);
@@ -138,11 +138,11 @@ proptest! {
         }
     }
 
-    /// Names of subjects and the order of rows do not matter; the scale turned
-    /// round turns the effect round.
+    /// Numbers of subjects and the order of rows have no influence; reversing the scale
+    /// reverses the effect.
     #[test]
-    fn what_must_not_matter_does_not((categories, counts) in any_counts()) {
-        let turned: Vec<CategoryCount> = counts
+    fn names_and_order_do_not_matter((categories, counts) in any_counts()) {
+        let reversed: Vec<CategoryCount> = counts
             .iter()
             .rev()
             .map(|c| CategoryCount {
@@ -151,7 +151,7 @@ proptest! {
                 ..*c
             })
             .collect();
-        let (a, b) = (of(categories, &counts), of(categories, &turned));
+        let (a, b) = (fitted(categories, &counts), fitted(categories, &reversed));
         for (a, b) in [(a.laplace, b.laplace), (a.quadrature, b.quadrature)] {
             if let (Ok(a), Ok(b)) = (a, b) {
                 prop_assert!((a.fit.loglik - b.fit.loglik).abs() < 1e-6);
@@ -162,12 +162,12 @@ proptest! {
     }
 }
 
-/// Two categories, one rating in each cell: Laplace's value is greatest far out,
-/// at σ = 41, where the integral is flat. R 4.2.2, ordinal 2022.11-16,
+/// Two categories, one rating in each cell: Laplace's approximation is largest at an
+/// extreme σ = 41, where the integral is flat. R 4.2.2, ordinal 2022.11-16,
 /// `clmm(…, nAGQ = 10)` and a trapezoid of 2,001 points over the integral find
 /// its maximum at σ = 1.943: log-likelihood −7.8312, slope 3.853.
 #[test]
-fn the_integral_is_searched_anew_where_laplace_leads_astray() {
+fn the_search_of_the_integral_restarts_if_laplace_is_misleading() {
     let x = [-0.292, -0.836, 0.876, 1.788];
     let answers = [
         [0, 0, 1, 1],
@@ -191,7 +191,7 @@ fn the_integral_is_searched_anew_where_laplace_leads_astray() {
     assert!((found.fit.beta[0] - 3.853).abs() < 5e-3, "{found:?}");
 }
 
-/// A design that is read: the counts of the cells, added up.
+/// Single ratings and their counts give the same fit.
 #[test]
 fn repeated_counts_add_up() {
     let cells = counts(&CELLS);
@@ -206,5 +206,5 @@ fn repeated_counts_add_up() {
         }
     }
     assert!(added.len() < cells.len());
-    assert_eq!(of(4, &cells), of(4, &added));
+    assert_eq!(fitted(4, &cells), fitted(4, &added));
 }

@@ -1,26 +1,26 @@
 //! The exact distribution of Friedman's statistic.
 //!
-//! Under H₀ every order of a subject's ranks, ties included, is as likely as any
-//! other, so the columns are exchangeable and a state is the sorted rank sums.
-//! Rows are added one after the other; the last one, which has the most orders,
-//! is not added but compared with what is missing to the observed statistic.
+//! Under H₀ every order of a subject's ranks, ties included, is equally likely. The
+//! columns are then exchangeable, and the sorted rank sums are a sufficient state.
+//! Rows are added one by one. The last row, which has the most orders, is not added:
+//! its orders are compared with the difference to the observed statistic.
 
 /// Most columns: a row of eight has 40,320 orders.
 const MAX_COLUMNS: usize = 8;
 
-/// Most sums of a state and an order that are looked up among the states: about
-/// twenty milliseconds. There are fewer states, of 16 bytes.
+/// Most additions of an order to a state, about twenty milliseconds. There are fewer
+/// states, of 16 bytes each.
 const MAX_ADDED: f64 = 2e6;
 
-/// After so many of them, and at each doubling, it is asked how many will follow.
-const ENOUGH_SEEN: f64 = 1e4;
+/// After this many additions, and at each doubling, the remaining number is estimated.
+const FIRST_ESTIMATE: f64 = 1e4;
 
-/// Most sums of the last row that are compared: about ten milliseconds.
+/// Most comparisons of a state with an order of the last row, about ten milliseconds.
 const MAX_COMPARED: usize = 4_000_000;
 
 /// P(Σ(Rⱼ − centre)² ≥ observed) over all orders within rows, of doubled ranks;
-/// `None` above these limits, which hang on the rows' ties only, never on what
-/// was observed.
+/// `None` above these limits, which depend on the size and ties of the table, not on the
+/// observed statistic.
 pub(super) fn upper_tail(ranks: &[Vec<i64>], observed: i64) -> Option<f64> {
     let bits = bits(ranks)?;
     match ranks.first()?.len() {
@@ -35,7 +35,7 @@ pub(super) fn upper_tail(ranks: &[Vec<i64>], observed: i64) -> Option<f64> {
     }
 }
 
-/// Bits that hold any rank sum, if those of all columns fit into one number.
+/// Bits of a rank sum, if those of all columns fit into one number.
 fn bits(ranks: &[Vec<i64>]) -> Option<u32> {
     let k = ranks.first()?.len();
     let largest = 2 * k.checked_mul(ranks.len())?;
@@ -50,18 +50,18 @@ fn tail<const K: usize>(ranks: &[Vec<i64>], observed: i64, bits: u32) -> Option<
         row.sort_unstable();
         rows.push(row);
     }
-    // Few orders first: the states grow late.
+    // Rows with few orders first, so that the number of states grows late.
     rows.sort_by_cached_key(|row| (number_of_orders(row), *row));
     let (last, rows) = rows.split_last()?;
     let (first, rows) = rows.split_first()?;
     let mut states = States::with(bits, first);
-    let (mut added, mut ask) = (0.0, ENOUGH_SEEN);
+    let (mut added, mut next_estimate) = (0.0, FIRST_ESTIMATE);
     for (i, row) in rows.iter().enumerate() {
-        if added > ask {
-            if added + ahead::<K>(states.len, i + 1, &rows[i..]) > MAX_ADDED {
+        if added > next_estimate {
+            if added + remaining::<K>(states.len, i + 1, &rows[i..]) > MAX_ADDED {
                 return None;
             }
-            ask = 2.0 * added;
+            next_estimate = 2.0 * added;
         }
         let orders = orders(row);
         added += (states.len * orders.len()) as f64;
@@ -81,13 +81,13 @@ fn tail<const K: usize>(ranks: &[Vec<i64>], observed: i64, bits: u32) -> Option<
     if states.len.saturating_mul(number_of_orders(last)) > MAX_COMPARED {
         return None;
     }
-    Some(states.reach(last, observed, ranks.len()).min(1.0))
+    Some(states.upper_tail(last, observed, ranks.len()).min(1.0))
 }
 
-/// The sums still to be looked up, so that what cannot be finished is not begun:
-/// the states lie on a lattice of k − 1 dimensions, so after j rows there are
-/// about ((j + ¼)/(i + ¼))^(k−1) times as many as after i (the ¼ is for the edge).
-fn ahead<const K: usize>(states: usize, added: usize, rows: &[[i64; K]]) -> f64 {
+/// Estimated number of additions still needed. The states lie on a lattice of k − 1
+/// dimensions, so after j rows there are about ((j + ¼)/(i + ¼))^(k−1) times as many as
+/// after i (the ¼ corrects for the boundary).
+fn remaining<const K: usize>(states: usize, added: usize, rows: &[[i64; K]]) -> f64 {
     (rows.iter().zip(added..))
         .map(|(row, j)| {
             let growth = ((j as f64 + 0.25) / (added as f64 + 0.25)).powi(K as i32 - 1);
@@ -103,8 +103,7 @@ fn number_of_orders(row: &[i64]) -> usize {
     factorial(row.len()) / ties.product::<usize>()
 }
 
-/// The distinct orders of a sorted row; each stands for equally many
-/// permutations.
+/// The distinct orders of a sorted row; each represents equally many permutations.
 fn orders<const K: usize>(row: &[i64; K]) -> Vec<[i64; K]> {
     let mut current = *row;
     let mut all = vec![current];
@@ -121,11 +120,11 @@ fn orders<const K: usize>(row: &[i64; K]) -> Vec<[i64; K]> {
     all
 }
 
-/// Sorted rank sums with their probability: an open hash table. Its order hangs
-/// on nothing but what was put in, so that sums over it are reproducible.
+/// Sorted rank sums with their probabilities: an open-addressing hash table. Its order
+/// depends only on the insertions, so that sums over it are reproducible.
 struct States {
     bits: u32,
-    /// Packed rank sums, 0 where there is none, and the probability.
+    /// Packed rank sums (0 in a free slot) and their probability.
     slots: Vec<(u64, f64)>,
     len: usize,
 }
@@ -156,20 +155,20 @@ impl States {
         }
         // Doubled ranks are positive, so no state is 0.
         let packed = (sums.iter()).fold(0, |all, s| all << self.bits | s.unsigned_abs());
-        self.put(packed, p);
+        self.insert(packed, p);
         if 2 * self.len > self.slots.len() {
             let larger = vec![(0, 0.0); 2 * self.slots.len()];
             let old = std::mem::replace(&mut self.slots, larger);
             self.len = 0;
             for (packed, p) in old.into_iter().filter(|s| s.0 != 0) {
-                self.put(packed, p);
+                self.insert(packed, p);
             }
         }
     }
 
-    fn put(&mut self, packed: u64, p: f64) {
+    fn insert(&mut self, packed: u64, p: f64) {
         let mask = self.slots.len() - 1;
-        // Fibonacci hashing (Knuth, vol. 3, §6.4): the high bits are mixed best.
+        // Fibonacci hashing (Knuth, vol. 3, §6.4) mixes the high bits best.
         let mut at = (packed.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize & mask;
         loop {
             match &mut self.slots[at] {
@@ -194,10 +193,10 @@ impl States {
         })
     }
 
-    /// P(statistic ≥ observed) when one more row comes to these states. With s
-    /// and r about their centres |s + r|² = |s|² + |r|² + 2s·r, and s·r is
-    /// largest where both have the same order and smallest where it is reversed.
-    fn reach<const K: usize>(&self, last: &[i64; K], observed: i64, n: usize) -> f64 {
+    /// P(statistic ≥ observed) after one more row. With s and r relative to their
+    /// centres, |s + r|² = |s|² + |r|² + 2s·r, and s·r is largest if both have the same
+    /// order and smallest if the orders are reversed.
+    fn upper_tail<const K: usize>(&self, last: &[i64; K], observed: i64, n: usize) -> f64 {
         let middle = K as i64 + 1;
         let dot = |a: &[i64; K], b: &[i64; K]| (0..K).map(|j| a[j] * b[j]).sum::<i64>();
         let row: [i64; K] = std::array::from_fn(|j| last[j] - middle);
@@ -227,14 +226,14 @@ mod tests {
     use super::*;
     use crate::rank::doubled_ranks;
 
-    /// P and the observed statistic by visiting every arrangement.
-    fn by_hand(ranks: &[Vec<i64>]) -> (f64, i64) {
+    /// The p and the observed statistic by enumerating every arrangement.
+    fn by_enumeration(ranks: &[Vec<i64>]) -> (f64, i64) {
         let k = ranks[0].len();
         let centre = (ranks.len() * (k + 1)) as i64;
         let size = |sums: &[i64]| sums.iter().map(|s| (s - centre).pow(2)).sum::<i64>();
         let column = |j: usize| ranks.iter().map(|r| r[j]).sum::<i64>();
         let observed = size(&(0..k).map(column).collect::<Vec<_>>());
-        // All permutations of positions, equal ranks told apart.
+        // All permutations of positions, with equal ranks distinguished.
         let mut permutations = vec![vec![]];
         for _ in 0..k {
             permutations = (permutations.iter())
@@ -259,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn every_arrangement_visited_gives_the_same_tail() {
+    fn the_tail_agrees_with_enumeration() {
         let tables: [&[&[f64]]; 5] = [
             &[
                 &[1.0, 2.0],
@@ -287,15 +286,15 @@ mod tests {
         ];
         for table in tables {
             let ranks: Vec<Vec<i64>> = table.iter().map(|r| doubled_ranks(r)).collect();
-            let (p, observed) = by_hand(&ranks);
+            let (p, observed) = by_enumeration(&ranks);
             let found = upper_tail(&ranks, observed).unwrap();
             assert!((found - p).abs() < 1e-14, "{found} {p} {table:?}");
         }
     }
 
-    /// Whether there is a p hangs on the ties and the size of the table alone.
+    /// Whether there is a p depends on the ties and the size of the table alone.
     #[test]
-    fn the_limit_does_not_look_at_the_statistic() {
+    fn the_limit_does_not_depend_on_the_statistic() {
         let untied: Vec<i64> = (1..=5).map(|r| 2 * r).collect();
         let rows = |n: usize| vec![untied.clone(); n];
         for observed in [0, 100, 100_000] {

@@ -1,27 +1,27 @@
-//! Cells to sufficient statistics: subjects with the same cells share a pattern.
+//! Sufficient statistics of cells: subjects with the same cells share a pattern.
 //!
-//! For a pattern with U cells (realization, covariate, n) and K subjects the
-//! criterion needs only Σy and Σyy' of the U cell means: Σyy' is held as the rows
-//! of a factor, at most U of them.
+//! For a pattern with U cells (realization, covariate, n) the criterion needs only the
+//! sums over its subjects Σy and Σyy' of the U cell means. Σyy' is stored as the rows of
+//! a factor, at most U of them.
 
 use super::LmmError;
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::collections::BTreeMap;
 
-/// One subject's ratings of one realization (and one value of the covariate).
+/// The ratings of one subject of one realization (at one value of the covariate).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellSummary {
-    /// Any number for the subject.
+    /// Any number that identifies the subject.
     pub subject: usize,
-    /// Any number for the realization.
+    /// Any number that identifies the realization.
     pub realization: usize,
-    /// The covariate; 0 where the model has none.
+    /// The covariate; 0 for models without one.
     pub x: f64,
-    /// Ratings, 1 or more.
+    /// Number of ratings, at least 1.
     pub n: usize,
-    /// Their mean.
+    /// Mean of the ratings.
     pub mean: f64,
-    /// Their sum of squares about it.
+    /// Sum of squared deviations of the ratings from their mean.
     pub within: f64,
 }
 
@@ -30,9 +30,10 @@ pub struct CellSummary {
 pub enum FixedEffects {
     /// One mean.
     Intercept,
-    /// A mean at `centre`, and a slope of the covariate.
+    /// An intercept and a slope of the covariate.
     Covariate {
-        /// Where the intercept (fixed and random) is.
+        /// The value of the covariate at which the intercepts, fixed and random, are
+        /// defined.
         centre: f64,
     },
     /// A mean for each realization.
@@ -43,7 +44,7 @@ pub enum FixedEffects {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unit {
     pub(super) realization: usize,
-    /// The covariate as it came, and standardised.
+    /// The covariate as given, and standardised.
     pub(super) raw: f64,
     pub(super) x: f64,
     pub(super) n: f64,
@@ -60,41 +61,41 @@ pub(super) struct Pattern {
     pub(super) rows: Vec<Vec<f64>>,
 }
 
-/// A table that models can be fitted to: standardised and aggregated.
+/// Cells, standardised and aggregated, with the fixed effects of a model. At most 200
+/// realizations, and Σ patterns × realizations² at most 5·10⁷.
 #[derive(Debug, Clone)]
 pub struct LmmData {
     pub(super) patterns: Vec<Pattern>,
     pub(super) fixed: FixedEffects,
-    /// The numbers of the realizations, sorted.
+    /// The numbers that identify the realizations, sorted.
     pub(super) realizations: Vec<usize>,
     pub(super) subjects: usize,
-    /// Ratings.
+    /// Number of ratings.
     pub(super) n: f64,
     pub(super) cells: usize,
     /// Within-cell sum of squares, standardised.
     pub(super) within: f64,
-    /// What was taken off the ratings, and what they were divided by.
+    /// What was subtracted from the ratings, and what they were divided by.
     pub(super) y_centre: f64,
     pub(super) y_scale: f64,
     /// What the centred covariate was divided by.
     pub(super) x_scale: f64,
-    /// Mean square of the centred covariate about its mean over ratings.
+    /// Variance of the covariate over the ratings, with n.
     pub(super) x_variance: f64,
     /// Whether a subject has two values of the covariate.
     pub(super) x_within: bool,
 }
 
-/// Most realizations: the dense factor has so many columns.
+/// Most realizations: the order of the dense Cholesky factor.
 const MAX_REALIZATIONS: usize = 200;
-/// Most Σ patterns × realizations²: the work of one evaluation.
+/// Most Σ patterns × realizations², which the work of one evaluation is proportional to.
 const MAX_WORK: usize = 50_000_000;
 
 impl LmmData {
-    /// Aggregates cells, for a model with these fixed effects. One subject's
-    /// cells may come in any order.
+    /// Aggregates cells, in any order, for a model with these fixed effects.
     ///
     /// # Errors
-    /// Where no model of this kind is defined for them.
+    /// If no model with these fixed effects is defined for the cells.
     pub fn new(cells: &[CellSummary], fixed: FixedEffects) -> Result<Self, LmmError> {
         if cells.is_empty() || cells.iter().any(|c| c.n == 0) {
             return Err(LmmError::NoData);
@@ -140,14 +141,14 @@ impl LmmData {
         if table.patterns.len().saturating_mul(width * width) > MAX_WORK {
             return Err(LmmError::TooLarge);
         }
-        table.patterns.iter_mut().for_each(shorten);
+        table.patterns.iter_mut().for_each(compress);
         table.with_fixed_effects(fixed)
     }
 
-    /// The same ratings for other fixed effects; the cells are not visited again.
+    /// The same ratings with other fixed effects, without aggregating again.
     ///
     /// # Errors
-    /// Where no model of this kind is defined for them.
+    /// If no model with these fixed effects is defined for the cells.
     pub fn with_fixed_effects(&self, fixed: FixedEffects) -> Result<Self, LmmError> {
         let mut table = self.clone();
         table.fixed = fixed;
@@ -220,14 +221,14 @@ impl LmmData {
                 *sum += y;
             }
             pattern.rows.push(row);
-            // Bounds what a pattern holds while it grows.
+            // Bounds the memory of a growing pattern.
             if pattern.rows.len() >= 1024 + 4 * pattern.units.len() {
-                shorten(pattern);
+                compress(pattern);
             }
         }
     }
 
-    /// Number of fixed effects.
+    /// Number of fixed effects p.
     pub(super) fn columns(&self) -> usize {
         match self.fixed {
             FixedEffects::Intercept => 1,
@@ -236,12 +237,13 @@ impl LmmData {
         }
     }
 
-    /// The numbers of the realizations, sorted: the order of their means.
+    /// The numbers that identify the realizations, sorted: the order of their means in
+    /// contrasts.
     pub fn realizations(&self) -> &[usize] {
         &self.realizations
     }
 
-    /// Number of ratings of each realization, in that order.
+    /// Number of ratings of each realization, in the order of [`Self::realizations`].
     pub(super) fn ratings_by_realization(&self) -> Vec<f64> {
         let mut ratings = vec![0.0; self.realizations.len()];
         for pattern in &self.patterns {
@@ -257,14 +259,14 @@ impl LmmData {
         self.n
     }
 
-    /// Mean square of the covariate about its mean over ratings, n − 1.
+    /// Variance of the covariate over the ratings, with n − 1.
     pub fn covariate_variance(&self) -> f64 {
         self.x_variance * self.n / (self.n - 1.0)
     }
 }
 
-/// Replaces the rows by the factor of Σyy' = QΛQ': the rows √λ·q'.
-fn shorten(pattern: &mut Pattern) {
+/// Replaces the rows by the eigenvalue factor of Σyy' = QΛQ': the rows √λ·q'.
+fn compress(pattern: &mut Pattern) {
     let width = pattern.units.len();
     if pattern.rows.len() <= width {
         return;

@@ -1,15 +1,15 @@
-//! Derivatives by central differences, exact to the fourth power of the step.
+//! Derivatives by central differences of fourth order.
 
 use nalgebra::{DMatrix, DVector};
 
-/// The step in a coordinate of size one; grows with the coordinate.
+/// The step for coordinates up to 1; for larger ones it is relative.
 const STEP: f64 = 0.01;
 
 pub(super) fn step(at: f64) -> f64 {
     STEP * at.abs().max(1.0)
 }
 
-/// ∂f/∂xᵢ for several f at once: (8(f₁ − f₋₁) − (f₂ − f₋₂))/12h.
+/// ∂f/∂xᵢ of a vector-valued f: (8(f₁ − f₋₁) − (f₂ − f₋₂))/12h.
 pub(super) fn first(
     f: &dyn Fn(&[f64]) -> Option<DVector<f64>>,
     at: &[f64],
@@ -55,7 +55,7 @@ pub(super) fn second(
                     + moved(&[(i, -k), (j, -k)])?;
                 Some(corners / (4.0 * k * k * h * step(at[j])))
             };
-            // Richardson's extrapolation of the four corners.
+            // Richardson extrapolation of the four corners.
             let mixed = (4.0 * cross(1.0)? - cross(2.0)?) / 3.0;
             hessian[(a, b)] = mixed;
             hessian[(b, a)] = mixed;

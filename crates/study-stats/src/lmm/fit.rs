@@ -1,7 +1,8 @@
-//! A fit: the minimum of the profiled criterion, on the scale of the data.
+//! Fitting a model: the minimum of the profiled criterion, on the scale of the data.
 //!
-//! ML: d = log|Z part| + N(1 + log 2πr²/N); REML: d = log|Z part| + log|A| +
-//! (N − p)(1 + log 2πr²/(N − p)) (Bates et al. 2015, eqs 34 and 41).
+//! With d_Z the log-determinant of the random part, the criterion is
+//! ML: d_Z + N(1 + log 2πr²/N); REML: d_Z + log|A| + (N − p)(1 + log 2πr²/(N − p))
+//! (Bates et al. 2015, eqs 34 and 41).
 
 use super::data::{FixedEffects, LmmData};
 use super::optimize::minimize;
@@ -10,29 +11,29 @@ use super::start::Coordinates;
 use super::{LmmError, RandomEffects};
 use std::f64::consts::PI;
 
-/// What is maximised.
+/// The likelihood that is maximised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Criterion {
-    /// Likelihood, for tests of fixed effects by likelihood ratio.
+    /// The likelihood: for likelihood-ratio tests of fixed effects.
     Ml,
-    /// Restricted likelihood, for variances and standard errors.
+    /// The restricted likelihood: for variances and standard errors.
     Reml,
 }
 
-/// Variances, in squared units of the rating.
+/// Variance components, in squared units of the rating; 0 if not in the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VarianceComponents {
-    /// Subject intercept.
+    /// Variance of the subject intercept.
     pub intercept: f64,
-    /// Subject slope, per squared unit of the covariate.
+    /// Variance of the subject slope, per squared unit of the covariate.
     pub slope: f64,
-    /// Of intercept and slope.
+    /// Covariance of subject intercept and slope, per unit of the covariate.
     pub covariance: f64,
-    /// Realization intercept.
+    /// Variance of the realization intercept.
     pub realization: f64,
-    /// Cell intercept.
+    /// Variance of the cell intercept.
     pub cell: f64,
-    /// Error.
+    /// Variance of the error.
     pub error: f64,
 }
 
@@ -50,9 +51,9 @@ pub struct LmmFit<'a> {
     pub(super) sigma2: f64,
     /// −2 log (restricted) likelihood.
     pub deviance: f64,
-    /// Fixed effects, variances and σ².
+    /// Number of fixed effects, variances, covariances and σ².
     pub parameters: usize,
-    /// In squared units of the rating.
+    /// The variance components.
     pub variances: VarianceComponents,
     /// Whether a variance is 0 or a correlation ±1.
     pub singular: bool,
@@ -77,10 +78,10 @@ fn deviance(p: &Profile, criterion: Criterion, weight: f64) -> Option<f64> {
     Some(log_det + weight * (1.0 + (2.0 * PI * p.rss / weight).ln()))
 }
 
-/// Share of the variance of the ratings below which there is no error left.
+/// A smaller share of the variance of the ratings is not an error variance but rounding.
 const NO_ERROR: f64 = 1e-13;
 
-/// What the table must have for these effects to be told apart.
+/// Whether the effects can be separated.
 fn identified(table: &LmmData, random: RandomEffects) -> Result<(), LmmError> {
     let covariate = matches!(table.fixed, FixedEffects::Covariate { .. });
     if random.realization && table.realizations.len() < 2 {
@@ -95,8 +96,8 @@ fn identified(table: &LmmData, random: RandomEffects) -> Result<(), LmmError> {
     if random.cell && table.n <= table.cells as f64 {
         return Err(LmmError::NoRepetition);
     }
-    // The residual with every random effect taken as a fixed one: the penalised
-    // residual is that + c/γ for large γ, and two γ take c out.
+    // The residual with every random effect taken as a fixed one: for large γ the
+    // penalised residual is that + c/γ, and two values of γ eliminate c.
     let rss = |all: f64| {
         let ratios = Ratios {
             intercept: all,
@@ -117,10 +118,11 @@ fn identified(table: &LmmData, random: RandomEffects) -> Result<(), LmmError> {
     }
 }
 
-/// Fits a model to a table.
+/// Fits a model.
 ///
 /// # Errors
-/// Where the effects cannot be told apart, or nothing is left for the error.
+/// If the effects cannot be separated, no error variance is left, or the search does not
+/// converge.
 pub fn fit(
     table: &LmmData,
     random: RandomEffects,
@@ -139,7 +141,7 @@ pub fn fit(
         .iter()
         .filter_map(|start| minimize(&value, start, &bounded));
     let found = if bounded.len() == 1 {
-        // The criterion can have two minima.
+        // The criterion can have two local minima.
         ends.min_by(|a, b| a.value.total_cmp(&b.value))
     } else {
         ends.next()
@@ -177,17 +179,17 @@ pub fn fit(
 }
 
 impl LmmFit<'_> {
-    /// −2 log L + 2k.
+    /// Akaike's criterion −2 log L + 2k, k the number of parameters.
     pub fn aic(&self) -> f64 {
         self.deviance + 2.0 * self.parameters as f64
     }
 
-    /// −2 log L + k log N.
+    /// Schwarz's criterion −2 log L + k log N.
     pub fn bic(&self) -> f64 {
         self.deviance + self.parameters as f64 * self.table.n.ln()
     }
 
-    /// What a unit of each fixed effect is in data units, and what is added.
+    /// The scale and offset that transform each fixed effect to the units of the data.
     pub(super) fn units(&self) -> Vec<(f64, f64)> {
         let t = self.table;
         match t.fixed {
@@ -199,8 +201,8 @@ impl LmmFit<'_> {
         }
     }
 
-    /// Σ lᵢβᵢ of the fixed effects: the means of [`FixedEffects::Realizations`], or the mean
-    /// at the centre and the slope.
+    /// The contrast Σ lᵢβᵢ of the fixed effects: of the means of
+    /// [`FixedEffects::Realizations`], of the intercept, or of intercept and slope.
     pub fn estimate(&self, l: &[f64]) -> f64 {
         self.units()
             .iter()

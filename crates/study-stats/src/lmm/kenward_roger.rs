@@ -1,6 +1,7 @@
-//! Kenward & Roger's (1997) F for realization means beside a subject intercept.
+//! Kenward & Roger's (1997) F test of realization means in a model with a subject
+//! intercept.
 //!
-//! V = σ²I + τ²J within a subject of n ratings, c of them of each realization.
+//! V = σ²I + τ²J within a subject with n ratings.
 //! With e = 1/(1 + nγ): V⁻ᵏ = (I − (1 − eᵏ)/n·J)/σ²ᵏ and J V⁻¹ = e/σ² J. For
 //! the parameters τ² (G₁ = J) and σ² (G₂ = I):
 //!
@@ -21,8 +22,9 @@ use crate::distribution::f_upper;
 use crate::finite;
 use nalgebra::{Cholesky, DMatrix};
 
-/// Tests that all realizations have the same mean. `None` for any other model
-/// than means with a subject intercept by REML, and where it is not defined.
+/// Tests that all realizations have the same mean. `None` unless the model was fitted by
+/// REML with [`FixedEffects::Realizations`] and a subject intercept only, or if the
+/// adjustment is not defined.
 pub fn kenward_roger(fit: &LmmFit<'_>) -> Option<ContrastF> {
     let table = fit.table;
     let wanted = table.fixed == FixedEffects::Realizations
@@ -30,7 +32,7 @@ pub fn kenward_roger(fit: &LmmFit<'_>) -> Option<ContrastF> {
         && fit.criterion == Criterion::Reml;
     let p = table.columns();
     let q = p.checked_sub(1).filter(|q| *q > 0 && wanted)?;
-    // σ² = 1 without loss: the scale cancels in F and its df.
+    // σ² = 1 without loss of generality: it cancels in F and its degrees of freedom.
     let gamma = fit.coordinates.ratios(&fit.at).intercept;
     let zero = || DMatrix::<f64>::zeros(p, p);
     let mut information = zero();
@@ -101,7 +103,7 @@ pub fn kenward_roger(fit: &LmmFit<'_>) -> Option<ContrastF> {
     })
 }
 
-/// m and λ.
+/// The denominator degrees of freedom m and the scale λ.
 fn scaled(a1: f64, a2: f64, q: f64) -> Option<(f64, f64)> {
     let b = (a1 + 6.0 * a2) / (2.0 * q);
     let g = ((q + 1.0) * a1 - (q + 4.0) * a2) / ((q + 2.0) * a2);

@@ -1,17 +1,17 @@
-//! Newton's method within bounds, made safe by the size of the eigenvalues.
+//! Newton's method with bounds and absolute eigenvalues.
 //!
-//! A step is −Σ q q'g/|λ| over the eigenpairs of the Hessian of the coordinates
-//! that are free: downhill also where the criterion is not convex. It is halved
-//! until the criterion falls. A bounded coordinate that is 0 and wants to go
-//! below is held at 0 exactly. A direction with next to no slope and no curvature
-//! is left alone: where the intercept has no variance, θ₂² and δ are one, and the
-//! criterion is flat along their sum. The search has converged when the step
-//! promises less than 10⁻⁷ of deviance; three more steps then polish the digits.
+//! A step is −Σ q q'g/|λ| over the eigenpairs of the Hessian of the free coordinates: a
+//! descent direction also where the criterion is not convex. It is halved until the
+//! criterion decreases. A bounded coordinate that is 0 and whose gradient points outwards
+//! is held at exactly 0. A direction with neither slope nor curvature is left out: if the
+//! intercept has no variance, θ₂² and δ cannot be separated, and the criterion is flat
+//! along their sum. The search has converged when the predicted decrease of the deviance
+//! is below 10⁻⁷; three more steps refine the last digits.
 
 use super::differences::second;
 use nalgebra::{DVector, SymmetricEigen};
 
-/// Where a search ended.
+/// The result of a search.
 #[derive(Debug, Clone)]
 pub(super) struct Minimum {
     pub(super) at: Vec<f64>,
@@ -22,19 +22,19 @@ pub(super) struct Minimum {
 
 const MAX_STEPS: usize = 80;
 const MAX_HALVINGS: usize = 40;
-/// Longest step in a coordinate, of its own size or 1.
+/// Longest step in a coordinate, relative to its size or to 1.
 const REACH: f64 = 3.0;
-/// Promised fall below which the search has converged.
+/// Predicted decrease below which the search has converged.
 const SMALL: f64 = 1e-7;
-/// γ = e⁴⁰ times the error: nothing is left to explain.
+/// γ = e⁴⁰: the error variance is practically 0.
 const FAR: f64 = 40.0;
 
-/// Share of the largest curvature below which there is none, and the slope below
-/// which it is the noise of differences.
+/// A direction is flat if its curvature is below this share of the largest one, and its
+/// slope below the noise of the differences.
 const FLAT: f64 = 1e-6;
 const LEVEL: f64 = 1e-5;
 
-/// Searches from a point; `None` if it does not converge.
+/// Searches a local minimum from `start`; `None` if the search does not converge.
 pub(super) fn minimize(
     f: &dyn Fn(&[f64]) -> Option<f64>,
     start: &[f64],
@@ -54,10 +54,10 @@ pub(super) fn minimize(
         let small = free.len();
         let g = DVector::from_fn(small, |i, _| gradient[free[i]]);
         let h = nalgebra::DMatrix::from_fn(small, small, |i, j| hessian[(free[i], free[j])]);
-        let Some((mut step, promise)) = direction(&g, h) else {
+        let Some((mut step, decrease)) = direction(&g, h) else {
             return Some(Minimum { at, value, free });
         };
-        if promise < SMALL {
+        if decrease < SMALL {
             for (k, &i) in free.iter().enumerate() {
                 at[i] = inside(at[i] + step[k], bounded[i]);
             }
@@ -101,7 +101,7 @@ pub(super) fn minimize(
     None
 }
 
-/// Below this a coordinate is on its boundary.
+/// A bounded coordinate below this is on its boundary.
 const ZERO: f64 = 1e-8;
 
 fn inside(x: f64, bounded: bool) -> f64 {
@@ -114,7 +114,7 @@ fn inside(x: f64, bounded: bool) -> f64 {
     }
 }
 
-/// The step and the fall that it promises; `None` without free coordinates.
+/// The step and its predicted decrease; `None` without free coordinates.
 fn direction(g: &DVector<f64>, h: nalgebra::DMatrix<f64>) -> Option<(DVector<f64>, f64)> {
     if g.is_empty() {
         return None;
@@ -123,17 +123,17 @@ fn direction(g: &DVector<f64>, h: nalgebra::DMatrix<f64>) -> Option<(DVector<f64
     let largest = eigen.eigenvalues.amax();
     let floor = (1e-9 * largest).max(1e-9);
     let mut along = eigen.eigenvectors.tr_mul(g);
-    let mut promise = 0.0;
+    let mut decrease = 0.0;
     for (a, l) in along.iter_mut().zip(eigen.eigenvalues.iter()) {
         if l.abs() < FLAT * largest && a.abs() < LEVEL {
             *a = 0.0;
             continue;
         }
         let size = l.abs().max(floor);
-        promise += 0.5 * *a * *a / size;
+        decrease += 0.5 * *a * *a / size;
         *a /= -size;
     }
-    Some((&eigen.eigenvectors * along, promise))
+    Some((&eigen.eigenvectors * along, decrease))
 }
 
 #[cfg(test)]
@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_minimum_inside_is_found_to_its_digits() {
+    fn an_interior_minimum_is_found_precisely() {
         let f = |x: &[f64]| Some((x[0] - 1.0).powi(2) + 10.0 * (x[1] - x[0] * x[0]).powi(2));
         let m = minimize(&f, &[3.0, 0.5], &[true, false]).unwrap();
         assert!(
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_minimum_on_the_boundary_is_zero_exactly() {
+    fn a_coordinate_on_the_boundary_is_exactly_zero() {
         let f = |x: &[f64]| Some((x[0] + 0.3).powi(2) + (x[1] - x[0] - 2.0).powi(2));
         let m = minimize(&f, &[4.0, 1.0], &[true, true]).unwrap();
         assert_eq!(m.at[0], 0.0);
@@ -162,16 +162,16 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_direction_is_no_reason_to_give_up() {
-        // Only the sum of the squares has a minimum; the digits are those of a
-        // criterion of 150.
+    fn a_flat_direction_does_not_prevent_convergence() {
+        // Only the sum of the squares has a minimum; the criterion has the size of a
+        // deviance.
         let f = |x: &[f64]| Some(150.0 + (x[0] * x[0] + x[1] * x[1] - 2.0).powi(2));
         let m = minimize(&f, &[0.3, 1.0], &[false, false]).unwrap();
         assert!((m.value - 150.0).abs() < 1e-9, "{m:?}");
     }
 
     #[test]
-    fn a_slope_without_end_does_not_hang() {
+    fn a_criterion_without_minimum_gives_none() {
         assert!(minimize(&|x| Some(-x[0]), &[1.0], &[true]).is_none());
         assert!(minimize(&|x| Some(-x[0]), &[1.0], &[false]).is_none());
     }

@@ -1,14 +1,16 @@
 //! The profiled criterion at given variance ratios.
 //!
-//! With Γ (2 × 2) of the subject, γ_m of the realization, γ_c of the cell, all
-//! relative to σ²:
+//! With the variances Γ (2 × 2) of the subject, γ_m of the realization and γ_c of the
+//! cell, all relative to σ²:
 //!
-//! * cells: the weight of a mean of n ratings is w = n/(1 + nγ_c); det 1 + nγ_c;
-//! * subjects: with z = (1, x), S = Σwzz': M = W − WZ Γ(I + SΓ)⁻¹ Z'W; det |I + SΓ|;
-//! * realizations: B = Z_m'MZ_m, Ω = M − γ_m MZ_m(I + γ_mB)⁻¹Z_m'M; det |I + γ_mB|.
+//! * cells: the weight of a mean of n ratings is w = n/(1 + nγ_c); determinant 1 + nγ_c;
+//! * subjects: with z = (1, x), S = Σwzz': M = W − WZ Γ(I + SΓ)⁻¹ Z'W;
+//!   determinant |I + SΓ|;
+//! * realizations: B = Z_m'MZ_m, Ω = M − γ_m MZ_m(I + γ_mB)⁻¹Z_m'M;
+//!   determinant |I + γ_mB|.
 //!
-//! Then A = X'ΩX, β = A⁻¹X'Ωy, r² = y'Ωy − β'X'Ωy + within. No root of a variance
-//! is taken, so that the criterion is smooth through the boundary 0.
+//! Then A = X'ΩX, β = A⁻¹X'Ωy, r² = y'Ωy − β'X'Ωy + within. The criterion
+//! contains no root of a variance and is therefore smooth through the boundary 0.
 
 use super::RandomEffects;
 use super::data::{FixedEffects, LmmData};
@@ -24,12 +26,12 @@ pub(super) struct Ratios {
     pub(super) cell: f64,
 }
 
-/// What the criterion is made of.
+/// The parts of the criterion.
 #[derive(Debug, Clone)]
 pub(super) struct Profile {
-    /// log det of the random part.
+    /// Log-determinant of the random part.
     pub(super) log_det_z: f64,
-    /// log det A.
+    /// log|A|.
     pub(super) log_det_x: f64,
     /// Penalised residual sum of squares.
     pub(super) rss: f64,
@@ -44,8 +46,8 @@ impl Profile {
     }
 }
 
-/// The sums [columns, y]'M[columns, y], columns those of the realizations (if
-/// random) and then of X.
+/// The sums [C, y]'M[C, y], with C the columns of the realizations (if random) and then
+/// those of X.
 struct Sums {
     /// Lower triangle.
     matrix: DMatrix<f64>,
@@ -54,7 +56,8 @@ struct Sums {
     log_det: f64,
 }
 
-/// Evaluates; `None` where a determinant is not positive or something overflows.
+/// Evaluates the criterion's parts; `None` if a determinant is not positive or a sum
+/// overflows.
 pub(super) fn profile(table: &LmmData, random: RandomEffects, ratios: &Ratios) -> Option<Profile> {
     let realizations = if random.realization {
         table.realizations.len()
@@ -76,7 +79,7 @@ pub(super) fn profile(table: &LmmData, random: RandomEffects, ratios: &Ratios) -
         }
         let factor = Cholesky::new(inner)?;
         sums.log_det += log_det(&factor);
-        // Columns: the cross products of the realizations with X and with y.
+        // The cross products of the realizations with X and, in the last column, y.
         let mut cross = DMatrix::<f64>::zeros(realizations, p + 1);
         for m in 0..realizations {
             for j in 0..p {
@@ -159,7 +162,7 @@ fn sums(
             s22 += w * unit.x * unit.x;
             sum1 += w * sum;
             sum2 += w * unit.x * sum;
-            // The design row has at most three entries.
+            // A design row has at most three non-zero entries.
             let fixed: [(usize, f64); 2] = match table.fixed {
                 FixedEffects::Intercept => [(realizations, 1.0), (realizations, 0.0)],
                 FixedEffects::Covariate { .. } => [(realizations, 1.0), (realizations + 1, unit.x)],
@@ -216,7 +219,7 @@ fn sums(
     Some(sums)
 }
 
-/// Φ = Γ(I + SΓ)⁻¹, symmetric, and log det(I + SΓ).
+/// Φ = Γ(I + SΓ)⁻¹, which is symmetric, and log|I + SΓ|.
 struct Inner {
     p11: f64,
     p12: f64,

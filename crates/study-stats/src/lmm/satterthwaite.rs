@@ -1,10 +1,10 @@
-//! Satterthwaite's degrees of freedom.
+//! t and F tests with Satterthwaite's (1946) degrees of freedom.
 //!
 //! With f(φ) = l'C(φ)l the variance of an estimate, C the covariance of the fixed
 //! effects, φ the coordinates off the boundary and log σ², g = ∂f/∂φ, H the
 //! Hessian of the REML deviance: var φ = 2H⁻¹, and ν = 2f²/(g'2H⁻¹g). A variance
-//! on the boundary is taken as known. F over several contrasts: lmerTest's
-//! contrasts, rotated to independent ones (Kuznetsova et al. 2017, §2.3): tₘ² = (l̃ₘ'β)²/dₘ,
+//! on the boundary is treated as known. F over several contrasts: those of lmerTest,
+//! rotated to be uncorrelated (Kuznetsova et al. 2017, §2.3): tₘ² = (l̃ₘ'β)²/dₘ,
 //! F = mean tₘ², E = Σ νₘ/(νₘ − 2), ν = 2E/(E − q).
 
 use super::data::FixedEffects;
@@ -15,42 +15,42 @@ use crate::distribution::{f_upper, t_quantile, t_two_sided};
 use crate::finite;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// A test of one contrast of the fixed effects.
+/// A t test of one contrast of the fixed effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContrastT {
-    /// Σ lᵢβᵢ.
+    /// The contrast Σ lᵢβᵢ.
     pub estimate: f64,
-    /// Its standard error.
+    /// Standard error of the contrast.
     pub se: f64,
-    /// estimate/se.
+    /// estimate/se; `None` if it overflows.
     pub t: Option<f64>,
-    /// Satterthwaite's.
+    /// Satterthwaite's degrees of freedom; `None` if the criterion has no curvature.
     pub df: Option<f64>,
-    /// Two-sided.
+    /// Two-sided p of t.
     pub p: Option<f64>,
-    /// 95 % by t.
+    /// 95 % t interval.
     pub ci95: Option<(f64, f64)>,
 }
 
-/// A test that several contrasts are 0.
+/// An F test that several contrasts are 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContrastF {
-    /// On `df1` and `df2`.
+    /// F on `df1` and `df2` degrees of freedom.
     pub f: f64,
     /// Number of contrasts.
     pub df1: f64,
-    /// Of the denominator.
+    /// Denominator degrees of freedom; `None` if the criterion has no curvature.
     pub df2: Option<f64>,
     /// P(F ≥ f).
     pub p: Option<f64>,
 }
 
-/// Covariance of the fixed effects, its derivatives, and H⁻¹; standardised.
+/// Covariance of the fixed effects, its derivatives, and H⁻¹, in standardised units.
 struct Uncertainty {
     covariance: DMatrix<f64>,
-    /// By the free coordinates, then log σ².
+    /// With respect to the free coordinates, then log σ².
     derivatives: Vec<DMatrix<f64>>,
-    /// H⁻¹ of these.
+    /// H⁻¹ over the same coordinates.
     inverse: DMatrix<f64>,
 }
 
@@ -67,7 +67,7 @@ impl Uncertainty {
 }
 
 impl LmmFit<'_> {
-    /// Tests Σ lᵢβᵢ = 0.
+    /// Tests Σ lᵢβᵢ = 0; `l` has an element for each fixed effect.
     pub fn t_test(&self, l: &[f64]) -> ContrastT {
         let u = self.uncertainty();
         self.t_with(l, u.as_ref())
@@ -82,7 +82,7 @@ impl LmmFit<'_> {
             .collect()
     }
 
-    /// The contrast in units of the standardised effects.
+    /// The contrast, applied to standardised effects.
     fn scaled(&self, l: &[f64]) -> DVector<f64> {
         DVector::from_iterator(
             l.len(),
@@ -108,8 +108,8 @@ impl LmmFit<'_> {
         }
     }
 
-    /// Tests that the means of all realizations are equal; for a table of
-    /// [`super::FixedEffects::Realizations`] with two or more.
+    /// Tests that the means of all realizations are equal. `None` unless the model has
+    /// [`super::FixedEffects::Realizations`] and two realizations or more.
     pub fn f_test(&self) -> Option<ContrastF> {
         let p = self.table.columns();
         let of_realizations = matches!(self.table.fixed, FixedEffects::Realizations);
@@ -138,10 +138,10 @@ impl LmmFit<'_> {
         })
     }
 
-    /// `None` if the criterion has no curvature to go by.
+    /// `None` if the criterion has no curvature.
     fn uncertainty(&self) -> Option<Uncertainty> {
         let (table, random) = (self.table, self.coordinates.random);
-        let place = |free: &[f64]| {
+        let profile_at = |free: &[f64]| {
             let mut at = self.at.clone();
             for (&i, v) in self.free.iter().zip(free) {
                 at[i] = *v;
@@ -151,14 +151,14 @@ impl LmmFit<'_> {
         let at: Vec<f64> = self.free.iter().map(|&i| self.at[i]).collect();
         let all: Vec<usize> = (0..at.len()).collect();
         let p = table.columns();
-        // At the fitted σ²; REML whatever the fit's criterion.
+        // At the fitted σ²; REML for either criterion of the fit.
         let value = |x: &[f64]| {
-            let p = place(x)?;
+            let p = profile_at(x)?;
             Some(p.log_det_z + p.log_det_x + p.rss / self.sigma2)
         };
         let (_, curvature) = second(&value, &at, &all)?;
         let parts = |x: &[f64]| {
-            let found = place(x)?;
+            let found = profile_at(x)?;
             let inverse = found.inverse();
             Some(DVector::from_iterator(
                 p * p + 1,
@@ -197,10 +197,9 @@ impl LmmFit<'_> {
     }
 }
 
-/// The contrasts of a sequential decomposition (lmerTest's for one factor): each
-/// level but the first against the ratings of the first and of all later ones.
-/// F is the same for every basis, its degrees of freedom are not where the
-/// levels have unequal numbers.
+/// The contrasts of a sequential decomposition (lmerTest's for one factor): each level
+/// but the first against the ratings of the first and of all later ones. F does not
+/// depend on the basis; its degrees of freedom do if the numbers of ratings are unequal.
 fn sequential(ratings: &[f64]) -> DMatrix<f64> {
     let p = ratings.len();
     let others = |i: usize| ratings[0] + ratings[i + 2..].iter().sum::<f64>();
@@ -211,7 +210,7 @@ fn sequential(ratings: &[f64]) -> DMatrix<f64> {
     })
 }
 
-/// Denominator degrees of freedom of F from those of its parts.
+/// Denominator degrees of freedom of F from those of its contrasts.
 fn pooled(dfs: &[f64]) -> Option<f64> {
     let q = dfs.len() as f64;
     let mean = dfs.iter().sum::<f64>() / q;

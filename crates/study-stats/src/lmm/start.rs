@@ -1,7 +1,7 @@
-//! The coordinates of the search, and where it starts.
+//! The coordinates of the search, and its starting points.
 //!
-//! A variance ratio is searched as u = ln(1 + cγ) ≥ 0, c the most ratings of one
-//! level: the log-determinants are nearly linear in u. A correlated intercept
+//! A variance ratio is searched as u = ln(1 + cγ) ≥ 0, with c the largest number of
+//! ratings of one level: the log-determinants are nearly linear in u. A correlated intercept
 //! and slope are Γ = θθ' + diag(0, δ), θ = (θ₁, θ₂) free, δ ≥ 0 the variance of
 //! the slope given the intercept; |correlation| = 1 is δ = 0.
 
@@ -9,7 +9,7 @@ use super::RandomEffects;
 use super::data::LmmData;
 use super::profile::Ratios;
 
-/// Most points that are started from.
+/// Most starting points.
 const MAX_STARTS: usize = 4;
 
 /// Maps the coordinates to variance ratios.
@@ -45,7 +45,7 @@ impl Coordinates {
         }
     }
 
-    /// Which coordinates end at 0.
+    /// Which coordinates are bounded below by 0.
     pub(super) fn bounded(&self) -> Vec<bool> {
         let mut bounded = if self.random.slope {
             vec![false, false, true]
@@ -82,9 +82,9 @@ impl Coordinates {
         ratios
     }
 
-    /// Points of a coarse grid from which the search starts: of one coordinate
-    /// every dip of the line, of more the best of them, and the next best for when
-    /// the search does not come to an end from there.
+    /// Starting points from a coarse grid: with one coordinate every local minimum of the
+    /// grid; with several the best points, of which the later ones serve if the search
+    /// from the first does not converge.
     pub(super) fn starts(&self, f: &dyn Fn(&[f64]) -> Option<f64>) -> Vec<Vec<f64>> {
         let bounded = self.bounded();
         let axes: Vec<&[f64]> = match (bounded.len(), self.random.slope) {

@@ -1,4 +1,5 @@
-//! What must hold for every fit. The digits are held by tests/analyze_golden.rs.
+//! Properties of every fit. `tests/analyze/golden.rs` of the repository compares the
+//! numbers with other programs.
 
 use super::*;
 use crate::correlation::{p_of_r, pearson};
@@ -46,8 +47,8 @@ fn close(a: f64, b: f64, relative: f64) {
     );
 }
 
-/// The level of inference: in balanced complete data off the boundary the
-/// realizations are the units, and the crossed model says what Pearson says.
+/// In balanced complete data off the boundary the realizations are the units of
+/// inference, and the crossed model agrees with Pearson's correlation.
 #[test]
 fn the_crossed_models_p_is_pearsons_over_realization_means() {
     let mut off_the_boundary = 0;
@@ -73,7 +74,7 @@ fn the_crossed_models_p_is_pearsons_over_realization_means() {
     assert!(off_the_boundary >= 10, "only {off_the_boundary}");
 }
 
-/// Mean squares of balanced data: REML off the boundary is the analysis of variance.
+/// For balanced data off the boundary REML agrees with the analysis of variance.
 #[test]
 fn a_balanced_random_intercept_has_its_closed_form() {
     let (subjects, n) = (7usize, 2usize);
@@ -109,15 +110,15 @@ fn a_balanced_random_intercept_has_its_closed_form() {
         (ms_subject - ss_error / df) / per_subject,
         1e-8,
     );
-    // Then both denominators are the residual's.
+    // Both denominator degrees of freedom are then those of the residual.
     close(fit.f_test().unwrap().df2.unwrap(), df, 1e-5);
     let adjusted = kenward_roger(&fit).unwrap();
     close(adjusted.df2.unwrap(), df, 1e-8);
     close(adjusted.f, fit.f_test().unwrap().f, 1e-8);
 }
 
-/// Unequal numbers of ratings, cells missing: the degrees of freedom of F hang on
-/// the contrasts that are taken. R 4.2.2, lmerTest 3.1.3,
+/// Unequal numbers of ratings and missing cells: the degrees of freedom of F depend on
+/// the choice of contrasts. R 4.2.2, lmerTest 3.1.3,
 /// `anova(lmer(y ~ m + (1 | s)))`: F 4.5316903505 on 2 and 11.5614721934,
 /// p .0352250596.
 #[test]
@@ -155,7 +156,7 @@ fn f_over_unequal_numbers_takes_the_contrasts_of_lmertest() {
 }
 
 #[test]
-fn a_variance_on_the_boundary_is_zero_exactly() {
+fn a_variance_on_the_boundary_is_exactly_zero() {
     // Each subject has the same mean.
     let mut cells = balanced(5, 6, &X, 2, [0.0, 1.0, 0.0, 1.0]);
     for own in cells.chunk_by_mut(|a, b| a.subject == b.subject) {
@@ -168,7 +169,7 @@ fn a_variance_on_the_boundary_is_zero_exactly() {
     assert!(fit.singular);
 }
 
-/// Every n, mean and covariate another: each subject a pattern of its own.
+/// Cells with different n, so that each subject has its own pattern.
 fn ragged(seed: u64) -> Vec<CellSummary> {
     let mut noise = SplitMix64::new(seed);
     balanced(seed, 9, &X, 3, [0.8, 0.4, 0.3, 1.0])
@@ -224,9 +225,9 @@ fn shift_scale_names_and_order_do_not_matter() {
     }
 }
 
-/// The sufficient statistics of a shared pattern say what the subjects say.
+/// The sufficient statistics of a shared pattern give the same fit as its subjects.
 #[test]
-fn many_subjects_of_one_pattern_are_as_each_alone() {
+fn subjects_of_one_pattern_are_aggregated_without_loss() {
     let cells = balanced(2, 30, &X, 3, [0.7, 0.6, 0.4, 1.0]);
     let shared = table(&cells);
     assert_eq!(shared.patterns.len(), 1);
@@ -254,12 +255,12 @@ fn many_subjects_of_one_pattern_are_as_each_alone() {
 }
 
 #[test]
-fn what_is_not_defined_says_why() {
+fn undefined_models_have_a_reason() {
     let cells = balanced(1, 4, &X, 1, [1.0, 1.0, 1.0, 1.0]);
     let table = table(&cells);
-    let why = |r: Result<LmmFit<'_>, LmmError>| r.unwrap_err();
+    let error = |r: Result<LmmFit<'_>, LmmError>| r.unwrap_err();
     assert_eq!(
-        why(fit(&table, CROSSED, Criterion::Reml)),
+        error(fit(&table, CROSSED, Criterion::Reml)),
         LmmError::NoRepetition
     );
     let new = |cells: &[CellSummary]| {
@@ -289,7 +290,7 @@ fn what_is_not_defined_says_why() {
     });
     let additive = LmmData::new(&additive, FixedEffects::Realizations).unwrap();
     assert_eq!(
-        why(fit(&additive, RandomEffects::default(), Criterion::Ml)),
+        error(fit(&additive, RandomEffects::default(), Criterion::Ml)),
         LmmError::NoError
     );
     let two: Vec<CellSummary> = cells
@@ -303,12 +304,12 @@ fn what_is_not_defined_says_why() {
         ..CROSSED
     };
     assert_eq!(
-        why(fit(&two, crossed, Criterion::Reml)),
+        error(fit(&two, crossed, Criterion::Reml)),
         LmmError::FewRealizations
     );
 }
 
-/// Small tables of small whole numbers: the worst for boundaries and ties.
+/// Small tables of small whole numbers, which often lie on boundaries.
 #[test]
 fn random_small_tables_give_numbers_or_reasons() {
     let mut draws = SplitMix64::new(9);
