@@ -1,16 +1,15 @@
-//! How often each test rejects at 5 % where there is nothing to find.
+//! How often each test rejects at 5 % under its null hypothesis.
 //!
-//! `cargo bench --bench calibration -- --studies 10000`: so many simulated studies
-//! of 10 × 5 × 3 ratings of 1 to 7 through the analysis as it ships, in each of three
-//! worlds. In *level* participants differ in nothing but their level. In *taste* each
-//! likes some realizations more than others, but all together like none more. In
-//! *differ* realizations differ as well, by chance, standard deviation 0.5, and VAF
-//! has nothing to do with it: the world in which "VAF predicts the rating" has to be
-//! rejected 5 % of the time. The seed is fixed: the same number of studies prints the
-//! same table, whatever the number of threads.
+//! `cargo bench --bench calibration -- --studies 10000` analyses this many simulated
+//! studies of 10 participants × 5 realizations × 3 repetitions, with ratings of 1 to 7,
+//! in each of three scenarios. In *level* participants differ only in their level. In
+//! *taste* each prefers some realizations, but there is no preference on average. In
+//! *differ* the realizations differ as well, at random with standard deviation 0.5 and
+//! independently of VAF: the null hypothesis of "VAF predicts the rating". The seed is
+//! fixed: the same number of studies prints the same table for any number of threads.
 //!
-//! An exact test can reach only some p. Its attainable level is the share of all
-//! equally likely arrangements of a study's own data (orders of the realizations,
+//! An exact test can attain only some values of p. Its attainable level is the share of
+//! all equally likely arrangements of a study's own data (orders of the realizations,
 //! signs of the differences) with p ≤ .05, averaged over the studies.
 #![allow(clippy::print_stdout)]
 
@@ -26,15 +25,17 @@ const SUBJECTS: u32 = 10;
 const MODELS: u32 = 5;
 const REPETITIONS: u32 = 3;
 
+/// How the simulated ratings vary.
 #[derive(Clone, Copy, PartialEq)]
-enum World {
+enum Scenario {
     Level,
     Taste,
     Differ,
 }
 
-/// Tests of "do realizations differ" and of the order, null where they do not.
-const ALIKE: [&str; 21] = [
+/// Tests of differences between realizations and of order effects: their null hypothesis
+/// holds in *level* and *taste*.
+const DIFFERENCE_TESTS: [&str; 21] = [
     "rmanova/p",
     "rmanova/p_gg",
     "rmanova/p_hf",
@@ -58,8 +59,8 @@ const ALIKE: [&str; 21] = [
     "clmm_model_quad/beta/m1",
 ];
 
-/// Tests of VAF, null everywhere.
-const VAF: [&str; 24] = [
+/// Tests of VAF: their null hypothesis holds in every scenario.
+const VAF_TESTS: [&str; 24] = [
     "corr/pearson/p_t",
     "corr/pearson/p_exact_two_sided",
     "corr/pearson/p_exact_greater",
@@ -86,7 +87,7 @@ const VAF: [&str; 24] = [
     "bootstrap/bca",
 ];
 
-/// Families of pairs: any of the ten after Holm's correction.
+/// Families of pairwise tests: any of the ten rejects after Holm's correction.
 const FAMILIES: [&str; 2] = ["p_t_holm", "p_wilcoxon_exact_holm"];
 
 fn main() {
@@ -95,13 +96,13 @@ fn main() {
     let studies = at
         .and_then(|at| args.get(at + 1)?.parse().ok())
         .unwrap_or(10_000u32);
-    println!("{studies} studies of {SUBJECTS} × {MODELS} × {REPETITIONS} in each world.");
+    println!("{studies} studies of {SUBJECTS} × {MODELS} × {REPETITIONS} in each scenario.");
     println!("`*`: further than three binomial standard deviations from the attainable level.");
-    for world in [World::Level, World::Taste, World::Differ] {
-        let name = world.name();
-        println!("\n| world `{name}` | rejected | attainable | ± | | undefined in |");
+    for scenario in [Scenario::Level, Scenario::Taste, Scenario::Differ] {
+        let name = scenario.name();
+        println!("\n| scenario `{name}` | rejected | attainable | ± | | undefined in |");
         println!("|---|---|---|---|---|---|");
-        for (id, found) in &count(world, studies) {
+        for (id, found) in &count(scenario, studies) {
             let n = f64::from(studies);
             let rate = f64::from(found.rejected) / n;
             let level = found.attainable as f64 / (n * UNIT);
@@ -118,26 +119,28 @@ fn main() {
     }
 }
 
-/// What a level of 1 counts in [`Found::attainable`]. Whole numbers, so that the
-/// order in which studies end changes no sum.
+/// A level of 1 in [`Rates::attainable`]. Levels are added as whole numbers, so that the
+/// order in which studies finish does not affect the sum.
 const UNIT: f64 = 1e9;
 
 #[derive(Default, Clone, Copy)]
-struct Found {
+struct Rates {
     rejected: u32,
     defined: u32,
     attainable: u64,
 }
 
-fn count(world: World, studies: u32) -> BTreeMap<String, Found> {
-    let tests: Vec<&str> = match world {
-        World::Level | World::Taste => ALIKE.iter().chain(&VAF).copied().collect(),
-        World::Differ => VAF.to_vec(),
+fn count(scenario: Scenario, studies: u32) -> BTreeMap<String, Rates> {
+    let tests: Vec<&str> = match scenario {
+        Scenario::Level | Scenario::Taste => {
+            DIFFERENCE_TESTS.iter().chain(&VAF_TESTS).copied().collect()
+        }
+        Scenario::Differ => VAF_TESTS.to_vec(),
     };
     (0..studies)
         .into_par_iter()
         .map(|number| {
-            let ratings = study(world, number);
+            let ratings = study(scenario, number);
             let v = analyze(&ratings, &Rules::default()).values;
             let cells = Cells::of(&ratings);
             let mut found = BTreeMap::new();
@@ -145,7 +148,7 @@ fn count(world: World, studies: u32) -> BTreeMap<String, Found> {
                 let rejected = rejects(&v, id);
                 found.insert((*id).to_owned(), one(rejected, cells.attainable(id)));
             }
-            for name in FAMILIES.iter().filter(|_| world != World::Differ) {
+            for name in FAMILIES.iter().filter(|_| scenario != Scenario::Differ) {
                 let pairs = v.iter().map(|(id, _)| id);
                 let pairs = pairs.filter(|id| id.starts_with("posthoc/") && id.ends_with(name));
                 let rejected = pairs.filter_map(|id| rejects(&v, id)).reduce(|a, b| a | b);
@@ -155,7 +158,7 @@ fn count(world: World, studies: u32) -> BTreeMap<String, Found> {
         })
         .reduce(BTreeMap::new, |mut all, one| {
             for (id, one) in one {
-                let sum: &mut Found = all.entry(id).or_default();
+                let sum: &mut Rates = all.entry(id).or_default();
                 sum.rejected += one.rejected;
                 sum.defined += one.defined;
                 sum.attainable += one.attainable;
@@ -164,16 +167,16 @@ fn count(world: World, studies: u32) -> BTreeMap<String, Found> {
         })
 }
 
-/// A test that is not defined does not reject.
-fn one(rejected: Option<bool>, attainable: f64) -> Found {
-    Found {
+/// An undefined test does not reject.
+fn one(rejected: Option<bool>, attainable: f64) -> Rates {
+    Rates {
         rejected: u32::from(rejected == Some(true)),
         defined: u32::from(rejected.is_some()),
         attainable: (attainable * UNIT).round() as u64,
     }
 }
 
-/// Whether a test rejects at 5 %: by its p, by Wald's z, by an interval without 0.
+/// Whether a test rejects at 5 %: by its p, by Wald's z, or because its interval excludes 0.
 fn rejects(v: &Values, id: &str) -> Option<bool> {
     if let Some((group, name)) = id.split_once("/beta/") {
         let se = v.number(&format!("{group}/se/{name}"))?;
@@ -189,7 +192,7 @@ fn rejects(v: &Values, id: &str) -> Option<bool> {
 
 const VAFS: [f64; MODELS as usize] = [0.701, 0.742, 0.778, 0.785, 0.793];
 
-/// Sums of the ratings by subject and realization: all cells hold three.
+/// Sums of the three ratings of each cell, by participant and realization.
 struct Cells(Vec<[f64; MODELS as usize]>);
 
 impl Cells {
@@ -203,8 +206,8 @@ impl Cells {
         Self(sums)
     }
 
-    /// Share of the equally likely arrangements with p ≤ .05; .05 of a test that
-    /// is not exact.
+    /// Share of the equally likely arrangements with p ≤ .05; .05 for tests that are not
+    /// exact.
     fn attainable(&self, id: &str) -> f64 {
         let two_sided = id.ends_with("two_sided");
         let statistic: fn(&[f64], &[f64]) -> Option<f64> = match id.rsplit_once("/p_exact") {
@@ -229,30 +232,31 @@ impl Cells {
         rejected as f64 / all.len() as f64
     }
 
-    /// All signs of the differences of the first two realizations.
+    /// The attainable level of Wilcoxon's test of the first two realizations, over all
+    /// signs of the differences.
     fn signed_ranks(&self) -> f64 {
         let d = self.0.iter().map(|s| (s[0] - s[1]).abs());
         let d: Vec<f64> = d.filter(|d| *d > 0.0).collect();
         let ranks = doubled_ranks(&d);
-        // How many of the signs give each sum of positive ranks.
-        let mut ways = vec![0u64; ranks.iter().sum::<i64>() as usize + 1];
-        ways[0] = 1;
+        // The number of sign patterns for each sum of positive ranks.
+        let mut patterns = vec![0u64; ranks.iter().sum::<i64>() as usize + 1];
+        patterns[0] = 1;
         for &rank in &ranks {
-            for at in (rank as usize..ways.len()).rev() {
-                ways[at] += ways[at - rank as usize];
+            for at in (rank as usize..patterns.len()).rev() {
+                patterns[at] += patterns[at - rank as usize];
             }
         }
-        let total: u64 = ways.iter().sum();
-        let rejected = (0..ways.len()).filter(|&at| {
-            let below: u64 = ways[..=at].iter().sum();
-            let above: u64 = ways[at..].iter().sum();
+        let total: u64 = patterns.iter().sum();
+        let rejected = (0..patterns.len()).filter(|&at| {
+            let below: u64 = patterns[..=at].iter().sum();
+            let above: u64 = patterns[at..].iter().sum();
             2.0 * below.min(above) as f64 / total as f64 <= 0.05
         });
-        rejected.map(|at| ways[at]).sum::<u64>() as f64 / total as f64
+        rejected.map(|at| patterns[at]).sum::<u64>() as f64 / total as f64
     }
 }
 
-/// Every order of the values from `from` on.
+/// Calls `visit` for every order of the values from `from` on.
 fn orders(x: &mut [f64], from: usize, visit: &mut impl FnMut(&[f64])) {
     if from == x.len() {
         return visit(x);
@@ -264,7 +268,7 @@ fn orders(x: &mut [f64], from: usize, visit: &mut impl FnMut(&[f64])) {
     }
 }
 
-impl World {
+impl Scenario {
     fn name(self) -> &'static str {
         match self {
             Self::Level => "level",
@@ -273,7 +277,7 @@ impl World {
         }
     }
 
-    /// Standard deviations of the realizations and of the tastes.
+    /// Standard deviations of the realizations and of the preferences.
     fn spread(self) -> (f64, f64) {
         match self {
             Self::Level => (0.0, 0.0),
@@ -283,10 +287,11 @@ impl World {
     }
 }
 
-/// One study without an effect of VAF. Participants differ in level (0.7).
-fn study(world: World, number: u32) -> Ratings {
-    let mut noise = Stream::new(2007, &["calibration", world.name(), &number.to_string()]);
-    let (of_models, of_tastes) = world.spread();
+/// One study without an effect of VAF. The levels of participants have the standard
+/// deviation 0.7.
+fn study(scenario: Scenario, number: u32) -> Ratings {
+    let mut noise = Stream::new(2007, &["calibration", scenario.name(), &number.to_string()]);
+    let (of_models, of_tastes) = scenario.spread();
     let of_model: Vec<f64> = (0..MODELS).map(|_| of_models * noise.normal()).collect();
     let lambda = [0.9991, 0.9993, 0.9995, 0.9997, 0.9999];
     let mut csv = String::from("subject,model,repetition,rating,vaf,trial_index,lambda\n");
@@ -299,8 +304,8 @@ fn study(world: World, number: u32) -> Ratings {
             noise.shuffle(&mut order);
             for m in order {
                 trial += 1;
-                let felt = level + of_model[m] + taste[m] + 0.8 * noise.normal();
-                let rating = felt.round().clamp(1.0, 7.0);
+                let impression = level + of_model[m] + taste[m] + 0.8 * noise.normal();
+                let rating = impression.round().clamp(1.0, 7.0);
                 csv += &format!(
                     "S{s:02},m{m},{},{rating},{},{trial},{}\n",
                     r + 1,
@@ -310,5 +315,5 @@ fn study(world: World, number: u32) -> Ratings {
             }
         }
     }
-    Ratings::read_csv("calibration", csv.as_bytes(), None).expect("the table is a good one")
+    Ratings::read_csv("calibration", csv.as_bytes(), None).expect("the table is valid")
 }

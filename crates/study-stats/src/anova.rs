@@ -273,6 +273,9 @@ mod tests {
         assert!((a.effect.f.unwrap() - t * t).abs() < 1e-12);
         assert_eq!(a.effect.mauchly, None);
         assert!((a.effect.eps_gg.unwrap() - 1.0).abs() < 1e-12);
+        // SSm = 6, SSs = 9, SSe = 1.
+        assert!((a.ges.unwrap() - 6.0 / 16.0).abs() < 1e-12);
+        assert!((a.pes.unwrap() - 6.0 / 7.0).abs() < 1e-12);
     }
 
     #[test]
