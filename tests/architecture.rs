@@ -106,9 +106,7 @@ const IMPORTS: [(&str, &[&str]); 22] = [
 ];
 
 /// Circles that stand and have to go: this list only gets shorter.
-const KNOWN_CIRCLES: [&str; 1] = [
-    "study/report/html: circle of answers, methods, prose",
-];
+const KNOWN_CIRCLES: [&str; 1] = ["study/report/html: circle of answers, methods, prose"];
 
 /// Modules that may touch files, clocks, terminals, processes or the network.
 const WITH_IO: [&str; 6] = [

@@ -9,7 +9,6 @@ pub(super) use args::Args;
 use super::console::{PATIENCE, progress};
 use super::{Console, Failure, Kind};
 use args::NamedPath;
-use indicatif::ProgressBar;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
@@ -269,44 +268,16 @@ fn identify(
 ) -> Result<Vec<Cell>, IdentifyError> {
     let training = Training::new(training)?;
     let recordings: Vec<&Recording> = recordings.iter().map(|(_, r)| *r).collect();
-    let progress = Progress::new(plan.cells());
-    grid::run(&training, plan, args.lookup, &recordings, || {
-        progress.step()
-    })
-}
-
-/// A progress bar that appears after [`PATIENCE`].
-struct Progress {
-    began: Instant,
-    cells: u64,
-    done: AtomicU64,
-    bar: OnceLock<ProgressBar>,
-}
-
-impl Progress {
-    fn new(cells: usize) -> Self {
-        Self {
-            began: Instant::now(),
-            cells: cells as u64,
-            done: AtomicU64::new(0),
-            bar: OnceLock::new(),
+    let (began, done, bar) = (Instant::now(), AtomicU64::new(0), OnceLock::new());
+    let cells = grid::run(&training, plan, args.lookup, &recordings, || {
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if began.elapsed() > PATIENCE {
+            bar.get_or_init(|| progress(plan.cells() as u64, "cells"))
+                .set_position(done);
         }
+    });
+    if let Some(bar) = bar.get() {
+        bar.finish_and_clear();
     }
-
-    /// Counts a finished cell; called from any thread.
-    fn step(&self) {
-        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        if self.began.elapsed() > PATIENCE {
-            let bar = self.bar.get_or_init(|| progress(self.cells, "cells"));
-            bar.set_position(done);
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        if let Some(bar) = self.bar.get() {
-            bar.finish_and_clear();
-        }
-    }
+    cells
 }

@@ -18,6 +18,8 @@ const MAX_LEVELS: usize = 1000;
 const LENGTHS_MM: RangeInclusive<f64> = -1000.0..=1000.0;
 /// Range of frequencies, Hz.
 const FREQUENCIES_HZ: RangeInclusive<f64> = 1e-3..=1000.0;
+/// Range of phases, degrees.
+const PHASES_DEG: RangeInclusive<f64> = -360.0..=360.0;
 /// Range of times, s.
 const TIMES_S: RangeInclusive<f64> = 1e-3..=MAX_DURATION_S;
 
@@ -49,9 +51,7 @@ fn read(document: &Document<'_>) -> Option<Trajectory> {
         return None;
     }
     let title = root.text("title");
-    let offset_mm = required(&mut root, "offset_mm", LENGTHS_MM);
-    let duration_s = required(&mut root, "duration_s", TIMES_S);
-    let ramp_s = required(&mut root, "ramp_s", 1e-3..=MAX_RAMP_S);
+    let timing = numbers(&mut root, &TRAJECTORY);
     let limits = root.table("limits").and_then(limits);
     let tables = root.tables("parts");
     if tables.is_empty() || tables.len() > MAX_PARTS {
@@ -66,18 +66,51 @@ fn read(document: &Document<'_>) -> Option<Trajectory> {
     }
     let parts = tables.into_iter().filter_map(part).collect();
     root.finish();
+    let [offset_mm, duration_s, ramp_s] = timing?;
     Some(Trajectory {
         title,
-        offset_mm: offset_mm?,
-        duration_s: duration_s?,
-        ramp_s: ramp_s?,
+        offset_mm,
+        duration_s,
+        ramp_s,
         parts,
         limits,
     })
 }
 
+/// A key with a number: its name, its range, and its default if it is optional.
+type Key = (&'static str, RangeInclusive<f64>, Option<f64>);
+
+/// The numbers of a trajectory and of each kind of part, for reading and writing.
+const TRAJECTORY: [Key; 3] = [
+    ("offset_mm", LENGTHS_MM, None),
+    ("duration_s", TIMES_S, None),
+    ("ramp_s", 1e-3..=MAX_RAMP_S, None),
+];
+const SINE: [Key; 3] = [
+    ("amplitude_mm", LENGTHS_MM, None),
+    ("frequency_hz", FREQUENCIES_HZ, None),
+    ("phase_deg", PHASES_DEG, Some(0.0)),
+];
+const SWEEP: [Key; 5] = [
+    ("amplitude_mm", LENGTHS_MM, None),
+    ("from_hz", FREQUENCIES_HZ, None),
+    ("to_hz", FREQUENCIES_HZ, None),
+    ("period_s", TIMES_S, None),
+    ("phase_deg", PHASES_DEG, Some(0.0)),
+];
+const PRBS: [Key; 3] = [
+    ("amplitude_mm", LENGTHS_MM, None),
+    ("bit_s", TIMES_S, None),
+    ("rise_s", TIMES_S, None),
+];
+const STEPS: [Key; 3] = [
+    ("speed_mm_s", 1e-3..=1e5, None),
+    ("acceleration_m_s2", 1e-3..=1e4, None),
+    ("hold_s", 0.0..=MAX_DURATION_S, Some(0.0)),
+];
+
 /// A number in a range; NaN is in no range.
-fn number(value: &Value<'_, '_>, range: RangeInclusive<f64>) -> Option<f64> {
+fn number(value: &Value<'_, '_>, range: &RangeInclusive<f64>) -> Option<f64> {
     let number = value.f64()?;
     if range.contains(&number) {
         return Some(number);
@@ -91,22 +124,21 @@ fn number(value: &Value<'_, '_>, range: RangeInclusive<f64>) -> Option<f64> {
     None
 }
 
-/// The number of a required key.
-fn required(table: &mut Table<'_, '_>, key: &str, range: RangeInclusive<f64>) -> Option<f64> {
-    number(&table.required(key)?, range)
-}
-
-/// The number of an optional key.
-fn optional(
-    table: &mut Table<'_, '_>,
-    key: &str,
-    range: RangeInclusive<f64>,
-    default: f64,
-) -> Option<f64> {
-    match table.value(key) {
-        Some(value) => number(&value, range),
-        None => Some(default),
+/// The numbers of a table, in the order of the keys; reports the faults of all.
+fn numbers<const N: usize>(table: &mut Table<'_, '_>, keys: &[Key; N]) -> Option<[f64; N]> {
+    let mut all = Some([0.0; N]);
+    for (i, (key, range, default)) in keys.iter().enumerate() {
+        let value = match default {
+            Some(_) => table.value(key),
+            None => table.required(key),
+        };
+        let read = value.map_or(*default, |value| number(&value, range));
+        all = all.zip(read).map(|(mut all, number)| {
+            all[i] = number;
+            all
+        });
     }
+    all
 }
 
 fn limits(mut table: Table<'_, '_>) -> Option<Envelope> {
@@ -141,63 +173,45 @@ fn limits(mut table: Table<'_, '_>) -> Option<Envelope> {
     })
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Kind {
-    Sine,
-    Sweep,
-    Prbs,
-    Steps,
-}
+/// Reads a part of one kind.
+type Reader = fn(&mut Table<'_, '_>) -> Option<Part>;
+const KINDS: [(&str, Reader); 4] = [
+    ("sine", sine),
+    ("sweep", sweep),
+    ("prbs", prbs),
+    ("steps", steps),
+];
 
 fn part(mut table: Table<'_, '_>) -> Option<Part> {
-    let kind = table.required("kind").and_then(|v| {
-        v.word(&[
-            ("sine", Kind::Sine),
-            ("sweep", Kind::Sweep),
-            ("prbs", Kind::Prbs),
-            ("steps", Kind::Steps),
-        ])
-    })?;
-    let part = match kind {
-        Kind::Sine => sine(&mut table).map(Part::Sine),
-        Kind::Sweep => sweep(&mut table).map(Part::Sweep),
-        Kind::Prbs => prbs(&mut table).map(Part::Prbs),
-        Kind::Steps => steps(&mut table).map(Part::Steps),
-    };
+    let read = table.required("kind").and_then(|v| v.word(&KINDS))?;
+    let part = read(&mut table);
     table.finish();
     part
 }
 
-fn sine(table: &mut Table<'_, '_>) -> Option<Sine> {
-    let amplitude_mm = required(table, "amplitude_mm", LENGTHS_MM);
-    let frequency_hz = required(table, "frequency_hz", FREQUENCIES_HZ);
-    let phase_deg = optional(table, "phase_deg", -360.0..=360.0, 0.0);
-    Some(Sine {
-        amplitude_mm: amplitude_mm?,
-        frequency_hz: frequency_hz?,
-        phase_deg: phase_deg?,
-    })
+fn sine(table: &mut Table<'_, '_>) -> Option<Part> {
+    let [amplitude_mm, frequency_hz, phase_deg] = numbers(table, &SINE)?;
+    Some(Part::Sine(Sine {
+        amplitude_mm,
+        frequency_hz,
+        phase_deg,
+    }))
 }
 
-fn sweep(table: &mut Table<'_, '_>) -> Option<Sweep> {
+fn sweep(table: &mut Table<'_, '_>) -> Option<Part> {
     let shape = table.required("shape").and_then(|v| v.word(&SHAPES));
-    let amplitude_mm = required(table, "amplitude_mm", LENGTHS_MM);
-    let from_hz = required(table, "from_hz", FREQUENCIES_HZ);
-    let to_hz = required(table, "to_hz", FREQUENCIES_HZ);
-    let period_s = required(table, "period_s", TIMES_S);
-    let phase_deg = optional(table, "phase_deg", -360.0..=360.0, 0.0);
-    Some(Sweep {
+    let [amplitude_mm, from_hz, to_hz, period_s, phase_deg] = numbers(table, &SWEEP)?;
+    Some(Part::Sweep(Sweep {
         shape: shape?,
-        amplitude_mm: amplitude_mm?,
-        from_hz: from_hz?,
-        to_hz: to_hz?,
-        period_s: period_s?,
-        phase_deg: phase_deg?,
-    })
+        amplitude_mm,
+        from_hz,
+        to_hz,
+        period_s,
+        phase_deg,
+    }))
 }
 
-fn prbs(table: &mut Table<'_, '_>) -> Option<Prbs> {
-    let amplitude_mm = required(table, "amplitude_mm", LENGTHS_MM);
+fn prbs(table: &mut Table<'_, '_>) -> Option<Part> {
     let order = table.required("order").and_then(|value| {
         let order = value.u32()?;
         if !PRBS_ORDERS.contains(&order) {
@@ -211,25 +225,22 @@ fn prbs(table: &mut Table<'_, '_>) -> Option<Prbs> {
         }
         Some(order)
     });
-    let bit_s = required(table, "bit_s", TIMES_S);
-    let rise_s = table.required("rise_s").and_then(|value| {
-        let rise_s = number(&value, TIMES_S)?;
-        if bit_s.is_some_and(|bit_s| rise_s > bit_s) {
-            value.fault(
-                Fault::error(format!("`{}` is longer than a bit", value.path()))
-                    .hint("a change has to end within its bit: rise_s is at most bit_s"),
-            );
-            return None;
-        }
-        Some(rise_s)
-    });
-    Prbs::new(amplitude_mm?, order?, bit_s?, rise_s?)
+    let [amplitude_mm, bit_s, rise_s] = numbers(table, &PRBS)?;
+    if rise_s > bit_s {
+        table.fault_at(
+            "rise_s",
+            Fault::error(format!("`{}.rise_s` is longer than a bit", table.path()))
+                .hint("a change has to end within its bit: rise_s is at most bit_s"),
+        );
+        return None;
+    }
+    Prbs::new(amplitude_mm, order?, bit_s, rise_s).map(Part::Prbs)
 }
 
-fn steps(table: &mut Table<'_, '_>) -> Option<Steps> {
+fn steps(table: &mut Table<'_, '_>) -> Option<Part> {
     let levels = table.required("levels_mm").and_then(|value| {
         let all = value.array()?;
-        let levels: Vec<f64> = all.iter().filter_map(|v| number(v, LENGTHS_MM)).collect();
+        let levels: Vec<f64> = all.iter().filter_map(|v| number(v, &LENGTHS_MM)).collect();
         if levels.len() < all.len() {
             return None;
         }
@@ -244,15 +255,13 @@ fn steps(table: &mut Table<'_, '_>) -> Option<Steps> {
         }
         Some(levels)
     });
-    let speed_mm_s = required(table, "speed_mm_s", 1e-3..=1e5);
-    let acceleration_m_s2 = required(table, "acceleration_m_s2", 1e-3..=1e4);
-    let hold_s = optional(table, "hold_s", 0.0..=MAX_DURATION_S, 0.0);
-    Some(Steps {
+    let [speed_mm_s, acceleration_m_s2, hold_s] = numbers(table, &STEPS)?;
+    Some(Part::Steps(Steps {
         levels_mm: levels?,
-        speed_mm_s: speed_mm_s?,
-        acceleration_m_s2: acceleration_m_s2?,
-        hold_s: hold_s?,
-    })
+        speed_mm_s,
+        acceleration_m_s2,
+        hold_s,
+    }))
 }
 
 /// The text of a trajectory file.
@@ -262,13 +271,7 @@ pub fn write(trajectory: &Trajectory) -> String {
     if let Some(title) = &t.title {
         line(&mut out, "title", toml::Value::String(title.clone()));
     }
-    for (key, number) in [
-        ("offset_mm", t.offset_mm),
-        ("duration_s", t.duration_s),
-        ("ramp_s", t.ramp_s),
-    ] {
-        line(&mut out, key, format!("{number:?}"));
-    }
+    lines(&mut out, &TRAJECTORY, [t.offset_mm, t.duration_s, t.ramp_s]);
     if let Some(limits) = &t.limits {
         out.push_str("\n[limits]\n");
         line(&mut out, "travel_mm", format!("{:?}", limits.travel_mm));
@@ -282,33 +285,25 @@ pub fn write(trajectory: &Trajectory) -> String {
         }
     }
     for part in &t.parts {
-        out.push_str("\n[[parts]]\n");
-        let mut numbers = |kind: &str, pairs: &[(&str, f64)]| {
-            line(&mut out, "kind", format!("\"{kind}\""));
-            for (key, number) in pairs {
-                line(&mut out, key, format!("{number:?}"));
-            }
+        let kind = match part {
+            Part::Sine(_) => "sine",
+            Part::Sweep(_) => "sweep",
+            Part::Prbs(_) => "prbs",
+            Part::Steps(_) => "steps",
         };
+        out.push_str("\n[[parts]]\n");
+        line(&mut out, "kind", format!("\"{kind}\""));
         match part {
-            Part::Sine(p) => numbers(
-                "sine",
-                &[
-                    ("amplitude_mm", p.amplitude_mm),
-                    ("frequency_hz", p.frequency_hz),
-                    ("phase_deg", p.phase_deg),
-                ],
-            ),
-            Part::Sweep(p) => {
-                numbers(
-                    "sweep",
-                    &[
-                        ("amplitude_mm", p.amplitude_mm),
-                        ("from_hz", p.from_hz),
-                        ("to_hz", p.to_hz),
-                        ("period_s", p.period_s),
-                        ("phase_deg", p.phase_deg),
-                    ],
+            Part::Sine(p) => {
+                lines(
+                    &mut out,
+                    &SINE,
+                    [p.amplitude_mm, p.frequency_hz, p.phase_deg],
                 );
+            }
+            Part::Sweep(p) => {
+                let values = [p.amplitude_mm, p.from_hz, p.to_hz, p.period_s, p.phase_deg];
+                lines(&mut out, &SWEEP, values);
                 let shape = match p.shape {
                     Shape::Triangular => "triangular",
                     Shape::Linear => "linear",
@@ -316,30 +311,23 @@ pub fn write(trajectory: &Trajectory) -> String {
                 line(&mut out, "shape", format!("\"{shape}\""));
             }
             Part::Prbs(p) => {
-                numbers(
-                    "prbs",
-                    &[
-                        ("amplitude_mm", p.amplitude_mm),
-                        ("bit_s", p.bit_s),
-                        ("rise_s", p.rise_s),
-                    ],
-                );
+                lines(&mut out, &PRBS, [p.amplitude_mm, p.bit_s, p.rise_s]);
                 line(&mut out, "order", p.order());
             }
             Part::Steps(p) => {
-                numbers(
-                    "steps",
-                    &[
-                        ("speed_mm_s", p.speed_mm_s),
-                        ("acceleration_m_s2", p.acceleration_m_s2),
-                        ("hold_s", p.hold_s),
-                    ],
-                );
+                let values = [p.speed_mm_s, p.acceleration_m_s2, p.hold_s];
+                lines(&mut out, &STEPS, values);
                 line(&mut out, "levels_mm", format!("{:?}", p.levels_mm));
             }
         }
     }
     out
+}
+
+fn lines<const N: usize>(out: &mut String, keys: &[Key; N], values: [f64; N]) {
+    for ((key, ..), value) in keys.iter().zip(values) {
+        line(out, key, format!("{value:?}"));
+    }
 }
 
 fn line(out: &mut String, key: &str, value: impl std::fmt::Display) {
