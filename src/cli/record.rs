@@ -159,19 +159,19 @@ fn header(
         out,
         "again: the command of the first line, with these two files as the trajectory and --plant"
     );
-    for (file, text) in [
-        ("TRAJECTORY", trajectory::file::write(trajectory)),
-        ("PLANT", plant::file::write(target)),
-    ] {
-        let _ = writeln!(out, "{file}:");
-        // blank lines would be lost where trailing spaces are stripped
-        for line in text.lines().filter(|line| !line.is_empty()) {
-            let _ = writeln!(out, "  {line}");
-        }
-    }
-    out
+    out + &embedded("TRAJECTORY", &trajectory::file::write(trajectory))
+        + &embedded("PLANT", &plant::file::write(target))
 }
 
+/// A file as part of the header, under its name.
+fn embedded(name: &str, text: &str) -> String {
+    // blank lines would be lost where trailing spaces are stripped
+    let lines = text.lines().filter(|line| !line.is_empty());
+    let lines: String = lines.map(|line| format!("  {line}\n")).collect();
+    format!("{name}:\n{lines}")
+}
+
+/// The header line about the filter of the signals.
 fn filter_line(args: &Args) -> String {
     match args.raw {
         true => "filter: none; x as the encoder counts, a and F with their noise\n".to_owned(),

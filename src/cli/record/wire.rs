@@ -1,7 +1,7 @@
 //! Recording with a probe on a serial port: the sampled trajectory is sent to the device,
 //! which follows it and returns the measured signals.
 
-use super::{Args, filter_line, finish, recording_bytes};
+use super::{Args, embedded, filter_line, finish, recording_bytes};
 use crate::cli::console::shell_command;
 use crate::cli::device::port::PortConnection;
 use crate::cli::trajectory::{read_trajectory, refuse_to_overwrite};
@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let why = why.to_string();
         let (address, why) = (Untrusted(&address), Untrusted(&why));
         Failure::new(Kind::Device, format!("{address}: {why}")).hint(
-            "nothing was recorded; `study device info` shows what the probe reaches, `study trajectory` what the path asks for",
+            "nothing was recorded; `study device info` shows the limits of the probe, `study trajectory` the extremes of the trajectory",
         )
     })?;
     let measured = Measurement {
@@ -87,13 +87,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         env!("CARGO_PKG_VERSION"),
     );
     header.push_str(&filter_line(args));
-    header.push_str("TRAJECTORY:\n");
-    // blank lines would be lost where trailing spaces are stripped
-    for line in trajectory::file::write(&trajectory).lines() {
-        if !line.is_empty() {
-            header.push_str(&format!("  {line}\n"));
-        }
-    }
+    header.push_str(&embedded(
+        "TRAJECTORY",
+        &trajectory::file::write(&trajectory),
+    ));
     let bytes = recording_bytes(&trajectory, &measured, filter, args.rate, &header);
     finish(args, &bytes, console)
 }
