@@ -17,7 +17,7 @@ pub mod stream;
 pub mod table;
 
 use super::frame::{Frame, MAX_BODY};
-use bytes::{Reader, Writer};
+use bytes::{Field, Reader, Writer, fields};
 use core::fmt;
 use core::num::NonZeroU16;
 
@@ -147,187 +147,191 @@ impl<T: Copy + Default + PartialEq, const N: usize> PartialEq for FixedVec<T, N>
     }
 }
 
-/// Opens a connection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Hello {
-    /// Different for each connection; the device returns it.
-    pub nonce: u32,
+fields! {
+    /// Opens a connection.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Hello {
+        /// Different for each connection; the device returns it.
+        nonce: u32;
+    }
 }
 
-/// Completes an upload.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Commit {
-    /// CRC over the fields of BEGIN and all nodes or points in the order sent.
-    pub crc: u32,
+fields! {
+    /// Completes an upload.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Commit {
+        /// CRC over the fields of BEGIN and all nodes or points in the order sent.
+        crc: u32;
+    }
 }
 
-/// Starts to play a table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Play {
-    /// The host's number for this playback, not 0.
-    pub playback: u32,
-    /// CRC of the table that has to be loaded.
-    pub crc: u32,
-    /// Duration after which the device stops by itself, ms.
-    pub longest_ms: u32,
-    /// Servo periods per telemetry sample; `None` without telemetry. A device whose
-    /// link is slower takes fewer samples.
-    pub every: Option<NonZeroU16>,
+fields! {
+    /// Starts to play a table.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Play {
+        /// The host's number for this playback, not 0.
+        playback: u32;
+        /// CRC of the table that has to be loaded.
+        crc: u32;
+        /// Duration after which the device stops by itself, ms.
+        longest_ms: u32;
+        /// Servo periods per telemetry sample; `None` without telemetry. A device whose
+        /// link is slower takes fewer samples.
+        every: Option<NonZeroU16>;
+    }
 }
 
-/// Starts a recording along a path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Record {
-    /// The host's number for this recording, not 0.
-    pub playback: u32,
-    /// CRC of the path that has to be loaded.
-    pub crc: u32,
+fields! {
+    /// Starts a recording along a path.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Record {
+        /// The host's number for this recording, not 0.
+        playback: u32;
+        /// CRC of the path that has to be loaded.
+        crc: u32;
+    }
 }
 
-/// Ends a playback.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stop {
-    /// The host's number of the playback or recording to stop.
-    pub playback: u32,
+fields! {
+    /// Ends a playback.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Stop {
+        /// The host's number of the playback or recording to stop.
+        playback: u32;
+    }
 }
 
-/// Shows that the host is alive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Heartbeat {
-    /// Higher than in every earlier heartbeat, wrapping.
-    pub count: u32,
-    /// Time on the device's clock at which the heartbeat expires, ms, wrapping.
-    pub deadline_ms: u32,
-}
-
-/// A message from the host to the device. Each request gets exactly one [`Reply`]
-/// with its sequence number; the reply to a heartbeat is a [`Reply::Pulse`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(
-    clippy::large_enum_variant,
-    reason = "a device does not allocate and holds one message at a time"
-)]
-pub enum Request {
-    /// Opens a connection and ends that of another host.
-    Hello(Hello),
-    /// Begins the upload of a table.
-    TableBegin(TableBegin),
-    /// Carries nodes of the table.
-    TableChunk(TableChunk),
-    /// Ends the upload of a table.
-    TableCommit(Commit),
-    /// Plays the loaded table.
-    Play(Play),
-    /// Stops playing or recording.
-    Stop(Stop),
-    /// Sets the force to zero at once and latches, in every state.
-    Limp,
+fields! {
     /// Shows that the host is alive.
-    Heartbeat(Heartbeat),
-    /// Leaves `Limp` or `Fault`, only at rest.
-    Rearm,
-    /// Asks for the state and the outcome of the last playback.
-    State,
-    /// Begins the upload of a path.
-    PathBegin(PathBegin),
-    /// Carries points of the path.
-    PathChunk(PathChunk),
-    /// Ends the upload of a path.
-    PathCommit(Commit),
-    /// Records along the loaded path.
-    Record(Record),
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    Heartbeat {
+        /// Higher than in every earlier heartbeat, wrapping.
+        count: u32;
+        /// Time on the device's clock at which the heartbeat expires, ms, wrapping.
+        deadline_ms: u32;
+    }
 }
 
-/// A message from the device to the host.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(
-    clippy::large_enum_variant,
-    reason = "a device does not allocate and holds one message at a time"
-)]
-pub enum Reply {
-    /// Reply to every request without a reply of its own.
-    Ack(Ack),
-    /// Reply to HELLO.
-    Identity(Identity),
-    /// Reply to STATE.
-    Outcome(Outcome),
-    /// Reply to a heartbeat.
-    Pulse(Pulse),
-    /// Samples of a playback; unsolicited.
-    Telemetry(Telemetry),
-    /// A change of state; unsolicited.
-    Event(Event),
-    /// Samples of a recording; unsolicited.
-    Recorded(Recorded),
+/// Defines the messages of both directions: their enums, type bytes, encoding and
+/// decoding.
+macro_rules! messages {
+    ($($(#[$about:meta])* $direction:ident {
+        $($(#[$what:meta])* $variant:ident $(($fields:ident: $payload:ty))? = $constant:ident $kind:literal;)+
+    })+) => {
+        $(
+            $(#[$about])*
+            #[derive(Debug, Clone, Copy, PartialEq)]
+            #[allow(
+                clippy::large_enum_variant,
+                reason = "a device does not allocate and holds one message at a time"
+            )]
+            pub enum $direction {
+                $($(#[$what])* $variant $(($payload))?,)+
+            }
+
+            impl $direction {
+                /// The message type, see [`kind`].
+                pub fn kind(&self) -> u8 {
+                    match self {
+                        $(Self::$variant { .. } => $kind,)+
+                    }
+                }
+
+                /// Encodes the message as a frame.
+                pub fn frame(&self, sequence: u16) -> Frame {
+                    let mut out = header(self.kind(), sequence);
+                    match self {
+                        $(Self::$variant $(($fields))? => { $($fields.write(&mut out);)? })+
+                    }
+                    to_frame(&out)
+                }
+
+                /// Decodes the body of a frame.
+                ///
+                /// # Errors
+                /// [`WireError`]. A device refuses such a request. A host treats such a
+                /// reply as a damaged frame, except for [`WireError::Version`], which
+                /// means that the device is incompatible.
+                pub fn decode(body: &[u8]) -> Result<(Header, Self), WireError> {
+                    let (header, mut from) = split_header(body)?;
+                    let message = match header.kind {
+                        $($kind => Self::$variant $((<$payload>::read(&mut from)?))?,)+
+                        other => return Err(WireError::UnknownType(other)),
+                    };
+                    from.done()?;
+                    Ok((header, message))
+                }
+            }
+        )+
+
+        /// Message types: below 0x80 to the device, from 0x80 to the host.
+        pub mod kind {
+            $($(
+                #[doc = concat!("[`super::", stringify!($direction), "::", stringify!($variant), "`]")]
+                pub const $constant: u8 = $kind;
+            )+)+
+        }
+
+        // Every message fits into a frame.
+        const _: () = {
+            $($($(assert!(Header::LEN + <$payload as Field>::MAX_LEN <= MAX_BODY);)?)+)+
+        };
+    };
 }
 
-/// Message types: below 0x80 to the device, from 0x80 to the host.
-pub mod kind {
-    /// [`super::Request::Hello`]
-    pub const HELLO: u8 = 0x01;
-    /// [`super::Request::TableBegin`]
-    pub const TABLE_BEGIN: u8 = 0x02;
-    /// [`super::Request::TableChunk`]
-    pub const TABLE_CHUNK: u8 = 0x03;
-    /// [`super::Request::TableCommit`]
-    pub const TABLE_COMMIT: u8 = 0x04;
-    /// [`super::Request::Play`]
-    pub const PLAY: u8 = 0x05;
-    /// [`super::Request::Stop`]
-    pub const STOP: u8 = 0x06;
-    /// [`super::Request::Limp`]
-    pub const LIMP: u8 = 0x07;
-    /// [`super::Request::Heartbeat`]
-    pub const HEARTBEAT: u8 = 0x08;
-    /// [`super::Request::Rearm`]
-    pub const REARM: u8 = 0x09;
-    /// [`super::Request::State`]
-    pub const STATE: u8 = 0x0A;
-    /// [`super::Request::PathBegin`]
-    pub const PATH_BEGIN: u8 = 0x10;
-    /// [`super::Request::PathChunk`]
-    pub const PATH_CHUNK: u8 = 0x11;
-    /// [`super::Request::PathCommit`]
-    pub const PATH_COMMIT: u8 = 0x12;
-    /// [`super::Request::Record`]
-    pub const RECORD: u8 = 0x13;
-    /// [`super::Reply::Ack`]
-    pub const ACK: u8 = 0x80;
-    /// [`super::Reply::Identity`]
-    pub const IDENTITY: u8 = 0x81;
-    /// [`super::Reply::Outcome`]
-    pub const OUTCOME: u8 = 0x82;
-    /// [`super::Reply::Pulse`]
-    pub const PULSE: u8 = 0x83;
-    /// [`super::Reply::Telemetry`]
-    pub const TELEMETRY: u8 = 0x90;
-    /// [`super::Reply::Event`]
-    pub const EVENT: u8 = 0x91;
-    /// [`super::Reply::Recorded`]
-    pub const RECORDED: u8 = 0x92;
+messages! {
+    /// A message from the host to the device. Each request gets exactly one [`Reply`]
+    /// with its sequence number; the reply to a heartbeat is a [`Reply::Pulse`].
+    Request {
+        /// Opens a connection and ends that of another host.
+        Hello(fields: Hello) = HELLO 0x01;
+        /// Begins the upload of a table.
+        TableBegin(fields: TableBegin) = TABLE_BEGIN 0x02;
+        /// Carries nodes of the table.
+        TableChunk(fields: TableChunk) = TABLE_CHUNK 0x03;
+        /// Ends the upload of a table.
+        TableCommit(fields: Commit) = TABLE_COMMIT 0x04;
+        /// Plays the loaded table.
+        Play(fields: Play) = PLAY 0x05;
+        /// Stops playing or recording.
+        Stop(fields: Stop) = STOP 0x06;
+        /// Sets the force to zero at once and latches, in every state.
+        Limp = LIMP 0x07;
+        /// Shows that the host is alive.
+        Heartbeat(fields: Heartbeat) = HEARTBEAT 0x08;
+        /// Leaves `Limp` or `Fault`, only at rest.
+        Rearm = REARM 0x09;
+        /// Asks for the state and the outcome of the last playback.
+        State = STATE 0x0A;
+        /// Begins the upload of a path.
+        PathBegin(fields: PathBegin) = PATH_BEGIN 0x10;
+        /// Carries points of the path.
+        PathChunk(fields: PathChunk) = PATH_CHUNK 0x11;
+        /// Ends the upload of a path.
+        PathCommit(fields: Commit) = PATH_COMMIT 0x12;
+        /// Records along the loaded path.
+        Record(fields: Record) = RECORD 0x13;
+    }
+    /// A message from the device to the host.
+    Reply {
+        /// Reply to every request without a reply of its own.
+        Ack(fields: Ack) = ACK 0x80;
+        /// Reply to HELLO.
+        Identity(fields: Identity) = IDENTITY 0x81;
+        /// Reply to STATE.
+        Outcome(fields: Outcome) = OUTCOME 0x82;
+        /// Reply to a heartbeat.
+        Pulse(fields: Pulse) = PULSE 0x83;
+        /// Samples of a playback; unsolicited.
+        Telemetry(fields: Telemetry) = TELEMETRY 0x90;
+        /// A change of state; unsolicited.
+        Event(fields: Event) = EVENT 0x91;
+        /// Samples of a recording; unsolicited.
+        Recorded(fields: Recorded) = RECORDED 0x92;
+    }
 }
 
 impl Request {
-    /// The message type, see [`kind`].
-    pub fn kind(&self) -> u8 {
-        match self {
-            Self::Hello(_) => kind::HELLO,
-            Self::TableBegin(_) => kind::TABLE_BEGIN,
-            Self::TableChunk(_) => kind::TABLE_CHUNK,
-            Self::TableCommit(_) => kind::TABLE_COMMIT,
-            Self::Play(_) => kind::PLAY,
-            Self::Stop(_) => kind::STOP,
-            Self::Limp => kind::LIMP,
-            Self::Heartbeat(_) => kind::HEARTBEAT,
-            Self::Rearm => kind::REARM,
-            Self::State => kind::STATE,
-            Self::PathBegin(_) => kind::PATH_BEGIN,
-            Self::PathChunk(_) => kind::PATH_CHUNK,
-            Self::PathCommit(_) => kind::PATH_COMMIT,
-            Self::Record(_) => kind::RECORD,
-        }
-    }
-
     /// Whether the device executes it only once per sequence number. All other
     /// requests may be sent at any time with any number.
     pub fn sequenced(&self) -> bool {
@@ -336,139 +340,19 @@ impl Request {
             Self::Hello(_) | Self::Limp | Self::Heartbeat(_) | Self::State
         )
     }
-
-    /// Encodes the message as a frame.
-    pub fn frame(&self, sequence: u16) -> Frame {
-        let mut out = header(self.kind(), sequence);
-        match self {
-            Self::Hello(hello) => out.u32(hello.nonce),
-            Self::TableBegin(begin) => begin.write(&mut out),
-            Self::TableChunk(chunk) => chunk.write(&mut out),
-            Self::TableCommit(commit) | Self::PathCommit(commit) => out.u32(commit.crc),
-            Self::Play(play) => {
-                out.u32(play.playback);
-                out.u32(play.crc);
-                out.u32(play.longest_ms);
-                out.u16(play.every.map_or(0, NonZeroU16::get));
-            }
-            Self::Record(record) => {
-                out.u32(record.playback);
-                out.u32(record.crc);
-            }
-            Self::Stop(stop) => out.u32(stop.playback),
-            Self::Heartbeat(beat) => {
-                out.u32(beat.count);
-                out.u32(beat.deadline_ms);
-            }
-            Self::PathBegin(begin) => begin.write(&mut out),
-            Self::PathChunk(chunk) => chunk.write(&mut out),
-            Self::Limp | Self::Rearm | Self::State => {}
-        }
-        to_frame(&out)
-    }
-
-    /// Decodes the body of a frame.
-    ///
-    /// # Errors
-    /// [`WireError`]; a device refuses such a request.
-    pub fn decode(body: &[u8]) -> Result<(Header, Self), WireError> {
-        let (header, mut from) = split_header(body)?;
-        let request = match header.kind {
-            kind::HELLO => Self::Hello(Hello { nonce: from.u32()? }),
-            kind::TABLE_BEGIN => Self::TableBegin(TableBegin::read(&mut from)?),
-            kind::TABLE_CHUNK => Self::TableChunk(TableChunk::read(&mut from)?),
-            kind::TABLE_COMMIT => Self::TableCommit(Commit { crc: from.u32()? }),
-            kind::PLAY => Self::Play(Play {
-                playback: from.u32()?,
-                crc: from.u32()?,
-                longest_ms: from.u32()?,
-                every: NonZeroU16::new(from.u16()?),
-            }),
-            kind::STOP => Self::Stop(Stop {
-                playback: from.u32()?,
-            }),
-            kind::LIMP => Self::Limp,
-            kind::HEARTBEAT => Self::Heartbeat(Heartbeat {
-                count: from.u32()?,
-                deadline_ms: from.u32()?,
-            }),
-            kind::REARM => Self::Rearm,
-            kind::STATE => Self::State,
-            kind::PATH_BEGIN => Self::PathBegin(PathBegin::read(&mut from)?),
-            kind::PATH_CHUNK => Self::PathChunk(PathChunk::read(&mut from)?),
-            kind::PATH_COMMIT => Self::PathCommit(Commit { crc: from.u32()? }),
-            kind::RECORD => Self::Record(Record {
-                playback: from.u32()?,
-                crc: from.u32()?,
-            }),
-            other => return Err(WireError::UnknownType(other)),
-        };
-        from.done()?;
-        Ok((header, request))
-    }
 }
 
 impl Reply {
-    /// The message type, see [`kind`].
-    pub fn kind(&self) -> u8 {
-        match self {
-            Self::Ack(_) => kind::ACK,
-            Self::Identity(_) => kind::IDENTITY,
-            Self::Outcome(_) => kind::OUTCOME,
-            Self::Pulse(_) => kind::PULSE,
-            Self::Telemetry(_) => kind::TELEMETRY,
-            Self::Event(_) => kind::EVENT,
-            Self::Recorded(_) => kind::RECORDED,
-        }
-    }
-
     /// Whether it answers a request.
     pub fn is_answer(&self) -> bool {
         self.kind() < kind::TELEMETRY
-    }
-
-    /// Encodes the message as a frame.
-    pub fn frame(&self, sequence: u16) -> Frame {
-        let mut out = header(self.kind(), sequence);
-        match self {
-            Self::Ack(ack) => ack.write(&mut out),
-            Self::Identity(identity) => identity.write(&mut out),
-            Self::Outcome(outcome) => outcome.write(&mut out),
-            Self::Pulse(pulse) => pulse.write(&mut out),
-            Self::Telemetry(telemetry) => telemetry.write(&mut out),
-            Self::Event(event) => event.write(&mut out),
-            Self::Recorded(recorded) => recorded.write(&mut out),
-        }
-        to_frame(&out)
-    }
-
-    /// Decodes the body of a frame.
-    ///
-    /// # Errors
-    /// [`WireError`]. A host treats such a reply as a damaged frame, except for
-    /// [`WireError::Version`], which means that the device is incompatible.
-    pub fn decode(body: &[u8]) -> Result<(Header, Self), WireError> {
-        let (header, mut from) = split_header(body)?;
-        let reply = match header.kind {
-            kind::ACK => Self::Ack(Ack::read(&mut from)?),
-            kind::IDENTITY => Self::Identity(Identity::read(&mut from)?),
-            kind::OUTCOME => Self::Outcome(Outcome::read(&mut from)?),
-            kind::PULSE => Self::Pulse(Pulse::read(&mut from)?),
-            kind::TELEMETRY => Self::Telemetry(Telemetry::read(&mut from)?),
-            kind::EVENT => Self::Event(Event::read(&mut from)?),
-            kind::RECORDED => Self::Recorded(Recorded::read(&mut from)?),
-            other => return Err(WireError::UnknownType(other)),
-        };
-        from.done()?;
-        Ok((header, reply))
     }
 }
 
 fn header(kind: u8, sequence: u16) -> Writer {
     let mut out = Writer::new();
-    out.u8(VERSION);
-    out.u8(kind);
-    out.u16(sequence);
+    [VERSION, kind].write(&mut out);
+    sequence.write(&mut out);
     out
 }
 
@@ -480,19 +364,8 @@ fn split_header(body: &[u8]) -> Result<(Header, Reader<'_>), WireError> {
     Ok((header, Reader::new(&body[Header::LEN..])))
 }
 
-/// Every message fits into a frame; the assertions below check the sizes.
+/// Every message fits into a frame; `messages!` checks the sizes.
 fn to_frame(out: &Writer) -> Frame {
     let body = out.done().unwrap_or_default();
     Frame::of(body).unwrap_or_else(|_| Frame::empty())
 }
-
-const _: () = {
-    assert!(Header::LEN + TableBegin::LEN <= MAX_BODY);
-    assert!(Header::LEN + TableChunk::MAX_LEN <= MAX_BODY);
-    assert!(Header::LEN + PathBegin::LEN <= MAX_BODY);
-    assert!(Header::LEN + PathChunk::MAX_LEN <= MAX_BODY);
-    assert!(Header::LEN + Identity::LEN <= MAX_BODY);
-    assert!(Header::LEN + Outcome::LEN <= MAX_BODY);
-    assert!(Header::LEN + Telemetry::MAX_LEN <= MAX_BODY);
-    assert!(Header::LEN + Recorded::MAX_LEN <= MAX_BODY);
-};

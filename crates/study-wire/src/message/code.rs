@@ -1,5 +1,8 @@
 //! States, faults and refusals, each one byte on the wire.
 
+use super::WireError;
+use super::bytes::{Field, Reader, Writer};
+
 /// Defines an enum with a byte code and a text for each value.
 macro_rules! codes {
     ($(#[$about:meta])* $name:ident { $($(#[$what:meta])* $variant:ident = $code:literal, $text:literal;)+ }) => {
@@ -32,6 +35,18 @@ macro_rules! codes {
                 match self {
                     $(Self::$variant => $text,)+
                 }
+            }
+        }
+
+        impl Field for $name {
+            const MAX_LEN: usize = 1;
+
+            fn write(&self, out: &mut Writer) {
+                self.code().write(out);
+            }
+
+            fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
+                Self::from_code(u8::read(from)?).ok_or(WireError::Field)
             }
         }
     };
