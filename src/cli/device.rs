@@ -8,6 +8,7 @@ mod rendered;
 mod safety;
 #[cfg(unix)]
 mod simulate;
+mod single_playback;
 #[cfg(not(unix))]
 mod unsupported;
 

@@ -100,6 +100,11 @@ impl CheckFailure {
     }
 }
 
+/// A violation with this observation.
+pub(super) fn fail<T>(seen: impl Into<String>) -> Result<T, CheckFailure> {
+    Err(CheckFailure::violation(seen))
+}
+
 /// The observation if the requirement is met.
 type ClauseResult = Result<String, CheckFailure>;
 

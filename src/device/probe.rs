@@ -4,9 +4,8 @@
 //! neither acknowledged nor repeated, so a recording with a gap is rejected and has to be
 //! repeated.
 
-use super::check::CheckFailure;
-use super::check::Connection;
 use super::check::exchange::Exchange;
+use super::check::{CheckFailure, Connection, fail};
 use std::time::Duration;
 use study_wire::message::{
     Commit, DeviceState, EventKind, FixedVec, Identity, PathBegin, PathChunk, PathCrc,
@@ -67,16 +66,16 @@ fn follow(
     exchange.reset()?;
     let device = exchange.identity()?;
     if !device.flags.probe {
-        return Err(CheckFailure::violation("it has no probe mode"));
+        return fail("it has no probe mode");
     }
     if path.x_mm.len() as u64 > u64::from(device.max_points) {
-        return Err(CheckFailure::violation(format!(
+        return fail(format!(
             "the path has {} points, but the device accepts {}: use a rate of at most {} samples \
              per second (--rate)",
             path.x_mm.len(),
             device.max_points,
             (path.rate_hz * f64::from(device.max_points) / path.x_mm.len() as f64).floor()
-        )));
+        ));
     }
     let x_nm: Vec<i32> = path.x_mm.iter().map(|x| fixed::nm(*x)).collect();
     let crc = upload(exchange, path, &x_nm, &device)?;
@@ -101,19 +100,17 @@ fn follow(
             .iter()
             .find(|e| e.kind == EventKind::Latched);
         if let Some(event) = latched {
-            return Err(CheckFailure::violation(event.fault.as_str()));
+            return fail(event.fault.as_str());
         }
         let outcome = exchange.outcome()?;
         if outcome.state.latched() {
-            return Err(CheckFailure::violation(outcome.fault.as_str()));
+            return fail(outcome.fault.as_str());
         }
         if outcome.state == DeviceState::Loaded {
             break;
         }
         if exchange.now() > until {
-            return Err(CheckFailure::violation(
-                "it does not reach the end of the path",
-            ));
+            return fail("it does not reach the end of the path");
         }
     }
     let mut points: Vec<RecordedPoint> = Vec::with_capacity(x_nm.len());
@@ -123,11 +120,11 @@ fn follow(
         }
     }
     if points.len() != x_nm.len() {
-        return Err(CheckFailure::violation(format!(
+        return fail(format!(
             "{} of {} samples were lost on the link",
             x_nm.len() - points.len().min(x_nm.len()),
             x_nm.len()
-        )));
+        ));
     }
     let forces: Option<Vec<f64>> = points
         .iter()

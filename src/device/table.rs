@@ -30,28 +30,13 @@ pub enum TableError {
     /// The length of the direction rule is not finite and positive, mm.
     #[error("the direction's delta_mm {0} is invalid")]
     Delta(f64),
-    /// A parameter does not have one value per node.
-    #[error("{branch} {parameter} has {values} values for {nodes} nodes")]
-    Length {
-        /// `positive` or `negative`.
-        branch: &'static str,
-        /// Name of the parameter.
-        parameter: &'static str,
-        /// Number of its values.
-        values: usize,
-        /// Number of nodes.
-        nodes: usize,
-    },
-    /// A parameter is NaN or infinite.
-    #[error("{branch} {parameter} is not a finite number at node {node}")]
-    ParameterNotFinite {
-        /// `positive` or `negative`.
-        branch: &'static str,
-        /// Name of the parameter.
-        parameter: &'static str,
-        /// Number of the node, from 1.
-        node: usize,
-    },
+    /// A parameter does not have one value per node: branch, parameter, number of values,
+    /// number of nodes.
+    #[error("{0} {1} has {2} values for {3} nodes")]
+    Length(&'static str, &'static str, usize, usize),
+    /// A parameter is NaN or infinite: branch, parameter, number of the node from 1.
+    #[error("{0} {1} is not a finite number at node {2}")]
+    ParameterNotFinite(&'static str, &'static str, usize),
 }
 
 /// Checks that the force of a table is defined everywhere.
@@ -95,19 +80,11 @@ fn check_branch(branch: &'static str, values: &Branch, nodes: usize) -> Result<(
         ("f0_n", &values.f0_n),
     ] {
         if values.len() != nodes {
-            return Err(TableError::Length {
-                branch,
-                parameter,
-                values: values.len(),
-                nodes,
-            });
+            let count = values.len();
+            return Err(TableError::Length(branch, parameter, count, nodes));
         }
         if let Some(node) = values.iter().position(|value| !value.is_finite()) {
-            return Err(TableError::ParameterNotFinite {
-                branch,
-                parameter,
-                node: node + 1,
-            });
+            return Err(TableError::ParameterNotFinite(branch, parameter, node + 1));
         }
     }
     Ok(())

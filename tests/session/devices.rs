@@ -554,7 +554,7 @@ fn what_is_wrong_with_a_port_is_said_before_anything_is_created() {
         folder.path(),
     );
     assert_eq!(code, 3);
-    assert!(err.contains("it is no serial port"), "{err}");
+    assert!(err.contains("it is not a serial port"), "{err}");
     assert_eq!(fs::read(&file).unwrap(), b"x");
     assert!(!folder.path().join("results").exists());
 }

@@ -3,26 +3,23 @@
 //! For measurements of the link: telemetry over minutes, memory, and the force after
 //! this program is killed.
 
+use super::single_playback;
 use crate::cli::device_selection::{DeviceAddress, WaitDisplay};
 use crate::cli::{Console, Failure, Kind, load};
 use crate::device::host::HostSettings;
 use crate::device::link::LinkedDevice;
 use crate::device::process::ProcessDevice;
-use crate::device::{Device, Report, Stimulus};
+use crate::device::{Device, Stimulus};
 use std::io::BufRead as _;
 use std::path::PathBuf;
 use std::sync::mpsc::channel;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use study_base::limits::{Limit, Limits};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::predict::{Direction, Lookup};
 
 /// A line of standard input with this text stalls the loop for a second.
 pub(super) const STALL: &str = "stall";
-/// Time for a load or a stop.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time between two polls, as in a session.
-const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Arguments of `study device hold`.
 #[derive(Debug, clap::Args)]
@@ -62,7 +59,6 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             None => return Ok(()),
         },
     };
-    let failed = |reason: String| Failure::new(Kind::Device, reason);
     let (sender, lines) = channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
@@ -71,50 +67,29 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             }
         }
     });
-    let start = Instant::now();
-    let at = || start.elapsed();
-    let device_failure = |e: crate::device::DeviceError| failed(e.to_string());
-    device
-        .any()
-        .load(&Stimulus::of_table(&table), limits, at())
-        .map_err(device_failure)?;
-    let mut until = ANSWER_TIMEOUT;
-    let mut stopping = false;
-    loop {
-        if lines.try_recv().is_ok_and(|line| line.trim() == STALL) {
-            std::thread::sleep(Duration::from_secs(1));
-        }
-        for report in device.any().poll(at()) {
-            match report {
-                Report::Loaded => device.any().start(at()).map_err(device_failure)?,
-                Report::Started => until = at() + Duration::from_secs(args.seconds),
-                Report::Stopped(playback) => {
-                    return console.out(format!(
-                        "{:.1} s, {} samples, {} lost, {} strokes, least energy {:.4} J, {:.1} switches/s, {} clamps\n{}",
-                        playback.exploration_s,
-                        playback.samples,
-                        playback.samples_lost,
-                        playback.strokes,
-                        playback.least_energy_j,
-                        playback.switches_per_s,
-                        playback.clamp_count,
-                        device.health(),
-                    ));
-                }
-                Report::Fault(reason) | Report::Lost(reason) => return Err(failed(reason)),
-                _ => {}
+    let playback = single_playback::play(
+        device.any(),
+        &Stimulus::of_table(&table),
+        limits,
+        Duration::from_secs(args.seconds),
+        &mut |_| {
+            if lines.try_recv().is_ok_and(|line| line.trim() == STALL) {
+                std::thread::sleep(Duration::from_secs(1));
             }
-        }
-        if at() > until {
-            if stopping {
-                return Err(failed("it does not answer in time".to_owned()));
-            }
-            stopping = true;
-            until = at() + ANSWER_TIMEOUT;
-            device.any().stop(at()).map_err(device_failure)?;
-        }
-        std::thread::sleep(POLL_INTERVAL);
-    }
+        },
+    )
+    .map_err(|e| Failure::new(Kind::Device, e))?;
+    console.out(format!(
+        "{:.1} s, {} samples, {} lost, {} strokes, least energy {:.4} J, {:.1} switches/s, {} clamps\n{}",
+        playback.exploration_s,
+        playback.samples,
+        playback.samples_lost,
+        playback.strokes,
+        playback.least_energy_j,
+        playback.switches_per_s,
+        playback.clamp_count,
+        device.health(),
+    ))
 }
 
 /// The device, of either kind.

@@ -4,16 +4,15 @@
 //! like recordings, and speed and acceleration are differences of the position. The
 //! VAF of the rendered force is therefore comparable with that of the identification.
 
+use super::single_playback;
 use crate::cli::device_selection::SerialPortArgs;
 use crate::cli::{Console, Failure, Kind, load};
 use crate::device::host::HostSettings;
-use crate::device::link::LinkedDevice;
-use crate::device::{Device, DeviceError, Report, Stimulus};
+use crate::device::{Report, Stimulus};
 use crate::runner::playback_limits;
 use serde::Serialize;
 use std::path::Path;
-use std::time::{Duration, Instant};
-use study_base::limits::Limits;
+use std::time::Duration;
 use study_core::outcome::Sample;
 use study_core::protocol::DeviceKind;
 use study_haptics::identify::signal::{LowPass, difference};
@@ -29,19 +28,10 @@ const SKIPPED_S: f64 = 0.6;
 const FILTER_HZ: f64 = 30.0;
 /// Samples needed for a comparison.
 const MIN_SAMPLES: usize = 2001;
-/// Time for a load, a start or a stop.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Why a table could not be compared.
 #[derive(Debug, thiserror::Error)]
 enum CompareError {
-    #[error(transparent)]
-    Device(#[from] DeviceError),
-    /// A fault or a loss, as reported by the device.
-    #[error("{0}")]
-    Playback(String),
-    #[error("it does not answer in time")]
-    Timeout,
     #[error("it sent {0} samples; at least {MIN_SAMPLES} are needed")]
     TooFewSamples(usize),
     #[error("the playback ended before the force had risen")]
@@ -92,8 +82,21 @@ pub(super) fn compare_all(
         let limits = playback_limits(&loaded.protocol, Some(table));
         let uncertified = loaded.protocol.device.uncertified.as_ref();
         let allow_uncertified = uncertified.is_some_and(|u| u.play);
-        let played = play(&mut device, table, allow_uncertified, limits);
-        let (samples, strokes, clamps) = played.map_err(|e| {
+        let stimulus = Stimulus {
+            allow_uncertified,
+            ..Stimulus::of_table(table)
+        };
+        let mut samples = Vec::new();
+        let mut collect = |reports: &[Report]| {
+            for report in reports {
+                if let Report::Telemetry(more) = report {
+                    samples.extend_from_slice(more);
+                }
+            }
+        };
+        let playback =
+            single_playback::play(&mut device, &stimulus, limits, PLAYBACK, &mut collect);
+        let playback = playback.map_err(|e| {
             Failure::new(Kind::Device, format!("{}: {e}", entry.id))
                 .hint("hold the handle during the playback")
         })?;
@@ -106,8 +109,8 @@ pub(super) fn compare_all(
             residual_n: score.residual_n,
             identified_vaf: entry.vaf,
             measured,
-            strokes,
-            clamps,
+            strokes: playback.strokes,
+            clamps: playback.clamp_count,
         };
         if !json {
             let identified = entry.vaf.map_or("–".to_owned(), |vaf| format!("{vaf:.3}"));
@@ -122,51 +125,6 @@ pub(super) fn compare_all(
         console.say("no force sensor: the values are for the commanded force");
     }
     Ok(all)
-}
-
-/// Plays a table and returns the samples, strokes and clamps.
-fn play(
-    device: &mut LinkedDevice,
-    table: &Realization,
-    allow_uncertified: bool,
-    limits: Limits,
-) -> Result<(Vec<Sample>, u32, u64), CompareError> {
-    let start = Instant::now();
-    let stimulus = Stimulus {
-        allow_uncertified,
-        ..Stimulus::of_table(table)
-    };
-    let at = || start.elapsed();
-    device.load(&stimulus, limits, at())?;
-    let mut samples = Vec::new();
-    let mut stop_at = None;
-    let mut due = ANSWER_TIMEOUT;
-    loop {
-        for report in device.poll(at()) {
-            match report {
-                Report::Loaded => device.start(at())?,
-                Report::Started => {
-                    stop_at = Some(at() + PLAYBACK);
-                    due = at() + PLAYBACK + ANSWER_TIMEOUT;
-                }
-                Report::Telemetry(more) => samples.extend(more),
-                Report::Stopped(playback) => {
-                    return Ok((samples, playback.strokes, playback.clamp_count));
-                }
-                Report::Fault(reason) | Report::Lost(reason) => {
-                    return Err(CompareError::Playback(reason));
-                }
-                Report::Mount(_) | Report::Progress { .. } | Report::Ready => {}
-            }
-        }
-        if stop_at.take_if(|stop_at| at() >= *stop_at).is_some() {
-            device.stop(at())?;
-        }
-        if at() > due {
-            return Err(CompareError::Timeout);
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
 }
 
 /// Compares the playback with the table like a recording. Also returns whether the force

@@ -4,7 +4,7 @@
 use super::exchange::{Exchange, name};
 use super::playing;
 use super::uploads::Upload;
-use super::{CheckFailure, Clause, ClauseResult, quantile};
+use super::{CheckFailure, Clause, ClauseResult, fail, quantile};
 use crate::device::host::RETRY_INTERVAL;
 use std::time::Duration;
 use study_wire::frame::Frame;
@@ -87,7 +87,7 @@ fn handshake(exchange: &mut Exchange<'_>) -> ClauseResult {
         ),
     ];
     match requirements.iter().find(|(met, _)| !met) {
-        Some((_, what)) => Err(CheckFailure::violation(*what)),
+        Some((_, what)) => fail(*what),
         None => Ok(format!(
             "version {}, servo {} Hz, watchdog {} ms, {} N, {} mm/s, {} nodes",
             message::VERSION,
@@ -111,7 +111,7 @@ fn latency(exchange: &mut Exchange<'_>) -> ClauseResult {
     trips.sort_by(f64::total_cmp);
     let quantiles = [0.5, 0.99, 1.0].map(|fraction| quantile(&trips, fraction));
     let [Some(median), Some(p99), Some(max)] = quantiles else {
-        return Err(CheckFailure::violation("no round trips"));
+        return fail("no round trips");
     };
     exchange.latency_ms = Some([median, p99, max]);
     let allowed = f64::from(device.watchdog_ms) / 3.0;
@@ -119,9 +119,9 @@ fn latency(exchange: &mut Exchange<'_>) -> ClauseResult {
     if p99 <= allowed {
         Ok(seen)
     } else {
-        Err(CheckFailure::violation(format!(
+        fail(format!(
             "{seen}: more than a third of the watchdog time; set the latency timer of an FTDI adapter to 1 ms"
-        )))
+        ))
     }
 }
 
@@ -132,13 +132,11 @@ fn bad_frames(exchange: &mut Exchange<'_>) -> ClauseResult {
     // Changes the first byte of the body without producing a zero.
     bytes[2] ^= if bytes[2] == 0x40 { 0x20 } else { 0x40 };
     if exchange.send(&bytes, sequence, RETRY_INTERVAL)?.is_some() {
-        return Err(CheckFailure::violation(
-            "a frame with a wrong CRC was answered",
-        ));
+        return fail("a frame with a wrong CRC was answered");
     }
     match exchange.outcome()?.bad_frames.wrapping_sub(before) {
         1 => Ok("dropped, counted once".to_owned()),
-        n => Err(CheckFailure::violation(format!("counted {n} times"))),
+        n => fail(format!("counted {n} times")),
     }
 }
 
@@ -155,10 +153,10 @@ fn noise(exchange: &mut Exchange<'_>) -> ClauseResult {
         let mut bytes = piece.to_vec();
         bytes.extend_from_slice(Request::State.frame(sequence).as_bytes());
         if exchange.send(&bytes, sequence, RETRY_INTERVAL)?.is_none() {
-            return Err(CheckFailure::violation(format!(
+            return fail(format!(
                 "no answer to the frame after {} bytes of noise",
                 piece.len()
-            )));
+            ));
         }
     }
     Ok(format!("{} kinds of noise", pieces.len()))
@@ -189,12 +187,12 @@ fn expect_refusal_of(
 ) -> Result<(), CheckFailure> {
     match refusal_of(exchange, body)? {
         Some((refusal, _)) if refusal == reason => Ok(()),
-        Some((refusal, _)) => Err(CheckFailure::violation(format!(
+        Some((refusal, _)) => fail(format!(
             "{what}: {} instead of: {}",
             refusal.as_str(),
             reason.as_str()
-        ))),
-        None => Err(CheckFailure::violation(format!("{what}: no answer"))),
+        )),
+        None => fail(format!("{what}: no answer")),
     }
 }
 
@@ -223,7 +221,7 @@ fn unknown_type(exchange: &mut Exchange<'_>) -> ClauseResult {
     }
     match refusal_of(exchange, &[1, 0xF0, 0, 0])? {
         None => Ok("three types refused; 0xf0 is dropped".to_owned()),
-        Some(_) => Err(CheckFailure::violation("type 0xf0, a reply, is answered")),
+        Some(_) => fail("type 0xf0, a reply, is answered"),
     }
 }
 
@@ -232,11 +230,8 @@ fn other_version(exchange: &mut Exchange<'_>) -> ClauseResult {
         Some((Refusal::Version, detail)) if (1..250).contains(&detail) => {
             Ok(format!("version 250: it supports {detail}"))
         }
-        Some((refusal, detail)) => Err(CheckFailure::violation(format!(
-            "version 250: {} ({detail})",
-            refusal.as_str()
-        ))),
-        None => Err(CheckFailure::violation("version 250: no answer")),
+        Some((refusal, detail)) => fail(format!("version 250: {} ({detail})", refusal.as_str())),
+        None => fail("version 250: no answer"),
     }
 }
 
@@ -246,12 +241,12 @@ fn any_limp(exchange: &mut Exchange<'_>) -> ClauseResult {
         refusal_of(exchange, body)?;
         let state = exchange.outcome()?.state;
         if state != DeviceState::Limp {
-            return Err(CheckFailure::violation(format!(
+            return fail(format!(
                 "after a LIMP of version {} and {} bytes {}",
                 body[0],
                 body.len(),
                 state.as_str()
-            )));
+            ));
         }
     }
     Ok("in version 77, and with three additional bytes".to_owned())
@@ -272,7 +267,7 @@ fn repeats(exchange: &mut Exchange<'_>) -> ClauseResult {
         replies.push(received.body);
     }
     if replies.iter().any(|body| *body != replies[0]) {
-        return Err(CheckFailure::violation("the reply to a repeat differs"));
+        return fail("the reply to a repeat differs");
     }
     // Other bytes with the same number.
     let received = exchange.send(
@@ -283,9 +278,7 @@ fn repeats(exchange: &mut Exchange<'_>) -> ClauseResult {
     match received.map(|received| received.reply) {
         Some(Reply::Ack(ack)) if ack.refusal == Refusal::Reused => {}
         _ => {
-            return Err(CheckFailure::violation(
-                "other bytes with a used number are not refused",
-            ));
+            return fail("other bytes with a used number are not refused");
         }
     }
     // A number that was overtaken.
@@ -294,7 +287,7 @@ fn repeats(exchange: &mut Exchange<'_>) -> ClauseResult {
         .send(chunks[1].frame(old).as_bytes(), old, RETRY_INTERVAL)?
         .is_some()
     {
-        return Err(CheckFailure::violation("an overtaken request is answered"));
+        return fail("an overtaken request is answered");
     }
     // If the chunk was executed once, the table is complete now.
     exchange.expect_done(chunks[1])?;
@@ -307,11 +300,11 @@ fn another_connection(exchange: &mut Exchange<'_>) -> ClauseResult {
     Upload::passive(&device, 0.0).load(exchange)?;
     let identity = exchange.hello()?;
     if identity.state != DeviceState::Limp || identity.fault != Fault::NewConnection {
-        return Err(CheckFailure::violation(format!(
+        return fail(format!(
             "{}: {}",
             identity.state.as_str(),
             identity.fault.as_str()
-        )));
+        ));
     }
     Ok(identity.fault.as_str().to_owned())
 }
@@ -328,10 +321,7 @@ fn latched(exchange: &mut Exchange<'_>) -> ClauseResult {
     exchange.wait(Duration::from_secs(1))?;
     let state = exchange.outcome()?.state;
     if state != DeviceState::Limp {
-        return Err(CheckFailure::violation(format!(
-            "a second later {}",
-            state.as_str()
-        )));
+        return fail(format!("a second later {}", state.as_str()));
     }
     exchange.reset()?;
     // The table is no longer loaded.
@@ -344,10 +334,7 @@ fn beat(exchange: &mut Exchange<'_>, count: u32, deadline_ms: u32) -> Result<boo
     let beat = Heartbeat { count, deadline_ms };
     match exchange.ask(Request::Heartbeat(beat))?.reply {
         Reply::Pulse(pulse) => Ok(pulse.fresh),
-        other => Err(CheckFailure::violation(format!(
-            "HEARTBEAT is answered by {}",
-            name(other.kind())
-        ))),
+        other => fail(format!("HEARTBEAT is answered by {}", name(other.kind()))),
     }
 }
 
@@ -376,7 +363,7 @@ fn stale_heartbeats(exchange: &mut Exchange<'_>) -> ClauseResult {
     ] {
         if beat(exchange, count, deadline_ms)? != fresh {
             let not = if fresh { "not " } else { "" };
-            return Err(CheckFailure::violation(format!("{what} is {not}fresh")));
+            return fail(format!("{what} is {not}fresh"));
         }
     }
     Ok("six heartbeats".to_owned())
@@ -389,7 +376,7 @@ fn no_heartbeat(exchange: &mut Exchange<'_>) -> ClauseResult {
     // A new connection has received no heartbeat.
     let hello = exchange.hello()?;
     if hello.state != DeviceState::Idle {
-        return Err(CheckFailure::violation(hello.state.as_str()));
+        return fail(hello.state.as_str());
     }
     exchange.wait(Duration::from_millis(u64::from(device.watchdog_ms) + 20))?;
     table.send(exchange)?;
@@ -429,7 +416,7 @@ fn checksum(exchange: &mut Exchange<'_>) -> ClauseResult {
     exchange.expect_refusal(Request::TableCommit(wrong), Refusal::Checksum)?;
     let state = exchange.outcome()?.state;
     if state != DeviceState::Idle {
-        return Err(CheckFailure::violation(state.as_str()));
+        return fail(state.as_str());
     }
     table.load(exchange)?;
     Ok("refused, and accepted with the correct CRC".to_owned())
@@ -490,11 +477,11 @@ fn bad_tables(exchange: &mut Exchange<'_>) -> ClauseResult {
         table.send(exchange)?;
         let ack = exchange.ack(table.commit())?;
         if ack.refusal != reason {
-            return Err(CheckFailure::violation(format!(
+            return fail(format!(
                 "{what}: {} instead of: {}",
                 ack.refusal.as_str(),
                 reason.as_str()
-            )));
+            ));
         }
     }
     Ok(format!("{count} tables"))
@@ -510,9 +497,7 @@ fn uncertified(exchange: &mut Exchange<'_>) -> ClauseResult {
     table.load(exchange)?;
     let limit_n = exchange.outcome()?.limit_n;
     if (limit_n - cap_n).abs() > 1e-9 {
-        return Err(CheckFailure::violation(format!(
-            "with a cap of {cap_n} N its limit is {limit_n} N"
-        )));
+        return fail(format!("with a cap of {cap_n} N its limit is {limit_n} N"));
     }
     // A table that passes is not capped.
     let mut table = Upload::passive(&device, 0.0);
@@ -520,10 +505,10 @@ fn uncertified(exchange: &mut Exchange<'_>) -> ClauseResult {
     table.load(exchange)?;
     let limit_n = exchange.outcome()?.limit_n;
     if (limit_n - table.begin.force_n).abs() > 1e-9 {
-        return Err(CheckFailure::violation(format!(
+        return fail(format!(
             "a passive table is limited to {limit_n} N instead of {} N",
             table.begin.force_n
-        )));
+        ));
     }
     Ok(format!("refused; with permission capped at {cap_n} N"))
 }
@@ -547,7 +532,7 @@ fn largest(exchange: &mut Exchange<'_>) -> ClauseResult {
     if commit_ms <= 50.0 + 2.0 * median_ms + 2.0 {
         Ok(seen)
     } else {
-        Err(CheckFailure::violation(seen))
+        fail(seen)
     }
 }
 

@@ -1,6 +1,6 @@
 //! An exchange of messages with a device whose answers may be wrong.
 
-use super::{CheckFailure, Connection};
+use super::{CheckFailure, Connection, fail};
 use crate::device::host::{DeviceClock, HEARTBEAT_INTERVAL, MAX_TRIES, RETRY_INTERVAL};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -209,11 +209,11 @@ impl<'w> Exchange<'w> {
     pub(crate) fn ack(&mut self, request: Request) -> Result<Ack, CheckFailure> {
         match self.ask(request)?.reply {
             Reply::Ack(ack) if ack.request == request.kind() => Ok(ack),
-            other => Err(CheckFailure::violation(format!(
+            other => fail(format!(
                 "{} is answered by {}",
                 name(request.kind()),
                 name(other.kind())
-            ))),
+            )),
         }
     }
 
@@ -222,12 +222,12 @@ impl<'w> Exchange<'w> {
         let ack = self.ack(request)?;
         match ack.refusal {
             Refusal::None => Ok(ack),
-            refusal => Err(CheckFailure::violation(format!(
+            refusal => fail(format!(
                 "{} is refused: {} ({})",
                 name(request.kind()),
                 refusal.as_str(),
                 ack.detail
-            ))),
+            )),
         }
     }
 
@@ -241,22 +241,19 @@ impl<'w> Exchange<'w> {
         if ack.refusal == why {
             Ok(ack)
         } else {
-            Err(CheckFailure::violation(format!(
+            fail(format!(
                 "{}: {}, and not: {}",
                 name(request.kind()),
                 ack.refusal.as_str(),
                 why.as_str()
-            )))
+            ))
         }
     }
 
     pub(crate) fn outcome(&mut self) -> Result<Outcome, CheckFailure> {
         match self.ask(Request::State)?.reply {
             Reply::Outcome(outcome) => Ok(outcome),
-            other => Err(CheckFailure::violation(format!(
-                "STATE is answered by {}",
-                name(other.kind())
-            ))),
+            other => fail(format!("STATE is answered by {}", name(other.kind()))),
         }
     }
 
@@ -281,13 +278,13 @@ impl<'w> Exchange<'w> {
             )));
         }
         let Reply::Identity(identity) = received.reply else {
-            return Err(CheckFailure::violation(format!(
+            return fail(format!(
                 "HELLO is answered by {}",
                 name(received.reply.kind())
-            )));
+            ));
         };
         if identity.nonce != self.nonce {
-            return Err(CheckFailure::violation("its nonce is not that of HELLO"));
+            return fail("its nonce is not that of HELLO");
         }
         self.clock = DeviceClock::default();
         self.clock.add(sent, received.at, identity.clock_ms);
@@ -310,11 +307,11 @@ impl<'w> Exchange<'w> {
                     self.wait(Duration::from_millis(50))?;
                 }
                 refusal => {
-                    return Err(CheckFailure::violation(format!(
+                    return fail(format!(
                         "REARM: {}, {}",
                         refusal.as_str(),
                         ack.state.as_str()
-                    )));
+                    ));
                 }
             }
         }
@@ -327,7 +324,7 @@ impl<'w> Exchange<'w> {
         let until = self.now() + RETRY_INTERVAL;
         while !self.pulses.iter().any(|pulse| pulse.fresh) {
             if self.now() > until {
-                return Err(CheckFailure::violation("no heartbeat is fresh after HELLO"));
+                return fail("no heartbeat is fresh after HELLO");
             }
             self.wait(POLL_INTERVAL)?;
         }

@@ -2,7 +2,7 @@
 
 use super::exchange::Exchange;
 use super::uploads::Upload;
-use super::{CheckFailure, ClauseResult, tag};
+use super::{CheckFailure, ClauseResult, fail, tag};
 use std::num::NonZeroU16;
 use std::time::Duration;
 use study_wire::message::{
@@ -39,10 +39,7 @@ fn play(
     };
     let started = exchange.expect_done(Request::Play(play))?;
     if started.state != DeviceState::Ramp {
-        return Err(CheckFailure::violation(format!(
-            "PLAY: {}",
-            started.state.as_str()
-        )));
+        return fail(format!("PLAY: {}", started.state.as_str()));
     }
     Ok(Playback {
         number: play.playback,
@@ -78,11 +75,11 @@ fn still_plays(exchange: &mut Exchange<'_>) -> Result<(), CheckFailure> {
     if outcome.state.applies_force() {
         return Ok(());
     }
-    Err(CheckFailure::violation(format!(
+    fail(format!(
         "the playback ended early: {}, {}; hold the handle near the middle of its stroke",
         outcome.state.as_str(),
         outcome.fault.as_str()
-    )))
+    ))
 }
 
 pub(super) fn telemetry(exchange: &mut Exchange<'_>) -> ClauseResult {
@@ -107,7 +104,7 @@ pub(super) fn telemetry(exchange: &mut Exchange<'_>) -> ClauseResult {
         })
         .fold(0.0, f64::max);
     let Some((first, last)) = all.first().zip(all.last()) else {
-        return Err(CheckFailure::violation("no samples received"));
+        return fail("no samples received");
     };
     let ticks = last.tick.wrapping_sub(first.tick);
     let rate_hz = (all.len() - 1) as f64 / (f64::from(ticks.max(1)) / playback.servo_hz);
@@ -116,28 +113,21 @@ pub(super) fn telemetry(exchange: &mut Exchange<'_>) -> ClauseResult {
         all.len()
     );
     if missed > 0 || all.len() as u64 != u64::from(outcome.samples) {
-        return Err(CheckFailure::violation(format!(
-            "{seen}; it sent {}",
-            outcome.samples
-        )));
+        return fail(format!("{seen}; it sent {}", outcome.samples));
     }
     if first.tick != 0 {
-        return Err(CheckFailure::violation(format!(
+        return fail(format!(
             "{seen}; the first sample is of period {}",
             first.tick
-        )));
+        ));
     }
     let requested_hz = device.telemetry_hz.min(1000.0);
     if !(0.9 * requested_hz..=1.01 * requested_hz).contains(&rate_hz) {
-        return Err(CheckFailure::violation(format!(
-            "{seen}; {requested_hz:.0} Hz were requested"
-        )));
+        return fail(format!("{seen}; {requested_hz:.0} Hz were requested"));
     }
     let events = &exchange.events;
     if !events.iter().any(|e| e.kind == EventKind::Stopped) {
-        return Err(CheckFailure::violation(format!(
-            "{seen}; no EVENT `stopped`"
-        )));
+        return fail(format!("{seen}; no EVENT `stopped`"));
     }
     Ok(seen)
 }
@@ -159,17 +149,13 @@ pub(super) fn clamp(exchange: &mut Exchange<'_>) -> ClauseResult {
     let seen =
         format!("{peak_n:.3} N at a limit of {limit_n} N; {early_n:.3} N in the first 50 ms");
     if peak_n > limit_n + 1e-6 {
-        return Err(CheckFailure::violation(seen));
+        return fail(seen);
     }
     if early_n > 0.25 * limit_n {
-        return Err(CheckFailure::violation(format!(
-            "{seen}: it rises too fast"
-        )));
+        return fail(format!("{seen}: it rises too fast"));
     }
     if peak_n < 0.9 * limit_n || outcome.clamps == 0 {
-        return Err(CheckFailure::violation(format!(
-            "{seen}: the force of the table is missing"
-        )));
+        return fail(format!("{seen}: the force of the table is missing"));
     }
     Ok(seen)
 }
@@ -220,19 +206,13 @@ pub(super) fn stop(exchange: &mut Exchange<'_>) -> ClauseResult {
     still_plays(exchange)?;
     let (ack, outcome, seen, late) = end_with(exchange, &playback, stop_request(&playback))?;
     if ack.state.applies_force() {
-        return Err(CheckFailure::violation(format!(
-            "STOP: {}",
-            ack.state.as_str()
-        )));
+        return fail(format!("STOP: {}", ack.state.as_str()));
     }
     if late {
-        return Err(CheckFailure::violation(seen));
+        return fail(seen);
     }
     if outcome.state != DeviceState::Loaded {
-        return Err(CheckFailure::violation(format!(
-            "then {}",
-            outcome.state.as_str()
-        )));
+        return fail(format!("then {}", outcome.state.as_str()));
     }
     Ok(seen)
 }
@@ -243,13 +223,10 @@ pub(super) fn limp(exchange: &mut Exchange<'_>) -> ClauseResult {
     still_plays(exchange)?;
     let (ack, outcome, seen, late) = end_with(exchange, &playback, Request::Limp)?;
     if ack.state != DeviceState::Limp || outcome.state != DeviceState::Limp {
-        return Err(CheckFailure::violation(format!(
-            "LIMP: {}",
-            outcome.state.as_str()
-        )));
+        return fail(format!("LIMP: {}", outcome.state.as_str()));
     }
     if late {
-        return Err(CheckFailure::violation(seen));
+        return fail(seen);
     }
     Ok(seen)
 }
@@ -268,10 +245,7 @@ pub(super) fn longest(exchange: &mut Exchange<'_>) -> ClauseResult {
     if ended && (lasted_ms - f64::from(LONGEST_MS)).abs() <= CLOCK_RESOLUTION_MS + 1.0 {
         Ok(seen)
     } else {
-        Err(CheckFailure::violation(format!(
-            "{seen}, {}",
-            outcome.state.as_str()
-        )))
+        fail(format!("{seen}, {}", outcome.state.as_str()))
     }
 }
 
@@ -296,7 +270,7 @@ fn stop_heartbeats(exchange: &mut Exchange<'_>) -> Result<(f64, Playback), Check
         .copied()
         .ok_or_else(|| CheckFailure::violation("it continues without heartbeats"))?;
     if event.fault != Fault::Watchdog {
-        return Err(CheckFailure::violation(event.fault.as_str()));
+        return fail(event.fault.as_str());
     }
     let after_ms = f64::from(event.clock_ms.wrapping_sub(heard_ms));
     Ok((after_ms, playback))
@@ -308,22 +282,19 @@ pub(super) fn watchdog(exchange: &mut Exchange<'_>) -> ClauseResult {
     let outcome = exchange.outcome()?;
     let seen = format!("{after_ms:.0} ms after the last heartbeat");
     if after_ms > f64::from(device.watchdog_ms) + CLOCK_RESOLUTION_MS {
-        return Err(CheckFailure::violation(seen));
+        return fail(seen);
     }
     // New heartbeats do not resume the playback.
     exchange.sends_heartbeats = true;
     exchange.wait(SECOND / 5)?;
     let later = exchange.outcome()?;
     if later.state != DeviceState::Limp || later.ticks != outcome.ticks {
-        return Err(CheckFailure::violation(format!(
-            "{seen}, then {}",
-            later.state.as_str()
-        )));
+        return fail(format!("{seen}, then {}", later.state.as_str()));
     }
     let (all, _) = samples(exchange, &playback);
     let last_tick = all.last().map_or(0, |s| s.tick);
     if last_tick > outcome.ticks {
-        return Err(CheckFailure::violation(format!("{seen}; samples continue")));
+        return fail(format!("{seen}; samples continue"));
     }
     Ok(format!("{seen}, latched"))
 }
@@ -360,7 +331,7 @@ pub(super) fn deadline(exchange: &mut Exchange<'_>) -> ClauseResult {
     let seen = format!("limp {after_ms:.0} ms after the deadline, {late} heartbeats not fresh");
     let outcome = exchange.outcome()?;
     if after_ms > CLOCK_RESOLUTION_MS || outcome.playback != playback.number || late == 0 {
-        return Err(CheckFailure::violation(seen));
+        return fail(seen);
     }
     Ok(seen)
 }
