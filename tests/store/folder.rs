@@ -321,7 +321,7 @@ fn the_tables_have_what_happened() {
     assert_eq!(c.status, Status::Declined);
     assert!(c.declined);
     assert_eq!(derived.participants[0].trials_done, 3);
-    let whats: Vec<&str> = derived.attempts.iter().map(|r| r.what).collect();
+    let whats: Vec<&str> = derived.attempts.iter().map(|r| r.what.as_str()).collect();
     assert_eq!(whats.iter().filter(|w| **w == "attempt").count(), 4);
     assert_eq!(whats.iter().filter(|w| **w == "failure").count(), 1);
     assert_eq!(whats.iter().filter(|w| **w == "correction").count(), 1);

@@ -13,7 +13,7 @@ pub mod ratings;
 pub mod rows;
 
 pub use event::{Author, Choice, Entry, Event, Failure, FormId, Moment, Playback, Start, State};
-pub use rows::{AttemptRow, ParticipantRow, RatingRow, Status};
+pub use rows::{AttemptEvent, AttemptRow, ParticipantRow, RatingRow, Status};
 
 /// A row says what its realization is; readers of rows need no protocol for it.
 pub use crate::protocol::Role;

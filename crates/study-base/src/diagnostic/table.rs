@@ -233,17 +233,6 @@ impl<'d, 't> Table<'d, 't> {
         )
     }
 
-    /// An array of numbers.
-    pub fn f64s(&mut self, key: &str) -> Option<Vec<f64>> {
-        Some(
-            self.value(key)?
-                .array()?
-                .into_iter()
-                .filter_map(|v| v.f64())
-                .collect(),
-        )
-    }
-
     /// An array of tables, `[[key]]`; empty if it is absent.
     pub fn tables(&mut self, key: &str) -> Vec<Table<'d, 't>> {
         self.value(key)

@@ -1,6 +1,6 @@
 //! The cells of a row, and the header of each table of a study.
 
-use super::rows::{AttemptRow, ParticipantRow, RatingRow};
+use super::rows::{AttemptEvent, AttemptRow, ParticipantRow, RatingRow};
 use super::{Author, Failure, Sample, State, Status};
 use crate::protocol::columns::{
     AttemptColumn, Column, ParticipantColumn, RatingColumn, Repeats, SampleColumn,
@@ -81,7 +81,7 @@ fields! {
     bool: |flag, _| Cell::Flag(*flag);
     DateTime<FixedOffset>: |at, _| Cell::Time(*at);
     String: |text, _| Cell::text(text);
-    &str: |text, _| Cell::text(text);
+    AttemptEvent: |what, _| Cell::text(what.as_str());
     ParticipantId: |id, _| Cell::text(id.as_str());
     ModelId: |id, _| Cell::text(id.as_str());
     QuestionId: |id, _| Cell::text(id.as_str());

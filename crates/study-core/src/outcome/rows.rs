@@ -1,13 +1,12 @@
 //! The rows of the derived tables. Their fields are the columns of the same name,
 //! which `protocol::columns` declares.
 
+use super::event::{Author, Event, Failure, State};
 use crate::protocol::{Answer, DeviceKind, Role};
 use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId, QuestionId};
-
-use super::event::{Author, Failure, State};
 
 /// The outcome of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -79,6 +78,54 @@ pub struct RatingRow {
     pub covariates: BTreeMap<String, f64>,
 }
 
+/// What a row of `attempts.csv` is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "AttemptColumn::What has the meanings")]
+pub enum AttemptEvent {
+    Attempt,
+    Answer,
+    Correction,
+    Failure,
+    Closed,
+    Remark,
+    Resume,
+    State,
+    Reveal,
+}
+
+impl AttemptEvent {
+    /// That of an event of the journal, if it has a row.
+    pub(super) fn of(event: &Event) -> Option<Self> {
+        Some(match event {
+            Event::AttemptStarted { .. } => Self::Attempt,
+            Event::Answered { .. } => Self::Answer,
+            Event::Corrected { .. } => Self::Correction,
+            Event::AttemptFailed { .. } => Self::Failure,
+            Event::TrialClosed { .. } => Self::Closed,
+            Event::Remark { .. } => Self::Remark,
+            Event::Reopened { .. } => Self::Resume,
+            Event::StateSet { .. } => Self::State,
+            Event::Revealed { .. } => Self::Reveal,
+            _ => return None,
+        })
+    }
+
+    /// As in `attempts.csv`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Attempt => "attempt",
+            Self::Answer => "answer",
+            Self::Correction => "correction",
+            Self::Failure => "failure",
+            Self::Closed => "closed",
+            Self::Remark => "remark",
+            Self::Resume => "resume",
+            Self::State => "state",
+            Self::Reveal => "reveal",
+        }
+    }
+}
+
 /// One row of `attempts.csv`: an attempt, answer, correction, failure or remark.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "AttemptColumn has the meanings")]
@@ -90,7 +137,7 @@ pub struct AttemptRow {
     pub trial: Option<u32>,
     pub attempt: Option<u32>,
     pub model: Option<ModelId>,
-    pub what: &'static str,
+    pub what: AttemptEvent,
     pub question: Option<QuestionId>,
     pub from: Option<Answer>,
     pub to: Option<Answer>,

@@ -6,7 +6,6 @@
 use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
 use super::{StudyFolder, atomic, layout, tables};
-use crate::outcome::cell::Header;
 use crate::outcome::fold::attempt_rows;
 use crate::outcome::{AttemptRow, ParticipantRow, RatingRow, State};
 use crate::protocol::Protocol;
@@ -23,10 +22,6 @@ pub struct Derived {
     pub attempts: Vec<AttemptRow>,
     /// One for each participant, by the last session.
     pub participants: Vec<ParticipantRow>,
-    /// The columns of `rows`.
-    pub rating_columns: Header<RatingColumn>,
-    /// The columns of `participants`.
-    pub participant_columns: Header<ParticipantColumn>,
 }
 
 impl StudyFolder {
@@ -62,15 +57,10 @@ impl StudyFolder {
             });
         }
         let derived = Derived::of(&sessions, protocol);
-        self.replace_tables(&derived)?;
-        Ok(derived)
-    }
-
-    fn replace_tables(&self, derived: &Derived) -> Result<(), StoreError> {
-        for (name, bytes) in derived.tables().at(&self.path)? {
+        for (name, bytes) in derived.tables(protocol).at(&self.path)? {
             atomic::replace_if_new(self.disk.as_ref(), &self.path.join(name), &bytes)?;
         }
-        Ok(())
+        Ok(derived)
     }
 }
 
@@ -80,8 +70,6 @@ impl Derived {
     pub fn of(sessions: &[SessionData], protocol: &Protocol) -> Self {
         let mut derived = Self {
             participants: participants(sessions),
-            rating_columns: RatingColumn::header(protocol),
-            participant_columns: ParticipantColumn::header(protocol),
             ..Self::default()
         };
         for session in sessions {
@@ -102,10 +90,11 @@ impl Derived {
     }
 
     /// File name and bytes of each table.
-    pub(super) fn tables(&self) -> io::Result<[(&'static str, Vec<u8>); 3]> {
-        let ratings = tables::csv(&self.rating_columns, &self.rows)?;
+    pub(super) fn tables(&self, protocol: &Protocol) -> io::Result<[(&'static str, Vec<u8>); 3]> {
+        let ratings = tables::csv(&RatingColumn::header(protocol), &self.rows)?;
         let attempts = tables::csv(&AttemptColumn::header(), &self.attempts)?;
-        let participants = tables::csv(&self.participant_columns, &self.participants)?;
+        let header = ParticipantColumn::header(protocol);
+        let participants = tables::csv(&header, &self.participants)?;
         Ok([
             (layout::RATINGS, ratings),
             (layout::ATTEMPTS, attempts),

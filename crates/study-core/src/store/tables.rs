@@ -25,7 +25,9 @@ mod tests {
     use super::csv;
     use crate::outcome::cell::{Cell, Header, Row};
     use crate::outcome::ratings::Ratings;
-    use crate::outcome::{AttemptRow, Author, Failure, ParticipantRow, RatingRow, State, Status};
+    use crate::outcome::{
+        AttemptEvent, AttemptRow, Author, Failure, ParticipantRow, RatingRow, State, Status,
+    };
     use crate::protocol::columns::{
         AttemptColumn, Column, Kind, ParticipantColumn, RatingColumn, Repeats,
     };
@@ -48,7 +50,7 @@ mod tests {
         }
 
         fn maybe<T>(&mut self, value: impl FnOnce(&mut Self) -> T) -> Option<T> {
-            let some = self.whole() % 3 > 0;
+            let some = !self.whole().is_multiple_of(3);
             some.then(|| value(self))
         }
 
@@ -57,7 +59,7 @@ mod tests {
         }
 
         fn flag(&mut self) -> bool {
-            self.whole() % 2 == 0
+            self.whole().is_multiple_of(2)
         }
 
         fn text(&mut self) -> String {
@@ -127,7 +129,7 @@ mod tests {
             ]),
             repetition: number,
             previous_model: d.maybe(Draws::model),
-            practice: d.whole() % 4 == 0,
+            practice: d.whole().is_multiple_of(4),
             pilot: d.flag(),
             simulated: d.flag(),
             device_kind: d.of(&[
@@ -164,9 +166,6 @@ mod tests {
 
     fn attempt_row(draws: &[u32]) -> AttemptRow {
         let mut d = Draws(draws.iter().cycle());
-        let Kind::Level(levels) = AttemptColumn::What.column().kind else {
-            panic!("`what` has levels");
-        };
         AttemptRow {
             participant: d.participant(),
             session: d.whole(),
@@ -175,7 +174,17 @@ mod tests {
             trial: d.maybe(Draws::whole),
             attempt: d.maybe(Draws::whole),
             model: d.maybe(Draws::model),
-            what: d.of(levels).0,
+            what: d.of(&[
+                AttemptEvent::Attempt,
+                AttemptEvent::Answer,
+                AttemptEvent::Correction,
+                AttemptEvent::Failure,
+                AttemptEvent::Closed,
+                AttemptEvent::Remark,
+                AttemptEvent::Resume,
+                AttemptEvent::State,
+                AttemptEvent::Reveal,
+            ]),
             question: d.maybe(|_| question("realism")),
             from: d.maybe(|d| Answer::Choice(vec![d.text(), "b".to_owned()])),
             to: d.maybe(|d| Answer::Rating(d.whole().into())),

@@ -260,7 +260,7 @@ impl StudyFolder {
         found: &mut Vec<Finding>,
     ) -> Result<(), StoreError> {
         let derived = Derived::of(sessions, protocol);
-        for (name, bytes) in derived.tables().at(&self.path)? {
+        for (name, bytes) in derived.tables(protocol).at(&self.path)? {
             match self.disk.read(&self.path.join(name)) {
                 Ok(old) if old == bytes => {}
                 Ok(_) => found.push(Finding::wrong(name, "it is not what the journals give")),

@@ -2,7 +2,7 @@
 
 use super::History;
 use crate::outcome::event::{Choice, Entry, Event, FormId};
-use crate::outcome::rows::AttemptRow;
+use crate::outcome::rows::{AttemptEvent, AttemptRow};
 use crate::protocol::Answer;
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId};
@@ -23,6 +23,9 @@ pub fn attempt_rows(
         .collect();
     let mut rows = Vec::new();
     for entry in entries {
+        let Some(what) = AttemptEvent::of(&entry.event) else {
+            continue;
+        };
         let mut row = AttemptRow {
             participant: id.clone(),
             session,
@@ -31,7 +34,7 @@ pub fn attempt_rows(
             trial: None,
             attempt: None,
             model: None,
-            what: "",
+            what,
             question: None,
             from: None,
             to: None,
@@ -48,7 +51,6 @@ pub fn attempt_rows(
                 ..
             } => {
                 models.insert(*trial, model.clone());
-                row.what = "attempt";
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
             }
             Event::Answered {
@@ -56,7 +58,6 @@ pub fn attempt_rows(
                 question,
                 answer,
             } => {
-                row.what = "answer";
                 (row.trial, row.attempt) = trial_of(*form);
                 row.question = Some(question.clone());
                 row.text = declined_reason(answer);
@@ -70,7 +71,6 @@ pub fn attempt_rows(
                 reason,
                 by,
             } => {
-                row.what = "correction";
                 (row.trial, row.attempt) = trial_of(*form);
                 row.question = Some(question.clone());
                 (row.from, row.to) = (from.clone(), Some(to.clone()));
@@ -85,7 +85,6 @@ pub fn attempt_rows(
                 constraint_broken,
                 ..
             } => {
-                row.what = "failure";
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
                 row.failure = Some(*failure);
                 row.text.clone_from(detail);
@@ -95,28 +94,23 @@ pub fn attempt_rows(
                 }
             }
             Event::TrialClosed { trial, attempt } => {
-                row.what = "closed";
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
             }
             Event::Remark { by, trial, text } => {
-                row.what = "remark";
                 row.trial = *trial;
                 row.by = Some(*by);
                 row.text.clone_from(text);
             }
             Event::Reopened { gap_s, choice, .. } => {
-                row.what = "resume";
                 row.text = resume_text(*gap_s, *choice);
             }
             Event::StateSet { state, reason } => {
-                row.what = "state";
                 row.text = format!("{}: {reason}", state.as_str());
             }
             Event::Revealed { reason } => {
-                row.what = "reveal";
                 row.text.clone_from(reason);
             }
-            _ => continue,
+            _ => {}
         }
         row.model = row.trial.and_then(|t| models.get(&t).cloned());
         rows.push(row);

@@ -1,11 +1,12 @@
-//! The same on systems that are not Unix, by what the standard library has.
-//! docs/results.md says how it differs.
+//! What `unix.rs` does, on other systems, by what the standard library offers.
+//! docs/results.md has the differences.
 
 use std::fs::{DirBuilder, File, OpenOptions};
 use std::io;
 use std::path::Path;
 
-/// Opens a file, not through a symbolic link; who can read it is up to its folder.
+/// Opens a file, but not through a symbolic link. Who can read a new one is up to its
+/// folder.
 pub(super) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     if std::fs::symlink_metadata(path).is_ok_and(|known| known.is_symlink()) {
         return Err(io::Error::other("it is a symbolic link"));
@@ -13,18 +14,18 @@ pub(super) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     options.open(path)
 }
 
-/// Who can enter it is up to the folder around it.
+/// Creates a folder; who can enter it is up to the folder around it.
 pub(super) fn create_folder(path: &Path) -> io::Result<()> {
     DirBuilder::new().create(path)
 }
 
-/// Does nothing: there is no such call.
-#[allow(clippy::unnecessary_wraps, reason = "it can fail on Unix")]
+/// Does nothing: these systems have no such call.
 pub(super) fn sync_folder(_path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// The file whose lock is a folder's: a folder has none, so it is a file beside it.
+/// The file whose lock stands for a folder's: one beside it, as a folder cannot be
+/// locked.
 pub(super) fn lock_file(path: &Path) -> io::Result<File> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut options = OpenOptions::new();
@@ -37,8 +38,7 @@ pub(super) fn is_lock(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(LOCK)
 }
 
-/// Not known.
-#[allow(clippy::unnecessary_wraps, reason = "it can fail on Unix")]
+/// `None`: not known.
 pub(super) fn free_bytes(_path: &Path) -> io::Result<Option<u64>> {
     Ok(None)
 }

@@ -1,4 +1,4 @@
-//! What Unix has of its own: permissions, syncs and locks of folders, free space.
+//! What only Unix offers: permissions, syncs and locks of folders, free space.
 
 use rustix::fs::{OFlags, statvfs};
 use std::fs::{DirBuilder, File, OpenOptions};
@@ -6,14 +6,14 @@ use std::io;
 use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
 use std::path::Path;
 
-/// Opens a file: not through a symbolic link, and without waiting for the other end
-/// of a pipe. Only its owner can read a new one.
+/// Opens a file, but not through a symbolic link, and without waiting for the other
+/// end of a pipe. Only the owner can read a new one.
 pub(super) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits();
     options.mode(0o600).custom_flags(flags as i32).open(path)
 }
 
-/// Only its owner can enter it.
+/// Creates a folder that only its owner can enter.
 pub(super) fn create_folder(path: &Path) -> io::Result<()> {
     DirBuilder::new().mode(0o700).create(path)
 }
@@ -23,7 +23,7 @@ pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
 }
 
-/// The file whose lock is a folder's: the folder.
+/// The file whose lock stands for a folder's: the folder itself.
 pub(super) fn lock_file(path: &Path) -> io::Result<File> {
     File::open(path)
 }
