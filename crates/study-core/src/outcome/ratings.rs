@@ -54,7 +54,7 @@ impl Origin {
     }
 }
 
-/// A subject: a participant, or whoever a foreign table has ratings of.
+/// A subject: a participant of the study or of a foreign table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Subject {
     /// Pseudonym. Untrusted.

@@ -242,8 +242,8 @@ mod tests {
             .collect()
     }
 
-    /// Whether the cells of a row are what the declarations of their columns say, and
-    /// stand in the CSV as they are.
+    /// Checks the cells of a row against the declarations of their columns, and the CSV
+    /// against the cells.
     fn check<R: Row>(
         row: &R,
         header: &Header<R::Column>,
@@ -284,7 +284,6 @@ mod tests {
             check(&participant_row(&draws), &columns, ParticipantColumn::column)?;
         }
 
-        /// What `ratings.csv` says is what the rows in memory say.
         #[test]
         fn a_written_table_reads_back_as_its_rows(
             draws in prop::collection::vec(prop::collection::vec(any::<u32>(), 97), 1..8)

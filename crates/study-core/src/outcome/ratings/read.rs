@@ -409,7 +409,7 @@ mod tests {
         Ratings::read_csv("r.csv", csv.as_bytes(), None)
     }
 
-    fn says(csv: &str) -> String {
+    fn message(csv: &str) -> String {
         read(csv).unwrap_err().to_string()
     }
 
@@ -441,28 +441,28 @@ mod tests {
         let r = read(&format!("{HEAD}S1,A,0,4,\nS1,A,,5,\nS1,B,,4,\nS1,B,,5,\n")).unwrap();
         assert_eq!(r.repetition, [0, 2, 1, 2]);
         assert_eq!(
-            says(&format!("{HEAD}S1,A,0,4,\nS1,A,0,5,\n")),
+            message(&format!("{HEAD}S1,A,0,4,\nS1,A,0,5,\n")),
             "r.csv, line 3: subject `S1`, model `A`, repetition 0 is already on line 2"
         );
-        assert!(says(&format!("{HEAD}S1,A,4294967296,4,\n")).contains("whole number from 0"));
+        assert!(message(&format!("{HEAD}S1,A,4294967296,4,\n")).contains("whole number from 0"));
     }
 
     #[test]
     fn each_error_names_its_line() {
         assert_eq!(
-            says(&format!("{HEAD}S1,A,1,4,0.5\nS1,B,1,4\n")),
+            message(&format!("{HEAD}S1,A,1,4,0.5\nS1,B,1,4\n")),
             "r.csv, line 3: 4 fields, but the header has 5"
         );
         assert_eq!(
-            says(&format!("{HEAD}S1,A,1,four,0.5\n")),
+            message(&format!("{HEAD}S1,A,1,four,0.5\n")),
             "r.csv, line 2: `four` in column `rating` is not a finite number"
         );
         assert_eq!(
-            says(&format!("{HEAD}S1,A,1,inf,0.5\n")),
+            message(&format!("{HEAD}S1,A,1,inf,0.5\n")),
             "r.csv, line 2: `inf` in column `rating` is not a finite number"
         );
         assert_eq!(
-            says(&format!("{HEAD}S1,A,1,4,0.5\nS1,A,1,5,0.5\n")),
+            message(&format!("{HEAD}S1,A,1,4,0.5\nS1,A,1,5,0.5\n")),
             "r.csv, line 3: subject `S1`, model `A`, repetition 1 is already on line 2"
         );
         // Lines are those of an editor: also where they end in \r\n, where one is
@@ -477,18 +477,18 @@ mod tests {
         ] {
             for end in ["\n", "\r\n"] {
                 let text = format!("{HEAD}{before}{wrong}").replace('\n', end);
-                let said = says(&text);
+                let found = message(&text);
                 assert!(
-                    said.starts_with(&format!("r.csv, line {line}:")),
-                    "{said} {text:?}"
+                    found.starts_with(&format!("r.csv, line {line}:")),
+                    "{found} {text:?}"
                 );
             }
         }
-        assert_eq!(says(HEAD), "r.csv: no ratings, only a header");
-        assert!(says("subject,model,vaf\n").contains("no column `rating`"));
-        assert!(says("subject,subject\n").contains("two columns are named `subject`"));
+        assert_eq!(message(HEAD), "r.csv: no ratings, only a header");
+        assert!(message("subject,model,vaf\n").contains("no column `rating`"));
+        assert!(message("subject,subject\n").contains("two columns are named `subject`"));
         assert_eq!(
-            says("subject;model;repetition;rating;vaf\nS1;A;1;4,5;0,5\n"),
+            message("subject;model;repetition;rating;vaf\nS1;A;1;4,5;0,5\n"),
             "r.csv: the columns are separated by `;`; save it with commas between the columns \
              and points in the numbers"
         );
@@ -503,8 +503,8 @@ mod tests {
 
     #[test]
     fn a_hostile_field_is_shown_escaped() {
-        let said = says(&format!("{HEAD}S1,A,1,\u{1b}[2J,0.5\n"));
-        assert!(said.contains("\\u{1b}[2J") && !said.contains('\u{1b}'));
+        let found = message(&format!("{HEAD}S1,A,1,\u{1b}[2J,0.5\n"));
+        assert!(found.contains("\\u{1b}[2J") && !found.contains('\u{1b}'));
     }
 
     #[test]
