@@ -259,7 +259,7 @@ fn check_rows(journal: &[Entry], protocol: &Protocol) {
         }
     }
     let log = attempt_rows(&history, &p01(), 1, journal);
-    let logged = |what: &str| log.iter().filter(|r| r.what == what).count();
+    let logged = |what: &str| log.iter().filter(|r| r.what.as_str() == what).count();
     let count = |which: fn(&Event) -> bool| expected.events().filter(|(_, e)| which(e)).count();
     assert_eq!(
         logged("attempt"),
