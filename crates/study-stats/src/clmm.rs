@@ -69,18 +69,14 @@ pub struct ClmmFits {
 /// Fits the model by Laplace's method and by adaptive quadrature. Each result is an error
 /// if its estimates do not exist or were not found.
 pub fn clmm(table: &CategoryCounts) -> ClmmFits {
-    let fixed = match clm(table) {
-        Ok(_) if table.subjects() < 2 => Err(ClmError::OneSubject),
-        other => other,
+    let undefined = |error| ClmmFits {
+        laplace: Err(error),
+        quadrature: Err(error),
     };
-    let fixed = match fixed {
+    let fixed = match clm(table) {
+        Ok(_) if table.subjects() < 2 => return undefined(ClmError::OneSubject),
         Ok(fixed) => fixed,
-        Err(cause) => {
-            return ClmmFits {
-                laplace: Err(cause),
-                quadrature: Err(cause),
-            };
-        }
+        Err(error) => return undefined(error),
     };
     let mut modes = vec![0.0; table.subjects()];
     let mut by_laplace = |at: &[f64]| laplace::evaluate(table, at, &mut modes);
@@ -139,6 +135,16 @@ fn best(
         .filter_map(|s| at(s).map(|p| (p.value, s)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, s)| s.clone())
+}
+
+/// What does not depend on the random intercepts at (θ, β, ln σ): 1/σ², the likelihood's
+/// term of the thresholds, and aₖ of every place. `None` if these are not admissible.
+fn common_part(table: &CategoryCounts, at: &[f64]) -> Option<(f64, Evaluation, Vec<f64>)> {
+    let precision = (-2.0 * at[at.len() - 1]).exp();
+    if !(precision.is_finite() && precision > 0.0) {
+        return None;
+    }
+    Some((precision, table.spacing(at, at.len())?, table.linear(at)))
 }
 
 /// The derivative of the marginal log-likelihood in σ² at σ = 0.

@@ -46,15 +46,14 @@ pub fn two_way_slope(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<TwoWa
     }
     let (mx, my) = (mean(x)?, mean(y)?);
     let mut groups = Groups {
-        rows: (x.iter().zip(y))
-            .zip(b)
-            .map(|((x, y), b)| Row {
-                x: x - mx,
-                y: y - my,
-                level: level_of[*b as usize],
+        rows: (0..n)
+            .map(|i| Row {
+                group: a[i],
+                level: level_of[b[i] as usize],
+                x: x[i] - mx,
+                y: y[i] - my,
             })
             .collect(),
-        ends: ends(a),
         levels,
     };
     let size: f64 = groups.rows.iter().map(|r| r.x * r.x).sum();
@@ -66,7 +65,7 @@ pub fn two_way_slope(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<TwoWa
     let tolerance = |i: usize| if i == last { 0.0 } else { 1e-11 };
     let factor = Cholesky::semidefinite(&normal, tolerance)?;
     let spread = factor.pivots[last];
-    let df = n as f64 - groups.ends.len() as f64 - (factor.rank() as f64 - 1.0) - 1.0;
+    let df = n as f64 - groups.each().count() as f64 - (factor.rank() as f64 - 1.0) - 1.0;
     if !(spread > 1e-12 * size && df >= 1.0) {
         return None;
     }
@@ -94,22 +93,13 @@ pub fn two_way_slope(x: &[f64], y: &[f64], a: &[u32], b: &[u32]) -> Option<TwoWa
     })
 }
 
-/// Where each run of equal numbers ends.
-fn ends(a: &[u32]) -> Vec<usize> {
-    let mut end = 0;
-    a.chunk_by(|x, y| x == y)
-        .map(|run| {
-            end += run.len();
-            end
-        })
-        .collect()
-}
-
 struct Row {
-    x: f64,
-    y: f64,
+    /// Level of the first factor.
+    group: u32,
     /// Level of the second factor.
     level: usize,
+    x: f64,
+    y: f64,
 }
 
 impl Row {
@@ -123,7 +113,6 @@ impl Row {
 /// second factor except its first, and then the slope.
 struct Groups {
     rows: Vec<Row>,
-    ends: Vec<usize>,
     levels: usize,
 }
 
@@ -137,16 +126,12 @@ struct LevelSums {
 
 impl Groups {
     fn each(&self) -> impl Iterator<Item = &[Row]> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(s, e)| &self.rows[s..*e])
+        self.rows.chunk_by(|a, b| a.group == b.group)
     }
 
     /// Subtracts the mean of its group from every x and y.
     fn centre(&mut self) {
-        let mut start = 0;
-        for &end in &self.ends {
-            let rows = &mut self.rows[start..end];
-            start = end;
+        for rows in self.rows.chunk_by_mut(|a, b| a.group == b.group) {
             let n = rows.len() as f64;
             let mx = rows.iter().map(|r| r.x).sum::<f64>() / n;
             let my = rows.iter().map(|r| r.y).sum::<f64>() / n;

@@ -14,6 +14,7 @@
 //! The matrices f_φφ, f_bφφ, f_bbφφ are sums over the terms, so their weights are
 //! accumulated by place over all subjects before the matrices are formed.
 
+use super::common_part;
 use super::mode::mode;
 use crate::clm::counts::{CategoryCounts, Term};
 use crate::clm::newton::Evaluation;
@@ -36,12 +37,7 @@ pub(super) fn evaluate(
     modes: &mut [f64],
 ) -> Option<Evaluation> {
     let size = table.parameters() + 1;
-    let precision = (-2.0 * at[size - 1]).exp();
-    if !(precision.is_finite() && precision > 0.0) {
-        return None;
-    }
-    let mut point = table.spacing(at, size)?;
-    let a = table.linear(at);
+    let (precision, mut point, a) = common_part(table, at)?;
     let mut first = vec![0.0; a.len()];
     let mut second = vec![0.0; a.len()];
     let mut k = Weights::default();

@@ -10,6 +10,7 @@
 //! π_r of b. By the identities of Fisher and Louis (1982), with s the derivative of f
 //! in the parameters, the gradient is E s and the Hessian E ∂²f + E ssᵀ − E s E sᵀ.
 
+use super::common_part;
 use super::hermite::Node;
 use super::mode::mode;
 use crate::clm::counts::{CategoryCounts, Term};
@@ -30,12 +31,7 @@ pub(super) fn evaluate(
 ) -> Option<Evaluation> {
     let size = table.parameters() + 1;
     let tau = size - 1;
-    let precision = (-2.0 * at[tau]).exp();
-    if !(precision.is_finite() && precision > 0.0) {
-        return None;
-    }
-    let mut point = table.spacing(at, size)?;
-    let a = table.linear(at);
+    let (precision, mut point, a) = common_part(table, at)?;
     let mut first = vec![0.0; a.len()];
     let mut second = vec![0.0; a.len()];
     let mut ln_share = vec![0.0; rule.len()];

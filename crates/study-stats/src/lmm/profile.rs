@@ -59,31 +59,28 @@ struct Sums {
 /// Evaluates the criterion's parts; `None` if a determinant is not positive or a sum
 /// overflows.
 pub(super) fn profile(table: &LmmData, random: RandomEffects, ratios: &Ratios) -> Option<Profile> {
-    let realizations = if random.realization {
+    let levels = if random.realization {
         table.realizations.len()
     } else {
         0
     };
     let p = table.columns();
-    let mut sums = sums(table, random, ratios, realizations)?;
-    if realizations > 0 && ratios.realization != 0.0 {
+    let mut sums = sums(table, random, ratios, levels)?;
+    if levels > 0 && ratios.realization != 0.0 {
         let g = ratios.realization;
-        let mut inner = sums
-            .matrix
-            .view((0, 0), (realizations, realizations))
-            .into_owned();
+        let mut inner = sums.matrix.view((0, 0), (levels, levels)).into_owned();
         inner.fill_upper_triangle_with_lower_triangle();
         inner *= g;
-        for i in 0..realizations {
+        for i in 0..levels {
             inner[(i, i)] += 1.0;
         }
         let factor = Cholesky::new(inner)?;
         sums.log_det += log_det(&factor);
         // The cross products of the realizations with X and, in the last column, y.
-        let mut cross = DMatrix::<f64>::zeros(realizations, p + 1);
-        for m in 0..realizations {
+        let mut cross = DMatrix::<f64>::zeros(levels, p + 1);
+        for m in 0..levels {
             for j in 0..p {
-                cross[(m, j)] = sums.matrix[(realizations + j, m)];
+                cross[(m, j)] = sums.matrix[(levels + j, m)];
             }
             cross[(m, p)] = sums.y[m];
         }
@@ -92,18 +89,15 @@ pub(super) fn profile(table: &LmmData, random: RandomEffects, ratios: &Ratios) -
         let less = cross.transpose() * solved * g;
         for i in 0..p {
             for j in 0..=i {
-                sums.matrix[(realizations + i, realizations + j)] -= less[(i, j)];
+                sums.matrix[(levels + i, levels + j)] -= less[(i, j)];
             }
-            sums.y[realizations + i] -= less[(i, p)];
+            sums.y[levels + i] -= less[(i, p)];
         }
         sums.yy -= less[(p, p)];
     }
-    let mut a = sums
-        .matrix
-        .view((realizations, realizations), (p, p))
-        .into_owned();
+    let mut a = sums.matrix.view((levels, levels), (p, p)).into_owned();
     a.fill_upper_triangle_with_lower_triangle();
-    let b = sums.y.rows(realizations, p).into_owned();
+    let b = sums.y.rows(levels, p).into_owned();
     let factor = Cholesky::new(a)?;
     let beta = factor.solve(&b);
     let rss = sums.yy - beta.dot(&b) + table.within;
@@ -126,13 +120,9 @@ fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
         .sum::<f64>()
 }
 
-fn sums(
-    table: &LmmData,
-    random: RandomEffects,
-    ratios: &Ratios,
-    realizations: usize,
-) -> Option<Sums> {
-    let width = realizations + table.columns();
+/// `levels` is the number of columns of the realizations, 0 unless they are random.
+fn sums(table: &LmmData, random: RandomEffects, ratios: &Ratios, levels: usize) -> Option<Sums> {
+    let width = levels + table.columns();
     let mut sums = Sums {
         matrix: DMatrix::zeros(width, width),
         y: DVector::zeros(width),
@@ -164,14 +154,12 @@ fn sums(
             sum2 += w * unit.x * sum;
             // A design row has at most three non-zero entries.
             let fixed: [(usize, f64); 2] = match table.fixed {
-                FixedEffects::Intercept => [(realizations, 1.0), (realizations, 0.0)],
-                FixedEffects::Covariate { .. } => [(realizations, 1.0), (realizations + 1, unit.x)],
-                FixedEffects::Realizations => {
-                    [(realizations + unit.realization, 1.0), (realizations, 0.0)]
-                }
+                FixedEffects::Intercept => [(levels, 1.0), (levels, 0.0)],
+                FixedEffects::Covariate { .. } => [(levels, 1.0), (levels + 1, unit.x)],
+                FixedEffects::Realizations => [(levels + unit.realization, 1.0), (levels, 0.0)],
             };
             let entries = [
-                if realizations > 0 {
+                if levels > 0 {
                     (unit.realization, 1.0)
                 } else {
                     (0, 0.0)
