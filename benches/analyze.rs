@@ -1,8 +1,7 @@
-//! How long an analysis takes inside the process, and apart from it how long its
-//! table takes to read.
+//! Duration of an analysis and, separately, of reading its table.
 //!
-//! `cargo bench --bench analyze -- --write FILE SUBJECTS MODELS REPETITIONS`
-//! writes such a table for timing the whole program.
+//! `cargo bench --bench analyze -- --write FILE SUBJECTS MODELS REPETITIONS` writes a
+//! table for timing the whole program.
 
 use std::io::{BufWriter, Write};
 use study_base::rng::Stream;
@@ -22,7 +21,7 @@ fn main() -> std::io::Result<()> {
     Ok(())
 }
 
-/// A long-form table: subjects differ, realizations differ, ratings of 1 to 7.
+/// A table in long form with ratings from 1 to 7; subjects and realizations differ.
 fn table(
     out: &mut impl Write,
     subjects: u32,
@@ -52,7 +51,7 @@ const LARGE: [Size; 2] = [(100_000, 5, 3), (1000, 5, 300)];
 
 fn csv((subjects, models, repetitions): Size) -> Vec<u8> {
     let mut csv = Vec::new();
-    // Memory takes it.
+    // Writing to memory does not fail.
     let _ = table(&mut csv, subjects, models, repetitions);
     csv
 }

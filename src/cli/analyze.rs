@@ -1,8 +1,7 @@
 //! `study analyze`
 
-mod possible;
+mod grim;
 mod progress;
-mod reading;
 mod report;
 
 use super::load::Loaded;
@@ -27,7 +26,7 @@ pub(super) struct Args {
     /// A results folder, one study in it, or a CSV: subject,model,rating[,repetition][,vaf][,trial_index]
     #[arg(required_unless_present = "possible")]
     results: Option<PathBuf>,
-    /// Say which data can give a printed mean and SD: mean=4.800 sd=0.997 n=30 scale=1..7 [each=3]
+    /// Check a published mean and SD (GRIM/GRIMMER): mean=4.800 sd=0.997 n=30 scale=1..7 [each=3]
     #[arg(
         long,
         num_args = 1..,
@@ -35,16 +34,16 @@ pub(super) struct Args {
         conflicts_with_all = ["results", "out", "question", "include", "comments"]
     )]
     possible: Vec<String>,
-    /// Print one JSON document, numbers unrounded, and nothing else
+    /// Print the results as one JSON document with unrounded numbers
     #[arg(long)]
     json: bool,
-    /// Write tables, report.html and figures here (default for a study: its analysis/)
+    /// Folder for tables, report.html and figures (default for a study: its analysis/)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Analyse another question than the protocol's primary one
+    /// Analyse this question instead of the protocol's primary one
     #[arg(long, value_name = "ID")]
     question: Option<String>,
-    /// Count these beside the participants
+    /// Also include these sessions
     #[arg(long, value_name = "WHO", value_delimiter = ',')]
     include: Vec<Who>,
     /// Print the comments by realization
@@ -58,10 +57,10 @@ enum Who {
     Simulated,
 }
 
-/// Does it.
+/// Runs `study analyze`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let Some(results) = &args.results else {
-        return possible::run(&args.possible, args.json, console);
+        return grim::run(&args.possible, args.json, console);
     };
     if results.is_file() {
         let input = of_csv(results, args)?;
@@ -70,7 +69,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let studies = study_folder::studies(results)?;
     if args.json && studies.len() > 1 {
         return Err(Failure::input(format!(
-            "{}: {} studies, and --json prints one",
+            "{}: {} studies, but --json prints only one",
             results.display(),
             studies.len()
         ))
@@ -88,16 +87,16 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             || study_folder::warnings(study, &sessions, Some(&loaded)),
         );
         let (mut input, damage) = (input?, damage?);
-        // On a terminal the page tells of it; who keeps or pipes the page, or asked
-        // for something else, is told on standard error as well.
+        // The page contains these warnings; if it is not shown on a terminal, they are
+        // also printed to standard error.
         if !console.terminal || args.json || args.comments {
             study_folder::warn(study, &damage, console);
         }
         let damage = damage.into_iter().map(|text| Warning {
             code: "damaged-results",
-            text: format!("{text} (`study verify` tells everything)"),
+            text: format!("{text} (see `study verify`)"),
         });
-        // Before all else that a reader has to know.
+        // Before all other warnings.
         input.analysis.warnings.splice(0..0, damage);
         let folder = study.path();
         let out = match &args.out {
@@ -111,7 +110,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is shown and written.
+/// An analysis with everything its report needs.
 struct Analysed {
     source: Source,
     details: Details,
@@ -130,21 +129,21 @@ fn show(
     } = analysed;
     let written = out.map(|dir| (dir, write_all(dir, analysed)));
     let written = match written {
-        // Where the user wants the tables they have to go.
+        // Writing to a folder that the user named must succeed.
         Some((_, Err(failure))) if args.out.is_some() => return Err(failure),
         other => other,
     };
     if args.json {
         return console.out(json::document(source, analysis));
     }
-    let set = Page {
+    let terminal = Page {
         width: console.width,
         colour: console.colour,
     };
     if args.comments {
-        console.out(comments(analysis, set))?;
+        console.out(comments(analysis, terminal))?;
     } else {
-        console.out(page(source, analysis, set))?;
+        console.out(page(source, analysis, terminal))?;
     }
     match written {
         Some((dir, Ok(()))) => {
@@ -156,7 +155,7 @@ fn show(
     Ok(())
 }
 
-/// Tables, report and figures into a folder.
+/// Writes tables, report and figures.
 fn write_all(dir: &Path, analysed: &Analysed) -> Result<(), Failure> {
     let Analysed {
         source,
@@ -184,12 +183,12 @@ fn include(args: &Args) -> Include {
     }
 }
 
-/// Somebody else's ratings, or our own table without its study.
+/// Analyzes a table of ratings without a study.
 fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
     let name = path.display().to_string();
     let length = file.metadata().map_or(0, |m| m.len());
-    let input = BufReader::with_capacity(1 << 16, reading::Watched::new(file, length));
+    let input = BufReader::with_capacity(1 << 16, progress::Reader::new(file, length));
     let ratings =
         Ratings::read_csv(&name, input, args.question.as_deref()).map_err(Failure::input)?;
     let rules = Rules {
@@ -214,8 +213,8 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
     })
 }
 
-/// A study, by the newest version of its protocol. The VAF may stand in the model
-/// files only: they are opened too.
+/// Analyzes a study by the newest version of its protocol. Model files are read too,
+/// because the VAF may be given only there.
 fn of_study(
     study: &StudyFolder,
     sessions: &[SessionData],
@@ -234,11 +233,11 @@ fn of_study(
         Some((m.id.as_str(), original.as_str()))
     }));
     for (id, model) in models {
-        let told = [
+        let covariates = [
             ("memory_mm", model.provenance.memory_mm),
             ("lambda", model.provenance.lambda),
         ];
-        for (name, value) in told {
+        for (name, value) in covariates {
             if let Some(value) = value {
                 ratings.add_covariate(id.as_str(), name, value);
             }
@@ -264,7 +263,7 @@ fn of_study(
             (&derived.rows, &derived.participants),
             question.as_str(),
         ),
-        // Telemetry is large: only for who looks at it.
+        // Telemetry is large: read it only if figures are written.
         traces: if written {
             report::traces(study, &derived.rows, &analysis)
         } else {
@@ -274,7 +273,7 @@ fn of_study(
     })
 }
 
-/// The question that was asked for, or the primary one; it has to give numbers.
+/// The given question or the primary one, which must have numeric answers.
 fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Failure> {
     use study_core::protocol::QuestionKind as K;
     let id = match asked {
@@ -296,22 +295,23 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
         Ok(id)
     } else {
         Err(
-            Failure::input(format!("no question `{id}` that is answered with a number"))
-                .hint(format!("there is: {}", numeric.join(", "))),
+            Failure::input(format!("there is no question `{id}` with numeric answers")).hint(
+                format!("questions with numeric answers: {}", numeric.join(", ")),
+            ),
         )
     }
 }
 
-/// What each later version of the protocol changed of the analysis.
+/// The changes of the analysis in later versions of the protocol.
 fn deviations(study: &StudyFolder) -> Result<Vec<Deviation>, Failure> {
-    let mut said = Vec::new();
+    let mut found = Vec::new();
     let mut before: Option<Protocol> = None;
     let versions = &study.manifest().versions;
     for version in versions.iter().filter(|_| versions.len() > 1) {
         let after = study_folder::frozen_version(study, version.version)?.protocol;
         if let Some(before) = &before {
             let changes = analyze::deviations(before, &after);
-            said.extend(changes.into_iter().map(|change| Deviation {
+            found.extend(changes.into_iter().map(|change| Deviation {
                 text: format!(
                     "protocol {} of {}, because \"{}\": {}",
                     version.version,
@@ -324,20 +324,20 @@ fn deviations(study: &StudyFolder) -> Result<Vec<Deviation>, Failure> {
         }
         before = Some(after);
     }
-    Ok(said)
+    Ok(found)
 }
 
-/// Each file as a whole or not at all, and not again if it has these bytes. None is
-/// synced: all of them can be made again at any time from what is on the disk.
+/// Writes each file atomically, unless it already has this content. Nothing is synced,
+/// because all files can be regenerated.
 fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
     let figures = dir.join("figures");
-    // What stands there may be somebody else's folder: a link leads out of this one.
+    // A link may lead to a folder that is not ours.
     if fs::symlink_metadata(&figures).is_ok_and(|m| m.is_symlink()) {
         return Err(Failure::input(format!(
-            "{}: this is a symbolic link, and the figures would be written where it leads",
+            "{}: this is a symbolic link, and figures would be written to its target",
             Untrusted(&figures.display().to_string())
         ))
-        .hint("remove the link, or name another folder with --out"));
+        .hint("remove the link, or choose another folder with --out"));
     }
     for item in [dir.to_owned(), figures] {
         fs::create_dir_all(&item).map_err(|e| Failure::file(&item, &e))?;
@@ -347,11 +347,11 @@ fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
         if fs::read(&path).is_ok_and(|old| old == output.content) {
             return Ok(());
         }
-        // Its own for each file and process: SVG, PNG and CSV of a figure share a stem.
+        // A unique temporary name for each file and process.
         let part = dir.join(format!("{}.{}.part", output.name, std::process::id()));
         let written = fs::write(&part, &output.content).and_then(|()| fs::rename(&part, &path));
         written.map_err(|e| {
-            // What is left of it is of no use; the first error is the one to tell.
+            // The first error is the one to report.
             let _ = fs::remove_file(&part);
             Failure::file(&path, &e)
         })

@@ -1,19 +1,19 @@
-//! The tables of `analysis/`, RFC 4180. Text is stored as it was typed.
+//! The CSV tables of `analysis/` (RFC 4180). Text is stored as typed.
 
 use super::Source;
 use study_core::analyze::{Analysis, Value};
 
-/// A file of `analysis/`: name and content.
+/// A file of `analysis/`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Table {
+pub struct TableFile {
     /// File name.
     pub name: &'static str,
-    /// Whole content.
+    /// Content.
     pub content: String,
 }
 
-/// All files: tables and `values.json`.
-pub fn tables(source: &Source, analysis: &Analysis) -> Vec<Table> {
+/// The CSV tables and `values.json`.
+pub fn tables(source: &Source, analysis: &Analysis) -> Vec<TableFile> {
     vec![
         table("descriptives.csv", descriptives(analysis)),
         table("correlation.csv", identified(analysis, &CORRELATION)),
@@ -25,25 +25,25 @@ pub fn tables(source: &Source, analysis: &Analysis) -> Vec<Table> {
         table("with_and_without.csv", with_and_without(analysis)),
         table("comments.csv", comments(analysis)),
         table("excluded.csv", excluded(analysis)),
-        Table {
+        TableFile {
             name: "ratings_used.csv",
             content: ratings_used(analysis),
         },
-        Table {
+        TableFile {
             name: "values.json",
             content: super::json::document(source, analysis),
         },
     ]
 }
 
-fn table(name: &'static str, rows: Vec<Vec<String>>) -> Table {
-    Table {
+fn table(name: &'static str, rows: Vec<Vec<String>>) -> TableFile {
+    TableFile {
         name,
         content: text(&rows),
     }
 }
 
-/// Rows as CSV; all are equally long.
+/// Rows of equal length as CSV.
 pub(super) fn text(rows: &[Vec<String>]) -> String {
     written(|to| {
         for row in rows {
@@ -52,7 +52,7 @@ pub(super) fn text(rows: &[Vec<String>]) -> String {
     })
 }
 
-/// A table that is written row by row, because it can have millions of them.
+/// A table that is written row by row, because it can have millions of rows.
 fn written(write: impl FnOnce(&mut Rows)) -> String {
     let mut rows = Rows(
         csv::WriterBuilder::new()
@@ -60,8 +60,11 @@ fn written(write: impl FnOnce(&mut Rows)) -> String {
             .from_writer(Vec::new()),
     );
     write(&mut rows);
-    let bytes = rows.0.into_inner().expect("memory takes them");
-    String::from_utf8(bytes).expect("only text was written")
+    let bytes = rows
+        .0
+        .into_inner()
+        .expect("writing to memory does not fail");
+    String::from_utf8(bytes).expect("all fields are UTF-8")
 }
 
 struct Rows(csv::Writer<Vec<u8>>);
@@ -70,7 +73,7 @@ impl Rows {
     fn row<T: AsRef<[u8]>>(&mut self, row: impl IntoIterator<Item = T>) {
         self.0
             .write_record(row)
-            .expect("rows of a table are equally long and memory takes them");
+            .expect("all rows have the same length");
     }
 }
 
@@ -86,7 +89,7 @@ fn whole(x: Option<u32>) -> String {
     x.map_or_else(String::new, |x| x.to_string())
 }
 
-/// All digits of a number, and no zeros that only say how large or small it is.
+/// All digits of a number; an exponent instead of many zeros.
 pub(super) fn digits(x: f64) -> String {
     if x == 0.0 || (1e-5..1e16).contains(&x.abs()) {
         x.to_string()
@@ -150,7 +153,7 @@ const AGREEMENT: [&str; 4] = [
     "krippendorff_repetitions",
 ];
 
-/// The statistics of some groups, one in a row.
+/// The statistics of some groups, one per row.
 fn identified(a: &Analysis, groups: &[&str]) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["identifier", "value", "undefined_because"])];
     for (id, value) in a.values.iter() {
@@ -199,7 +202,7 @@ fn pairs(a: &Analysis) -> Vec<Vec<String>> {
     rows
 }
 
-/// Every participant that counts; empty where they are too many to be listed.
+/// The included participants; empty if there are too many to list.
 fn subjects(a: &Analysis) -> Vec<Vec<String>> {
     const STATISTICS: [&str; 10] = [
         "n",
@@ -230,7 +233,7 @@ fn subjects(a: &Analysis) -> Vec<Vec<String>> {
     rows
 }
 
-/// What each pre-stated rule did.
+/// The effect of each exclusion rule.
 fn exclusions(a: &Analysis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["rule", "rows", "participants", "problem"])];
     rows.extend(a.exclusions.iter().map(|e| {
@@ -244,7 +247,7 @@ fn exclusions(a: &Analysis) -> Vec<Vec<String>> {
     rows
 }
 
-/// The headline with the exclusions and without any.
+/// The main results with and without the exclusions.
 fn with_and_without(a: &Analysis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["identifier", "with", "without"])];
     for (id, value) in a.values.iter() {

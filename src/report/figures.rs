@@ -1,24 +1,24 @@
-//! The figures of an analysis: for each a picture, and the numbers in it.
+//! The figures of an analysis, each with the data it shows.
 //!
-//! Means of subject × realization cells and of repetitions are formed here from
-//! the rows that count, because they are drawn one by one; everything that is
-//! inferred stands in the analysis and is only looked up. A figure that the data
-//! do not allow is left out. Two widths: one for paper and screens, one for phones.
+//! Means of subject × realization cells and of repetitions are computed here from the
+//! included rows; all other statistics are looked up in the analysis. Figures that the
+//! data do not allow are left out. Each figure has two widths: one for paper and
+//! screens, one for phones.
 
 mod counts;
 mod means;
 mod subjects;
 mod traces;
 
-use super::svg::{Axis, Figure, Look};
+use super::svg::{Axis, Figure};
 use std::collections::BTreeMap;
-use study_core::analyze::{Analysis, Listed};
+use study_core::analyze::{Analysis, RealizationSummary};
 use study_core::outcome::Role;
 
-/// Most realizations, and most subjects, that are drawn one by one.
+/// Largest number of realizations, and of subjects, that are drawn individually.
 pub const MAX_DRAWN: usize = 60;
 
-/// File names, without ending, that a figure can have.
+/// File names of all figures, without extension.
 pub const NAMES: [&str; 8] = [
     "fig10-means",
     "fig11-rating-and-vaf",
@@ -35,34 +35,34 @@ pub const NAMES: [&str; 8] = [
 pub struct Trace {
     /// Realization. Untrusted.
     pub model: String,
-    /// Whose and which trial. Untrusted.
+    /// Participant and trial. Untrusted.
     pub label: String,
-    /// Whether the force was measured; else it is the commanded one.
+    /// Whether the force was measured, not only commanded.
     pub measured: bool,
-    /// Position mm, force N.
+    /// Position in mm, force in N.
     pub points: Vec<(f64, f64)>,
 }
 
 /// A figure, ready to be written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawn {
-    /// File name without ending.
+    /// File name without extension.
     pub name: &'static str,
-    /// What it shows, in a sentence or two. Untrusted.
+    /// Caption. Untrusted.
     pub caption: String,
-    /// For paper and screens.
+    /// Version for paper and screens.
     pub wide: Figure,
-    /// For phones.
+    /// Version for phones.
     pub narrow: Figure,
-    /// The numbers in it, as CSV.
+    /// The data of the figure, as CSV.
     pub data: String,
 }
 
-/// Width of the page that a figure is for.
+/// The page that a version of a figure is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Canvas {
+    /// px.
     width: f64,
-    /// Of ids and widths alike.
     narrow: bool,
 }
 
@@ -85,13 +85,13 @@ impl Canvas {
         Figure::new(&id, title, self.width, height)
     }
 
-    /// The one or the other.
+    /// One of two settings.
     fn pick<T>(self, wide: T, narrow: T) -> T {
         if self.narrow { narrow } else { wide }
     }
 }
 
-/// Everything that can be drawn, in the order of the report.
+/// All figures that the data allow, in the order of the report.
 pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
     let scene = Scene::of(a);
     [
@@ -109,12 +109,12 @@ pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
     .collect()
 }
 
-/// What the figures share.
+/// Data that several figures use.
 struct Scene<'a> {
     a: &'a Analysis,
-    /// Those that the study asks about, then the others.
-    models: Vec<&'a Listed>,
-    /// The question as a noun.
+    /// The tested realizations, then the others.
+    models: Vec<&'a RealizationSummary>,
+    /// The question as a noun, without article.
     asked: String,
     /// Ratings by subject and realization.
     cells: BTreeMap<(&'a str, &'a str), Vec<f64>>,
@@ -123,13 +123,10 @@ struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     fn of(a: &'a Analysis) -> Self {
-        let (mut models, others): (Vec<&Listed>, Vec<&Listed>) = a
-            .realizations
-            .iter()
-            .partition(|m| m.role == Role::Test && m.duplicate_of.is_none());
-        models.extend(others);
+        let mut models: Vec<&RealizationSummary> = a.realizations.iter().collect();
+        models.sort_by_key(|m| !m.tested);
         let mut cells: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
-        // Of more subjects none is drawn.
+        // Larger numbers of subjects are not drawn.
         let few = a.counts.participants <= MAX_DRAWN;
         let rows = a.rows.iter().filter(|r| few && r.excluded.is_none());
         for row in rows {
@@ -139,23 +136,24 @@ impl<'a> Scene<'a> {
                 cells.entry(cell).or_default().push(rating);
             }
         }
+        let asked = super::sentences::asked(a);
         let mut subjects: Vec<&str> = cells.keys().map(|(s, _)| *s).collect();
         subjects.dedup();
         Self {
             a,
             models,
-            asked: super::asked(a).trim_start_matches("the ").to_owned(),
+            asked: asked.trim_start_matches("the ").to_owned(),
             cells,
             subjects,
         }
     }
 
-    /// Whether the realizations can be drawn one by one.
+    /// Whether the realizations can be drawn individually.
     fn drawable(&self) -> bool {
         (1..=MAX_DRAWN).contains(&self.models.len())
     }
 
-    /// Whether the subjects can, too.
+    /// Whether realizations and subjects can be drawn individually.
     fn with_subjects(&self) -> bool {
         self.drawable() && (1..=MAX_DRAWN).contains(&self.subjects.len())
     }
@@ -165,10 +163,10 @@ impl<'a> Scene<'a> {
     }
 
     fn number(&self, model: &str, what: &str) -> Option<f64> {
-        self.a.values.number(&format!("desc/{model}/{what}"))
+        self.a.described(model, what)
     }
 
-    /// The scale of the ratings, and what has to be seen beyond it.
+    /// An axis with the rating scale and the values beyond it.
     fn ratings(&self, label: &str, beyond: &[f64]) -> Axis {
         let finite = || beyond.iter().copied().filter(|v| v.is_finite());
         let low = finite().fold(f64::INFINITY, f64::min);
@@ -181,22 +179,17 @@ impl<'a> Scene<'a> {
             None => Axis::around(label, [low, high]),
         }
     }
-
-    /// How the n-th realization looks in every figure.
-    fn look(&self, n: usize) -> Look {
-        Look::nth(n)
-    }
 }
 
-fn name(m: &Listed) -> String {
+fn name(m: &RealizationSummary) -> String {
     match (&m.duplicate_of, m.role) {
-        (Some(_), _) => format!("{} (repeat)", m.id),
+        (Some(_), _) => format!("{} (duplicate)", m.id),
         (None, Role::Test) => m.id.clone(),
         (None, role) => format!("{} ({})", m.id, role.as_str()),
     }
 }
 
-/// A figure in both widths; `None` if it cannot be drawn.
+/// A figure in both widths.
 fn drawn(
     name: &'static str,
     caption: String,

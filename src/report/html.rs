@@ -1,59 +1,59 @@
-//! The report: one HTML file that needs nothing else.
+//! The report: one self-contained HTML file.
 //!
-//! No script, no reference to anything outside (the content security policy in
-//! its head forbids both), dark on white, for screens, phones and A4. Everything
-//! from the data is text: maud escapes it, and [`Untrusted`] shows control and
-//! bidirectional characters as what they are.
+//! It has no scripts and no external references (the content security policy in its
+//! head forbids both), and is laid out for screens, phones and A4. All text from the
+//! data is escaped by maud, and [`Untrusted`] shows control and bidirectional
+//! characters as codes.
 //!
-//! Every number is read from the analysis by its identifier. What is absent is
-//! left out, what is undefined is listed with its reason.
+//! Every number is looked up in the analysis by its identifier. What is absent is left
+//! out; what is undefined is listed with its reason.
 
-mod answers;
 mod methods;
 mod notes;
-mod prose;
+mod paragraphs;
 mod statistics;
 mod style;
 mod tables;
 
 use super::Source;
+use super::answers::{answers, conditional};
 use super::figures::Drawn;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use study_base::text::Untrusted;
+use study_base::text::{Untrusted, counted};
 use study_core::analyze::Analysis;
 
-/// What the report says of a study beyond its analysis. All text is untrusted.
+/// Facts about a study besides its analysis. All text is untrusted.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Details {
-    /// BCP 47 tag of the texts of the study.
+    /// BCP 47 language tag of the texts of the study.
     pub lang: Option<String>,
-    /// Who made the study.
+    /// Authors.
     pub authors: Vec<String>,
-    /// What the participants were asked.
+    /// The question.
     pub prompt: Option<String>,
-    /// Words at places of the scale.
+    /// Labels of ratings on the scale.
     pub labels: Vec<(f64, String)>,
-    /// Name and value: of the design, the device, the ethics; for the notes.
+    /// Name and value of further facts, such as funding, for the notes.
     pub facts: Vec<(String, String)>,
-    /// How often each realization was felt, as planned.
+    /// Planned repetitions of each realization.
     pub repetitions: Option<u32>,
-    /// How orders were made, as the protocol calls it.
+    /// How the order of the trials was made, as a phrase.
     pub order: Option<String>,
-    /// How many participants are in which state.
+    /// Number of participants by state.
     pub states: Vec<(String, usize)>,
-    /// Sentences on how the sessions were run, for the methods.
+    /// Sentences on the conduct of the sessions, for the methods.
     pub conduct: Vec<String>,
-    /// What the participants did before each trial.
+    /// Instruction shown before each trial.
     pub reference: Option<String>,
     /// Kind of the device.
     pub device: Option<String>,
     /// Seed of the study's randomness.
     pub seed: Option<u64>,
-    /// Versions of this program that the sessions were run with.
+    /// Versions of this program that ran the sessions.
     pub tools: Vec<String>,
     /// Name and value of each fingerprint of the newest version.
     pub fingerprints: Vec<(String, String)>,
-    /// Versions of the protocol: number, when, why.
+    /// Versions of the protocol: number, time, reason.
     pub versions: Vec<(u32, String, String)>,
 }
 
@@ -62,7 +62,7 @@ pub fn document(source: &Source, details: &Details, a: &Analysis, figures: &[Dra
     let lang = details.lang.as_deref().filter(|l| is_tag(l));
     let page = html! {
         (DOCTYPE)
-        // The report's own words are English; texts of the study carry `lang`.
+        // The report itself is in English; texts of the study carry their own `lang`.
         html lang="en" {
             head {
                 meta charset="utf-8";
@@ -76,11 +76,11 @@ pub fn document(source: &Source, details: &Details, a: &Analysis, figures: &[Dra
             body {
                 (head(source, details, a, lang))
                 main {
-                    (answers::section(a))
+                    (answers_section(a))
                     (figures_section(figures))
                     (tables::section(a))
-                    (prose::section(details, a))
-                    (answers::only_these(a))
+                    (paragraphs::section(details, a))
+                    (conditional_section(a))
                     (notes::comments(a, lang))
                     (notes::exclusions(a, source.study.is_some()))
                     (statistics::section(a))
@@ -88,7 +88,7 @@ pub fn document(source: &Source, details: &Details, a: &Analysis, figures: &[Dra
                 }
                 footer {
                     "Written by study " (env!("CARGO_PKG_VERSION"))
-                    ". Every number is in values.json by its identifier; figures and their data are in figures/."
+                    ". All numbers are in values.json by identifier, figures and their data in figures/."
                 }
             }
         }
@@ -103,17 +103,17 @@ fn safe(text: &str) -> String {
     Untrusted(text).to_string()
 }
 
-/// A sentence, whose lines break neither around a sign of equality or comparison nor
-/// before a per cent sign.
+/// An escaped sentence that does not break around `=` and `<` or before `%`.
 fn typeset(text: &str) -> String {
     safe(text)
         .replace(" = ", "\u{a0}=\u{a0}")
         .replace(" < ", "\u{a0}<\u{a0}")
+        .replace(" > ", "\u{a0}>\u{a0}")
         .replace(" %", "\u{a0}%")
         .replace("% CI [", "%\u{a0}CI\u{a0}[")
 }
 
-/// Text from the data that may have lines.
+/// Text from the data that may have several lines.
 fn lines(text: &str) -> Markup {
     html! {
         @for (i, line) in text.lines().enumerate() {
@@ -123,7 +123,7 @@ fn lines(text: &str) -> Markup {
     }
 }
 
-/// Whether it looks like a language tag: nothing else goes into `lang`.
+/// Whether a text has the form of a language tag, so that it may go into `lang`.
 fn is_tag(tag: &str) -> bool {
     (2..=35).contains(&tag.len()) && tag.chars().all(|c| c.is_ascii_alphanumeric() || c == '-')
 }
@@ -145,20 +145,58 @@ fn head(source: &Source, details: &Details, a: &Analysis, lang: Option<&str>) ->
                     Some(planned) => {
                         span {
                             (c.finished) " of "
-                            (super::apa::counted(planned as usize, "planned participant", "planned participants"))
+                            (counted(planned as usize, "planned participant", "planned participants"))
                             " finished"
                         }
                         @if c.participants != c.finished { " " span { (c.participants) " analysed" } }
                     },
-                    None => span { (super::apa::counted(c.participants, "subject", "subjects")) },
+                    None => span { (counted(c.participants, "participant", "participants")) },
                 }
                 " "
-                span { (super::apa::counted(c.rated, "rating", "ratings")) } " "
+                span { (counted(c.rated, "rating", "ratings")) } " "
                 @if !a.realizations.is_empty() {
-                    span { (super::apa::counted(a.realizations.len(), "realization", "realizations")) }
+                    span { (counted(a.realizations.len(), "realization", "realizations")) }
                 }
             }
             (notes::banners(a))
+        }
+    }
+}
+
+fn answers_section(a: &Analysis) -> Markup {
+    let all = answers(a);
+    html! {
+        section {
+            h2 { "Answers" }
+            @if a.counts.rated == 0 {
+                p { "No rating is included: there is nothing to analyse. See “Included and excluded data”." }
+            } @else if all.is_empty() {
+                p { "The data do not allow an answer to any question of the study; see the tables." }
+            }
+            @for answer in &all {
+                h3 { (safe(&answer.question)) }
+                p.short { (typeset(&answer.short)) }
+                @for line in answer.main.iter().chain(&answer.more) { p { (typeset(line)) } }
+            }
+        }
+    }
+}
+
+/// Results that hold for these realizations only, set apart.
+fn conditional_section(a: &Analysis) -> Markup {
+    let (rows, _) = conditional(a);
+    html! {
+        @if !rows.is_empty() {
+            section.apart {
+                h2 { "For these realizations only" }
+                p.warning {
+                    "These analyses treat the realizations as fixed and do not generalise to others: \
+                     where realizations differ for reasons other than VAF, such tests found an effect \
+                     of VAF that did not exist in up to half of simulated studies. None of them answers \
+                     whether VAF predicts realism."
+                }
+                ul { @for row in &rows { li { (typeset(row)) } } }
+            }
         }
     }
 }

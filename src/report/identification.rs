@@ -1,70 +1,70 @@
-//! The figures of an identification, after those of the paper: 4 VAF over λ and dx,
+//! The figures of an identification, numbered as in the paper: 4 VAF over λ and dx,
 //! 5 parameters over position, 6 force over time, 7 its spectrum, 8 parameters over
 //! position and λ.
 //!
-//! Each comes with the numbers that it shows as a CSV, in the units of its axes.
-//! What is drawn is computed here from tables and recordings; nothing is identified
-//! or chosen here. The numbers follow the paper's figures, so that they can lie side
-//! by side.
+//! Each figure comes with its data as a CSV, in the units of its axes. Nothing is
+//! identified or selected here.
 
 mod spectrum;
 
-use super::svg::{Axis, ColourBar, Dash, Figure, Look, Mark, Note, PALETTE, Panel, Span, ramp};
+use super::svg::{
+    Axis, ColourBar, Dash, Figure, Look, Mark, Note, PALETTE, Panel, Span, ramp, share,
+};
 use std::fmt::Write as _;
 use study_haptics::identify::vaf;
 use study_haptics::model::{Branch, Realization};
 use study_haptics::recording::Recording;
 
-/// Seconds that Fig. 6 shows.
+/// Duration shown in Fig. 6, s.
 const SHOWN_S: f64 = 4.0;
-/// Points of a line in Fig. 6: more cannot be told apart.
-const MOST_POINTS: usize = 2000;
-/// Cells in which Fig. 4 writes the number.
-const MOST_NUMBERS: usize = 160;
+/// Largest number of points of a line in Fig. 6.
+const MAX_POINTS: usize = 2000;
+/// Largest number of cells that are labelled in Fig. 4.
+const MAX_LABELLED: usize = 160;
 
-/// A figure and the numbers in it.
+/// A figure and its data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
-    /// Name of its files, without an ending.
+    /// File name without extension.
     pub name: &'static str,
-    /// What is drawn.
+    /// The figure.
     pub figure: Figure,
-    /// The same as a table.
+    /// Its data.
     pub csv: String,
 }
 
-/// One cell of Fig. 4.
+/// A cell of Fig. 4.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct GridCell {
     /// Forgetting factor.
     pub lambda: f64,
-    /// L, mm, if it is finite.
+    /// Memory length, mm, if finite.
     pub memory_mm: Option<f64>,
-    /// mm.
+    /// Resampling increment, mm.
     pub dx_mm: f64,
     /// Variance accounted for.
     pub vaf: f64,
 }
 
-/// Fig. 4: VAF over λ and dx. `best` is one of `places`; `on` says which recording,
-/// untrusted. `None` unless there are two λ and two dx.
-pub fn surface(places: &[Place], best: Option<usize>, on: &str) -> Option<Drawing> {
-    let lambdas = distinct(places.iter().map(|p| p.lambda));
-    let increments = distinct(places.iter().map(|p| p.dx_mm));
+/// Fig. 4: VAF over λ and dx. `best` is an index of `grid`; `on` names the recording,
+/// untrusted. `None` unless there are at least two λ and two dx.
+pub fn surface(grid: &[GridCell], best: Option<usize>, on: &str) -> Option<Drawing> {
+    let lambdas = distinct(grid.iter().map(|p| p.lambda));
+    let increments = distinct(grid.iter().map(|p| p.dx_mm));
     if lambdas.len() < 2 || increments.len() < 2 {
         return None;
     }
-    let finite = || places.iter().map(|p| p.vaf).filter(|v| v.is_finite());
+    let finite = || grid.iter().map(|p| p.vaf).filter(|v| v.is_finite());
     let high = finite().fold(f64::NEG_INFINITY, f64::max);
-    // a few ruined cells must not take the colours from all others
+    // A few very low values must not take up the colour range of all others.
     let low = finite().fold(high, f64::min).max(high - 0.5);
     let index = |of: &[f64], value: f64| of.partition_point(|v| *v < value) as f64;
-    let place = |p: &Place| (index(&lambdas, p.lambda), index(&increments, p.dx_mm));
+    let position = |p: &GridCell| (index(&lambdas, p.lambda), index(&increments, p.dx_mm));
     let around = |(x, y): (f64, f64)| Span {
         x: (x - 0.5, x + 0.5),
         y: (y - 0.5, y + 0.5),
     };
-    let cells = places.iter().map(|p| (around(place(p)), p.vaf)).collect();
+    let cells = grid.iter().map(|p| (around(position(p)), p.vaf)).collect();
     let names = |of: &[f64]| of.iter().map(ToString::to_string).collect::<Vec<_>>();
     let mut panel = Panel::new(
         Axis::of_names("forgetting factor λ", &names(&lambdas)),
@@ -77,18 +77,17 @@ pub fn surface(places: &[Place], best: Option<usize>, on: &str) -> Option<Drawin
         low,
         high,
     });
-    if places.len() <= MOST_NUMBERS {
-        for p in places {
-            let share = (p.vaf - low) / (high - low);
-            let mut note = Note::new(place(p), &short(p.vaf)).moved(0.0, 4.0);
-            note.colour = ramp(share).text_on();
-            // a white rim would swallow white letters
+    if grid.len() <= MAX_LABELLED {
+        for p in grid {
+            let mut note = Note::new(position(p), &short(p.vaf)).moved(0.0, 4.0);
+            note.colour = ramp(share(p.vaf, low, high)).text_on();
+            // White letters must have no white outline.
             note.rim = false;
             panel = panel.note(note);
         }
     }
-    if let Some(best) = best.and_then(|i| places.get(i)) {
-        let (x, y) = place(best);
+    if let Some(best) = best.and_then(|i| grid.get(i)) {
+        let (x, y) = position(best);
         let corners = [
             (-0.5, -0.5),
             (0.5, -0.5),
@@ -101,7 +100,7 @@ pub fn surface(places: &[Place], best: Option<usize>, on: &str) -> Option<Drawin
         panel = panel.named("highest", look, Mark::Line(frame));
     }
     let mut csv = String::from("lambda,memory_mm,dx_mm,vaf\n");
-    for p in places {
+    for p in grid {
         let memory = p.memory_mm.map_or(String::new(), |l| l.to_string());
         let _ = writeln!(csv, "{},{memory},{},{}", p.lambda, p.dx_mm, p.vaf);
     }
@@ -120,7 +119,7 @@ pub fn surface(places: &[Place], best: Option<usize>, on: &str) -> Option<Drawin
     })
 }
 
-/// What a branch has at each node: heading in a CSV, axis, values.
+/// A parameter: column of the CSV, label of the axis, values by node.
 type Column = (&'static str, &'static str, fn(&Branch) -> &Vec<f64>);
 
 const PARAMETERS: [Column; 4] = [
@@ -176,11 +175,11 @@ pub fn parameters(realization: &Realization) -> Drawing {
     }
 }
 
-/// Fig. 6: measured and predicted force over time, some seconds of it.
+/// Fig. 6: measured and predicted force over the first seconds.
 pub fn force(realization: &Realization, recording: &Recording) -> Drawing {
     let start = recording.t_s[0];
     let shown = recording.t_s.partition_point(|t| t - start <= SHOWN_S);
-    let stride = shown.div_ceil(MOST_POINTS).max(1);
+    let stride = shown.div_ceil(MAX_POINTS).max(1);
     let rows: Vec<[f64; 3]> = vaf::predict(realization, recording)
         .enumerate()
         .take(shown)
@@ -220,17 +219,16 @@ pub fn force(realization: &Realization, recording: &Recording) -> Drawing {
     }
 }
 
-/// Fig. 7: amplitude spectra of measured and predicted force and of what is left,
-/// 0 to 10 Hz.
+/// Fig. 7: amplitude spectra of measured force, predicted force and residual, 0 to 10 Hz.
 pub fn spectra(realization: &Realization, recording: &Recording) -> Drawing {
     let predicted: Vec<f64> = vaf::predict(realization, recording).collect();
-    let left: Vec<f64> = recording
+    let residual: Vec<f64> = recording
         .f_n
         .iter()
         .zip(&predicted)
         .map(|(f, p)| f - p)
         .collect();
-    let found = spectrum::amplitudes(&recording.t_s, [&recording.f_n, &predicted, &left]);
+    let found = spectrum::amplitudes(&recording.t_s, [&recording.f_n, &predicted, &residual]);
     let line = |i: usize| Mark::Line(found.iter().map(|(hz, n)| (*hz, n[i])).collect());
     let top = found.iter().flat_map(|(_, n)| *n).fold(0.0, f64::max);
     let [measured, other] = both();
@@ -258,8 +256,8 @@ pub fn spectra(realization: &Realization, recording: &Recording) -> Drawing {
     }
 }
 
-/// Fig. 8: the parameters of the + direction over position and λ. All realizations
-/// have the same nodes; `None` unless there are two.
+/// Fig. 8: the parameters of the + direction over position and λ. `None` unless there
+/// are at least two realizations with the same nodes.
 pub fn map(by_lambda: &[(f64, &Realization)]) -> Option<Drawing> {
     let mut sorted = by_lambda.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -285,7 +283,7 @@ pub fn map(by_lambda: &[(f64, &Realization)]) -> Option<Drawing> {
             .copied()
             .collect();
         all.sort_by(f64::total_cmp);
-        // the colours of the middle 96 %: what lies outside takes the end colours
+        // The colours cover the middle 96 %; other values get the colours of the ends.
         let at = |share: f64| all[((all.len() - 1) as f64 * share).round() as usize];
         let (low, high) = (at(0.02), at(0.98));
         let cells = sorted
@@ -336,7 +334,7 @@ pub fn map(by_lambda: &[(f64, &Realization)]) -> Option<Drawing> {
     })
 }
 
-/// How two things that are compared look: apart in colour, lightness and dash.
+/// The appearance of two compared series, different in colour, lightness and dash.
 fn both() -> [Look; 2] {
     [
         Look::plain(PALETTE[0]).stroke(2.0),
@@ -348,7 +346,7 @@ fn points(x: &[f64], y: &[f64]) -> Mark {
     Mark::Line(x.iter().copied().zip(y.iter().copied()).collect())
 }
 
-/// Ascending, each once.
+/// The distinct values, ascending.
 fn distinct(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);

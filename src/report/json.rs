@@ -1,13 +1,13 @@
-//! The analysis as one JSON document, `study-analysis/1`, numbers unrounded.
+//! The analysis as one JSON document, `study-analysis/1`, with unrounded numbers.
 
 use super::Source;
 use serde_json::{Map, Value as Json, json};
 use study_core::analyze::{Analysis, Value};
 
-/// The name and version of the document.
+/// Name and version of the format.
 pub const FORMAT: &str = "study-analysis/1";
 
-/// The document, with a line feed at its end.
+/// The document, with a final line feed.
 pub fn document(source: &Source, analysis: &Analysis) -> String {
     let (mut values, mut undefined) = (Map::new(), Map::new());
     for (id, value) in analysis.values.iter() {

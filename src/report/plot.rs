@@ -1,9 +1,9 @@
-//! Small charts of characters: histograms in a cell, dots with error bars.
+//! Small text charts: histograms in a table cell, dots with error bars.
 
-/// Eighths of a full block.
+/// Blocks of 0 to 8 eighths.
 const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// One bar for each count, against `most`; what is not empty shows.
+/// One bar for each count, relative to `most`; counts above 0 are always visible.
 pub fn bars(counts: &[f64], most: f64, gap: &str) -> String {
     let bar = |n: &f64| {
         let eighths = if most > 0.0 {
@@ -18,7 +18,7 @@ pub fn bars(counts: &[f64], most: f64, gap: &str) -> String {
     counts.iter().map(bar).collect::<Vec<_>>().join(gap)
 }
 
-/// An axis of characters.
+/// A horizontal axis of some columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
     low: f64,
@@ -28,10 +28,10 @@ pub struct Axis {
 
 impl Axis {
     /// From `low` to `high` over at least two columns. `None` unless the ends are
-    /// finite and apart.
+    /// finite and different.
     pub fn new(low: f64, high: f64, columns: usize) -> Option<Self> {
-        let apart = low.is_finite() && high.is_finite() && (high - low).is_finite();
-        (apart && high > low && columns >= 2).then_some(Self { low, high, columns })
+        let finite = low.is_finite() && high.is_finite() && (high - low).is_finite();
+        (finite && high > low && columns >= 2).then_some(Self { low, high, columns })
     }
 
     /// The column of a number, if it is on the axis.
@@ -42,8 +42,8 @@ impl Axis {
         (at >= 0.0 && at < self.columns as f64).then_some(at as usize)
     }
 
-    /// `├──●──┤`: a dot at `x`, a bar of ± `half`. A bar that leaves the axis has
-    /// no cap there; a dot that is not on it is not drawn.
+    /// `├──●──┤`: a dot at `x` with a bar of ± `half`. A bar has no cap where it leaves
+    /// the axis; a dot outside the axis is not drawn.
     pub fn dot(&self, x: f64, half: Option<f64>) -> String {
         let mut line = vec![' '; self.columns];
         if let Some(half) = half.filter(|h| h.is_finite()) {
@@ -66,8 +66,7 @@ impl Axis {
         line.into_iter().collect::<String>().trim_end().to_owned()
     }
 
-    /// Numbers at round places, centred over their columns: as many, up to ten,
-    /// as leave a space between them.
+    /// Round numbers centred at their columns: as many as fit, at most ten.
     pub fn ticks(&self) -> String {
         (2..=10)
             .rev()
@@ -96,7 +95,7 @@ impl Axis {
             }
             line[start..start + label.len()].copy_from_slice(&label);
             free = start + label.len() + 1;
-            // Far out, a double's next neighbour is further than a step.
+            // For large values adjacent doubles are further apart than a step.
             if k + 1.0 <= k {
                 return None;
             }

@@ -1,9 +1,9 @@
-//! SVG to PNG, with one bundled font and none of the machine's.
+//! Conversion of SVG to PNG with a bundled font.
 //!
 //! The same SVG gives the same bytes on every machine. The font is Liberation
-//! Sans (SIL Open Font License 1.1, `assets/LiberationSans-LICENSE.txt`): Latin,
-//! Greek and Cyrillic. Letters of other scripts are missing in the PNG; they are
-//! in the SVG and in the report, which use the reader's fonts.
+//! Sans (SIL Open Font License 1.1, `assets/LiberationSans-LICENSE.txt`), with Latin,
+//! Greek and Cyrillic. Letters of other scripts are missing in the PNG but not in the
+//! SVG and the report, which use the reader's fonts.
 
 use resvg::tiny_skia::{PixmapMut, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
@@ -12,40 +12,39 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 const FONT: &[u8] = include_bytes!("../../assets/LiberationSans-Regular.ttf");
 
-/// The name that the font has in SVG.
+/// Name of the font in SVG.
 const FAMILY: &str = "Liberation Sans";
 
-/// Pixels to a CSS pixel: enough for print at 10 cm width.
+/// Pixels per CSS pixel: enough for print at 10 cm width.
 const SCALE: f32 = 2.0;
 
 /// Largest side of a picture, pixels.
 const MAX_SIDE: u32 = 16_384;
 
-/// Why there is no PNG.
+/// Why a PNG cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
-    /// It is no SVG that can be drawn.
+    /// The SVG is invalid.
     #[error("the figure cannot be drawn: {0}")]
     Svg(#[from] resvg::usvg::Error),
-    /// It is empty, or larger than any picture should be.
-    #[error("the figure has {width} × {height} pixels; from 1 to {MAX_SIDE} are possible")]
+    /// The picture is empty or too large.
+    #[error("the figure has {width} × {height} pixels; each side must have 1 to {MAX_SIDE}")]
     Size {
-        /// Pixels.
+        /// Width, pixels.
         width: u32,
-        /// Pixels.
+        /// Height, pixels.
         height: u32,
     },
-    /// The encoder failed.
+    /// Encoding failed.
     #[error("the figure cannot be written as PNG: {0}")]
     Encoding(String),
 }
 
-/// Draws SVG; made once, used for all figures, by several threads.
+/// Renders SVG; can be shared between threads.
 #[derive(Debug)]
 pub struct Painter {
     options: Options<'static>,
-    /// Memory of pictures that are done, for the next ones: a figure takes
-    /// megabytes, and fresh ones cost as much time as drawing.
+    /// Buffers for reuse: allocating megabytes takes as long as drawing.
     canvases: Mutex<Vec<Vec<u8>>>,
 }
 
@@ -67,14 +66,14 @@ impl Default for Painter {
 }
 
 impl Painter {
-    /// The picture of an SVG, as the bytes of a PNG.
+    /// Converts an SVG to a PNG file.
     ///
     /// # Errors
-    /// [`PngError`] for what is no SVG, or too large.
+    /// [`PngError`] if the SVG is invalid or too large.
     pub fn png(&self, svg: &str) -> Result<Vec<u8>, PngError> {
         let tree = Tree::from_str(svg, &self.options)?;
         let size = tree.size();
-        // A size is finite and positive; what is too large saturates.
+        // A size is finite and positive; too large a size saturates.
         let pixels = |side: f32| (side * SCALE).ceil() as u32;
         let (width, height) = (pixels(size.width()), pixels(size.height()));
         if width.max(height) > MAX_SIDE {
@@ -94,10 +93,10 @@ impl Painter {
     }
 }
 
-/// Three bytes a pixel: every figure has a white ground, so nothing shows through.
-/// Fast compression takes a third of the time of the usual one.
+/// Encodes without the alpha channel, because every figure has a white background. Fast
+/// compression takes a third of the time of the default one.
 fn encoded(rgba: &[u8], width: u32, height: u32) -> Result<Vec<u8>, png::EncodingError> {
-    // A figure is mostly white: a sixteenth of its pixels' bytes is enough for most.
+    // Most figures compress to less than a sixteenth.
     let mut bytes = Vec::with_capacity(rgba.len() / 16);
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);

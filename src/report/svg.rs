@@ -1,15 +1,15 @@
-//! Figures as SVG: axes, ticks, legends, marks, and nothing that moves.
+//! Static figures as SVG: axes, ticks, legends, marks.
 //!
 //! A [`Figure`] is a grid of [`Panel`]s; a panel has two axes, series and notes.
-//! Lengths are CSS pixels, data are in the units of their axis. It is no general
+//! Lengths are in CSS pixels, data in the units of their axis. This is no general
 //! plotting library: it has what the figures of this program need.
 //!
 //! Invariants: equal figures give equal bytes, on every machine and in every
-//! locale; ids begin with the figure's own, so that several can stand in one
-//! page; text from the data is escaped and cannot leave its element; what is not
-//! finite is not drawn; what lies outside the axes is clipped. Colours are safe
-//! for the colour-blind, and shape, dash or hatching says the same again, so that
-//! a figure reads in grey.
+//! locale; ids start with the figure's own, so that one page can contain several;
+//! text from the data is escaped and cannot leave its element; values that are not
+//! finite are not drawn; marks outside the axes are clipped. Colours are safe for
+//! colour-blind readers and repeated by shape, dash or hatching, so that a figure can
+//! be read in greyscale.
 
 mod axis;
 mod draw;
@@ -18,12 +18,14 @@ mod look;
 mod out;
 
 pub use axis::{Axis, Ticks};
+pub(in crate::report) use draw::share;
 pub(in crate::report) use frame::for_names;
 pub use look::{Colour, Dash, Fill, Look, PALETTE, Shape, ramp};
 
 use out::Out;
+use study_base::text::{Untrusted, cut_middle};
 
-/// The font of every text, first the one that is bundled for PNG.
+/// The fonts of all text, first the one that is bundled for PNG.
 pub const FONT_FAMILY: &str = "Liberation Sans, Arial, Helvetica, sans-serif";
 
 /// Size of tick labels and notes, px.
@@ -35,64 +37,64 @@ pub const NORMAL: f64 = 13.0;
 /// A picture with one or more panels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// Prefix of every id in the SVG: letters, digits, `-`. Unique in a page.
+    /// Prefix of every id in the SVG: letters, digits, `-`. Unique within a page.
     pub id: String,
-    /// What the picture shows, for those who cannot see it. Untrusted.
+    /// Text alternative for screen readers. Untrusted.
     pub title: String,
-    /// px.
+    /// Width, px.
     pub width: f64,
-    /// px.
+    /// Height, px.
     pub height: f64,
-    /// Panels beside each other, at least one.
+    /// Panels per row, at least one.
     pub columns: usize,
-    /// Row by row.
+    /// Panels, row by row.
     pub panels: Vec<Panel>,
 }
 
-/// A pair of axes and what is drawn on them.
+/// Axes and the marks on them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Above the panel; empty for none. Untrusted.
+    /// Title above the panel; empty for none. Untrusted.
     pub title: String,
-    /// Left to right.
+    /// Axis from left to right.
     pub x: Axis,
-    /// Bottom to top.
+    /// Axis from bottom to top.
     pub y: Axis,
-    /// In the order in which they are drawn.
+    /// Series in drawing order.
     pub series: Vec<Series>,
-    /// Texts at places of the data.
+    /// Text in the panel.
     pub notes: Vec<Note>,
-    /// Key of the colours of a heat map.
+    /// Legend of a heat map.
     pub colour_bar: Option<ColourBar>,
-    /// Height relative to other rows; that of a row is its panels' largest.
+    /// Height relative to other rows; a row takes the largest of its panels.
     pub share: f64,
 }
 
-/// Marks that look alike.
+/// Marks of one appearance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Entry in the legend, if any. Untrusted.
+    /// Legend entry, if any. Untrusted.
     pub name: Option<String>,
-    /// How they look.
+    /// Appearance.
     pub look: Look,
-    /// What they are.
+    /// The marks.
     pub mark: Mark,
 }
 
-/// What is drawn. Places are (x, y) in units of the axes.
+/// Marks at positions (x, y) in units of the axes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
-    /// Joined points; one that is not finite breaks the line.
+    /// A polyline; a point that is not finite interrupts it.
     Line(Vec<(f64, f64)>),
-    /// Many small round dots, `stroke` px wide: for thousands of samples.
+    /// Small round dots, `stroke` px wide, for thousands of samples.
     Dots(Vec<(f64, f64)>),
-    /// Marker shapes.
+    /// Markers.
     Points(Vec<(f64, f64)>),
-    /// Upright bars with caps.
+    /// Vertical error bars with caps.
     ErrorBars(Vec<Whisker>),
-    /// Lying bars with caps: `at` is y, the ends are x.
+    /// Horizontal error bars with caps: `at` is y, the ends are x.
     ErrorBarsAcross(Vec<Whisker>),
-    /// Filled boxes, also those of a histogram.
+    /// Filled boxes, such as those of a histogram.
     Bars(Vec<Span>),
     /// Boxes coloured by a value between `low` and `high`, by [`ramp`].
     Heat {
@@ -108,11 +110,11 @@ pub enum Mark {
 /// An error bar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whisker {
-    /// Place along the other axis.
+    /// Position along the other axis.
     pub at: f64,
-    /// One end.
+    /// Lower end.
     pub low: f64,
-    /// The other.
+    /// Upper end.
     pub high: f64,
 }
 
@@ -125,24 +127,24 @@ pub struct Span {
     pub y: (f64, f64),
 }
 
-/// A text at a place.
+/// Text at a position in a panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Note {
-    /// Place in units of the axes.
+    /// Position in units of the axes.
     pub at: (f64, f64),
-    /// Moved by so many px, right and down.
+    /// Offset to the right and down, px.
     pub by: (f64, f64),
-    /// Untrusted.
+    /// Text. Untrusted.
     pub text: String,
-    /// Which end of the text stands there.
+    /// Which part of the text is at the position.
     pub anchor: Anchor,
     /// Colour.
     pub colour: Colour,
-    /// Whether a white rim keeps it readable over lines.
+    /// Whether it has a white outline, to be readable over lines.
     pub rim: bool,
 }
 
-/// Which end of a text stands at its place.
+/// Which part of a text is at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
     /// Its start.
@@ -153,10 +155,10 @@ pub enum Anchor {
     End,
 }
 
-/// Key of a heat map.
+/// Legend of a heat map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourBar {
-    /// What the colours say. Untrusted.
+    /// Label. Untrusted.
     pub label: String,
     /// Value of the lightest colour.
     pub low: f64,
@@ -165,7 +167,7 @@ pub struct ColourBar {
 }
 
 impl Figure {
-    /// A figure with one column and no panel yet.
+    /// An empty figure with one column.
     pub fn new(id: &str, title: &str, width: f64, height: f64) -> Self {
         Self {
             id: id.to_owned(),
@@ -177,14 +179,14 @@ impl Figure {
         }
     }
 
-    /// The same with one more panel.
+    /// Adds a panel.
     #[must_use]
     pub fn with(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
     }
 
-    /// The SVG, one document that also stands in HTML as it is.
+    /// The SVG document, which can also be embedded in HTML.
     pub fn to_svg(&self) -> String {
         let mut out = Out::new(&self.id);
         out.open(&self.title, self.width, self.height);
@@ -209,14 +211,14 @@ impl Panel {
         }
     }
 
-    /// The same with a title.
+    /// Sets the title.
     #[must_use]
     pub fn titled(mut self, title: &str) -> Self {
         title.clone_into(&mut self.title);
         self
     }
 
-    /// The same with marks that the legend does not name.
+    /// Adds marks without a legend entry.
     #[must_use]
     pub fn with(mut self, look: Look, mark: Mark) -> Self {
         self.series.push(Series {
@@ -227,7 +229,7 @@ impl Panel {
         self
     }
 
-    /// The same with marks that the legend names.
+    /// Adds marks with a legend entry.
     #[must_use]
     pub fn named(mut self, name: &str, look: Look, mark: Mark) -> Self {
         self.series.push(Series {
@@ -238,7 +240,7 @@ impl Panel {
         self
     }
 
-    /// The same with a note.
+    /// Adds a note.
     #[must_use]
     pub fn note(mut self, note: Note) -> Self {
         self.notes.push(note);
@@ -247,7 +249,7 @@ impl Panel {
 }
 
 impl Note {
-    /// A dark text with a rim, whose middle stands at a place.
+    /// Dark text with an outline, centred at a position.
     pub fn new(at: (f64, f64), text: &str) -> Self {
         Self {
             at,
@@ -259,14 +261,14 @@ impl Note {
         }
     }
 
-    /// The same, moved by px right and down.
+    /// Sets the offset to the right and down, px.
     #[must_use]
     pub fn moved(mut self, right: f64, down: f64) -> Self {
         self.by = (right, down);
         self
     }
 
-    /// The same without a rim, in black or white: for text on a filled box.
+    /// Black or white text without an outline, for a filled box of colour `paper`.
     #[must_use]
     pub fn on(mut self, paper: Colour) -> Self {
         self.colour = paper.text_on();
@@ -274,7 +276,7 @@ impl Note {
         self
     }
 
-    /// The same with another end at the place.
+    /// Sets the anchor.
     #[must_use]
     pub fn anchored(mut self, anchor: Anchor) -> Self {
         self.anchor = anchor;
@@ -282,17 +284,7 @@ impl Note {
     }
 }
 
-/// Boxes of a histogram: bin i covers `from + i·width` and that much on.
-pub fn histogram(from: f64, width: f64, counts: &[f64]) -> Mark {
-    let bin = |(i, n): (usize, &f64)| Span {
-        x: (from + i as f64 * width, from + (i + 1) as f64 * width),
-        y: (0.0, *n),
-    };
-    Mark::Bars(counts.iter().enumerate().map(bin).collect())
-}
-
-/// Width of a text in the figures' font, px: an estimate that errs on the wide
-/// side, for layout only.
+/// Width of a text in the figures' font, px: an estimate for layout, rather too wide.
 pub fn text_width(text: &str, size: f64) -> f64 {
     use unicode_width::UnicodeWidthChar as _;
     let em = |c: char| match c {
@@ -306,13 +298,13 @@ pub fn text_width(text: &str, size: f64) -> f64 {
             _ => 1.02,
         },
     };
-    let shown = study_base::text::Untrusted(text).to_string();
+    let shown = Untrusted(text).to_string();
     shown.chars().map(em).sum::<f64>() * size
 }
 
-/// A text that is at most about so many px wide; what is left out is marked.
+/// A text shortened to at most about `room` px.
 pub fn fitted(text: &str, size: f64, room: f64) -> String {
-    let mut most = text.chars().count();
+    let mut most = Untrusted(text).to_string().chars().count();
     let mut shown = text.to_owned();
     while most > 1 && text_width(&shown, size) > room {
         most -= 1;
@@ -321,20 +313,9 @@ pub fn fitted(text: &str, size: f64, room: f64) -> String {
     shown
 }
 
-/// A text of at most so many characters. What is left out is marked, after the first
-/// third: names of realizations often begin alike.
-/// Characters that are shown as their code count as that.
-pub fn shortened(text: &str, most: usize) -> String {
-    let text = &study_base::text::Untrusted(text).to_string();
-    let length = text.chars().count();
-    if length <= most {
-        return text.to_owned();
-    }
-    let kept = most.saturating_sub(1);
-    let end = kept - kept / 3;
-    let first: String = text.chars().take(kept - end).collect();
-    let last: String = text.chars().skip(length - end).collect();
-    format!("{first}…{last}")
+/// An escaped text of at most some columns, shortened in the middle.
+pub fn shortened(text: &str, columns: usize) -> String {
+    cut_middle(&Untrusted(text).to_string(), columns)
 }
 
 #[cfg(test)]

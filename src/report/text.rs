@@ -1,37 +1,36 @@
-//! The terminal page: tables, the chart of Fig. 10 above that of Fig. 11, the
-//! answers in words, what a reader has to know, what was counted.
+//! The terminal page: tables, charts after Fig. 10 and Fig. 11, answers, warnings,
+//! counts.
 //!
-//! It fits 80 columns and uses up to 100. Colour supports and never carries.
-//! Everything from the data passes through [`Untrusted`].
+//! It uses 60 to 100 columns. Colour only repeats what the text says. Everything from
+//! the data passes through [`Untrusted`].
 
-mod answers;
-mod headline;
 mod layout;
 
+use super::answers::{answers, conditional};
 use super::plot::{Axis, bars};
-use super::{Source, apa};
-use layout::{Grid, Paint, number, pad, squeezed, wrap};
-use study_base::text::Untrusted;
-use study_core::analyze::{Analysis, Listed};
+use super::{Source, apa, sentences};
+use layout::{Grid, Paint, pad, wrap};
+use study_base::text::{Untrusted, counted, cut_middle};
+use study_core::analyze::{Analysis, RealizationSummary};
 use study_core::outcome::Role;
 use unicode_width::UnicodeWidthStr as _;
 
-/// How the page is set.
+/// The terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Page {
     /// Columns of the terminal; the page uses 60 to 100 of them.
     pub width: usize,
-    /// Whether it shows colours.
+    /// Whether the terminal shows colours.
     pub colour: bool,
 }
 
-/// Most realizations on the page, of those that are asked about and of the others.
+/// Largest number of tested realizations on the page, and of the others.
 const MAX_SHOWN: usize = 40;
 
-/// Columns that are spent on saying of what a repeat is one.
+/// Largest width of the name of a hidden duplicate with that of its original.
 const MAX_NAME: usize = 30;
 
-/// Most bins that a table shows as a histogram.
+/// Largest number of bins of a histogram.
 const MAX_BINS: usize = 11;
 
 /// The page.
@@ -39,7 +38,7 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
     let width = page.width.clamp(60, 100);
     let paint = Paint(page.colour);
     let mut out = head(source, a, width, paint);
-    let (tests, others) = listed(a);
+    let (tests, others): (Vec<_>, Vec<_>) = a.realizations.iter().partition(|m| m.tested);
     if !a.realizations.is_empty() {
         let tests = &tests[..tests.len().min(MAX_SHOWN)];
         let others = &others[..others.len().min(MAX_SHOWN)];
@@ -47,20 +46,19 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
         out += &chart(a, tests, others, width, paint);
         let more = a.realizations.len() - tests.len() - others.len();
         if more > 0 {
-            let what = apa::counted(more, "realization is", "realizations are");
-            let text = format!("{what} not shown here: --out writes descriptives.csv, with all.");
+            let what = counted(more, "realization is", "realizations are");
+            let text = format!("{what} not shown here: --out writes descriptives.csv with all.");
             out += &wrap(&text, width, "", "");
             out.push('\n');
         }
     }
     if a.counts.rated == 0 {
-        out += &paint.warn("Nothing is left to analyse: no rating counts.\n\n");
+        out += &paint.warn("No rating is included: there is nothing to analyse.\n\n");
     }
-    out += &answers::answers(a, width, paint);
-    out += &headline::headline(a, width, paint);
-    // The first stands at the top, the second in the answer.
-    let said = ["no-participants", "few-realizations"];
-    let warnings = a.warnings.iter().filter(|w| !said.contains(&w.code));
+    out += &all_answers(a, width, paint);
+    // The head and the answers contain these.
+    let shown = ["no-participants", "few-realizations"];
+    let warnings = a.warnings.iter().filter(|w| !shown.contains(&w.code));
     for w in warnings.clone() {
         let text = wrap(&Untrusted(&w.text).to_string(), width, "! ", "  ");
         out += &paint.warn(&text);
@@ -82,29 +80,46 @@ pub fn comments(a: &Analysis, page: Page) -> String {
     let mut out = String::new();
     for group in a.comments.chunk_by(|x, y| x.model == y.model) {
         let id = Untrusted(&group[0].model).to_string();
-        let mean = a.values.number(&format!("desc/{}/mean", group[0].model));
-        let mean = mean.map_or_else(String::new, |m| format!("  mean {}", number(m, 3)));
+        let mean = a.described(&group[0].model, "mean");
+        let mean = mean.map_or_else(String::new, |m| format!("  mean {}", apa::number(m, 3)));
         out += &paint.strong(&format!("{id}{mean}"));
         out.push('\n');
         for c in group {
-            let who = format!("  {} {}  ", Untrusted(&c.subject), c.repetition);
-            let what = match c.question.as_str() {
+            let author = format!("  {} {}  ", Untrusted(&c.subject), c.repetition);
+            let question = match c.question.as_str() {
                 "comment" => String::new(),
                 other => format!("[{}] ", Untrusted(other)),
             };
-            let rest = " ".repeat(who.width());
-            out += &wrap(&format!("{what}{}", Untrusted(&c.text)), width, &who, &rest);
+            let text = format!("{question}{}", Untrusted(&c.text));
+            out += &wrap(&text, width, &author, &" ".repeat(author.width()));
         }
         out.push('\n');
     }
     out
 }
 
-/// Those that the study asks about, and those that stand beside them.
-fn listed(a: &Analysis) -> (Vec<&Listed>, Vec<&Listed>) {
-    a.realizations
-        .iter()
-        .partition(|m| m.role == Role::Test && m.duplicate_of.is_none())
+/// The answers, with the results that hold for these realizations only at the end.
+fn all_answers(a: &Analysis, width: usize, paint: Paint) -> String {
+    let mut out = String::new();
+    let mut section = |title: &str, sentences: &[String]| {
+        out += &paint.strong(&Untrusted(title).to_string());
+        out.push('\n');
+        for sentence in sentences {
+            out += &wrap(&Untrusted(sentence).to_string(), width, "  ", "  ");
+        }
+        out.push('\n');
+    };
+    for mut answer in answers(a) {
+        answer.main.insert(0, answer.short);
+        section(&answer.question, &answer.main);
+    }
+    let (mut rows, on_terminal) = conditional(a);
+    rows.truncate(on_terminal);
+    if !rows.is_empty() {
+        rows.push("These results do not generalise to other realizations.".to_owned());
+        section("For these realizations only", &rows);
+    }
+    out
 }
 
 fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
@@ -118,7 +133,7 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
     }
     facts.push(match c.planned {
         Some(planned) => {
-            let planned = apa::counted(planned as usize, "participant", "participants");
+            let planned = counted(planned as usize, "participant", "participants");
             let finished = format!("{} of {planned}", c.finished);
             if c.participants == c.finished {
                 finished
@@ -126,9 +141,9 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
                 format!("{finished}, {} analysed", c.participants)
             }
         }
-        None => apa::counted(c.participants, "subject", "subjects"),
+        None => counted(c.participants, "participant", "participants"),
     });
-    facts.push(apa::counted(c.rated, "rating", "ratings"));
+    facts.push(counted(c.rated, "rating", "ratings"));
     let facts = facts.join(" · ");
     let title = Untrusted(&source.title).to_string();
     let mut out = String::new();
@@ -147,15 +162,15 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
     out
 }
 
-fn name(m: &Listed) -> String {
+fn name(m: &RealizationSummary) -> String {
     let id = Untrusted(&m.id);
     match (&m.duplicate_of, m.role) {
         (Some(of), _) => {
-            let whole = format!("{id} (repeats {})", Untrusted(of));
+            let whole = format!("{id} (duplicate of {})", Untrusted(of));
             if whole.width() <= MAX_NAME {
                 whole
             } else {
-                format!("{id} (repeat)")
+                format!("{id} (duplicate)")
             }
         }
         (None, Role::Test) => id.to_string(),
@@ -165,8 +180,8 @@ fn name(m: &Listed) -> String {
 
 fn table(
     a: &Analysis,
-    tests: &[&Listed],
-    others: &[&Listed],
+    tests: &[&RealizationSummary],
+    others: &[&RealizationSummary],
     width: usize,
     paint: Paint,
 ) -> String {
@@ -187,7 +202,7 @@ fn table(
     let mut head = vec!["realization", "n", "mean", "sd", "median"];
     let last = hist.map_or(0.0, |h| from + h.len() as f64 - 1.0);
     let scale = match hist {
-        // One digit each, or the two ends.
+        // The digits of the scale, or its ends.
         Some(h) if from >= 0.0 && last <= 9.0 => (0..h.len())
             .map(|b| (from + b as f64).to_string())
             .collect::<Vec<_>>()
@@ -204,7 +219,7 @@ fn table(
         head.push(h);
     }
     head.push("by subject [95 %]");
-    // The median, the histogram, the share, the count.
+    // Dropped first: median, histogram, share, count.
     let counts_at = hist.map(|_| 5);
     let share_at = at_least.as_ref().map(|_| head.len() - 2);
     let dropped: Vec<usize> = [Some(4), counts_at, share_at, Some(1)]
@@ -213,11 +228,10 @@ fn table(
         .collect();
     let mut grid = Grid::new(&head, counts_at, &dropped);
     let vaf: Vec<f64> = a.realizations.iter().filter_map(|m| m.vaf).collect();
-    let digits = apa::telling(&vaf);
+    let digits = apa::distinguishing_decimals(&vaf);
     for m in tests.iter().chain(others) {
-        let get = |s: &str| v.number(&format!("desc/{}/{s}", m.id));
-        let show =
-            |x: Option<f64>, digits: usize| x.map_or_else(|| "–".to_owned(), |x| number(x, digits));
+        let get = |s: &str| a.described(&m.id, s);
+        let show = |x: Option<f64>, digits: usize| apa::or_dash(x, |x| apa::number(x, digits));
         let mut row = vec![
             name(m),
             show(get("n"), 0),
@@ -232,34 +246,27 @@ fn table(
         row.push(show(m.vaf, digits));
         if at_least.is_some() {
             let share = v.number(&format!("realistic/{}/share", m.id));
-            row.push(share.map_or_else(|| "–".to_owned(), |s| format!("{:.0} %", 100.0 * s)));
+            row.push(apa::or_dash(share, apa::percent));
         }
-        let over = get("subject_mean/mean");
-        let ends = get("subject_mean/ci95_lo").zip(get("subject_mean/ci95_hi"));
-        row.push(match ends {
-            Some((low, high)) => format!(
-                "{} [{}, {}]",
-                show(over, 2),
-                number(low, 2),
-                number(high, 2)
-            ),
-            None => show(over, 2),
+        let ci = v.interval(&format!("desc/{}/subject_mean/ci95", m.id));
+        let ci = ci.map_or_else(String::new, |ci| {
+            format!(" {}", apa::interval(ci, apa::two))
         });
+        row.push(show(get("subject_mean/mean"), 2) + &ci);
         grid.row(row);
     }
     grid.render(width, tests.len(), paint)
 }
 
-/// Means ± one SD (Fig. 10) above the VAF (Fig. 11), on one margin.
+/// Means ± one SD (Fig. 10) and VAF (Fig. 11), with aligned margins.
 fn chart(
     a: &Analysis,
-    tests: &[&Listed],
-    others: &[&Listed],
+    tests: &[&RealizationSummary],
+    others: &[&RealizationSummary],
     width: usize,
     paint: Paint,
 ) -> String {
-    let v = &a.values;
-    let shown: Vec<&&Listed> = tests.iter().chain(others).collect();
+    let shown: Vec<&&RealizationSummary> = tests.iter().chain(others).collect();
     let margin = shown
         .iter()
         .map(|m| name(m).width())
@@ -268,8 +275,8 @@ fn chart(
         .clamp(8, width / 3);
     let columns = width - margin - 3;
     let extent = |id: &str| -> Vec<f64> {
-        let of = |m: &&&Listed| v.number(&format!("desc/{}/{id}", m.id));
-        shown.iter().filter_map(of).collect()
+        let values = shown.iter().filter_map(|m| a.described(&m.id, id));
+        values.collect()
     };
     let mut out = String::new();
     let ends = a.scale.or_else(|| {
@@ -278,11 +285,11 @@ fn chart(
         Some((low, high))
     });
     if let Some(axis) = ends.and_then(|(l, h)| Axis::new(l, h, columns)) {
-        let title = format!("{}, mean ± one SD", asked(a));
+        let title = format!("{}, mean ± 1 SD", Untrusted(&sentences::asked(a)));
         out += &section(&title, &axis, margin, paint);
         for m in &shown {
-            if let Some(mean) = v.number(&format!("desc/{}/mean", m.id)) {
-                let half = v.number(&format!("desc/{}/sd", m.id));
+            if let Some(mean) = a.described(&m.id, "mean") {
+                let half = a.described(&m.id, "sd");
                 out += &line(m, &axis.dot(mean, half), margin);
             }
         }
@@ -309,25 +316,13 @@ fn section(title: &str, axis: &Axis, margin: usize, paint: Paint) -> String {
     format!("{}\n{}\n", paint.strong(title), paint.dim(&ticks))
 }
 
-fn line(m: &Listed, drawn: &str, margin: usize) -> String {
-    format!("{}   {drawn}\n", pad(&squeezed(&name(m), margin), margin))
-}
-
-/// The question as a noun.
-fn asked(a: &Analysis) -> String {
-    match a.question.as_str() {
-        "rating" => "the rating".to_owned(),
-        other => Untrusted(other).to_string(),
-    }
+fn line(m: &RealizationSummary, drawn: &str, margin: usize) -> String {
+    format!("{}   {drawn}\n", pad(&cut_middle(&name(m), margin), margin))
 }
 
 fn counts(a: &Analysis, width: usize) -> String {
     let c = &a.counts;
-    let some = |n: usize, one: &str, many: &str| match n {
-        0 => None,
-        1 => Some(format!("1 {one}")),
-        n => Some(format!("{n} {many}")),
-    };
+    let some = |n: usize, one: &str, many: &str| (n > 0).then(|| counted(n, one, many));
     let mut parts: Vec<String> = [
         some(c.corrected, "trial corrected", "trials corrected"),
         some(c.repeated, "trial repeated", "trials repeated"),
@@ -336,8 +331,8 @@ fn counts(a: &Analysis, width: usize) -> String {
         some(c.missing, "rating missing", "ratings missing"),
         some(
             c.practice,
-            "practice trial not counted",
-            "practice trials not counted",
+            "practice trial not included",
+            "practice trials not included",
         ),
         some(c.pilots, "pilot", "pilots"),
         some(
@@ -350,11 +345,11 @@ fn counts(a: &Analysis, width: usize) -> String {
     .flatten()
     .collect();
     if c.excluded.is_empty() {
-        parts.push("none excluded".to_owned());
+        parts.push("no rows excluded".to_owned());
     }
     for (reason, n) in &c.excluded {
-        let rows = if *n == 1 { "row" } else { "rows" };
-        parts.push(format!("{n} {rows} left out ({})", Untrusted(reason)));
+        let rows = counted(*n, "row", "rows");
+        parts.push(format!("{rows} excluded ({})", Untrusted(reason)));
     }
     if !a.comments.is_empty() {
         parts.push(format!("comments: {} (--comments)", a.comments.len()));

@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
-use study_base::text::{Untrusted, is_unsafe};
+use study_base::text::{Untrusted, cut_end, is_unsafe};
 use unicode_segmentation::UnicodeSegmentation as _;
 use unicode_width::UnicodeWidthStr as _;
 
@@ -181,7 +181,7 @@ pub fn paragraph(text: &str, columns: usize, rows: usize) -> Vec<String> {
         .map(|line| line.shown.trim_end().to_owned())
         .collect();
     if cut && let Some(last) = out.last_mut() {
-        *last = ellipsis(&format!("{last}…"), columns);
+        *last = cut_end(&format!("{last}…"), columns);
     }
     out
 }
@@ -196,28 +196,7 @@ pub fn one_line(text: &str, columns: usize) -> String {
             g => shown(g),
         })
         .collect();
-    ellipsis(&safe, columns)
-}
-
-fn ellipsis(safe: &str, columns: usize) -> String {
-    if width(safe) <= columns {
-        return safe.to_owned();
-    }
-    let mut out = String::new();
-    let mut cells = 0;
-    for g in safe.graphemes(true) {
-        if cells + g.width() + 1 > columns {
-            break;
-        }
-        cells += g.width();
-        out.push_str(g);
-    }
-    let kept = out.trim_end_matches([' ', '…']).len();
-    out.truncate(kept);
-    if columns > 0 {
-        out.push('…');
-    }
-    out
+    cut_end(&safe, columns)
 }
 
 #[cfg(test)]

@@ -88,8 +88,8 @@ fn a_place_that_two_rows_claim_is_before_no_other() {
     assert!(once.values.number("order_previous_rating/slope").is_some());
 }
 
-/// Squares of 10³⁰⁸ are no doubles. What is lost by that says so; what is not
-/// defined for another reason keeps it; no reason speaks of no ratings.
+/// Squares of 10³⁰⁸ exceed a double. What may be lost by that says so; no reason claims
+/// that ratings are missing.
 #[test]
 fn what_overflows_says_that_it_does() {
     let csv = table(|s, m, r| format!("{}e307", some(s, m, r)));
@@ -132,7 +132,7 @@ fn what_overflows_says_that_it_does() {
 fn one_is_not_many() {
     let one = of("subject,model,repetition,rating,vaf\nS,m,1,4,0.7\n");
     let page = shown(&one);
-    assert!(page.contains("1 subject · 1 rating\n"), "{page}");
+    assert!(page.contains("1 participant · 1 rating\n"), "{page}");
 }
 
 #[test]

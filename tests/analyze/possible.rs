@@ -44,7 +44,7 @@ fn what_is_missing_or_wrong_is_named() {
         ),
         (
             vec!["mean=4.8", "sd=1", "n=30", "scale=1..7", "each=4"],
-            "not 4 of each",
+            "no multiple of each=4",
         ),
         (
             vec!["mean=nan", "sd=1", "n=30", "scale=1..7"],

@@ -10,7 +10,7 @@ use study::report::Source;
 use study::report::figures::{self, Trace};
 use study::report::html::{Details, document};
 use study_core::analyze::{
-    Analysis, Deviation, Exclusion, PreregisteredRule, Rules, Said, analyze,
+    Analysis, Comment, Deviation, Exclusion, PreregisteredRule, Rules, analyze,
 };
 use study_core::outcome::ratings::Ratings;
 
@@ -144,11 +144,11 @@ fn what_is_absent_is_left_out_politely() {
     assert!(!page.contains("For these realizations only"));
     let nothing = analysis_of("subject,model,repetition,rating,vaf\nS1,a,1,,\n");
     let page = report(&nothing, &[]);
-    assert!(page.contains("Nothing is left to analyse"));
+    assert!(page.contains("there is nothing to analyse"));
 }
 
 #[test]
-fn what_was_stated_beforehand_and_what_was_changed_is_told() {
+fn preregistered_rules_and_their_changes_are_reported() {
     let csv = "subject,model,repetition,rating,vaf\n\
                S1,a,1,4,0.5\nS1,b,1,4,0.6\nS1,c,1,4,0.7\nS2,a,1,5,0.5\nS2,b,1,3,0.6\nS2,c,1,6,0.7\n\
                S3,a,1,2,0.5\nS3,b,1,3,0.6\nS3,c,1,5,0.7\n";
@@ -166,11 +166,11 @@ fn what_was_stated_beforehand_and_what_was_changed_is_told() {
                <td class=\"text\">participants whose ratings never change</td><td>3</td><td>1</td>";
     assert!(page.contains(row), "{page}");
     assert!(page.contains("the design has no hidden duplicate"));
-    assert!(page.contains("Deviations from what was stated beforehand"));
+    assert!(page.contains("Deviations from the preregistered analysis"));
     assert!(page.contains("because &quot;typo&quot;: vaf: a → b"));
     let neither = report(&analyze(&ratings, &Rules::default()), &[]);
-    assert!(neither.contains("No rule of exclusion was stated beforehand."));
-    assert!(neither.contains("No rule of the analysis was changed"));
+    assert!(neither.contains("No exclusion rule was preregistered."));
+    assert!(neither.contains("No analysis rule was changed"));
 }
 
 #[test]
@@ -186,7 +186,7 @@ fn hostile_names_and_comments_stay_text() {
         }
     }
     let mut a = analysis_of(&csv);
-    a.comments.push(Said {
+    a.comments.push(Comment {
         model: EVIL.to_owned(),
         subject: EVIL.to_owned(),
         repetition: 1,
@@ -281,7 +281,7 @@ fn the_command_writes_the_same_bytes_whatever_the_locale_and_the_threads() {
 }
 
 #[test]
-fn what_was_changed_after_the_study_began_is_not_called_stated_beforehand() {
+fn rules_changed_after_the_study_began_are_not_called_preregistered() {
     let csv = "subject,model,repetition,rating,vaf\n\
                S1,a,1,4,0.5\nS1,b,1,4,0.6\nS1,c,1,4,0.7\nS2,a,1,5,0.5\nS2,b,1,3,0.6\nS2,c,1,6,0.7\n\
                S3,a,1,2,0.5\nS3,b,1,3,0.6\nS3,c,1,5,0.7\n";
@@ -313,30 +313,30 @@ fn what_was_changed_after_the_study_began_is_not_called_stated_beforehand() {
             },
         );
         // The heading of the changes themselves, and their warnings.
-        let html = report(&a, &[]).replace("Deviations from what was stated beforehand", "");
+        let html = report(&a, &[]).replace("Deviations from the preregistered analysis", "");
         format!("{html}{page}")
             .replace('\u{a0}', " ")
-            .replace("eviation from what was stated beforehand", "")
+            .replace("eviation from the preregistered analysis", "")
     };
     let changed = told(&rules);
-    for bad in ["beforehand", "pre-stated"] {
+    for bad in ["beforehand", "preregistered"] {
         assert!(!changed.contains(bad), "{bad}: {changed}");
     }
     for said in [
-        "The rules of exclusion were changed after the study began (see Deviations)",
-        "counts as realistic; this was changed after the study began",
-        "Exclusions, changed after the study began: see Deviations",
-        "ratings are 4 or higher, a bound changed after the study began",
+        "The exclusion rules were changed after the study began (see Deviations)",
+        "counts as realistic; this threshold was changed after the study began",
+        "Exclusion rules, changed after the study began: see Deviations",
+        "ratings are 4 or higher, a threshold changed after the study began",
     ] {
         assert!(changed.contains(said), "{said}: {changed}");
     }
     rules.deviations.clear();
     let stated = told(&rules);
     for said in [
-        "It was stated beforehand to leave out",
-        "said beforehand to count as realistic",
-        "Exclusions stated beforehand",
-        "pre-stated exclusion",
+        "The preregistered rules exclude",
+        "was preregistered to count as realistic",
+        "Preregistered exclusion rules",
+        "the preregistered exclusion rule",
     ] {
         assert!(stated.contains(said), "{said}: {stated}");
     }

@@ -141,8 +141,8 @@ fn only_real_participants_are_analyzed_unless_others_are_included() {
     assert_eq!(n(with(true, true)), (4.0, 0));
     let a = analyze(&all, &Rules::default());
     let text = printed(&a);
-    assert!(text.contains("1 row left out (pilot)"), "{text}");
-    assert!(text.contains("1 row left out (simulated)"), "{text}");
+    assert!(text.contains("1 row excluded (pilot)"), "{text}");
+    assert!(text.contains("1 row excluded (simulated)"), "{text}");
 }
 
 #[test]
@@ -152,7 +152,10 @@ fn an_analysis_of_simulated_participants_alone_says_so_in_a_banner() {
     let a = analyze(&ratings(&rows, &[]), &Rules::default());
     assert_eq!(a.counts.rated, 6);
     let text = printed(&a);
-    assert!(text.contains("*** NO PARTICIPANTS: 2 simulated"), "{text}");
+    assert!(
+        text.contains("*** NO PARTICIPANTS: only 2 simulated"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -186,7 +189,7 @@ fn participants_are_excluded_by_state_with_the_reason() {
     let all = ratings(&two(), &people);
     let a = analyze(&all, &Rules::default());
     assert_eq!(a.counts.rated, 3);
-    assert!(printed(&a).contains("3 rows left out (excluded: fell asleep)"));
+    assert!(printed(&a).contains("3 rows excluded (excluded: fell asleep)"));
     let files = csv::tables(&source(), &a);
     let excluded = files.iter().find(|f| f.name == "excluded.csv").unwrap();
     assert!(
@@ -321,7 +324,7 @@ fn references_anchors_and_repeats_are_not_in_the_correlation() {
     assert_eq!(a.values.number("realistic/C/share"), Some(1.0));
     let text = printed(&a);
     assert!(text.contains("target (hidden-reference)"), "{text}");
-    assert!(text.contains("C2 (repeats C)"), "{text}");
+    assert!(text.contains("C2 (duplicate of C)"), "{text}");
 }
 
 #[test]

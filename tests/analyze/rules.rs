@@ -1,5 +1,5 @@
-//! Walls: what was stated beforehand is applied as stated, shown with and without,
-//! and every row tells what became of it.
+//! Preregistered rules are applied as stated, results are shown with and without them,
+//! and every row states whether it is included.
 #![allow(clippy::unwrap_used)]
 
 use study::report::{Source, csv};
@@ -181,7 +181,7 @@ fn references_and_anchors_are_contrasted_and_stay_out_of_the_comparisons() {
         a.values
             .reason("reference/R/C/p_tost")
             .unwrap()
-            .contains("no margin")
+            .contains("no equivalence margin")
     );
 }
 
@@ -215,7 +215,7 @@ fn the_memory_stands_for_the_forgetting_factor() {
     let ratings = Ratings::read_csv("r.csv", same.as_bytes(), None).unwrap();
     let values = analyze(&ratings, &Rules::default()).values;
     let why = values.reason("covariate/log10_memory/slope").unwrap();
-    assert_eq!(why, "all realizations have the same");
+    assert_eq!(why, "all realizations have the same value");
 }
 
 #[test]

@@ -33,7 +33,7 @@ fn the_example_verifies_and_is_marked_as_simulated() {
     assert!(out.contains("10 sessions"), "{out}");
     let (code, out, err) = study(&["analyze", "results"], home.path());
     assert_eq!(code, 0, "{out}{err}");
-    assert!(out.contains("NO PARTICIPANTS: 10 simulated"), "{out}");
+    assert!(out.contains("NO PARTICIPANTS: only 10 simulated"), "{out}");
     assert!(out.contains("150 ratings"), "{out}");
     for row in rows(&folder.join("ratings.csv")) {
         assert_eq!(row["simulated"], "true");

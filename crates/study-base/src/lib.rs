@@ -11,6 +11,7 @@
 //! Nothing here opens a file or knows the time. Begin with
 //! `examples/streams.rs`.
 
+pub mod apa;
 pub mod diagnostic;
 pub mod limits;
 pub mod rng;

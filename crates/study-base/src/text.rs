@@ -8,6 +8,8 @@
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use unicode_segmentation::UnicodeSegmentation as _;
+use unicode_width::UnicodeWidthStr as _;
 
 /// Borrowed text whose `Display` is safe to print on one line: characters that
 /// [`is_unsafe`] are printed as `\u{…}`, line breaks and tabs as `\n`, `\r`, `\t`.
@@ -36,6 +38,46 @@ impl fmt::Display for Untrusted<'_> {
 /// A number and the noun for it: "1 session", "2 sessions".
 pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
+}
+
+/// The terminal columns of a text, grapheme by grapheme, as terminals count them.
+fn columns_of(text: &str) -> usize {
+    text.graphemes(true).map(|g| g.width()).sum()
+}
+
+/// The leading graphemes that fit into some terminal columns.
+fn fitting<'t>(graphemes: impl Iterator<Item = &'t str>, columns: usize) -> Vec<&'t str> {
+    let mut used = 0;
+    let fits = |g: &&str| {
+        used += g.width();
+        used <= columns
+    };
+    graphemes.take_while(fits).collect()
+}
+
+/// A text of at most some terminal columns; `…` marks a missing end.
+pub fn cut_end(text: &str, columns: usize) -> String {
+    if columns_of(text) <= columns {
+        return text.to_owned();
+    }
+    let Some(room) = columns.checked_sub(1) else {
+        return String::new();
+    };
+    let kept = fitting(text.graphemes(true), room).concat();
+    format!("{}…", kept.trim_end_matches([' ', '…']))
+}
+
+/// A text of at most some terminal columns; `…` after the first third marks a missing
+/// middle. Names of realizations often start alike.
+pub fn cut_middle(text: &str, columns: usize) -> String {
+    if columns_of(text) <= columns {
+        return text.to_owned();
+    }
+    let room = columns.saturating_sub(1);
+    let start = fitting(text.graphemes(true), room / 3);
+    let mut end = fitting(text.graphemes(true).rev(), room - room / 3);
+    end.reverse();
+    format!("{}…{}", start.concat(), end.concat())
 }
 
 /// Whether a character can control a terminal or disguise the text around it: C0,
@@ -168,6 +210,17 @@ mod tests {
         let hostile = "a\u{1b}[2Jb\u{9b}c\u{202e}d\n=1";
         let shown = Untrusted(hostile).to_string();
         assert_eq!(shown, "a\\u{1b}[2Jb\\u{9b}c\\u{202e}d\\n=1");
+    }
+
+    #[test]
+    fn shortened_text_fits_and_keeps_what_distinguishes_names() {
+        assert_eq!(cut_middle("lambda-0.99995-dx-1", 13), "lamb…995-dx-1");
+        assert_eq!(cut_middle("よかったね", 6), "…たね");
+        assert_eq!(cut_end("よかった", 5), "よか…");
+        assert_eq!(cut_end("two words", 5), "two…");
+        for (columns, cut) in [(0, ""), (1, "…"), (3, "ab…"), (4, "abcd")] {
+            assert_eq!(cut_end("abcd", columns), cut);
+        }
     }
 
     #[test]

@@ -1,14 +1,13 @@
-//! Ratings to an analysis: numbers and warnings. Pure.
+//! The analysis of ratings: statistics, verdicts and warnings. No input or output.
 //!
-//! [`analyze`] decides which rows count, computes every statistic that they
-//! allow, and says of each other one why it is not defined. A statistic has the
+//! [`analyze`] decides which rows are included, computes every statistic that they
+//! allow, and gives a reason for each one that is undefined. A statistic has the
 //! identifier that `docs/statistics.md` gives it (`corr/pearson/r`); the report
-//! reads the values by it, and `--json` prints them as they are.
+//! looks values up by identifier, and `--json` prints them unrounded.
 //!
-//! The level of inference: VAF varies only between realizations, so "VAF
-//! predicts the rating" is tested over the means of the realizations, however
-//! many subjects rated. What is tested over subjects holds for these
-//! realizations only.
+//! Level of inference: VAF varies only between realizations, so "VAF predicts the
+//! rating" is tested over the means of the realizations, whatever the number of
+//! participants. Tests over participants hold for these realizations only.
 
 mod cells;
 mod describe;
@@ -27,6 +26,7 @@ mod select;
 mod subjects;
 mod vaf;
 mod values;
+mod verdicts;
 mod warnings;
 
 pub use crate::protocol::Exclusion;
@@ -34,6 +34,7 @@ pub use deviation::{Deviation, PreregisteredRule, deviations};
 pub use exclude::Applied;
 pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
+pub use verdicts::{ALPHA, ComparedPairs, DecidingTest, MAX_PAIRED, TestKind, significant};
 pub use warnings::Warning;
 
 use crate::outcome::ratings::{Practice, Ratings};
@@ -44,28 +45,28 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What was decided before the data.
+/// The rules of the analysis, fixed before the data were seen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rules {
-    /// Planned participants; below them the analysis is interim.
+    /// Planned number of participants; the analysis is interim until they have finished.
     pub planned: Option<u32>,
-    /// Ratings from here up count as realistic.
+    /// Lowest rating that counts as realistic.
     pub realistic_from: Option<f64>,
-    /// Ends of the rating scale.
+    /// Lowest and highest rating of the scale.
     pub scale: Option<(f64, f64)>,
-    /// Whether unfinished sessions count.
+    /// Whether unfinished sessions are included.
     pub unfinished: Unfinished,
-    /// Which rows count beside those of participants.
+    /// Which sessions are included besides those of participants.
     pub include: Include,
-    /// Of Monte Carlo, where there are too many permutations to visit.
+    /// Seed of the permutation tests and the bootstrap.
     pub seed: u64,
     /// Whether the ratings answer the primary question.
     pub primary: bool,
-    /// The pre-stated rules of exclusion.
+    /// The preregistered exclusion rules.
     pub exclude: Vec<Exclusion>,
-    /// Differences from a hidden reference below this count as none.
+    /// Equivalence margin for differences from a hidden reference, in rating points.
     pub equivalence_margin: Option<f64>,
-    /// What was changed of these rules after the study began, in words.
+    /// Changes to these rules after the study began.
     pub deviations: Vec<Deviation>,
 }
 
@@ -87,8 +88,8 @@ impl Default for Rules {
 }
 
 impl Rules {
-    /// Those of a protocol. `realistic_from` and the margin of equivalence belong
-    /// to the primary question; for another `question` there are none.
+    /// The rules of a protocol. `realistic_from` and the equivalence margin apply
+    /// to the primary question only.
     pub fn of(protocol: &Protocol, question: &str, include: Include) -> Self {
         use crate::protocol::QuestionKind;
         let primary = protocol.analysis.primary.as_str() == question;
@@ -117,14 +118,14 @@ impl Rules {
     }
 }
 
-/// A comment with its place.
+/// A comment on a presentation.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Said {
+pub struct Comment {
     /// Realization. Untrusted.
     pub model: String,
-    /// Subject. Untrusted.
+    /// Participant. Untrusted.
     pub subject: String,
-    /// The how-maniest time.
+    /// Repetition number, from 1.
     pub repetition: u32,
     /// Question, or `remarks`.
     pub question: String,
@@ -132,118 +133,116 @@ pub struct Said {
     pub text: String,
 }
 
-/// A realization, as the tables name it.
+/// A realization of the design.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Listed {
-    /// Name; the M of the identifiers. Untrusted.
+pub struct RealizationSummary {
+    /// Name, as in the identifiers of its statistics. Untrusted.
     pub id: String,
-    /// Role.
+    /// Role in the design.
     pub role: Role,
-    /// The realization that it repeats.
+    /// The realization of which this one is a hidden duplicate.
     pub duplicate_of: Option<String>,
-    /// Its VAF, if all of its rows agree on one.
+    /// Whether it takes part in the tests: role `test` and no hidden duplicate.
+    pub tested: bool,
+    /// Its VAF, if all of its rows have the same one.
     pub vaf: Option<f64>,
 }
 
-/// A row with the decision about it; [`Analysis::subject`] and [`Analysis::model`]
-/// tell its names. There can be millions: no more is kept than has to be.
+/// A row of the ratings and whether it is included. [`Analysis::subject`] and
+/// [`Analysis::model`] look its names up.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Judged {
+pub struct RowDecision {
     subject: u32,
     model: Option<u32>,
-    /// Repetition number, from 1.
+    /// Repetition number, from 1; a foreign table may count from 0.
     pub repetition: u32,
-    /// Position in the subject's order, from 1, if it is known.
+    /// Position in the participant's session, from 1, if known.
     pub trial_index: Option<u32>,
     /// The rating, if there is one.
     pub rating: Option<f64>,
     /// The VAF, if there is one.
     pub vaf: Option<f64>,
-    /// Why it does not count; `None`: it does.
+    /// Why the row is excluded; `None` if it is included.
     pub excluded: Option<Arc<Reason>>,
 }
 
-/// Everything that was computed.
+/// The results of an analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
     /// The question whose answers were analysed.
     pub question: String,
-    /// Statistic by identifier.
+    /// Statistics by identifier.
     pub values: Values,
-    /// What a reader has to know.
+    /// Warnings for the reader.
     pub warnings: Vec<Warning>,
     /// Realizations, sorted by name.
-    pub realizations: Vec<Listed>,
-    /// What was counted, left out, corrected.
+    pub realizations: Vec<RealizationSummary>,
+    /// Numbers of rows and participants included, excluded, corrected.
     pub counts: Counts,
-    /// Every row with the decision about it.
-    pub rows: Vec<Judged>,
-    /// Practice rows, about which nothing is to be decided.
+    /// Every row and whether it is included.
+    pub rows: Vec<RowDecision>,
+    /// Practice rows, which are never included.
     pub practice: Arc<Practice>,
-    /// Names of the subjects and realizations of the rows.
+    /// Names that the rows refer to.
     subjects: Vec<String>,
     models: Vec<String>,
-    /// What each pre-stated rule of exclusion did, in the protocol's order.
+    /// The effect of each preregistered exclusion rule, in the protocol's order.
     pub exclusions: Vec<Applied>,
-    /// What was changed of the rules after the study began, in words.
+    /// Changes to the rules after the study began.
     pub deviations: Vec<Deviation>,
-    /// Comments of the rows that count, by realization.
-    pub comments: Vec<Said>,
-    /// The threshold of "realistic".
+    /// Comments of the included rows, by realization.
+    pub comments: Vec<Comment>,
+    /// Lowest rating that counts as realistic.
     pub realistic_from: Option<f64>,
-    /// Ends of the rating scale.
+    /// Lowest and highest rating of the scale.
     pub scale: Option<(f64, f64)>,
 }
 
 impl Analysis {
-    /// Whose row it is. Untrusted.
-    pub fn subject(&self, row: &Judged) -> &str {
+    /// The participant of a row. Untrusted.
+    pub fn subject(&self, row: &RowDecision) -> &str {
         self.subjects
             .get(row.subject as usize)
             .map_or("", String::as_str)
     }
 
-    /// Whether a rule was changed after the study began: what was, is not called
-    /// stated beforehand.
+    /// Whether a rule was changed after the study began, so that it must not be
+    /// called preregistered.
     pub fn changed(&self, rule: PreregisteredRule) -> bool {
         self.deviations.iter().any(|d| d.affects.contains(&rule))
     }
 
-    /// The row's realization, empty if there is none. Untrusted.
-    pub fn model(&self, row: &Judged) -> &str {
+    /// The realization of a row, empty if it has none. Untrusted.
+    pub fn model(&self, row: &RowDecision) -> &str {
         row.model.map_or("", |m| &self.models[m as usize])
     }
 }
 
-/// How far an analysis is, for who watches it from another thread.
+/// Progress of an analysis, to be read from another thread.
 #[derive(Debug, Default)]
 pub struct Progress {
-    /// Groups of statistics to be made: a second round of them may follow.
+    /// Groups of statistics to compute; grows if a second analysis follows.
     pub groups: AtomicU64,
-    /// Of these, made.
-    pub made: AtomicU64,
+    /// Groups computed so far.
+    pub done: AtomicU64,
 }
 
-/// Analyses ratings under rules.
+/// Analyzes ratings under the given rules.
 pub fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
-    analyze_watched(ratings, rules, &Progress::default())
+    analyze_with_progress(ratings, rules, &Progress::default())
 }
 
-/// The same; `progress` tells how far it is.
-pub fn analyze_watched(ratings: &Ratings, rules: &Rules, progress: &Progress) -> Analysis {
+/// [`analyze`] that reports its progress.
+pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progress) -> Analysis {
     let (decisions, exclusions) = select::decide(ratings, rules);
     let used = rows(ratings, |i| decisions[i].is_none());
-    let (cells, rows_judged) = rayon::join(|| Cells::of(&used), || judged(ratings, &decisions));
+    let (cells, rows_decided) =
+        rayon::join(|| Cells::of(&used), || row_decisions(ratings, &decisions));
     let (mut values, counts) = rayon::join(
         || statistics(&cells, rules, progress),
         || Counts::of(ratings, &used, &decisions, rules),
     );
-    if let Some(smaller) = overflow::smaller(&used) {
-        overflow::explain(
-            &mut values,
-            &statistics(&Cells::of(&smaller), rules, progress),
-        );
-    }
+    overflow::explain(&used, &mut values);
     if exclusions.iter().any(|e| e.rows > 0) {
         let all = rows(ratings, |i| {
             let reason = decisions[i].as_deref();
@@ -258,14 +257,15 @@ pub fn analyze_watched(ratings: &Ratings, rules: &Rules, progress: &Progress) ->
             .models
             .iter()
             .zip(&cells.vaf)
-            .map(|(m, vaf)| Listed {
+            .map(|(m, vaf)| RealizationSummary {
                 id: m.id.clone(),
                 role: m.role,
                 duplicate_of: m.duplicate_of.clone(),
+                tested: m.is_tested(),
                 vaf: *vaf,
             })
             .collect(),
-        rows: rows_judged,
+        rows: rows_decided,
         practice: Arc::clone(&ratings.practice),
         subjects: ratings.subjects.iter().map(|s| s.id.clone()).collect(),
         models: ratings.models.iter().map(|m| m.id.clone()).collect(),
@@ -280,7 +280,7 @@ pub fn analyze_watched(ratings: &Ratings, rules: &Rules, progress: &Progress) ->
     }
 }
 
-/// Some of the rows; all of them are not copied.
+/// The rows to keep, without a copy if all are kept.
 fn rows(ratings: &Ratings, keep: impl Fn(usize) -> bool) -> Cow<'_, Ratings> {
     if (0..ratings.len()).all(&keep) {
         Cow::Borrowed(ratings)
@@ -289,10 +289,10 @@ fn rows(ratings: &Ratings, keep: impl Fn(usize) -> bool) -> Cow<'_, Ratings> {
     }
 }
 
-/// Writes a group of statistics.
+/// Computes a group of statistics.
 type Group = fn(&Cells<'_>, &Rules, &mut Values);
 
-/// Groups that need nothing of each other; those that take long for large tables first.
+/// Independent groups of statistics, the slowest ones first.
 const GROUPS: [Group; 10] = [
     order::order,
     vaf::against_vaf,
@@ -306,34 +306,34 @@ const GROUPS: [Group; 10] = [
     reference::reference,
 ];
 
-/// Every statistic. Groups are computed side by side, in the order of the list;
-/// each by itself, so that the number of threads changes no bit.
+/// All statistics. Each group runs on one thread, so the number of threads changes
+/// no bit of the result.
 fn statistics(cells: &Cells<'_>, rules: &Rules, progress: &Progress) -> Values {
     progress
         .groups
         .fetch_add(GROUPS.len() as u64, Ordering::Relaxed);
     let mut parts: Vec<(usize, Values)> = (GROUPS.iter().enumerate())
         .par_bridge()
-        .map(|(place, group)| {
+        .map(|(index, group)| {
             let mut values = Values::default();
             group(cells, rules, &mut values);
-            progress.made.fetch_add(1, Ordering::Relaxed);
-            (place, values)
+            progress.done.fetch_add(1, Ordering::Relaxed);
+            (index, values)
         })
         .collect();
-    parts.sort_by_key(|(place, _)| *place);
+    parts.sort_by_key(|(index, _)| *index);
     let mut values = Values::default();
     for (_, part) in parts {
-        values.take(part);
+        values.extend(part);
     }
     memory::memory(cells, rules, &mut values);
     headline::headline(cells, rules, &mut values);
     values
 }
 
-fn judged(ratings: &Ratings, decisions: &[select::Decision]) -> Vec<Judged> {
+fn row_decisions(ratings: &Ratings, decisions: &[select::Decision]) -> Vec<RowDecision> {
     (decisions.iter().cloned().enumerate())
-        .map(|(i, excluded)| Judged {
+        .map(|(i, excluded)| RowDecision {
             subject: ratings.subject[i],
             model: ratings.model[i],
             repetition: ratings.repetition[i],
@@ -349,11 +349,9 @@ fn model_name(ratings: &Ratings, row: usize) -> String {
     ratings.model[row].map_or_else(String::new, |m| ratings.models[m as usize].id.clone())
 }
 
-fn comments(used: &Ratings) -> Vec<Said> {
-    let mut said: Vec<Said> = used
-        .comments
-        .iter()
-        .map(|c| Said {
+fn comments(used: &Ratings) -> Vec<Comment> {
+    let mut comments: Vec<Comment> = (used.comments.iter())
+        .map(|c| Comment {
             model: model_name(used, c.row),
             subject: used.subjects[used.subject[c.row] as usize].id.clone(),
             repetition: used.repetition[c.row],
@@ -361,8 +359,8 @@ fn comments(used: &Ratings) -> Vec<Said> {
             text: c.text.clone(),
         })
         .collect();
-    said.sort_by(|a, b| {
+    comments.sort_by(|a, b| {
         (&a.model, &a.subject, a.repetition).cmp(&(&b.model, &b.subject, b.repetition))
     });
-    said
+    comments
 }

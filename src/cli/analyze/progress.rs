@@ -1,41 +1,81 @@
-//! A progress bar for analyses that take longer than a second.
+//! Progress bars for reading and analyzing, shown after a second.
 
 use super::super::console::{PATIENCE, progress};
-use std::io::IsTerminal as _;
+use indicatif::ProgressBar;
+use std::io::{self, IsTerminal as _, Read};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
-use study_core::analyze::{Analysis, Progress, Rules, analyze_watched};
+use std::time::{Duration, Instant};
+use study_core::analyze::{Analysis, Progress, Rules, analyze_with_progress};
 use study_core::outcome::ratings::Ratings;
 
-/// Interval between two updates of the bar.
-const LOOK: Duration = Duration::from_millis(200);
+/// Interval between updates of the bar.
+const UPDATE: Duration = Duration::from_millis(200);
 
-/// Runs the analysis, with a progress bar on a terminal.
+/// A reader with a progress bar.
+pub(super) struct Reader<R> {
+    inner: R,
+    length: u64,
+    done: u64,
+    since: Instant,
+    bar: Option<ProgressBar>,
+}
+
+impl<R: Read> Reader<R> {
+    /// Wraps a reader of `length` bytes.
+    pub(super) fn new(inner: R, length: u64) -> Self {
+        Self {
+            inner,
+            length,
+            done: 0,
+            since: Instant::now(),
+            bar: None,
+        }
+    }
+}
+
+impl<R: Read> Read for Reader<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = self.inner.read(buffer)?;
+        self.done += n as u64;
+        if n == 0 {
+            if let Some(bar) = &self.bar {
+                bar.finish_and_clear();
+            }
+        } else if self.bar.is_some() || self.since.elapsed() > PATIENCE {
+            let length = self.length;
+            let bar = self.bar.get_or_insert_with(|| progress(length, "bytes"));
+            bar.set_position(self.done);
+        }
+        Ok(n)
+    }
+}
+
+/// Analyzes; on a terminal with a progress bar.
 pub(super) fn analyze(ratings: &Ratings, rules: &Rules) -> Analysis {
-    let made = Progress::default();
-    if !std::io::stderr().is_terminal() {
-        return analyze_watched(ratings, rules, &made);
+    let state = Progress::default();
+    if !io::stderr().is_terminal() {
+        return analyze_with_progress(ratings, rules, &state);
     }
     let (done, wait) = channel::<()>();
-    let made = &made;
+    let state = &state;
     std::thread::scope(|scope| {
         scope.spawn(move || {
             let mut bar = None;
             let mut patience = PATIENCE;
-            // Nothing is ever sent: the sender is dropped when the analysis has finished.
+            // Nothing is sent: the channel closes when the analysis is done.
             while let Err(RecvTimeoutError::Timeout) = wait.recv_timeout(patience) {
-                patience = LOOK;
-                let groups = made.groups.load(Ordering::Relaxed);
+                patience = UPDATE;
+                let groups = state.groups.load(Ordering::Relaxed);
                 let bar = bar.get_or_insert_with(|| progress(groups, "groups of statistics"));
                 bar.set_length(groups);
-                bar.set_position(made.made.load(Ordering::Relaxed));
+                bar.set_position(state.done.load(Ordering::Relaxed));
             }
             if let Some(bar) = bar {
                 bar.finish_and_clear();
             }
         });
-        let analysis = analyze_watched(ratings, rules, made);
+        let analysis = analyze_with_progress(ratings, rules, state);
         drop(done);
         analysis
     })

@@ -1,4 +1,4 @@
-//! What the report says beyond the analysis, and its files.
+//! Facts about the study for the report, and the report's files.
 
 use super::super::{Failure, Kind};
 use crate::report::Source;
@@ -18,15 +18,15 @@ use study_core::protocol::columns::SampleColumn;
 use study_core::protocol::{Order, Protocol, QuestionKind};
 use study_core::store::{StudyFolder, layout};
 
-/// Samples of a playback that are read.
+/// Largest number of samples that are read of a playback.
 const MAX_SAMPLES: usize = 200_000;
 
-/// Playbacks of a realization that are shown.
+/// Largest number of playbacks of a realization that are shown.
 const MAX_TRACES: usize = 3;
 
 /// A file of `analysis/`.
 pub(super) struct Output {
-    /// Relative to the folder.
+    /// Path relative to the folder.
     pub(super) name: String,
     pub(super) content: Vec<u8>,
 }
@@ -62,13 +62,13 @@ pub(super) fn files(
     Ok(files)
 }
 
-/// SVG and PNG of each figure, each drawn by one thread, so that their number
+/// SVG and PNG of each figure. Each is drawn by one thread, so the number of threads
 /// changes no byte.
 fn pictures(drawn: &[Drawn]) -> Result<Vec<(String, Vec<u8>)>, PngError> {
     let painter = Painter::default();
     let figures = drawn.par_iter().with_max_len(1);
     let svgs: Vec<String> = figures.map(|figure| figure.wide.to_svg()).collect();
-    // What takes longest first, so that no thread has it alone at the end.
+    // The largest first, so that the load is balanced.
     let mut order: Vec<usize> = (0..svgs.len()).collect();
     order.sort_by_key(|&i| Reverse(svgs[i].len()));
     let mut pngs: Vec<(usize, Vec<u8>)> = (order.into_iter().par_bridge())
@@ -81,7 +81,7 @@ fn pictures(drawn: &[Drawn]) -> Result<Vec<(String, Vec<u8>)>, PngError> {
         .collect())
 }
 
-/// What the study's folder says beyond its ratings.
+/// Facts about the study besides its ratings.
 pub(super) fn details(
     protocol: &Protocol,
     study: &StudyFolder,
@@ -108,7 +108,7 @@ pub(super) fn details(
         some("ethics", &s.ethics),
         some("contact", &s.contact),
         some("funding", &s.funding),
-        some("license of the data", &s.license),
+        some("data license", &s.license),
         some("doi", &s.doi),
         some("VAF on recording", &protocol.analysis.vaf),
     ]
@@ -116,11 +116,14 @@ pub(super) fn details(
     .flatten()
     .collect();
     if let Some(u) = &protocol.device.uncertified {
-        facts.push(("uncertified tables played".to_owned(), u.reason.clone()));
+        facts.push((
+            "uncertified realizations played".to_owned(),
+            u.reason.clone(),
+        ));
     }
-    // What was felt, which for pilots can be another device than the protocol's.
-    let felt = rows.iter().filter(|r| r.attempt.is_some());
-    let devices: BTreeSet<&str> = felt.map(|r| r.device_kind.as_str()).collect();
+    // The devices used, which for pilots can differ from the protocol's.
+    let played = rows.iter().filter(|r| r.attempt.is_some());
+    let devices: BTreeSet<&str> = played.map(|r| r.device_kind.as_str()).collect();
     let devices: Vec<&str> = devices.into_iter().collect();
     let tools: BTreeSet<&str> = rows.iter().map(|r| r.tool_version.as_str()).collect();
     let manifest = study.manifest();
@@ -156,8 +159,8 @@ pub(super) fn details(
     }
 }
 
-/// How many participants are in which state; pilots and simulated ones only where
-/// nobody else is.
+/// Number of participants by state; pilots and simulated ones only if there are no
+/// others.
 fn states(participants: &[ParticipantRow]) -> Vec<(String, usize)> {
     let real = |p: &&ParticipantRow| !p.pilot && !p.simulated;
     let any = participants.iter().any(|p| real(&p));
@@ -168,42 +171,44 @@ fn states(participants: &[ParticipantRow]) -> Vec<(String, usize)> {
     by.into_iter().map(|(s, n)| (s.to_owned(), n)).collect()
 }
 
-/// How the sessions were run, in sentences for the methods.
+/// Sentences on the conduct of the sessions, for the methods.
 fn conduct(protocol: &Protocol, devices: &[&str]) -> Vec<String> {
     let design = &protocol.design;
-    let mut said = Vec::new();
+    let mut text = Vec::new();
     match design.max_run {
-        Some(1) => said.push("No realization came twice in a row.".to_owned()),
-        Some(n) => said.push(format!("No realization came more than {n} times in a row.")),
+        Some(1) => text.push("No realization was presented twice in a row.".to_owned()),
+        Some(n) => text.push(format!(
+            "No realization was presented more than {n} times in a row."
+        )),
         None => {}
     }
     match design.practice.len() {
         0 => {}
-        n => said.push(format!(
-            "Before these, {} felt that {} not analysed.",
-            counted(n, "practice trial was", "practice trials were"),
-            if n == 1 { "is" } else { "are" }
+        n => text.push(format!(
+            "{} preceded these and {} not analysed.",
+            counted(n, "practice trial", "practice trials"),
+            if n == 1 { "was" } else { "were" }
         )),
     }
     if let Some(breaks) = &design.breaks {
-        said.push(format!(
+        text.push(format!(
             "After every {} there was a break of at least {} s.",
             counted(breaks.every as usize, "trial", "trials"),
             breaks.at_least_s
         ));
     }
-    said.push(match devices {
-        [] => return said,
+    text.push(match devices {
+        [] => return text,
         ["simulated"] => "The device was simulated: nobody felt a force.".to_owned(),
-        kinds => format!("Kinds of device that were played on: {}.", kinds.join(", ")),
+        kinds => format!("Kinds of device used: {}.", kinds.join(", ")),
     });
     if let Some(u) = protocol.device.uncertified.as_ref().filter(|u| u.play) {
-        said.push(format!(
-            "Realizations without a certificate of passivity were played with at most {} N.",
+        text.push(format!(
+            "Realizations without a passivity certificate were limited to {} N.",
             u.force_n.get()
         ));
     }
-    said
+    text
 }
 
 fn order(order: &Order) -> &'static str {
@@ -213,15 +218,15 @@ fn order(order: &Order) -> &'static str {
         Order::Williams => "taken from a Williams design, balanced for first-order carry-over",
         Order::LatinSquare => "taken from a cyclic Latin square",
         Order::Fixed => "the same in every repetition",
-        Order::File(_) => "read from a file that was made beforehand",
+        Order::File(_) => "read from a prepared file",
     }
 }
 
-/// Force against position of some playbacks that count: the first of each
-/// realization by up to three participants. A file that cannot be read is
-/// passed over: it is a picture, and `study verify` tells what is damaged.
+/// Force against position in some included playbacks: the first of each realization by
+/// up to three participants. Files that cannot be read are skipped; `study verify`
+/// reports them.
 pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysis) -> Vec<Trace> {
-    let counts: BTreeSet<(&str, &str, u32)> = analysis
+    let included: BTreeSet<(&str, &str, u32)> = analysis
         .rows
         .iter()
         .filter(|r| r.excluded.is_none())
@@ -233,10 +238,10 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
         .iter()
         .filter(|r| !r.practice && r.status == Status::Ok)
     {
-        let (model, who) = (row.model.as_str(), row.participant.as_str());
+        let (model, participant) = (row.model.as_str(), row.participant.as_str());
         let own = shown.entry(model).or_default();
-        let enough = own.len() >= MAX_TRACES || own.contains(who);
-        if enough || !counts.contains(&(who, model, row.repetition)) {
+        let enough = own.len() >= MAX_TRACES || own.contains(participant);
+        if enough || !included.contains(&(participant, model, row.repetition)) {
             continue;
         }
         let Some(attempt) = row.attempt else { continue };
@@ -244,7 +249,7 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
             .join(layout::TELEMETRY)
             .join(layout::telemetry(row.trial, attempt, 1));
         if path.is_file() {
-            own.insert(who);
+            own.insert(participant);
             wanted.push((row, path));
         }
     }
@@ -260,7 +265,7 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
     read.collect::<Vec<_>>().into_iter().flatten().collect()
 }
 
-/// Position and force of a telemetry file, and whether the force was measured.
+/// Position (mm) and force (N) of a telemetry file, and whether the force was measured.
 fn trace(path: &Path) -> Option<(Vec<(f64, f64)>, bool)> {
     let mut reader = csv::Reader::from_reader(BufReader::new(File::open(path).ok()?));
     let head = reader.headers().ok()?.clone();
@@ -282,7 +287,7 @@ fn trace(path: &Path) -> Option<(Vec<(f64, f64)>, bool)> {
     (points.len() > 1).then_some((points, all_measured))
 }
 
-/// Removes pictures of an earlier analysis that this one did not draw again.
+/// Removes figures of an earlier analysis that this one did not write.
 pub(super) fn clear_figures(dir: &Path, files: &[Output]) {
     let Ok(items) = fs::read_dir(dir.join("figures")) else {
         return;
@@ -296,7 +301,7 @@ pub(super) fn clear_figures(dir: &Path, files: &[Output]) {
                 .iter()
                 .any(|n| name.starts_with(&format!("figures/{n}.")))
         {
-            // A stale picture that stays is no reason to fail.
+            // A remaining outdated figure is no reason to fail.
             let _ = fs::remove_file(item.path());
         }
     }

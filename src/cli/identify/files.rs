@@ -3,7 +3,7 @@
 use super::super::trajectory::{refuse_to_overwrite, write_file};
 use super::args::{Args, MethodName};
 use super::{Failure, Kind, Results};
-use crate::report::identification::{self, Drawing, Place};
+use crate::report::identification::{self, Drawing, GridCell};
 use crate::report::png::Painter;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -73,12 +73,12 @@ pub(super) fn figures(
     let mut missing = Vec::new();
     let mut drawings: Vec<Drawing> = Vec::new();
     let (selected_on, _) = results.recordings[0];
-    let places: Vec<Place> = results
+    let places: Vec<GridCell> = results
         .cells
         .iter()
         .filter_map(|cell| {
             let provenance = &cell.realization.provenance;
-            Some(Place {
+            Some(GridCell {
                 lambda: provenance.lambda?,
                 memory_mm: provenance.memory_mm,
                 dx_mm: provenance.dx_mm?,

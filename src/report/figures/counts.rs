@@ -1,13 +1,13 @@
-//! How often each rating was given, by realization.
+//! Histograms of the ratings, by realization.
 
 use super::{Canvas, Drawn, Scene, drawn, head, name};
 use crate::report::csv::digits;
 use crate::report::svg::{Axis, Look, Mark, PALETTE, Panel, Span};
 
-/// Most bins of a histogram that can be told apart.
+/// Largest number of bins of a histogram.
 const MAX_BINS: usize = 21;
 
-/// Most histograms.
+/// Largest number of histograms.
 const MAX_PANELS: usize = 24;
 
 pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
@@ -24,7 +24,7 @@ pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
         return None;
     }
     let last = first + bins as f64 - 1.0;
-    // All of a short scale, also what nobody gave.
+    // The whole scale if it is short, including ratings that nobody gave.
     let (low, high) = scene
         .a
         .scale
@@ -47,8 +47,7 @@ pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
         "rating" => String::new(),
         asked => format!(" of {asked}"),
     };
-    let caption =
-        format!("How often each rating{of} was given, by realization. All axes are alike.");
+    let caption = format!("Number of ratings{of} by realization. All panels have the same axes.");
     let title = format!("Counts of {} by realization", scene.asked);
     Some(drawn("histograms", caption, data, |c: Canvas| {
         let columns = c.pick(3, 2).min(scene.models.len());

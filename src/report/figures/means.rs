@@ -1,12 +1,12 @@
-//! Means of the realizations: Fig. 10, Fig. 11, and the mean against VAF.
+//! Means of the realizations: Fig. 10, Fig. 11, and the mean rating against VAF.
 
 use super::{Canvas, Drawn, Scene, cell, drawn, head};
 use crate::report::csv::digits;
-use crate::report::svg::{Anchor, Axis, Colour, Figure, Look, Mark, Note, Panel, Whisker};
+use crate::report::svg::{Anchor, Axis, Figure, Look, Mark, Note, Panel, Whisker};
 use crate::report::svg::{PALETTE, SMALL, for_names, shortened, text_width};
-use crate::report::{apa, identified};
+use crate::report::{apa, sentences};
 
-/// Mean and its deviation, by realization: (place, mean, half).
+/// Index, mean and standard deviation of each realization.
 fn deviations(scene: &Scene<'_>) -> Vec<(f64, f64, f64)> {
     let each = scene.models.iter().enumerate();
     each.filter_map(|(i, m)| {
@@ -37,9 +37,9 @@ fn rating_panel(scene: &Scene<'_>, x_label: &str) -> Panel {
     )
 }
 
-/// The figure of the paper that it follows; only realizations of its kind are told so.
+/// The figure of the paper that this one reproduces, if the realizations are of that kind.
 fn as_in(scene: &Scene<'_>, figure: u8) -> String {
-    if identified(scene.a) {
+    if scene.a.has_memory() {
         format!(", as in Fig. {figure} of Colton & Hollerbach (World Haptics 2007)")
     } else {
         String::new()
@@ -57,7 +57,7 @@ pub(super) fn fig10(scene: &Scene<'_>) -> Option<Drawn> {
         data.push(row);
     }
     let caption = format!(
-        "Mean {} of each realization. Error bars: one standard deviation over all of its ratings \
+        "Mean {} of each realization. Error bars: ± 1 standard deviation over all of its ratings \
          (n − 1){}.",
         scene.asked,
         as_in(scene, 10)
@@ -90,7 +90,7 @@ pub(super) fn fig11(scene: &Scene<'_>) -> Option<Drawn> {
     let caption = format!(
         "Mean {} (above) and variance accounted for{} (below) of each realization{}.",
         scene.asked,
-        if identified(scene.a) {
+        if scene.a.has_memory() {
             " on the validation recording"
         } else {
             ""
@@ -113,12 +113,13 @@ pub(super) fn fig11(scene: &Scene<'_>) -> Option<Drawn> {
     }))
 }
 
-/// A realization on the plane of VAF and rating.
+/// A realization as a point.
 struct Dot {
+    /// Index of the realization.
     nth: usize,
     vaf: f64,
     mean: f64,
-    ends: Option<(f64, f64)>,
+    ci95: Option<(f64, f64)>,
 }
 
 pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
@@ -130,7 +131,7 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
                 nth,
                 vaf: m.vaf?,
                 mean: get("mean")?,
-                ends: get("ci95_lo").zip(get("ci95_hi")),
+                ci95: get("ci95_lo").zip(get("ci95_hi")),
             })
         })
         .collect();
@@ -143,24 +144,18 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
             scene.models[d.nth].id.clone(),
             digits(d.vaf),
             digits(d.mean),
-            cell(d.ends.map(|e| e.0)),
-            cell(d.ends.map(|e| e.1)),
+            cell(d.ci95.map(|e| e.0)),
+            cell(d.ci95.map(|e| e.1)),
         ]);
     }
     let v = &scene.a.values;
     let found = v.number("corr/pearson/r").map_or_else(String::new, |r| {
-        let p = crate::report::permuted(scene.a, "pearson");
-        let p = p.map_or_else(String::new, |(kind, p)| {
-            format!(", {}", apa::named_p(kind, p))
-        });
-        format!(
-            " Over the realizations that are tested r = {}{p}.",
-            apa::r(r)
-        )
+        let p = sentences::permutation_p(scene.a.permutation_test("pearson"));
+        format!(" Over the tested realizations r = {}{p}.", apa::r(r))
     });
-    let bars = if dots.iter().any(|d| d.ends.is_some()) {
-        " Error bars: 95 % t intervals over subjects; they hold for these realizations and say \
-         nothing about others."
+    let bars = if dots.iter().any(|d| d.ci95.is_some()) {
+        " Error bars: 95 % t intervals over subjects; they do not generalise to other \
+         realizations."
     } else {
         ""
     };
@@ -178,25 +173,29 @@ fn plane(scene: &Scene<'_>, dots: &[Dot], title: &str, c: Canvas) -> Figure {
     let beyond: Vec<f64> = dots
         .iter()
         .flat_map(|d| {
-            let (low, high) = d.ends.unwrap_or((d.mean, d.mean));
+            let (low, high) = d.ci95.unwrap_or((d.mean, d.mean));
             [low, high, d.mean]
         })
         .collect();
-    let with = dots.iter().any(|d| d.ends.is_some());
-    let label = format!("{}, mean{}", scene.asked, if with { " [95 %]" } else { "" });
+    let with = dots.iter().any(|d| d.ci95.is_some());
+    let label = format!(
+        "{}, mean{}",
+        scene.asked,
+        if with { " [95 % CI]" } else { "" }
+    );
     let mut height = c.pick(360.0, 320.0);
     let axes = Panel::new(
         Axis::around("VAF", dots.iter().map(|d| d.vaf)),
         scene.ratings(&label, &beyond),
     );
-    // About what is left of the figure for the axes.
+    // The approximate size of the axes.
     let room = (c.width - 70.0, height - 60.0);
     let names: Vec<String> = (dots.iter())
         .map(|d| shortened(&scene.models[d.nth].id, 22))
         .collect();
     let (mut notes, crowded) = labels(&names, dots, &axes, room);
     if crowded {
-        // Numbers have room; the legend tells what they stand for.
+        // Use numbers, which fit, and explain them in the legend.
         let numbers: Vec<String> = (1..=dots.len()).map(|n| n.to_string()).collect();
         notes = labels(&numbers, dots, &axes, room).0;
         let widths = names.iter().map(|n| text_width(n, SMALL) + 52.0);
@@ -204,8 +203,8 @@ fn plane(scene: &Scene<'_>, dots: &[Dot], title: &str, c: Canvas) -> Figure {
     }
     let mut panel = axes;
     for (i, d) in dots.iter().enumerate() {
-        let look = scene.look(d.nth);
-        if let Some((low, high)) = d.ends {
+        let look = Look::nth(d.nth);
+        if let Some((low, high)) = d.ci95 {
             let at = d.vaf;
             let bar = Mark::ErrorBars(vec![Whisker { at, low, high }]);
             panel = panel.with(look, bar);
@@ -228,10 +227,10 @@ fn overlap(a: &Box, b: &Box) -> bool {
     !(a.2 < b.0 || b.2 < a.0 || a.3 < b.1 || b.3 < a.1)
 }
 
-/// Texts beside the dots, inside the picture, where they cover no other text or dot,
-/// and as few bars as can be; whether there was no such place for one.
+/// Labels of the dots that overlap no other label or dot and as few error bars as
+/// possible; and whether this failed for any label.
 fn labels(texts: &[String], dots: &[Dot], panel: &Panel, room: (f64, f64)) -> (Vec<Note>, bool) {
-    let place = |x: f64, y: f64| {
+    let position = |x: f64, y: f64| {
         let share = |v: f64, axis: &Axis| (v - axis.low) / (axis.high - axis.low);
         (
             share(x, &panel.x) * room.0,
@@ -241,19 +240,19 @@ fn labels(texts: &[String], dots: &[Dot], panel: &Panel, room: (f64, f64)) -> (V
     let mut names: Vec<Box> = Vec::new();
     let mut bars: Vec<Box> = Vec::new();
     for d in dots {
-        let (x, y) = place(d.vaf, d.mean);
+        let (x, y) = position(d.vaf, d.mean);
         names.push((x - 5.0, y - 5.0, x + 5.0, y + 5.0));
-        if let Some((low, high)) = d.ends {
-            let (top, bottom) = (place(d.vaf, high).1, place(d.vaf, low).1);
+        if let Some((low, high)) = d.ci95 {
+            let (top, bottom) = (position(d.vaf, high).1, position(d.vaf, low).1);
             bars.push((x - 3.0, top, x + 3.0, bottom));
         }
     }
-    // From below upwards, so that texts that give way keep the order of their dots.
+    // From the lowest dot upwards, so that displaced labels keep the order of the dots.
     let mut upwards: Vec<(&Dot, &String)> = dots.iter().zip(texts).collect();
     upwards.sort_by(|a, b| a.0.mean.total_cmp(&b.0.mean));
     let (mut notes, mut crowded) = (Vec::new(), false);
     for (d, text) in upwards {
-        let (x, y) = place(d.vaf, d.mean);
+        let (x, y) = position(d.vaf, d.mean);
         let width = text_width(text, SMALL);
         let boxed = |c: &(Anchor, f64, f64)| -> Box {
             let left = if c.0 == Anchor::Start {
@@ -271,7 +270,7 @@ fn labels(texts: &[String], dots: &[Dot], panel: &Panel, room: (f64, f64)) -> (V
         };
         let mut best = (Anchor::Start, 9.0, 0.0);
         for step in 0..9 {
-            // 0, −14, 14, −28, 28 …; the further away, the further aside.
+            // Vertical offsets 0, −14, 14, −28, 28 …, with growing horizontal offsets.
             let down = 14.0 * f64::from((step + 1) / 2) * if step % 2 == 1 { -1.0 } else { 1.0 };
             let aside = 9.0 + 0.3 * down.abs();
             for c in [(Anchor::Start, aside, down), (Anchor::End, -aside, down)] {
@@ -282,12 +281,8 @@ fn labels(texts: &[String], dots: &[Dot], panel: &Panel, room: (f64, f64)) -> (V
         }
         crowded |= cost(&best) >= 10;
         names.push(boxed(&best));
-        let mut note = Note::new((d.vaf, d.mean), text)
-            .moved(best.1, best.2)
-            .anchored(best.0);
-        note.rim = true;
-        note.colour = Colour::INK;
-        notes.push(note);
+        let note = Note::new((d.vaf, d.mean), text);
+        notes.push(note.moved(best.1, best.2).anchored(best.0));
     }
     (notes, crowded)
 }

@@ -1,19 +1,20 @@
-//! Ratings by subject: the table of cells, a line for each subject, repetitions.
+//! Ratings by subject: a heat map, a line for each subject, repetitions.
 
 use super::{Canvas, Drawn, Scene, cell, drawn, head, name};
 use crate::report::apa;
 use crate::report::svg::{
-    Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, SMALL, Span, for_names, ramp,
+    Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, SMALL, Span, for_names, ramp, share,
     shortened, text_width,
 };
 use std::collections::BTreeMap;
+use study_core::analyze::RealizationSummary;
 use study_stats::describe::mean;
 
 fn mean_of(scene: &Scene<'_>, subject: &str, model: &str) -> Option<f64> {
     scene.cells.get(&(subject, model)).and_then(|x| mean(x))
 }
 
-/// The means of all cells, for a table.
+/// The means of all cells, as CSV rows.
 fn table(scene: &Scene<'_>) -> Vec<Vec<String>> {
     let mut data = vec![head(["subject", "model", "n", "mean"])];
     for ((subject, model), x) in &scene.cells {
@@ -45,7 +46,7 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
         (low, all().fold(f64::NEG_INFINITY, f64::max))
     });
     let caption = format!(
-        "Mean {} of each subject for each realization, over the repetitions. Darker is higher.",
+        "Mean {} of each participant for each realization, over the repetitions. Darker is higher.",
         scene.asked
     );
     let title = format!("{} by subject and realization", scene.asked);
@@ -63,7 +64,7 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
                 (span, *mean)
             });
             let mut subjects = Axis::of_names("subject", &scene.subjects);
-            // The first one stands at the top.
+            // The first one is at the top.
             (subjects.low, subjects.high) = (subjects.high, subjects.low);
             let heat = Mark::Heat {
                 cells: boxes.collect(),
@@ -80,7 +81,7 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
             let widest = (scene.subjects.iter())
                 .map(|s| text_width(&shortened(s, 24), SMALL))
                 .fold(0.0, f64::max);
-            // Beside labels and key; below 26 px a number does not fit into its cell.
+            // Width without labels and legend; a cell below 26 px is too narrow for a number.
             let room = c.width - widest - 110.0;
             let wide = room / scene.models.len() as f64 >= 26.0;
             if wide && high.abs() < 1000.0 && low.abs() < 1000.0 {
@@ -92,7 +93,7 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
                     })
                     .collect();
             }
-            // Names that have no room side by side are set at a slant, below the cells.
+            // Room for slanted names below the cells.
             let below = for_names(&scene.names(), room);
             let height = 70.0 + c.pick(22.0, 20.0) * rows.max(4) as f64 + below;
             c.figure("subjects-and-realizations", &title, height)
@@ -101,16 +102,8 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
     ))
 }
 
-fn share(value: f64, low: f64, high: f64) -> f64 {
-    if high > low {
-        (value - low) / (high - low)
-    } else {
-        0.5
-    }
-}
-
-/// The test realizations, by VAF where all have one.
-fn ordered<'s>(scene: &'s Scene<'_>) -> (Vec<&'s study_core::analyze::Listed>, bool) {
+/// The realizations, ordered by VAF if all have one.
+fn ordered<'s>(scene: &'s Scene<'_>) -> (Vec<&'s RealizationSummary>, bool) {
     let mut models = scene.models.clone();
     let by_vaf = models.iter().all(|m| m.vaf.is_some());
     if by_vaf {
@@ -126,11 +119,11 @@ pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
     let (models, by_vaf) = ordered(scene);
     let order = if by_vaf { " ordered by VAF" } else { "" };
     let caption = format!(
-        "One grey line for each subject: mean {} of each realization{order}. The thick line is the \
-         mean over subjects.",
+        "Mean {} of each realization{order}, with a grey line for each participant. The thick line is \
+         the mean over participants.",
         scene.asked
     );
-    let title = format!("{}, a line for each subject", scene.asked);
+    let title = format!("{} by participant", scene.asked);
     let names: Vec<String> = models.iter().map(|m| name(m)).collect();
     Some(drawn(
         "subject-lines",
@@ -161,7 +154,7 @@ pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
                 let line = along(&|m| mean_of(scene, s, m));
                 let mark = Mark::Line(line.clone());
                 panel = if i == 0 {
-                    panel.named("one subject", thin, mark)
+                    panel.named("one participant", thin, mark)
                 } else {
                     panel.with(thin, mark)
                 };
@@ -170,7 +163,7 @@ pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
             let over = along(&|m| scene.number(m, "subject_mean/mean"));
             let thick = Look::plain(PALETTE[0]).stroke(3.0).size(9.0);
             panel = panel
-                .named("mean over subjects", thick, Mark::Line(over.clone()))
+                .named("mean over participants", thick, Mark::Line(over.clone()))
                 .with(thick, Mark::Points(over));
             let height = c.pick(320.0, 290.0) + for_names(&names, c.width - 60.0);
             c.figure("subject-lines", &title, height).with(panel)
@@ -189,7 +182,7 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     }
     let last = by.keys().map(|k| k.1).max().unwrap_or(0);
     let lines = (1..=MAX_LINES).contains(&scene.models.len());
-    // A foreign table may count from 0.
+    // A foreign table may number repetitions from 0.
     let first = by.keys().map(|k| k.1).min().unwrap_or(1).min(1);
     if last <= first || last > MAX_REPETITIONS || !lines {
         return None;
@@ -210,13 +203,13 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     let digits = apa::decimals(v.number("order_trial/se").unwrap_or(0.0), 3);
     let slope = slope.map_or_else(String::new, |(b, p)| {
         format!(
-            " With a mean for each subject and each realization taken out, the rating changes by {} per trial, t test p {}.",
+            " Adjusted for subjects and realizations, the rating changes by {} per trial, t test p {}.",
             apa::number(b, digits),
-            apa::equals_p(p)
+            apa::p(p)
         )
     });
     let caption = format!(
-        "Mean {} by repetition, a line for each realization; black: all of them.{slope}",
+        "Mean {} by repetition, with a line for each realization; black: all realizations.{slope}",
         scene.asked
     );
     let title = format!("{} by repetition", scene.asked);
@@ -233,7 +226,7 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
         for (i, m) in scene.models.iter().enumerate() {
             let at = |k: u32| (f64::from(k), of(&m.id, k).unwrap_or(f64::NAN));
             let line: Vec<(f64, f64)> = (first..=last).map(at).collect();
-            let look = scene.look(i);
+            let look = Look::nth(i);
             panel = panel.with(look, Mark::Line(line.clone())).named(
                 &name(m),
                 look,
@@ -244,7 +237,7 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
         let thick = Look::plain(Colour::INK).stroke(3.0);
         let line: Vec<(f64, f64)> = (first..=last).map(at).collect();
         panel = panel.named("all", thick, Mark::Line(line));
-        // A long legend takes nothing from the axes.
+        // Additional height for a long legend.
         let names = scene
             .models
             .iter()
@@ -255,8 +248,8 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     }))
 }
 
-/// Most repetitions that are drawn.
+/// Largest number of repetitions.
 const MAX_REPETITIONS: u32 = 30;
 
-/// Most lines that the eye can follow.
+/// Largest number of lines.
 const MAX_LINES: usize = 12;

@@ -1,18 +1,18 @@
-//! Force against position during some playbacks.
+//! Force against position in some playbacks.
 
 use super::{Canvas, Drawn, Scene, Trace, drawn, head};
 use crate::report::svg::{Axis, Look, Mark, Panel};
 
-/// Points of a trace that are drawn.
+/// Largest number of points of a trace.
 const MAX_POINTS: usize = 400;
 
-/// Traces of a realization that are drawn.
+/// Largest number of traces of a realization.
 const MAX_TRACES: usize = 3;
 
-/// Most realizations.
+/// Largest number of realizations.
 const MAX_PANELS: usize = 24;
 
-/// Every n-th point, at most so many.
+/// Every n-th point, so that at most [`MAX_POINTS`] remain.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let every = points.len().div_ceil(MAX_POINTS).max(1);
     points.iter().copied().step_by(every).collect()
@@ -69,12 +69,12 @@ pub(super) fn traces(scene: &Scene<'_>, traces: &[Trace]) -> Option<Drawn> {
         ""
     };
     let caption = format!(
-        "Force against position during some of the playbacks ({}{more}), from telemetry, thinned; a colour for each playback. {}",
+        "Force against position in some playbacks ({}{more}), from a subset of the telemetry samples; one colour per playback. {}",
         labels.join(", "),
         if measured {
-            "The force is measured."
+            "Measured force."
         } else {
-            "The force is the commanded one: no sensor reported any."
+            "Commanded force: no force was measured."
         }
     );
     Some(drawn("telemetry", caption, data, |c: Canvas| {

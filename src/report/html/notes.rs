@@ -1,23 +1,24 @@
-//! What a reader has to know: banners, warnings, exclusions, comments, versions.
+//! Banners, warnings, exclusions, comments, provenance.
 
-use super::methods::in_words;
+use super::methods::rule_in_words;
 use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
 use crate::report::{Source, apa};
 use maud::{Markup, html};
-use study_core::analyze::{Analysis, PreregisteredRule, Said, Warning};
+use study_base::text::counted;
+use study_core::analyze::{Analysis, Comment, PreregisteredRule, Warning};
 
-/// Warnings that stand at the top.
+/// Warnings that are banners at the top.
 const AT_THE_TOP: [&str; 3] = ["no-participants", "mixed", "interim"];
 
 pub(super) fn banners(a: &Analysis) -> Markup {
     let title = |code: &str| match code {
         "no-participants" if a.counts.simulated > 0 && a.counts.pilots == 0 => {
-            "SIMULATED – NO PARTICIPANTS"
+            "SIMULATED DATA – NO PARTICIPANTS"
         }
         "no-participants" => "NO PARTICIPANTS",
-        "mixed" => "PILOTS OR SIMULATED PARTICIPANTS AMONG THE DATA",
-        _ => "AN EARLY LOOK",
+        "mixed" => "INCLUDES PILOT OR SIMULATED DATA",
+        _ => "INTERIM ANALYSIS",
     };
     html! {
         @for w in a.warnings.iter().filter(|w| AT_THE_TOP.contains(&w.code)) {
@@ -26,14 +27,14 @@ pub(super) fn banners(a: &Analysis) -> Markup {
         @let others: Vec<_> = a.warnings.iter().filter(|w| !AT_THE_TOP.contains(&w.code)).collect();
         @if !others.is_empty() {
             details open {
-                summary { (apa::counted(others.len(), "thing", "things")) " to know before believing a number" }
+                summary { (counted(others.len(), "caveat", "caveats")) }
                 ul { @for w in others { li { (sentence(w)) } } }
             }
         }
     }
 }
 
-/// With a capital letter, unless a path stands first, and a full stop.
+/// With a capital letter, unless it starts with a path, and a full stop.
 fn sentence(w: &Warning) -> String {
     let text = safe(&w.text);
     let mut letters = text.chars();
@@ -46,33 +47,32 @@ fn sentence(w: &Warning) -> String {
     }
 }
 
-/// What was stated before the data of what to leave out, what each rule did, and
-/// what was changed afterwards.
-fn stated(a: &Analysis) -> Markup {
+/// The exclusion rules, their effects, and changes after the study began.
+fn rules(a: &Analysis) -> Markup {
     let r = |id: &str| a.values.number(id).map(apa::r);
     let changed = a.changed(PreregisteredRule::Exclusions);
     let caption = if changed {
-        "Exclusions, changed after the study began: see Deviations"
+        "Exclusion rules, changed after the study began: see Deviations"
     } else {
-        "Exclusions stated beforehand"
+        "Preregistered exclusion rules"
     };
     html! {
         @if a.exclusions.is_empty() && changed {
-            p { "The rules of exclusion were changed after the study began; none is left: see Deviations." }
+            p { "The exclusion rules were removed after the study began: see Deviations." }
         } @else if a.exclusions.is_empty() {
-            p { "No rule of exclusion was stated beforehand." }
+            p { "No exclusion rule was preregistered." }
         } @else {
             div.scroll tabindex="0" role="region" aria-label=(caption) {
                 table {
                     caption { (caption) }
                     thead { tr {
-                        th scope="col" { "rule" } th.text scope="col" { "leaves out" } th scope="col" { "rows" }
+                        th scope="col" { "rule" } th.text scope="col" { "excludes" } th scope="col" { "rows" }
                         th scope="col" { "participants" } th.text scope="col" { "remark" }
                     } }
                     tbody {
                         @for e in &a.exclusions {
                             tr {
-                                td { code { (e.rule.to_string()) } } td.text { (in_words(e.rule)) } td { (e.rows) } td { (e.participants) }
+                                td { code { (e.rule.to_string()) } } td.text { (rule_in_words(e.rule)) } td { (e.rows) } td { (e.participants) }
                                 td.text { (e.problem.unwrap_or_default()) }
                             }
                         }
@@ -81,20 +81,20 @@ fn stated(a: &Analysis) -> Markup {
             }
             @match (r("corr/pearson/r"), r("before_exclusion/corr/pearson/r")) {
                 (Some(with), Some(without)) => p {
-                    "With them, mean rating and VAF correlate at r = " (with)
-                    "; without them, at r = " (without)
-                    ". More of the headline with and without them is in a table above."
+                    "With the exclusions mean rating and VAF correlate at r = " (with)
+                    ", without them at r = " (without)
+                    ". A table above compares more results."
                 },
                 (None, Some(without)) => p {
-                    "With them, no correlation of mean rating and VAF is defined; without them, r = " (without) "."
+                    "With the exclusions the correlation of mean rating and VAF is undefined; without them r = " (without) "."
                 },
                 _ => {},
             }
         }
         @if a.deviations.is_empty() {
-            p { "No rule of the analysis was changed after the study began." }
+            p { "No analysis rule was changed after the study began." }
         } @else {
-            h3 { "Deviations from what was stated beforehand" }
+            h3 { "Deviations from the preregistered analysis" }
             ul { @for d in &a.deviations { li { (safe(&d.text)) } } }
         }
     }
@@ -103,38 +103,38 @@ fn stated(a: &Analysis) -> Markup {
 pub(super) fn exclusions(a: &Analysis, of_study: bool) -> Markup {
     let c = &a.counts;
     let facts: Vec<(&str, usize)> = [
-        ("rows, practice not counted", c.rows),
+        ("rows (without practice)", c.rows),
         ("ratings analysed", c.rated),
-        ("failed for good", c.failed),
-        ("declined", c.declined),
-        ("missing", c.missing),
-        ("corrected", c.corrected),
-        ("after a failed attempt", c.repeated),
-        ("practice", c.practice),
+        ("failed trials", c.failed),
+        ("declined answers", c.declined),
+        ("missing ratings", c.missing),
+        ("corrected answers", c.corrected),
+        ("trials repeated after a failed attempt", c.repeated),
+        ("practice trials", c.practice),
     ]
     .into_iter()
     .collect();
     let left_out: Vec<_> = a.rows.iter().filter(|r| r.excluded.is_some()).collect();
     html! {
         section {
-            h2 { "What was counted and left out" }
+            h2 { "Included and excluded data" }
             dl { @for (what, n) in facts { dt { (what) } dd { (n) } } }
-            @if of_study { (stated(a)) }
+            @if of_study { (rules(a)) }
             @if c.excluded.is_empty() {
                 p { "No row was excluded." }
             } @else {
-                p { (apa::counted(c.excluded_participants, "participant has", "participants have")) " rows that do not count:" }
+                p { (counted(c.excluded_participants, "participant has", "participants have")) " excluded rows:" }
                 ul {
                     @for (reason, n) in &c.excluded {
-                        li { (safe(reason)) ": " (apa::counted(*n, "row", "rows")) }
+                        li { (safe(reason)) ": " (counted(*n, "row", "rows")) }
                     }
                 }
                 details {
-                    summary { "The rows that do not count" }
-                    div.scroll tabindex="0" role="region" aria-label="The rows that do not count" {
+                    summary { "Excluded rows" }
+                    div.scroll tabindex="0" role="region" aria-label="Excluded rows" {
                         table {
                             thead { tr {
-                                th scope="col" { "subject" } th scope="col" { "realization" } th scope="col" { "repetition" }
+                                th scope="col" { "participant" } th scope="col" { "realization" } th scope="col" { "repetition" }
                                 th scope="col" { "rating" } th.text scope="col" { "reason" }
                             } }
                             tbody {
@@ -143,7 +143,7 @@ pub(super) fn exclusions(a: &Analysis, of_study: bool) -> Markup {
                                         td { (safe(a.subject(r))) }
                                         td { (safe(a.model(r))) }
                                         td { (r.repetition) }
-                                        td { (r.rating.map_or_else(|| "–".to_owned(), apa::plain)) }
+                                        td { (apa::or_dash(r.rating, apa::plain)) }
                                         td.text { (safe(&r.excluded.as_ref().map(ToString::to_string).unwrap_or_default())) }
                                     }
                                 }
@@ -164,23 +164,23 @@ pub(super) fn comments(a: &Analysis, lang: Option<&str>) -> Markup {
         @if !a.comments.is_empty() {
             section {
                 h2 { "Comments" }
-                p.note { "As typed. What would steer a terminal or turn the direction of text is shown as its code." }
+                p.note { "As typed. Control characters and characters that change the direction of text are shown as codes." }
                 @for group in a.comments.chunk_by(|x, y| x.model == y.model) {
-                    (of_one(a, group, lang))
+                    (comments_on_one(a, group, lang))
                 }
             }
         }
     }
 }
 
-fn of_one(a: &Analysis, group: &[Said], lang: Option<&str>) -> Markup {
-    let mean = a.values.number(&format!("desc/{}/mean", group[0].model));
+fn comments_on_one(a: &Analysis, group: &[Comment], lang: Option<&str>) -> Markup {
+    let mean = a.described(&group[0].model, "mean");
     html! {
         @let model = if group[0].model.is_empty() { "no realization" } else { &group[0].model };
         details open {
             summary {
                 (safe(model))
-                @if let Some(mean) = mean { ", mean " (apa::number(mean, 2)) }
+                @if let Some(mean) = mean { ", mean " (apa::two(mean)) }
                 " (" (group.len()) ")"
             }
             @for c in group.iter().take(MAX_ROWS) {
@@ -202,7 +202,7 @@ fn of_one(a: &Analysis, group: &[Said], lang: Option<&str>) -> Markup {
 pub(super) fn provenance(source: &Source, d: &Details, a: &Analysis) -> Markup {
     html! {
         section {
-            h2 { "Where this comes from" }
+            h2 { "Provenance" }
             dl {
                 dt { "analysed with" } dd { "study " (env!("CARGO_PKG_VERSION")) }
                 @if let Some(id) = &source.study { dt { "study" } dd { (safe(id)) } }
@@ -229,7 +229,7 @@ pub(super) fn provenance(source: &Source, d: &Details, a: &Analysis) -> Markup {
                         }
                     }
                     @if d.versions.len() > 1 {
-                        p.note { "Every version after the first is a deviation from what was stated before the data." }
+                        p.note { "Every version after the first is a deviation from the preregistered protocol." }
                     }
                 }
             }

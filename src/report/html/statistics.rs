@@ -1,14 +1,14 @@
-//! Everything that was computed, by identifier, and what was not and why.
+//! All statistics by identifier, and the undefined ones with reasons.
 
 use super::safe;
 use crate::report::apa;
 use maud::{Markup, html};
 use study_core::analyze::{Analysis, Value};
 
-/// Most statistics that are listed.
+/// Largest number of statistics that are listed.
 const MAX_LISTED: usize = 2000;
 
-/// Longest list that is shown.
+/// Largest number of elements that are shown of a list.
 const MAX_LIST: usize = 40;
 
 pub(super) fn section(a: &Analysis) -> Markup {
@@ -23,14 +23,14 @@ pub(super) fn section(a: &Analysis) -> Markup {
     html! {
         section {
             h2 { "All statistics" }
-            p.note { "By the identifiers of docs/statistics.md; unrounded in values.json." }
+            p.note { "Identifiers are explained in docs/statistics.md; values.json has unrounded values." }
             @if !undefined.is_empty() {
                 details {
-                    summary { (undefined.len()) " not defined, with reasons" }
-                    div.scroll tabindex="0" role="region" aria-label="Statistics that are not defined" {
+                    summary { (undefined.len()) " undefined, with reasons" }
+                    div.scroll tabindex="0" role="region" aria-label="Undefined statistics" {
                         table {
                             thead { tr {
-                                th scope="col" { "statistic" } th.text scope="col" { "why it is not defined" }
+                                th scope="col" { "statistic" } th.text scope="col" { "reason" }
                             } }
                             tbody {
                                 @for (id, why) in undefined.iter().take(MAX_LISTED) {

@@ -1,6 +1,6 @@
-//! The one style sheet. It names no file and no address.
+//! The style sheet. It refers to no other file.
 
-/// Dark on white; figures in two widths; tables scroll on their own.
+/// Dark on white; figures in two widths; wide tables scroll.
 pub(super) const CSS: &str = "
 :root { color-scheme: only light; }
 * { box-sizing: border-box; }
@@ -31,7 +31,7 @@ td { border-bottom: 1px solid #ddd; }
 th:first-child, td:first-child, .text { text-align: left; }
 td:first-child { white-space: normal; min-width: 7.5rem; max-width: 23rem; overflow-wrap: anywhere; }
 .text { white-space: normal; min-width: 12rem; }
-tr.beside td { font-style: italic; }
+tr.italic td { font-style: italic; }
 code { font-family: 'Liberation Mono', Consolas, Menlo, monospace; font-size: .88em; }
 ul { padding-left: 1.2rem; margin: .4rem 0; }
 details { margin: .6rem 0; border: 1px solid #bbb; padding: .4rem .8rem; }

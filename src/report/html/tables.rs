@@ -1,41 +1,46 @@
-//! Tables that a reader looks for first.
+//! The main tables.
 
-use super::{answers, safe};
-use crate::report::apa;
+use super::safe;
+use crate::report::{answers, apa};
 use maud::{Markup, html};
-use study_core::analyze::{Analysis, Listed, Value};
+use study_core::analyze::{Analysis, RealizationSummary, Value, significant};
 use study_core::outcome::Role;
 
-/// Most rows of a table; the rest is in the CSV.
+/// Largest number of rows of a table; the CSV has all.
 pub(super) const MAX_ROWS: usize = 200;
 
-/// Rows of a table that is not cut at the end of a page.
+/// Largest number of rows of a table that is kept on one printed page.
 const MAX_WHOLE: usize = 15;
 
-/// A table: head, rows, and which of them stand beside the others.
-struct Table {
+/// A table on the page.
+struct HtmlTable {
     caption: String,
     head: Vec<String>,
+    /// The cells of each row, and whether it is in italics.
     rows: Vec<(bool, Vec<String>)>,
-    /// Rows that are left out.
-    more: usize,
+    /// Number of omitted rows.
+    omitted: usize,
 }
 
-impl Table {
+impl HtmlTable {
     fn new(caption: &str, head: &[&str]) -> Self {
         Self {
             caption: caption.to_owned(),
             head: head.iter().map(|h| (*h).to_owned()).collect(),
             rows: Vec::new(),
-            more: 0,
+            omitted: 0,
         }
     }
 
-    fn row(&mut self, beside: bool, cells: Vec<String>) {
+    fn row(&mut self, cells: Vec<String>) {
+        self.styled_row(false, cells);
+    }
+
+    fn styled_row(&mut self, italic: bool, cells: Vec<String>) {
         if self.rows.len() < MAX_ROWS {
-            self.rows.push((beside, cells));
+            self.rows.push((italic, cells));
         } else {
-            self.more += 1;
+            self.omitted += 1;
         }
     }
 
@@ -47,14 +52,14 @@ impl Table {
                         caption { (self.caption) }
                         thead { tr { @for h in &self.head { th scope="col" { (safe(h)) } } } }
                         tbody {
-                            @for (beside, cells) in &self.rows {
-                                tr.beside[*beside] { @for c in cells { td { (safe(c)) } } }
+                            @for (italic, cells) in &self.rows {
+                                tr.italic[*italic] { @for c in cells { td { (safe(c)) } } }
                             }
                         }
                     }
                 }
-                @if self.more > 0 {
-                    p.note { (self.more) " more rows are in the CSV file." }
+                @if self.omitted > 0 {
+                    p.note { (self.omitted) " more rows are in the CSV file." }
                 }
             }
         }
@@ -62,22 +67,21 @@ impl Table {
 }
 
 pub(super) fn section(a: &Analysis) -> Markup {
-    let any_interval = a.realizations.iter().any(|m| {
-        let id = format!("desc/{}/subject_mean/ci95_lo", m.id);
-        a.values.number(&id).is_some()
-    });
+    let mut realizations_with = a.realizations.iter();
+    let any_interval =
+        realizations_with.any(|m| a.described(&m.id, "subject_mean/ci95_lo").is_some());
     html! {
         section {
             h2 { "Tables" }
             @if !a.realizations.is_empty() {
                 (realizations(a).render())
                 p.note {
-                    "n: ratings. Mean, SD (standard deviation, n − 1) and median are over all ratings of a \
-                     realization"
+                    "n: number of ratings. Mean, SD (standard deviation, n − 1) and median are over all \
+                     ratings of a realization"
                     @if any_interval { "; the interval is a 95 % t interval of the mean over subjects" }
                     "."
-                    @if a.realizations.len() > answers::tests(a).len() {
-                        " Realizations in italics stand beside the tested ones."
+                    @if a.realizations.iter().any(|m| !m.tested) {
+                        " Realizations in italics are not included in the tests."
                     }
                 }
             }
@@ -85,8 +89,8 @@ pub(super) fn section(a: &Analysis) -> Markup {
             @for table in against_references(a) { (table.render()) }
             (repeats(a).render())
             (shares(a).render())
-            @if !answers::shares(a).is_empty() {
-                p.note { "Shares are rounded to whole per cent: their sum can be 99 or 101." }
+            @if !answers::variance_shares(a).is_empty() {
+                p.note { "Shares are rounded to whole per cent, so their sum can be 99 or 101." }
             }
             (agreement(a).render())
             (glossary(a))
@@ -96,7 +100,7 @@ pub(super) fn section(a: &Analysis) -> Markup {
     }
 }
 
-/// What the letters mean, of those that are on the page.
+/// Definitions of the symbols on the page.
 fn glossary(a: &Analysis) -> Markup {
     let any = |ids: &[&str]| ids.iter().any(|id| a.values.number(id).is_some());
     let alpha = [
@@ -106,41 +110,45 @@ fn glossary(a: &Analysis) -> Markup {
     let all: Vec<&str> = [
         (
             any(&["rmanova/eps_gg"]),
-            "ε: how nearly all differences vary alike (1: they do); it lowers the degrees of freedom.",
+            "ε: departure from sphericity (1: none); it reduces the degrees of freedom.",
         ),
         (
             any(&["rmanova/ges"]),
-            "Generalised η²: share of the variance that the realizations have.",
+            "Generalised η²: share of the variance explained by the realizations.",
         ),
         (
             any(&["friedman/kendall_W"]),
-            "W: how alike subjects rank, from 0 to 1.",
+            "W: concordance of the subjects' rankings, from 0 to 1.",
         ),
-        (any(&alpha), "α: agreement beyond chance, 1 at most."),
+        (any(&alpha), "α: agreement beyond chance, at most 1."),
         (
-            !crate::report::pairs(a).0.is_empty(),
-            "dz: mean difference by the standard deviation of the differences.",
+            !a.compared_pairs().pairs.is_empty(),
+            "dz: mean difference divided by the standard deviation of the differences.",
         ),
     ]
     .into_iter()
-    .filter(|(there, _)| *there)
+    .filter(|(shown, _)| *shown)
     .map(|(_, text)| text)
     .collect();
     html! { @if !all.is_empty() { p.note { (all.join(" ")) } } }
 }
 
 fn show(x: Option<f64>, decimals: usize) -> String {
-    x.map_or_else(|| "–".to_owned(), |x| apa::number(x, decimals))
+    apa::or_dash(x, |x| apa::number(x, decimals))
 }
 
-fn role(m: &Listed) -> String {
+fn show_p(x: Option<f64>) -> String {
+    apa::or_dash(x, apa::bare_p)
+}
+
+fn role(m: &RealizationSummary) -> String {
     match &m.duplicate_of {
-        Some(of) => format!("repeats {}", apa::name(of)),
+        Some(of) => format!("duplicate of {}", apa::name(of)),
         None => m.role.as_str().to_owned(),
     }
 }
 
-fn realizations(a: &Analysis) -> Table {
+fn realizations(a: &Analysis) -> HtmlTable {
     let v = &a.values;
     let share = a.realistic_from.map(|f| format!("≥ {f}"));
     let mut head = vec![
@@ -154,80 +162,68 @@ fn realizations(a: &Analysis) -> Table {
         "95 % CI",
     ];
     head.extend(share.as_deref());
-    let mut table = Table::new("Ratings by realization", &head);
-    let tests = answers::tests(a);
-    let beside = |m: &Listed| !tests.iter().any(|t| t.id == m.id);
-    let mut listed: Vec<&Listed> = a.realizations.iter().collect();
-    listed.sort_by_key(|m| beside(m));
+    let mut table = HtmlTable::new("Ratings by realization", &head);
+    let mut listed: Vec<&RealizationSummary> = a.realizations.iter().collect();
+    listed.sort_by_key(|m| !m.tested);
     let vaf: Vec<f64> = listed.iter().filter_map(|m| m.vaf).collect();
-    let digits = apa::telling(&vaf);
+    let digits = apa::distinguishing_decimals(&vaf);
     for m in listed {
-        let get = |what: &str| v.number(&format!("desc/{}/{what}", m.id));
-        let ends = get("subject_mean/ci95_lo").zip(get("subject_mean/ci95_hi"));
+        let get = |what: &str| a.described(&m.id, what);
+        let ci = v.interval(&format!("desc/{}/subject_mean/ci95", m.id));
         let mut row = vec![
             apa::name(&m.id),
             role(m),
-            m.vaf
-                .map_or_else(|| "–".to_owned(), |v| apa::share(v, digits)),
+            apa::or_dash(m.vaf, |v| apa::share(v, digits)),
             show(get("n"), 0),
             show(get("mean"), 3),
             show(get("sd"), 3),
             show(get("median"), 1),
-            ends.map_or_else(
-                || "–".to_owned(),
-                |(l, h)| apa::interval(l, h, |x| apa::number(x, 2)),
-            ),
+            apa::interval_or_dash(ci, apa::two),
         ];
         if share.is_some() {
             let s = v.number(&format!("realistic/{}/share", m.id));
-            row.push(s.map_or_else(|| "–".to_owned(), apa::percent));
+            row.push(apa::or_dash(s, apa::percent));
         }
-        table.row(beside(m), row);
+        table.styled_row(!m.tested, row);
     }
     table
 }
 
 fn pairs(a: &Analysis) -> Markup {
     let head = [
-        "pair (a minus b)",
+        "pair (a − b)",
         "difference",
         "dz",
         "t",
         "p (t, Holm)",
         "p (Wilcoxon, Holm)",
     ];
-    let mut table = Table::new("Pairs of realizations", &head);
-    let v = &a.values;
-    let (compared, least) = crate::report::pairs(a);
-    for (first, second) in &compared {
-        let get = |what: &str| v.number(&format!("posthoc/{first}|{second}/{what}"));
-        // thirds that cancel leave the digits that rounding left
+    let mut table = HtmlTable::new("Pairs of realizations", &head);
+    let compared = a.compared_pairs();
+    for (first, second) in &compared.pairs {
+        let get = |what: &str| a.paired(first, second, what);
+        // Cancelling thirds leave a rounding error.
         let shown = |what: &str, decimals: usize| {
             let x = get(what).map(|x| if x.abs() < 1e-9 { 0.0 } else { x });
             show(x, decimals)
         };
-        let p = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), apa::p);
-        table.row(
-            false,
-            vec![
-                format!("{} − {}", apa::name(first), apa::name(second)),
-                shown("mean_diff", 3),
-                shown("dz", 2),
-                shown("t", 2),
-                p(get("p_t_holm")),
-                p(get("p_wilcoxon_exact_holm")),
-            ],
-        );
+        table.row(vec![
+            format!("{} − {}", apa::name(first), apa::name(second)),
+            shown("mean_diff", 3),
+            shown("dz", 2),
+            shown("t", 2),
+            show_p(get("p_t_holm")),
+            show_p(get("p_wilcoxon_exact_holm")),
+        ]);
     }
     html! {
         (table.render())
-        @if !compared.is_empty() {
+        @if !compared.pairs.is_empty() {
             p.note {
-                "Differences of cell means over subjects; dz: mean difference by its standard deviation; \
-                 p of the paired t test and of Wilcoxon’s signed-rank test (exact), with Holm’s \
-                 correction over all pairs."
-                @if let Some(least) = least.filter(|l| *l >= 0.05) {
-                    " " (answers::too_few_for_pairs(compared.len(), least))
+                "Differences of cell means over subjects; p of the paired t test and of Wilcoxon's \
+                 signed-rank test (exact), with Holm's correction over all pairs."
+                @if let Some(p) = compared.smallest_p.filter(|p| !significant(*p)) {
+                    " " (answers::too_few_for_pairs(compared.pairs.len(), p))
                 }
             }
         }
@@ -235,116 +231,109 @@ fn pairs(a: &Analysis) -> Markup {
 }
 
 /// Each tested realization minus each reference, anchor and physical sample.
-fn against_references(a: &Analysis) -> Vec<Table> {
+fn against_references(a: &Analysis) -> Vec<HtmlTable> {
     let v = &a.values;
-    let beside = [Role::HiddenReference, Role::Physical, Role::LowAnchor];
-    let references = a.realizations.iter().filter(|m| beside.contains(&m.role));
-    let one = |r: &Listed| {
+    let roles = [Role::HiddenReference, Role::Physical, Role::LowAnchor];
+    let references = a.realizations.iter().filter(|m| roles.contains(&m.role));
+    let one = |r: &RealizationSummary| {
         let caption = format!(
             "Differences from {} ({})",
             apa::name(&r.id),
             r.role.as_str().replace('-', " ")
         );
         let mut head = vec!["realization", "n", "difference", "95 % CI", "p (t, Holm)"];
-        let contrast =
-            |t: &Listed, what: &str| v.number(&format!("reference/{}/{}/{what}", r.id, t.id));
-        let tests = answers::tests(a);
-        let equivalence = tests.iter().any(|t| contrast(t, "p_tost").is_some());
+        let id = |t: &RealizationSummary| format!("reference/{}/{}", r.id, t.id);
+        let contrast = |t: &RealizationSummary, what: &str| v.number(&format!("{}/{what}", id(t)));
+        let equivalence = a.tested().any(|t| contrast(t, "p_tost").is_some());
         head.extend(equivalence.then_some("p (equivalence)"));
-        let mut table = Table::new(&caption, &head);
-        for t in tests {
+        let mut table = HtmlTable::new(&caption, &head);
+        for t in a.tested() {
             let get = |what: &str| contrast(t, what);
             let Some(difference) = get("mean_diff") else {
                 continue;
             };
-            let p = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), apa::p);
+            let ci = v.interval(&format!("{}/ci95", id(t)));
             let mut row = vec![
                 apa::name(&t.id),
                 show(get("n"), 0),
                 apa::number(difference, 3),
-                ends(get("ci95_lo"), get("ci95_hi")),
-                p(get("p_t_holm")),
+                apa::interval_or_dash(ci, apa::two),
+                show_p(get("p_t_holm")),
             ];
-            row.extend(equivalence.then(|| p(get("p_tost"))));
-            table.row(false, row);
+            row.extend(equivalence.then(|| show_p(get("p_tost"))));
+            table.row(row);
         }
         table
     };
     references.map(one).collect()
 }
 
-/// Each hidden repeat minus its original.
-fn repeats(a: &Analysis) -> Table {
+/// Each hidden duplicate minus its original.
+fn repeats(a: &Analysis) -> HtmlTable {
     let head = [
-        "repeat",
+        "duplicate",
         "of",
         "n",
         "difference",
         "95 % CI",
-        "mean distance",
+        "mean |difference|",
     ];
-    let mut table = Table::new("Hidden repeats minus their originals, over subjects", &head);
+    let mut table = HtmlTable::new(
+        "Hidden duplicates minus their originals, over subjects",
+        &head,
+    );
     for m in &a.realizations {
-        let get = |what: &str| a.values.number(&format!("duplicate/{}/{what}", m.id));
+        let id = format!("duplicate/{}", m.id);
+        let get = |what: &str| a.values.number(&format!("{id}/{what}"));
         let (Some(of), Some(difference)) = (&m.duplicate_of, get("mean_diff")) else {
             continue;
         };
-        table.row(
-            false,
-            vec![
-                apa::name(&m.id),
-                apa::name(of),
-                show(get("n"), 0),
-                apa::number(difference, 3),
-                ends(get("ci95_lo"), get("ci95_hi")),
-                show(get("mean_absolute_diff"), 3),
-            ],
-        );
+        let ci = a.values.interval(&format!("{id}/ci95"));
+        table.row(vec![
+            apa::name(&m.id),
+            apa::name(of),
+            show(get("n"), 0),
+            apa::number(difference, 3),
+            apa::interval_or_dash(ci, apa::two),
+            show(get("mean_absolute_diff"), 3),
+        ]);
     }
     table
 }
 
-/// An interval, or a dash.
-fn ends(low: Option<f64>, high: Option<f64>) -> String {
-    low.zip(high).map_or_else(
-        || "–".to_owned(),
-        |(l, h)| apa::interval(l, h, |x| apa::number(x, 2)),
-    )
-}
-
-fn shares(a: &Analysis) -> Table {
-    let mut table = Table::new("Shares of variance", &["of", "share"]);
-    for (name, share) in answers::shares(a) {
-        table.row(false, vec![name.to_owned(), apa::percent(share)]);
+fn shares(a: &Analysis) -> HtmlTable {
+    let mut table = HtmlTable::new("Variance components", &["component", "share"]);
+    for (name, share) in answers::variance_shares(a) {
+        table.row(vec![name.to_owned(), apa::percent(share)]);
     }
     table
 }
 
-fn agreement(a: &Analysis) -> Table {
-    let mut table = Table::new("Agreement", &["coefficient", "value", "95 % CI"]);
+/// The confidence interval of a coefficient of agreement.
+pub(super) fn icc_interval(a: &Analysis, id: &str) -> Option<(f64, f64)> {
+    let bound = |end: &str| a.values.number(&format!("{id}/{end}"));
+    bound("lo").zip(bound("hi"))
+}
+
+fn agreement(a: &Analysis) -> HtmlTable {
+    let mut table = HtmlTable::new("Agreement", &["coefficient", "value", "95 % CI"]);
     let v = &a.values;
     for (id, what) in [
-        ("icc_subjects/ICC2", "subjects, one: ICC(2,1)"),
-        ("icc_subjects/ICC2k", "subjects, their mean: ICC(2,k)"),
-        ("icc_repetitions/ICC1", "repetitions, one: ICC(1,1)"),
+        ("icc_subjects/ICC2", "between subjects, single: ICC(2,1)"),
+        ("icc_subjects/ICC2k", "between subjects, mean: ICC(2,k)"),
+        ("icc_repetitions/ICC1", "over repetitions, single: ICC(1,1)"),
         (
             "krippendorff_subjects/ordinal",
-            "subjects: Krippendorff’s α, ordinal",
+            "between subjects: Krippendorff's α, ordinal",
         ),
         (
             "krippendorff_repetitions/ordinal",
-            "repetitions: Krippendorff’s α, ordinal",
+            "over repetitions: Krippendorff's α, ordinal",
         ),
     ] {
         let Some(x) = v.number(id) else { continue };
-        let ends = v
-            .number(&format!("{id}/lo"))
-            .zip(v.number(&format!("{id}/hi")));
-        let ends = ends.map_or_else(
-            || "–".to_owned(),
-            |(l, h)| apa::interval(l, h, |x| apa::share(x, 2)),
-        );
-        table.row(false, vec![what.to_owned(), apa::share(x, 3), ends]);
+        let ci = apa::interval_or_dash(icc_interval(a, id), |x| apa::share(x, 2));
+        table.row(vec![what.to_owned(), apa::share(x, 3), ci]);
     }
     for (id, what) in [
         ("desc_all/within_cell_sd", "SD within cells"),
@@ -354,10 +343,7 @@ fn agreement(a: &Analysis) -> Table {
         ),
     ] {
         if let Some(x) = v.number(id) {
-            table.row(
-                false,
-                vec![what.to_owned(), apa::number(x, 3), "–".to_owned()],
-            );
+            table.row(vec![what.to_owned(), apa::number(x, 3), "–".to_owned()]);
         }
     }
     table
@@ -371,35 +357,38 @@ fn whole(x: f64) -> String {
     apa::number(x, 0)
 }
 
-/// A row of the comparison: what, its identifier, how it is printed.
+/// A row of the comparison: name, identifier, format.
 type Row = (&'static str, &'static str, fn(f64) -> String);
 
-/// What is compared with and without the exclusions, beside the means.
+/// The results that are compared with and without the exclusions, besides the means.
 const HEADLINE: [Row; 8] = [
     ("participants", "design/n_subjects", whole),
     ("r of mean rating and VAF", "corr/pearson/r", apa::r),
-    ("its p, exact", "corr/pearson/p_exact_two_sided", apa::p),
+    (
+        "its p, exact",
+        "corr/pearson/p_exact_two_sided",
+        apa::bare_p,
+    ),
     (
         "its p, random permutations",
         "corr/pearson/p_monte_carlo_two_sided",
-        apa::p,
+        apa::bare_p,
     ),
-    ("Spearman’s ρ", "corr/spearman/rho", apa::r),
+    ("Spearman's ρ", "corr/spearman/rho", apa::r),
     ("F of the realizations", "rmanova/F", three),
-    ("its p, Greenhouse–Geisser", "rmanova/p_gg", apa::p),
-    ("p of Friedman’s test", "friedman/p", apa::p),
+    ("its p, Greenhouse–Geisser", "rmanova/p_gg", apa::bare_p),
+    ("p of Friedman's test", "friedman/p", apa::bare_p),
 ];
 
-/// The headline with the exclusions and without them.
-fn with_and_without(a: &Analysis) -> Table {
+/// The main results with and without the exclusions.
+fn with_and_without(a: &Analysis) -> HtmlTable {
     let head = ["statistic", "with the exclusions", "without them"];
-    let mut table = Table::new("The headline with and without the exclusions", &head);
+    let mut table = HtmlTable::new("Main results with and without the exclusions", &head);
     let v = &a.values;
     let mut both = |what: String, id: &str, shown: fn(f64) -> String| {
-        let pair = (v.number(id), v.number(&format!("before_exclusion/{id}")));
-        if let (with, Some(before)) = pair {
-            let with = with.map_or_else(|| "–".to_owned(), shown);
-            table.row(false, vec![what, with, shown(before)]);
+        if let Some(before) = v.number(&format!("before_exclusion/{id}")) {
+            let with = apa::or_dash(v.number(id), shown);
+            table.row(vec![what, with, shown(before)]);
         }
     };
     for (what, id, shown) in HEADLINE {
@@ -414,7 +403,7 @@ fn with_and_without(a: &Analysis) -> Table {
 
 fn subjects(a: &Analysis) -> Markup {
     let mut head = vec![
-        "subject",
+        "participant",
         "n",
         "mean",
         "SD",
@@ -425,11 +414,11 @@ fn subjects(a: &Analysis) -> Markup {
         "r with VAF",
     ];
     let v = &a.values;
-    // What the design has: a reference, an anchor, a repeat.
-    let beside: Vec<(&str, &str)> = [
+    // Columns of designs with a reference, an anchor or a repeat.
+    let extra: Vec<(&str, &str)> = [
         ("hidden_reference_mean", "mean of the references"),
         ("low_anchor_mean", "mean of the anchors"),
-        ("repeat_distance", "distance of the repeats"),
+        ("repeat_distance", "mean |difference| of duplicates"),
     ]
     .into_iter()
     .filter(|(id, _)| {
@@ -439,18 +428,18 @@ fn subjects(a: &Analysis) -> Markup {
         })
     })
     .collect();
-    head.extend(beside.iter().map(|(_, what)| *what));
-    let mut table = Table::new("Subjects: flagged, never dropped", &head);
+    head.extend(extra.iter().map(|(_, what)| *what));
+    let mut table = HtmlTable::new(
+        "Screening of participants (nobody is excluded by it)",
+        &head,
+    );
     let ids = v.iter().map(|(id, _)| id);
     let names = ids.filter_map(|id| id.strip_prefix("subject/")?.strip_suffix("/n"));
-    // Two points always lie on a line.
-    let enough = answers::tests(a).len() > 2;
+    // A correlation of two points is always ±1.
+    let enough = a.tested().count() > 2;
     for s in names {
         let get = |what: &str| v.number(&format!("subject/{s}/{what}"));
-        let r = |x: Option<f64>| {
-            let x = x.filter(|_| enough);
-            x.map_or_else(|| "–".to_owned(), |x| apa::share(x, 2))
-        };
+        let r = |x: Option<f64>| apa::or_dash(x.filter(|_| enough), |x| apa::share(x, 2));
         let mut row = vec![
             apa::name(s),
             show(get("n"), 0),
@@ -462,16 +451,17 @@ fn subjects(a: &Analysis) -> Markup {
             r(get("leave_one_out_r")),
             r(v.number(&format!("subject_corr/{s}/r"))),
         ];
-        row.extend(beside.iter().map(|(id, _)| show(get(id), 2)));
-        table.row(false, row);
+        row.extend(extra.iter().map(|(id, _)| show(get(id), 2)));
+        table.row(row);
     }
     html! {
         (table.render())
         @if !table.rows.is_empty() {
             p.note {
-                "Over all ratings of a subject. Distinct: how many different ratings were given; longest \
-                 run: trials in a row with the same one; SD within cells: of the repetitions; r with the \
-                 others: of the subject’s means with those of all other subjects, over realizations."
+                "Over all ratings of a participant. Distinct: number of different ratings; longest run: \
+                 number of consecutive trials with the same rating; SD within cells: of the repetitions; \
+                 r with the others: correlation of the participant's means with those of all others, over \
+                 realizations."
             }
         }
     }

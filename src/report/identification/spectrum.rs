@@ -1,21 +1,21 @@
 //! Amplitude spectra between 0 and 10 Hz.
 //!
-//! A discrete Fourier transform at those few frequencies, by its definition: a fast
-//! one would compute thousands that nobody looks at, and would need samples at equal
-//! steps. Signals are first averaged over blocks of 1/200 s, which lowers 10 Hz by
-//! 0.4 %, and their mean is taken off; a Hann window keeps a line from spreading. An
-//! amplitude is that of a sine: sin(2π f t) with 1 N gives 1 N at f.
+//! A discrete Fourier transform at the few frequencies of interest, by definition: an
+//! FFT would need equidistant samples and compute thousands of other frequencies.
+//! Signals are averaged over blocks of 1/200 s, which lowers the amplitude at 10 Hz by
+//! 0.4 %; then their mean is subtracted and a Hann window applied. The amplitude is
+//! that of a sine: sin(2π f t) N gives 1 N at f.
 
 /// The highest frequency, Hz.
 pub(super) const TOP_HZ: f64 = 10.0;
-/// Length of the blocks, s.
-/// A little less, so that rounding of time does not move samples between blocks.
+/// Length of the blocks, s; slightly below 1/200, so that rounding of time does not
+/// move samples between blocks.
 const BLOCK_S: f64 = (1.0 - 1e-6) / 200.0;
-/// More frequencies than this are no better to look at.
+/// Largest number of frequencies.
 const MOST: usize = 1000;
 
-/// Frequency in Hz and the amplitudes of each signal, in the signals' unit.
-/// `t_s` ascends.
+/// Frequencies in Hz and the amplitudes of each signal, in the signal's unit. `t_s`
+/// must ascend.
 pub(super) fn amplitudes<const N: usize>(
     t_s: &[f64],
     signals: [&[f64]; N],
@@ -30,13 +30,13 @@ pub(super) fn amplitudes<const N: usize>(
     }
     let window = |t: f64| 0.5 - 0.5 * (std::f64::consts::TAU * (t - start) / span).cos();
     let weight: f64 = blocks.iter().map(|(t, _)| window(*t)).sum();
-    // weighted as the signal is, so that nothing is left at 0 Hz
+    // Weighted by the window, so that the amplitude at 0 Hz is 0.
     let means: [f64; N] = std::array::from_fn(|k| {
         let weighted = blocks.iter().map(|(t, y)| window(*t) * y[k]);
         weighted.sum::<f64>() / weight
     });
     let gain = 0.5 * weight;
-    // half as far apart as the recording can tell, so that no peak falls between
+    // Half the frequency resolution, so that no peak is missed.
     let step = (0.5 / span).max(TOP_HZ / MOST as f64);
     let count = (TOP_HZ / step) as usize;
     (0..=count)
@@ -63,7 +63,7 @@ fn blocks<const N: usize>(t_s: &[f64], signals: [&[f64]; N]) -> Vec<(f64, [f64; 
     let mut from = 0;
     while from < t_s.len() {
         let to = from + t_s[from..].partition_point(|t| t - t_s[from] < BLOCK_S);
-        // time ascends, so a block has its first sample at least
+        // A block contains at least its first sample.
         let to = to.max(from + 1);
         let mean = |y: &[f64]| y[from..to].iter().sum::<f64>() / (to - from) as f64;
         blocks.push((mean(t_s), std::array::from_fn(|k| mean(signals[k]))));

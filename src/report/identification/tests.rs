@@ -27,11 +27,11 @@ fn realization(scale: f64) -> Realization {
     }
 }
 
-fn grid() -> Vec<Place> {
+fn grid() -> Vec<GridCell> {
     let mut places = Vec::new();
     for lambda in [0.999, 0.9995] {
         for (dx_mm, vaf) in [(0.5, 0.95), (1.0, 0.9), (4.0, -11.0)] {
-            places.push(Place {
+            places.push(GridCell {
                 lambda,
                 memory_mm: Some(1.5),
                 dx_mm,
@@ -94,7 +94,7 @@ fn force_over_time_shows_some_seconds_and_its_prediction() {
     let last = drawing.csv.lines().last().unwrap();
     let t: f64 = last.split(',').next().unwrap().parse().unwrap();
     assert!((3.9..=4.0).contains(&t), "{last}");
-    assert!(drawing.csv.lines().count() <= MOST_POINTS + 1);
+    assert!(drawing.csv.lines().count() <= MAX_POINTS + 1);
     let spectra = spectra(&realization(1.0), &recording);
     assert!(spectra.csv.lines().count() > 100);
 }

@@ -1,22 +1,22 @@
-//! An axis: its ends, its ticks and their labels.
+//! Axes, ticks and tick labels.
 
 use crate::report::plot::step;
 
-/// Which ticks an axis has.
+/// The ticks of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ticks {
-    /// At round numbers, as many as there is room for.
+    /// At round numbers, as many as fit.
     Round,
-    /// At these places with these labels. Untrusted.
+    /// At these values with these labels. Untrusted.
     At(Vec<(f64, String)>),
-    /// None.
+    /// No ticks.
     Bare,
 }
 
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What it shows, with its unit; empty for none. Untrusted.
+    /// Quantity and unit; empty for none. Untrusted.
     pub label: String,
     /// Value at the left or lower end.
     pub low: f64,
@@ -24,14 +24,14 @@ pub struct Axis {
     pub high: f64,
     /// Ticks.
     pub ticks: Ticks,
-    /// Whether faint lines go from the ticks through the panel.
+    /// Whether grid lines are drawn at the ticks.
     pub grid: bool,
 }
 
 impl Axis {
-    /// From `low` to `high` with round ticks and grid lines. Ends that are not
-    /// finite, or not apart, are replaced so that there is something to draw on;
-    /// `low` above `high` makes an axis that runs backwards.
+    /// From `low` to `high` with round ticks and grid lines. Ends that are equal or
+    /// not finite are replaced by a range that can be drawn; with `low` above `high`
+    /// the axis is reversed.
     pub fn new(label: &str, low: f64, high: f64) -> Self {
         let (low, high) = if (high - low).is_finite() && high != low {
             (low, high)
@@ -50,7 +50,7 @@ impl Axis {
         }
     }
 
-    /// One that holds all finite values, with a tenth of room at both ends.
+    /// An axis that includes all finite values, with a margin of a tenth of the range.
     pub fn around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let mut low = f64::INFINITY;
         let mut high = f64::NEG_INFINITY;
@@ -66,7 +66,7 @@ impl Axis {
         }
     }
 
-    /// Categories at 0, 1, 2 …, half a step of room at both ends, no grid.
+    /// Categories at 0, 1, 2 …, without grid lines.
     pub fn of_names<S: AsRef<str>>(label: &str, names: &[S]) -> Self {
         let at = names.iter().enumerate();
         Self {
@@ -76,29 +76,29 @@ impl Axis {
         }
     }
 
-    /// The same with ticks at these places.
+    /// Sets the ticks.
     #[must_use]
     pub fn at(mut self, ticks: Vec<(f64, String)>) -> Self {
         self.ticks = Ticks::At(ticks);
         self
     }
 
-    /// The same without ticks.
+    /// Removes the ticks.
     #[must_use]
     pub fn bare(mut self) -> Self {
         self.ticks = Ticks::Bare;
         self
     }
 
-    /// The same without grid lines.
+    /// Removes the grid lines.
     #[must_use]
     pub fn without_grid(mut self) -> Self {
         self.grid = false;
         self
     }
 
-    /// Where a value lies, 0 at the low end and 1 at the high one. Far outside
-    /// it stays near, so that no coordinate overflows.
+    /// Position of a value, 0 at the low end and 1 at the high end, limited to ±50 so
+    /// that no coordinate overflows.
     pub(super) fn share(&self, value: f64) -> Option<f64> {
         let share = (value - self.low) / (self.high - self.low);
         let share = if value.is_finite() && share.is_infinite() {
@@ -109,7 +109,7 @@ impl Axis {
         (!share.is_nan()).then(|| share.clamp(-50.0, 50.0))
     }
 
-    /// Places and labels, at most about `most`.
+    /// Values and labels of the ticks, at most about `most`.
     pub(super) fn marks(&self, most: usize) -> Vec<(f64, String)> {
         match &self.ticks {
             Ticks::Bare => Vec::new(),
@@ -126,7 +126,7 @@ impl Axis {
         for i in 0..=most {
             let k = first + i as f64;
             let at = k * step;
-            // Far out, a double's next neighbour is further than a step.
+            // For large values adjacent doubles are further apart than a step.
             if at > high + 1e-9 * step || k + 1.0 <= k || !at.is_finite() {
                 break;
             }
@@ -136,7 +136,7 @@ impl Axis {
     }
 }
 
-/// A tick's number with as many decimals as its step needs.
+/// The label of a tick, with as many decimals as the step needs.
 fn label(at: f64, step: f64) -> String {
     let size = at.abs().max(step);
     let shown = if !(1e-4..1e7).contains(&size) {

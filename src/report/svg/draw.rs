@@ -1,4 +1,4 @@
-//! A panel: axes, marks, notes, legend.
+//! Drawing of a panel: axes, marks, notes, legend.
 
 use super::frame::{Frame, MAX_LABEL, SAMPLE, TITLE_BASE};
 use super::look::{Colour, Fill, Look, Shape, ramp};
@@ -11,15 +11,15 @@ use std::collections::BTreeSet;
 /// Half the width of an error bar's cap, px.
 const CAP: f64 = 4.0;
 
-/// A note that stands further above or below its place than this has a line to it, px.
+/// A note with a larger vertical offset has a leader line, px.
 const LEADER: f64 = 10.0;
 
-/// Characters of a note that are shown.
+/// Largest width of a note, in columns.
 const MAX_NOTE: usize = 80;
 
 pub(super) fn panel(out: &mut Out, panel: &Panel, frame: &Frame) {
     grid(out, panel, frame);
-    // A clip costs whoever draws the picture a layer of its own.
+    // Clipping is slow to render.
     if panel.series.iter().all(|s| fits(panel, &s.mark)) {
         out.line("<g>");
     } else {
@@ -188,7 +188,7 @@ fn mark(out: &mut Out, panel: &Panel, f: &Frame, mark: &Mark, look: Look) {
         Mark::Heat { cells, low, high } => {
             for (span, value) in cells.iter().filter(|(_, v)| v.is_finite()) {
                 let colour = ramp(share(*value, *low, *high)).hex();
-                // An edge of its own colour closes the seams between cells.
+                // An outline of the same colour hides the seams between cells.
                 let edge = format!(" stroke=\"{colour}\" stroke-width=\"0.5\"");
                 boxed(out, panel, f, span, &colour, &edge);
             }
@@ -196,13 +196,13 @@ fn mark(out: &mut Out, panel: &Panel, f: &Frame, mark: &Mark, look: Look) {
     }
 }
 
-/// Where a value lies between two others; in the middle of equal ones.
-pub(super) fn share(value: f64, low: f64, high: f64) -> f64 {
+/// Position of a value between two others; 0.5 if these are equal.
+pub(in crate::report) fn share(value: f64, low: f64, high: f64) -> f64 {
     let share = (value - low) / (high - low);
     if share.is_finite() { share } else { 0.5 }
 }
 
-/// Of stroke and fill, not of the whole element, which would cost a layer.
+/// Opacity of stroke and fill, which renders faster than that of the element.
 fn opacity(look: Look) -> String {
     if look.opacity < 1.0 {
         let share = px(look.opacity);
@@ -234,11 +234,11 @@ fn line(out: &mut Out, places: &[(f64, f64)], look: Look) {
 }
 
 fn dots(out: &mut Out, places: &[(f64, f64)], look: Look) {
-    // Of dots that nobody could tell apart, the first.
+    // Only the first of dots within a quarter of a pixel.
     let quarter = |v: f64| (v * 4.0).round() as i64;
     let mut taken = BTreeSet::new();
     let places = (places.iter()).filter(|(x, y)| taken.insert((quarter(*x), quarter(*y))));
-    // A line of no length with round ends is a dot, in a seventh of the bytes.
+    // A line of length 0 with round ends is a dot in a seventh of the bytes.
     let all: Vec<String> = places
         .map(|(x, y)| format!("M{} {}h0", px(*x), px(*y)))
         .collect();
@@ -305,7 +305,7 @@ fn whisker(out: &mut Out, a: (f64, f64), b: (f64, f64), cap: (f64, f64), look: L
     }
 }
 
-/// The value of `fill`; defines the hatching if there is any.
+/// The value of the `fill` attribute; defines the hatching if there is any.
 fn fill(out: &mut Out, look: Look) -> String {
     let colour = look.colour.hex();
     let d = match look.fill {
@@ -350,7 +350,7 @@ fn note(out: &mut Out, panel: &Panel, f: &Frame, n: &Note) {
     };
     let at = (x + n.by.0, y + n.by.1 + 4.0);
     if n.by.1.abs() > LEADER {
-        // From the middle of the letters' height to the edge of what it names.
+        // From the middle of the text to the edge of the marker.
         let (dx, dy) = (n.by.0, n.by.1);
         let length = dx.hypot(dy);
         let edge = (x + dx * 6.0 / length, y + dy * 6.0 / length);
@@ -360,7 +360,7 @@ fn note(out: &mut Out, panel: &Panel, f: &Frame, n: &Note) {
     out.text(at, &text, SMALL, (n.anchor, n.colour), how);
 }
 
-/// What stands before a name in the legend.
+/// The sample of a legend entry.
 fn sample(out: &mut Out, mark: &Mark, look: Look, at: (f64, f64)) {
     let (left, middle, right) = (at.0, at.0 + 10.0, at.0 + 20.0);
     match mark {
@@ -402,7 +402,7 @@ fn colour_bar(out: &mut Out, bar: &ColourBar, f: &Frame) {
             "<rect x=\"{}\" y=\"{}\" width=\"12\" height=\"{}\" fill=\"{colour}\"/>",
             px(left),
             px(y),
-            // Half a pixel of overlap closes the seams.
+            // An overlap of half a pixel hides the seams.
             px(height / STEPS as f64 + 0.5)
         ));
     }

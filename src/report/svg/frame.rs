@@ -1,27 +1,25 @@
-//! Where panels, their margins and their legends lie.
+//! Layout of panels, margins and legends.
 
 use super::axis::{Axis, Ticks};
 use super::{Figure, NORMAL, Panel, SMALL, fitted, text_width};
 
-/// Least distance of two tick labels, px.
+/// Smallest gap between two tick labels, px.
 const APART: f64 = 8.0;
 
-/// Width of a slanted label, px.
+/// Largest width of a slanted label, px.
 const MAX_SLANTED: f64 = 140.0;
 
 /// An angle: degrees, cosine, sine.
 type Angle = (u8, f64, f64);
 
-/// Angles at which labels are set: the flatter one
-/// where there is room for it.
+/// Angles of slanted labels; the flatter one is used if it fits.
 const FLAT: Angle = (35, 0.819, 0.574);
 const STEEP: Angle = (60, 0.5, 0.866);
 
-/// Least distance of the base lines of slanted labels, px.
+/// Smallest distance of the base lines of slanted labels, px.
 const LINE: f64 = 12.0;
 
-/// The angle of so many labels on an axis of x of `room` px;
-/// `None` if they have room side by side.
+/// The angle of the labels of an x axis of `room` px; `None` if they fit horizontally.
 fn slant(widest: f64, labels: usize, room: f64) -> Option<Angle> {
     if (widest + APART) * labels as f64 <= room {
         None
@@ -32,8 +30,7 @@ fn slant(widest: f64, labels: usize, room: f64) -> Option<Angle> {
     }
 }
 
-/// How much higher a figure has to be whose names of x stand at a slant, px, when its
-/// axis is about `room` px wide.
+/// Additional height for slanted labels of an x axis about `room` px wide, px.
 pub(in crate::report) fn for_names(names: &[String], room: f64) -> f64 {
     let widths = names
         .iter()
@@ -42,29 +39,29 @@ pub(in crate::report) fn for_names(names: &[String], room: f64) -> f64 {
     slant(widest, names.len(), room).map_or(0.0, |(_, _, sine)| sine * widest.min(MAX_SLANTED))
 }
 
-/// Characters of a tick label that are shown.
+/// Largest width of a tick label, in columns.
 pub(super) const MAX_LABEL: usize = 24;
 
-/// Where the parts of a panel lie, px.
+/// Positions of the parts of a panel, px.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Frame {
-    /// Of the axes: left, top, right, bottom.
+    /// Edges of the axes.
     pub(super) left: f64,
     pub(super) top: f64,
     pub(super) right: f64,
     pub(super) bottom: f64,
-    /// Left end of the whole panel.
+    /// Left edge of the panel.
     pub(super) outer_left: f64,
-    /// Upper end of the whole panel.
+    /// Upper edge of the panel.
     pub(super) outer_top: f64,
-    /// Lower end of the whole panel.
+    /// Lower edge of the panel.
     pub(super) outer_bottom: f64,
-    /// Ticks of x and y: place, label.
+    /// Ticks of x and y: value, label.
     pub(super) x_ticks: Vec<(f64, String)>,
     pub(super) y_ticks: Vec<(f64, String)>,
-    /// Degrees by which the labels of x are set at a slant.
+    /// Slant of the labels of x, degrees.
     pub(super) slant: u8,
-    /// Legend: series, place of its sample.
+    /// Legend: index of the series, position of its sample.
     pub(super) legend: Vec<(usize, (f64, f64))>,
 }
 
@@ -78,12 +75,12 @@ impl Frame {
     }
 }
 
-/// Width of the sample before a legend entry and of the gap behind it, px.
+/// Width of the sample of a legend entry with the following gap, px.
 pub(super) const SAMPLE: f64 = 26.0;
 const LEGEND_LINE: f64 = 18.0;
 
-/// The frames of all panels; left margins are equal, and lower ones within a row,
-/// so that axes stand above and beside each other.
+/// The frames of all panels. All have the same left margin, and those of a row the same
+/// lower margin, so that axes are aligned.
 pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
     let columns = figure.columns.max(1);
     let cell_width = figure.width / columns as f64;
@@ -91,7 +88,7 @@ pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
     let share = |row: &[Panel]| row.iter().map(|p| p.share).fold(0.1, f64::max);
     let whole: f64 = rows.iter().map(|r| share(r)).sum();
     let margin = figure.panels.iter().map(left_margin).fold(0.0, f64::max);
-    // Panels that are compared side by side are equally high.
+    // Panels in a grid have equal heights.
     let labelled = |row: &[Panel]| row.iter().any(|p| !p.x.label.is_empty());
     let anywhere = columns > 1 && labelled(&figure.panels);
     let mut frames = Vec::new();
@@ -114,7 +111,7 @@ pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
 
 fn left_margin(panel: &Panel) -> f64 {
     let label = if panel.y.label.is_empty() { 6.0 } else { 24.0 };
-    // How many there will be is not known yet: the widest of few and of many.
+    // The number of ticks is not known yet, so take the widest label of several choices.
     let widest = [2, 4, 6, 8, 10]
         .into_iter()
         .flat_map(|most| panel.y.marks(most))
@@ -143,7 +140,7 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool
                 .iter()
                 .map(|(_, l)| text_width(l, SMALL))
                 .fold(0.0, f64::max);
-            // and the height of the letters
+            // Plus the height of the letters.
             widest * sine + 18.0
         }
     };
@@ -167,9 +164,9 @@ fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool
     }
 }
 
-/// As many ticks as have room beside each other; names that have none are set
-/// at a slant, and if even that is too tight every n-th is shown. A slanted one
-/// reaches to the left, `margin` px beyond the axis at most.
+/// As many ticks as fit. Names that do not fit are slanted, and if they still do not fit
+/// only every n-th is shown. A slanted label extends at most `margin` px to the left
+/// of the axis.
 fn x_ticks(axis: &Axis, room: f64, margin: f64) -> (Vec<(f64, String)>, Option<Angle>) {
     let widest = |ticks: &[(f64, String)]| {
         let all = ticks.iter().map(|(_, l)| text_width(l, SMALL));
@@ -220,5 +217,5 @@ fn legend(panel: &Panel, left: f64, right: f64, top: &mut f64) -> Vec<(usize, (f
     entries
 }
 
-/// Base line of a panel's title below its upper end, px.
+/// Distance of the base line of a panel's title from the upper edge, px.
 pub(super) const TITLE_BASE: f64 = NORMAL + 4.0;

@@ -5,21 +5,21 @@
 pub struct Colour(pub u8, pub u8, pub u8);
 
 impl Colour {
-    /// Text and axes.
+    /// Colour of text and axes.
     pub const INK: Self = Self(0x1a, 0x1a, 0x1a);
-    /// Lesser text.
+    /// Colour of secondary text.
     pub const GREY: Self = Self(0x59, 0x59, 0x59);
-    /// Grid lines.
+    /// Colour of grid lines.
     pub const FAINT: Self = Self(0xdd, 0xdd, 0xdd);
-    /// Paper.
+    /// Background.
     pub const WHITE: Self = Self(0xff, 0xff, 0xff);
 
-    /// `#rrggbb`.
+    /// The colour as `#rrggbb`.
     pub fn hex(self) -> String {
         format!("#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
     }
 
-    /// Relative luminance of WCAG 2, from 0 (black) to 1 (white).
+    /// Relative luminance (WCAG 2), from 0 (black) to 1 (white).
     pub fn luminance(self) -> f64 {
         let linear = |c: u8| {
             let c = f64::from(c) / 255.0;
@@ -32,7 +32,7 @@ impl Colour {
         0.2126 * linear(self.0) + 0.7152 * linear(self.1) + 0.0722 * linear(self.2)
     }
 
-    /// Black or white, whichever is read better on this: at least 4.5 to 1.
+    /// Black or white, whichever has the higher contrast on this colour: at least 4.5 to 1.
     pub fn text_on(self) -> Self {
         if self.luminance() > 0.18 {
             Self(0, 0, 0)
@@ -42,8 +42,8 @@ impl Colour {
     }
 }
 
-/// Eight colours after Okabe & Ito (2008), darkened where white paper swallows
-/// them, in an order in which neighbours also differ in lightness.
+/// Eight colours after Okabe & Ito (2008), darkened for white paper, ordered so that
+/// neighbours also differ in lightness.
 pub const PALETTE: [Colour; 8] = [
     Colour(0x00, 0x4a, 0x8f),
     Colour(0xd5, 0x5e, 0x00),
@@ -122,47 +122,47 @@ impl Dash {
     }
 }
 
-/// How boxes are filled.
+/// Fills of boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fill {
-    /// With the colour.
+    /// Solid.
     Solid,
-    /// With lines that rise.
+    /// Hatched, rising lines.
     Rising,
-    /// With lines that fall.
+    /// Hatched, falling lines.
     Falling,
-    /// With both.
+    /// Cross-hatched.
     Crossed,
 }
 
 const FILLS: [Fill; 4] = [Fill::Solid, Fill::Rising, Fill::Falling, Fill::Crossed];
 
-/// How marks look.
+/// Appearance of marks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// Of lines and filled marks.
+    /// Colour of lines and fills.
     pub colour: Colour,
-    /// Of points.
+    /// Shape of points.
     pub shape: Shape,
-    /// Of lines.
+    /// Dash of lines.
     pub dash: Dash,
-    /// Of boxes.
+    /// Fill of boxes.
     pub fill: Fill,
     /// Width of lines, px.
     pub stroke: f64,
     /// Diameter of points, px.
     pub size: f64,
-    /// From 0 to 1.
+    /// Opacity, from 0 to 1.
     pub opacity: f64,
 }
 
 impl Look {
-    /// The n-th of several series: colour, shape, dash and hatching all differ
-    /// from the neighbours'. They start again after some.
+    /// The appearance of the n-th series: adjacent series differ in colour, shape, dash
+    /// and hatching.
     pub fn nth(n: usize) -> Self {
         Self {
             colour: PALETTE[n % PALETTE.len()],
-            // after a round of colours each comes with the next shape
+            // When the colours repeat, each gets the next shape.
             shape: SHAPES[(n + n / PALETTE.len()) % SHAPES.len()],
             dash: DASHES[n % DASHES.len()],
             fill: FILLS[n % FILLS.len()],
@@ -172,7 +172,7 @@ impl Look {
         }
     }
 
-    /// Solid, in one colour.
+    /// Solid lines and discs in one colour.
     pub fn plain(colour: Colour) -> Self {
         Self {
             colour,
@@ -183,21 +183,21 @@ impl Look {
         }
     }
 
-    /// The same with another stroke, px.
+    /// Sets the width of lines, px.
     #[must_use]
     pub fn stroke(mut self, px: f64) -> Self {
         self.stroke = px;
         self
     }
 
-    /// The same with another size of points, px.
+    /// Sets the diameter of points, px.
     #[must_use]
     pub fn size(mut self, px: f64) -> Self {
         self.size = px;
         self
     }
 
-    /// The same with another dash.
+    /// Sets the dash.
     #[must_use]
     pub fn dashed(mut self, dash: Dash) -> Self {
         self.dash = dash;
@@ -205,7 +205,7 @@ impl Look {
     }
 }
 
-/// Stops of the ramp, from light to dark; the lightness falls evenly.
+/// Stops of the colour ramp, with evenly decreasing lightness.
 const STOPS: [Colour; 5] = [
     Colour(0xf4, 0xf7, 0xfb),
     Colour(0xb9, 0xd3, 0xe8),
@@ -214,8 +214,8 @@ const STOPS: [Colour; 5] = [
     Colour(0x08, 0x30, 0x6b),
 ];
 
-/// Colour of a value on a scale from 0 (light) to 1 (dark): one hue, so that
-/// everybody and every printer sees the same order.
+/// The colour of a value from 0 (light) to 1 (dark). It has a single hue, so that the
+/// order is visible in greyscale too.
 pub fn ramp(share: f64) -> Colour {
     let at = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
     // Between 0 and 3, so the cast is exact.

@@ -1,10 +1,10 @@
-//! SVG elements, one line each.
+//! Writing of SVG elements, one per line.
 
 use super::look::Colour;
 use super::{Anchor, FONT_FAMILY};
 use study_base::text::Untrusted;
 
-/// A document that is being written.
+/// An SVG document under construction.
 #[derive(Debug)]
 pub(super) struct Out {
     id: String,
@@ -12,7 +12,7 @@ pub(super) struct Out {
     text: String,
 }
 
-/// Text that may stand in an element or a quoted attribute.
+/// Escapes a text for an element or a quoted attribute.
 pub(super) fn escape(text: &str) -> String {
     let shown = Untrusted(text).to_string();
     let mut safe = String::with_capacity(shown.len() + 16);
@@ -31,7 +31,7 @@ pub(super) fn escape(text: &str) -> String {
     safe
 }
 
-/// A length with at most two decimals.
+/// A length in px with at most two decimals.
 pub(super) fn px(x: f64) -> String {
     let shown = format!("{x:.2}");
     let shown = shown.trim_end_matches('0').trim_end_matches('.');
@@ -43,8 +43,8 @@ pub(super) fn px(x: f64) -> String {
 }
 
 impl Out {
-    /// An empty document whose ids begin with this; what is no letter, digit or
-    /// `-` is left out of it.
+    /// An empty document. `id` is the prefix of all ids; characters other than letters,
+    /// digits and `-` are removed.
     pub(super) fn new(id: &str) -> Self {
         let id = id
             .chars()
@@ -56,7 +56,7 @@ impl Out {
         }
     }
 
-    /// The root element with its title.
+    /// Writes the root element, title and background.
     pub(super) fn open(&mut self, title: &str, width: f64, height: f64) {
         let (w, h) = (px(width), px(height));
         let id = format!("{}-title", self.id);
@@ -78,19 +78,19 @@ impl Out {
         self.text
     }
 
-    /// One line, already safe.
+    /// Adds a line, which must be escaped.
     pub(super) fn line(&mut self, line: &str) {
         self.text.push_str(line);
         self.text.push('\n');
     }
 
-    /// An id that no other element has.
+    /// A new unique id.
     pub(super) fn fresh_id(&mut self) -> String {
         self.ids += 1;
         format!("{}-{}", self.id, self.ids)
     }
 
-    /// A straight line.
+    /// Adds a straight line.
     pub(super) fn segment(&mut self, a: (f64, f64), b: (f64, f64), colour: Colour, width: f64) {
         self.line(&format!(
             "<line x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\" stroke=\"{}\" stroke-width=\"{}\"/>",
@@ -103,7 +103,7 @@ impl Out {
         ));
     }
 
-    /// A text on a base line; `turned` reads upwards.
+    /// Adds a text on a base line.
     pub(super) fn text(
         &mut self,
         at: (f64, f64),
@@ -123,7 +123,7 @@ impl Out {
             Setting::Bold => " font-weight=\"bold\"".to_owned(),
             Setting::Turned => format!(" transform=\"rotate(-90 {x} {y})\""),
             Setting::Slanted(by) => format!(" transform=\"rotate(-{by} {x} {y})\""),
-            // A white rim keeps it readable over lines.
+            // A white outline keeps it readable over lines.
             Setting::Rimmed => {
                 " stroke=\"#ffffff\" stroke-width=\"3\" paint-order=\"stroke\"".to_owned()
             }
@@ -137,13 +137,14 @@ impl Out {
     }
 }
 
-/// How a text is set.
+/// Typesetting of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Setting {
     Plain,
     Bold,
+    /// Rotated to read upwards.
     Turned,
-    /// By so many degrees, upwards.
+    /// Rotated upwards, degrees.
     Slanted(u8),
     Rimmed,
 }

@@ -1,10 +1,11 @@
 //! Columns, wrapping and colour of the terminal page, by display width.
 
 use std::collections::BTreeSet;
+use study_base::text::{cut_end, cut_middle};
 use unicode_segmentation::UnicodeSegmentation as _;
 use unicode_width::UnicodeWidthStr as _;
 
-/// Styles, or none.
+/// Terminal styles, if enabled.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Paint(pub(super) bool);
 
@@ -21,7 +22,7 @@ impl Paint {
         self.style("33", text)
     }
 
-    /// Line by line, so that no style runs over a line's end.
+    /// Styles each line separately, so that no style runs over the end of a line.
     fn style(self, code: &str, text: &str) -> String {
         if !self.0 {
             return text.to_owned();
@@ -38,66 +39,13 @@ impl Paint {
     }
 }
 
-/// A number with so many decimals; a very large one in exponents.
-pub(super) fn number(x: f64, decimals: usize) -> String {
-    if x.abs() >= 1e12 {
-        format!("{x:.3e}")
-    } else {
-        // The addition turns a rounded −0 into 0.
-        let shown = format!("{x:.decimals$}");
-        match shown.strip_prefix('-') {
-            Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
-            _ => shown.replace('-', "−"),
-        }
-    }
-}
-
-/// Text of at most so many columns, with `…` where it was cut.
-pub(super) fn cut(text: &str, width: usize) -> String {
-    if text.width() <= width {
-        return text.to_owned();
-    }
-    let mut out = String::new();
-    let mut used = 1;
-    for g in text.graphemes(true) {
-        used += g.width();
-        if used > width {
-            break;
-        }
-        out.push_str(g);
-    }
-    out.push('…');
-    out
-}
-
-/// A name of at most so many columns, with `…` after its first third where it was
-/// cut: names of realizations often begin alike.
-pub(super) fn squeezed(name: &str, width: usize) -> String {
-    if name.width() <= width {
-        return name.to_owned();
-    }
-    let room = width.saturating_sub(1);
-    let within = |parts: &mut dyn Iterator<Item = &str>, most: usize| -> Vec<String> {
-        let mut used = 0;
-        let fits = |g: &&str| {
-            used += g.width();
-            used <= most
-        };
-        parts.take_while(fits).map(str::to_owned).collect()
-    };
-    let first = within(&mut name.graphemes(true), room / 3);
-    let mut last = within(&mut name.graphemes(true).rev(), room - room / 3);
-    last.reverse();
-    format!("{}…{}", first.concat(), last.concat())
-}
-
-/// Text filled up to so many columns.
+/// Text padded with spaces to some columns.
 pub(super) fn pad(text: &str, width: usize) -> String {
     format!("{text}{}", " ".repeat(width.saturating_sub(text.width())))
 }
 
-/// Lines of at most so many columns, broken between words (or, in a word that is
-/// longer than a line, anywhere), each with a line feed.
+/// Wraps text between words, and inside words longer than a line; each line ends with a
+/// line feed.
 pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String {
     let mut out = String::new();
     let mut line = first.to_owned();
@@ -107,7 +55,7 @@ pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String 
         out.push('\n');
         rest.clone_into(line);
     };
-    for word in glued(text) {
+    for word in unbreakable(text) {
         let word = word.as_str();
         let space = usize::from(!empty);
         if !empty && line.width() + space + word.width() > width {
@@ -129,14 +77,13 @@ pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String 
     out
 }
 
-/// The words of a text. What stands around an equals or a less-than sign stays
-/// together, a number with its per cent, and the degrees of freedom of an F: `p = .023`
-/// and `F(2, 5) = 8.10` are one word each.
-fn glued(text: &str) -> Vec<String> {
+/// The pieces of a text between which a line may break: words, but `p = .023`, `95 %`
+/// and `F(2, 5) = 8.10` are one piece each.
+fn unbreakable(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut open = false;
     for word in text.split(' ').filter(|w| !w.is_empty()) {
-        let sign = matches!(word, "=" | "<");
+        let sign = matches!(word, "=" | "<" | ">");
         let unit = word.starts_with('%');
         match words.last_mut().filter(|_| sign || unit || open) {
             Some(last) => {
@@ -150,17 +97,17 @@ fn glued(text: &str) -> Vec<String> {
     words
 }
 
-/// A table that gives way when the page is narrow: first the names, as long as they
-/// differ, then whole columns, last the ends of the lines.
+/// A table that adapts to the width of the page: it shortens names as long as they stay
+/// distinct, then drops columns, then cuts the ends of lines.
 pub(super) struct Grid {
     rows: Vec<Vec<String>>,
-    /// A column that is set to the left, like the first and the last.
+    /// A left-aligned column besides the first and the last.
     left: Option<usize>,
-    /// Columns that are left out, one after the other.
+    /// Columns to drop, in this order.
     dropped: Vec<usize>,
 }
 
-/// Narrowest first column.
+/// Smallest width of the first column.
 const MIN_NAME: usize = 8;
 
 impl Grid {
@@ -172,10 +119,10 @@ impl Grid {
         }
     }
 
-    /// The narrowest first column in which the names differ that do so in full.
+    /// The smallest width of the first column at which different names look different.
     fn narrowest(&self, widest: usize) -> usize {
         let differ = |width: usize| {
-            let shown = self.rows.iter().map(|r| squeezed(&r[0], width));
+            let shown = self.rows.iter().map(|r| cut_middle(&r[0], width));
             shown.collect::<BTreeSet<_>>().len()
         };
         let all = differ(widest);
@@ -188,10 +135,10 @@ impl Grid {
         self.rows.push(row);
     }
 
-    /// The table; a blank line after the `apart`-th row, if others follow.
-    pub(super) fn render(&self, width: usize, apart: usize, paint: Paint) -> String {
+    /// The table, with a blank line after the first `tests` rows if others follow.
+    pub(super) fn render(&self, width: usize, tests: usize, paint: Paint) -> String {
         let columns = self.rows[0].len();
-        // Of the last heading the words give way, not the numbers under it.
+        // The last heading may be cut, the numbers below it may not.
         let column = |j: usize| {
             let skip = usize::from(j + 1 == columns && self.rows.len() > 1);
             let cells = self.rows[skip..].iter();
@@ -216,9 +163,9 @@ impl Grid {
             for &j in &shown {
                 let w = widths[j];
                 let cell = if j == 0 {
-                    squeezed(&row[j], w)
+                    cut_middle(&row[j], w)
                 } else {
-                    cut(&row[j], w)
+                    cut_end(&row[j], w)
                 };
                 if j > 0 {
                     line.push_str("  ");
@@ -230,10 +177,10 @@ impl Grid {
                     line.push_str(&cell);
                 }
             }
-            let line = cut(line.trim_end(), width);
+            let line = cut_end(line.trim_end(), width);
             out.push_str(&if i == 0 { paint.dim(&line) } else { line });
             out.push('\n');
-            if i == apart && i > 0 && i + 1 < self.rows.len() {
+            if i == tests && i > 0 && i + 1 < self.rows.len() {
                 out.push('\n');
             }
         }
@@ -254,8 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_begin_alike_stay_apart() {
-        assert_eq!(squeezed("lambda-0.99995-dx-1", 13), "lamb…995-dx-1");
+    fn names_that_begin_alike_stay_distinct() {
         let mut grid = Grid::new(&["realization", "n", "VAF"], None, &[1]);
         for name in ["lambda-0.9995-dx-1", "lambda-0.99995-dx-1"] {
             grid.row(vec![name.to_owned(), "30".to_owned(), "0.9".to_owned()]);
@@ -273,20 +219,14 @@ mod tests {
 
     #[test]
     fn wide_characters_count_twice() {
-        assert_eq!(squeezed("よかったね", 6), "…たね");
-        assert_eq!(cut("よかった", 5), "よか…");
         assert_eq!(pad("よ", 4), "よ  ");
     }
 
     #[test]
     fn the_degrees_of_freedom_stay_together() {
-        assert_eq!(glued("a F(2, 5) = 8.10, p"), ["a", "F(2, 5) = 8.10,", "p"]);
-    }
-
-    #[test]
-    fn no_minus_zero_is_shown() {
-        assert_eq!(number(-0.0001, 2), "0.00");
-        assert_eq!(number(-0.01, 2), "−0.01");
-        assert_eq!(number(1e300, 3), "1.000e300");
+        assert_eq!(
+            unbreakable("a F(2, 5) = 8.10, p"),
+            ["a", "F(2, 5) = 8.10,", "p"]
+        );
     }
 }

@@ -1,74 +1,73 @@
-//! Subject × realization cells, and the complete tables made of them.
+//! Subject × realization cells, and complete tables of them.
 //!
-//! Ratings are held as differences from a whole number near their mean, so that
-//! an offset costs no digits; what is a level (a mean, a quantile) adds it back.
+//! Ratings are stored as differences from a whole number near their mean, so that a
+//! large offset costs no digits. Means and quantiles add the offset back.
 
 use crate::outcome::ratings::Ratings;
-use crate::protocol::Role;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 use study_stats::describe::{mean, mean_of, squares_about};
 
-/// One subject's ratings of one realization, with what suffices of them for
-/// every Gaussian model that has no terms of single trials.
+/// One subject's ratings of one realization, with the sufficient statistics of a
+/// Gaussian model without trial-level terms.
 #[derive(Debug, Clone)]
 pub(super) struct Cell {
     pub(super) subject: usize,
     pub(super) model: usize,
-    /// Into [`Cells::order`] and [`Cells::sorted`].
+    /// Range in [`Cells::order`] and [`Cells::sorted`].
     pub(super) rows: Range<usize>,
     /// Mean of the centred ratings.
     pub(super) mean: f64,
-    /// Sum of squares about the mean; 0 for one rating, NaN if it overflows.
+    /// Sum of squares about the mean, not finite if it overflows.
     pub(super) squares: f64,
 }
 
-/// The ratings that count, sorted into cells.
+/// The included ratings, sorted into cells.
 #[derive(Debug)]
 pub(super) struct Cells<'a> {
     pub(super) ratings: &'a Ratings,
-    /// What was taken off every rating.
+    /// What was subtracted from every rating.
     pub(super) offset: f64,
     /// Ratings less the offset, by row.
     pub(super) centred: Vec<Option<f64>>,
-    /// Every row, by subject and model (none comes last), otherwise as they stand.
+    /// All rows, by subject and realization (rows without one last).
     pub(super) all: Vec<usize>,
-    /// Rows with a rating and a realization, by subject, model, repetition.
+    /// Rows with a rating and a realization, by subject, realization, repetition.
     pub(super) order: Vec<usize>,
-    /// The centred ratings in that order: those of a cell stand together.
+    /// The centred ratings in this order; those of a cell are adjacent.
     pub(super) sorted: Vec<f64>,
-    /// By subject, then model; none is empty.
+    /// By subject, then realization; none is empty.
     pub(super) cells: Vec<Cell>,
-    /// VAF of each model, if its rows agree on one.
+    /// VAF by realization, if all of its rows have the same one.
     pub(super) vaf: Vec<Option<f64>>,
-    /// Whether anyone rated the model.
+    /// Whether anyone rated the realization.
     pub(super) rated: Vec<bool>,
-    /// The complete table of the realizations that the study asks about.
-    complete: Table,
+    /// The complete table of the tested realizations.
+    complete: CompleteTable,
 }
 
-/// A complete table: the subjects that rated all of some realizations.
+/// Cell means of the subjects that rated all of some realizations.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Table {
+pub(super) struct CompleteTable {
     /// Indices of the subjects.
     pub(super) subjects: Vec<usize>,
     /// Indices of the realizations.
     pub(super) models: Vec<usize>,
-    /// Cell means less the offset. Equal thirds may differ in their last bit.
+    /// Cell means less the offset, subjects × realizations. Equal thirds may differ in
+    /// their last bit.
     pub(super) rows: Vec<Vec<f64>>,
 }
 
-impl Table {
-    /// A column: one realization, by subject.
+impl CompleteTable {
+    /// The cell means of one realization, by subject.
     pub(super) fn column(&self, j: usize) -> Vec<f64> {
         self.rows.iter().map(|r| r[j]).collect()
     }
 }
 
 impl<'a> Cells<'a> {
-    /// Linear in the rows, but for sorting the repetitions of cells that do not
-    /// come in their order.
+    /// Sorts ratings into cells, in linear time unless repetitions are out of order.
     pub(super) fn of(ratings: &'a Ratings) -> Self {
         let offset = mean_of(ratings.rating.iter().copied().flatten()).map_or(0.0, f64::round);
         let less = |v: &Option<f64>| v.map(|v| v - offset).filter(|v| v.is_finite());
@@ -118,9 +117,9 @@ impl<'a> Cells<'a> {
             order,
             sorted,
             cells,
-            complete: Table::default(),
+            complete: CompleteTable::default(),
         };
-        made.complete = made.complete_table(&made.test_models());
+        made.complete = made.complete_table(&made.tested());
         made
     }
 
@@ -129,19 +128,25 @@ impl<'a> Cells<'a> {
         &self.sorted[cell.rows.clone()]
     }
 
-    /// Realizations that the study asks about and somebody rated: role test and
-    /// no hidden repeat.
-    pub(super) fn test_models(&self) -> Vec<usize> {
-        (0..self.ratings.models.len())
-            .filter(|&m| {
-                let model = &self.ratings.models[m];
-                self.rated[m] && model.role == Role::Test && model.duplicate_of.is_none()
-            })
+    /// The tested realizations that somebody rated.
+    pub(super) fn tested(&self) -> Vec<usize> {
+        let models = self.ratings.models.iter().enumerate();
+        (models.filter(|(m, model)| self.rated[*m] && model.is_tested()))
+            .map(|(m, _)| m)
             .collect()
     }
 
-    /// The subjects that rated all of these realizations.
-    pub(super) fn table(&self, models: &[usize]) -> Cow<'_, Table> {
+    /// For each realization its column in a table of `models`, if it has one.
+    pub(super) fn columns(&self, models: &[usize]) -> Vec<Option<usize>> {
+        let mut columns = vec![None; self.ratings.models.len()];
+        for (j, &m) in models.iter().enumerate() {
+            columns[m] = Some(j);
+        }
+        columns
+    }
+
+    /// The complete table of these realizations.
+    pub(super) fn table(&self, models: &[usize]) -> Cow<'_, CompleteTable> {
         if models == self.complete.models {
             Cow::Borrowed(&self.complete)
         } else {
@@ -149,8 +154,8 @@ impl<'a> Cells<'a> {
         }
     }
 
-    fn complete_table(&self, models: &[usize]) -> Table {
-        let mut table = Table {
+    fn complete_table(&self, models: &[usize]) -> CompleteTable {
+        let mut table = CompleteTable {
             subjects: Vec::new(),
             models: models.to_vec(),
             rows: Vec::new(),
@@ -158,18 +163,15 @@ impl<'a> Cells<'a> {
         if models.is_empty() {
             return table;
         }
-        let mut place = vec![usize::MAX; self.ratings.models.len()];
-        for (j, &m) in models.iter().enumerate() {
-            place[m] = j;
-        }
+        let columns = self.columns(models);
         for cells in self.cells.chunk_by(|a, b| a.subject == b.subject) {
-            let mut row = vec![f64::NAN; models.len()];
+            let mut row = vec![None; models.len()];
             for cell in cells {
-                if let Some(slot) = row.get_mut(place[cell.model]) {
-                    *slot = cell.mean;
+                if let Some(j) = columns[cell.model] {
+                    row[j] = Some(cell.mean).filter(|mean| mean.is_finite());
                 }
             }
-            if row.iter().all(|v| v.is_finite()) {
+            if let Some(row) = row.into_iter().collect() {
                 table.subjects.push(cells[0].subject);
                 table.rows.push(row);
             }
@@ -177,7 +179,7 @@ impl<'a> Cells<'a> {
         table
     }
 
-    /// Mean over the subjects of their cell means, less the offset, by model.
+    /// The cell means of all subjects less the offset, by realization.
     pub(super) fn subject_means(&self) -> Vec<Vec<f64>> {
         let mut means = vec![Vec::new(); self.ratings.models.len()];
         for cell in &self.cells {
@@ -197,7 +199,7 @@ impl<'a> Cells<'a> {
     }
 }
 
-/// Sum of squares and degrees of freedom within some cells.
+/// Sum of squares and degrees of freedom within cells.
 pub(super) fn within<'c>(cells: impl IntoIterator<Item = &'c Cell>) -> (f64, usize) {
     let (mut squares, mut df) = (0.0, 0);
     for cell in cells {

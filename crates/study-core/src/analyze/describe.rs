@@ -1,13 +1,13 @@
 //! `desc/*`, `desc_all/*`, `design/*`, `univariate/*`, `regression/*`.
 
 use super::Rules;
-use super::cells::{Cells, Table, within};
+use super::cells::{Cells, CompleteTable, within};
 use super::values::Values;
 use study_stats::describe::{counts, lag1_autocorrelation, mean, quantile, sd, sorted};
 use study_stats::distribution::t_quantile;
 use study_stats::regression::line;
 
-/// Most bins of a histogram.
+/// Largest number of bins of a histogram.
 const MAX_BINS: f64 = 101.0;
 
 pub(super) const ONE: &str = "fewer than two ratings";
@@ -15,7 +15,7 @@ const ONE_SUBJECT: &str = "fewer than two subjects";
 pub(super) const NO_REPETITION: &str = "no cell has two ratings";
 
 pub(super) fn describe(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
-    let table = cells.table(&cells.test_models());
+    let table = cells.table(&cells.tested());
     let bins = whole_scale(cells);
     design(cells, &table, values);
     all(cells, bins, values);
@@ -24,7 +24,7 @@ pub(super) fn describe(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     alone(cells, values);
 }
 
-/// Smallest and largest rating, if all are whole and near enough.
+/// Smallest and largest rating, if all are whole and the range is not too wide.
 fn whole_scale(cells: &Cells<'_>) -> Option<(f64, f64)> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for &v in cells.ratings.rating.iter().flatten() {
@@ -36,7 +36,7 @@ fn whole_scale(cells: &Cells<'_>) -> Option<(f64, f64)> {
     (low <= high && high - low < MAX_BINS).then_some((low, high))
 }
 
-/// The ratings in ascending order; whole ones by counting.
+/// The ratings in ascending order; a counting sort if they are whole.
 fn ascending(x: &[f64], bins: Option<(f64, f64)>) -> Vec<f64> {
     let Some((low, high)) = bins else {
         return sorted(x);
@@ -54,7 +54,7 @@ fn rated(cells: &Cells<'_>) -> Vec<f64> {
     cells.ratings.rating.iter().copied().flatten().collect()
 }
 
-fn design(cells: &Cells<'_>, table: &Table, values: &mut Values) {
+fn design(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
     let r = cells.ratings;
     let rated = rated(cells).len();
     let (s, m) = (r.subjects.len(), r.models.len());
@@ -130,9 +130,9 @@ fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
     }
 }
 
-/// Normalised to C − row mean + grand mean (Cousineau 2005); SEM × √(M/(M−1))
-/// (Morey 2008).
-fn cousineau_morey(cells: &Cells<'_>, table: &Table, values: &mut Values) {
+/// Within-subject intervals: ratings less the subject's mean (Cousineau 2005), SEM
+/// times √(M/(M − 1)) (Morey 2008).
+fn cousineau_morey(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
     let (s, m) = (table.rows.len(), table.models.len());
     let why = if m < 2 {
         "fewer than two realizations"
@@ -143,7 +143,8 @@ fn cousineau_morey(cells: &Cells<'_>, table: &Table, values: &mut Values) {
         .rows
         .iter()
         .map(|row| {
-            let centre = mean(row).unwrap_or(f64::NAN);
+            // Of no realizations there is no row.
+            let centre = mean(row).unwrap_or(0.0);
             row.iter().map(|v| v - centre).collect()
         })
         .collect();
@@ -161,7 +162,7 @@ fn cousineau_morey(cells: &Cells<'_>, table: &Table, values: &mut Values) {
     }
 }
 
-/// Data of one subject: nothing but numbers, or numbers against VAF.
+/// A table of one subject: univariate data, or a regression on VAF.
 fn alone(cells: &Cells<'_>, values: &mut Values) {
     let r = cells.ratings;
     if r.subjects.len() != 1 {

@@ -1,9 +1,9 @@
-//! The random streams of the resampling methods.
+//! Random streams of the permutation tests and the bootstrap.
 
 use study_base::rng::Stream;
 use study_stats::random::RandomSource;
 
-/// A stream named after the method that draws from it.
+/// A random stream, separate for each method.
 pub(super) struct Draws(Stream);
 
 impl Draws {

@@ -1,22 +1,22 @@
-//! Do realizations differ, and do raters agree: `friedman/*`, `rmanova/*`,
-//! `rmanova2/*`, `posthoc/*`, `icc_*`, `krippendorff_*`. All of them over the
-//! test realizations, hidden repeats left out.
+//! Differences between realizations and agreement: `friedman/*`, `rmanova/*`,
+//! `rmanova2/*`, `posthoc/*`, `icc_*`, `krippendorff_*`. All over the tested
+//! realizations.
 
 use super::Rules;
-use super::cells::{Cell, Cells, Table};
+use super::cells::{Cell, Cells, CompleteTable};
 use super::values::Values;
 use study_stats::agreement::{Alpha, Coefficient, Icc, icc, krippendorff};
 use study_stats::anova::{Effect, one_way, two_way};
 use study_stats::friedman::friedman;
 use study_stats::paired::{holm, paired};
 
-/// Most realizations (times repetitions) for an analysis of variance.
+/// Largest number of realizations (times repetitions) of an analysis of variance.
 const MAX_COLUMNS: usize = 300;
 
-/// Most realizations that are compared pair by pair.
-const MAX_PAIRED: usize = 8;
+/// Largest number of realizations that are compared pair by pair.
+pub const MAX_PAIRED: usize = 8;
 
-/// Most different repetitions that agreement is computed over.
+/// Largest number of distinct repetitions for agreement.
 const MAX_LABELS: usize = 10_000;
 
 const FEW: &str = "fewer than two complete subjects or realizations";
@@ -24,23 +24,23 @@ const NO_END: &str = "the interval of ICC2 ends where Spearman–Brown's formula
 const NO_ERROR: &str = "the ratings leave no variance of error";
 
 pub(super) fn ranks_and_anova(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
-    let table = cells.table(&cells.test_models());
+    let table = cells.table(&cells.tested());
     ranks(&table, values);
     anova(&table, values);
     anova_with_repetitions(cells, &table, values);
 }
 
 pub(super) fn pairs(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
-    posthoc(cells, &cells.table(&cells.test_models()), values);
+    posthoc(cells, &cells.table(&cells.tested()), values);
 }
 
 pub(super) fn agree(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
-    let models = cells.test_models();
+    let models = cells.tested();
     agreement(cells, &cells.table(&models), values);
     repetitions(cells, &models, values);
 }
 
-fn ranks(table: &Table, values: &mut Values) {
+fn ranks(table: &CompleteTable, values: &mut Values) {
     let Some(f) = friedman(&table.rows) else {
         values
             .group("friedman", FEW)
@@ -67,7 +67,7 @@ fn ranks(table: &Table, values: &mut Values) {
     g.put_or("exact_p", f.exact_p, why);
 }
 
-fn anova(table: &Table, values: &mut Values) {
+fn anova(table: &CompleteTable, values: &mut Values) {
     let wide = table.models.len() > MAX_COLUMNS;
     let Some(a) = one_way(&table.rows).filter(|_| !wide) else {
         let why = if wide {
@@ -103,8 +103,8 @@ fn anova(table: &Table, values: &mut Values) {
     );
 }
 
-/// Complete subjects whose cells all hold the same repetitions, once each.
-fn anova_with_repetitions(cells: &Cells<'_>, table: &Table, values: &mut Values) {
+/// For complete subjects whose cells all have the same repetitions, once each.
+fn anova_with_repetitions(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
     let why = "not every cell has the same two or more repetitions";
     let Some((rows, repetitions)) = balanced(cells, table) else {
         for effect in ["model", "rep", "inter"] {
@@ -133,7 +133,7 @@ fn anova_with_repetitions(cells: &Cells<'_>, table: &Table, values: &mut Values)
         g.maybe("F", *f);
         g.maybe("p", *p);
         g.maybe("eps_gg", *eps_gg);
-        // Without an F there is nothing to correct and nothing to explain.
+        // Without an F there is no p to correct and no effect to size.
         if f.is_some() {
             g.maybe("p_gg", *p_gg);
             g.maybe("ges", *ges);
@@ -141,14 +141,11 @@ fn anova_with_repetitions(cells: &Cells<'_>, table: &Table, values: &mut Values)
     }
 }
 
-fn balanced(cells: &Cells<'_>, table: &Table) -> Option<(Vec<Vec<f64>>, usize)> {
+fn balanced(cells: &Cells<'_>, table: &CompleteTable) -> Option<(Vec<Vec<f64>>, usize)> {
     let r = cells.ratings;
     let labels = |c: &Cell| cells.order[c.rows.clone()].iter().map(|&i| r.repetition[i]);
-    let mut place = vec![usize::MAX; r.models.len()];
-    for (j, &m) in table.models.iter().enumerate() {
-        place[m] = j;
-    }
-    let first = cells.cells.iter().find(|c| place[c.model] != usize::MAX)?;
+    let columns = cells.columns(&table.models);
+    let first = cells.cells.iter().find(|c| columns[c.model].is_some())?;
     let wanted: Vec<u32> = labels(first).collect();
     let n = wanted.len();
     let distinct = wanted.windows(2).all(|w| w[0] < w[1]);
@@ -157,13 +154,10 @@ fn balanced(cells: &Cells<'_>, table: &Table) -> Option<(Vec<Vec<f64>>, usize)> 
     }
     let mut rows = vec![vec![f64::NAN; n * table.models.len()]; table.subjects.len()];
     for cell in &cells.cells {
-        let j = place[cell.model];
-        let Ok(s) = table.subjects.binary_search(&cell.subject) else {
+        let subject = table.subjects.binary_search(&cell.subject);
+        let (Some(j), Ok(s)) = (columns[cell.model], subject) else {
             continue;
         };
-        if j == usize::MAX {
-            continue;
-        }
         if !labels(cell).eq(wanted.iter().copied()) {
             return None;
         }
@@ -172,7 +166,12 @@ fn balanced(cells: &Cells<'_>, table: &Table) -> Option<(Vec<Vec<f64>>, usize)> 
     (rows.len() >= 2 && table.models.len() >= 2).then_some((rows, n))
 }
 
-fn posthoc(cells: &Cells<'_>, table: &Table, values: &mut Values) {
+/// The identifier of a pair of realizations, by name.
+pub(super) fn pair_id(a: &str, b: &str) -> String {
+    format!("posthoc/{a}|{b}")
+}
+
+fn posthoc(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
     let m = table.models.len();
     if !(2..=MAX_PAIRED).contains(&m) || table.rows.len() < 2 {
         return;
@@ -183,7 +182,7 @@ fn posthoc(cells: &Cells<'_>, table: &Table, values: &mut Values) {
         for b in a + 1..m {
             if let Some(p) = paired(&columns[a], &columns[b]) {
                 let name = |j: usize| cells.model_name(table.models[j]);
-                pairs.push((format!("posthoc/{}|{}", name(a), name(b)), p));
+                pairs.push((pair_id(name(a), name(b)), p));
             }
         }
     }
@@ -208,27 +207,24 @@ fn posthoc(cells: &Cells<'_>, table: &Table, values: &mut Values) {
     }
 }
 
-fn agreement(cells: &Cells<'_>, table: &Table, values: &mut Values) {
+fn agreement(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
     let transposed: Vec<Vec<f64>> = (0..table.models.len()).map(|j| table.column(j)).collect();
     put_icc(icc(&transposed).as_ref(), "icc_subjects", FEW, values);
     let r = cells.ratings;
     let labels = labels(cells, &table.models);
-    // Units are realization and repetition; a rating's is found by counting.
-    let mut place = vec![usize::MAX; r.models.len()];
-    for (j, &m) in table.models.iter().enumerate() {
-        place[m] = j;
-    }
+    // A unit is one repetition of one realization.
+    let columns = cells.columns(&table.models);
     let mut units = vec![Vec::new(); table.models.len() * labels.len()];
     for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
-        let j = r.model[i].map_or(usize::MAX, |m| place[m as usize]);
-        if let (Ok(k), true) = (labels.binary_search(&r.repetition[i]), j != usize::MAX) {
+        let column = r.model[i].and_then(|m| columns[m as usize]);
+        if let (Ok(k), Some(j)) = (labels.binary_search(&r.repetition[i]), column) {
             units[j * labels.len() + k].push(v);
         }
     }
     put_alpha(krippendorff(&units), "krippendorff_subjects", values);
 }
 
-/// The repetitions that there are of some realizations, sorted.
+/// The distinct repetition numbers of some realizations, sorted.
 fn labels(cells: &Cells<'_>, models: &[usize]) -> Vec<u32> {
     let r = cells.ratings;
     let mut labels: Vec<u32> = Vec::new();
@@ -241,7 +237,7 @@ fn labels(cells: &Cells<'_>, models: &[usize]) -> Vec<u32> {
                 labels.insert(at, r.repetition[i]);
             }
         }
-        // A table that numbers its rows through has no repetitions to speak of.
+        // In a table that numbers all rows these are no repetitions.
         if labels.len() > MAX_LABELS {
             return Vec::new();
         }
@@ -249,7 +245,7 @@ fn labels(cells: &Cells<'_>, models: &[usize]) -> Vec<u32> {
     labels
 }
 
-/// Targets are the cells that hold every repetition, raters the repetitions.
+/// Intraclass correlation of the repetitions, over the cells that have all of them.
 fn repetitions(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
     let labels = labels(cells, models);
     let units: Vec<&[f64]> = (cells.cells.iter())

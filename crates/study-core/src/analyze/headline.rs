@@ -1,7 +1,6 @@
-//! The study's questions in numbers: `realistic/*`, the share of the variance
-//! between realizations that VAF has (`corr/share/*`), how much of the variance
-//! is whose (`variance/*`), and the same without the exclusions
-//! (`before_exclusion/*`).
+//! The main results: `realistic/*`, the share of the variance between realizations
+//! that VAF explains (`corr/share/*`), variance components (`variance/*`), and the
+//! main results without the exclusions (`before_exclusion/*`).
 
 use super::Rules;
 use super::cells::{Cells, within};
@@ -18,7 +17,7 @@ pub(super) fn headline(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     components(cells, values);
 }
 
-/// Shares of ratings at or above a threshold; subjects are what was sampled.
+/// Shares of ratings at or above a threshold, with subjects as clusters.
 fn realistic(cells: &Cells<'_>, from: f64, values: &mut Values) {
     let r = cells.ratings;
     let mut clusters: Vec<Vec<(f64, f64)>> = vec![Vec::new(); r.models.len()];
@@ -45,9 +44,9 @@ fn realistic(cells: &Cells<'_>, from: f64, values: &mut Values) {
     }
 }
 
-/// What of the variance between realizations goes along with VAF, and which |r|
-/// is needed: r² of the means, its unbiased version 1 − (1 − r²)(n − 1)/(n − 2)
-/// (Ezekiel 1930). The crossed model's share stands with that model.
+/// The share of the variance between realizations that VAF explains: r² of the means
+/// and its adjusted version 1 − (1 − r²)(n − 1)/(n − 2) (Ezekiel 1930); and the
+/// critical |r|. The crossed model's share is computed with that model.
 fn explained(values: &mut Values) {
     let n = values.number("corr/n_models").unwrap_or(0.0);
     let r2 = values.number("corr/pearson/r").map(|r| r * r);
@@ -69,10 +68,10 @@ fn explained(values: &mut Values) {
 /// Variance components of the complete table, by the expected mean squares of its
 /// cells: with h the mean of 1/(ratings of a cell), σ² within cells,
 /// E(MS subjects) = M σ²ₛ + σ²ₛₘ + hσ², E(MS realizations) = S σ²ₘ + σ²ₛₘ + hσ²,
-/// E(MS error) = σ²ₛₘ + hσ² (Searle, Casella & McCulloch 1992, §5.3; of balanced
-/// tables the usual analysis of variance). Negative ones are 0.
+/// E(MS error) = σ²ₛₘ + hσ² (Searle, Casella & McCulloch 1992, §5.3; for balanced
+/// tables the usual analysis of variance). Negative estimates are set to 0.
 fn components(cells: &Cells<'_>, values: &mut Values) {
-    let table = cells.table(&cells.test_models());
+    let table = cells.table(&cells.tested());
     let (s, m) = (table.rows.len() as f64, table.models.len() as f64);
     let found = one_way(&table.rows);
     let own: Vec<_> = (cells.cells.iter())
@@ -92,7 +91,7 @@ fn components(cells: &Cells<'_>, values: &mut Values) {
     let subject = ((a.ss_subject / (s - 1.0) - error) / m).max(0.0);
     let model = ((a.effect.ss / a.effect.df1 - error) / s).max(0.0);
     let interaction = noise.map(|noise| (error - h * noise).max(0.0));
-    // Without repetitions interaction and noise cannot be told apart.
+    // Without repetitions interaction and noise are confounded.
     let rest = interaction.zip(noise).map_or(error, |(i, n)| i + n);
     let total = subject + model + rest;
     let why = "no cell has two ratings: it is part of `interaction_and_noise`";
@@ -115,7 +114,7 @@ fn components(cells: &Cells<'_>, values: &mut Values) {
     }
 }
 
-/// What is shown with and without the exclusions.
+/// The statistics that are compared with and without the exclusions.
 const BOTH: [&str; 14] = [
     "corr/n_models",
     "corr/pearson/",
@@ -133,7 +132,7 @@ const BOTH: [&str; 14] = [
     "variance/",
 ];
 
-/// Copies the headline of `all` rows that the rules left out or kept.
+/// Adds the main results of `all`, computed without the exclusion rules.
 pub(super) fn without_exclusions(all: &Values, values: &mut Values) {
     let ids: Vec<&str> = (all.iter())
         .map(|(id, _)| id)

@@ -1,9 +1,9 @@
-//! Gaussian mixed models: `lmm_model`, `lmm_vaf`, `lmm_vaf_slope`,
-//! `lmm_vaf_crossed`, `lmm_crossed`, `lmm_variance`. All of them over the test
-//! realizations, hidden repeats left out; subjects need not be complete.
+//! Linear mixed models: `lmm_model`, `lmm_vaf`, `lmm_vaf_slope`,
+//! `lmm_vaf_crossed`, `lmm_crossed`, `lmm_variance`. All over the tested
+//! realizations, including subjects who did not rate all of them.
 //!
-//! Only `lmm_vaf_crossed` speaks of other realizations than these: it has a
-//! realization effect of its own beside VAF.
+//! Of the models with VAF only `lmm_vaf_crossed` generalizes to other realizations:
+//! it has a random effect of the realization besides VAF.
 
 use super::cells::Cells;
 use super::values::{Group, Values};
@@ -13,24 +13,43 @@ use study_stats::lmm::{
     CellSummary, ContrastT, Criterion, FixedEffects, LmmData, LmmError, LmmFit, RandomEffects, fit,
     kenward_roger,
 };
+use thiserror::Error;
 
-/// The ratings as the models need them.
+/// The data of the models.
 struct Data {
-    /// Of all test realizations.
+    /// All tested realizations.
     all: Result<LmmData, LmmError>,
-    /// Of those with a VAF, with the VAF and without.
+    /// The tested realizations with a VAF, with the covariate VAF.
     vaf: Result<LmmData, LmmError>,
+    /// The same without the covariate.
     vaf_null: Result<LmmData, LmmError>,
-    /// Whether any has a VAF.
+    /// Whether any realization has a VAF.
     has_vaf: bool,
     /// Whether a cell with a VAF has two ratings.
     repeats: bool,
-    /// The slope beside fixed subjects.
+    /// The slope on VAF with fixed effects of the subjects.
     within_subjects: Option<f64>,
-    /// Mean of the VAF over realizations; over rows if each row has its own.
+    /// Mean VAF over realizations, or over rows if each row has its own; 0 without VAF.
     centre: f64,
-    /// Whether VAF differs between the rows of one realization.
+    /// Whether VAF differs between the rows of a realization.
     by_row: bool,
+}
+
+/// Why a model with VAF is not fitted.
+#[derive(Debug, Clone, Copy, Error)]
+enum NotFitted {
+    #[error("no test realization has a VAF")]
+    NoVaf,
+    #[error("VAF differs between the ratings of one realization")]
+    VafByRow,
+    #[error("VAF does not vary, or overflows")]
+    ConstantVaf,
+    #[error("fewer than three realizations with a VAF")]
+    FewRealizations,
+    #[error("no subject rated two realizations with different VAF")]
+    NoSlope,
+    #[error(transparent)]
+    Estimation(#[from] LmmError),
 }
 
 pub(super) fn mixed(cells: &Cells<'_>, values: &mut Values) {
@@ -46,7 +65,7 @@ pub(super) fn mixed(cells: &Cells<'_>, values: &mut Values) {
 
 impl Data {
     fn of(cells: &Cells<'_>) -> Self {
-        let models = cells.test_models();
+        let models = cells.tested();
         let own: Vec<_> = (cells.cells.iter())
             .filter(|c| models.binary_search(&c.model).is_ok())
             .collect();
@@ -93,7 +112,9 @@ impl Data {
                     .filter_map(|c| cells.vaf[c.realization].map(|x| CellSummary { x, ..*c })),
             );
         }
-        let centre = if by_row {
+        let centre = if with_vaf.is_empty() {
+            0.0
+        } else if by_row {
             let n: f64 = with_vaf.iter().map(|c| c.n as f64).sum();
             with_vaf.iter().map(|c| c.x * c.n as f64).sum::<f64>() / n
         } else {
@@ -101,10 +122,10 @@ impl Data {
             rated.sort_unstable();
             rated.dedup();
             let rated: Vec<f64> = rated.iter().filter_map(|&m| cells.vaf[m]).collect();
-            mean(&rated).unwrap_or(f64::NAN)
+            mean(&rated).unwrap_or(0.0)
         };
         let vaf_null = LmmData::new(&with_vaf, FixedEffects::Intercept);
-        // Where every realization has its VAF the ratings are the same.
+        // If every realization has a VAF, the ratings are the same.
         let all = if all.len() == with_vaf.len() && !by_row {
             vaf_null.clone()
         } else {
@@ -124,26 +145,27 @@ impl Data {
     }
 }
 
-/// A table, or the reason why there is none.
+/// Borrows a table or copies its error.
 fn given(table: &Result<LmmData, LmmError>) -> Result<&LmmData, LmmError> {
     table.as_ref().map_err(|e| *e)
 }
 
-/// Why there is nothing about VAF.
-fn why_no_vaf(data: &Data, error: LmmError) -> String {
-    let why = match error {
-        _ if !data.has_vaf => "no test realization has a VAF",
-        LmmError::ConstantCovariate => "VAF does not vary, or overflows",
-        LmmError::FewRealizations => "fewer than three realizations with a VAF",
-        LmmError::NoSlope => "no subject rated two realizations with different VAF",
-        other => return other.to_string(),
-    };
-    why.to_owned()
+impl Data {
+    /// Why a model with VAF is not fitted, given the error of its table or fit.
+    fn reason(&self, error: LmmError) -> NotFitted {
+        match error {
+            _ if !self.has_vaf => NotFitted::NoVaf,
+            LmmError::ConstantCovariate => NotFitted::ConstantVaf,
+            LmmError::FewRealizations => NotFitted::FewRealizations,
+            LmmError::NoSlope => NotFitted::NoSlope,
+            other => other.into(),
+        }
+    }
 }
 
-const NO_DF: &str = "the likelihood has no curvature to take degrees of freedom from";
+const NO_DF: &str = "the likelihood is too flat for degrees of freedom";
 
-/// −2 log likelihood ratio; rounding below 0 is 0.
+/// −2 log likelihood ratio, at least 0.
 fn ratio(null: &LmmFit<'_>, full: &LmmFit<'_>) -> f64 {
     (null.deviance - full.deviance).max(0.0)
 }
@@ -183,7 +205,7 @@ fn model(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         g.maybe("satterthwaite_df2", f.and_then(|f| f.df2));
         g.maybe("satterthwaite_p", f.and_then(|f| f.p));
         let f = kenward_roger(&reml);
-        let why = "the adjustment is not defined for so few ratings";
+        let why = "the adjustment is undefined for so few ratings";
         g.put_or("kenward_roger_F", f.map(|f| f.f), why);
         g.put_or("kenward_roger_df2", f.and_then(|f| f.df2), why);
         g.put_or("kenward_roger_p", f.and_then(|f| f.p), why);
@@ -239,7 +261,7 @@ const COVARIATE: [&str; 11] = [
     "slope_ci95_hi",
 ];
 
-/// Intercept at a VAF, slope with its test.
+/// Adds the intercept at a VAF and the slope with its test.
 fn coefficients(g: &mut Group<'_>, fit: &LmmFit<'_>, at: f64, offset: f64) -> ContrastT {
     let tests = fit.t_tests(&[vec![1.0, at], vec![0.0, 1.0]]);
     let (intercept, slope) = (tests[0], tests[1]);
@@ -277,7 +299,7 @@ fn vaf(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let mut g = values.group("lmm_vaf", "no subject has two values of VAF");
     g.maybe("statsmodels_slope", data.within_subjects);
     if let Err(error) = found {
-        let mut g = values.group("lmm_vaf", why_no_vaf(data, error));
+        let mut g = values.group("lmm_vaf", data.reason(error).to_string());
         g.none(&COVARIATE);
         g.none(&[
             "var_subject",
@@ -292,8 +314,8 @@ fn vaf(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     }
 }
 
-/// The slope beside fixed subjects, Σn(x − x̄ₛ)(y − ȳₛ)/Σn(x − x̄ₛ)²: the limit of
-/// the mixed model's as the subject variance grows.
+/// The slope with fixed effects of the subjects, Σn(x − x̄ₛ)(y − ȳₛ)/Σn(x − x̄ₛ)²: the
+/// limit of the mixed model's slope for a large subject variance.
 fn within_subjects(cells: &[CellSummary]) -> Option<f64> {
     let (mut xx, mut xy, mut scale) = (0.0, 0.0, 0.0f64);
     for own in cells.chunk_by(|a, b| a.subject == b.subject) {
@@ -331,7 +353,7 @@ fn vaf_slope(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         Ok(())
     })();
     if let Err(error) = found {
-        let mut g = values.group("lmm_vaf_slope", why_no_vaf(data, error));
+        let mut g = values.group("lmm_vaf_slope", data.reason(error).to_string());
         g.none(&COVARIATE);
         g.none(&[
             "vaf_centre",
@@ -343,15 +365,13 @@ fn vaf_slope(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     }
 }
 
-const BY_ROW: &str = "VAF differs between the ratings of one realization";
-
 fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     let cell = data.repeats;
     let found = (|| {
         if data.by_row {
-            return Err(BY_ROW.to_owned());
+            return Err(NotFitted::VafByRow);
         }
-        let why = |e| why_no_vaf(data, e);
+        let why = |e| data.reason(e);
         let table = given(&data.vaf).map_err(why)?;
         let random = RandomEffects {
             realization: true,
@@ -368,8 +388,8 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         if cell {
             g.put("var_subject_model", v.cell);
         }
-        // What VAF explains is the fall from the same terms over the same ratings:
-        // another model would put the interaction to VAF's account.
+        // The share of VAF is relative to the same model without it: other terms would
+        // attribute the interaction to VAF.
         let without = given(&data.vaf_null).and_then(|t| fit(t, random, Criterion::Reml));
         match without {
             Ok(without) => g.put("var_model_without_vaf", without.variances.realization),
@@ -378,7 +398,7 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         Ok(())
     })();
     if let Err(why) = found {
-        let mut g = values.group("lmm_vaf_crossed", why);
+        let mut g = values.group("lmm_vaf_crossed", why.to_string());
         g.none(&COVARIATE);
         g.none(&[
             "var_subject",
@@ -421,8 +441,7 @@ fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     }
 }
 
-/// How much of the variance of a rating is whose: ~ 1 + (1|subject) + (1|model)
-/// + (1|subject:model).
+/// Variance components: ~ 1 + (1|subject) + (1|model) + (1|subject:model).
 fn variance(data: &Data, values: &mut Values) {
     let random = RandomEffects {
         realization: true,
@@ -452,14 +471,14 @@ fn variance(data: &Data, values: &mut Values) {
     }
 }
 
-/// The share of the variance between realizations that goes when VAF enters the
-/// crossed model, its random terms and its ratings the same. Below 0 where VAF
-/// explains less than a covariate without any relation is expected to.
+/// The share of the variance between realizations that VAF explains in the crossed
+/// model, with the same random terms and ratings. Negative if VAF explains less than
+/// an unrelated covariate is expected to.
 fn share_of_vaf(values: &mut Values) {
     let why = ["var_model", "var_model_without_vaf"]
         .iter()
         .find_map(|v| values.reason(&format!("lmm_vaf_crossed/{v}")))
-        .unwrap_or("there is no variance between realizations with a VAF to explain")
+        .unwrap_or("there is no variance between realizations to explain")
         .to_owned();
     let number = |v: &str| values.number(&format!("lmm_vaf_crossed/{v}"));
     let share = number("var_model")

@@ -10,23 +10,23 @@ use study_stats::two_way_slope::{TwoWaySlope, two_way_slope};
 
 pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     let r = cells.ratings;
-    // Rows of a subject stand together and stay so.
+    // Rows of a subject are adjacent.
     let known: Vec<(usize, u32)> = (cells.order.iter())
         .filter_map(|&i| Some((i, r.trial_index[i]?)))
         .collect();
-    // The rating of the trial just before, and of no other.
+    // The rating of the immediately preceding trial.
     let (mut rows, mut previous) = (Vec::new(), Vec::new());
-    let mut places: Vec<(u32, usize)> = Vec::new();
+    let mut trials: Vec<(u32, usize)> = Vec::new();
     for own in known.chunk_by(|a, b| r.subject[a.0] == r.subject[b.0]) {
-        places.clear();
-        places.extend(own.iter().map(|&(i, trial)| (trial, i)));
-        places.sort_by_key(|p| p.0);
+        trials.clear();
+        trials.extend(own.iter().map(|&(i, trial)| (trial, i)));
+        trials.sort_by_key(|p| p.0);
         for &(i, trial) in own {
             let before = trial - 1;
-            let first = places.partition_point(|p| p.0 < before);
-            // Where several claim the place, which one was before is not known.
-            if let [(place, j), after, ..] = &places[first..]
-                && *place == before
+            let first = trials.partition_point(|p| p.0 < before);
+            // If several rows have this index, the preceding one is not known.
+            if let [(index, j), after, ..] = &trials[first..]
+                && *index == before
                 && after.0 != before
             {
                 rows.push(i);
@@ -58,10 +58,10 @@ pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     }
 }
 
-/// Most repetitions whose means are listed.
+/// Largest number of repetitions whose means are listed.
 const MAX_REPETITIONS: usize = 10_000;
 
-/// The slope of the rating on x beside fixed subjects and realizations.
+/// The slope of the rating on x with fixed effects of subjects and realizations.
 fn slope(cells: &Cells<'_>, rows: &[usize], x: &[f64]) -> Option<TwoWaySlope> {
     let r = cells.ratings;
     let y: Vec<f64> = rows.iter().filter_map(|&i| cells.centred[i]).collect();
@@ -71,7 +71,7 @@ fn slope(cells: &Cells<'_>, rows: &[usize], x: &[f64]) -> Option<TwoWaySlope> {
 }
 
 fn put(id: &str, found: Option<TwoWaySlope>, values: &mut Values) {
-    let why = "the order is not known, or is one with subjects and realizations";
+    let why = "the order is not known, or is confounded with subjects and realizations";
     let mut g = values.group(id, why);
     g.maybe("slope", found.map(|f| f.slope));
     g.maybe("se", found.map(|f| f.se));

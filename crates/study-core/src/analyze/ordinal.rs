@@ -1,35 +1,59 @@
-//! Ratings as ordered categories: `clm_*` over all ratings as if independent,
-//! `clmm_*` with an intercept for each subject. `*_model` has an effect of each
-//! test realization against the first, hidden repeats left out; `*_vaf` one of
-//! the row's VAF. All of them hold for these realizations only.
+//! Ordinal regression: `clm_*` treats all ratings as independent, `clmm_*` has a
+//! random intercept for each subject. `*_model` estimates an effect of each tested
+//! realization relative to the first, `*_vaf` a slope on the row's VAF. All results
+//! hold for these realizations only.
 //!
-//! The categories are the whole numbers that occur; the others have no
-//! probability, and a threshold between them no estimate.
+//! The categories are the whole numbers that occur. A rating that nobody gave has no
+//! probability and no threshold.
 
 use super::cells::Cells;
 use super::values::{self, Values};
 use rayon::prelude::*;
 use study_stats::clm::{CategoryCount, CategoryCounts, ClmError, ClmFit, Predictor, clm};
 use study_stats::clmm::{ClmmFit, clmm};
+use thiserror::Error;
 
-/// More than these are no longer a rating scale: a slider.
+/// Largest number of categories; more come from a slider, not from a rating scale.
 const MAX_CATEGORIES: usize = 20;
 
-/// Most realizations that get an effect of their own.
+/// Largest number of realizations with an effect of their own.
 const MAX_MODELS: usize = 50;
 
-/// Most different VAF.
+/// Largest number of distinct VAF.
 const MAX_LEVELS: usize = 10_000;
 
-/// Most subjects of a mixed model: its cost is proportional to them.
+/// Largest number of subjects of a mixed model, whose cost is proportional to it.
 const MAX_SUBJECTS: usize = 10_000;
 
-/// Beyond, not every whole number is a double.
+/// Not every larger whole number is a double.
 const WHOLE: f64 = 9_007_199_254_740_992.0;
+
+/// Why a model is not fitted.
+#[derive(Debug, Clone, Copy, Error)]
+enum NotFitted {
+    #[error("more than {MAX_MODELS} realizations")]
+    TooManyRealizations,
+    #[error("no rating has a realization")]
+    NoRealization,
+    #[error("the ratings are not whole numbers")]
+    NotWhole,
+    #[error("more than {MAX_CATEGORIES} different ratings")]
+    TooManyCategories,
+    #[error("no rating has a realization and a VAF")]
+    NoVaf,
+    #[error("all VAF are equal")]
+    EqualVaf,
+    #[error("more than {MAX_LEVELS} different VAF")]
+    TooManyVaf,
+    #[error("more than {MAX_SUBJECTS} subjects")]
+    TooManySubjects,
+    #[error(transparent)]
+    Estimation(#[from] ClmError),
+}
 
 pub(super) fn ordinal(cells: &Cells<'_>, values: &mut Values) {
     let mut test = vec![false; cells.ratings.models.len()];
-    for m in cells.test_models() {
+    for m in cells.tested() {
         test[m] = true;
     }
     let of_test = |i: &usize| cells.ratings.model[*i].is_some_and(|m| test[m as usize]);
@@ -41,15 +65,15 @@ pub(super) fn ordinal(cells: &Cells<'_>, values: &mut Values) {
         values
     });
     for part in parts.collect::<Vec<Values>>() {
-        values.take(part);
+        values.extend(part);
     }
 }
 
-/// Writes the models of one predictor.
+/// Fits the models of one predictor.
 type Group = fn(&Cells<'_>, &[usize], &mut Values);
 
-/// Whether there are more subjects than a mixed model is fitted to. Nobody needs
-/// to be told apart then: the counts are pooled.
+/// Whether there are too many subjects for a mixed model. The counts are then pooled
+/// over subjects.
 fn many(cells: &Cells<'_>, rows: &[usize]) -> bool {
     let subject = |i: usize| cells.ratings.subject[i];
     let same = rows.windows(2).filter(|w| subject(w[0]) != subject(w[1]));
@@ -66,16 +90,16 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         .skip(1)
         .map(|&m| cells.model_name(m as usize))
         .collect();
-    // The first realization is the origin: no column, a zero in the first.
+    // The first realization is the reference level: x = 0 in the first column.
     let predictors: Vec<Predictor> = (0..present.len())
         .map(|g| Predictor {
             column: g.saturating_sub(1),
             x: if g == 0 { 0.0 } else { 1.0 },
         })
         .collect();
-    let mut place = vec![0; cells.ratings.models.len()];
+    let mut level = vec![0; cells.ratings.models.len()];
     for (g, &m) in (0u32..).zip(&present) {
-        place[m as usize] = g;
+        level[m as usize] = g;
     }
     let scale = Scale {
         names: &names,
@@ -83,12 +107,12 @@ fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         origin: 0.0,
     };
     let made = if present.len() > MAX_MODELS {
-        Err(format!("more than {MAX_MODELS} realizations"))
+        Err(NotFitted::TooManyRealizations)
     } else {
         categories(cells, rows).map(|ratings| {
             let n = predictors.len();
             let counts = counts(cells, rows, &ratings, n, |i| {
-                model(i).map_or(0, |m| place[m as usize])
+                model(i).map_or(0, |m| level[m as usize])
             });
             let table = CategoryCounts::new(predictors, names.len(), ratings.len(), &counts);
             (table, ratings)
@@ -105,7 +129,7 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     let mut levels: Vec<f64> = rows.iter().filter_map(|&i| vaf(i)).collect();
     levels.sort_unstable_by(f64::total_cmp);
     levels.dedup_by(|a, b| a.total_cmp(b).is_eq());
-    // From −1 to 1, so that the search sees no units.
+    // Scaled to −1 … 1, so that the search does not depend on units.
     let (low, high) = match (levels.first(), levels.last()) {
         (Some(low), Some(high)) => (*low, *high),
         _ => (0.0, 0.0),
@@ -117,11 +141,11 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
         origin,
     };
     let made = if rows.is_empty() {
-        Err("no rating has a realization and a VAF".to_owned())
+        Err(NotFitted::NoVaf)
     } else if unit <= 0.0 {
-        Err("all VAF are equal".to_owned())
+        Err(NotFitted::EqualVaf)
     } else if levels.len() > MAX_LEVELS {
-        Err(format!("more than {MAX_LEVELS} different VAF"))
+        Err(NotFitted::TooManyVaf)
     } else {
         categories(cells, &rows).map(|ratings| {
             let predictors = levels
@@ -143,29 +167,29 @@ fn by_vaf(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     put_all("vaf", made, many(cells, &rows), &scale, values);
 }
 
-/// The ratings that occur, rising, or why they are no categories.
-fn categories(cells: &Cells<'_>, rows: &[usize]) -> Result<Vec<f64>, String> {
+/// The distinct ratings, ascending.
+fn categories(cells: &Cells<'_>, rows: &[usize]) -> Result<Vec<f64>, NotFitted> {
     let mut found: Vec<f64> = Vec::new();
     for rating in rows.iter().filter_map(|&i| cells.ratings.rating[i]) {
-        // Adding 0 makes one zero of two.
+        // Adding 0 turns −0 into 0.
         let rating = rating + 0.0;
         if let Err(at) = found.binary_search_by(|v| v.total_cmp(&rating)) {
             if rating.fract() != 0.0 || rating.abs() > WHOLE {
-                return Err("the ratings are not whole numbers".to_owned());
+                return Err(NotFitted::NotWhole);
             }
             if found.len() == MAX_CATEGORIES {
-                return Err(format!("more than {MAX_CATEGORIES} different ratings"));
+                return Err(NotFitted::TooManyCategories);
             }
             found.insert(at, rating);
         }
     }
     match found.len() {
-        0 => Err("no rating has a realization".to_owned()),
+        0 => Err(NotFitted::NoRealization),
         _ => Ok(found),
     }
 }
 
-/// The rows, which come cell by cell, counted; `predictors` is how many there are.
+/// Counts of the rows by subject, predictor and category; the rows are sorted by cell.
 fn counts(
     cells: &Cells<'_>,
     rows: &[usize],
@@ -203,7 +227,7 @@ fn counts(
         }
         let same =
             |c: &&mut CategoryCount| (c.predictor, c.category) == (new.predictor, new.category);
-        // The last ones of the subject are of the same cell.
+        // Counts of the same cell are the subject's last ones.
         match counts[from..].iter_mut().rev().find(same) {
             Some(c) => c.n += 1,
             None => counts.push(new),
@@ -212,7 +236,7 @@ fn counts(
     counts
 }
 
-/// How β is named, and its unit: x = (value − origin)/unit.
+/// Names of the coefficients, and the scaling of x = (value − origin)/unit.
 struct Scale<'a> {
     names: &'a [&'a str],
     unit: f64,
@@ -221,7 +245,7 @@ struct Scale<'a> {
 
 fn put_all(
     what: &str,
-    made: Result<(CategoryCounts, Vec<f64>), String>,
+    made: Result<(CategoryCounts, Vec<f64>), NotFitted>,
     many: bool,
     scale: &Scale<'_>,
     values: &mut Values,
@@ -235,7 +259,7 @@ fn put_all(
         Ok(made) => made,
         Err(why) => {
             for id in ids {
-                none(&mut values.group(id, why.as_str()), what);
+                none(&mut values.group(id, why.to_string()), what);
             }
             return;
         }
@@ -249,12 +273,11 @@ fn put_all(
         Ok(fit) => put(fit, &labels, scale, &mut values.group(&ids[0], "")),
         Err(cause) => none(&mut values.group(&ids[0], cause.to_string()), what),
     }
-    let mixed: [Result<ClmmFit, String>; 2] = if many {
-        let why = format!("more than {MAX_SUBJECTS} subjects");
-        [Err(why.clone()), Err(why)]
+    let mixed: [Result<ClmmFit, NotFitted>; 2] = if many {
+        [(); 2].map(|()| Err(NotFitted::TooManySubjects))
     } else {
         let both = clmm(&table);
-        [both.laplace, both.quadrature].map(|m| m.map_err(|cause: ClmError| cause.to_string()))
+        [both.laplace, both.quadrature].map(|m| m.map_err(NotFitted::from))
     };
     for (id, mixed) in ids[1..].iter().zip(mixed) {
         match mixed {
@@ -265,7 +288,7 @@ fn put_all(
                 g.put("boundary", f64::from(u8::from(mixed.boundary)));
             }
             Err(why) => {
-                let mut g = values.group(id, why);
+                let mut g = values.group(id, why.to_string());
                 none(&mut g, what);
                 g.none(&["sd_subject"]);
             }
@@ -280,7 +303,7 @@ fn none(g: &mut values::Group<'_>, what: &str) {
     }
 }
 
-/// On the scale of the data: θ + β·origin/unit, β/unit.
+/// Adds the estimates on the scale of the data: θ + β·origin/unit, β/unit.
 fn put(fit: &ClmFit, labels: &[String], scale: &Scale<'_>, g: &mut values::Group<'_>) {
     g.put("loglik", fit.loglik);
     for ((name, beta), se) in scale.names.iter().zip(&fit.beta).zip(&fit.se) {

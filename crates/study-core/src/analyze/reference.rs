@@ -1,6 +1,6 @@
-//! What stands beside the test realizations: `reference/*` contrasts each of
-//! them with each reference, anchor and physical sample, over subjects;
-//! `duplicate/*` is a hidden repeat minus its original.
+//! Contrasts with other realizations: `reference/*` compares each tested realization
+//! with each reference, anchor and physical sample over subjects; `duplicate/*` is
+//! a hidden duplicate minus its original.
 
 use super::Rules;
 use super::cells::Cells;
@@ -12,7 +12,7 @@ use study_stats::paired::{equivalence, holm, one_sample};
 
 pub(super) fn reference(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     duplicates(cells, values);
-    let tests = cells.test_models();
+    let tests = cells.tested();
     for (m, model) in cells.ratings.models.iter().enumerate() {
         match model.role {
             Role::Test | Role::Practice => {}
@@ -23,7 +23,7 @@ pub(super) fn reference(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     }
 }
 
-/// Test realization minus reference, of the subjects that rated both.
+/// Tested realization minus reference, over the subjects who rated both.
 fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values: &mut Values) {
     let found: Vec<(usize, Vec<f64>)> = (tests.iter())
         .map(|&t| {
@@ -53,11 +53,7 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
         g.maybe("p_t", test.and_then(|t| t.p));
         g.maybe("p_t_holm", p_holm);
         let Some(margin) = rules.equivalence_margin else {
-            g.put_or(
-                "p_tost",
-                None,
-                "no margin of equivalence was stated beforehand",
-            );
+            g.put_or("p_tost", None, "no equivalence margin was preregistered");
             continue;
         };
         let e = equivalence(differences, margin);
@@ -70,7 +66,7 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
     }
 }
 
-/// Hidden repeats against their originals: repeat minus original over subjects.
+/// Hidden duplicate minus original, over subjects.
 fn duplicates(cells: &Cells<'_>, values: &mut Values) {
     for (d, o) in exclude::pairs(cells.ratings) {
         let pair = cells.table(&[d, o]);

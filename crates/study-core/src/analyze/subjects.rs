@@ -1,7 +1,7 @@
-//! `subject/*` and `screen/*`: each participant, flagged and never dropped.
+//! Screening of participants: `subject/*` and `screen/*`. Nobody is excluded here.
 
 use super::Rules;
-use super::cells::{Cells, Table, within};
+use super::cells::{Cells, CompleteTable, within};
 use super::describe::{NO_REPETITION, ONE};
 use super::exclude::{distances, pairs};
 use super::values::Values;
@@ -9,7 +9,7 @@ use crate::protocol::Role;
 use study_stats::correlation::pearson;
 use study_stats::describe::{mean, sd};
 
-/// Most participants that are listed one by one; `screen/*` counts them all.
+/// Largest number of participants that are listed one by one.
 pub(super) const MAX_LISTED: usize = 5000;
 
 pub(super) fn subjects(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
@@ -18,7 +18,7 @@ pub(super) fn subjects(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     let listed = n <= MAX_LISTED;
     let screens = Screens::of(cells);
     let mut constant = 0.0;
-    let table = cells.table(&cells.test_models());
+    let table = cells.table(&cells.tested());
     let others = leave_one_out(&table);
     let mut own_cells = cells
         .cells
@@ -74,7 +74,7 @@ pub(super) fn subjects(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     }
 }
 
-/// Hidden references, anchors and repeats, where the design has them: by subject.
+/// Screening statistics of designs with hidden references, anchors or repeats, by subject.
 struct Screens {
     reference: Option<Vec<Option<f64>>>,
     anchor: Option<Vec<Option<f64>>>,
@@ -108,7 +108,7 @@ impl Screens {
     }
 }
 
-/// Mean over each subject's cells of a role.
+/// Mean over each subject's cells of the realizations with a role.
 fn means(cells: &Cells<'_>, role: Role) -> Vec<Option<f64>> {
     let r = cells.ratings;
     let mut sums = vec![(0.0, 0.0); r.subjects.len()];
@@ -123,8 +123,8 @@ fn means(cells: &Cells<'_>, role: Role) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// Each subject's cells against the mean of all the others'.
-fn leave_one_out(table: &Table) -> Vec<Option<f64>> {
+/// Correlation of each subject's cells with the mean of all others.
+fn leave_one_out(table: &CompleteTable) -> Vec<Option<f64>> {
     let m = table.models.len();
     if table.rows.len() < 2 || table.rows.len() > MAX_LISTED {
         return vec![None; table.rows.len()];

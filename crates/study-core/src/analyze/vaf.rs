@@ -1,11 +1,11 @@
-//! Does VAF predict the rating: `corr/*` over realizations, which is the
-//! headline; `subject_corr/*`, `subject_slope/*`, `rmcorr_*`, `bootstrap/*`,
-//! `page/*` over subjects, which hold for these realizations only.
+//! VAF as a predictor of the rating: `corr/*` over realizations, the main result;
+//! `subject_corr/*`, `subject_slope/*`, `rmcorr_*`, `bootstrap/*`, `page/*` over
+//! subjects, which hold for these realizations only.
 //!
-//! Only test realizations with a VAF, hidden repeats left out.
+//! Only tested realizations with a VAF.
 
 use super::Rules;
-use super::cells::{Cells, Table};
+use super::cells::{Cells, CompleteTable};
 use super::draws::Draws;
 use super::subjects::MAX_LISTED;
 use super::values::Values;
@@ -23,12 +23,12 @@ use study_stats::regression::slope;
 
 const FEW: &str = "fewer than three realizations with a VAF";
 
-/// Most realizations that are left out one by one: the work goes with the square.
+/// Largest number of realizations to leave out one by one; the cost is quadratic.
 const MAX_LEFT_OUT: usize = 1000;
 
 pub(super) fn against_vaf(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     let models: Vec<usize> = cells
-        .test_models()
+        .tested()
         .into_iter()
         .filter(|&m| cells.vaf[m].is_some())
         .collect();
@@ -41,7 +41,7 @@ pub(super) fn against_vaf(cells: &Cells<'_>, rules: &Rules, values: &mut Values)
     within(cells, &models, values);
 }
 
-/// The means over subjects of the cells, one for each realization.
+/// Correlations over realizations, of VAF with the mean of the subjects' cell means.
 fn between_realizations(
     cells: &Cells<'_>,
     models: &[usize],
@@ -155,7 +155,7 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
                 }
                 None => {
                     complete = false;
-                    // Where there is a correlation over all, it fails for this one.
+                    // The correlation over all is defined but not without this one.
                     if defined && lost.is_none() {
                         let name = Untrusted(name);
                         lost = Some(format!("without `{name}` all {left} are equal"));
@@ -172,8 +172,8 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
     }
 }
 
-/// Correlations and slopes of each complete subject, then over them.
-fn by_subject(cells: &Cells<'_>, table: &Table, vaf: &[f64], values: &mut Values) {
+/// Correlation and slope of each complete subject, and their means.
+fn by_subject(cells: &Cells<'_>, table: &CompleteTable, vaf: &[f64], values: &mut Values) {
     let (mut z, mut slopes, mut perfect) = (Vec::new(), Vec::new(), false);
     let enough = vaf.len() >= 3 && !is_constant(vaf);
     for (&s, row) in table.subjects.iter().zip(&table.rows).filter(|_| enough) {
@@ -224,7 +224,7 @@ fn by_subject(cells: &Cells<'_>, table: &Table, vaf: &[f64], values: &mut Values
     g.maybe("jzs_bf10", t.and_then(|t| jzs_bf10(t, slopes.len(), 0.707)));
 }
 
-fn trend(table: &Table, vaf: &[f64], values: &mut Values) {
+fn trend(table: &CompleteTable, vaf: &[f64], values: &mut Values) {
     let Some(p) = page(&table.rows, vaf).filter(|_| vaf.len() >= 3) else {
         let why = "fewer than two complete subjects, or three realizations, or one VAF";
         values.group("page", why).none(&["L", "z", "p_greater"]);
@@ -242,7 +242,7 @@ fn trend(table: &Table, vaf: &[f64], values: &mut Values) {
     );
 }
 
-fn resampled(table: &Table, vaf: &[f64], rules: &Rules, values: &mut Values) {
+fn resampled(table: &CompleteTable, vaf: &[f64], rules: &Rules, values: &mut Values) {
     let found = bootstrap::correlation(&table.rows, vaf, &mut Draws::new(rules.seed, "bootstrap"));
     let why = "fewer than two complete subjects or three realizations, or no correlation";
     let mut g = values.group("bootstrap", why);
@@ -269,12 +269,12 @@ fn resampled(table: &Table, vaf: &[f64], rules: &Rules, values: &mut Values) {
     g.put_or("z0", b.z0, why);
     g.put_or("bca_lo", b.bca.map(|c| c.0), why);
     g.put_or("bca_hi", b.bca.map(|c| c.1), why);
-    let why = "leaving any subject out changes nothing, or all";
+    let why = "leaving out any one subject changes nothing, or leaves no correlation";
     g.put_or("jackknife_acceleration", b.acceleration, why);
 }
 
-/// The correlation within subjects, of cells and of trials. Trials need no
-/// realization, only a VAF.
+/// Repeated-measures correlation, over cells and over trials. Trials need a VAF but no
+/// realization.
 fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
     let r = cells.ratings;
     let mut by_cell = Flat::default();
@@ -286,17 +286,17 @@ fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
             }
         }
     }
-    // Whether the trials of a realization count; those without one do.
-    let mut counts = vec![false; r.models.len()];
-    for m in cells.test_models() {
-        counts[m] = true;
+    // Whether to include the trials of a realization; those without one are included.
+    let mut included = vec![false; r.models.len()];
+    for m in cells.tested() {
+        included[m] = true;
     }
     let mut by_trial = Flat::default();
     for own in cells.all.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
         by_trial.next();
         for &i in own {
             if let (Some(vaf), Some(rating)) = (r.vaf[i], cells.centred[i])
-                && r.model[i].is_none_or(|m| counts[m as usize])
+                && r.model[i].is_none_or(|m| included[m as usize])
             {
                 by_trial.push(vaf, rating);
             }
@@ -313,7 +313,7 @@ fn within(cells: &Cells<'_>, models: &[usize], values: &mut Values) {
     }
 }
 
-/// Pairs by subject, in one piece.
+/// Pairs (x, y) of all subjects, and the number of pairs of each.
 #[derive(Default)]
 struct Flat {
     x: Vec<f64>,
@@ -322,7 +322,7 @@ struct Flat {
 }
 
 impl Flat {
-    /// Begins the next subject.
+    /// Starts the next subject.
     fn next(&mut self) {
         self.lengths.push(0);
     }

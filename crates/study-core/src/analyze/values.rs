@@ -1,19 +1,19 @@
-//! Statistics by identifier, each a number, a list, or the reason why not.
+//! Statistics by identifier: a number, a list, or the reason why it is undefined.
 
 use std::collections::BTreeMap;
 
 /// A statistic.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// A finite number; a flag is 0 or 1.
+    /// A finite number; flags are 0 or 1.
     Number(f64),
     /// Finite numbers.
     List(Vec<f64>),
-    /// Why it is not defined.
+    /// Why it is undefined.
     Undefined(String),
 }
 
-/// All statistics of an analysis. No number in it is NaN or infinite.
+/// The statistics of an analysis. No number is NaN or infinite.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Values(BTreeMap<String, Value>);
 
@@ -23,7 +23,7 @@ impl Values {
         self.0.get(id)
     }
 
-    /// Its number, if it is defined and one.
+    /// The value of a statistic that is a defined number.
     pub fn number(&self, id: &str) -> Option<f64> {
         match self.0.get(id) {
             Some(Value::Number(x)) => Some(*x),
@@ -31,7 +31,13 @@ impl Values {
         }
     }
 
-    /// Its numbers, if it is a list.
+    /// The bounds `ID_lo` and `ID_hi` of an interval, if both are defined.
+    pub fn interval(&self, id: &str) -> Option<(f64, f64)> {
+        let bound = |end: &str| self.number(&format!("{id}_{end}"));
+        bound("lo").zip(bound("hi"))
+    }
+
+    /// The values of a statistic that is a defined list.
     pub fn list(&self, id: &str) -> Option<&[f64]> {
         match self.0.get(id) {
             Some(Value::List(x)) => Some(x),
@@ -39,7 +45,7 @@ impl Values {
         }
     }
 
-    /// Why it is not defined, if it is not.
+    /// Why a statistic is undefined.
     pub fn reason(&self, id: &str) -> Option<&str> {
         match self.0.get(id) {
             Some(Value::Undefined(why)) => Some(why),
@@ -47,34 +53,34 @@ impl Values {
         }
     }
 
-    /// All, in the order of their identifiers.
+    /// All statistics, sorted by identifier.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> + Clone {
         self.0.iter().map(|(id, value)| (id.as_str(), value))
     }
 
-    /// Takes over all of another's.
-    pub(super) fn take(&mut self, mut other: Self) {
+    /// Adds all statistics of another set.
+    pub(super) fn extend(&mut self, mut other: Self) {
         self.0.append(&mut other.0);
     }
 
-    /// Says why anew of each that is not defined.
-    pub(super) fn explain(&mut self, why: impl Fn(&str) -> Option<String>) {
+    /// Replaces the reason of the undefined statistics whose identifiers match.
+    pub(super) fn explain(&mut self, matches: impl Fn(&str) -> bool, reason: &str) {
         for (id, value) in &mut self.0 {
-            if let (Value::Undefined(old), Some(new)) = (&mut *value, why(id)) {
-                *old = new;
+            if let (Value::Undefined(why), true) = (value, matches(id)) {
+                reason.clone_into(why);
             }
         }
     }
 
-    /// Copies one to another identifier.
+    /// Copies a statistic of another set to a new identifier.
     pub(super) fn copy(&mut self, from: &Self, id: &str, to: String) {
         if let Some(value) = from.0.get(id) {
             self.0.insert(to, value.clone());
         }
     }
 
-    /// A group of statistics under a prefix; `why` is the reason of those that
-    /// come without one of their own.
+    /// Starts a group of statistics with a common prefix; `why` is the default reason
+    /// of the undefined ones.
     pub(super) fn group(&mut self, prefix: impl Into<String>, why: impl Into<String>) -> Group<'_> {
         Group {
             values: self,
@@ -84,7 +90,7 @@ impl Values {
     }
 }
 
-/// Writes the statistics of one group.
+/// Adds the statistics of one group.
 pub(super) struct Group<'a> {
     values: &'a mut Values,
     prefix: String,
@@ -92,18 +98,18 @@ pub(super) struct Group<'a> {
 }
 
 impl Group<'_> {
-    /// A statistic that is always defined, but may have overflowed.
+    /// Adds a statistic that is always defined unless it overflows.
     pub(super) fn put(&mut self, name: &str, value: f64) {
         self.put_or(name, Some(value), "it overflows");
     }
 
-    /// A statistic that is undefined for the group's reason.
+    /// Adds a statistic that may be undefined for the group's reason.
     pub(super) fn maybe(&mut self, name: &str, value: Option<f64>) {
         let why = self.why.clone();
         self.put_or(name, value, &why);
     }
 
-    /// A statistic that is undefined for its own reason.
+    /// Adds a statistic that may be undefined for a reason of its own.
     pub(super) fn put_or(&mut self, name: &str, value: Option<f64>, why: &str) {
         let value = match value {
             Some(x) if x.is_finite() => Value::Number(x),
@@ -113,13 +119,13 @@ impl Group<'_> {
         self.insert(name, value);
     }
 
-    /// The two ends of an interval, `NAME_lo` and `NAME_hi`.
+    /// Adds the bounds of an interval, `NAME_lo` and `NAME_hi`.
     pub(super) fn interval(&mut self, name: &str, ends: Option<(f64, f64)>) {
         self.maybe(&format!("{name}_lo"), ends.map(|e| e.0));
         self.maybe(&format!("{name}_hi"), ends.map(|e| e.1));
     }
 
-    /// A list.
+    /// Adds a list.
     pub(super) fn list(&mut self, name: &str, list: Vec<f64>) {
         let value = if list.iter().all(|x| x.is_finite()) {
             Value::List(list)
@@ -129,7 +135,7 @@ impl Group<'_> {
         self.insert(name, value);
     }
 
-    /// Several that are undefined for the group's reason.
+    /// Adds several statistics that are undefined for the group's reason.
     pub(super) fn none(&mut self, names: &[&str]) {
         for name in names {
             self.maybe(name, None);

@@ -1,4 +1,4 @@
-//! What a reader has to know before believing a number.
+//! Warnings: what limits the interpretation of the results.
 
 use super::Rules;
 use super::cells::Cells;
@@ -7,18 +7,21 @@ use super::exclude::Applied;
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
 use super::values::Values;
+use super::verdicts::{has_memory, significant};
+use study_base::apa;
+use study_base::text::counted;
 use study_stats::permutation::{DRAWS, MAX_EXACT};
 
-/// A warning: a short name that stays, and a sentence.
+/// A warning.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// For programs.
+    /// A stable identifier for programs.
     pub code: &'static str,
-    /// For people. May hold names from the data: untrusted.
+    /// A sentence without capital and full stop. May contain names from the data: untrusted.
     pub text: String,
 }
 
-/// Below so many realizations, "VAF predicts the rating" is read with care.
+/// With fewer realizations a test of "VAF predicts the rating" has little power.
 const ENOUGH_REALIZATIONS: f64 = 8.0;
 
 pub(super) fn warnings(
@@ -35,22 +38,22 @@ pub(super) fn warnings(
     if others > 0 && real == 0 {
         warn(
             "no-participants",
-            format!("{}; this is no evidence", who(counts)),
+            format!("only {}: the results are not evidence", who(counts)),
         );
     } else if counts.rows > 0 && counts.real_rows == 0 {
-        // whoever took part was left out, and was nobody real
-        let text = "only pilots or simulated participants; this is no evidence";
+        // All pilots and simulated participants are excluded as well.
+        let text = "only pilots or simulated participants: the results are not evidence";
         warn("no-participants", text.to_owned());
     } else if others > 0 {
-        warn("mixed", format!("among the participants: {}", who(counts)));
+        warn("mixed", format!("the analysis includes {}", who(counts)));
     }
     if counts.interim() {
         let planned = counts.planned.unwrap_or(0);
         warn(
             "interim",
             format!(
-                "interim: {} of {planned} planned participants {} finished; looking early and \
-                 stopping when it pleases makes every p too small",
+                "interim: {} of {planned} planned participants {} finished; optional stopping \
+                 inflates false positives",
                 counts.finished,
                 if counts.finished == 1 { "has" } else { "have" }
             ),
@@ -59,14 +62,13 @@ pub(super) fn warnings(
     for change in &rules.deviations {
         warn(
             "deviation",
-            format!("deviation from what was stated beforehand: {}", change.text),
+            format!("deviation from the preregistered analysis: {}", change.text),
         );
     }
     if counts.participants == 1 && counts.rated > 0 {
         warn(
             "one-participant",
-            "only one participant is analysed: the results tell of that one, and nothing about \
-             people in general"
+            "only one participant is analysed: the results do not generalise to other people"
                 .to_owned(),
         );
     }
@@ -80,10 +82,16 @@ pub(super) fn warnings(
 }
 
 fn who(counts: &Counts) -> String {
+    let pilots = counted(counts.pilots, "pilot participant", "pilot participants");
+    let simulated = counted(
+        counts.simulated,
+        "simulated participant",
+        "simulated participants",
+    );
     match (counts.pilots, counts.simulated) {
-        (0, s) => format!("{s} simulated"),
-        (p, 0) => counted(p, "pilot", "pilots"),
-        (p, s) => format!("{} and {s} simulated", counted(p, "pilot", "pilots")),
+        (0, _) => simulated,
+        (_, 0) => pilots,
+        _ => format!("{pilots} and {simulated}"),
     }
 }
 
@@ -94,20 +102,20 @@ fn excluded(
     values: &Values,
 ) {
     let (first, later) = if changed {
-        ("the", " (the rules were changed after the study began)")
+        ("the", " (changed after the study began)")
     } else {
-        ("the pre-stated", "")
+        ("the preregistered", "")
     };
     for e in exclusions {
         if let Some(problem) = e.problem {
-            let text = format!("{first} exclusion `{}`{later}: {problem}", e.rule);
+            let text = format!("{first} exclusion rule `{}`{later}: {problem}", e.rule);
             warn("rule-not-judged", text);
         }
         if e.rows > 0 {
             warn(
                 "excluded",
                 format!(
-                    "{first} exclusion `{}`{later} left out {} of {}",
+                    "{first} exclusion rule `{}`{later} excluded {} of {}",
                     e.rule,
                     counted(e.rows, "row", "rows"),
                     people(e.participants)
@@ -120,17 +128,11 @@ fn excluded(
         before.zip(values.number(id))
     };
     if let Some((before, after)) = both("corr/pearson/r") {
-        let text = if shown(before) == shown(after) {
-            format!(
-                "without the exclusions r would be the same to three digits, {}",
-                shown(after)
-            )
+        let (before, after) = (apa::r(before), apa::r(after));
+        let text = if before == after {
+            format!("the exclusions do not change r to three decimals: r = {after}")
         } else {
-            format!(
-                "without the exclusions r would be {}, not {}: both are in the tables",
-                shown(before),
-                shown(after)
-            )
+            format!("without the exclusions r would be {before} instead of {after}: see the tables")
         };
         warn("with-and-without", text);
     }
@@ -145,15 +147,17 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
         warn(
             "few-realizations",
             format!(
-                "VAF varies between {n} realizations only: there are {n} points, however many \
-                 participants rated"
+                "VAF varies only between the {n} realizations: the correlation rests on {n} points, \
+                 whatever the number of participants"
             ),
         );
     }
     if n > MAX_EXACT as f64 {
         warn(
             "monte-carlo",
-            format!("permutation p from {DRAWS} random orders of the realizations, not from all"),
+            format!(
+                "the permutation p is estimated from {DRAWS} random orders of the realizations"
+            ),
         );
     }
     let ends = [
@@ -166,10 +170,10 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
         warn(
             "one-realization",
             format!(
-                "the correlation hangs on single realizations: with one left out, r lies between \
-                 {} and {}",
-                shown(low),
-                shown(high)
+                "the correlation is driven by single realizations: with one left out, r lies \
+                 between {} and {}",
+                apa::r(low),
+                apa::r(high)
             ),
         );
     }
@@ -179,31 +183,30 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
         warn(
             "not-linear",
             format!(
-                "r = {} and rho = {} differ: the relation is no line, or one point is far out",
-                shown(r),
-                shown(rho)
+                "r = {} and rho = {} differ: the relation is not linear, or there is an outlier",
+                apa::r(r),
+                apa::r(rho)
             ),
         );
     }
-    let f = values.number("rmanova/p_gg").is_some_and(|p| p < 0.05);
-    let flat = values.number("corr/pearson/p_t").is_some_and(|p| p >= 0.05);
+    let f = values.number("rmanova/p_gg").is_some_and(significant);
+    let flat = values
+        .number("corr/pearson/p_t")
+        .is_some_and(|p| !significant(p));
     if f && flat {
         warn(
             "differ-without-trend",
-            "the realizations differ, but that they do so along VAF is not shown: look at their \
-             means, not at the slope alone"
+            "the realizations differ, but a linear relation with VAF is not shown: look at the \
+             means, not only at the slope"
                 .to_owned(),
         );
     }
-    // Only what was identified with forgetting factors has them.
-    let identified = values.get("covariate/log10_memory/r").is_some();
-    let text = if identified {
-        "the permutation takes the realizations as exchangeable, which neighbours on one ladder \
-         of lambda are not; what goes along with VAF, such as lambda or activeness, cannot be \
-         told from it"
+    let text = if has_memory(values) {
+        "the permutation test assumes exchangeable realizations, and realizations with adjacent \
+         lambda are not; the effect of VAF is confounded with lambda and activeness"
     } else {
-        "the permutation takes the realizations as exchangeable; what goes along with VAF cannot \
-         be told from it"
+        "the permutation test assumes exchangeable realizations; the effect of VAF is confounded \
+         with everything that correlates with it"
     };
     warn("assumptions", text.to_owned());
 }
@@ -215,8 +218,8 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
         warn(
             "incomplete",
             format!(
-                "{} did not rate every test realization and {} left out of what needs complete \
-                 tables",
+                "{} did not rate every test realization and {} excluded from the analyses that \
+                 need complete data",
                 people(incomplete as usize),
                 if incomplete == 1.0 { "is" } else { "are" }
             ),
@@ -226,8 +229,8 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     if sizes.iter().min() != sizes.iter().max() {
         warn(
             "unbalanced",
-            "cells hold different numbers of ratings: the mean over ratings is not the mean over \
-             participants"
+            "the cells contain different numbers of ratings: the mean over ratings differs from \
+             the mean over participants"
                 .to_owned(),
         );
     }
@@ -241,7 +244,7 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     for (m, model) in r.models.iter().enumerate() {
         if !cells.rated[m] {
             let text = format!(
-                "nobody rated realization {}: it is left out of all comparisons",
+                "nobody rated realization {}: it is excluded from all comparisons",
                 model.id
             );
             warn("not-rated", text);
@@ -250,7 +253,7 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
             warn(
                 "vaf-differs",
                 format!(
-                    "realization {} has rows with different VAF; it has none here",
+                    "the rows of realization {} have different VAF: it is analysed without VAF",
                     model.id
                 ),
             );
@@ -259,20 +262,18 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     if values.number("screen/listed") == Some(0.0) {
         warn(
             "many-participants",
-            format!(
-                "more than {MAX_LISTED} participants: they are screened, but not listed one by one"
-            ),
+            format!("more than {MAX_LISTED} participants: they are screened but not listed"),
         );
     }
     if values.number("bootstrap/normal_limit") == Some(1.0) {
         warn(
             "normal-limit",
-            "so many participants that the bootstrap draws means from their normal limit"
+            "with so many participants the bootstrap draws means from their normal limit"
                 .to_owned(),
         );
     }
     if r.model.contains(&None) {
-        warn("no-model", "some ratings name no realization".to_owned());
+        warn("no-model", "some ratings have no realization".to_owned());
     }
 }
 
@@ -296,29 +297,12 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     warn(
         "constant-rater",
         format!(
-            "{} gave the same rating every time: {shown}{more} (kept)",
+            "{} always gave the same rating: {shown}{more} (not excluded)",
             people(constant)
         ),
     );
 }
 
-/// A correlation as the pages print it: three decimals, no zero before the point, a
-/// real minus and no negative zero.
-fn shown(r: f64) -> String {
-    let digits = format!("{:.3}", r.abs());
-    let sign = if r < 0.0 && digits != "0.000" {
-        "−"
-    } else {
-        ""
-    };
-    format!("{sign}{}", digits.strip_prefix('0').unwrap_or(&digits))
-}
-
 fn people(n: usize) -> String {
     counted(n, "participant", "participants")
-}
-
-/// `one` or so many `many`.
-fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
 }

@@ -26,11 +26,18 @@ pub struct Realization {
     pub id: String,
     /// Its role in the study.
     pub role: Role,
-    /// The realization of which it is a hidden repeat.
+    /// The realization of which it is a hidden duplicate.
     pub duplicate_of: Option<String>,
     /// Covariates by name; with telemetry also `least_energy_j`, J, the mean over its
     /// playbacks.
     pub covariates: BTreeMap<String, f64>,
+}
+
+impl Realization {
+    /// Whether it takes part in the tests: role `test` and no hidden duplicate.
+    pub fn is_tested(&self) -> bool {
+        self.role == Role::Test && self.duplicate_of.is_none()
+    }
 }
 
 /// The kind of participant that a row is from.
@@ -215,7 +222,7 @@ impl Ratings {
         builder.finish()
     }
 
-    /// Marks hidden repeats, given as (repeat, original).
+    /// Marks hidden duplicates, given as (repeat, original).
     pub fn set_duplicates<'a>(&mut self, pairs: impl IntoIterator<Item = (&'a str, &'a str)>) {
         for (repeat, original) in pairs {
             if let Some(model) = self.models.iter_mut().find(|m| m.id == repeat) {

@@ -1,4 +1,5 @@
-//! `study analyze --possible`: which data can give a printed mean and SD.
+//! `study analyze --possible`: checks whether whole ratings can have a published mean
+//! and SD (GRIM and GRIMMER).
 
 use crate::cli::{Console, Failure};
 use serde_json::json;
@@ -8,7 +9,7 @@ use study_stats::grim::{
     MAX_COUNTED, MAX_N, MAX_SCALE, PrintedNumber, Published, SdCheck, SdOver, check, possible_sums,
 };
 
-/// The name and version of the document.
+/// Name and version of the JSON format.
 const FORMAT: &str = "study-possible/1";
 
 pub(super) fn run(given: &[String], as_json: bool, console: &mut Console) -> Result<(), Failure> {
@@ -37,7 +38,7 @@ fn parse(given: &[String]) -> Result<Published, Failure> {
         };
         let count = |most: u32| {
             let n = value.parse().ok().filter(|n| (1..=most).contains(n));
-            n.ok_or_else(|| bad(&format!("a whole number from 1 to {most} is wanted")))
+            n.ok_or_else(|| bad(&format!("expected a whole number from 1 to {most}")))
         };
         let twice = match key {
             "mean" => mean.replace(printed()?).is_some(),
@@ -52,13 +53,13 @@ fn parse(given: &[String]) -> Result<Published, Failure> {
                     };
                     Some((whole(low)?, whole(high)?)).filter(|(low, high)| low < high)
                 });
-                let wanted = "a scale is two whole numbers, lowest first, such as 1..7";
+                let wanted = "expected two whole numbers, lowest first, such as 1..7";
                 scale.replace(ends.ok_or_else(|| bad(wanted))?).is_some()
             }
-            _ => return Err(bad("there are mean, sd, n, scale and each")),
+            _ => return Err(bad("unknown key; the keys are mean, sd, n, scale and each")),
         };
         if twice {
-            return Err(bad("it is there twice"));
+            return Err(bad("given twice"));
         }
     }
     let need = |key: &str| Failure::input(format!("--possible needs {key}=…"));
@@ -72,16 +73,16 @@ fn parse(given: &[String]) -> Result<Published, Failure> {
     if let Some(each) = each
         && !published.n.is_multiple_of(each)
     {
-        let odd = format!("{} ratings are not {each} of each subject", published.n);
+        let odd = format!("n={} is no multiple of each={each}", published.n);
         return Err(Failure::input(odd));
     }
     if published.sd.digits < 0 {
-        return Err(Failure::input("a standard deviation is not below 0"));
+        return Err(Failure::input("sd must not be negative"));
     }
     Ok(published)
 }
 
-/// A printed number as it was given.
+/// A number as it was given.
 fn as_given(x: PrintedNumber) -> String {
     let digits = usize::try_from(x.decimals).unwrap_or(0);
     let sign = if x.digits < 0 { "-" } else { "" };
@@ -122,13 +123,13 @@ fn page(q: &Published, found: &[SdCheck]) -> String {
     let _ = match all[..] {
         [] => writeln!(
             out,
-            "The mean is impossible: no whole sum over {} gives it.",
+            "The mean is impossible: no whole sum divided by {} rounds to it.",
             q.n
         ),
         [one] => writeln!(out, "The mean is possible: the ratings sum to {one}."),
         [first, .., last] => writeln!(
             out,
-            "The mean is possible: the ratings sum to one of {} numbers from {first} to {last}.",
+            "The mean is possible: {} sums of the ratings, from {first} to {last}, round to it.",
             all.len()
         ),
     };
@@ -137,7 +138,7 @@ fn page(q: &Published, found: &[SdCheck]) -> String {
     }
     let _ = writeln!(
         out,
-        "Of {} definitions of the SD {} can have given it.",
+        "Of {} definitions of the SD, {} can give the published value.",
         found.len(),
         match found.iter().filter(|f| f.count > 0).count() {
             0 => "none".to_owned(),
@@ -174,9 +175,9 @@ fn page(q: &Published, found: &[SdCheck]) -> String {
         }
         if f.count == 0 {
             let why = match f.unattainable.first() {
-                None => "no whole sum of squares gives it".to_owned(),
+                None => "no whole sum of squares rounds to it".to_owned(),
                 Some(s) if (s.squares - s.sum).rem_euclid(2) == 1 => format!(
-                    "the {squares} would sum to {}, the ratings to {}: one is odd, the other even",
+                    "the {squares} would sum to {} and the ratings to {}, but one is odd and the other even",
                     s.squares, s.sum
                 ),
                 Some(s) => format!(

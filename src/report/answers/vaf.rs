@@ -1,0 +1,263 @@
+//! VAF, the forgetting factor and other covariates as predictors of the mean rating.
+
+use super::Answer;
+use crate::report::{apa, sentences};
+use study_core::analyze::{Analysis, TestKind, Value};
+use study_stats::permutation::DRAWS;
+
+/// Covariates in a list.
+const MAX_COVARIATES: usize = 8;
+
+/// Whether VAF predicts the rating.
+pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
+    let v = &a.values;
+    let question = format!("Does VAF predict {}?", sentences::asked(a));
+    let Some(r) = v.number("corr/pearson/r") else {
+        let any_vaf = a.realizations.iter().any(|m| m.vaf.is_some());
+        let why = v.reason("corr/pearson/r").filter(|_| any_vaf)?;
+        return Some(Answer::new(
+            &question,
+            format!("Cannot be determined: {why}."),
+        ));
+    };
+    let n = v.number("corr/n_models").unwrap_or(0.0);
+    let test = a.permutation_test("pearson");
+    let verdict = match test {
+        Some(test) if test.is_significant() => format!(
+            "Yes: over these {n} realizations, those with a higher VAF are rated {}",
+            if r > 0.0 { "higher" } else { "lower" }
+        ),
+        Some(_) => format!("Not shown over these {n} realizations"),
+        None => format!("Over {n} realizations"),
+    };
+    let ci = sentences::ci(a, "corr/pearson/ci95", apa::r);
+    let p = sentences::permutation_p(test);
+    let sides = if test.is_some() { " (two-sided)" } else { "" };
+    let mut answer = Answer::new(
+        &question,
+        format!("{verdict}: r = {}{ci}{p}{sides}.", apa::r(r)),
+    );
+    answer.main.extend(points(a, n));
+    answer.main.extend(sentences::ties(a));
+    if let (Some((low, high)), Some(test)) = (v.interval("corr/pearson/ci95"), test)
+        && (low * high > 0.0) != test.is_significant()
+    {
+        answer.more.push(
+            "The confidence interval and p disagree: the interval (Fisher's z) assumes normally \
+             distributed VAF and means, the permutation test does not. Rely on p."
+                .to_owned(),
+        );
+    }
+    answer.main.extend(crossed(a));
+    if let Some(rho) = v.number("corr/spearman/rho") {
+        let tau = v
+            .number("corr/kendall/tau_b")
+            .map_or_else(String::new, |tau| {
+                let p = sentences::permutation_p(a.permutation_test("kendall"));
+                format!("; Kendall's τb = {}{p}", apa::r(tau))
+            });
+        answer.main.push(format!(
+            "Rank correlations: Spearman's ρ = {}{}{tau}.",
+            apa::r(rho),
+            sentences::permutation_p(a.permutation_test("spearman"))
+        ));
+    }
+    let bounds = v
+        .number("corr/leave_one_out/pearson_min")
+        .zip(v.number("corr/leave_one_out/pearson_max"));
+    if let Some((low, high)) = bounds {
+        answer.main.push(format!(
+            "Leaving out one realization at a time, r ranges from {} to {}.",
+            apa::r(low),
+            apa::r(high)
+        ));
+    }
+    answer.main.extend(sentences::sole_influence(a));
+    if let Some(share) = v.number("corr/share/r2") {
+        let adjusted = v.number("corr/share/r2_adjusted");
+        let adjusted = adjusted.map_or_else(String::new, |x| {
+            format!(" (adjusted for their number: {})", apa::percent(x.max(0.0)))
+        });
+        answer.more.push(format!(
+            "VAF explains {} of the variance between the means of the realizations{adjusted}.",
+            apa::percent(share)
+        ));
+    }
+    Some(answer)
+}
+
+/// The number of points and the p that it allows.
+fn points(a: &Analysis, n: f64) -> Option<String> {
+    let smallest = a.values.number("corr/pearson/smallest_p_two_sided")?;
+    let smallest = match a.permutation_test("pearson")?.kind {
+        TestKind::PermutationExact => format!(
+            "the smallest p that {n} realizations can give is {}",
+            apa::of_orders(smallest, n)
+        ),
+        _ => format!(
+            "p is estimated from {DRAWS} random orders of the realizations and cannot be below 1/{}",
+            DRAWS + 1
+        ),
+    };
+    let critical = a.values.number("corr/pearson/critical_r");
+    let critical = critical.map_or_else(String::new, |r| {
+        format!("; in a t test, p < .05 requires |r| > {}", apa::r(r))
+    });
+    Some(format!(
+        "VAF varies only between realizations, so the correlation rests on {n} points, whatever the \
+         number of participants: {smallest}{critical}."
+    ))
+}
+
+/// The mixed model with crossed random effects.
+fn crossed(a: &Analysis) -> Option<String> {
+    let slope = sentences::slope_on_vaf(a, "lmm_vaf_crossed")?;
+    let get = |id: &str| a.values.number(&format!("lmm_vaf_crossed/{id}"));
+    let between = get("var_model_without_vaf").zip(get("var_model"));
+    let between = between.map_or_else(String::new, |(without, with)| {
+        format!(
+            " The variance between realizations is {} without VAF in the model and {} with it.",
+            apa::number(without, 3),
+            apa::number(with, 3)
+        )
+    });
+    let singular = match a.no_variance_beside_vaf() {
+        Some(true) => {
+            " The fit is singular: besides VAF no variance between realizations is left, so p is \
+             too small and does not generalise to other realizations."
+        }
+        Some(false) => {
+            " Another variance component is estimated as 0 (a singular fit); the variance between \
+             realizations, on which p rests, is not."
+        }
+        None => "",
+    };
+    Some(format!(
+        "Mixed model with crossed random effects of subjects and realizations: {slope}.{between}\
+         {singular}"
+    ))
+}
+
+/// Whether the forgetting factor or other covariates matter.
+pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
+    let v = &a.values;
+    let get = |id: &str| v.number(&format!("covariate/log10_memory/{id}"));
+    let others = others(a);
+    let short = match (get("r"), v.reason("covariate/log10_memory/r")) {
+        (Some(r), _) => {
+            let test = get("t").zip(get("df")).zip(get("p"));
+            let test = test.map_or_else(String::new, |((t, df), p)| {
+                let (df, t, p) = (apa::number(df, 0), apa::two(t), apa::p(p));
+                format!(", t({df}) = {t}, p {p}")
+            });
+            let unit = match get("in_mm") {
+                Some(1.0) => "mm",
+                _ => "samples",
+            };
+            format!(
+                "{}; mean rating against log10 of the memory in {unit}: r = {}{test}.",
+                sentences::memory_verdict(r, get("p"), get("quadratic/p")),
+                apa::r(r)
+            )
+        }
+        (None, Some(why)) => format!("Cannot be determined: {why}."),
+        (None, None) if others.is_empty() => return None,
+        (None, None) => "Correlations of the mean rating with the covariates:".to_owned(),
+    };
+    let question = if a.has_memory() {
+        "Does the forgetting factor matter?"
+    } else {
+        "Do the covariates matter?"
+    };
+    let mut answer = Answer::new(question, short);
+    answer.main.extend(curvature(a));
+    if let Some(r) = get("r_with_vaf") {
+        answer.main.push(format!(
+            "Over these realizations memory and VAF correlate at r = {}: their effects are \
+             confounded.",
+            apa::r(r)
+        ));
+    }
+    if others.len() > 1 {
+        answer.more.push(
+            "Each covariate is tested separately, by a t test over the realizations, without a \
+             correction for their number."
+                .to_owned(),
+        );
+    }
+    answer.more.extend(others);
+    if get("r").is_some() {
+        answer.more.push(
+            "The memory is the length over which the identification averages: the closer the \
+             forgetting factor λ is to 1, the longer."
+                .to_owned(),
+        );
+    }
+    Some(answer)
+}
+
+fn curvature(a: &Analysis) -> Option<String> {
+    let get = |id: &str| {
+        a.values
+            .number(&format!("covariate/log10_memory/quadratic/{id}"))
+    };
+    let ((b, p), df) = get("square").zip(get("p")).zip(get("df"))?;
+    let direction = if b < 0.0 { "downward" } else { "upward" };
+    let df = apa::number(df, 0);
+    let both = get("F").zip(get("p_F")).map_or_else(String::new, |(f, p)| {
+        let (f, p) = (apa::two(f), apa::p(p));
+        format!(" Both terms jointly: F(2, {df}) = {f}, p {p}.")
+    });
+    Some(format!(
+        "Quadratic term: b = {} (a {direction} curve), t({df}) = {}, p {}. The linear and the \
+         quadratic term are two tests of one question, each at the level .025.{both}",
+        apa::two(b),
+        apa::or_dash(get("t"), apa::two),
+        apa::p(p)
+    ))
+}
+
+/// A sentence for each covariate other than the logarithm of the memory.
+fn others(a: &Analysis) -> Vec<String> {
+    let v = &a.values;
+    let covariates = v.iter().filter_map(|(id, value)| {
+        let name = id.strip_prefix("covariate/")?.strip_suffix("/r")?;
+        // The memory in mm is covered by its logarithm.
+        let covered = name == "memory_mm" && v.number("covariate/log10_memory/r").is_some();
+        (name != "log10_memory" && !covered).then_some((name, value))
+    });
+    covariates
+        .filter_map(|(name, value)| {
+            let what = described(name);
+            match value {
+                Value::Number(r) => {
+                    let get = |what: &str| v.number(&format!("covariate/{name}/{what}"));
+                    let p = get("p").map_or_else(String::new, |p| format!(", p {}", apa::p(p)));
+                    let with_vaf = get("r_with_vaf").map_or_else(String::new, |r| {
+                        format!(" (with VAF it correlates at r = {})", apa::r(r))
+                    });
+                    let r = apa::r(*r);
+                    Some(format!("Mean rating against {what}: r = {r}{p}{with_vaf}."))
+                }
+                Value::Undefined(why) => Some(format!("Mean rating against {what}: {why}.")),
+                Value::List(_) => None,
+            }
+        })
+        .take(MAX_COVARIATES)
+        .collect()
+}
+
+/// The meaning of the program's own covariates; others by their names.
+fn described(name: &str) -> String {
+    match name {
+        "least_energy_j" => {
+            "the minimum energy absorbed by the device (J, over playbacks; negative if the device \
+             was active)"
+                .to_owned()
+        }
+        "lambda" => "the forgetting factor λ".to_owned(),
+        "memory_mm" => "the memory (mm)".to_owned(),
+        "dx_mm" => "the resampling increment dx (mm)".to_owned(),
+        other => apa::name(other),
+    }
+}
