@@ -11,7 +11,7 @@ pub(super) struct Args {
     results: PathBuf,
     /// The amended protocol.toml, or the folder that holds it
     protocol: PathBuf,
-    /// Why; it is kept
+    /// Reason; it is recorded
     #[arg(long, value_name = "TEXT")]
     reason: String,
 }
@@ -25,7 +25,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut studies = study_folder::studies(&args.results)?;
     studies.retain(|s| s.manifest().study == *id);
     let Some(mut study) = studies.pop() else {
-        let none = format!("{}: no study `{id}` there", args.results.display());
+        let none = format!("{}: contains no study `{id}`", args.results.display());
         return Err(Failure::input(none).hint("a protocol with another id is another study"));
     };
     let frozen = Frozen {
@@ -35,7 +35,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let version = study.amend(&frozen, reason, study_folder::now())?;
     console.out(format!(
-        "{id}: version {version} of the protocol is frozen. Sessions that start from now on record it.\n"
+        "{id}: froze version {version} of the protocol. New sessions use it.\n"
     ))?;
     study_folder::refresh(&study, console)
 }

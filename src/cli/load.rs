@@ -1,9 +1,7 @@
-//! Opens a protocol and everything it names, and joins them.
+//! Loading a protocol with its model files and its orders file.
 //!
-//! The protocol is read first, then each model file and the orders file, once
-//! each; every fault of every file is collected before anything is refused. What
-//! only shows once they stand together is checked here: VAFs that differ, orders
-//! that cannot be made.
+//! All files are read, each once, and all their faults are collected. Checks that
+//! need several files follow: VAFs that differ, orders that cannot be made.
 
 use super::Failure;
 use std::collections::BTreeMap;
@@ -23,36 +21,36 @@ mod join;
 const MAX_MODEL_BYTES: usize = 16 * 1024 * 1024;
 const MAX_ORDERS_BYTES: usize = 64 * 1024 * 1024;
 
-/// What to do about a table that fails its certificate.
+/// Hint for a table that fails its certificate.
 pub(super) const PERMIT: &str = "identify it with m, b >= 0, or permit it in [device]: uncertified = { play = true, force_n = ..., reason = \"...\" }";
 
-/// The name of a protocol in its folder.
+/// File name of a protocol in its folder.
 pub const FILE_NAME: &str = "protocol.toml";
 
-/// A protocol and everything it names.
+/// A protocol with all its files.
 #[derive(Debug)]
 pub struct Loaded {
-    /// With the VAFs of the model files filled in.
+    /// Protocol, including the VAFs of the model files.
     pub protocol: Protocol,
-    /// Where the protocol and its models are.
+    /// Folder of the protocol.
     pub folder: PathBuf,
-    /// The protocol file itself.
+    /// Path of the protocol file.
     pub path: PathBuf,
     /// The table of each realization that has a file.
     pub models: BTreeMap<ModelId, Realization>,
     /// The orders file, if the design has one.
     pub orders: Option<FileOrders>,
-    /// What has to be copied to keep the study: relative path, with `/`, and
-    /// bytes; `protocol.toml` first, then each other file once.
+    /// The files of the study: relative path, separated by `/`, and bytes;
+    /// `protocol.toml` first, then each other file once.
     pub files: Vec<(String, Vec<u8>)>,
-    /// Of the whole study.
+    /// Fingerprints of the study.
     pub fingerprints: Fingerprints,
     /// The warnings of all files.
     pub findings: Vec<Findings>,
 }
 
 impl Loaded {
-    /// Trials of a session, practice included.
+    /// Number of trials of a session, including practice.
     pub fn trials(&self) -> usize {
         match self.orders.as_ref().and_then(|rows| rows.values().next()) {
             Some(row) => row.len() + self.protocol.design.practice.len(),
@@ -61,10 +59,10 @@ impl Loaded {
     }
 }
 
-/// Opens the protocol at `path`, a `protocol.toml` or the folder that holds one.
+/// Loads the protocol at `path`, a `protocol.toml` or the folder that contains one.
 ///
 /// # Errors
-/// [`Failure`] with all faults of all files if any is an error.
+/// [`Failure`] with all faults of all files if any of them is an error.
 pub fn load(path: &Path) -> Result<Loaded, Failure> {
     match examine(path) {
         (Some(loaded), _) => Ok(loaded),
@@ -72,8 +70,8 @@ pub fn load(path: &Path) -> Result<Loaded, Failure> {
     }
 }
 
-/// Opens the frozen protocol of a study that has begun, to read what was gathered:
-/// what would only be refused to be played is not refused.
+/// Loads the frozen protocol of a running study in order to read its data: tables
+/// that must not be played are accepted.
 ///
 /// # Errors
 /// As [`load`].
@@ -84,13 +82,13 @@ pub fn load_frozen(path: &Path) -> Result<Loaded, Failure> {
     }
 }
 
-/// Opens the protocol at `path` and tells everything that was found, errors and
-/// warnings. The protocol is there if there are no errors.
+/// Loads the protocol at `path`; returns all errors and warnings, and the protocol if
+/// there are no errors.
 pub fn examine(path: &Path) -> (Option<Loaded>, Vec<Findings>) {
     open(path, true)
 }
 
-/// `to_play`: tables that fail their certificate are refused, unless permitted.
+/// With `to_play`, tables that fail their certificate are errors unless permitted.
 fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
     let path = if path.is_dir() {
         path.join(FILE_NAME)
@@ -101,8 +99,8 @@ fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
     let bytes = match read_capped(&path, file::MAX_FILE_BYTES) {
         Ok(bytes) => bytes,
         Err(problem) => {
-            let fault = Fault::error(problem)
-                .hint("PROTOCOL is a protocol.toml or the folder that holds one");
+            let fault = Fault::error(problem.to_string())
+                .hint("PROTOCOL is a protocol.toml or the folder that contains one");
             return (None, vec![alone(shown, fault)]);
         }
     };
@@ -120,7 +118,7 @@ fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
         Some(parent) if parent != Path::new("") => parent.to_owned(),
         _ => PathBuf::from("."),
     };
-    let mut others = Others::new(&folder);
+    let mut others = OtherFiles::new(&folder);
     for name in named {
         if let Err(fault) = others.open(&name) {
             let place = spans.get(&name.place).cloned();
@@ -137,7 +135,7 @@ fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
         join::certificates(&protocol, &others, &spans, &mut findings);
     }
     let orders = others.orders.take();
-    // Without its file an order is not infeasible, only unknown.
+    // An order whose file is missing cannot be checked.
     if orders.is_some() || !matches!(protocol.design.order, Order::File(_)) {
         join::orders(&protocol, orders.as_ref(), &spans, &mut findings);
     }
@@ -168,9 +166,9 @@ fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
     (Some(loaded), all)
 }
 
-/// The files beside the protocol, each read once.
+/// The other files of a protocol, each read once.
 #[derive(Debug)]
-struct Others<'f> {
+struct OtherFiles<'f> {
     folder: &'f Path,
     /// In the order of the protocol.
     opened: Vec<Opened>,
@@ -187,7 +185,7 @@ struct Opened {
     findings: Findings,
 }
 
-impl<'f> Others<'f> {
+impl<'f> OtherFiles<'f> {
     fn new(folder: &'f Path) -> Self {
         Self {
             folder,
@@ -197,8 +195,8 @@ impl<'f> Others<'f> {
         }
     }
 
-    /// Reads a file that the protocol names, if that has not been done. The fault
-    /// is about the protocol; those of the file itself are kept with it.
+    /// Reads a file that the protocol names, once. The returned fault concerns the
+    /// protocol; the faults of the file itself are kept with the file.
     fn open(&mut self, name: &Named) -> Result<(), Fault> {
         if self.opened.iter().any(|o| o.file == name.file) {
             return Ok(());
@@ -240,7 +238,7 @@ impl<'f> Others<'f> {
         Ok(())
     }
 
-    /// Says which realization is in which file.
+    /// Assigns each realization its file.
     fn assign(&mut self, protocol: &Protocol) {
         for model in &protocol.models {
             let index = self
@@ -253,7 +251,7 @@ impl<'f> Others<'f> {
         }
     }
 
-    /// Those whose file is missing or wrong.
+    /// The realizations whose file is missing or faulty.
     fn unread<'p>(&self, protocol: &'p Protocol) -> Vec<&'p ModelId> {
         let models = protocol.models.iter().filter(|m| m.file.is_some());
         let unread = models.filter(|m| self.realization(&m.id).is_none());
@@ -285,7 +283,8 @@ impl<'f> Others<'f> {
             .collect()
     }
 
-    /// Those of all files, the protocol's first; files without any are left out.
+    /// The findings of all files, the protocol's first; files without findings are
+    /// omitted.
     fn findings(self, protocol: Findings) -> Vec<Findings> {
         std::iter::once(protocol)
             .chain(self.opened.into_iter().map(|o| o.findings))
@@ -309,26 +308,39 @@ fn text_of(bytes: &[u8]) -> Result<&str, Fault> {
     })
 }
 
-/// The bytes of an ordinary file of at most `most` bytes; else what is wrong with
-/// it. What it is, is asked before it is opened: a pipe would be waited for.
-fn read_capped(path: &Path, most: usize) -> Result<Vec<u8>, String> {
-    let size = |n: usize| format!("{} KiB", n / 1024);
+/// Why a file cannot be read.
+#[derive(Debug, thiserror::Error)]
+enum ReadError {
+    #[error("there is no such file")]
+    NotFound,
+    #[error("it is a folder")]
+    Folder,
+    #[error("it is not a regular file")]
+    NotRegular,
+    #[error("it has more than {} KiB", .0 / 1024)]
+    TooLarge(usize),
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+}
+
+/// Reads a regular file of at most `most` bytes. Its type is checked before it is
+/// opened, because opening a pipe would block.
+fn read_capped(path: &Path, most: usize) -> Result<Vec<u8>, ReadError> {
     let metadata = fs::metadata(path).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
-        _ => e.to_string(),
+        std::io::ErrorKind::NotFound => ReadError::NotFound,
+        _ => ReadError::Io(e),
     })?;
     if metadata.is_dir() {
-        return Err("it is a folder".to_owned());
+        return Err(ReadError::Folder);
     }
     if !metadata.is_file() {
-        return Err("it is no ordinary file".to_owned());
+        return Err(ReadError::NotRegular);
     }
     let mut bytes = Vec::new();
-    fs::File::open(path)
-        .and_then(|file| file.take(most as u64 + 1).read_to_end(&mut bytes))
-        .map_err(|e| e.to_string())?;
+    let file = fs::File::open(path)?;
+    file.take(most as u64 + 1).read_to_end(&mut bytes)?;
     if bytes.len() > most {
-        return Err(format!("it has more than {}", size(most)));
+        return Err(ReadError::TooLarge(most));
     }
     Ok(bytes)
 }

@@ -14,30 +14,30 @@ pub(super) struct Args {
     results: PathBuf,
     /// Participant
     id: String,
-    /// What became of them
+    /// New state
     #[arg(long, value_enum)]
     state: Settable,
-    /// Why; it is kept
+    /// Reason; it is recorded
     #[arg(long, value_name = "TEXT")]
     reason: String,
-    /// Remove everything that they gave, for good; only the fact that they took part
-    /// stays. analysis/ is removed too, for ratings and comments of theirs are in it
+    /// Permanently delete all data of the participant; only a record that they took
+    /// part remains. Also deletes analysis/, which contains ratings and comments
     #[arg(long)]
     erase: bool,
 }
 
-/// The states that are set from outside a session.
+/// The states that this command can set.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Settable {
     /// Started by mistake; only before the first rating
     Void,
     /// Did not come
     NoShow,
-    /// Broke off
+    /// Dropped out during the session
     DroppedOut,
-    /// Not analysed
+    /// Excluded from the analysis
     Excluded,
-    /// Took back what was given
+    /// Withdrew consent
     Withdrawn,
 }
 
@@ -53,13 +53,13 @@ impl From<Settable> for State {
     }
 }
 
-/// Sets the state and says what that means for the row.
+/// Sets the state and prints the consequences.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if args.erase && matches!(args.state, Settable::Excluded) {
         return Err(Failure::input(
-            "exclusion keeps the data, and --erase removes them",
+            "exclusion keeps the data, but --erase deletes them",
         )
-        .hint("`--state withdrawn --erase` erases; `--state excluded` alone leaves out of the analysis"));
+        .hint("use `--state withdrawn --erase` to delete the data, or `--state excluded` alone to leave them out of the analysis"));
     }
     let participant = ParticipantId::new(args.id.as_str()).map_err(Failure::input)?;
     let request = StateRequest {
@@ -73,42 +73,42 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for notice in &change.notices {
         console.say(notice);
     }
-    console.out(told(&request, &change))?;
+    console.out(summary(&request, &change))?;
     study_folder::refresh(&study, console)
 }
 
-/// What became of the participant, their data and their row.
-fn told(request: &StateRequest, change: &StateChange) -> String {
+/// What happened to the participant, their data and their row.
+fn summary(request: &StateRequest, change: &StateChange) -> String {
     let id = &request.participant;
     let sessions = counted(change.erased, "session", "sessions");
     let analysis = if change.analysis_removed {
-        " analysis/ held some of it and is removed too: run `study analyze` again."
+        " analysis/ contained some of them and is deleted too: run `study analyze` again."
     } else {
         ""
     };
     if let Some(at) = change.erased_before {
         let when = at.format("%Y-%m-%d %H:%M %:z");
         let left = match change.erased {
-            0 => "Nothing of theirs was left.".to_owned(),
-            _ => format!("What was left of {sessions} is erased now."),
+            0 => "No data were left.".to_owned(),
+            _ => format!("The remaining data of {sessions} are erased now."),
         };
         return format!(
-            "What {id} gave was erased already, on {when}; nothing else is changed. {left}{analysis}\n"
+            "The data of {id} were already erased on {when}; nothing else is changed. {left}{analysis}\n"
         );
     }
     let state = request.state.as_str();
-    let mut said = match change.before {
+    let mut text = match change.before {
         Some(before) => format!("{id} was {} and is now {state}.", before.as_str()),
-        None => format!("{id} is on record as {state}."),
+        None => format!("{id} is recorded as {state}."),
     };
     if request.erase {
-        said.push_str(&format!(
-            " What they gave in {sessions} is erased and cannot be brought back; tombstone.json says that it was.{analysis} Copies and backups are not touched.",
+        text.push_str(&format!(
+            " The data of {sessions} are erased and cannot be restored; tombstone.json records the erasure.{analysis} Copies and backups are not affected.",
         ));
     }
-    said.push_str(&match change.freed_row {
-        Some(row) => format!(" Row {row} goes to the next participant.\n"),
-        None => " No row is handed out again.\n".to_owned(),
+    text.push_str(&match change.freed_row {
+        Some(row) => format!(" Row {row} is assigned to the next participant.\n"),
+        None => " No row becomes free.\n".to_owned(),
     });
-    said
+    text
 }

@@ -14,7 +14,7 @@ pub(super) struct Args {
     results: PathBuf,
 }
 
-/// Prints who has taken part, and never an order.
+/// Prints the participants and their states, never an order.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for (n, study) in study_folder::studies(&args.results)?.iter().enumerate() {
         if n > 0 {
@@ -57,7 +57,10 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {
         out.push_str(&table(rows));
     }
     let _ = writeln!(out, "\n{}", summary(study, &real));
-    let _ = writeln!(out, "Next free row: {}", next_row(sessions));
+    let _ = match next_row(sessions) {
+        Some(row) => writeln!(out, "Next free row: {row}"),
+        None => writeln!(out, "No row is free"),
+    };
     out
 }
 
@@ -131,7 +134,7 @@ fn summary(study: &StudyFolder, real: &[&ParticipantRow]) -> String {
         1 => format!("1 participant: {}", counts.join(", ")),
         n => format!("{n} participants: {}", counts.join(", ")),
     };
-    // A damaged frozen protocol is told in the warnings.
+    // A damaged frozen protocol is reported among the warnings.
     match study_folder::frozen(study) {
         Ok(loaded) => format!("{people}; {} planned", loaded.protocol.design.participants),
         Err(_) => people,

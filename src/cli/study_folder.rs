@@ -1,4 +1,4 @@
-//! What the commands on a results folder share.
+//! Opening the studies of a results folder; shared by the commands on it.
 
 use super::failure::Kind;
 use super::load::{self, Loaded};
@@ -23,7 +23,7 @@ impl From<StoreError> for Failure {
     }
 }
 
-/// The studies of RESULTS: a results folder, or one study in it.
+/// The studies of RESULTS, a results folder or the folder of one study in it.
 pub(super) fn studies(path: &Path) -> Result<Vec<StudyFolder>, Failure> {
     if path.join(layout::MANIFEST).exists() {
         return Ok(vec![StudyFolder::open(path)?]);
@@ -38,7 +38,7 @@ pub(super) fn studies(path: &Path) -> Result<Vec<StudyFolder>, Failure> {
     }
     folders.sort();
     if folders.is_empty() {
-        let none = format!("{}: no results of a study there", path.display());
+        let none = format!("{}: contains no results of a study", path.display());
         return Err(Failure::results(none)
             .hint("RESULTS is a results folder, or the folder of one study in it"));
     }
@@ -54,8 +54,8 @@ pub(super) fn one_study(path: &Path) -> Result<StudyFolder, Failure> {
     match (studies.pop(), studies.len()) {
         (Some(only), 0) => Ok(only),
         (_, others) => {
-            let many = format!("{}: {} studies are there", path.display(), others + 1);
-            Err(Failure::input(many).hint("name the folder of one of them"))
+            let many = format!("{}: contains {} studies", path.display(), others + 1);
+            Err(Failure::input(many).hint("give the folder of one of them"))
         }
     }
 }
@@ -65,7 +65,7 @@ pub(super) fn frozen(study: &StudyFolder) -> Result<Loaded, Failure> {
     frozen_version(study, study.version())
 }
 
-/// The same of an earlier version.
+/// The same for any version.
 pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded, Failure> {
     let file = layout::protocol(study.path(), version).join(layout::PROTOCOL);
     load::load_frozen(&file).map_err(|mut failure| {
@@ -74,8 +74,8 @@ pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded
     })
 }
 
-/// What is wrong with the journals and the frozen protocol of a study, as
-/// `study verify` has it; one sentence each, with the place.
+/// The problems of the journals and the frozen protocol of a study, as `study verify`
+/// reports them; one sentence each.
 pub(super) fn warnings(
     study: &StudyFolder,
     sessions: &[SessionData],
@@ -90,8 +90,8 @@ pub(super) fn warnings(
         .collect())
 }
 
-/// Reads each frozen protocol, but the newest if it is there already, and compares
-/// its fingerprints with study.json.
+/// Reads each frozen protocol and compares its fingerprints with study.json. `newest`
+/// is the newest version, if it has been read already.
 pub(super) fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> Vec<Finding> {
     let mut found = Vec::new();
     for version in &study.manifest().versions {
@@ -103,11 +103,11 @@ pub(super) fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> V
         };
         let what = match prints {
             Ok(prints) if prints == version.fingerprints => continue,
-            Ok(_) => "its fingerprints are not those in study.json".to_owned(),
+            Ok(_) => "its fingerprints differ from those in study.json".to_owned(),
             Err(_) => format!("it cannot be read; see `study check {}`", path.display()),
         };
         found.push(Finding {
-            wrong: true,
+            is_problem: true,
             place: format!("{}/{number}/{}", layout::PROTOCOLS, layout::PROTOCOL),
             what,
         });
@@ -115,18 +115,18 @@ pub(super) fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> V
     found
 }
 
-/// Tells of [`warnings`] on standard error.
+/// Prints [`warnings`] on standard error.
 pub(super) fn warn(study: &StudyFolder, warnings: &[String], console: &mut Console) {
     for warning in warnings {
         console.say(format!("warning: {warning}"));
     }
     if !warnings.is_empty() {
         let path = study.path().display();
-        console.say(format!("  hint: `study verify {path}` tells everything"));
+        console.say(format!("  hint: `study verify {path}` lists all findings"));
     }
 }
 
-/// An analysis that was printed is no failure although its tables have no place.
+/// Warns that the tables of a printed analysis could not be written.
 pub(super) fn tables_unwritten(failure: &Failure, console: &mut Console) {
     console.say(format!(
         "warning: the tables could not be written: {}",
@@ -139,12 +139,12 @@ pub(super) fn tables_unwritten(failure: &Failure, console: &mut Console) {
 pub(super) fn refresh(study: &StudyFolder, console: &mut Console) -> Result<(), Failure> {
     study.refresh(&frozen(study)?.protocol)?;
     if study.path().join(layout::ANALYSIS).exists() {
-        console.say("analysis/ still holds the results from before: run `study analyze` again");
+        console.say("analysis/ is out of date: run `study analyze` again");
     }
     Ok(())
 }
 
-/// Now, outside a session: there is no monotonic clock to compare with.
+/// The current time outside a session, where no monotonic clock is needed.
 pub(super) fn now() -> Moment {
     Moment {
         wall: chrono::Local::now().fixed_offset(),
@@ -152,10 +152,11 @@ pub(super) fn now() -> Moment {
     }
 }
 
-/// A reason that says something and is not a book.
+/// Checks a reason: neither empty nor too long.
 pub(super) fn reason(given: &str) -> Result<&str, Failure> {
     if given.trim().is_empty() {
-        Err(Failure::input("the reason is empty").hint("say why in a few words; it is kept"))
+        Err(Failure::input("the reason is empty")
+            .hint("give a reason in a few words; it is recorded"))
     } else if given.len() > MAX_TEXT_BYTES {
         let long = format!("the reason is longer than {MAX_TEXT_BYTES} bytes");
         Err(Failure::input(long))

@@ -10,17 +10,17 @@ use study_core::store::{Finding, SessionData, StudyFolder, layout};
 pub(super) struct Args {
     /// Results folder, or the folder of one study in it
     results: PathBuf,
-    /// First write the derived tables again from the journals
+    /// First derive the tables again from the journals
     #[arg(long)]
     rebuild: bool,
-    /// Let --rebuild take participants out of the tables whose journals are gone
+    /// Let --rebuild remove participants without a journal from the tables
     #[arg(long, requires = "rebuild")]
     drop_missing: bool,
 }
 
-/// Prints what was found and fails if anything of it is wrong.
+/// Prints the findings and fails if there is a problem.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let mut wrong = 0;
+    let mut problems = 0;
     for study in study_folder::studies(&args.results)? {
         let protocol = study_folder::frozen(&study);
         if let (true, Ok(loaded)) = (args.rebuild, &protocol) {
@@ -29,12 +29,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
         found.extend(study_folder::frozen_versions(&study, None));
         console.out(of_study(&study, &study.sessions()?, &found))?;
-        wrong += found.iter().filter(|f| f.wrong).count();
+        problems += count_problems(&found);
     }
-    match wrong {
+    match problems {
         0 => Ok(()),
-        1 => Err(Failure::results("one thing is wrong")),
-        n => Err(Failure::results(format!("{n} things are wrong"))),
+        n => Err(Failure::results(problems_found(n))),
     }
 }
 
@@ -42,7 +41,11 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) ->
     let path = study.path().display().to_string();
     let mut out = String::new();
     for finding in found {
-        let word = if finding.wrong { "wrong" } else { "note" };
+        let word = if finding.is_problem {
+            "problem"
+        } else {
+            "note"
+        };
         out.push_str(&format!(
             "{word}: {}/{}: {}\n",
             Untrusted(&path),
@@ -51,10 +54,7 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) ->
         ));
     }
     let events: usize = sessions.iter().map(|s| s.entries.len()).sum();
-    let verdict = match found.iter().filter(|f| f.wrong).count() {
-        0 => "all is as it was written",
-        _ => "not all is as it was written",
-    };
+    let verdict = problems_found(count_problems(found));
     out.push_str(&format!(
         "{}: {}, {}: {verdict}\n",
         Untrusted(&path),
@@ -62,13 +62,24 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) ->
         counted(events, "event", "events"),
     ));
     out.push_str(
-        "Not checked: the numbers in telemetry files (only that the files and their lines are there) and analysis/.\n",
+        "Not checked: the numbers in telemetry files (only their files and lines are counted) and analysis/.\n",
     );
     if found
         .iter()
-        .any(|f| f.wrong && layout::TABLES.contains(&f.place.as_str()))
+        .any(|f| f.is_problem && layout::TABLES.contains(&f.place.as_str()))
     {
-        out.push_str("the tables are made again with --rebuild\n");
+        out.push_str("Use --rebuild to derive the tables again.\n");
     }
     out
+}
+
+fn count_problems(found: &[Finding]) -> usize {
+    found.iter().filter(|f| f.is_problem).count()
+}
+
+fn problems_found(problems: usize) -> String {
+    match problems {
+        0 => "no problems found".to_owned(),
+        n => format!("{} found", counted(n, "problem", "problems")),
+    }
 }

@@ -245,7 +245,7 @@ fn a_vaf_that_differs_from_the_file_is_an_error_and_a_rounded_one_is_not() {
     assert_eq!(
         errors,
         [
-            "the VAF of `lambda-0.9995` is not 0.79: its file says 0.9623644884535236 for `validation-1.5hz`"
+            "the VAF of `lambda-0.9995` is not 0.79: its file has 0.9623644884535236 for `validation-1.5hz`"
         ]
     );
 }
@@ -323,7 +323,9 @@ fn a_balanced_order_says_at_how_many_participants() {
     );
     let warnings = report(dir.path()).2;
     assert!(
-        warnings.contains(&"the orders balance at every 10 participants, not at 12".to_owned()),
+        warnings.contains(
+            &"the orders are balanced at multiples of 10 participants, not at 12".to_owned()
+        ),
         "{warnings:?}"
     );
 }
@@ -334,7 +336,7 @@ fn what_is_no_protocol_is_one_clear_error() {
     for (args, said) in [
         (["check", "nowhere"], "there is no such file"),
         (["check", "."], "there is no such file"),
-        (["check", "/dev/null"], "it is no ordinary file"),
+        (["check", "/dev/null"], "it is not a regular file"),
     ] {
         let (code, out, err) = run(dir.path(), &args);
         assert_eq!((code, out.as_str()), (1, ""));

@@ -109,7 +109,7 @@ fn analyze_and_status_warn_of_a_damaged_journal_and_an_altered_protocol() {
     let text = std::fs::read_to_string(&frozen).unwrap();
     std::fs::write(&frozen, text.replace("realistic", "plausible")).unwrap();
     let journal = predicate::str::contains("sessions/P01/1: journal.jsonl, line");
-    let protocol = predicate::str::contains("protocol/1/protocol.toml: it is not the file");
+    let protocol = predicate::str::contains("protocol/1/protocol.toml: not the file");
     for command in ["status", "analyze"] {
         study_command()
             .arg(command)
@@ -154,7 +154,7 @@ fn participant_sets_a_state_and_refuses_what_is_no_id() {
         .assert()
         .success()
         .stdout(predicate::str::contains(
-            "Row 2 goes to the next participant",
+            "Row 2 is assigned to the next participant",
         ));
     set("P01", "withdrawn")
         .arg("--erase")
@@ -200,13 +200,13 @@ fn erasing_leaves_nothing_in_the_analysis_and_says_so_twice() {
     assert!(folder.join("sessions/P01/1/journal.jsonl").exists());
     erase("withdrawn")
         .success()
-        .stdout(predicate::str::contains("cannot be brought back"))
-        .stdout(predicate::str::contains("analysis/ held some of it"));
+        .stdout(predicate::str::contains("cannot be restored"))
+        .stdout(predicate::str::contains("analysis/ contained some of them"));
     assert!(!folder.join("analysis").exists());
     erase("withdrawn")
         .success()
-        .stdout(predicate::str::contains("was erased already, on 20"))
-        .stdout(predicate::str::contains("Nothing of theirs was left"));
+        .stdout(predicate::str::contains("were already erased on 20"))
+        .stdout(predicate::str::contains("No data were left"));
 }
 
 #[test]
@@ -230,7 +230,7 @@ fn a_session_that_is_gone_is_told_and_not_dropped_unasked() {
     let table = || std::fs::read_to_string(folder.join("participants.csv")).unwrap();
     verify(&["--rebuild"])
         .code(4)
-        .stderr(predicate::str::contains("the tables name P02"))
+        .stderr(predicate::str::contains("the tables contain P02"))
         .stderr(predicate::str::contains("--rebuild --drop-missing"));
     assert!(table().contains("P02"));
     verify(&["--drop-missing"]).code(2);
@@ -275,8 +275,8 @@ fn verify_misses_telemetry_that_the_journal_counts_and_says_what_it_does_not_che
     std::fs::remove_file(&file).unwrap();
     verify()
         .code(4)
-        .stdout(predicate::str::contains("002-a1.csv: it is not there"))
-        .stdout(predicate::str::contains("made again").not());
+        .stdout(predicate::str::contains("002-a1.csv: missing"))
+        .stdout(predicate::str::contains("--rebuild").not());
 }
 
 #[test]
@@ -363,7 +363,7 @@ fn a_folder_that_is_none_or_of_a_newer_version_is_refused() {
             .arg(results.path())
             .assert()
             .code(4)
-            .stderr(predicate::str::contains("no results of a study"));
+            .stderr(predicate::str::contains("contains no results of a study"));
     }
     let folder = turn_signal(results.path());
     let manifest = folder.join("study.json");

@@ -105,7 +105,7 @@ fn comes_back(disk: &MemoryDisk, told: &mut Told, why: &str) {
         .unwrap()
         .into_iter()
         // The harness writes none.
-        .filter(|f| f.wrong && !f.place.contains("telemetry"))
+        .filter(|f| f.is_problem && !f.place.contains("telemetry"))
         .collect();
     assert_eq!(wrong, [], "{why}");
 }

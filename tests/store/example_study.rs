@@ -31,6 +31,7 @@ fn the_example_verifies_and_is_marked_as_simulated() {
     let (code, out, err) = study(&["verify", "results"], home.path());
     assert_eq!(code, 0, "{out}{err}");
     assert!(out.contains("10 sessions"), "{out}");
+    assert!(out.contains("no problems found"), "{out}");
     let (code, out, err) = study(&["analyze", "results"], home.path());
     assert_eq!(code, 0, "{out}{err}");
     assert!(out.contains("NO PARTICIPANTS: only 10 simulated"), "{out}");

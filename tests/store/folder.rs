@@ -85,7 +85,7 @@ fn the_row_of_a_drop_out_is_assigned_again() {
         set(&study, "P02", State::DroppedOut, false).unwrap(),
         Some(2)
     );
-    assert_eq!(next_row(&study.sessions().unwrap()), 2);
+    assert_eq!(next_row(&study.sessions().unwrap()), Some(2));
     let back = study.claim(&real("P02"));
     assert!(matches!(back, Err(StoreError::InState { .. })), "{back:?}");
     assert_eq!(run(&study, &real("P04"), 8), Seat::Row(2));
@@ -180,7 +180,7 @@ fn a_no_show_has_no_row_and_can_still_take_part() {
         "{unknown:?}"
     );
     set(&study, "P01", State::NoShow, false).unwrap();
-    assert_eq!(next_row(&study.sessions().unwrap()), 1);
+    assert_eq!(next_row(&study.sessions().unwrap()), Some(1));
     assert_eq!(
         participants(&study.sessions().unwrap())[0].state,
         State::NoShow
@@ -260,7 +260,7 @@ fn a_changed_frozen_file_is_reported() {
     let results = tempfile::tempdir().unwrap();
     let study = open(results.path());
     let clean = study.verify(None).unwrap();
-    assert!(clean.iter().all(|f| !f.wrong), "{clean:?}");
+    assert!(clean.iter().all(|f| !f.is_problem), "{clean:?}");
     std::fs::write(
         study.path().join("protocol/1/models/A.toml"),
         "id = \"B\"\n",
@@ -268,7 +268,9 @@ fn a_changed_frozen_file_is_reported() {
     .unwrap();
     let found = study.verify(None).unwrap();
     assert!(
-        found.iter().any(|f| f.wrong && f.place.ends_with("A.toml")),
+        found
+            .iter()
+            .any(|f| f.is_problem && f.place.ends_with("A.toml")),
         "{found:?}"
     );
 }
@@ -373,7 +375,7 @@ fn the_tables_are_the_same_bytes_from_the_same_journals() {
             .verify(Some(&protocol()))
             .unwrap()
             .iter()
-            .all(|f| !f.wrong)
+            .all(|f| !f.is_problem)
     );
     std::fs::write(&ratings, "lost").unwrap();
     assert!(
@@ -381,7 +383,7 @@ fn the_tables_are_the_same_bytes_from_the_same_journals() {
             .verify(Some(&protocol()))
             .unwrap()
             .iter()
-            .any(|f| f.wrong)
+            .any(|f| f.is_problem)
     );
     study.refresh(&protocol()).unwrap();
     assert_eq!(std::fs::read(&ratings).unwrap(), first);
@@ -457,7 +459,7 @@ fn erasure_leaves_only_a_tombstone() {
         "{left}"
     );
     let found = study.verify(Some(&protocol())).unwrap();
-    assert!(found.iter().all(|f| !f.wrong), "{found:?}");
+    assert!(found.iter().all(|f| !f.is_problem), "{found:?}");
     assert_eq!(
         found.iter().filter(|f| f.what.contains("erased")).count(),
         2
@@ -467,9 +469,9 @@ fn erasure_leaves_only_a_tombstone() {
     // An interrupted erasure is completed by the same command.
     std::fs::create_dir(study.path().join("sessions/P01/1")).unwrap();
     std::fs::write(study.path().join("sessions/P01/1/journal.jsonl"), "left").unwrap();
-    assert!(study.verify(None).unwrap().iter().any(|f| f.wrong));
+    assert!(study.verify(None).unwrap().iter().any(|f| f.is_problem));
     set(&study, "P01", State::Withdrawn, true).unwrap();
-    assert!(study.verify(None).unwrap().iter().all(|f| !f.wrong));
+    assert!(study.verify(None).unwrap().iter().all(|f| !f.is_problem));
 }
 
 #[test]

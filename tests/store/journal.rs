@@ -287,7 +287,7 @@ fn a_damaged_line_in_the_middle_stays_and_the_session_goes_on() {
             .verify(None)
             .unwrap()
             .iter()
-            .filter(|f| f.wrong)
+            .filter(|f| f.is_problem)
             .count();
         assert!(wrong >= 1);
     }

@@ -1,16 +1,16 @@
 //! The results folder.
 //!
-//! `results/<study id>` holds the frozen protocol, one folder for each session
-//! with its journal and telemetry, and tables derived from the journals. The
-//! journals are the only truth: everything else can be made again from them.
+//! `results/<study id>` contains the frozen protocol, one folder for each session
+//! with its journal and telemetry, and tables derived from the journals. Only the
+//! journals and the protocol matter: the tables can be derived again from them.
 //! `docs/results.md` describes each file.
 //!
 //! Invariants: [`Journal::append`] returns only when the event is on the medium.
-//! A journal is only appended to; its torn tail is set apart before it is cut, and
-//! a damaged line stays where it is. A session's folder belongs to one process at
-//! a time, a row to one participant.
+//! A journal is only appended to; an incomplete last line is copied before it is cut
+//! off, and a damaged line stays where it is. A session's folder is locked by one
+//! process at a time, and a row belongs to one participant.
 //!
-//! Every change goes through [`disk::Disk`], so that tests can fail each call.
+//! Every change goes through [`disk::Disk`], so that tests can make each call fail.
 
 pub mod disk;
 pub mod journal_record;
@@ -22,12 +22,12 @@ mod reveals;
 mod atomic;
 mod derive;
 mod error;
-mod held;
 mod journal;
 mod ledger;
 mod missing_sessions;
 mod participant;
 mod session_folder;
+mod session_lock;
 mod sessions;
 mod tables;
 mod telemetry;
@@ -36,13 +36,13 @@ mod verify;
 
 pub use derive::{Derived, participants};
 pub use error::{StoreError, plain};
-pub use held::RESERVE_BYTES;
 pub use journal::Journal;
 pub use ledger::{ClaimRequest, Claimed, SeatKind, next_row};
 pub use manifest::Manifest;
 pub use participant::{StateChange, StateRequest};
 pub use replay::{Damage, DamageKind};
 pub use session_folder::SessionFolder;
+pub use session_lock::RESERVE_BYTES;
 pub use sessions::SessionData;
 pub use telemetry::TelemetryWriter;
 pub use tombstone::Tombstone;
@@ -57,15 +57,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A protocol with the bytes of every file it consists of.
+/// A protocol with the content of all its files, to be copied into the results.
 #[derive(Debug, Clone, Copy)]
 pub struct Frozen<'a> {
     /// The protocol.
     pub protocol: &'a Protocol,
-    /// Path relative to the protocol's folder, with `/` → bytes; first
+    /// Paths relative to the protocol's folder, separated by `/`, and bytes; first
     /// `protocol.toml`.
     pub files: &'a [(String, Vec<u8>)],
-    /// Of these files.
+    /// Fingerprints of these files.
     pub fingerprints: &'a Fingerprints,
 }
 
@@ -77,16 +77,16 @@ pub struct StudyFolder {
     manifest: Manifest,
 }
 
-/// How often a lock is tried, and how long the pause between two tries is.
+/// Number of attempts to lock a study and the pause between two of them.
 const LOCK_TRIES: u32 = 1500;
 const LOCK_PAUSE: Duration = Duration::from_millis(20);
 
 impl StudyFolder {
-    /// The folder of a protocol's study in `results`; made if it is not there.
+    /// Opens the folder of a protocol's study in `results`, or creates it.
     ///
     /// # Errors
-    /// [`StoreError`]: other stimuli than the study has, a change of wording or
-    /// analysis that is no amendment, a newer format, or the disk's.
+    /// [`StoreError`] if the protocol has other stimuli than the study, or another
+    /// wording or analysis without an amendment; for a newer format; or the disk's.
     pub fn open_or_create(
         results: &Path,
         frozen: &Frozen<'_>,
@@ -95,7 +95,7 @@ impl StudyFolder {
         Self::open_or_create_on(Arc::new(RealDisk), results, frozen, at)
     }
 
-    /// The same on any disk.
+    /// The same on the given disk.
     ///
     /// # Errors
     /// As [`StudyFolder::open_or_create`].
@@ -127,7 +127,7 @@ impl StudyFolder {
                 manifest
             }
             Err(StoreError::NoStudy { .. }) => {
-                make_sure_it_is_new(disk.as_ref(), &path)?;
+                check_new(disk.as_ref(), &path)?;
                 let first = manifest::freeze(disk.as_ref(), &path, 1, frozen, "", at)?;
                 let manifest = Manifest::new(study, first, at);
                 manifest.write(disk.as_ref(), &path)?;
@@ -143,15 +143,15 @@ impl StudyFolder {
         })
     }
 
-    /// An existing study's folder.
+    /// Opens the folder of an existing study.
     ///
     /// # Errors
-    /// [`StoreError`]: no study there, a newer format, damage.
+    /// [`StoreError`] if there is no study, or for a newer format or damage.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         Self::open_on(Arc::new(RealDisk), path)
     }
 
-    /// The same on any disk.
+    /// The same on the given disk.
     ///
     /// # Errors
     /// As [`StudyFolder::open`].
@@ -164,12 +164,12 @@ impl StudyFolder {
         })
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// `study.json`, as it was when the folder was opened.
+    /// `study.json` as it was when the folder was opened.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
@@ -179,10 +179,10 @@ impl StudyFolder {
         self.manifest.newest().version
     }
 
-    /// Freezes a new version of wording or analysis and returns its number.
+    /// Freezes a new version of wording or analysis; returns its number.
     ///
     /// # Errors
-    /// [`StoreError`]: other stimuli, another study, nothing changed, or the disk's.
+    /// [`StoreError`] for other stimuli, another study or no change; or the disk's.
     pub fn amend(
         &mut self,
         frozen: &Frozen<'_>,
@@ -215,14 +215,14 @@ impl StudyFolder {
         Ok(version + 1)
     }
 
-    /// Keeps every other process from claiming, amending and deriving.
+    /// Prevents other processes from claiming, amending and deriving.
     fn lock(&self) -> Result<Lock, StoreError> {
         lock_study(self.disk.as_ref(), &self.path)
     }
 }
 
-/// Waits for the lock of a study's folder, 30 s at most: it is held for the time
-/// of a few syncs, unless its holder was stopped.
+/// Waits for the lock of a study's folder, at most 30 s. It is normally held for the
+/// duration of a few syncs.
 fn lock_study(disk: &dyn Disk, path: &Path) -> Result<Lock, StoreError> {
     for _ in 0..LOCK_TRIES {
         if let Some(lock) = disk.lock(path).at(path)? {
@@ -235,7 +235,7 @@ fn lock_study(disk: &dyn Disk, path: &Path) -> Result<Lock, StoreError> {
     })
 }
 
-/// Whether a study that was started can go on with this protocol.
+/// Checks that a running study can continue with this protocol.
 fn check_unchanged(
     path: &Path,
     manifest: &Manifest,
@@ -262,9 +262,9 @@ fn check_unchanged(
     })
 }
 
-/// A folder without `study.json` is ours only if nothing but the left-overs of a
-/// start that was killed are in it.
-fn make_sure_it_is_new(disk: &dyn Disk, path: &Path) -> Result<(), StoreError> {
+/// Checks that a folder without `study.json` contains at most the remains of an
+/// interrupted creation.
+fn check_new(disk: &dyn Disk, path: &Path) -> Result<(), StoreError> {
     let items = disk.list(path).at(path)?;
     let ours = |name: &str| name == layout::PROTOCOLS || name == ".study.json.tmp";
     match items.iter().find(|i| !ours(&i.name)) {
@@ -272,7 +272,7 @@ fn make_sure_it_is_new(disk: &dyn Disk, path: &Path) -> Result<(), StoreError> {
         Some(other) => Err(StoreError::Damaged {
             path: path.to_owned(),
             what: format!(
-                "it has no study.json, but holds `{}`: not the results of a study",
+                "it has no study.json but contains `{}`: not the results of a study",
                 study_base::text::Untrusted(&other.name)
             ),
         }),

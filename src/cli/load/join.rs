@@ -1,7 +1,6 @@
-//! What only shows once the protocol, the model files and the orders stand
-//! together.
+//! Checks that need the protocol, the model files and the orders together.
 
-use super::Others;
+use super::OtherFiles;
 use study_base::diagnostic::{Fault, Findings, did_you_mean};
 use study_base::text::Untrusted;
 use study_core::protocol::check::Spans;
@@ -9,14 +8,13 @@ use study_core::protocol::{DeviceKind, FileOrders, Order, Protocol, Role, Seat};
 use study_core::schedule::balance::balances;
 use study_core::schedule::{Planner, ScheduleError};
 
-/// Rows whose order is tried, however many participants are planned.
+/// Largest number of rows whose order is checked.
 const MAX_ROWS: u32 = 200;
 
-/// Fills in the VAFs that the protocol leaves to the model files, and compares
-/// those that it states.
+/// Takes VAFs missing in the protocol from the model files and compares the others.
 pub(super) fn vaf(
     protocol: &mut Protocol,
-    others: &Others<'_>,
+    others: &OtherFiles<'_>,
     spans: &Spans,
     findings: &mut Findings,
 ) {
@@ -39,7 +37,7 @@ pub(super) fn vaf(
                     let names: Vec<&str> = known.keys().map(String::as_str).collect();
                     misses.push(
                         Fault::warning(format!(
-                            "`{}` has several VAFs and `analysis.vaf` does not say which counts",
+                            "`{}` has several VAFs and `analysis.vaf` does not select one",
                             entry.id
                         ))
                         .at(spans.get(&format!("models[{i}].id")).cloned())
@@ -61,12 +59,12 @@ pub(super) fn vaf(
             if (stated - measured).abs() > tolerance(written.unwrap_or_default()) {
                 findings.faults.push(
                     Fault::error(format!(
-                        "the VAF of `{}` is not {stated}: its file says {measured} for `{}`",
+                        "the VAF of `{}` is not {stated}: its file has {measured} for `{}`",
                         entry.id,
                         Untrusted(&name)
                     ))
                     .at(place)
-                    .hint("leave `vaf` out and it is taken from the file"),
+                    .hint("omit `vaf` to take it from the file"),
                 );
                 continue;
             }
@@ -96,18 +94,18 @@ pub(super) fn vaf(
     if names_used.len() > 1 {
         findings.faults.push(
             Fault::warning(format!(
-                "VAFs on different recordings are compared: {}",
+                "VAFs of different recordings are compared: {}",
                 names_used.join(", ")
             ))
-            .hint("name one with `analysis.vaf`"),
+            .hint("select one with `analysis.vaf`"),
         );
     }
 }
 
-/// Refuses tables that fail their certificate, unless the protocol permits them.
+/// Reports tables that fail their certificate unless the protocol permits them.
 pub(super) fn certificates(
     protocol: &Protocol,
-    others: &Others<'_>,
+    others: &OtherFiles<'_>,
     spans: &Spans,
     findings: &mut Findings,
 ) {
@@ -119,7 +117,7 @@ pub(super) fn certificates(
         let Some(realization) = others.realization(&entry.id) else {
             continue;
         };
-        // what is mounted by hand has no force
+        // a sample mounted by hand has no actuator
         if entry.device.unwrap_or(protocol.device.kind) == DeviceKind::Manual {
             continue;
         }
@@ -140,7 +138,8 @@ pub(super) fn certificates(
     }
 }
 
-/// How far a stated VAF may be from the file's: half a unit of its last digit.
+/// Largest accepted difference between a stated VAF and that of the file: half a unit
+/// of the stated value's last digit.
 fn tolerance(written: &str) -> f64 {
     const EXACT: f64 = 1e-9;
     let decimals = match written.split_once('.') {
@@ -148,12 +147,12 @@ fn tolerance(written: &str) -> f64 {
         _ => return EXACT,
     };
     let digits = i32::try_from(decimals).unwrap_or(i32::MAX);
-    // one digit is too coarse to state a VAF: at least two are compared
+    // at least two digits are compared
     0.5 * 10f64.powi(-digits.max(2)) + EXACT
 }
 
-/// Tries the order of every row that is planned and reports the first that cannot
-/// be made; says at how many participants a balanced order balances.
+/// Reports the first planned row whose order cannot be made, and whether a balanced
+/// order is balanced for the planned number of participants.
 pub(super) fn orders(
     protocol: &Protocol,
     orders: Option<&FileOrders>,
@@ -183,7 +182,7 @@ pub(super) fn orders(
     {
         findings.faults.push(
             Fault::warning(format!(
-                "the orders balance at every {} participants, not at {}",
+                "the orders are balanced at multiples of {} participants, not at {}",
                 balance.participants, protocol.design.participants
             ))
             .at(spans.get("design.participants").cloned()),
@@ -191,7 +190,7 @@ pub(super) fn orders(
     }
 }
 
-/// The keys that a schedule's error is about, the likeliest first.
+/// The protocol keys that an error of the schedule concerns, the likeliest first.
 fn keys(error: &ScheduleError, protocol: &Protocol) -> &'static [&'static str] {
     match error {
         ScheduleError::MinDistance { .. } => &["design.min_distance"],

@@ -29,7 +29,7 @@ impl StudyFolder {
     /// later one also writes later.
     ///
     /// # Errors
-    /// As [`StudyFolder::sessions`]; [`StoreError::Vanished`] if the tables name a
+    /// As [`StudyFolder::sessions`]; [`StoreError::SessionsMissing`] if the tables name a
     /// session that does not exist; those of writing, after which each table is either
     /// the old one or the new one.
     pub fn refresh(&self, protocol: &Protocol) -> Result<Derived, StoreError> {
@@ -48,10 +48,10 @@ impl StudyFolder {
     ) -> Result<Derived, StoreError> {
         let _lock = self.lock()?;
         let sessions = self.sessions()?;
-        let vanished = self.vanished(&sessions);
-        if !drop_missing && !vanished.is_empty() {
-            let who: Vec<String> = vanished.iter().map(ToString::to_string).collect();
-            return Err(StoreError::Vanished {
+        let missing = self.missing_sessions(&sessions);
+        if !drop_missing && !missing.is_empty() {
+            let who: Vec<String> = missing.iter().map(ToString::to_string).collect();
+            return Err(StoreError::SessionsMissing {
                 path: self.path.clone(),
                 who: who.join(", "),
             });

@@ -1,62 +1,62 @@
-//! Why the results folder could not be read or written.
+//! Errors of the results folder.
 
 use crate::outcome::State;
 use std::io;
 use std::path::{Path, PathBuf};
 use study_base::text::{ParticipantId, Untrusted};
 
-/// Why a results folder could not be used.
+/// An error of a results folder.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// A file or folder could not be read or written.
     #[error("{}: {}", .path.display(), plain(.source))]
     Io {
-        /// Which.
+        /// File or folder.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
-    /// There is no room for a session.
-    #[error("no room for a session: {} KiB free, {} KiB needed in {}", .free / 1024, .needed.div_ceil(1024), .path.display())]
+    /// The disk has too little space for a session.
+    #[error("not enough disk space for a session: {} KiB free, {} KiB needed in {}", .free / 1024, .needed.div_ceil(1024), .path.display())]
     Full {
-        /// Where.
+        /// The study's folder.
         path: PathBuf,
-        /// Bytes free.
+        /// Free space, bytes.
         free: u64,
-        /// Bytes that a session needs at the least.
+        /// Minimum for a session, bytes.
         needed: u64,
     },
-    /// The folder is not a study's.
+    /// The folder does not contain a study.
     #[error("{}: not the results of a study: it has no study.json", .path.display())]
     NoStudy {
-        /// Which folder.
+        /// Folder.
         path: PathBuf,
     },
-    /// A later version of the program wrote this.
+    /// Written by a later version of the program.
     #[error("{}: written by a newer version of study ({})", .path.display(), Untrusted(.found))]
     Newer {
-        /// Which file.
+        /// File.
         path: PathBuf,
-        /// The format or event that is not known here.
+        /// The unknown format or event.
         found: String,
     },
-    /// A file is not what this program writes.
+    /// A file is damaged.
     #[error("{}: {what}", .path.display())]
     Damaged {
-        /// Which file.
+        /// File.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Damage.
         what: String,
     },
-    /// The study that the folder holds has other stimuli.
+    /// The study in the folder has other stimuli.
     #[error("{}: the stimuli are not those of the running study `{}`", .path.display(), Untrusted(.study))]
     StimulusChanged {
         /// The study's folder.
         path: PathBuf,
-        /// Its id.
+        /// Study id.
         study: String,
     },
-    /// Wording or analysis changed without an amendment.
+    /// Wording or analysis were changed without an amendment.
     #[error("{}: {what} changed since version {version} of the protocol was frozen", .path.display())]
     NotAmended {
         /// The study's folder.
@@ -74,118 +74,118 @@ pub enum StoreError {
         /// The newest version.
         version: u32,
     },
-    /// Somebody amended the study after it was opened here.
-    #[error("{}: the protocol was amended meanwhile, to version {version}", .path.display())]
+    /// Another process amended the study after it was opened.
+    #[error("{}: the protocol was amended in the meantime, to version {version}", .path.display())]
     AmendedMeanwhile {
         /// The study's folder.
         path: PathBuf,
         /// The newest version.
         version: u32,
     },
-    /// All trials are done.
+    /// The participant has finished.
     #[error("{participant} has finished (session {session})")]
     Finished {
-        /// Who.
+        /// Participant.
         participant: ParticipantId,
-        /// Their last session.
+        /// Last session.
         session: u32,
     },
     /// The participant's state allows no session.
     #[error("{participant} is {}: {}", .state.as_str(), Untrusted(.reason))]
     InState {
-        /// Who.
+        /// Participant.
         participant: ParticipantId,
-        /// Their state.
+        /// State.
         state: State,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// What the participant gave was erased.
-    #[error("what {participant} gave was erased; the id is not used again")]
+    /// The participant's data were erased.
+    #[error("the data of {participant} were erased; the id cannot be used again")]
     Erased {
-        /// Who.
+        /// Participant.
         participant: ParticipantId,
     },
     /// Another process has the session open.
     #[error("{participant}'s session {session} is open in another process ({})", .path.display())]
     Open {
-        /// Who.
+        /// Participant.
         participant: ParticipantId,
-        /// Which.
+        /// Session.
         session: u32,
-        /// Its folder.
+        /// The session's folder.
         path: PathBuf,
     },
-    /// Another process has kept the study locked for long.
+    /// Another process keeps the study locked.
     #[error("{}: another process keeps the study locked", .path.display())]
     Busy {
         /// The study's folder.
         path: PathBuf,
     },
-    /// A pilot's id for a real session, or the like.
+    /// The id belongs to another kind of participant.
     #[error("{participant} is a {had} participant and cannot be a {wanted} one")]
     OtherKind {
-        /// Who.
+        /// Participant.
         participant: ParticipantId,
-        /// What they are.
+        /// Kind of the existing participant.
         had: &'static str,
-        /// What was asked for.
+        /// Kind requested.
         wanted: &'static str,
     },
     /// The id differs from an existing one only in upper and lower case.
     #[error("`{given}` and the existing `{existing}` differ only in upper and lower case")]
     Collides {
-        /// As asked for.
+        /// Requested id.
         given: ParticipantId,
-        /// As it is.
+        /// Existing id.
         existing: ParticipantId,
     },
     /// No row is free in the range of this rig.
     #[error("no row from {from} to {to} is free")]
     NoRow {
-        /// First of the range.
+        /// First row of the range.
         from: u32,
-        /// Last of the range.
+        /// Last row of the range.
         to: u32,
     },
-    /// Nobody of that id has taken part.
+    /// There is no participant with this id.
     #[error("there is no participant `{participant}`{}", .near.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
     Unknown {
-        /// As asked for.
+        /// Requested id.
         participant: ParticipantId,
-        /// An id that is near.
+        /// A similar id.
         near: Option<ParticipantId>,
     },
-    /// The tables tell of sessions that are not there; they are not written over.
-    #[error("{}: the tables name {who}, whose journal is not there", .path.display())]
-    Vanished {
+    /// The tables contain sessions without a journal; they are not overwritten.
+    #[error("{}: the tables contain {who}, whose journal is missing", .path.display())]
+    SessionsMissing {
         /// The study's folder.
         path: PathBuf,
-        /// Everybody, safe to print.
+        /// The participants, safe to print.
         who: String,
     },
-    /// The state cannot follow on the present one.
+    /// The state cannot follow the present one.
     #[error("{participant} cannot be set to {}: {why}", .state.as_str())]
     StateRefused {
-        /// Who.
+        /// Participant.
         participant: ParticipantId,
-        /// Asked for.
+        /// Requested state.
         state: State,
-        /// Why not.
+        /// Reason.
         why: String,
     },
-    /// An earlier write to this segment failed: it is not touched again.
-    #[error("{}: an earlier write failed, a new segment is needed", .path.display())]
+    /// An earlier write to this segment failed; it must not be written to again.
+    #[error("{}: an earlier write failed; a new segment is needed", .path.display())]
     SegmentFailed {
-        /// The segment.
+        /// Segment.
         path: PathBuf,
     },
-    /// An event that could not be read back.
-    #[error("{}: an event could not be written so that it reads back: {what}", .path.display())]
+    /// A record that could not be read back.
+    #[error("{}: a record cannot be written so that it can be read back: {what}", .path.display())]
     Unstorable {
-        /// The segment.
+        /// Segment.
         path: PathBuf,
-        /// What the reader says.
+        /// Message of the reader.
         what: String,
     },
     /// [`super::SessionFolder::journal`] was called twice.
@@ -194,16 +194,16 @@ pub enum StoreError {
         /// The session's folder.
         path: PathBuf,
     },
-    /// A file name of the protocol that leaves its folder.
+    /// A file of the protocol outside its folder.
     #[error("`{}` is not a path inside the protocol's folder", Untrusted(.name))]
     OutsideFolder {
-        /// The name.
+        /// File name.
         name: String,
     },
 }
 
 impl StoreError {
-    /// What to do next, where the message does not say it.
+    /// What to do next, if the message does not say it.
     pub fn hint(&self) -> Option<String> {
         Some(match self {
             Self::Full { .. } => "free some space, then start again".to_owned(),
@@ -218,29 +218,29 @@ impl StoreError {
                     .to_owned()
             }
             Self::AmendedMeanwhile { .. } => "start again with the amended protocol".to_owned(),
-            Self::Finished { .. } => "each participant needs an id of their own".to_owned(),
+            Self::Finished { .. } => "use a new id for each participant".to_owned(),
             Self::InState { state, .. } if *state == State::NoShow => {
                 "if they came after all, set the state to void first".to_owned()
             }
             Self::InState { .. } | Self::Erased { .. } => {
-                "each participant needs an id of their own".to_owned()
+                "use a new id for each participant".to_owned()
             }
-            Self::Open { .. } => "go on there, or end that process".to_owned(),
-            Self::Busy { .. } => "wait for it, or end it".to_owned(),
+            Self::Open { .. } => "continue there, or end that process".to_owned(),
+            Self::Busy { .. } => "wait for that process, or end it".to_owned(),
             Self::Collides { existing, .. } => {
-                format!("write `{existing}` if it is the same person")
+                format!("use `{existing}` if it is the same person")
             }
             Self::NoRow { .. } => "give this rig a larger range with --rows".to_owned(),
             Self::OtherKind { .. } => "use another id".to_owned(),
-            Self::Vanished { path, .. } => format!(
-                "put their folders back into sessions/ from a copy; `study verify {} --rebuild --drop-missing` takes them out of the tables for good",
+            Self::SessionsMissing { path, .. } => format!(
+                "restore their folders in sessions/ from a copy, or remove them from the tables with `study verify {} --rebuild --drop-missing`",
                 path.display()
             ),
             _ => return None,
         })
     }
 
-    /// Whether the request was at fault, not the folder.
+    /// Whether the request is at fault and not the folder.
     pub fn is_request(&self) -> bool {
         matches!(
             self,
@@ -259,7 +259,7 @@ impl StoreError {
         )
     }
 
-    /// Whether the disk is full, so that a reserve helps.
+    /// Whether the disk is full.
     pub fn is_full(&self) -> bool {
         match self {
             Self::Full { .. } => true,
@@ -269,7 +269,7 @@ impl StoreError {
     }
 }
 
-/// An error of the operating system in plain words, where there are some.
+/// The message of an error of the operating system, in plain words where possible.
 pub fn plain(error: &io::Error) -> String {
     use io::ErrorKind as K;
     let words = match error.kind() {
@@ -279,21 +279,21 @@ pub fn plain(error: &io::Error) -> String {
         K::QuotaExceeded => "the disk quota is used up",
         K::ReadOnlyFilesystem => "the file system is read-only",
         K::IsADirectory => "it is a folder, not a file",
-        K::NotADirectory => "a part of the path is no folder",
-        K::FileTooLarge => "the file is larger than is allowed",
-        // Another program's words for it are kept, the system's number is not.
+        K::NotADirectory => "part of the path is not a folder",
+        K::FileTooLarge => "the file is larger than allowed",
+        // The message of the system without its error number.
         _ => {
-            let told = error.to_string();
-            return match told.split_once(" (os error ") {
+            let message = error.to_string();
+            return match message.split_once(" (os error ") {
                 Some((words, _)) => words.to_owned(),
-                None => told,
+                None => message,
             };
         }
     };
     words.to_owned()
 }
 
-/// Whether an error of the operating system says that there is no room.
+/// Whether an error of the operating system says that the disk is full.
 pub(super) fn is_full(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -329,7 +329,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn an_error_of_the_system_has_words_and_no_number() {
+    fn an_error_of_the_system_is_shown_without_its_number() {
         // errno.h of Linux: ENOENT 2, EACCES 13, ENOSPC 28, EIO 5.
         assert_eq!(
             io(2),
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn room_is_told_in_kib_and_the_path_last() {
+    fn the_message_gives_free_space_in_kib_and_the_path_last() {
         let path: PathBuf = "results/x".into();
         let full = StoreError::Full {
             path: path.clone(),
@@ -350,7 +350,7 @@ mod tests {
         };
         assert_eq!(
             full.to_string(),
-            "no room for a session: 92 KiB free, 128 KiB needed in results/x"
+            "not enough disk space for a session: 92 KiB free, 128 KiB needed in results/x"
         );
         let open = StoreError::Open {
             participant: ParticipantId::new("P01").unwrap(),

@@ -1,37 +1,37 @@
-//! The journal of one session, written.
+//! Writing the journal of one session.
 //!
-//! One write for a record, then a sync; [`Journal::append`] returns only when the
-//! record is on the medium. After a failed write or sync the file is never touched
-//! again: a second sync may well say "ok" over lost data. [`Journal::new_segment`]
-//! goes on in another file.
+//! Each record is one write followed by a sync; [`Journal::append`] returns only
+//! when the record is on the medium. After a failed write or sync the file is not
+//! touched again, because a second sync can succeed although data were lost.
+//! [`Journal::new_segment`] continues in another file.
 
 use super::disk::{Appender, Disk};
 use super::error::{At as _, StoreError};
-use super::held::Held;
 use super::journal_record::{self, Record};
 use super::layout;
 use super::replay::{Replay, Segment, replay};
+use super::session_lock::SessionLock;
 use crate::outcome::{Event, Moment};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// An open journal. It can be moved to a thread of its own.
+/// An open journal. It can be moved to another thread.
 pub struct Journal {
-    held: Arc<Held>,
+    lock: Arc<SessionLock>,
     file: Box<dyn Appender>,
     path: PathBuf,
     segment: u32,
     next_seq: u64,
     prev: String,
-    /// Why the present segment is not touched any more.
-    failed: Option<Trouble>,
+    /// Why the current segment must not be written to any more.
+    failed: Option<SegmentFailure>,
 }
 
-/// What kind of failure a segment had.
+/// How a write to a segment failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Trouble {
+enum SegmentFailure {
     Full,
     Other,
 }
@@ -47,17 +47,17 @@ impl fmt::Debug for Journal {
 }
 
 impl Journal {
-    /// Opens the last segment to go on where a replay ended.
-    pub(super) fn open(held: Arc<Held>, segment: u32, replay: &Replay) -> Result<Self, StoreError> {
-        let path = held.path.join(layout::segment(segment));
-        let file = held.disk.open(&path).at(&path)?;
+    /// Opens the last segment to continue after the last record.
+    pub(super) fn open(lock: Arc<SessionLock>, from: &Recovered) -> Result<Self, StoreError> {
+        let path = lock.path.join(layout::segment(from.segment));
+        let file = lock.disk.open(&path).at(&path)?;
         Ok(Self {
-            held,
+            lock,
             file,
             path,
-            segment,
-            next_seq: replay.next_seq,
-            prev: replay.prev.clone(),
+            segment: from.segment,
+            next_seq: from.replay.next_seq,
+            prev: from.replay.prev.clone(),
             failed: None,
         })
     }
@@ -65,9 +65,9 @@ impl Journal {
     /// Writes an event and returns its sequence number when it is on the medium.
     ///
     /// # Errors
-    /// [`StoreError`]: the event is not acknowledged, whatever the file may hold.
-    /// After a failed write or sync only [`Journal::new_segment`] helps; append the
-    /// same event again afterwards.
+    /// [`StoreError`]: the event is not acknowledged, whatever the file contains.
+    /// After a failed write or sync call [`Journal::new_segment`] and append the same
+    /// event again.
     pub fn append(&mut self, at: Moment, event: &Event) -> Result<u64, StoreError> {
         self.record(&Record::Event(at, event.clone()))
     }
@@ -78,22 +78,22 @@ impl Journal {
                 path: self.path.clone(),
             });
         }
-        let unstorable = |e: journal_record::BadLine| StoreError::Unstorable {
+        let unstorable = |e: journal_record::LineError| StoreError::Unstorable {
             path: self.path.clone(),
             what: e.to_string(),
         };
         let mut bytes =
             journal_record::encode(self.next_seq, &self.prev, record).map_err(unstorable)?;
-        // What does not read back now would be lost later, in silence.
+        // A record that cannot be read back now would be lost unnoticed later.
         journal_record::decode(&bytes).map_err(unstorable)?;
         let hash = journal_record::hash(&bytes);
         bytes.push(b'\n');
         let written = self.file.write_all(&bytes).and_then(|()| self.file.sync());
         if let Err(e) = written {
             self.failed = Some(if super::error::is_full(&e) {
-                Trouble::Full
+                SegmentFailure::Full
             } else {
-                Trouble::Other
+                SegmentFailure::Other
             });
             return Err(e).at(&self.path);
         }
@@ -103,29 +103,29 @@ impl Journal {
         Ok(seq)
     }
 
-    /// Goes on in a new file, `journal-2.jsonl` and so on, of the same folder. On a
-    /// full disk it first frees the reserve. The record in doubt has to be appended
-    /// again; it keeps its sequence number, and a reader takes two equal lines as one.
+    /// Continues in a new file (`journal-2.jsonl`, …) of the same folder; on a full
+    /// disk it first frees the reserve. The failed record must be appended again. It
+    /// keeps its sequence number, and a reader takes two equal lines as one.
     ///
     /// # Errors
-    /// [`StoreError`]; it can be tried again.
+    /// [`StoreError`]; the call can be repeated.
     pub fn new_segment(&mut self) -> Result<(), StoreError> {
-        if self.failed == Some(Trouble::Full) {
-            self.held.free_reserve();
+        if self.failed == Some(SegmentFailure::Full) {
+            self.lock.free_reserve();
         }
         let mut number = self.segment + 1;
         let (path, file) = loop {
-            let path = self.held.path.join(layout::segment(number));
-            match self.held.disk.create(&path) {
+            let path = self.lock.path.join(layout::segment(number));
+            match self.lock.disk.create(&path) {
                 Ok(file) => break (path, file),
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => number += 1,
                 Err(e) => return Err(e).at(&path),
             }
         };
-        self.held
+        self.lock
             .disk
-            .sync_folder(&self.held.path)
-            .at(&self.held.path)?;
+            .sync_folder(&self.lock.path)
+            .at(&self.lock.path)?;
         self.file = file;
         self.path = path;
         self.segment = number;
@@ -134,7 +134,7 @@ impl Journal {
     }
 }
 
-/// The segments of a journal, in order. No folder or no journal: none.
+/// The segments of a journal, in order; none if there is no journal.
 pub(super) fn segments(disk: &dyn Disk, folder: &Path) -> Result<Vec<Segment>, StoreError> {
     let items = disk.list(folder).at(folder)?;
     let mut numbers: Vec<u32> = items
@@ -152,16 +152,34 @@ pub(super) fn segments(disk: &dyn Disk, folder: &Path) -> Result<Vec<Segment>, S
     numbers.into_iter().map(read).collect()
 }
 
-/// Sets a torn tail of the last segment apart, so that it can be written on, and
-/// says what it did. Damaged lines before it are left alone. The caller holds the
-/// lock of the session.
+/// A journal that can be continued.
+#[derive(Debug)]
+pub(super) struct Recovered {
+    /// Number of the last segment.
+    pub(super) segment: u32,
+    pub(super) replay: Replay,
+    /// Messages to the operator about repairs and damage.
+    pub(super) notices: Vec<String>,
+}
+
+/// Prepares the journal of a locked session for writing: creates the first segment
+/// if there is none and moves an incomplete last line to a file of its own. Damaged
+/// lines before it stay where they are.
 ///
-/// Each step leaves a folder from which it can be done again: the bytes are copied
+/// After an interruption at any step the call can be repeated: the bytes are copied
 /// and on the medium before they are cut off, and an equal copy is not made twice.
-pub(super) fn recover(
-    disk: &dyn Disk,
-    folder: &Path,
-) -> Result<(Vec<Segment>, Replay, Vec<String>), StoreError> {
+///
+/// # Errors
+/// [`StoreError::Newer`] for a journal of a later version, or the disk's.
+pub(super) fn recover(lock: &SessionLock) -> Result<Recovered, StoreError> {
+    let (disk, folder) = (lock.disk.as_ref(), lock.path.as_path());
+    let items = disk.list(folder).at(folder)?;
+    let number = |i: &super::disk::Item| layout::segment_number(&i.name);
+    if !items.iter().any(|i| number(i).is_some()) {
+        let path = folder.join(layout::segment(1));
+        disk.create(&path).at(&path)?;
+        disk.sync_folder(folder).at(folder)?;
+    }
     let mut segments = segments(disk, folder)?;
     let first = replay(&segments);
     let mut notices = Vec::new();
@@ -173,7 +191,7 @@ pub(super) fn recover(
             disk.truncate(&path, tail.keep as u64).at(&path)?;
             last.bytes.truncate(tail.keep);
             notices.push(format!(
-                "the last line of {} had not been written to its end; its {} bytes are in {copy}",
+                "the last line of {} was incomplete; its {} bytes are in {copy}",
                 last.name, tail.torn
             ));
         }
@@ -187,11 +205,22 @@ pub(super) fn recover(
         }
     }
     let replay = replay(&segments);
+    if let Some(found) = replay.newer() {
+        let path = folder.to_owned();
+        return Err(StoreError::Newer { path, found });
+    }
     notices.extend(replay.damage.iter().map(ToString::to_string));
-    Ok((segments, replay, notices))
+    let last = segments.last();
+    Ok(Recovered {
+        segment: last
+            .and_then(|s| layout::segment_number(&s.name))
+            .unwrap_or(1),
+        replay,
+        notices,
+    })
 }
 
-/// Copies bytes to the first free `torn-<n>.bin`, unless one holds them already.
+/// Copies bytes to the first free `torn-<n>.bin` unless one contains them already.
 fn set_apart(disk: &dyn Disk, folder: &Path, bytes: &[u8]) -> Result<String, StoreError> {
     let mut number = 1;
     loop {
@@ -205,7 +234,7 @@ fn set_apart(disk: &dyn Disk, folder: &Path, bytes: &[u8]) -> Result<String, Sto
             }
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
                 if disk.read(&path).at(&path)? == bytes {
-                    // Made by a process that died before it could cut.
+                    // Written by a process that died before it could truncate.
                     let mut file = disk.open(&path).at(&path)?;
                     file.sync().at(&path)?;
                     disk.sync_folder(folder).at(folder)?;
@@ -223,7 +252,7 @@ mod tests {
     use super::*;
     use crate::store::TelemetryWriter;
 
-    /// Saving has a thread of its own, so that a screen that hangs delays nothing.
+    /// Saving runs on its own thread, so that a blocked screen does not delay it.
     #[test]
     fn journal_and_telemetry_can_move_to_a_thread() {
         fn moves<T: Send + 'static>() {}

@@ -1,14 +1,14 @@
-//! One line of a journal, as bytes.
+//! The bytes of one line of a journal.
 //!
 //! ```text
 //! {"crc":"3f2a9c01","v":1,"seq":7,"prev":"9b1c…","wall":"…","mono_ns":…,"event":"…",…}
 //! ```
 //!
 //! `crc` is the CRC-32 (ISO-HDLC, as in zlib) of every byte after its comma up to
-//! the closing brace; `prev` the first 16 hexadecimal digits of the SHA-256 of the
-//! line before, without its line end. The first 8 bytes of a line occur nowhere
-//! else in it, because JSON escapes quotation marks in text: records can be told
-//! apart even where a line end is damaged. Pure: bytes in, bytes out.
+//! the closing brace; `prev` is the first 16 hexadecimal digits of the SHA-256 of the
+//! line before, without its line end. The first 8 bytes of a line occur nowhere else
+//! in it, because JSON escapes quotation marks in text: two records can be separated
+//! even if the line end between them is damaged.
 
 use crate::outcome::{Event, Moment};
 use crate::protocol::Seat;
@@ -24,63 +24,63 @@ pub const VERSION: u32 = 1;
 /// `prev` of the first line.
 pub const NO_LINE: &str = "0000000000000000";
 
-/// How every line starts, and nothing else in it.
+/// Start of every line; occurs nowhere else in it.
 pub(super) const PREFIX: &[u8] = b"{\"crc\":\"";
 
-/// Bytes up to where the checksum begins to count: `{"crc":"3f2a9c01",`.
+/// Number of bytes before the checksummed part: `{"crc":"3f2a9c01",`.
 const HEAD: usize = 18;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// What a line says.
+/// The content of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
-    /// The first line: the session folder belongs to this participant.
+    /// The first line: whose session it is.
     Claim(Claim),
-    /// Any other.
+    /// Any other line.
     Event(Moment, Event),
-    /// An event of a later version of the program: its name.
+    /// Name of an event of a later version of the program.
     Unknown(String),
 }
 
-/// The first line of a journal, written when the session's folder is made.
+/// The first line of a journal, written when the session is claimed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Claim {
-    /// Whose session.
+    /// Participant.
     pub participant: ParticipantId,
-    /// From 1.
+    /// Session of the participant, from 1.
     pub session: u32,
-    /// Where the order comes from; none for somebody who never came.
+    /// Source of the order; `None` for a no-show.
     pub seat: Option<Seat>,
-    /// Newest version of the protocol then.
+    /// Newest version of the protocol at that time.
     pub protocol_version: u32,
 }
 
-/// A line that is whole.
+/// A valid line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Place in the journal, from 0.
+    /// Sequence number, from 0.
     pub seq: u64,
     /// Hash of the line before.
     pub prev: String,
-    /// What it says.
+    /// Content.
     pub record: Record,
 }
 
-/// Why bytes are no line.
+/// Why a line is not valid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum BadLine {
-    /// Not what this program writes.
-    #[error("it is no record")]
+pub enum LineError {
+    /// It does not have the form of a line.
+    #[error("it is not a record")]
     Shape,
-    /// Some byte is not what was written.
-    #[error("its checksum does not fit")]
+    /// A byte was changed.
+    #[error("its checksum does not match")]
     Checksum,
     /// A later version of the format.
     #[error("it has version {0} of the format")]
     Newer(u32),
-    /// The checksum fits, but this program would not have written it.
-    #[error("it does not read as an event: {0}")]
+    /// The checksum matches, but the content is not valid.
+    #[error("it is not an event: {0}")]
     Content(String),
 }
 
@@ -120,11 +120,11 @@ struct Head {
     event: Option<String>,
 }
 
-/// A line without its line end.
+/// Writes a line without its line end.
 ///
 /// # Errors
-/// What the serialiser says; no event of this program is known to do that.
-pub fn encode(seq: u64, prev: &str, record: &Record) -> Result<Vec<u8>, BadLine> {
+/// [`LineError::Content`] if the record cannot be serialized.
+pub fn encode(seq: u64, prev: &str, record: &Record) -> Result<Vec<u8>, LineError> {
     let body = match record {
         Record::Claim(claim) => Body::Claim {
             v: VERSION,
@@ -140,10 +140,10 @@ pub fn encode(seq: u64, prev: &str, record: &Record) -> Result<Vec<u8>, BadLine>
             mono_ns: at.mono_ns,
             event,
         },
-        Record::Unknown(name) => return Err(BadLine::Content(format!("unknown event {name}"))),
+        Record::Unknown(name) => return Err(LineError::Content(format!("unknown event {name}"))),
     };
-    let body = serde_json::to_string(&body).map_err(|e| BadLine::Content(e.to_string()))?;
-    // The body's own opening brace gives way to the checksum.
+    let body = serde_json::to_string(&body).map_err(|e| LineError::Content(e.to_string()))?;
+    // The opening brace of the body is replaced by the checksum.
     let counted = &body[1..];
     let sum = CRC.checksum(counted.as_bytes());
     Ok(format!("{{\"crc\":\"{sum:08x}\",{counted}").into_bytes())
@@ -152,27 +152,27 @@ pub fn encode(seq: u64, prev: &str, record: &Record) -> Result<Vec<u8>, BadLine>
 /// Reads a line without its line end.
 ///
 /// # Errors
-/// [`BadLine`], never a panic, whatever the bytes.
-pub fn decode(bytes: &[u8]) -> Result<Line, BadLine> {
-    let (head, counted) = bytes.split_at_checked(HEAD).ok_or(BadLine::Shape)?;
+/// [`LineError`]; never panics.
+pub fn decode(bytes: &[u8]) -> Result<Line, LineError> {
+    let (head, counted) = bytes.split_at_checked(HEAD).ok_or(LineError::Shape)?;
     if !head.starts_with(PREFIX) || !head.ends_with(b"\",") {
-        return Err(BadLine::Shape);
+        return Err(LineError::Shape);
     }
     if head[PREFIX.len()..HEAD - 2] != *format!("{:08x}", CRC.checksum(counted)).as_bytes() {
-        return Err(BadLine::Checksum);
+        return Err(LineError::Checksum);
     }
-    let content = |e: serde_json::Error| BadLine::Content(e.to_string());
+    let content = |e: serde_json::Error| LineError::Content(e.to_string());
     let head: Head = serde_json::from_slice(bytes).map_err(|e| {
-        // The rest of a newer line may have any shape.
+        // The rest of a newer line may have any form.
         match serde_json::from_slice(bytes) {
-            Ok(Version { v }) if v > VERSION => BadLine::Newer(v),
+            Ok(Version { v }) if v > VERSION => LineError::Newer(v),
             _ => content(e),
         }
     })?;
     if head.v > VERSION {
-        return Err(BadLine::Newer(head.v));
+        return Err(LineError::Newer(head.v));
     }
-    let missing = |what: &str| BadLine::Content(format!("{what} is missing"));
+    let missing = |what: &str| LineError::Content(format!("{what} is missing"));
     let seq = head.seq.ok_or_else(|| missing("seq"))?;
     let prev = head.prev.ok_or_else(|| missing("prev"))?;
     let record = match (head.claim, head.event) {
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_is_none_is_stored_and_read() {
+    fn nan_is_stored_and_read() {
         let at = Moment {
             wall: DateTime::parse_from_rfc3339("2007-03-22T10:00:00+01:00").unwrap(),
             mono_ns: 1,
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn an_event_of_a_later_version_is_named_and_not_damage() {
+    fn an_event_of_a_later_version_is_named_and_is_not_damage() {
         let body = r#""v":1,"seq":4,"prev":"0000000000000000","wall":"2007-03-22T10:00:00+01:00","mono_ns":1,"event":"levitated","height_m":2}"#;
         let sum = CRC.checksum(body.as_bytes());
         let bytes = format!("{{\"crc\":\"{sum:08x}\",{body}").into_bytes();
@@ -285,7 +285,7 @@ mod tests {
         let newer = body.replace("\"v\":1", "\"v\":2");
         let sum = CRC.checksum(newer.as_bytes());
         let bytes = format!("{{\"crc\":\"{sum:08x}\",{newer}").into_bytes();
-        assert_eq!(decode(&bytes), Err(BadLine::Newer(2)));
+        assert_eq!(decode(&bytes), Err(LineError::Newer(2)));
     }
 
     proptest! {

@@ -1,25 +1,25 @@
-//! Where things are in a results folder. Names only.
+//! Names of the files and folders of a results folder.
 
 use std::path::{Path, PathBuf};
 use study_base::text::ParticipantId;
 
-/// What the study is and which versions its protocol has had.
+/// The study and the versions of its protocol.
 pub const MANIFEST: &str = "study.json";
-/// Frozen copies of the protocol, by version.
+/// Folder of the frozen copies of the protocol, by version.
 pub const PROTOCOLS: &str = "protocol";
-/// The protocol file in each of them.
+/// The protocol file in each copy.
 pub const PROTOCOL: &str = "protocol.toml";
-/// One folder for each participant, in it one for each session.
+/// Folder with one folder for each participant, each with one for each session.
 pub const SESSIONS: &str = "sessions";
-/// What is left of a participant whose data were erased.
+/// Record of a participant whose data were erased.
 pub const TOMBSTONE: &str = "tombstone.json";
-/// Telemetry of a session, one file for each attempt.
+/// Folder of a session's telemetry, one file for each attempt.
 pub const TELEMETRY: &str = "telemetry";
-/// Room for the last records of a session on a full disk.
+/// File that reserves disk space for the last records of a session.
 pub const RESERVE: &str = "reserve";
-/// The same, before it belongs to a session.
+/// The same file before the session is claimed.
 pub const PROBE: &str = ".probe";
-/// Which orders were shown while the study ran, to whom it may matter.
+/// Log of the orders that were shown during the study.
 pub const REVEALS: &str = "reveals.jsonl";
 /// Derived: one row for each trial.
 pub const RATINGS: &str = "ratings.csv";
@@ -30,10 +30,10 @@ pub const PARTICIPANTS: &str = "participants.csv";
 
 /// The derived tables.
 pub const TABLES: [&str; 3] = [RATINGS, ATTEMPTS, PARTICIPANTS];
-/// Derived, by `study analyze`: what the ratings come to.
+/// Derived by `study analyze`: the results of the analysis.
 pub const ANALYSIS: &str = "analysis";
 
-/// The frozen copy of a version of the protocol.
+/// Folder of the frozen copy of a version of the protocol.
 pub fn protocol(study: &Path, version: u32) -> PathBuf {
     study.join(PROTOCOLS).join(version.to_string())
 }
@@ -48,7 +48,7 @@ pub fn session(study: &Path, id: &ParticipantId, session: u32) -> PathBuf {
     participant(study, id).join(session.to_string())
 }
 
-/// A segment of a journal, from 1.
+/// File name of a segment of a journal, from 1.
 pub fn segment(number: u32) -> String {
     if number == 1 {
         "journal.jsonl".to_owned()
@@ -57,7 +57,7 @@ pub fn segment(number: u32) -> String {
     }
 }
 
-/// Which segment of a journal a file name is.
+/// Number of the journal segment with this file name.
 pub fn segment_number(name: &str) -> Option<u32> {
     let number = match name.strip_prefix("journal")?.strip_suffix(".jsonl")? {
         "" => 1,
@@ -66,7 +66,7 @@ pub fn segment_number(name: &str) -> Option<u32> {
     (segment(number) == name).then_some(number)
 }
 
-/// Bytes of a torn tail that were set apart, from 1.
+/// File name of the copy of an incomplete last line, from 1.
 pub fn torn(number: u32) -> String {
     format!("torn-{number}.bin")
 }
@@ -78,7 +78,8 @@ pub fn is_torn(name: &str) -> bool {
         .is_some_and(|n| n.parse::<u32>().is_ok())
 }
 
-/// The telemetry of an attempt; `copy` from 1 tells files of the same attempt apart.
+/// File name of the telemetry of an attempt; `copy`, from 1, distinguishes files of
+/// the same attempt.
 pub fn telemetry(trial: u32, attempt: u32, copy: u32) -> String {
     if copy == 1 {
         format!("{trial:03}-a{attempt}.csv")
@@ -87,7 +88,7 @@ pub fn telemetry(trial: u32, attempt: u32, copy: u32) -> String {
     }
 }
 
-/// A number from 1 as this program writes it in a name, without leading zeros.
+/// Parses a number from 1 without leading zeros.
 pub fn number(name: &str) -> Option<u32> {
     let n: u32 = name.parse().ok()?;
     (n > 0 && n.to_string() == name).then_some(n)

@@ -1,16 +1,15 @@
-//! Who has which session and which row.
+//! Claiming sessions and rows.
 //!
-//! There is no ledger file: it is read from the journals, under a lock on the
-//! study's folder, so it cannot disagree with them. A row belongs to a participant
-//! while their state keeps it; the numbers of pilots and simulated participants
-//! are never given twice.
+//! There is no ledger file: who has which row is read from the journals, under a
+//! lock on the study's folder. A participant keeps a row while their state allows
+//! it; the numbers of pilots and simulated participants are never reused.
 
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
-use super::held::{Held, RESERVE_BYTES};
 use super::journal::{self, Journal};
 use super::journal_record::{Claim, Record};
 use super::manifest::Manifest;
+use super::session_lock::{RESERVE_BYTES, SessionLock};
 use super::sessions::SessionData;
 use super::{SessionFolder, StudyFolder, atomic, layout};
 use crate::outcome::fold::Standing;
@@ -23,22 +22,22 @@ use std::path::Path;
 use std::sync::Arc;
 use study_base::text::ParticipantId;
 
-/// Free space below which the operator is told, bytes.
-const LITTLE_BYTES: u64 = 32 << 20;
+/// Free space below which the operator is warned, bytes.
+const LOW_SPACE_BYTES: u64 = 32 << 20;
 
-/// What kind of participant a seat is for.
+/// The kind of a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SeatKind {
-    /// Takes a row.
+    /// Takes part in the study and has a row of the schedule.
     Real,
-    /// A person who tries the study out.
+    /// Tries the study out.
     Pilot,
-    /// Nobody.
+    /// Simulated: no person.
     Simulated,
 }
 
 impl SeatKind {
-    /// In a sentence.
+    /// The word for it in a sentence.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Real => "real",
@@ -47,7 +46,7 @@ impl SeatKind {
         }
     }
 
-    /// Of a seat.
+    /// The kind of participant that has a seat.
     pub fn of(seat: Seat) -> Self {
         match seat {
             Seat::Row(_) => Self::Real,
@@ -57,41 +56,42 @@ impl SeatKind {
     }
 }
 
-/// Who wants a session.
+/// A request for a session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ClaimRequest {
-    /// Who.
+    /// Participant.
     pub participant: ParticipantId,
-    /// What kind of participant.
+    /// Kind of participant.
     pub kind: SeatKind,
-    /// The rows of this rig; all if `None`.
+    /// Rows available to this rig; all if `None`.
     pub rows: Option<RangeInclusive<u32>>,
 }
 
-/// A session that belongs to this process.
+/// A session claimed by this process.
 #[derive(Debug)]
 pub struct Claimed {
-    /// Which of the participant's, from 1.
+    /// Session of the participant, from 1.
     pub session: u32,
-    /// Where the order comes from.
+    /// Source of the order.
     pub seat: Seat,
-    /// What has happened in it; empty for a new one.
+    /// Its events so far; empty for a new session.
     pub entries: Vec<Entry>,
-    /// The version of the protocol that it started with; for a new one the newest.
+    /// Version of the protocol that it started with; the newest for a new session.
     pub protocol_version: u32,
-    /// Its folder.
+    /// Folder of the session.
     pub folder: SessionFolder,
-    /// What the operator should know.
+    /// Messages to the operator.
     pub notices: Vec<String>,
 }
 
 impl StudyFolder {
     /// Claims a participant's unfinished session, or a new one with the lowest free
-    /// row. When this returns the claim is on the medium.
+    /// row. When this returns, the claim is on the medium.
     ///
     /// # Errors
-    /// [`StoreError`]: the participant is done or out, open elsewhere, of another
-    /// kind, collides with another id; no free row; no room; a newer format.
+    /// [`StoreError`] if the participant has finished or left the study, is of another
+    /// kind, has the session open elsewhere or an id that differs from another only
+    /// in case; if no row is free or the disk is full; if the format is newer.
     pub fn claim(&self, request: &ClaimRequest) -> Result<Claimed, StoreError> {
         let _lock = self.lock()?;
         let newest = Manifest::read(self.disk.as_ref(), &self.path)?
@@ -118,31 +118,15 @@ impl StudyFolder {
             self.make_session(&request.participant, &folder)?;
         }
         let disk = self.disk.as_ref();
-        let Some(lock) = disk.lock(&folder).at(&folder)? else {
+        let locked = self.lock_session(&request.participant, number);
+        let lock = locked.inspect_err(|_| {
             let _ = disk.remove_file(&self.path.join(layout::PROBE));
-            return Err(StoreError::Open {
-                participant: request.participant.clone(),
-                session: number,
-                path: folder,
-            });
-        };
-        let held = Arc::new(Held::new(Arc::clone(&self.disk), folder.clone(), lock));
-        if !self.has_journal(&folder)? {
-            let path = folder.join(layout::segment(1));
-            disk.create(&path).at(&path)?;
-            disk.sync_folder(&folder).at(&folder)?;
-        }
-        // Others may have written since the ledger was read; now nobody can.
-        let (mut segments, mut replay, recovered) = journal::recover(disk, &folder)?;
-        notices.extend(recovered);
-        if let Some(found) = replay.newer() {
-            return Err(StoreError::Newer {
-                path: folder,
-                found,
-            });
-        }
-        check_standing(request, number, replay.history.standing())?;
-        if replay.records == 0 {
+        })?;
+        // Other processes may have written since the sessions were read.
+        let mut recovered = journal::recover(&lock)?;
+        notices.append(&mut recovered.notices);
+        check_standing(request, number, recovered.replay.history.standing())?;
+        if recovered.replay.records == 0 {
             let seat = next_seat(request, &all)?;
             let claim = Claim {
                 participant: request.participant.clone(),
@@ -150,23 +134,18 @@ impl StudyFolder {
                 seat: Some(seat),
                 protocol_version: self.version(),
             };
-            let last = segments
-                .last()
-                .and_then(|s| layout::segment_number(&s.name));
-            let mut journal = Journal::open(Arc::clone(&held), last.unwrap_or(1), &replay)?;
+            let mut journal = Journal::open(Arc::clone(&lock), &recovered)?;
             journal.record(&Record::Claim(claim))?;
             drop(journal);
-            (segments, replay, _) = journal::recover(disk, &folder)?;
+            recovered = journal::recover(&lock)?;
         }
+        let replay = &recovered.replay;
         let seat = replay.seat().ok_or_else(|| StoreError::Damaged {
             path: folder.clone(),
             what: "the lines that say which order the session has are damaged".to_owned(),
         })?;
         check_kind(request, seat)?;
         self.keep_reserve(&folder)?;
-        let last = segments
-            .last()
-            .and_then(|s| layout::segment_number(&s.name));
         let protocol_version = replay
             .history
             .start()
@@ -177,12 +156,12 @@ impl StudyFolder {
             seat,
             entries,
             protocol_version,
-            folder: SessionFolder::new(held, last.unwrap_or(1), replay),
+            folder: SessionFolder::new(lock, recovered),
             notices,
         })
     }
 
-    /// Refuses an id that a file system could take for another one.
+    /// Refuses an id that a file system may not distinguish from an existing one.
     ///
     /// # Errors
     /// [`StoreError::Collides`], or the sessions cannot be read.
@@ -197,7 +176,7 @@ impl StudyFolder {
         }
     }
 
-    /// The session to go on with or to begin.
+    /// Number of the session to continue or begin.
     fn session_to_claim(
         &self,
         request: &ClaimRequest,
@@ -214,7 +193,7 @@ impl StudyFolder {
             return Err(StoreError::Erased { participant });
         }
         let standing = last.standing();
-        // A no-show whose state was not written to its end has nothing to go on with.
+        // A no-show whose state was written incompletely cannot be continued.
         let empty = last.claimed && last.seat.is_none() && last.entries.is_empty();
         if standing.state == State::Void || (empty && last.damage.is_empty()) {
             return Ok(last.session + 1);
@@ -223,26 +202,42 @@ impl StudyFolder {
         Ok(last.session)
     }
 
-    /// Makes a session's folder and everything above it, durably.
+    /// Creates a session's folder and its parents durably.
     pub(super) fn make_session(&self, id: &ParticipantId, folder: &Path) -> Result<(), StoreError> {
         let disk = self.disk.as_ref();
         atomic::folder(disk, &self.path.join(layout::SESSIONS))?;
         let participant = layout::participant(&self.path, id);
         atomic::folder(disk, &participant)?;
-        // This is the claim: of all who try, one succeeds.
+        // Of several processes only one succeeds.
         disk.create_folder(folder).at(folder)?;
         disk.sync_folder(&participant).at(&participant)
     }
 
-    pub(super) fn has_journal(&self, folder: &Path) -> Result<bool, StoreError> {
-        let items = self.disk.list(folder).at(folder)?;
-        Ok(items
-            .iter()
-            .any(|i| layout::segment_number(&i.name).is_some()))
+    /// Locks a session's folder.
+    ///
+    /// # Errors
+    /// [`StoreError::Open`] if another process has it open, or the disk's.
+    pub(super) fn lock_session(
+        &self,
+        id: &ParticipantId,
+        number: u32,
+    ) -> Result<Arc<SessionLock>, StoreError> {
+        let path = layout::session(&self.path, id, number);
+        match self.disk.lock(&path).at(&path)? {
+            Some(lock) => {
+                let disk = Arc::clone(&self.disk);
+                Ok(Arc::new(SessionLock::new(disk, path, lock)))
+            }
+            None => Err(StoreError::Open {
+                participant: id.clone(),
+                session: number,
+                path,
+            }),
+        }
     }
 
-    /// Writes the reserve where it belongs to no session yet: if there is no room
-    /// or the disk does not take it, nothing was claimed.
+    /// Writes the reserve before anything is claimed, so that a full or read-only
+    /// disk prevents the claim.
     fn probe(&self, notices: &mut Vec<String>) -> Result<(), StoreError> {
         let disk = self.disk.as_ref();
         let path = self.path.join(layout::PROBE);
@@ -259,8 +254,8 @@ impl StudyFolder {
                 needed,
             });
         }
-        if let Some(free) = free.filter(|free| *free < LITTLE_BYTES) {
-            notices.push(format!("only {} KiB are free on the disk", free >> 10));
+        if let Some(free) = free.filter(|free| *free < LOW_SPACE_BYTES) {
+            notices.push(format!("only {} KiB of disk space are free", free >> 10));
         }
         let written = write_reserve(disk, &path);
         if written.is_err() {
@@ -269,7 +264,7 @@ impl StudyFolder {
         written.at(&path)
     }
 
-    /// Gives the session the reserve that the probe has written.
+    /// Moves the reserve written by [`Self::probe`] into the session.
     fn keep_reserve(&self, folder: &Path) -> Result<(), StoreError> {
         let to = folder.join(layout::RESERVE);
         self.disk
@@ -280,13 +275,13 @@ impl StudyFolder {
 
 fn write_reserve(disk: &dyn Disk, path: &Path) -> io::Result<()> {
     let mut file = disk.create(path)?;
-    // Not zeros: some file systems would keep no room for those.
+    // Not zeros: some file systems allocate no space for those.
     let bytes: Vec<u8> = (0..RESERVE_BYTES).map(|i| (i % 251) as u8 ^ 0x5a).collect();
     file.write_all(&bytes)?;
     file.sync()
 }
 
-/// Only an unfinished session goes on.
+/// Refuses a session that is not unfinished.
 fn check_standing(
     request: &ClaimRequest,
     session: u32,
@@ -343,12 +338,12 @@ fn next_seat(request: &ClaimRequest, all: &[SessionData]) -> Result<Seat, StoreE
     }
 }
 
-/// The lowest row that the next participant would get, by all sessions of a study.
-pub fn next_row(sessions: &[SessionData]) -> u32 {
-    free_row(1..=u32::MAX, sessions).unwrap_or(u32::MAX)
+/// The row that the next participant would get, from all sessions of a study.
+pub fn next_row(sessions: &[SessionData]) -> Option<u32> {
+    free_row(1..=u32::MAX, sessions)
 }
 
-/// The lowest row of a range that nobody keeps.
+/// The lowest row of a range that no participant keeps.
 fn free_row(rows: RangeInclusive<u32>, all: &[SessionData]) -> Option<u32> {
     let held: BTreeSet<u32> = all.iter().filter_map(SessionData::held_row).collect();
     let mut rows = (*rows.start()).max(1)..=*rows.end();

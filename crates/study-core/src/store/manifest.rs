@@ -1,7 +1,6 @@
-//! `study.json`: what the folder is, and every version of its protocol.
+//! `study.json`: the study and every version of its protocol.
 //!
-//! It is the commit point: a version exists when `study.json` names it, and its
-//! files were on the medium before that.
+//! A version exists when `study.json` names it; its files are on the medium before.
 
 use super::atomic;
 use super::disk::Disk;
@@ -15,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The version of the folder's format that this program writes and reads.
+/// Format of the folder that this program writes and reads.
 pub const FORMAT: &str = "study-results/1";
 
 /// The content of `study.json`.
@@ -23,11 +22,11 @@ pub const FORMAT: &str = "study-results/1";
 pub struct Manifest {
     /// [`FORMAT`].
     pub format: String,
-    /// The study's id.
+    /// Study id.
     pub study: String,
-    /// The program that made the folder.
+    /// Version of the program that created the folder.
     pub tool_version: String,
-    /// When it was made.
+    /// When the folder was created.
     pub created: DateTime<FixedOffset>,
     /// Versions of the protocol, from 1, without gaps.
     pub versions: Vec<Version>,
@@ -40,11 +39,11 @@ pub struct Version {
     pub version: u32,
     /// When it was frozen.
     pub at: DateTime<FixedOffset>,
-    /// Why it was amended; empty for the first.
+    /// Reason of the amendment; empty for the first version.
     pub reason: String,
-    /// The program that froze it.
+    /// Version of the program that froze it.
     pub tool_version: String,
-    /// What of it may change.
+    /// Fingerprints of stimuli, wording and analysis.
     pub fingerprints: Fingerprints,
     /// Path in the frozen folder → SHA-256 of the file.
     pub files: BTreeMap<String, String>,
@@ -56,7 +55,7 @@ struct FormatOnly {
 }
 
 impl Manifest {
-    /// Of a study that starts now.
+    /// The manifest of a new study.
     pub(super) fn new(study: &str, first: Version, at: Moment) -> Self {
         Self {
             format: FORMAT.to_owned(),
@@ -77,7 +76,7 @@ impl Manifest {
     /// Reads the manifest of a study's folder.
     ///
     /// # Errors
-    /// [`StoreError`]: none there, of a newer version, or damaged.
+    /// [`StoreError`] if there is none, or it is of a newer version or damaged.
     pub(super) fn read(disk: &dyn Disk, study: &Path) -> Result<Self, StoreError> {
         let path = study.join(layout::MANIFEST);
         let bytes = match disk.read(&path) {
@@ -112,7 +111,7 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Puts it in place of the old one.
+    /// Replaces the manifest of a study's folder.
     pub(super) fn write(&self, disk: &dyn Disk, study: &Path) -> Result<(), StoreError> {
         let mut text = serde_json::to_string_pretty(self).map_err(|e| StoreError::Unstorable {
             path: study.join(layout::MANIFEST),
@@ -123,8 +122,8 @@ impl Manifest {
     }
 }
 
-/// Writes the files of a version to its folder, ready to be named by the manifest.
-/// Left-overs of a process that died before it came so far are replaced.
+/// Writes the files of a version to its folder; the manifest must name it afterwards.
+/// Remains of an interrupted call are replaced.
 pub(super) fn freeze(
     disk: &dyn Disk,
     study: &Path,
@@ -162,7 +161,7 @@ pub(super) fn freeze(
     })
 }
 
-/// Whether a path with `/` stays in its folder.
+/// Whether a path separated by `/` stays in its folder.
 fn is_inside(name: &str) -> bool {
     !name.contains(['\\', '\0'])
         && name

@@ -1,7 +1,7 @@
-//! Whom the tables name although no journal tells of them.
+//! Sessions that the derived tables contain although their journals are missing.
 //!
-//! The tables are derived and prove nothing, but a session that was in them and is
-//! gone was lost or taken away: it is told, and they are not written over unasked.
+//! Such a session was lost or removed. It is reported, and the tables are not
+//! overwritten without an explicit request.
 
 use super::sessions::SessionData;
 use super::{StudyFolder, layout};
@@ -10,18 +10,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use study_base::text::Untrusted;
 
-/// A session that a table names and that is not there.
+/// A session in a table whose journal is missing.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Vanished {
-    /// The table.
+pub(super) struct MissingSession {
+    /// File name of the table.
     pub(super) table: &'static str,
-    /// Whose, as the table has it.
+    /// Participant, as in the table.
     pub(super) participant: String,
-    /// Which, as the table has it.
+    /// Session, as in the table.
     pub(super) session: String,
 }
 
-impl fmt::Display for Vanished {
+impl fmt::Display for MissingSession {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", Untrusted(&self.participant))?;
         match self.session.as_str() {
@@ -32,32 +32,34 @@ impl fmt::Display for Vanished {
 }
 
 impl StudyFolder {
-    /// By participant and session, each once. A table that is not there or cannot
-    /// be read names nobody.
-    pub(super) fn vanished(&self, sessions: &[SessionData]) -> Vec<Vanished> {
+    /// The missing sessions by participant and session, each once. A table that does
+    /// not exist or cannot be read contains none.
+    pub(super) fn missing_sessions(&self, sessions: &[SessionData]) -> Vec<MissingSession> {
         let mut erased = BTreeSet::new();
-        let mut there = BTreeSet::new();
+        let mut present = BTreeSet::new();
         for session in sessions.iter().filter(|s| s.claimed) {
             let id = session.participant.as_str();
-            there.insert((id, session.session.to_string()));
+            present.insert((id, session.session.to_string()));
             if session.tombstone.is_some() {
                 erased.insert(id);
             }
         }
-        let mut gone = BTreeMap::new();
+        let mut missing = BTreeMap::new();
         for table in [layout::PARTICIPANTS, layout::RATINGS] {
             let Ok(bytes) = self.disk.read(&self.path.join(table)) else {
                 continue;
             };
             for (id, session) in named(&bytes) {
-                if !erased.contains(id.as_str()) && !there.contains(&(id.as_str(), session.clone()))
+                if !erased.contains(id.as_str())
+                    && !present.contains(&(id.as_str(), session.clone()))
                 {
-                    gone.entry((id, session)).or_insert(table);
+                    missing.entry((id, session)).or_insert(table);
                 }
             }
         }
-        gone.into_iter()
-            .map(|((participant, session), table)| Vanished {
+        missing
+            .into_iter()
+            .map(|((participant, session), table)| MissingSession {
                 table,
                 participant,
                 session,

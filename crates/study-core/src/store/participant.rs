@@ -1,11 +1,10 @@
-//! States that are set from outside a session, and the erasure of data.
+//! Setting the state of a participant and erasing their data.
 //!
-//! An erasure is committed by the tombstone: from then on the participant counts
-//! as erased, whatever is left of the files, and doing it again completes it.
+//! Writing the tombstone commits an erasure: from then on the participant counts as
+//! erased, whatever is left of the files, and repeating the command completes it.
 
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
-use super::held::Held;
 use super::journal::{self, Journal};
 use super::journal_record::{Claim, Record};
 use super::sessions::SessionData;
@@ -14,46 +13,45 @@ use super::{StudyFolder, layout};
 use crate::outcome::{Event, Moment, State};
 use chrono::{DateTime, FixedOffset};
 use std::path::Path;
-use std::sync::Arc;
 use study_base::text::ParticipantId;
 
-/// A state that an operator sets.
+/// A request to set the state of a participant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StateRequest {
-    /// Whose.
+    /// Participant.
     pub participant: ParticipantId,
-    /// Which.
+    /// New state.
     pub state: State,
-    /// Why.
+    /// Reason.
     pub reason: String,
-    /// Whether what the participant gave is erased.
+    /// Whether to erase the participant's data.
     pub erase: bool,
 }
 
-/// What setting a state came to.
+/// The effect of setting a state.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StateChange {
-    /// The state before; `None` for somebody who had never come.
+    /// State before; `None` for a participant without a session.
     pub before: Option<State>,
-    /// The row that goes to the next participant.
+    /// The row that the next participant gets, if one became free.
     pub freed_row: Option<u32>,
-    /// Sessions whose data were erased.
+    /// Number of sessions whose data were erased.
     pub erased: usize,
-    /// When the data had been erased before this, if they had.
+    /// When the data had been erased by an earlier command, if they had.
     pub erased_before: Option<DateTime<FixedOffset>>,
-    /// Whether `analysis/`, which held what they gave too, was removed.
+    /// Whether `analysis/`, which contains data of all participants, was removed.
     pub analysis_removed: bool,
-    /// What the operator should know.
+    /// Messages to the operator.
     pub notices: Vec<String>,
 }
 
 impl StudyFolder {
-    /// Sets a participant's state, and erases what they gave if that is asked.
-    /// The derived tables are then to be written again.
+    /// Sets a participant's state and, on request, erases their data. The derived
+    /// tables must be written again afterwards.
     ///
     /// # Errors
-    /// [`StoreError`]: nobody of that id, a state that cannot follow, a session
-    /// that is open, or the disk's.
+    /// [`StoreError`]: no such participant, a state that cannot follow the present
+    /// one, an open session, or the disk's.
     pub fn set_state(&self, request: &StateRequest, at: Moment) -> Result<StateChange, StoreError> {
         let _lock = self.lock()?;
         let id = &request.participant;
@@ -65,7 +63,7 @@ impl StudyFolder {
                     participant: id.clone(),
                 });
             }
-            // There is something left if it was killed after its commit.
+            // Files remain if the earlier erasure was interrupted.
             return Ok(StateChange {
                 before: Some(stone.state),
                 freed_row: None,
@@ -121,7 +119,7 @@ impl StudyFolder {
         };
         let started = last.history.start().is_some();
         match request.state {
-            State::Unfinished | State::Done => refused("only a session itself says that"),
+            State::Unfinished | State::Done => refused("only a session sets this state"),
             State::Void if last.history.has_rating() => {
                 refused("a trial has been rated; use dropped-out or excluded")
             }
@@ -140,8 +138,8 @@ impl StudyFolder {
         Ok(near.and_then(|near| ids.iter().find(|i| i.as_str() == near).cloned()))
     }
 
-    /// Appends the state to the journal of a session that nobody has open. Somebody
-    /// who never came gets a folder without a seat, so that it is on record.
+    /// Appends the state to the journal of a session. A participant without a session
+    /// gets a folder without a seat.
     fn append_state(
         &self,
         request: &StateRequest,
@@ -150,30 +148,15 @@ impl StudyFolder {
         at: Moment,
         notices: &mut Vec<String>,
     ) -> Result<(), StoreError> {
-        let disk = self.disk.as_ref();
-        let folder = layout::session(&self.path, &request.participant, number);
         if new {
+            let folder = layout::session(&self.path, &request.participant, number);
             self.make_session(&request.participant, &folder)?;
         }
-        let held = self.hold(&request.participant, number)?;
-        if !self.has_journal(&folder)? {
-            let path = folder.join(layout::segment(1));
-            disk.create(&path).at(&path)?;
-            disk.sync_folder(&folder).at(&folder)?;
-        }
-        let (segments, replay, recovered) = journal::recover(disk, &folder)?;
-        notices.extend(recovered);
-        if let Some(found) = replay.newer() {
-            return Err(StoreError::Newer {
-                path: folder,
-                found,
-            });
-        }
-        let segment = segments
-            .last()
-            .and_then(|s| layout::segment_number(&s.name));
-        let mut journal = Journal::open(held, segment.unwrap_or(1), &replay)?;
-        if replay.records == 0 {
+        let lock = self.lock_session(&request.participant, number)?;
+        let mut recovered = journal::recover(&lock)?;
+        notices.append(&mut recovered.notices);
+        let mut journal = Journal::open(lock, &recovered)?;
+        if recovered.replay.records == 0 {
             journal.record(&Record::Claim(Claim {
                 participant: request.participant.clone(),
                 session: number,
@@ -189,18 +172,6 @@ impl StudyFolder {
         Ok(())
     }
 
-    fn hold(&self, id: &ParticipantId, number: u32) -> Result<Arc<Held>, StoreError> {
-        let folder = layout::session(&self.path, id, number);
-        match self.disk.lock(&folder).at(&folder)? {
-            Some(lock) => Ok(Arc::new(Held::new(Arc::clone(&self.disk), folder, lock))),
-            None => Err(StoreError::Open {
-                participant: id.clone(),
-                session: number,
-                path: folder,
-            }),
-        }
-    }
-
     fn erase(
         &self,
         request: &StateRequest,
@@ -208,10 +179,10 @@ impl StudyFolder {
         at: Moment,
     ) -> Result<usize, StoreError> {
         let id = &request.participant;
-        let mut held = Vec::new();
+        let mut locks = Vec::new();
         let mut sessions = Vec::new();
         for session in own {
-            held.push(self.hold(id, session.session)?);
+            locks.push(self.lock_session(id, session.session)?);
             let segments = journal::segments(self.disk.as_ref(), &session.path)?;
             let replay = super::replay::replay(&segments);
             sessions.push(ErasedSession {
@@ -225,11 +196,11 @@ impl StudyFolder {
         let folder = layout::participant(&self.path, id);
         stone.write(self.disk.as_ref(), &folder)?;
         let erased = self.remove_sessions(id);
-        drop(held);
+        drop(locks);
         erased
     }
 
-    /// Removes the sessions of a participant and says how many there were.
+    /// Removes the sessions of a participant; returns their number.
     fn remove_sessions(&self, id: &ParticipantId) -> Result<usize, StoreError> {
         let folder = layout::participant(&self.path, id);
         let numbers = self.session_numbers(&folder)?;
@@ -241,9 +212,8 @@ impl StudyFolder {
         Ok(numbers.len())
     }
 
-    /// Removes what was derived from everybody's ratings, if it is there: single
-    /// ratings and comments are in it. Anything but a folder of that name is not
-    /// ours and stays.
+    /// Removes the folder `analysis/`, which contains single ratings and comments;
+    /// returns whether there was one.
     fn remove_analysis(&self) -> Result<bool, StoreError> {
         let items = self.disk.list(&self.path).at(&self.path)?;
         let is_analysis = |i: &super::disk::Item| i.name == layout::ANALYSIS && i.is_folder;
@@ -256,7 +226,7 @@ impl StudyFolder {
     }
 }
 
-/// Removes a folder with everything in it; follows no links.
+/// Removes a folder and its content without following links.
 fn remove_all(disk: &dyn Disk, folder: &Path) -> Result<(), StoreError> {
     for item in disk.list(folder).at(folder)? {
         let path = folder.join(&item.name);

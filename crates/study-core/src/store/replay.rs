@@ -1,10 +1,9 @@
-//! The segments of a journal, read to events and damage.
+//! Reading the segments of a journal.
 //!
-//! Pure: bytes in, records out; nothing is repaired here. A line that cannot be
-//! read costs itself and nothing else: every other whole line is used, wherever
-//! it stands. What is wrong is listed in [`Damage`], never passed over.
+//! Nothing is repaired here. A line that cannot be read affects no other line: every
+//! valid line is used, wherever it is. All damage is listed as [`Damage`].
 
-use super::journal_record::{self, BadLine, Claim, Line, PREFIX, Record};
+use super::journal_record::{self, Claim, Line, LineError, PREFIX, Record};
 use crate::outcome::Entry;
 use crate::outcome::fold::History;
 use crate::protocol::Seat;
@@ -14,40 +13,40 @@ use std::fmt;
 /// One file of a journal, in order.
 #[derive(Debug, Clone)]
 pub struct Segment {
-    /// Its name in the session's folder.
+    /// File name in the session's folder.
     pub name: String,
-    /// All of it.
+    /// Content.
     pub bytes: Vec<u8>,
 }
 
-/// Something in a journal that is not as it was written.
+/// Damage of a journal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Damage {
-    /// Which file of the session's folder.
+    /// File name in the session's folder.
     pub file: String,
-    /// Its line, from 1.
+    /// Line of the file, from 1.
     pub line: usize,
-    /// What.
+    /// Kind of damage.
     pub kind: DamageKind,
 }
 
-/// What is wrong at a place of a journal.
+/// A kind of damage.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DamageKind {
-    /// The last line was not written to its end: it was never acknowledged. So
-    /// many bytes are no record.
+    /// The last line is incomplete: it was never acknowledged. Number of bytes that
+    /// are not part of a record.
     Torn(usize),
     /// The line cannot be read.
-    Unreadable(BadLine),
-    /// Whole lines are gone: the sequence number that was due, and that which came.
+    Unreadable(LineError),
+    /// Whole lines are missing: the expected and the found sequence number.
     Missing(u64, u64),
-    /// The line does not follow on the one before it.
+    /// The line does not follow the one before it.
     Chain(u64),
-    /// Two lines of one sequence number differ.
+    /// Two different lines have the same sequence number.
     Conflict(u64),
     /// An event of a later version of the program.
     Unknown(String),
-    /// The journal has no claim, or events come before it.
+    /// The journal has no claim, or events precede it.
     NoClaim,
 }
 
@@ -55,63 +54,60 @@ impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}, line {}: ", self.file, self.line)?;
         match &self.kind {
-            DamageKind::Torn(0) => write!(f, "the last line has no end"),
+            DamageKind::Torn(0) => write!(f, "the last line has no line end"),
             DamageKind::Torn(bytes) => {
-                write!(
-                    f,
-                    "the last line was not written to its end ({bytes} bytes)"
-                )
+                write!(f, "the last line is incomplete ({bytes} bytes)")
             }
             DamageKind::Unreadable(why) => write!(f, "damaged: {why}"),
             DamageKind::Missing(due, found) => {
-                write!(f, "lines are missing: record {due} was due, {found} came")
+                write!(f, "lines are missing: expected record {due}, found {found}")
             }
-            DamageKind::Chain(seq) => write!(f, "record {seq} does not follow on the line before"),
+            DamageKind::Chain(seq) => write!(f, "record {seq} does not follow the line before it"),
             DamageKind::Conflict(seq) => write!(f, "there are two different records {seq}"),
             DamageKind::Unknown(name) => write!(
                 f,
                 "`{}` is an event of a newer version of study",
                 study_base::text::Untrusted(name)
             ),
-            DamageKind::NoClaim => write!(f, "there is no claim of the folder"),
+            DamageKind::NoClaim => write!(f, "the claim of the session is missing"),
         }
     }
 }
 
-/// How the last segment ends.
+/// The end of the last segment.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tail {
-    /// Bytes up to the end of the last whole record.
+    /// Number of bytes up to the end of the last valid record.
     pub keep: usize,
-    /// Bytes after that which are no record.
+    /// Number of bytes after it.
     pub torn: usize,
-    /// The last whole record has no line end.
+    /// The last valid record has no line end.
     pub unended: bool,
 }
 
-/// A journal, read.
+/// The content of a journal.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Replay {
-    /// The first line.
+    /// The first line, if it could be read.
     pub claim: Option<Claim>,
     /// Every event that could be read, by sequence number.
     pub entries: Vec<Entry>,
     /// What these events add up to.
     pub history: History,
-    /// Everything that is wrong, in the order of the files.
+    /// All damage, in the order of the files.
     pub damage: Vec<Damage>,
-    /// Records that could be read, the claim included.
+    /// Number of records that could be read, including the claim.
     pub records: u64,
-    /// The sequence number of the next record.
+    /// Sequence number of the next record.
     pub next_seq: u64,
     /// Hash of the last line.
     pub prev: String,
-    /// How the last segment ends.
+    /// The end of the last segment.
     pub tail: Tail,
 }
 
 impl Replay {
-    /// The seat, from the claim or, where that is damaged, the first event.
+    /// The seat from the claim or, if that is damaged, from the first event.
     pub fn seat(&self) -> Option<Seat> {
         match (&self.claim, self.history.start()) {
             (Some(claim), _) => claim.seat,
@@ -120,17 +116,17 @@ impl Replay {
         }
     }
 
-    /// Whether a later version of the program wrote into it.
+    /// The format or event of a later version of the program, if it contains one.
     pub fn newer(&self) -> Option<String> {
         self.damage.iter().find_map(|d| match &d.kind {
             DamageKind::Unknown(name) => Some(name.clone()),
-            DamageKind::Unreadable(BadLine::Newer(v)) => Some(format!("journal version {v}")),
+            DamageKind::Unreadable(LineError::Newer(v)) => Some(format!("journal version {v}")),
             _ => None,
         })
     }
 }
 
-/// Reads the segments of one journal, first to last.
+/// Reads the segments of one journal, in order.
 pub fn replay(segments: &[Segment]) -> Replay {
     let mut reader = Reader {
         out: Replay {
@@ -181,7 +177,7 @@ impl Reader {
             Ok(line) => return self.record(segment, number, bytes, line),
             Err(why) => why,
         };
-        // Two records can stand on one line if the line end between is damaged.
+        // Two records are on one line if the line end between them is damaged.
         self.damage(segment, number, DamageKind::Unreadable(why));
         let mut lost = 0;
         for piece in pieces(bytes) {
@@ -220,7 +216,7 @@ impl Reader {
         let hash = journal_record::hash(raw);
         let due = self.out.next_seq;
         if line.seq < due {
-            // After a failed write the record in doubt is written once more.
+            // After a failed write the same record is written again.
             if let Ok(at) = self.seen.binary_search_by_key(&line.seq, |(seq, _)| *seq) {
                 if self.seen[at].1 != hash {
                     self.damage(segment, number, DamageKind::Conflict(line.seq));
@@ -278,7 +274,7 @@ impl Reader {
     }
 }
 
-/// The bytes cut before every place where a record starts.
+/// The bytes split before each start of a record.
 fn pieces(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut starts: Vec<usize> = bytes
         .windows(PREFIX.len())
@@ -302,7 +298,7 @@ fn pieces(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
         .filter(|piece| !piece.is_empty())
 }
 
-/// The record that the bytes start with, whatever follows it.
+/// The record at the start of the bytes.
 fn whole(piece: &[u8]) -> Option<(&[u8], Line)> {
     let mut values = serde_json::Deserializer::from_slice(piece).into_iter::<IgnoredAny>();
     values.next()?.ok()?;

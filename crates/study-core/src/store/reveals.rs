@@ -1,5 +1,5 @@
-//! The log of orders that were shown while a study ran: append-only, one JSON
-//! object a line, on disk before the order is on the screen.
+//! The log of orders shown during a study: one JSON object a line, on disk before
+//! the order is shown.
 
 use super::error::{At as _, StoreError};
 use super::{StudyFolder, layout};
@@ -7,10 +7,10 @@ use crate::outcome::Moment;
 use std::ops::RangeInclusive;
 
 impl StudyFolder {
-    /// Logs that the orders of these rows are shown to somebody, and why.
+    /// Logs that the orders of these rows are shown, with a reason.
     ///
     /// # Errors
-    /// [`StoreError`] if it cannot be written; the order is then not to be shown.
+    /// [`StoreError`] if the log cannot be written; the orders must not be shown then.
     pub fn log_reveal(
         &self,
         rows: &RangeInclusive<u32>,

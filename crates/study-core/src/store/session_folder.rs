@@ -1,55 +1,55 @@
-//! An open session's folder: its lock, its reserve, its telemetry.
+//! The folder of a claimed session: its journal and telemetry.
 
 use super::error::StoreError;
-use super::held::Held;
-use super::journal::Journal;
-use super::replay::Replay;
+use super::journal::{Journal, Recovered};
+use super::session_lock::SessionLock;
 use super::telemetry::TelemetryWriter;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A session's folder, claimed by this process until it and everything opened
-/// from it is dropped.
+/// The folder of a session, locked by this process until this value and everything
+/// opened from it is dropped.
 #[derive(Debug)]
 pub struct SessionFolder {
-    held: Arc<Held>,
-    /// Last segment and what the journal holds, until the journal is opened.
-    journal: Option<(u32, Replay)>,
+    lock: Arc<SessionLock>,
+    /// The journal until it is opened.
+    journal: Option<Recovered>,
 }
 
 impl SessionFolder {
-    pub(super) fn new(held: Arc<Held>, segment: u32, replay: Replay) -> Self {
+    pub(super) fn new(lock: Arc<SessionLock>, journal: Recovered) -> Self {
         Self {
-            held,
-            journal: Some((segment, replay)),
+            lock,
+            journal: Some(journal),
         }
     }
 
-    /// The folder.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
-        &self.held.path
+        &self.lock.path
     }
 
-    /// Opens the journal, once.
+    /// Opens the journal for writing.
     ///
     /// # Errors
-    /// [`StoreError`] if it cannot be opened or already is.
+    /// [`StoreError::JournalTaken`] on the second call, or the disk's.
     pub fn journal(&mut self) -> Result<Journal, StoreError> {
-        let Some((segment, replay)) = &self.journal else {
+        let Some(recovered) = &self.journal else {
             return Err(StoreError::JournalTaken {
-                path: self.held.path.clone(),
+                path: self.lock.path.clone(),
             });
         };
-        let journal = Journal::open(Arc::clone(&self.held), *segment, replay)?;
+        let journal = Journal::open(Arc::clone(&self.lock), recovered)?;
         self.journal = None;
         Ok(journal)
     }
 
-    /// A file for the telemetry of an attempt. An existing one is never written to.
+    /// Creates a file for the telemetry of an attempt; an existing one is never
+    /// written to.
     ///
     /// # Errors
-    /// [`StoreError`] if it cannot be made.
+    /// [`StoreError`] if it cannot be created.
     pub fn telemetry(&self, trial: u32, attempt: u32) -> Result<TelemetryWriter, StoreError> {
-        TelemetryWriter::create(Arc::clone(&self.held), trial, attempt)
+        TelemetryWriter::create(Arc::clone(&self.lock), trial, attempt)
     }
 }

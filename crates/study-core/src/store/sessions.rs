@@ -1,4 +1,4 @@
-//! Every session of a study, read and not changed.
+//! Reading the sessions of a study.
 
 use super::error::{At as _, StoreError};
 use super::journal_record::Claim;
@@ -13,36 +13,36 @@ use std::io;
 use std::path::{Path, PathBuf};
 use study_base::text::ParticipantId;
 
-/// One session, as its journal tells it.
+/// One session as read from its journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionData {
-    /// Whose.
+    /// Participant.
     pub participant: ParticipantId,
-    /// Which, from 1.
+    /// Session of the participant, from 1.
     pub session: u32,
-    /// Its folder.
+    /// Folder of the session.
     pub path: PathBuf,
-    /// Where the order comes from; none for somebody who never came, for a session
-    /// whose claim was killed, and where both places that say it are damaged.
+    /// Source of the order; `None` for a no-show, an incomplete claim, and a journal in
+    /// which both claim and first event are damaged.
     pub seat: Option<Seat>,
     /// Every event that could be read; empty if the data were erased.
     pub entries: Vec<Entry>,
     /// What these events add up to.
     pub history: History,
-    /// Whatever is wrong with the journal.
+    /// Damage of the journal.
     pub damage: Vec<Damage>,
-    /// What is left if the data were erased.
+    /// The tombstone, if the data were erased.
     pub tombstone: Option<Tombstone>,
-    /// Whether the claim of the folder was completed.
+    /// Whether the journal contains any record.
     pub claimed: bool,
     /// The claim, if it could be read.
     pub(super) claim: Option<Claim>,
-    /// The file that the journal was last written to.
-    pub(super) last_file: String,
+    /// File name of the last segment of the journal.
+    pub(super) last_file: Option<String>,
 }
 
 impl SessionData {
-    /// State and reason.
+    /// State and its reason.
     pub fn standing(&self) -> Standing {
         match &self.tombstone {
             Some(tombstone) => Standing {
@@ -53,22 +53,22 @@ impl SessionData {
         }
     }
 
-    /// The row that this session keeps from being given to others.
+    /// The row that this session keeps.
     pub fn held_row(&self) -> Option<u32> {
         let state = self.standing().state;
         self.seat?.row().filter(|_| state.keeps_row())
     }
 
-    /// Whether the session can go on.
+    /// Whether the session can be continued.
     pub fn is_unfinished(&self) -> bool {
         self.standing().state == State::Unfinished
     }
 }
 
 impl StudyFolder {
-    /// Every session, by participant (in the order of their bytes) and number.
-    /// Nothing is changed or locked: of a session under way this is what was on
-    /// disk. What is erased is there once, with its tombstone.
+    /// Reads every session, by participant (in byte order) and number. Nothing is
+    /// changed or locked: a session under way is read as far as it is on disk. An
+    /// erased participant has one entry, with the tombstone.
     ///
     /// # Errors
     /// [`StoreError`] if a folder or file cannot be read. Damage is no error.
@@ -76,14 +76,14 @@ impl StudyFolder {
         let ids = self.participant_ids()?;
         let read: Vec<_> = ids.par_iter().map(|id| self.sessions_of(id)).collect();
         let mut all = Vec::new();
-        // Of several errors always the same one is told.
+        // Of several errors always the same one is reported.
         for sessions in read {
             all.extend(sessions?);
         }
         Ok(all)
     }
 
-    /// Everybody who has a folder, in the order of their bytes.
+    /// The ids of all participants with a folder, in byte order.
     pub(super) fn participant_ids(&self) -> Result<Vec<ParticipantId>, StoreError> {
         let folder = self.path.join(layout::SESSIONS);
         let items = match self.disk.list(&folder) {
@@ -114,7 +114,7 @@ impl StudyFolder {
                 tombstone: Some(tombstone),
                 claimed: true,
                 claim: None,
-                last_file: String::new(),
+                last_file: None,
             }]);
         }
         self.session_numbers(&folder)?
@@ -157,7 +157,7 @@ impl StudyFolder {
             damage: replay.damage,
             tombstone: None,
             claim: replay.claim,
-            last_file: segments.last().map(|s| s.name.clone()).unwrap_or_default(),
+            last_file: segments.last().map(|s| s.name.clone()),
         })
     }
 }

@@ -5,8 +5,8 @@
 
 use super::disk::Appender;
 use super::error::{At as _, StoreError};
-use super::held::Held;
 use super::layout;
+use super::session_lock::SessionLock;
 use crate::outcome::Sample;
 use crate::outcome::cell::Row as _;
 use crate::protocol::columns::SampleColumn;
@@ -27,7 +27,7 @@ pub(super) fn header() -> String {
 
 /// Writes the telemetry of one attempt. It can be moved to another thread.
 pub struct TelemetryWriter {
-    held: Arc<Held>,
+    lock: Arc<SessionLock>,
     file: Box<dyn Appender>,
     path: PathBuf,
     buffer: Vec<u8>,
@@ -42,16 +42,20 @@ impl fmt::Debug for TelemetryWriter {
 }
 
 impl TelemetryWriter {
-    pub(super) fn create(held: Arc<Held>, trial: u32, attempt: u32) -> Result<Self, StoreError> {
-        let folder = held.path.join(layout::TELEMETRY);
-        match held.disk.create_folder(&folder) {
+    pub(super) fn create(
+        lock: Arc<SessionLock>,
+        trial: u32,
+        attempt: u32,
+    ) -> Result<Self, StoreError> {
+        let folder = lock.path.join(layout::TELEMETRY);
+        match lock.disk.create_folder(&folder) {
             Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e).at(&folder),
             _ => {}
         }
         let mut copy = 1;
         let (path, file) = loop {
             let path = folder.join(layout::telemetry(trial, attempt, copy));
-            match held.disk.create(&path) {
+            match lock.disk.create(&path) {
                 Ok(file) => break (path, file),
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => copy += 1,
                 Err(e) => return Err(e).at(&path),
@@ -60,7 +64,7 @@ impl TelemetryWriter {
         let mut buffer = Vec::with_capacity(BUFFER + 1024);
         buffer.extend_from_slice(header().as_bytes());
         Ok(Self {
-            held,
+            lock,
             file,
             path,
             buffer,
@@ -88,7 +92,7 @@ impl TelemetryWriter {
     }
 
     fn flush(&mut self) -> Result<(), StoreError> {
-        if self.held.is_full() {
+        if self.lock.is_full() {
             return Err(io::Error::from(io::ErrorKind::StorageFull)).at(&self.path);
         }
         self.file.write_all(&self.buffer).at(&self.path)?;
@@ -103,8 +107,8 @@ impl TelemetryWriter {
     pub fn finish(mut self) -> Result<(), StoreError> {
         self.flush()?;
         self.file.sync().at(&self.path)?;
-        let folder = self.held.path.join(layout::TELEMETRY);
-        self.held.disk.sync_folder(&folder).at(&folder)
+        let folder = self.lock.path.join(layout::TELEMETRY);
+        self.lock.disk.sync_folder(&folder).at(&folder)
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is left of a participant whose data were erased.
+//! The record that remains of a participant whose data were erased.
 
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
@@ -11,40 +11,40 @@ use std::io;
 use std::path::Path;
 use study_base::text::ParticipantId;
 
-/// The version of the tombstone's format.
+/// Format of the tombstone.
 const FORMAT: &str = "study-tombstone/1";
 
-/// What is left of a participant whose data were erased: nothing that they gave.
+/// The record that remains of a participant whose data were erased.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tombstone {
     format: String,
-    /// Whose.
+    /// Participant.
     pub participant: ParticipantId,
-    /// State that was set with it.
+    /// State set with the erasure.
     pub state: State,
-    /// Why.
+    /// Reason.
     pub reason: String,
-    /// When.
+    /// When the data were erased.
     pub erased_at: DateTime<FixedOffset>,
-    /// The sessions that were erased.
+    /// The erased sessions.
     pub sessions: Vec<ErasedSession>,
 }
 
-/// A session that was erased.
+/// An erased session.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ErasedSession {
-    /// Which, from 1.
+    /// Session of the participant, from 1.
     pub session: u32,
-    /// The seat that it had.
+    /// Its seat.
     pub seat: Option<Seat>,
-    /// Records that its journal had.
+    /// Number of records of its journal.
     pub lines: u64,
-    /// Hash of the last, as the next line would have had it in `prev`.
+    /// Hash of the last record, as in `prev` of a following line.
     pub last_hash: String,
 }
 
 impl Tombstone {
-    /// The last session that was erased.
+    /// The last erased session.
     pub fn last_session(&self) -> u32 {
         self.sessions.last().map_or(1, |s| s.session)
     }
@@ -83,7 +83,7 @@ impl Tombstone {
         atomic::replace(disk, &path, text.as_bytes())
     }
 
-    /// Reads the one in a participant's folder, if there is one.
+    /// Reads the tombstone in a participant's folder, if there is one.
     pub(super) fn read(disk: &dyn Disk, folder: &Path) -> Result<Option<Self>, StoreError> {
         let path = folder.join(layout::TOMBSTONE);
         let bytes = match disk.read(&path) {

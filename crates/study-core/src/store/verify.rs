@@ -1,4 +1,4 @@
-//! Re-reading everything and comparing it.
+//! Verifying a results folder: every file is read again and compared.
 
 mod telemetry;
 
@@ -15,21 +15,21 @@ use crate::protocol::{Protocol, Seat};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{ParticipantId, Untrusted};
 
-/// Something that a check of a results folder found.
+/// A finding of the verification of a results folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
-    /// Whether something is wrong; else it is only worth knowing.
-    pub wrong: bool,
-    /// Which file or folder, relative to the study's.
+    /// Whether it is a problem and not only a note.
+    pub is_problem: bool,
+    /// File or folder, relative to the study's folder.
     pub place: String,
-    /// What.
+    /// Description.
     pub what: String,
 }
 
 impl Finding {
-    fn wrong(place: impl Into<String>, what: impl Into<String>) -> Self {
+    fn problem(place: impl Into<String>, what: impl Into<String>) -> Self {
         Self {
-            wrong: true,
+            is_problem: true,
             place: place.into(),
             what: what.into(),
         }
@@ -37,16 +37,16 @@ impl Finding {
 
     fn note(place: impl Into<String>, what: impl Into<String>) -> Self {
         Self {
-            wrong: false,
-            ..Self::wrong(place, what)
+            is_problem: false,
+            ..Self::problem(place, what)
         }
     }
 }
 
 impl StudyFolder {
-    /// Re-reads every journal and compares it with itself, the frozen protocol with
-    /// its hashes, the telemetry with the number of its samples, and, given a
-    /// protocol, the tables with what the journals give.
+    /// Verifies the checksums and the chain of every journal, the hashes of the frozen
+    /// protocol, the number of telemetry samples and, given a protocol, the derived
+    /// tables.
     ///
     /// # Errors
     /// [`StoreError`] if a folder or journal cannot be read at all.
@@ -63,14 +63,14 @@ impl StudyFolder {
         Ok(found)
     }
 
-    /// What is wrong with the frozen protocol and the journals: whatever is made of
-    /// them is to be read with that in mind.
+    /// The problems of the frozen protocol and the journals, which affect everything
+    /// derived from them.
     ///
     /// # Errors
     /// As [`StudyFolder::verify`].
     pub fn faults(&self, sessions: &[SessionData]) -> Result<Vec<Finding>, StoreError> {
         let mut found = self.verify_journals(sessions)?;
-        found.retain(|f| f.wrong);
+        found.retain(|f| f.is_problem);
         Ok(found)
     }
 
@@ -82,9 +82,12 @@ impl StudyFolder {
             self.verify_session(session, &mut found)?;
         }
         verify_rows(sessions, &mut found);
-        for gone in self.vanished(sessions) {
-            let what = format!("{} names {gone}, whose journal is not there", gone.table);
-            found.push(Finding::wrong(layout::SESSIONS, what));
+        for missing in self.missing_sessions(sessions) {
+            let what = format!(
+                "{} contains {missing}, whose journal is missing",
+                missing.table
+            );
+            found.push(Finding::problem(layout::SESSIONS, what));
         }
         Ok(found)
     }
@@ -96,10 +99,10 @@ impl StudyFolder {
             for (name, hash) in &version.files {
                 let place = format!("{}/{}/{name}", layout::PROTOCOLS, version.version);
                 match self.disk.read(&folder.join(name)) {
-                    Err(e) => found.push(Finding::wrong(place, plain(&e))),
-                    Ok(bytes) if sha256(&bytes) != *hash => found.push(Finding::wrong(
+                    Err(e) => found.push(Finding::problem(place, plain(&e))),
+                    Ok(bytes) if sha256(&bytes) != *hash => found.push(Finding::problem(
                         place,
-                        "it is not the file that was frozen (SHA-256 in study.json)",
+                        "not the file that was frozen (its SHA-256 differs from study.json)",
                     )),
                     Ok(_) => {}
                 }
@@ -108,7 +111,7 @@ impl StudyFolder {
         Ok(())
     }
 
-    /// What stands among the sessions that this program did not put there.
+    /// Checks the names of the folders in `sessions/`.
     fn verify_names(
         &self,
         sessions: &[SessionData],
@@ -124,7 +127,7 @@ impl StudyFolder {
             match ParticipantId::new(item.name) {
                 Ok(id) if item.is_folder => {
                     if let Some(other) = ids.iter().find(|i| i.collides_with(&id)) {
-                        found.push(Finding::wrong(
+                        found.push(Finding::problem(
                             &place,
                             format!("differs from {other} only in upper and lower case"),
                         ));
@@ -134,7 +137,10 @@ impl StudyFolder {
                     self.verify_participant(&id, erased, &place, found)?;
                     ids.push(id);
                 }
-                _ => found.push(Finding::note(place, "no participant's folder; passed over")),
+                _ => found.push(Finding::note(
+                    place,
+                    "not the folder of a participant; ignored",
+                )),
             }
         }
         Ok(())
@@ -152,12 +158,12 @@ impl StudyFolder {
             let is_session = item.is_folder && layout::number(&item.name).is_some();
             let place = format!("{place}/{}", Untrusted(&item.name));
             if is_session && erased {
-                found.push(Finding::wrong(
+                found.push(Finding::problem(
                     place,
-                    "the erasure was not completed; give the same command again",
+                    "the erasure is incomplete; repeat the same command",
                 ));
             } else if !is_session && item.name != layout::TOMBSTONE {
-                found.push(Finding::note(place, "not written by study; passed over"));
+                found.push(Finding::note(place, "not written by study; ignored"));
             }
         }
         Ok(())
@@ -172,9 +178,9 @@ impl StudyFolder {
         if let Some(stone) = &session.tombstone {
             let place = format!("{}/{}", layout::SESSIONS, session.participant);
             if stone.participant != session.participant {
-                found.push(Finding::wrong(
+                found.push(Finding::problem(
                     &place,
-                    "the tombstone is another participant's",
+                    "the tombstone belongs to another participant",
                 ));
             }
             let when = stone.erased_at.to_rfc3339();
@@ -182,15 +188,19 @@ impl StudyFolder {
             return Ok(());
         }
         if !session.claimed && session.damage.iter().all(is_torn) {
-            found.push(Finding::note(place, "made, but never claimed to the end"));
+            found.push(Finding::note(
+                place,
+                "the claim is incomplete; no session was started",
+            ));
             return Ok(());
         }
-        // A line that a dying process did not finish was never acknowledged.
+        // An incomplete last line was never acknowledged.
         let under_way = session.is_unfinished();
         for damage in &session.damage {
-            let expected = is_torn(damage) && (under_way || damage.file != session.last_file);
+            let expected =
+                is_torn(damage) && (under_way || Some(&damage.file) != session.last_file.as_ref());
             found.push(Finding {
-                wrong: !expected,
+                is_problem: !expected,
                 place: place.clone(),
                 what: damage.to_string(),
             });
@@ -199,10 +209,10 @@ impl StudyFolder {
             && (claim.participant != session.participant || claim.session != session.session)
         {
             let whose = format!(
-                "the journal is of {}, session {}",
+                "the journal belongs to {}, session {}",
                 claim.participant, claim.session
             );
-            found.push(Finding::wrong(&place, whose));
+            found.push(Finding::problem(&place, whose));
         }
         self.verify_start(session, &place, found);
         for item in self.disk.list(&session.path).at(&session.path)? {
@@ -215,7 +225,7 @@ impl StudyFolder {
                     "bytes of a line that was never acknowledged",
                 ));
             } else if !known {
-                found.push(Finding::note(place, "not written by study; passed over"));
+                found.push(Finding::note(place, "not written by study; ignored"));
             }
         }
         Ok(())
@@ -225,9 +235,9 @@ impl StudyFolder {
         let Some(start) = session.history.start() else {
             let only_state = |e: &Event| matches!(e, Event::StateSet { .. });
             if !session.entries.iter().all(|e| only_state(&e.event)) {
-                found.push(Finding::wrong(
+                found.push(Finding::problem(
                     place,
-                    "the event that starts the session is missing",
+                    "the start of the session is missing",
                 ));
             }
             return;
@@ -236,18 +246,18 @@ impl StudyFolder {
             || start.session != session.session
             || Some(start.seat) != session.seat
         {
-            let what = "its first event tells of another participant, session or row";
-            found.push(Finding::wrong(place, what));
+            let what = "its first event names another participant, session or row";
+            found.push(Finding::problem(place, what));
         }
         let version = start.protocol_version;
         match self.manifest.versions.iter().find(|v| v.version == version) {
-            None => found.push(Finding::wrong(
+            None => found.push(Finding::problem(
                 place,
                 format!("version {version} of the protocol is not in study.json"),
             )),
-            Some(v) if v.fingerprints != start.fingerprints => found.push(Finding::wrong(
+            Some(v) if v.fingerprints != start.fingerprints => found.push(Finding::problem(
                 place,
-                format!("its fingerprints are not those of version {version} of the protocol"),
+                format!("its fingerprints differ from those of version {version} of the protocol"),
             )),
             Some(_) => {}
         }
@@ -263,11 +273,14 @@ impl StudyFolder {
         for (name, bytes) in derived.tables(protocol).at(&self.path)? {
             match self.disk.read(&self.path.join(name)) {
                 Ok(old) if old == bytes => {}
-                Ok(_) => found.push(Finding::wrong(name, "it is not what the journals give")),
+                Ok(_) => found.push(Finding::problem(
+                    name,
+                    "differs from what the journals give",
+                )),
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                     found.push(Finding::note(name, "not written yet"));
                 }
-                Err(e) => found.push(Finding::wrong(name, plain(&e))),
+                Err(e) => found.push(Finding::problem(name, plain(&e))),
             }
         }
         Ok(())
@@ -283,7 +296,7 @@ fn is_torn(damage: &super::Damage) -> bool {
     matches!(damage.kind, DamageKind::Torn(_))
 }
 
-/// Two participants who both keep one row, or have one number.
+/// Finds participants who have the same row or number.
 fn verify_rows(sessions: &[SessionData], found: &mut Vec<Finding>) {
     let mut holders: BTreeMap<Seat, BTreeSet<&ParticipantId>> = BTreeMap::new();
     for session in sessions {
@@ -301,7 +314,7 @@ fn verify_rows(sessions: &[SessionData], found: &mut Vec<Finding>) {
     }
     for (seat, who) in holders.into_iter().filter(|(_, who)| who.len() > 1) {
         let names: Vec<&str> = who.iter().map(|id| id.as_str()).collect();
-        found.push(Finding::wrong(
+        found.push(Finding::problem(
             layout::SESSIONS,
             format!("{} have the same {seat}", names.join(" and ")),
         ));

@@ -1,8 +1,8 @@
-//! Whether the telemetry that a journal tells of is there.
+//! Comparing the telemetry files with the journal.
 //!
-//! Files and lines are counted; the numbers in them have no checksum and are not
-//! checked. A file that is shorter than the journal says is no fault: a crash or a
-//! full disk ends one early.
+//! Only files and lines are counted; the numbers in them have no checksum. A file
+//! with fewer samples than the journal reports is not a problem: a crash or a full
+//! disk ends a file early.
 
 use super::Finding;
 use crate::store::sessions::SessionData;
@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 use std::io;
 
 impl StudyFolder {
-    /// Compares the files of a session with what each playback reported. A playback
-    /// whose samples were never counted has no entry in the journal to compare with.
+    /// Compares the telemetry files of a session with the number of samples of each
+    /// playback in the journal. A playback without a confirmed end has none.
     pub(super) fn verify_telemetry(
         &self,
         session: &SessionData,
@@ -31,14 +31,14 @@ impl StudyFolder {
         for ((trial, attempt), samples) in counted {
             let name = layout::telemetry(trial, attempt, 1);
             let place = format!("{place}/{}/{name}", layout::TELEMETRY);
-            let (mut there, mut lines, mut foreign) = (false, 0, false);
+            let (mut exists, mut lines, mut foreign) = (false, 0, false);
             for copy in 1.. {
                 match self
                     .disk
                     .read(&folder.join(layout::telemetry(trial, attempt, copy)))
                 {
                     Ok(bytes) => {
-                        there = true;
+                        exists = true;
                         match lines_of(&bytes) {
                             Some(n) => lines += n,
                             None => foreign = true,
@@ -46,23 +46,23 @@ impl StudyFolder {
                     }
                     Err(e) if e.kind() == io::ErrorKind::NotFound => break,
                     Err(e) => {
-                        found.push(Finding::wrong(&place, plain(&e)));
-                        there = true;
+                        found.push(Finding::problem(&place, plain(&e)));
+                        exists = true;
                         foreign = true;
                         break;
                     }
                 }
             }
-            if !there {
-                let what = format!("it is not there; the journal counts {samples} samples");
-                found.push(Finding::wrong(place, what));
+            if !exists {
+                let what = format!("missing; the journal reports {samples} samples");
+                found.push(Finding::problem(place, what));
             } else if foreign {
-                found.push(Finding::wrong(place, "it is not what study writes"));
+                found.push(Finding::problem(place, "not a telemetry file of study"));
             } else if lines < samples {
                 found.push(Finding::note(
                     place,
                     format!(
-                        "{lines} of the {samples} samples are there; a crash or a full disk ends a file early"
+                        "contains {lines} of {samples} samples; a crash or a full disk ends a file early"
                     ),
                 ));
             }
@@ -71,8 +71,8 @@ impl StudyFolder {
     }
 }
 
-/// Samples in a file, without a last line that has no end; `None` if it does not
-/// begin as one of ours. An empty file is one whose buffer was never written.
+/// Number of complete sample lines of a file; `None` if its first line is not the
+/// header. An empty file has none: its buffer was never written.
 fn lines_of(bytes: &[u8]) -> Option<u64> {
     let header = header();
     let header = header.as_bytes();

@@ -10,24 +10,24 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Disk space kept free for the last records of a session, bytes.
 pub const RESERVE_BYTES: u64 = 64 << 10;
 
-/// What journal and telemetry share: the lock, and whether the disk is full.
-pub(super) struct Held {
+/// The lock of a session's folder, shared by its journal and telemetry.
+pub(super) struct SessionLock {
     pub(super) disk: Arc<dyn Disk>,
     pub(super) path: PathBuf,
-    /// What is left of the disk belongs to the journal.
+    /// The disk is full: the remaining space is for the journal alone.
     full: AtomicBool,
     _lock: Lock,
 }
 
-impl fmt::Debug for Held {
+impl fmt::Debug for SessionLock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Held")
+        f.debug_struct("SessionLock")
             .field("path", &self.path)
             .finish_non_exhaustive()
     }
 }
 
-impl Held {
+impl SessionLock {
     pub(super) fn new(disk: Arc<dyn Disk>, path: PathBuf, lock: Lock) -> Self {
         Self {
             disk,
@@ -37,22 +37,22 @@ impl Held {
         }
     }
 
-    /// Gives the reserve back to the disk and keeps telemetry from taking it.
+    /// Frees the reserve and stops telemetry from using it.
     pub(super) fn free_reserve(&self) {
         self.full.store(true, Ordering::Release);
-        // If it is gone already there is nothing to free.
+        // If it does not exist there is nothing to free.
         let _ = self.disk.remove_file(&self.path.join(layout::RESERVE));
     }
 
-    /// Whether telemetry has to make way.
+    /// Whether telemetry must stop.
     pub(super) fn is_full(&self) -> bool {
         self.full.load(Ordering::Acquire)
     }
 }
 
-impl Drop for Held {
+impl Drop for SessionLock {
     fn drop(&mut self) {
-        // A left-over reserve is harmless: readers pass it over.
+        // A remaining reserve is harmless: readers ignore it.
         let _ = self.disk.remove_file(&self.path.join(layout::RESERVE));
     }
 }
