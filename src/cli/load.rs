@@ -100,7 +100,7 @@ fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
         Ok(bytes) => bytes,
         Err(problem) => {
             let fault = Fault::error(problem.to_string())
-                .hint("PROTOCOL is a protocol.toml or the folder that contains one");
+                .hint("PROTOCOL is a protocol.toml or the folder that holds one");
             return (None, vec![alone(shown, fault)]);
         }
     };

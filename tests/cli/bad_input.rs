@@ -134,7 +134,7 @@ fn an_id_that_differs_only_in_case_has_one_hint() {
     terminal.wait_for("Operate the real switch");
     drop(terminal);
     let told = "`p01` and the existing `P01` differ only in upper and lower case";
-    let hint = "write `P01` if it is the same person";
+    let hint = "use `P01` if it is the same person";
     for arguments in [
         vec!["run", &path, "--participant", "p01"],
         [&["participant", "results", "p01"][..], &state].concat(),

@@ -262,7 +262,7 @@ fn verify_misses_telemetry_that_the_journal_counts_and_says_what_it_does_not_che
     let whole = std::fs::read(&file).unwrap();
     std::fs::write(&file, &whole[..whole.len() - 20]).unwrap();
     verify().success().stdout(predicate::str::contains(
-        "002-a1.csv: 3248 of the 3250 samples",
+        "002-a1.csv: contains 3248 of 3250 samples",
     ));
     std::fs::write(
         &file,
@@ -270,12 +270,14 @@ fn verify_misses_telemetry_that_the_journal_counts_and_says_what_it_does_not_che
     )
     .unwrap();
     verify().code(4).stdout(predicate::str::contains(
-        "002-a1.csv: it is not what study writes",
+        "002-a1.csv: not a telemetry file of study",
     ));
     std::fs::remove_file(&file).unwrap();
     verify()
         .code(4)
+        .stdout(predicate::str::contains("problem: "))
         .stdout(predicate::str::contains("002-a1.csv: missing"))
+        .stderr(predicate::str::contains("error: 1 problem found"))
         .stdout(predicate::str::contains("--rebuild").not());
 }
 

@@ -1,61 +1,61 @@
-//! What comes into a session and what goes out.
+//! The inputs and effects of a session.
 
 use crate::outcome::{Author, Choice, Entry, Event, FormId, Playback};
 use crate::protocol::fingerprint::Fingerprints;
 use crate::protocol::{Answer, DeviceKind, Seat};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 
-/// What an operator, the device or the store tells a session.
+/// An input from the operator, the device or the store.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {
-    /// Who it is; from the first screen.
+    /// Participant and operator, from the first screen.
     Identify {
         /// As typed; checked by the session.
         participant: String,
-        /// As typed, possibly empty.
+        /// As typed; may be empty.
         operator: String,
     },
-    /// The store has claimed the session folder.
+    /// The store has claimed the session's folder.
     Claimed(Box<Claim>),
-    /// It could not: back to the first screen with these words.
+    /// The store refused the claim, with a message for the first screen.
     ClaimRefused(String),
-    /// How to go on with an old unfinished session.
+    /// How to resume after a long gap.
     Resume(Choice),
     /// Consent given or refused.
     Consent(bool),
-    /// Enter, where there is nothing to answer.
+    /// Enter on a screen without questions.
     Advance,
     /// Confirmed answers to all questions of the page on the screen, in any order.
-    /// An optional one may be absent: a text or choice then counts as left empty.
-    /// If one is not accepted, none is taken.
+    /// Optional questions may be absent: a text or choice then counts as left empty.
+    /// If one answer is not accepted, none is recorded.
     Answer(Vec<(QuestionId, Answer)>),
     /// A remark, at any time.
     Remark {
-        /// By whom.
+        /// Who enters it.
         by: Author,
-        /// What.
+        /// Text.
         text: String,
     },
     /// A correction of an earlier answer, at any time.
     Correct {
-        /// Where it was asked.
+        /// Form.
         form: FormId,
-        /// Which.
+        /// Question.
         question: QuestionId,
-        /// The new answer.
+        /// New answer.
         answer: Answer,
-        /// Why; not empty.
+        /// Reason; not empty.
         reason: String,
-        /// By whom.
+        /// Who corrects it.
         by: Author,
     },
-    /// The present trial, or the last one where none is under way, is bad.
+    /// Mark the trial under way, or else the last one, as bad.
     MarkBad {
-        /// Why; not empty.
+        /// Reason; not empty.
         reason: String,
     },
-    /// Esc, or Space while a table is loaded or playing: stop the device. A second
-    /// one during a stop makes it limp whatever becomes of the playback.
+    /// Esc, or Space while a table is loaded or playing: stop the device. Repeated
+    /// during a stop, it makes the device limp without waiting for the report.
     Stop,
     /// After a stop: play the same trial again.
     PlayAgain,
@@ -63,14 +63,15 @@ pub enum Input {
     RateStopped,
     /// Pause.
     Pause,
-    /// Leave the program; the operator confirmed it. It waits for the disk; a
-    /// second one does not.
+    /// Leave the program, confirmed by the operator. Waits until everything is saved;
+    /// a second one does not.
     Quit,
-    /// The terminal is gone, a signal came: leave at once.
+    /// Leave without confirmation, because of a signal or a lost terminal; with the
+    /// reason.
     Abort(String),
-    /// The device has taken the table.
+    /// The device has loaded the table.
     DeviceLoaded,
-    /// The sample with this opaque code is to be mounted by hand.
+    /// The sample with this opaque code must be mounted by hand.
     DeviceMount(String),
     /// The device confirms that it plays.
     DeviceStarted,
@@ -85,98 +86,97 @@ pub enum Input {
     DeviceStopped(Playback),
     /// The device reports a fault; it is limp.
     DeviceFault(String),
-    /// The device does not answer any more; it is limp by its own watchdog.
+    /// The device no longer responds; its watchdog makes it limp.
     DeviceLost(String),
-    /// The device answers, or may, but has said nothing of the playback for too
-    /// long: its end will never be confirmed.
+    /// The device has sent no telemetry for too long: the end of the playback will
+    /// not be confirmed.
     PlaybackLost(String),
-    /// The device is back and limp.
+    /// The device responds again and is limp.
     DeviceReady,
-    /// All events are on disk that the session sent before its `count`-th (from 0,
-    /// of this process).
+    /// More events are on disk.
     Saved {
-        /// How many events of this process are on disk now.
+        /// Number of events of this process on disk, counted from the first.
         count: u64,
     },
-    /// It could not be saved; nothing since is acknowledged.
+    /// Saving failed; no later event is acknowledged.
     SaveFailed(String),
-    /// Something that the operator should know and that changes nothing, such as
-    /// telemetry that could not be written.
+    /// A message to the operator without other effect, such as telemetry that could
+    /// not be written.
     Notice(String),
-    /// Try again to save what is in memory.
+    /// Retry saving.
     RetrySave,
-    /// Time has passed.
+    /// Time has passed; sent regularly.
     Tick,
 }
 
-/// A claimed session folder.
+/// A claimed session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claim {
-    /// Who.
+    /// Participant.
     pub participant: ParticipantId,
-    /// Which session of theirs.
+    /// Session of the participant, from 1.
     pub session: u32,
-    /// Where the order comes from.
+    /// Source of the order.
     pub seat: Seat,
-    /// What the journal holds already: empty for a new session.
+    /// Events in the journal; empty for a new session.
     pub entries: Vec<Entry>,
     /// Version of the protocol that a new session records.
     pub protocol_version: u32,
-    /// Of that version.
+    /// Fingerprints of that version.
     pub fingerprints: Fingerprints,
-    /// What plays.
+    /// Kind of the device.
     pub device_kind: DeviceKind,
-    /// Which one.
+    /// Identity of the device.
     pub device_id: String,
-    /// What its last commissioning came to, if it is known.
+    /// Result of the device's last commissioning test, if known.
     pub device_check: Option<String>,
-    /// Whether it reports telemetry.
+    /// Whether the device reports telemetry.
     pub device_telemetry: bool,
-    /// Notices for the operator, such as a recovered tail.
+    /// Messages to the operator, such as a repaired journal.
     pub notices: Vec<String>,
 }
 
-/// What a session wants done.
+/// An action that the session requests.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
-    /// Claim a session folder for this participant.
+    /// Claim a session for this participant.
     Claim {
-        /// Who.
+        /// Participant.
         participant: ParticipantId,
-        /// By whom.
+        /// Operator.
         operator: String,
     },
-    /// Write the event to the journal, in this order, and say when it is on disk.
-    /// After [`Input::SaveFailed`] it is only kept, until [`Effect::RetrySave`].
+    /// Write the event to the journal, in this order, and report when it is on disk.
+    /// After [`Input::SaveFailed`] keep it until [`Effect::RetrySave`].
     Record(Event),
-    /// Give the device this realization, for this trial and attempt.
+    /// Load a realization into the device.
     Load {
-        /// Names the telemetry file.
+        /// Trial, for the name of the telemetry file.
         trial: u32,
-        /// Names the telemetry file.
+        /// Attempt, for the name of the telemetry file.
         attempt: u32,
-        /// What to play.
+        /// Realization.
         model: ModelId,
     },
     /// Start playing what is loaded.
     Start,
     /// Stop playing; the device confirms.
     Stop,
-    /// Go limp at once, whatever happens. Cancels a load as well: no
-    /// [`Input::DeviceLoaded`] for it may follow.
+    /// Make the device limp at once. Also cancels a load: no [`Input::DeviceLoaded`]
+    /// for it may follow.
     Limp,
-    /// Rewrite what is not acknowledged to a new journal segment.
+    /// Write the unacknowledged events to a new journal segment.
     RetrySave,
-    /// The program is over.
+    /// End the program.
     End(Ending),
 }
 
 /// How a session's process ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Ending {
-    /// Everything is done.
+    /// The session is completed.
     Finished,
-    /// Left in the middle; it can be picked up.
+    /// Left before the end; it can be resumed.
     Interrupted,
     /// The participant dropped out or did not consent.
     DroppedOut,

@@ -1,102 +1,102 @@
-//! What may be seen of a session. Nothing here identifies a realization.
+//! What a session shows. Nothing here identifies a realization.
 
 use crate::outcome::FormId;
 use crate::protocol::{Answer, DeviceKind, Entry, Question};
 use study_base::text::QuestionId;
 
-/// Everything that a screen shows.
+/// The content of the screen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// The one thing to do now.
+    /// The main content: what to do now.
     pub screen: Screen,
     /// "trial 7 of 15", "practice 1 of 2"; `None` outside trials.
     pub progress: Option<Progress>,
-    /// The experimenter's line.
+    /// The experimenter's status line.
     pub line: StatusLine,
-    /// What gives the force: of the trial under way, or else of the study. Where it
-    /// is [`DeviceKind::Manual`] nothing can be stopped, limp or counted.
+    /// Kind of the device of the trial under way, or else of the study. A
+    /// [`DeviceKind::Manual`] one cannot be stopped, made limp or report counts.
     pub device: DeviceKind,
-    /// Shown above everything: pilot, simulated.
+    /// Banner above everything else.
     pub banner: Option<Banner>,
-    /// One sentence for the operator, until the next input.
+    /// Message to the operator until the next input.
     pub notice: Option<String>,
-    /// Who types.
+    /// Who enters the participant's answers.
     pub entry: Entry,
     /// Earlier answers that can be corrected, newest first.
     pub correctable: Vec<Correctable>,
-    /// Whether a trial could be marked bad now, and which: "trial 7".
+    /// The trial that can be marked as bad now, such as "trial 7".
     pub can_mark_bad: Option<String>,
     /// Whether a table is loaded or playing, so that Space stops it.
     pub armed: bool,
-    /// Whether Enter does anything now.
+    /// Whether Enter has an effect now.
     pub can_advance: bool,
 }
 
-/// How far the participant is.
+/// The participant's progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// Whether these are practice trials.
     pub practice: bool,
-    /// From 1: trials closed, and one. A trial that came back looks like any other.
+    /// Number of closed trials plus 1. A repeated trial looks like any other.
     pub current: u32,
-    /// How many there are.
+    /// Number of trials.
     pub total: u32,
 }
 
-/// Why what is shown is no real data.
+/// Why the data are not those of a real participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Banner {
-    /// A person tries the study out.
+    /// Pilot.
     Pilot,
-    /// Nobody is there.
+    /// Simulated participant.
     Simulated,
 }
 
 /// The experimenter's line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StatusLine {
-    /// Pseudonym; empty before it is known.
+    /// Pseudonym; empty before it is typed.
     pub participant: String,
-    /// Operator; may be empty.
+    /// Operator code; may be empty.
     pub operator: String,
-    /// The device.
+    /// State of the device.
     pub device: DeviceState,
-    /// Since the session was opened by this process, s.
+    /// Time since this process opened the session, s.
     pub elapsed_s: f64,
-    /// Trials that count and are on disk.
+    /// Number of completed trials on disk, without practice.
     pub trials_saved: u32,
-    /// Trials that count and are answered.
+    /// Number of completed trials, without practice.
     pub trials_answered: u32,
-    /// Whether every event so far is on disk.
+    /// Whether every event is on disk.
     pub all_saved: bool,
 }
 
-/// What the device does, as far as the session knows.
+/// The state of the device as far as the session knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeviceState {
-    /// Nothing is claimed yet.
+    /// No session is claimed yet.
     Unknown,
-    /// No force, nothing loaded or loaded and not started.
+    /// No force: nothing is playing.
     Limp,
-    /// A table is on its way.
+    /// A table is being loaded.
     Loading,
-    /// Loaded, about to start.
+    /// Loaded and about to start.
     Ready,
-    /// Playing: strokes and clamps so far, where somebody counts them.
+    /// Playing; with strokes and clamps so far if the device reports them.
     Running(Option<Counts>),
-    /// Stop is asked and not confirmed.
+    /// A stop is requested and not confirmed.
     Stopping,
     /// It reported a fault.
     Fault,
-    /// It does not answer.
+    /// It does not respond.
     Lost,
-    /// There is none: samples are mounted by hand.
+    /// There is no device: samples are mounted by hand.
     ByHand,
-    /// A sample that was mounted by hand is felt.
+    /// A sample mounted by hand is being felt.
     Felt,
 }
 
-/// What a device has counted in a playback.
+/// Counts of a playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Full strokes.
@@ -105,25 +105,25 @@ pub struct Counts {
     pub clamps: u64,
 }
 
-/// The one thing to do.
+/// The main content of the screen.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Screen {
-    /// Who is it: two text fields.
+    /// Two text fields: participant and operator.
     Who {
         /// Preset participant id.
         participant: String,
         /// Preset operator.
         operator: String,
-        /// Whether a claim is under way.
+        /// Whether the session is being claimed.
         claiming: bool,
     },
-    /// An old unfinished session: choose.
+    /// The choice how to resume after a long gap.
     ResumeChoice {
-        /// Since the last event, hours.
+        /// Time since the last activity, h.
         gap_h: f64,
-        /// Trials that count and are done.
+        /// Number of closed trials, without practice.
         done: u32,
-        /// Trials that count.
+        /// Number of trials, without practice.
         total: u32,
     },
     /// The consent document.
@@ -133,114 +133,114 @@ pub enum Screen {
         /// Version.
         version: String,
     },
-    /// Text to read; Enter goes on.
+    /// A text to read; Enter continues.
     Message {
-        /// Which.
+        /// Kind of message.
         kind: MessageKind,
-        /// What.
+        /// Text.
         text: String,
     },
-    /// Questions on one page: the first in full, an optional text below it.
+    /// A page of a form.
     Form {
-        /// Where the answers belong.
+        /// Form.
         form: FormId,
-        /// One or two; the second is an optional text.
+        /// One question, or two of which the second is an optional text.
         questions: Vec<Question>,
-        /// Page from 1.
+        /// Page, from 1.
         page: u32,
-        /// Pages.
+        /// Number of pages.
         pages: u32,
-        /// Whether the experimenter is asked (setup).
+        /// Whether the experimenter is asked (set-up).
         to_experimenter: bool,
     },
     /// The reference prompt before a trial.
     Reference {
-        /// What to do.
+        /// Prompt.
         prompt: String,
-        /// Seconds until Enter works; 0 when it does.
+        /// Time until Enter works, s; 0 when it does.
         wait_s: f64,
     },
-    /// The table is on its way.
+    /// The table is being loaded.
     Loading,
-    /// The experimenter mounts a sample; Enter says that it is there.
+    /// The experimenter mounts a sample and confirms with Enter.
     Mount {
-        /// What stands on the sample: says nothing about what it is.
+        /// Opaque code on the sample.
         code: String,
     },
     /// The device plays.
     Playing {
-        /// Since the confirmed start, s.
+        /// Time since the confirmed start, s.
         since_s: f64,
-        /// Full strokes still needed before Enter works.
+        /// Full strokes still required before Enter works.
         strokes_missing: u32,
     },
-    /// Stop is asked, the confirmation on its way.
+    /// A stop is requested and not yet confirmed.
     Stopping,
     /// Stopped by Esc, Space or a pause, or with too few strokes:
     /// [`PlayAgain`](super::Input::PlayAgain) or, where it can be rated,
     /// [`RateStopped`](super::Input::RateStopped).
     Stopped {
-        /// Whether what was felt can be rated: the device confirmed its end and
-        /// the strokes suffice.
+        /// Whether the trial can be rated: the end is confirmed and the strokes
+        /// suffice.
         can_rate: bool,
     },
-    /// Fault or loss: what the operator should do.
+    /// A fault or loss of the device.
     DeviceTrouble {
-        /// The device's words.
+        /// The device's message.
         what: String,
-        /// Whether Enter goes on (the device is back, or nothing can be done).
+        /// Whether Enter continues: the device is back or not needed.
         can_go_on: bool,
     },
-    /// An answer is on its way to the disk.
+    /// Saving.
     Saving,
-    /// It could not be saved.
+    /// Saving failed.
     SaveTrouble {
-        /// Why.
+        /// Cause.
         what: String,
     },
-    /// A break of the design.
+    /// A scheduled break.
     Break {
-        /// What to read.
+        /// Text.
         text: String,
-        /// Seconds until Enter works.
+        /// Time until Enter works, s.
         wait_s: f64,
     },
-    /// Paused.
+    /// A pause.
     Paused {
-        /// For how long, s.
+        /// Its duration so far, s.
         since_s: f64,
     },
-    /// Over.
+    /// The end of the session.
     End {
-        /// What to read.
+        /// Text.
         text: String,
     },
 }
 
-/// Which text is shown.
+/// The kind of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MessageKind {
-    /// First.
+    /// Welcome.
     Welcome,
-    /// Before the trials.
+    /// Instructions, before the trials.
     Instructions,
-    /// Before the practice trials.
+    /// Announcement of the practice trials.
     Practice,
-    /// Between practice and the trials that count.
+    /// End of the practice trials.
     PracticeOver,
 }
 
 /// An earlier answer that can be corrected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correctable {
-    /// Where it was asked.
+    /// Form.
     pub form: FormId,
-    /// "trial 6", "practice 1", "set-up", "intake", "closing questions". The number
-    /// is the one that was on the screen.
+    /// Title such as "trial 6", "practice 1", "set-up", "intake" or "closing
+    /// questions"; the number is that on the screen.
     pub title: String,
-    /// The question.
+    /// Question.
     pub question: Question,
-    /// The answer now.
+    /// Current answer.
     pub answer: Answer,
 }
 

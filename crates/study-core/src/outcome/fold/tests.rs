@@ -224,7 +224,7 @@ fn the_last_event_that_sets_a_state_determines_it() {
 }
 
 #[test]
-fn a_missing_start_of_an_attempt_costs_only_what_that_line_said() {
+fn without_the_start_of_an_attempt_only_the_content_of_that_line_is_lost() {
     let mut events = play(1, 1, 9).to_vec();
     events.extend([rate(1, 1, 6), done(1, 1)]);
     events.extend(play(2, 1, 9));
