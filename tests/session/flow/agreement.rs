@@ -343,7 +343,7 @@ fn check_live(session: &Session, now: Moment, journal: &[Entry], protocol: &Prot
         .filter(|r| r.response_s.is_none() && r.status != Status::Failed)
         .map(|r| r.trial)
         .collect();
-    let queue: BTreeSet<u32> = history.queue().iter().copied().collect();
+    let queue: BTreeSet<u32> = history.queue.iter().copied().collect();
     assert_eq!(queue, open, "what is to come is what is not closed");
 }
 
@@ -376,8 +376,8 @@ fn check_resumed(journal: &[Entry], protocol: &Arc<Protocol>) {
     check_live(&session, now, &after, protocol);
     let before = History::of(journal);
     let history = session.history();
-    assert_eq!(history.standing(), before.standing());
-    assert_eq!(history.answers(), before.answers());
+    assert_eq!(history.standing, before.standing);
+    assert_eq!(history.answers, before.answers);
     assert!(history.completed().eq(before.completed()));
     let kept = |h: &History| {
         h.rating_rows(protocol)

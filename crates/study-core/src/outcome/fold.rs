@@ -35,20 +35,30 @@ pub struct History {
     /// The first event and when it happened.
     start: Option<(Moment, Box<Start>)>,
     sitting: Sitting,
-    standing: Standing,
-    queue: Vec<u32>,
-    consent: Option<Consent>,
-    answers: Vec<GivenAnswer>,
-    instructions_read: bool,
+    /// The state of the session.
+    pub standing: Standing,
+    /// Numbers of the trials still to come, the present or next one first.
+    pub queue: Vec<u32>,
+    /// The participant's decision, if they were asked for consent.
+    pub consent: Option<Consent>,
+    /// The current answers in the order in which the questions were first answered.
+    pub answers: Vec<GivenAnswer>,
+    /// Whether the instructions were read.
+    pub instructions_read: bool,
     trials: BTreeMap<u32, TrialHistory>,
     /// The trial whose last attempt is under way.
     open: Option<u32>,
-    last_done: Option<u32>,
+    /// The trial that counts that was completed last, until it is marked as bad.
+    pub last_done: Option<u32>,
     /// Trials in the order in which they were felt; immediate repeats once.
     felt: Vec<u32>,
-    breaks: BTreeSet<u32>,
-    open_break: Option<Moment>,
-    last_activity: Option<Moment>,
+    /// Numbers of closed trials after which a break began.
+    pub breaks: BTreeSet<u32>,
+    /// When the break under way began.
+    pub open_break: Option<Moment>,
+    /// When somebody last took part. Remarks, corrections and what was done from
+    /// outside the session do not count.
+    pub last_activity: Option<Moment>,
 }
 
 /// The state of a session and the reason for it.

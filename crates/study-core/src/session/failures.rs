@@ -122,7 +122,7 @@ impl Session {
             self.phase,
             Phase::Reference { .. } | Phase::Break { .. } | Phase::Saving | Phase::Form(_)
         );
-        let trial = self.history.last_done().filter(|_| between)?;
+        let trial = self.history.last_done.filter(|_| between)?;
         let (attempt, done) = self.history.completion(trial)?;
         (!self.history.over()).then(|| (trial, attempt, title(false, done.number)))
     }
@@ -149,7 +149,7 @@ impl Session {
             return;
         };
         let planned = |n: &u32| self.history.planned(*n).cloned();
-        let mut rest: Vec<Trial> = self.history.queue().iter().filter_map(planned).collect();
+        let mut rest: Vec<Trial> = self.history.queue.iter().filter_map(planned).collect();
         rest.retain(|t| t.trial != number);
         let mut constraint_broken = false;
         let mut given_up = false;

@@ -43,7 +43,7 @@ impl Session {
     }
 
     fn consent_is_missing(&self) -> bool {
-        self.protocol.consent.is_some() && self.history.consent().is_none()
+        self.protocol.consent.is_some() && self.history.consent.is_none()
     }
 
     pub(super) fn consent(&mut self, accepted: bool, at: Moment) {
@@ -74,7 +74,7 @@ impl Session {
     /// Enters the first of set-up, welcome, intake and instructions that is not
     /// completed; returns whether there was one.
     fn before_trials(&mut self, at: Moment) -> bool {
-        let begun = self.history.any_attempt(false) || self.history.instructions_read();
+        let begun = self.history.any_attempt(false) || self.history.instructions_read;
         let intake_begun = begun || self.history.any_answer(FormId::Intake);
         let setup = !intake_begun && self.open_form(FormId::Setup, at);
         if setup || (!intake_begun && self.show_message(MessageKind::Welcome)) {
@@ -103,7 +103,7 @@ impl Session {
             self.after_playback(at);
             return true;
         }
-        if let Some(began) = self.history.open_break() {
+        if let Some(began) = self.history.open_break {
             let rested_s = (at.wall - began.wall).as_seconds_f64().max(0.0);
             self.phase = Phase::Break {
                 since: at,
@@ -135,7 +135,7 @@ impl Session {
         let closed = self.history.closed(false);
         let due = every > 0 && closed > 0 && closed.is_multiple_of(every);
         let more = self.history.next_trial().is_some_and(|t| !t.practice);
-        (due && more && !self.history.had_break(closed)).then_some(closed)
+        (due && more && !self.history.breaks.contains(&closed)).then_some(closed)
     }
 
     fn after_trials(&mut self, at: Moment) -> bool {

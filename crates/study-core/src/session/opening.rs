@@ -114,7 +114,7 @@ impl Session {
     /// Wall-clock time since the last activity, s.
     fn gap_s(&self, at: Moment) -> f64 {
         self.history
-            .last_activity()
+            .last_activity
             .map_or(0.0, |last| (at.wall - last.wall).as_seconds_f64().max(0.0))
     }
 
@@ -145,7 +145,7 @@ impl Session {
         let queue = if restart {
             self.restarted_queue()
         } else {
-            self.history.queue().to_vec()
+            self.history.queue.to_vec()
         };
         let device_id = self.claim.as_ref().map(|c| c.device_id.clone());
         let reopened = Event::Reopened {
@@ -171,7 +171,7 @@ impl Session {
         let given_up = |trial: &u32| {
             !history.is_closed(*trial)
                 && history.failures(*trial) >= max
-                && !history.queue().contains(trial)
+                && !history.queue.contains(trial)
         };
         let trials = history.schedule().iter().map(|t| t.trial);
         trials
@@ -191,7 +191,7 @@ impl Session {
         let again = history.schedule().iter().filter(|t| t.block == block);
         again
             .map(|t| t.trial)
-            .chain(history.queue().iter().copied().filter(|t| !in_block(t)))
+            .chain(history.queue.iter().copied().filter(|t| !in_block(t)))
             .collect()
     }
 

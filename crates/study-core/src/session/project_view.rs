@@ -204,7 +204,7 @@ impl Session {
     }
 
     fn correctable(&self) -> Vec<Correctable> {
-        let given = self.history.answers().iter().rev();
+        let given = self.history.answers.iter().rev();
         given
             .filter(|g| self.history.is_current(g.form))
             .filter_map(|g| {

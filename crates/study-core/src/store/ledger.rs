@@ -125,7 +125,7 @@ impl StudyFolder {
         // Other processes may have written since the sessions were read.
         let mut recovered = journal::recover(&lock)?;
         notices.append(&mut recovered.notices);
-        check_standing(request, number, recovered.replay.history.standing())?;
+        check_standing(request, number, &recovered.replay.history.standing)?;
         if recovered.replay.records == 0 {
             let seat = next_seat(request, &all)?;
             let claim = Claim {
@@ -142,7 +142,7 @@ impl StudyFolder {
         let replay = &recovered.replay;
         let seat = replay.seat().ok_or_else(|| StoreError::Damaged {
             path: folder.clone(),
-            what: "the lines that say which order the session has are damaged".to_owned(),
+            what: "claim and first event are damaged, so its row of the schedule is unknown".to_owned(),
         })?;
         check_kind(request, seat)?;
         self.keep_reserve(&folder)?;

@@ -49,7 +49,7 @@ impl SessionData {
                 state: tombstone.state,
                 reason: tombstone.reason.clone(),
             },
-            None => self.history.standing().clone(),
+            None => self.history.standing.clone(),
         }
     }
 

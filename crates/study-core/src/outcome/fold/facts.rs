@@ -1,7 +1,7 @@
 //! What the history of a session tells.
 
 use super::trial::TrialHistory;
-use super::{Attempt, Completion, Consent, GivenAnswer, History, OpenAttempt, Standing};
+use super::{Attempt, Completion, GivenAnswer, History, OpenAttempt};
 use crate::outcome::event::{FormId, Moment, Start, State};
 use crate::protocol::{Answer, Trial};
 use study_base::text::QuestionId;
@@ -17,11 +17,6 @@ impl History {
         self.start.as_ref().map(|(at, _)| *at)
     }
 
-    /// The state of the session.
-    pub fn standing(&self) -> &Standing {
-        &self.standing
-    }
-
     /// Whether nothing more is to be asked.
     pub fn over(&self) -> bool {
         self.standing.state != State::Unfinished
@@ -30,22 +25,6 @@ impl History {
     /// Whether every trial is closed and every form answered.
     pub fn finished(&self) -> bool {
         self.standing.state == State::Done
-    }
-
-    /// The participant's decision, if they were asked for consent.
-    pub fn consent(&self) -> Option<&Consent> {
-        self.consent.as_ref()
-    }
-
-    /// Whether the instructions were read.
-    pub fn instructions_read(&self) -> bool {
-        self.instructions_read
-    }
-
-    /// When somebody last took part. Remarks, corrections and what was done from
-    /// outside the session do not count.
-    pub fn last_activity(&self) -> Option<Moment> {
-        self.last_activity
     }
 
     /// Every planned trial; empty before the session has started.
@@ -61,11 +40,6 @@ impl History {
     /// Number of planned trials that count, or of practice trials.
     pub fn planned_total(&self, practice: bool) -> u32 {
         count(self.schedule().iter().filter(|t| t.practice == practice))
-    }
-
-    /// Numbers of the trials still to come, the present or next one first.
-    pub fn queue(&self) -> &[u32] {
-        &self.queue
     }
 
     /// The trial under way or to come next.
@@ -102,11 +76,6 @@ impl History {
     pub fn completion(&self, trial: u32) -> Option<(u32, Completion)> {
         let attempt = self.trials.get(&trial)?.counted()?;
         Some((attempt.number, attempt.done?))
-    }
-
-    /// The trial that counts that was completed last, until it is marked as bad.
-    pub fn last_done(&self) -> Option<u32> {
-        self.last_done
     }
 
     /// Whether a trial is completed or given up.
@@ -147,21 +116,6 @@ impl History {
     /// The trial that was felt last.
     pub fn last_felt(&self) -> Option<&Trial> {
         self.felt.last().and_then(|t| self.planned(*t))
-    }
-
-    /// When the break under way began.
-    pub fn open_break(&self) -> Option<Moment> {
-        self.open_break
-    }
-
-    /// Whether a break began after so many closed trials.
-    pub fn had_break(&self, after: u32) -> bool {
-        self.breaks.contains(&after)
-    }
-
-    /// The current answers in the order in which the questions were first answered.
-    pub fn answers(&self) -> &[GivenAnswer] {
-        &self.answers
     }
 
     /// The current answer to a question.

@@ -209,7 +209,7 @@ fn without_telemetry_there_are_no_strokes_and_no_number_is_never_a_number() {
 
 #[test]
 fn the_last_event_that_sets_a_state_determines_it() {
-    let state = |events| History::of(&journal(events)).standing().state;
+    let state = |events| History::of(&journal(events)).standing.state;
     assert_eq!(state(vec![]), State::Unfinished);
     assert_eq!(state(vec![Event::Finished]), State::Done);
     let excluded = Event::StateSet {
