@@ -142,7 +142,8 @@ impl StudyFolder {
         let replay = &recovered.replay;
         let seat = replay.seat().ok_or_else(|| StoreError::Damaged {
             path: folder.clone(),
-            what: "claim and first event are damaged, so its row of the schedule is unknown".to_owned(),
+            what: "claim and first event are damaged, so its row of the schedule is unknown"
+                .to_owned(),
         })?;
         check_kind(request, seat)?;
         self.keep_reserve(&folder)?;
