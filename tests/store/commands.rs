@@ -219,7 +219,7 @@ fn a_session_that_is_gone_is_told_and_not_dropped_unasked() {
         command.assert()
     };
     std::fs::remove_dir_all(folder.join("sessions/P02")).unwrap();
-    let names = "participants.csv names P02, whose journal is not there";
+    let names = "participants.csv contains P02, whose journal is missing";
     verify(&[]).code(4).stdout(predicate::str::contains(names));
     study_command()
         .arg("analyze")
@@ -239,7 +239,7 @@ fn a_session_that_is_gone_is_told_and_not_dropped_unasked() {
     // A journal that is gone from a folder that stayed is the same.
     std::fs::remove_file(folder.join("sessions/P01/1/journal.jsonl")).unwrap();
     verify(&[]).code(4).stdout(predicate::str::contains(
-        "names P01, whose journal is not there",
+        "contains P01, whose journal is missing",
     ));
 }
 

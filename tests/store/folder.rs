@@ -499,7 +499,10 @@ fn fill(results: &Path) {
     let study = open(results);
     let mut claimed = study.claim(&real("P01")).unwrap();
     assert!(
-        claimed.notices.iter().any(|n| n.contains("KiB are free")),
+        claimed
+            .notices
+            .iter()
+            .any(|n| n.contains("KiB of disk space are free")),
         "{:?}",
         claimed.notices
     );
