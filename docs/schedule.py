@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Reproduces the orders of `study schedule` from docs/schedule.md alone.
 
-An independent implementation, for comparison: it favours the words of the
-document over speed. Not used by `study` itself.
+An independent implementation for comparison: it follows the text of the
+document rather than being fast. `study` itself does not use it.
 """
 
 import argparse

@@ -300,7 +300,7 @@ fn an_order_that_cannot_be_is_an_error_with_its_reason() {
     .unwrap();
     assert_eq!(
         report(dir.path()).1,
-        ["the file of orders, row 1: 1 positions; 15 are needed"]
+        ["the file of orders, row 1: 1 positions instead of 15"]
     );
 }
 

@@ -1,11 +1,11 @@
-//! Faults with spans and hints, for every file we read.
+//! Faults of a file, with spans and hints.
 //!
-//! A reader of a file never stops at the first fault: it collects [`Fault`]s and
-//! goes on. [`Findings`] are the faults of one file, rendered the way rustc does:
-//! what, where (file, line, column, caret), what to do next. [`table`] walks a
-//! TOML document by hand, because serde stops at the first error.
+//! A reader of a file does not stop at the first fault; it collects [`Fault`]s.
+//! [`Findings`] are the faults of one file, rendered as rustc does: what, where
+//! (file, line, column, caret), what to do. [`table`] reads TOML, because serde
+//! stops at the first error.
 //!
-//! Text from the file appears in messages only through [`crate::text::Untrusted`].
+//! Text from the file is printed through [`crate::text::Untrusted`] only.
 
 pub mod table;
 
@@ -14,32 +14,32 @@ use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet, renderer::Deco
 use std::fmt::Write as _;
 use std::ops::Range;
 
-/// How bad a fault is.
+/// The severity of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// The file cannot be used.
     Error,
-    /// It can, but somebody should look.
+    /// The file can be used, but something in it is doubtful.
     Warning,
 }
 
-/// One thing that is wrong with a file, or doubtful.
+/// An error or doubt in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
     /// Error or warning.
     pub severity: Severity,
-    /// What is wrong, in one short sentence without a full stop.
+    /// What is wrong, in a short sentence without a full stop.
     pub message: String,
-    /// Bytes of the file that it is about; `None`: the file as a whole.
+    /// The bytes of the file that it concerns; `None`: the whole file.
     pub span: Option<Range<usize>>,
-    /// What stands beside the caret, such as "did you mean `repetitions`?".
+    /// The text beside the caret, such as "did you mean `repetitions`?".
     pub label: Option<String>,
-    /// What to do next, where the label does not say it.
+    /// What to do, if the label does not say it.
     pub hint: Option<String>,
 }
 
 impl Fault {
-    /// An error without a place yet.
+    /// An error about the whole file.
     pub fn error(message: impl Into<String>) -> Self {
         Self {
             severity: Severity::Error,
@@ -50,7 +50,7 @@ impl Fault {
         }
     }
 
-    /// A warning without a place yet.
+    /// A warning about the whole file.
     pub fn warning(message: impl Into<String>) -> Self {
         Self {
             severity: Severity::Warning,
@@ -58,21 +58,21 @@ impl Fault {
         }
     }
 
-    /// The same, at these bytes of the file (`None` leaves the whole file).
+    /// The same fault, at these bytes of the file; `None` is the whole file.
     #[must_use]
     pub fn at(mut self, span: impl Into<Option<Range<usize>>>) -> Self {
         self.span = span.into();
         self
     }
 
-    /// The same, with words beside the caret.
+    /// The same fault, with a label beside the caret.
     #[must_use]
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.label = Some(label.into());
         self
     }
 
-    /// The same, with advice.
+    /// The same fault, with a hint.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());
@@ -80,19 +80,19 @@ impl Fault {
     }
 }
 
-/// The faults of one file, with its text to point into.
+/// The faults of a file, with its text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Findings {
-    /// The path as the user gave it, for the message.
+    /// The path, as the user gave it.
     pub path: String,
     /// The text of the file; empty if it could not be read.
     pub text: String,
-    /// In the order of their place in the file.
+    /// The faults; [`Findings::sort`] orders them by place.
     pub faults: Vec<Fault>,
 }
 
 impl Findings {
-    /// No faults yet.
+    /// Without faults.
     pub fn new(path: impl Into<String>, text: impl Into<String>) -> Self {
         Self {
             path: path.into(),
@@ -106,7 +106,7 @@ impl Findings {
         self.count(Severity::Error) > 0
     }
 
-    /// How many faults are of this severity.
+    /// Number of faults of a severity.
     pub fn count(&self, severity: Severity) -> usize {
         self.faults
             .iter()
@@ -114,7 +114,7 @@ impl Findings {
             .count()
     }
 
-    /// Those of one severity.
+    /// The faults of one severity.
     #[must_use]
     pub fn only(&self, severity: Severity) -> Self {
         let faults = self.faults.iter().filter(|f| f.severity == severity);
@@ -125,13 +125,13 @@ impl Findings {
         }
     }
 
-    /// Sorts the faults by their place, those about the whole file first.
+    /// Sorts the faults by place, those about the whole file first.
     pub fn sort(&mut self) {
         self.faults
             .sort_by_key(|f| f.span.as_ref().map_or(0, |s| s.start + 1));
     }
 
-    /// Line and column (both from 1, columns in characters) of a byte.
+    /// Line and column of a byte, both from 1; columns are characters.
     pub fn line_and_column(&self, byte: usize) -> (usize, usize) {
         let before = &self.text[..floor_char_boundary(&self.text, byte)];
         let line = before.matches('\n').count() + 1;
@@ -139,7 +139,7 @@ impl Findings {
         (line, column)
     }
 
-    /// All faults as text for a terminal; `colour` adds ANSI styles.
+    /// All faults as text for a terminal, with ANSI styles if `colour`.
     pub fn render(&self, colour: bool) -> String {
         let renderer = if colour {
             Renderer::styled()
@@ -185,8 +185,8 @@ impl Findings {
     }
 }
 
-/// The text with whatever could steer a terminal replaced by as many `?` as it
-/// has bytes, so that spans still fit.
+/// The text with each unsafe character replaced by as many `?` as it has bytes, so that
+/// spans stay valid.
 fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
@@ -207,7 +207,7 @@ fn floor_char_boundary(text: &str, byte: usize) -> usize {
     at
 }
 
-/// The candidate that a mistyped word most likely meant, if one is near enough.
+/// The candidate nearest to a misspelt word, if one is near enough.
 pub fn did_you_mean<'a>(
     given: &str,
     candidates: impl IntoIterator<Item = &'a str>,
@@ -225,7 +225,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fault_shows_the_line_the_caret_and_the_way_out() {
+    fn a_fault_shows_line_caret_and_suggestion() {
         let mut findings = Findings::new("protocol.toml", "[design]\nrepetition = 3\n");
         findings.faults.push(
             Fault::error("unknown key `repetition` in [design]")
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_near_miss_is_recognised_and_a_stranger_is_not() {
+    fn only_near_words_are_suggested() {
         let keys = ["repetitions", "participants", "order"];
         assert_eq!(did_you_mean("repetition", keys), Some("repetitions"));
         assert_eq!(did_you_mean("oder", keys), Some("order"));

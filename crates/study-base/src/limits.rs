@@ -1,17 +1,16 @@
-//! The one constructor of every limit.
+//! Limits that are finite and positive by construction.
 //!
-//! TOML and CSV can say `nan` and `inf`, and `force > nan` is never true: a
-//! limit that is not a finite positive number would silently be none. So no
-//! limit in this program is a bare `f64`.
+//! TOML and CSV can contain `nan` and `inf`, and `force > nan` is never true: a limit
+//! that is NaN would silently not limit. Therefore no limit is a bare `f64`.
 
 use serde::{Deserialize, Serialize};
 
-/// A finite, positive bound, in the unit that its field's name says.
+/// A finite, positive bound, in the unit of its field's name.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct Limit(f64);
 
-/// Why a number cannot be a limit.
+/// A number that cannot be a limit.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("a limit has to be a finite number above zero, not {0}")]
 pub struct BadLimit(pub f64);
@@ -34,13 +33,13 @@ impl Limit {
         self.0
     }
 
-    /// The smaller of the two: a limit asked for, never above the device's own.
+    /// The smaller of the two limits.
     #[must_use]
     pub fn capped_at(self, other: Self) -> Self {
         if other.0 < self.0 { other } else { self }
     }
 
-    /// `value` brought into [−limit, limit]; a NaN becomes 0, which is limp.
+    /// `value` clamped to [−limit, limit]; NaN becomes 0, no force.
     pub fn clamp(self, value: f64) -> f64 {
         if value.is_nan() {
             0.0
@@ -63,7 +62,7 @@ impl From<Limit> for f64 {
     }
 }
 
-/// What a playback may never exceed.
+/// Limits that no playback exceeds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// Largest force, N.
@@ -73,7 +72,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Both limits, each the smaller of the two.
+    /// The smaller of the two, for each limit.
     #[must_use]
     pub fn capped_at(self, device: Self) -> Self {
         Self {
@@ -96,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clamp_lets_nothing_through() {
+    fn a_clamp_never_exceeds_the_limit() {
         let limit = Limit::new(12.0).unwrap();
         assert_eq!(limit.clamp(f64::NAN), 0.0);
         assert_eq!(limit.clamp(f64::INFINITY), 12.0);
@@ -105,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn the_device_limit_wins_when_it_is_lower() {
+    fn the_lower_limit_applies() {
         let asked = Limit::new(12.0).unwrap();
         let device = Limit::new(9.0).unwrap();
         assert_eq!(asked.capped_at(device), device);

@@ -1,13 +1,14 @@
-//! Randomness: a seed and a path of names give an independent, bit-exact stream.
+//! Reproducible random streams: a seed and a path of names give an independent,
+//! bit-exact stream.
 //!
 //! Everything random in a study (orders, simulated participants, sensor noise)
 //! comes from a [`Stream`]. The key of a stream is the SHA-256 of a version tag,
-//! the seed and the names of its path; its bits are ChaCha20 of RFC 8439 with a
-//! zero nonce, counted from block 0. The construction is specified word for word
-//! in `docs/schedule.md`, so that another language can reproduce an order; it
-//! never changes under the tag [`VERSION`].
+//! the seed and the names of its path; its bits are ChaCha20 of RFC 8439 with a zero
+//! nonce, from block 0. `docs/schedule.md` specifies the construction, so that
+//! another language can reproduce an order; it never changes under the tag
+//! [`VERSION`].
 //!
-//! This is not a source of secrets.
+//! Not for cryptography: seeds are public.
 
 use num_bigint::BigUint;
 use rand::rngs::ChaCha20Rng;
@@ -15,7 +16,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use sha2::{Digest, Sha256};
 
-/// The tag that enters every key. A change of any rule in this file is a new tag.
+/// The tag in every key. A change of any rule in this file needs a new tag.
 pub const VERSION: &str = "study-rng/1";
 
 /// A named, reproducible stream of random numbers.
@@ -53,10 +54,10 @@ impl Stream {
         self.chacha.next_u64()
     }
 
-    /// A whole number in `0..n`, exactly uniform. `n` = 1 draws nothing.
+    /// A whole number in `0..n`, exactly uniform. For `n` = 1 nothing is drawn.
     ///
     /// # Panics
-    /// If `n` is 0: there is no such number.
+    /// If `n` is 0.
     pub fn below(&mut self, n: u64) -> u64 {
         assert!(n > 0, "no number is below zero");
         let bits = u64::BITS - (n - 1).leading_zeros();
@@ -76,7 +77,7 @@ impl Stream {
     /// the same number, from the same draws, as [`Stream::below`].
     ///
     /// ceil(bits / 64) draws, the first the least significant, cut to the bit
-    /// length of n − 1; anything not below `n` is thrown away and drawn anew.
+    /// length of n − 1; a number that is not below `n` is rejected and drawn again.
     ///
     /// # Panics
     /// If `n` is 0.
@@ -105,7 +106,7 @@ impl Stream {
     }
 
     /// Puts `items` in a uniformly random order (Fisher–Yates from the end:
-    /// i = n−1 … 1 changes places with [`Stream::below`]`(i + 1)`).
+    /// i = n−1 … 1 is exchanged with [`Stream::below`]`(i + 1)`).
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for i in (1..items.len()).rev() {
             let j = self.below(i as u64 + 1);
@@ -118,7 +119,7 @@ impl Stream {
         (self.next_u64() >> 11) as f64 * 2f64.powi(-53)
     }
 
-    /// A standard normal deviate. For simulation only: no order depends on it.
+    /// A standard normal deviate. For simulation only; no order uses it.
     pub fn normal(&mut self) -> f64 {
         self.chacha.sample(StandardNormal)
     }
@@ -145,9 +146,9 @@ mod tests {
         );
     }
 
-    /// The second block goes on where the first ended (appendix A.1, vector 2).
+    /// The second block follows the first (appendix A.1, vector 2).
     #[test]
-    fn the_counter_goes_on_to_block_one() {
+    fn block_one_follows_block_zero() {
         let mut stream = Stream::from_key([0; 32]);
         for _ in 0..8 {
             stream.next_u64();
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn names_cannot_run_into_each_other() {
+    fn the_division_of_a_path_into_names_matters() {
         let one = Stream::new(1, &["ab", "c"]).next_u64();
         let other = Stream::new(1, &["a", "bc"]).next_u64();
         assert_ne!(one, other);

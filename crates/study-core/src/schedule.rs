@@ -1,20 +1,20 @@
-//! Design and seat to a whole, frozen order of trials.
+//! The order of a participant's trials.
 //!
 //! A [`Planner`] is made once per protocol and gives the order of any seat. The
-//! order depends on (seed, design, seat) alone and is the same on every machine
-//! and for ever; `docs/schedule.md` specifies it so that another language can
-//! reproduce it, and golden orders in the tests hold it.
+//! order depends only on seed, design and seat and is the same on every machine and
+//! in every version; `docs/schedule.md` specifies it so that another language can
+//! reproduce it, and golden tests protect it.
 //!
-//! Not here: who gets which row (`store`), and what is felt when (`session`,
-//! which only asks [`requeue`] where a failed trial comes back).
+//! `store` decides which participant gets which row; `session` decides when a trial
+//! takes place and calls [`requeue`] for a failed one.
 //!
-//! Invariant: no order leaves this module that breaks `max_run` or
-//! `min_distance`. Random orders are drawn exactly uniformly from those that
-//! keep them; orders that are given (Williams, Latin square, fixed, file) are
-//! verified, and one that breaks them is an error. Both constraints hold over all
-//! trials that count, across the ends of blocks; practice is not looked at.
+//! Invariant: no order from this module violates `max_run` or `min_distance`. Random
+//! orders are drawn exactly uniformly from the valid ones. Orders that are given
+//! (Williams, Latin square, fixed, file) are verified; a violation is an error. Both
+//! constraints hold over all trials that count, also across blocks; practice is
+//! exempt.
 //!
-//! Positions are without unit, from 1.
+//! Positions count from 1.
 
 pub mod balance;
 mod completions;
@@ -32,61 +32,61 @@ use std::collections::HashMap;
 use study_base::rng::Stream;
 use study_base::text::ModelId;
 
-/// More trials than this in one session are taken for a slip of the pen.
+/// Most trials of a session; more are probably a typing error.
 pub const MAX_TRIALS: u64 = 10_000;
 
 /// Why there is no order.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ScheduleError {
-    /// Nothing to schedule.
+    /// There is no realization to schedule.
     #[error("no realization to schedule: all models have the role practice")]
     NoRealizations,
-    /// Nothing to schedule either.
+    /// There are no repetitions.
     #[error("repetitions = 0 schedules no trial")]
     NoRepetitions,
-    /// Beyond [`MAX_TRIALS`].
+    /// More than [`MAX_TRIALS`] trials.
     #[error(
         "{realizations} realizations × {repetitions} repetitions are {trials} trials; at most {MAX_TRIALS} are possible"
     )]
     TooLong {
         /// Realizations that are scheduled.
         realizations: usize,
-        /// How often each.
+        /// Trials of each.
         repetitions: u32,
-        /// The product.
+        /// All trials.
         trials: u64,
     },
     /// `max_run = 0`
     #[error("max_run = 0 allows no trial at all")]
     MaxRunZero,
-    /// The same realization cannot stay away for so long.
+    /// `min_distance` exceeds the number of realizations.
     #[error(
         "min_distance = {min_distance} needs at least {min_distance} realizations, there are {realizations}"
     )]
     MinDistance {
-        /// What was asked for.
+        /// The constraint.
         min_distance: u32,
         /// Realizations that are scheduled.
         realizations: usize,
     },
-    /// Nothing to put between.
+    /// `max_run` with a single realization.
     #[error(
-        "max_run = {max_run} cannot hold: the only realization is felt {repetitions} times in a row"
+        "max_run = {max_run} cannot hold: the only realization has {repetitions} trials in a row"
     )]
     MaxRun {
-        /// What was asked for.
+        /// The constraint.
         max_run: u32,
-        /// How often the only realization is felt.
+        /// Trials of the only realization.
         repetitions: u32,
     },
-    /// Counting the valid orders would take too much memory.
+    /// Counting the valid orders needs too much memory.
     #[error(
         "the orders of {realizations} realizations × {repetitions} repetitions, shuffled with {constraint}, are too many to count"
     )]
     TooManyStates {
         /// Realizations that are scheduled.
         realizations: usize,
-        /// How often each.
+        /// Trials of each.
         repetitions: u32,
         /// Such as `max_run = 2`.
         constraint: String,
@@ -94,63 +94,63 @@ pub enum ScheduleError {
     /// Rows, pilots and simulated participants are numbered from 1.
     #[error("there is no {0}: numbers start at 1")]
     SeatZero(Seat),
-    /// A given order breaks a constraint.
+    /// A given order violates a constraint.
     #[error("{seat}, {violation}")]
     Broken {
-        /// Whose order.
+        /// The seat of the order.
         seat: Seat,
-        /// Where and how.
+        /// The violation.
         violation: Violation,
     },
-    /// `order = { file = … }`, and nobody has read the file.
+    /// The order comes from a file that was not passed.
     #[error("the order comes from a file, which was not read")]
     NoOrders,
-    /// The file of orders does not have the row.
+    /// The file of orders lacks the row.
     #[error("the file of orders has no row {row}")]
     NoRow {
-        /// The row that was asked for.
+        /// The row.
         row: u32,
     },
-    /// A row of the file is too short or too long.
-    #[error("the file of orders, row {row}: {found} positions; {expected} are needed")]
+    /// A row of the file has the wrong length.
+    #[error("the file of orders, row {row}: {found} positions instead of {expected}")]
     WrongLength {
         /// Row of the file.
         row: u32,
-        /// How many it has.
+        /// Positions in the file.
         found: usize,
         /// Realizations × repetitions.
         expected: usize,
     },
-    /// A row of the file names something else than a scheduled realization.
+    /// A row of the file names an id that is not a scheduled realization.
     #[error(
-        "the file of orders, row {row}, position {position}: `{model}` is no scheduled realization"
+        "the file of orders, row {row}, position {position}: `{model}` is not a scheduled realization"
     )]
     UnknownModel {
         /// Row of the file.
         row: u32,
         /// Position in it, from 1.
         position: usize,
-        /// What stands there.
+        /// The id.
         model: ModelId,
     },
-    /// A row of the file has a realization too often or not often enough.
+    /// A row of the file has the wrong number of trials of a realization.
     #[error(
-        "the file of orders, row {row}: `{model}` comes {found} times; repetitions = {expected}"
+        "the file of orders, row {row}: `{model}` occurs {found} times, but repetitions = {expected}"
     )]
     WrongCount {
         /// Row of the file.
         row: u32,
-        /// Which realization.
+        /// The realization.
         model: ModelId,
-        /// How often it comes.
+        /// Its trials in the file.
         found: u32,
-        /// How often it should.
+        /// `repetitions`
         expected: u32,
     },
 }
 
 impl ScheduleError {
-    /// What to do next, where the message does not say it.
+    /// What to do, if the message does not say it.
     pub fn hint(&self) -> Option<&'static str> {
         match self {
             Self::MinDistance { .. } => Some("lower min_distance or add realizations"),
@@ -179,7 +179,7 @@ impl ScheduleError {
 
 /// The order of one seat: practice first, then every trial that counts.
 ///
-/// Whoever needs many seats makes a [`Planner`] once.
+/// For several seats, make a [`Planner`] once.
 ///
 /// # Errors
 /// [`ScheduleError`] if the design is infeasible, or the given order of this seat
@@ -192,7 +192,7 @@ pub fn plan(
     Planner::new(protocol, orders)?.plan(seat)
 }
 
-/// Makes the orders of one study.
+/// Makes the orders of a study.
 #[derive(Debug)]
 pub struct Planner {
     seed: u64,
@@ -204,7 +204,7 @@ pub struct Planner {
     source: Source,
 }
 
-/// What an order is made from.
+/// How orders are made.
 #[derive(Debug)]
 enum Source {
     Blocked { distance: usize },
@@ -222,9 +222,9 @@ enum Lines {
 }
 
 impl Planner {
-    /// Checks the design and counts what has to be counted.
+    /// Checks the design and prepares drawing.
     ///
-    /// `orders` is the content of the file that `order = { file = … }` names.
+    /// `orders` is the content of the file of `order = { file = … }`.
     ///
     /// # Errors
     /// [`ScheduleError`] if no seat can have an order.
@@ -236,7 +236,7 @@ impl Planner {
         let repetitions = design.repetitions as usize;
         let source = match &design.order {
             Order::Blocked => Source::Blocked {
-                // In a block each comes once, so that no run is longer than two.
+                // Each realization occurs once in a block: no run is longer than two.
                 distance: match rule {
                     Rule::Distance(d) => d as usize,
                     Rule::Run(_) | Rule::None => 1,
@@ -295,9 +295,9 @@ impl Planner {
             self.source,
             Source::Blocked { .. } | Source::Shuffled | Source::ShuffledWithin(_)
         ) {
-            let felt: Vec<&ModelId> = order.iter().map(|&m| &self.models[m]).collect();
+            let models: Vec<&ModelId> = order.iter().map(|&m| &self.models[m]).collect();
             if let Some(violation) =
-                constraints::first_violation(&felt, self.max_run, self.min_distance)
+                constraints::first_violation(&models, self.max_run, self.min_distance)
             {
                 return Err(ScheduleError::Broken { seat, violation });
             }
@@ -334,10 +334,10 @@ impl Planner {
         })
     }
 
-    /// The row of a file of orders, complete or an error.
+    /// A row of the file of orders, checked to be complete.
     ///
-    /// A pilot or simulated participant takes the rows of the file in turn, from
-    /// the first again after the last.
+    /// Pilots and simulated participants take the rows of the file in turn, starting
+    /// again after the last.
     fn row_of(&self, file: &FileOrders, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
         let row = match seat {
             Seat::Row(row) => row,
@@ -407,17 +407,17 @@ impl Planner {
                 practice: true,
             });
         }
-        let mut felt = vec![0u32; self.models.len()];
+        let mut repetitions = vec![0u32; self.models.len()];
         for (position, &model) in (1..).zip(order) {
             number += 1;
-            felt[model] += 1;
+            repetitions[model] += 1;
             trials.push(Trial {
                 trial: number,
-                // Each block holds each realization once.
-                block: if blocks { felt[model] } else { 1 },
+                // Each block contains each realization once.
+                block: if blocks { repetitions[model] } else { 1 },
                 position,
                 model: self.models[model].clone(),
-                repetition: felt[model],
+                repetition: repetitions[model],
                 practice: false,
             });
         }
@@ -425,8 +425,7 @@ impl Planner {
     }
 }
 
-/// Whether the design has any order; if so, the one rule that its constraints
-/// come down to.
+/// The rule that the constraints of the design reduce to, if there is a valid order.
 fn feasible(design: &Design, realizations: usize) -> Result<Rule, ScheduleError> {
     let repetitions = design.repetitions;
     if realizations == 0 {
@@ -455,9 +454,9 @@ fn feasible(design: &Design, realizations: usize) -> Result<Rule, ScheduleError>
             repetitions,
         });
     }
-    // The n first places are at least 0 … n−1 and the n last ones at most the n
-    // last of all n R: first and last lie n (R − 1) apart on average, R − 1
-    // distances each. Their mean is at most n, so one of them is.
+    // The first positions of the n realizations are at least 0 … n−1 and the last ones
+    // at most the last n of all n R. First and last are thus at most n (R − 1) apart on
+    // average, which is R − 1 distances each: the mean distance is at most n.
     if let Some(min_distance) = design.min_distance
         && repetitions > 1
         && min_distance as usize > realizations

@@ -6,11 +6,11 @@ use study_base::text::{ModelId, Untrusted};
 use study_core::protocol::{Design, Order, Protocol, Role, Trial};
 use study_core::schedule::balance::{Balance, Balances, Spread, balances};
 
-/// Ids up to this length stand for themselves in the tables.
+/// Ids up to this length are used in the tables.
 const SHORT: usize = 3;
 
-/// Everything that `study schedule` shows; lines are at most `width` columns
-/// where the numbers allow it.
+/// The text of `study schedule`: orders, counts and a summary of the balance. Lines
+/// have at most `width` columns if the numbers allow it.
 pub(super) fn render(
     protocol: &Protocol,
     models: &[ModelId],
@@ -46,7 +46,7 @@ pub(super) fn render(
         _ => return out,
     };
     if balance.blocks > 1 {
-        let _ = writeln!(out, "\nTimes at each place of a block, {rows}");
+        let _ = writeln!(out, "\nOccurrences at each place of a block, {rows}");
         counts(
             &mut out,
             &codes,
@@ -55,7 +55,7 @@ pub(super) fn render(
             width,
         );
     }
-    let _ = writeln!(out, "\nTimes at each position of the session, {rows}");
+    let _ = writeln!(out, "\nOccurrences at each position of the session, {rows}");
     counts(
         &mut out,
         &codes,
@@ -66,12 +66,12 @@ pub(super) fn render(
     if balance.blocks > 1 {
         let _ = writeln!(
             out,
-            "\nTimes that the column follows the line within a block, {rows}"
+            "\nOccurrences of the column directly after the line, within blocks, {rows}"
         );
         counts(&mut out, &codes, &codes.names, &balance.carry_over, width);
         let _ = writeln!(
             out,
-            "\nTimes that the column begins the block after the line ended one, {rows}"
+            "\nOccurrences of the column at the start of a block after one that ends with the line, {rows}"
         );
         counts(
             &mut out,
@@ -81,7 +81,10 @@ pub(super) fn render(
             width,
         );
     } else {
-        let _ = writeln!(out, "\nTimes that the column follows the line, {rows}");
+        let _ = writeln!(
+            out,
+            "\nOccurrences of the column directly after the line, {rows}"
+        );
         counts(&mut out, &codes, &codes.names, &balance.carry_over, width);
     }
     out.push('\n');
@@ -91,7 +94,7 @@ pub(super) fn render(
     out
 }
 
-/// What stands for a realization in the tables.
+/// Short codes of the realizations in the tables.
 struct Codes {
     names: Vec<String>,
     by_id: HashMap<ModelId, usize>,
@@ -129,12 +132,8 @@ impl Codes {
 
 fn headline(design: &Design, models: usize) -> String {
     let order = match &design.order {
-        Order::Blocked => "blocked".to_owned(),
-        Order::Shuffled => "shuffled".to_owned(),
-        Order::Williams => "williams".to_owned(),
-        Order::LatinSquare => "latin-square".to_owned(),
-        Order::Fixed => "fixed".to_owned(),
         Order::File(path) => format!("orders from {}", Untrusted(path)),
+        order => order.as_str().to_owned(),
     };
     let mut line = format!(
         "{order}, {models} realizations × {} repetitions",
@@ -161,7 +160,7 @@ fn legend(out: &mut String, protocol: &Protocol, models: &[ModelId], codes: &Cod
     out.push('\n');
 }
 
-/// One line for each row, broken between trials where it is too long.
+/// One line per row, wrapped between trials.
 fn orders(out: &mut String, plans: &[(u32, Vec<Trial>)], codes: &Codes, width: usize) {
     let label = plans.last().map_or(1, |(row, _)| row.to_string().len());
     let cell = codes.width();
@@ -197,7 +196,7 @@ fn numbers(table: &[Vec<u32>]) -> Vec<String> {
     (1..=columns).map(|i| i.to_string()).collect()
 }
 
-/// A table of counts, in parts below each other where it is too wide.
+/// A table of counts, split into parts if it is too wide.
 fn counts(out: &mut String, codes: &Codes, heads: &[String], table: &[Vec<u32>], width: usize) {
     let largest = table.iter().flatten().map(|c| c.to_string().len()).max();
     let head = heads.iter().map(String::len).max().unwrap_or(1);
@@ -224,7 +223,7 @@ fn counts(out: &mut String, codes: &Codes, heads: &[String], table: &[Vec<u32>],
     }
 }
 
-/// The balance in words.
+/// The balance in sentences.
 fn verdict(design: &Design, balance: &Balance) -> Vec<String> {
     let (place, within) = if balance.blocks > 1 {
         ("place of a block", " within blocks")
@@ -237,7 +236,7 @@ fn verdict(design: &Design, balance: &Balance) -> Vec<String> {
             "Positions: {}.",
             evenness(
                 spread,
-                &format!("each realization comes {{}} at each {place}")
+                &format!("each realization occurs {{}} at each {place}")
             )
         ));
     }
@@ -259,11 +258,14 @@ fn verdict(design: &Design, balance: &Balance) -> Vec<String> {
 
 fn evenness(spread: Spread, sentence: &str) -> String {
     if spread.is_even() {
-        format!("even; {}", sentence.replace("{}", &times(spread.least)))
+        format!("balanced; {}", sentence.replace("{}", &times(spread.least)))
     } else {
         let range = format!("{} to {} times", spread.least, spread.most);
         let even = (spread.even * 10.0).round() / 10.0;
-        format!("uneven; {} (even: {even})", sentence.replace("{}", &range))
+        format!(
+            "unbalanced; {} (balanced: {even})",
+            sentence.replace("{}", &range)
+        )
     }
 }
 
@@ -275,7 +277,7 @@ fn times(n: u32) -> String {
     }
 }
 
-/// What the design promises, whatever rows are shown.
+/// The balance of the design, independent of the rows that are shown.
 fn promise(design: &Design, balances: Option<Balances>) -> String {
     match (&design.order, balances) {
         (_, Some(b)) => {
@@ -286,26 +288,26 @@ fn promise(design: &Design, balances: Option<Balances>) -> String {
             };
             let planned = u64::from(design.participants);
             let fits = if planned.is_multiple_of(b.participants) {
-                format!("{planned} are planned, which fits")
+                format!("{planned} are planned, which is one")
             } else {
                 let below = planned / b.participants * b.participants;
                 let above = below + b.participants;
                 match below {
-                    0 => format!("{planned} are planned; take {above}"),
-                    below => format!("{planned} are planned; take {below} or {above}"),
+                    0 => format!("{planned} are planned; the next is {above}"),
+                    below => format!("{planned} are planned; the nearest are {below} and {above}"),
                 }
             };
             match b.participants {
-                1 => format!("{what} even for any number of participants."),
-                n => format!("{what} even at every {n} participants; {fits}."),
+                1 => format!("{what} balanced for any number of participants."),
+                n => format!("{what} balanced at multiples of {n} participants; {fits}."),
             }
         }
         (Order::Fixed, _) => {
-            "Everybody feels the same order: its effect cannot be told from the realizations'."
+            "All participants have the same order: order effects cannot be separated from effects of realizations."
                 .to_owned()
         }
         (Order::File(_), _) => "The orders are those of the file.".to_owned(),
-        _ => "The orders are random: even on average over many participants, not in any few."
+        _ => "The orders are random: balanced on average over many participants, not over a few."
             .to_owned(),
     }
 }
@@ -357,7 +359,7 @@ mod tests {
             let counted = text
                 .lines()
                 .filter(|l| !l.contains(". ") && !l.ends_with('.'));
-            for line in counted.filter(|l| !l.starts_with("Times")) {
+            for line in counted.filter(|l| !l.starts_with("Occurrences")) {
                 assert!(line.chars().count() <= 60, "{line}");
             }
             // Nothing is lost: 36 trials in the first row.
@@ -379,9 +381,12 @@ mod tests {
         p.design.order = Order::Williams;
         p.design.participants = 12;
         let text = rendered(&p, 7, 80);
-        assert!(text.contains("Positions: uneven; "), "{text}");
-        assert!(text.contains("(even: 4.2)"), "{text}");
-        assert!(text.contains("12 are planned; take 10 or 20."), "{text}");
-        assert!(rendered(&p, 10, 80).contains("Carry-over: even; "));
+        assert!(text.contains("Positions: unbalanced; "), "{text}");
+        assert!(text.contains("(balanced: 4.2)"), "{text}");
+        assert!(
+            text.contains("12 are planned; the nearest are 10 and 20."),
+            "{text}"
+        );
+        assert!(rendered(&p, 10, 80).contains("Carry-over: balanced; "));
     }
 }

@@ -1,4 +1,4 @@
-//! A strict reader of TOML that reports every fault, not the first.
+//! A strict reader of TOML that reports every fault rather than the first.
 //!
 //! ```text
 //! let document = Document::parse(text);            // syntax faults collected
@@ -6,11 +6,11 @@
 //! let mut design = root.table("design");           // Option<Table>
 //! design.u32("repetitions")                        // type faults collected
 //! design.finish();                                 // unknown keys collected
-//! let faults = document.into_faults();
+//! let faults = document.finish().faults;
 //! ```
 //!
-//! Every value that is looked at leaves its place in [`Document::span_of`] under
-//! its path (`models[2].vaf`), for checks that come later and know only the path.
+//! The span of every value that is read is recorded under its path
+//! (`models[2].vaf`), for later checks: see [`Document::span_of`].
 
 use super::{Fault, did_you_mean};
 use crate::text::Untrusted;
@@ -21,7 +21,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// More syntax faults than this help nobody.
+/// Most syntax faults that are reported.
 const MAX_SYNTAX_FAULTS: usize = 20;
 
 /// A parsed TOML document and the faults found in it so far.
@@ -37,23 +37,23 @@ struct Notes {
     spans: BTreeMap<String, Range<usize>>,
 }
 
-/// What reading leaves behind: the faults, and where each value stood.
+/// The result of reading: the faults and the span of each value.
 #[derive(Debug, Default, Clone)]
 pub struct Read {
-    /// In the order they were found.
+    /// The faults, in the order in which they were found.
     pub faults: Vec<Fault>,
     /// Path of a value (`models[2].vaf`, `design`) → its bytes.
     pub spans: BTreeMap<String, Range<usize>>,
 }
 
 impl<'t> Document<'t> {
-    /// Parses TOML; syntax errors become faults and whatever could be read stays.
+    /// Parses TOML; syntax errors become faults, and the rest is kept.
     pub fn parse(text: &'t str) -> Self {
         let (root, errors) = DeTable::parse_recoverable(text);
         let mut faults: Vec<Fault> = Vec::new();
         for error in &errors {
             let fault = Fault::error(error.message().trim().to_owned()).at(error.span());
-            // One slip can be found again at each level that it leaves open.
+            // One error can be reported again for each table that it leaves open.
             if faults
                 .last()
                 .is_none_or(|last| last.message != fault.message)
@@ -64,7 +64,7 @@ impl<'t> Document<'t> {
         let more = faults.len().saturating_sub(MAX_SYNTAX_FAULTS);
         if more > 0 {
             faults.truncate(MAX_SYNTAX_FAULTS);
-            faults.push(Fault::error(format!("and {more} more faults of this kind")));
+            faults.push(Fault::error(format!("and {more} more syntax errors")));
         }
         Self {
             root,
@@ -86,8 +86,7 @@ impl<'t> Document<'t> {
         }
     }
 
-    /// How many faults there are so far; right after [`Document::parse`], those of
-    /// the syntax.
+    /// Number of faults so far; directly after [`Document::parse`], that of syntax errors.
     pub fn fault_count(&self) -> usize {
         self.notes.borrow().faults.len()
     }
@@ -97,12 +96,12 @@ impl<'t> Document<'t> {
         self.notes.borrow_mut().faults.push(fault);
     }
 
-    /// Where the value at a path stands, if it was read.
+    /// The span of the value at a path, if it was read.
     pub fn span_of(&self, path: &str) -> Option<Range<usize>> {
         self.notes.borrow().spans.get(path).cloned()
     }
 
-    /// All faults and places.
+    /// All faults and spans.
     pub fn finish(self) -> Read {
         let notes = self.notes.into_inner();
         Read {
@@ -112,7 +111,7 @@ impl<'t> Document<'t> {
     }
 }
 
-/// A table that is being read: ask for keys, then [`Table::finish`].
+/// A table that is being read: read its keys, then [`Table::finish`].
 #[derive(Debug)]
 pub struct Table<'d, 't> {
     document: &'d Document<'t>,
@@ -122,7 +121,7 @@ pub struct Table<'d, 't> {
     known: Vec<Cow<'static, str>>,
 }
 
-/// A value with its place.
+/// A value with its span and path.
 #[derive(Debug, Clone)]
 pub struct Value<'d, 't> {
     document: &'d Document<'t>,
@@ -132,7 +131,7 @@ pub struct Value<'d, 't> {
 }
 
 impl<'d, 't> Table<'d, 't> {
-    /// Where the table stands.
+    /// The bytes of the table.
     pub fn span(&self) -> Range<usize> {
         self.span.clone()
     }
@@ -142,7 +141,7 @@ impl<'d, 't> Table<'d, 't> {
         &self.path
     }
 
-    /// The keys of the table, as written, with their places.
+    /// The keys of the table with their spans, in the order of the file.
     pub fn keys(&self) -> Vec<(String, Range<usize>)> {
         let mut keys: Vec<_> = self
             .table
@@ -153,7 +152,7 @@ impl<'d, 't> Table<'d, 't> {
         keys
     }
 
-    /// The value of a key, if it is there. Marks the key as known.
+    /// The value of a key, if present. Marks the key as known.
     pub fn value(&mut self, key: &str) -> Option<Value<'d, 't>> {
         self.known.push(Cow::Owned(key.to_owned()));
         let value = self.table.get(key)?;
@@ -165,7 +164,7 @@ impl<'d, 't> Table<'d, 't> {
         Some(Value::new(self.document, value, path))
     }
 
-    /// The value of a key that has to be there; its absence is a fault.
+    /// The value of a required key; its absence is a fault.
     pub fn required(&mut self, key: &str) -> Option<Value<'d, 't>> {
         let value = self.value(key);
         if value.is_none() {
@@ -197,7 +196,7 @@ impl<'d, 't> Table<'d, 't> {
         self.value(key)?.table()
     }
 
-    /// Text; a value of another type is a fault and `None`.
+    /// Text. Here and below, a value of another type is a fault and `None`.
     pub fn text(&mut self, key: &str) -> Option<String> {
         self.value(key)?.text()
     }
@@ -243,13 +242,13 @@ impl<'d, 't> Table<'d, 't> {
             .collect()
     }
 
-    /// One of a fixed set of words; anything else is a fault that lists them.
+    /// One of a fixed set of words; another text is a fault that lists them.
     pub fn word<T: Copy>(&mut self, key: &str, words: &[(&'static str, T)]) -> Option<T> {
         let value = self.value(key)?;
         value.word(words)
     }
 
-    /// Adds a fault about the value of a key (or about the table without it).
+    /// Adds a fault about the value of a key, or about the table if it is absent.
     pub fn fault_at(&self, key: &str, fault: Fault) {
         let span = self
             .table
@@ -262,7 +261,7 @@ impl<'d, 't> Table<'d, 't> {
     pub fn finish(self) {
         let known: Vec<&str> = self.known.iter().map(AsRef::as_ref).collect();
         for near in self.refuse_unknown(&known) {
-            // It is not missing but misspelt.
+            // The key is not missing but misspelt.
             let missing = self.missing_message(&near);
             let mut notes = self.document.notes.borrow_mut();
             notes.faults.retain(|f| f.message != missing);
@@ -316,7 +315,7 @@ impl<'d, 't> Value<'d, 't> {
         }
     }
 
-    /// Where the value stands.
+    /// The bytes of the value.
     pub fn span(&self) -> Range<usize> {
         self.span.clone()
     }
@@ -367,8 +366,7 @@ impl<'d, 't> Value<'d, 't> {
         text
     }
 
-    /// The value as a number. NaN and infinities are legal TOML and come through:
-    /// whoever asks has to check them.
+    /// The value as a number, which can be NaN or infinite: both are legal TOML.
     pub fn f64(&self) -> Option<f64> {
         let number = match self.value {
             DeValue::Float(float) => float.as_str().parse().ok(),
@@ -472,7 +470,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_is_found_not_only_the_first() {
+    fn every_fault_is_reported() {
         let text = "a = 1\nb = \"x\"\n[design]\nrepetition = 3\norder = \"blokked\"\nn = -1\n";
         let document = Document::parse(text);
         let mut root = document.root();
@@ -507,7 +505,7 @@ mod tests {
     }
 
     #[test]
-    fn a_misspelled_key_is_one_fault_and_so_is_a_flood_of_brackets() {
+    fn a_misspelt_key_and_a_flood_of_brackets_are_one_fault_each() {
         let document = Document::parse("[design]\nrepetition = 3\n");
         let mut root = document.root();
         let mut design = root.table("design").unwrap();

@@ -1,9 +1,7 @@
-//! What can be doubted about a readable protocol.
+//! Warnings about a valid protocol whose design is doubtful.
 //!
-//! Nothing here keeps a study from running: each finding is a warning that a
-//! careful reader of the protocol would raise before the first participant comes.
-//! Doubts that need the models' tables or the orders are raised by those who have
-//! them.
+//! No finding here prevents a study from running. Warnings that need the models'
+//! tables or the orders are given where these are loaded.
 
 use super::{Design, DeviceKind, Exclusion, Protocol, Question, QuestionKind, Role};
 use std::collections::BTreeMap;
@@ -11,28 +9,28 @@ use std::ops::Range;
 use study_base::diagnostic::Fault;
 use study_base::text::ModelId;
 
-/// Test realizations below which a correlation over them says little.
+/// Number of test realizations from which a correlation over them is informative.
 const ENOUGH_REALIZATIONS: usize = 8;
 
-/// Trials, and minutes, that a hand can judge without a rest.
+/// Number of trials without a break that needs no warning.
 const TRIALS_WITHOUT_BREAK: u32 = 15;
 
-/// Minutes after which attention is in doubt.
+/// Duration of a session, min, that needs no warning.
 const LONG_SESSION_MIN: f64 = 60.0;
 
 /// Just noticeable difference of a force, N (Doerrer & Werthschützky 2002).
 const FORCE_JND_N: f64 = 0.1;
 
-/// Standard deviation of the force of a turn-signal switch worked by hand, N: the
-/// scale on which a VAF becomes a force where no recording is at hand. The
-/// simulated switch at 1.5 Hz has 5.3 N.
+/// Standard deviation of the force of a turn-signal switch operated by hand, N. It
+/// converts a VAF to a residual force if there is no recording. The simulated switch
+/// at 1.5 Hz has 5.3 N.
 const FORCE_SD_N: f64 = 5.0;
 
-/// Where each value of the file stood, as `file::Parsed` has it.
+/// Path of a value → its bytes in the file, as in `file::Parsed`.
 pub type Spans = BTreeMap<String, Range<usize>>;
 
-/// Every doubt, as warnings. VAFs should have been filled in from the model files;
-/// those of `unread` could not be, which is an error of its own.
+/// All warnings. VAFs should have been filled in from the model files; those of
+/// `unread` could not be, which is reported as an error elsewhere.
 pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<Fault> {
     let mut faults = Vec::new();
     realizations(protocol, spans, &mut faults);
@@ -43,7 +41,7 @@ pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<
     faults
 }
 
-/// Trials of a session, practice included. An orders file may hold fewer.
+/// Trials of a session, practice included, unless an orders file has fewer.
 pub fn trials(protocol: &Protocol) -> u32 {
     let Design {
         repetitions,
@@ -55,28 +53,28 @@ pub fn trials(protocol: &Protocol) -> u32 {
     models.saturating_mul(*repetitions).saturating_add(practice)
 }
 
-/// Seconds that things are assumed to take, for a participant in no hurry.
+/// Assumed durations, s, for a participant who takes their time.
 mod pace {
-    /// Coming in: welcome, instructions, a hand on the device.
+    /// Arrival: welcome, instructions, hand on the device.
     pub(super) const ARRIVAL_S: f64 = 120.0;
     /// Reading and signing a consent form.
     pub(super) const CONSENT_S: f64 = 120.0;
-    /// Working the reference, or being told to, before a trial.
+    /// Operating the reference before a trial.
     pub(super) const REFERENCE_S: f64 = 15.0;
     /// Loading a table, or mounting a sample by hand.
     pub(super) const LOAD_S: f64 = 2.0;
     pub(super) const MOUNT_S: f64 = 30.0;
     /// Exploring a realization without a time limit.
     pub(super) const EXPLORE_S: f64 = 25.0;
-    /// Answering a question that is chosen, and one that is typed.
+    /// Answering a question by choosing and by typing.
     pub(super) const CHOOSE_S: f64 = 6.0;
     pub(super) const TYPE_S: f64 = 15.0;
 }
 
-/// Minutes that a session takes, from assumed paces: 25 s of exploration and 15 s
-/// with the reference in a trial, 6 s for an answer that is chosen, 15 s for one
-/// that is typed (8 s if it may be left empty), 30 s for a sample mounted by
-/// hand, 2 minutes of arrival and 2 of consent, breaks at their least.
+/// Estimated duration of a session, min. Assumes 25 s of exploration and 15 s with
+/// the reference in a trial, 6 s for an answer that is chosen, 15 s for one that is
+/// typed (8 s if optional), 30 s to mount a sample by hand, 2 min for arrival, 2 min
+/// for consent, and breaks of the least duration.
 pub fn minutes(protocol: &Protocol) -> f64 {
     let mut seconds = pace::ARRIVAL_S;
     if protocol.consent.is_some() {
@@ -185,13 +183,13 @@ fn vaf(protocol: &Protocol, spans: &Spans, unread: &[&ModelId], faults: &mut Vec
     if !without.is_empty() {
         faults.push(
             Fault::warning(format!(
-                "no VAF is known of {}: the correlation leaves them out",
+                "no VAF is known for {}: the correlation excludes them",
                 without.join(", ")
             ))
             .at(spans.get("analysis.vaf").cloned()),
         );
     }
-    // what could not be read may differ enough
+    // Realizations that could not be read may differ enough.
     if known.len() < 2 || !unread.is_empty() {
         return;
     }
@@ -247,7 +245,7 @@ fn duration(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     {
         faults.push(
             Fault::warning(format!(
-                "no break comes: a session has {counted} trials, the first break would be after {}",
+                "no break occurs: a session has {counted} trials, the first break would be after {}",
                 breaks.every
             ))
             .at(spans.get("design.breaks").cloned()),
@@ -257,7 +255,7 @@ fn duration(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
         faults.push(
             Fault::warning(format!("a session takes about {minutes:.0} minutes"))
                 .at(place)
-                .hint("fewer repetitions or realizations keep the hand and the mind fresh"),
+                .hint("fewer repetitions or realizations reduce fatigue"),
         );
     }
 }
@@ -294,7 +292,7 @@ fn roles(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     }
 }
 
-/// Only the start of a long span, so that the caret does not cover the file.
+/// The start of a long span, so that the caret does not cover the file.
 fn first_line(span: Range<usize>) -> Range<usize> {
     span.start..span.end.min(span.start + 1)
 }
@@ -312,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn eight_spread_realizations_in_fifteen_trials_raise_no_doubt() {
+    fn eight_spread_realizations_in_fifteen_trials_give_no_warning() {
         let mut protocol = example::protocol(8, 1);
         for (i, model) in protocol.models.iter_mut().enumerate() {
             model.vaf = Some(0.9 - 0.1 * i as f64);
@@ -321,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn five_realizations_are_few_and_the_number_to_beat_is_told() {
+    fn few_realizations_give_a_warning_with_the_critical_correlation() {
         let found = messages(&example::protocol(5, 3));
         assert_eq!(
             found,
@@ -330,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn vafs_that_nobody_can_feel_apart_are_doubted() {
+    fn vafs_below_the_just_noticeable_difference_give_a_warning() {
         let mut protocol = example::protocol(8, 1);
         for (i, model) in protocol.models.iter_mut().enumerate() {
             model.vaf = Some(0.75 + 0.001 * i as f64);
@@ -354,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn practice_with_what_is_tested_is_doubted() {
+    fn practice_with_a_test_realization_gives_a_warning() {
         let mut protocol = example::protocol(8, 1);
         let id = protocol.models[0].id.clone();
         protocol.design.practice = vec![id];

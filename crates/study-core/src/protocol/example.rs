@@ -1,4 +1,4 @@
-//! A small protocol, built without a file, for tests and examples.
+//! A small protocol without a file, for tests and examples.
 
 use super::*;
 use std::collections::BTreeMap;

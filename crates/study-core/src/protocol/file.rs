@@ -64,7 +64,7 @@ pub const ROOT: &[Key] = keys! {
 /// Largest protocol file that is read, bytes.
 pub const MAX_FILE_BYTES: usize = 1024 * 1024;
 
-/// What reading a protocol file came to.
+/// The result of reading a protocol file.
 #[derive(Debug, Clone)]
 pub struct Parsed {
     /// The protocol, if the file has no errors.
@@ -73,7 +73,7 @@ pub struct Parsed {
     pub findings: Findings,
     /// Path of a value (`models[2].vaf`, `design.order`) → its bytes in the file.
     pub spans: BTreeMap<String, Range<usize>>,
-    /// The other files that it names, also where the protocol has errors.
+    /// The other files that it names, even if the protocol has errors.
     pub named: Vec<Named>,
 }
 
@@ -84,7 +84,7 @@ pub struct Named {
     pub place: String,
     /// Relative to the protocol, with `/`.
     pub file: String,
-    /// Whether it holds orders, not a model.
+    /// Whether it contains orders rather than a model.
     pub orders: bool,
 }
 
@@ -124,8 +124,8 @@ pub fn parse(path: &str, text: &str) -> Parsed {
     }
 }
 
-/// Where the syntax is broken (the first `broken` faults), the reader stumbles a
-/// second time over what was put there instead: that is not a fault of its own.
+/// Removes faults at the places of syntax errors (the first `broken` faults): they are
+/// consequences of these.
 fn drop_echoes(faults: &mut Vec<Fault>, broken: usize) {
     let holes: Vec<Range<usize>> = faults[..broken]
         .iter()
@@ -143,7 +143,8 @@ fn drop_echoes(faults: &mut Vec<Fault>, broken: usize) {
     });
 }
 
-/// A file of another format is not read any further: every key would be a fault.
+/// Checks the format. A file of another format is not read any further, because every
+/// key would be a fault.
 fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
     let mut root = document.root();
     let Some(value) = root.value("format") else {
@@ -170,7 +171,7 @@ fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
         ))
         .hint("use a newer version of study"),
         _ => Fault::error(format!(
-            "`{}` is no format of a protocol",
+            "`{}` is not a format of a protocol",
             Untrusted(&format)
         ))
         .label(format!("`{FORMAT}` is")),

@@ -1,12 +1,12 @@
-//! Fingerprints: what of a study may change while it runs.
+//! Fingerprints: which parts of a study may change while it runs.
 //!
-//! A change of the *stimulus* fingerprint is a new study; *wording* and
-//! *analysis* can be amended, and each session records its own.
+//! A change of the *stimulus* fingerprint makes a new study; *wording* and
+//! *analysis* can be amended, and each session records all three.
 //!
 //! Each is the SHA-256 of a canonical JSON text: no white space, keys sorted,
-//! numbers as serde_json writes them (the shortest that reads back the same).
-//! Every field of a [`Protocol`] stands in exactly one of the three, except the
-//! paths of files: moving a file changes nothing that anybody feels.
+//! numbers as serde_json writes them (the shortest text that reads back the same).
+//! Every field of a [`Protocol`] is in exactly one of the three, except the paths of
+//! files, because moving a file does not change the stimulus.
 //!
 //! * stimulus: study id and seed; the design without the planned number of
 //!   participants (more of them change no order); device kind, limits,
@@ -26,25 +26,25 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use study_base::text::ModelId;
 
-/// SHA-256 in hexadecimal of the three parts of a study.
+/// The fingerprints of a study, SHA-256 in hexadecimal.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprints {
     /// Design, models' bytes, limits, rating scales, orders file.
     pub stimulus: String,
-    /// Every text that a person reads.
+    /// Every text that participants and experimenters read.
     pub wording: String,
-    /// `[analysis]` and what enters only the analysis.
+    /// `[analysis]` and everything else that affects only the analysis.
     pub analysis: String,
 }
 
-/// The fingerprints of a study: its protocol (with VAFs filled in from the model
-/// files), the bytes of each realization's file and the orders file, if any.
+/// The fingerprints of a protocol (with VAFs filled in from the model files), the
+/// bytes of each model file, and the orders file, if any.
 pub fn of(
     protocol: &Protocol,
     model_bytes: &BTreeMap<ModelId, Vec<u8>>,
     orders: Option<&FileOrders>,
 ) -> Fingerprints {
-    // Taken apart without `..`, so that a new field has to be given its part.
+    // No `..`: a new field has to be assigned to a fingerprint.
     let Protocol {
         study,
         text,
@@ -92,7 +92,7 @@ pub fn of(
     };
     let orders: Option<BTreeMap<String, &Vec<ModelId>>> =
         orders.map(|rows| rows.iter().map(|(n, row)| (n.to_string(), row)).collect());
-    let felt: Vec<Value> = models
+    let stimuli: Vec<Value> = models
         .iter()
         .map(|m| {
             json!({
@@ -118,7 +118,7 @@ pub fn of(
         "orders": orders,
         "device": device,
         "trial": { "reference_min_s": reference_min_s, "minimum_strokes": minimum_strokes },
-        "models": felt,
+        "models": stimuli,
         "questions": questions.iter().map(scale).collect::<Vec<_>>(),
     });
     let wording = json!({
@@ -156,7 +156,7 @@ pub fn of(
     }
 }
 
-/// What of a question decides which answers there are.
+/// The part of a question that determines its answers.
 fn scale(question: &Question) -> Value {
     let Question {
         id,
@@ -178,7 +178,7 @@ fn scale(question: &Question) -> Value {
     json!({ "id": id, "required": required, "kind": kind })
 }
 
-/// What of a question is only read.
+/// The part of a question that is only read.
 fn words(question: &Question) -> Value {
     let labels = match &question.kind {
         QuestionKind::Rating { labels, .. } => labels
@@ -201,8 +201,8 @@ fn hex(bytes: &[u8]) -> String {
     text
 }
 
-/// JSON with sorted keys, whatever order the map of `serde_json` keeps: a crate
-/// elsewhere in the build can switch that order.
+/// JSON with sorted keys, independent of the order of `serde_json`'s map, which
+/// another crate of the build can change.
 fn canonical(value: &Value) -> String {
     let mut text = String::new();
     write_canonical(value, &mut text);
@@ -255,9 +255,9 @@ mod tests {
         of(protocol, &bytes(protocol), None)
     }
 
-    /// These stand in results folders: do not change the test. If it fails, a
-    /// study that is running could not be continued with this version. The first was
-    /// reproduced from the description above with Python's `json.dumps(…,
+    /// Results folders contain these values: do not change the test. If it fails, this
+    /// version could not continue a running study. The first value was reproduced from
+    /// the description above with Python's `json.dumps(…,
     /// sort_keys=True, separators=(",", ":"))`.
     #[test]
     fn the_fingerprint_of_an_example_never_changes() {
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn each_change_moves_one_fingerprint() {
+    fn each_change_affects_one_fingerprint() {
         let base = example::protocol(3, 2);
         let first = print(&base);
         let parts = |f: &dyn Fn(&mut Protocol)| {

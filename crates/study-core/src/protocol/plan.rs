@@ -1,7 +1,7 @@
-//! One entry of a schedule, and where a schedule comes from.
+//! A planned trial, and the seat that determines a participant's order.
 //!
-//! These live beside the protocol because both the schedule, which makes them,
-//! and the outcomes, which record them, speak of them.
+//! Both the schedule, which makes trials, and the outcomes, which record them, use
+//! these types.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -10,26 +10,26 @@ use study_base::text::ModelId;
 /// A planned trial. Frozen before the session starts.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Trial {
-    /// Number in the whole session, practice included, from 1.
+    /// Number within the session, practice included, from 1.
     pub trial: u32,
     /// Block from 1; 0 for practice.
     pub block: u32,
-    /// Place among the trials that count, from 1; among the practice trials for
-    /// practice.
+    /// Position among the trials that count, from 1; for practice among the practice
+    /// trials.
     pub position: u32,
-    /// What is played.
+    /// The realization.
     pub model: ModelId,
-    /// The how-maniest time it is played among the trials that count, from 1; 0
-    /// for practice.
+    /// Repetition number among the trials that count, from 1; 0 for practice.
     pub repetition: u32,
-    /// Whether it is practice, which is never analysed.
+    /// Whether it is practice, which is never analyzed.
     pub practice: bool,
 }
 
-/// Where a participant's order comes from.
+/// What a participant's order is drawn from: a row, or the number of a pilot or of a
+/// simulated participant.
 ///
-/// Only real participants take a row. Pilots and simulated participants draw
-/// from streams of their own, so that they never change what a row holds.
+/// Only real participants take a row. Pilots and simulated participants have random
+/// streams of their own and so never change the order of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Seat {
@@ -42,7 +42,7 @@ pub enum Seat {
 }
 
 impl Seat {
-    /// The name of the stream that its order is drawn from.
+    /// The name of the random stream of the order.
     pub fn stream(self) -> &'static str {
         match self {
             Self::Row(_) => "row",
@@ -51,7 +51,7 @@ impl Seat {
         }
     }
 
-    /// Its number, from 1.
+    /// The number, from 1.
     pub fn number(self) -> u32 {
         match self {
             Self::Row(n) | Self::Pilot(n) | Self::Simulated(n) => n,
@@ -66,12 +66,12 @@ impl Seat {
         }
     }
 
-    /// Whether the participant is no real one but tried the study out.
+    /// Whether the participant is a pilot.
     pub fn is_pilot(self) -> bool {
         matches!(self, Self::Pilot(_))
     }
 
-    /// Whether there was no person.
+    /// Whether the participant is simulated.
     pub fn is_simulated(self) -> bool {
         matches!(self, Self::Simulated(_))
     }

@@ -1,10 +1,10 @@
-//! How even the orders of a range of rows are: at which place each realization
-//! is felt how often, and which follows which.
+//! Balance of the orders of a range of rows: how often each realization occurs at
+//! each place, and how often each follows each other.
 //!
 //! *Place* is the position within a block, *position* that within the session;
-//! both from 1, stored from 0. *Carry-over* is of the first order: what is felt
-//! immediately before, within a block; pairs across the end of a block are
-//! counted apart. Practice does not count.
+//! both are indexed from 0. *Carry-over* is of the first order: pairs of successive
+//! trials within a block. Pairs across blocks are counted separately. Practice does
+//! not count.
 
 use super::Trial;
 use super::orders::williams_lines;
@@ -15,9 +15,9 @@ use study_base::text::ModelId;
 /// Counts over a range of rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Balance {
-    /// The realizations, in the order in which the counts are indexed.
+    /// The realizations, in the order of the indices below.
     pub models: Vec<ModelId>,
-    /// How many rows were counted.
+    /// Number of rows.
     pub rows: u32,
     /// Blocks of a session.
     pub blocks: u32,
@@ -31,14 +31,14 @@ pub struct Balance {
     pub between_blocks: Vec<Vec<u32>>,
 }
 
-/// How far counts that should be equal are from it.
+/// The range of counts that are equal in a balanced design.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
     /// Smallest count.
     pub least: u32,
     /// Largest.
     pub most: u32,
-    /// What all would be if they were equal.
+    /// Their mean.
     pub even: f64,
 }
 
@@ -59,8 +59,8 @@ impl Spread {
 }
 
 impl Balance {
-    /// Counts the orders of some rows; each a whole plan of a [`super::Planner`]
-    /// with these realizations.
+    /// Counts the orders of some rows, each a plan of a [`super::Planner`] with these
+    /// realizations.
     pub fn of<'a>(models: &[ModelId], plans: impl IntoIterator<Item = &'a [Trial]>) -> Self {
         let n = models.len();
         let index: HashMap<&ModelId, usize> = models.iter().zip(0..).collect();
@@ -102,13 +102,13 @@ impl Balance {
         balance
     }
 
-    /// How even the places are; `None` without a row.
+    /// Range of the counts by place; `None` without a row.
     pub fn places(&self) -> Option<Spread> {
         Spread::of(self.by_place.iter().flatten().copied())
     }
 
-    /// How even the carry-over from one realization to another is, within
-    /// blocks; `None` with fewer than two realizations.
+    /// Range of the carry-over counts between different realizations, within blocks;
+    /// `None` with fewer than two realizations.
     pub fn carry_overs(&self) -> Option<Spread> {
         Spread::of(self.carry_over.iter().enumerate().flat_map(|(before, to)| {
             let others = to
@@ -120,7 +120,7 @@ impl Balance {
     }
 }
 
-/// Adds one; the table grows in all lines alike.
+/// Adds one; all lines of the table keep the same length.
 fn add(table: &mut [Vec<u32>], line: usize, column: usize) {
     if table[line].len() <= column {
         for counts in table.iter_mut() {
@@ -130,17 +130,17 @@ fn add(table: &mut [Vec<u32>], line: usize, column: usize) {
     table[line][column] += 1;
 }
 
-/// What a design evens out exactly, at each multiple of so many participants.
+/// What a design balances exactly at each multiple of a number of participants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Balances {
     /// The smallest such number of participants.
     pub participants: u64,
-    /// Whether carry-over is even too, not only the places.
+    /// Whether carry-over is balanced as well, not only places.
     pub carry_over: bool,
 }
 
-/// At how many participants a design is exactly even; `None` for designs that
-/// are not made for it.
+/// At how many participants a design is exactly balanced; `None` for orders that are
+/// not designed to be.
 ///
 /// Participants take `repetitions` lines each, one after the other, so that all
 /// lines are used equally often after lines / gcd(lines, repetitions) of them.

@@ -1,20 +1,18 @@
-//! Counting the ways to complete a shuffled order under a constraint, and with
-//! that drawing one of all valid orders, each exactly as likely.
+//! Counts the completions of a shuffled order under a constraint, and draws one of
+//! all valid orders uniformly.
 //!
-//! In how many ways an order can be completed depends not on which realizations
-//! were felt but on how often each is still to come and which of them may not
-//! come yet. A *state* is just that:
+//! The number of completions of an order depends only on how many trials each
+//! realization has left and which realizations may not come yet. This is a *state*:
 //!
-//! * **held**: what cannot be chosen freely. Under a distance d the remaining
-//!   times of the last d − 1 realizations, the newest first. Under a run of k
-//!   the remaining times of the last realization and how often it may still come
-//!   at once.
-//! * **free**: how many of the other realizations have 1, 2, … times to come.
+//! * **held**: realizations that cannot be chosen freely. Under a distance d: the
+//!   trials left of the last d − 1 realizations, the newest first. Under a run of k:
+//!   the trials left of the last realization, and how often it may still come at
+//!   once.
+//! * **free**: how many of the other realizations have 1, 2, … trials left.
 //!
-//! From the start the states of each position are listed, each once; from the
-//! end their completions are summed. The order is then the one at a drawn place
-//! of the list of all valid orders, in the sequence of a dictionary whose
-//! alphabet is the protocol's sequence of realizations.
+//! A forward pass lists the states of each position, each once; a backward pass sums
+//! their completions. The order is then found at a random place in the list of all
+//! valid orders, sorted lexicographically by the protocol's sequence of realizations.
 
 use super::constraints::Rule;
 use num_bigint::BigUint;
@@ -22,16 +20,16 @@ use std::collections::HashMap;
 use std::ops::Range;
 use study_base::rng::Stream;
 
-/// Bytes that the states of a design may take, roughly, before it is refused.
+/// Approximate bytes above which the states of a design are refused.
 const MEMORY: usize = 64 << 20;
 
-/// The completions of every state that can be reached.
+/// The number of completions of every reachable state.
 #[derive(Debug)]
 pub(super) struct Completions {
     n: usize,
     repetitions: usize,
     rule: Rule,
-    /// The start first, then position by position.
+    /// The initial state first, then position by position.
     nodes: Vec<Node>,
     edges: Vec<Edge>,
 }
@@ -42,14 +40,14 @@ struct Node {
     edges: Range<usize>,
 }
 
-/// Choosing a realization.
+/// The choice of a realization.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
-    /// How often the chosen one was to come; [`Edge::GOES_ON`] for a run.
+    /// Trials that the chosen one had left; [`Edge::GOES_ON`] if it continues a run.
     class: u16,
     /// How many realizations there are to choose from.
     times: u16,
-    /// The node after it.
+    /// The node after the choice.
     next: usize,
 }
 
@@ -57,13 +55,13 @@ impl Edge {
     const GOES_ON: u16 = 0;
 }
 
-/// A state: what is held, then pairs (times to come, how many realizations) of
-/// the free ones, by rising times, all above 0.
+/// A state: the held numbers, then pairs (trials left, number of realizations) of the
+/// free ones, by ascending trials left, all above 0.
 type Key = Vec<u16>;
 
 impl Completions {
-    /// Counts for `n` realizations, each felt `repetitions` times; `None` if the
-    /// states would take too much memory.
+    /// Counts for `n` realizations with `repetitions` trials each; `None` if the states
+    /// need too much memory.
     pub(super) fn count(n: usize, repetitions: usize, rule: Rule) -> Option<Self> {
         let trials = n * repetitions;
         // No count is above n^trials.
@@ -102,7 +100,7 @@ impl Completions {
                 layer[at - first] = key;
             }
         }
-        // All are felt: only one state is left, and it is complete.
+        // No trial is left: a single, complete state.
         nodes.extend(layer.iter().map(|_| Node {
             completions: BigUint::from(1u32),
             edges: 0..0,
@@ -125,20 +123,20 @@ impl Completions {
         })
     }
 
-    /// How many valid orders there are.
+    /// The number of valid orders.
     pub(super) fn total(&self) -> &BigUint {
         &self.nodes[0].completions
     }
 
-    /// One of all valid orders, each exactly as likely.
+    /// One of all valid orders, drawn uniformly.
     ///
     /// # Panics
-    /// If there is none, which whoever counted has excluded.
+    /// If there is none; `feasible` excludes such designs.
     pub(super) fn draw(&self, stream: &mut Stream) -> Vec<usize> {
         self.at(stream.below_big(self.total()))
     }
 
-    /// The order at a place, from 0, of all valid ones in dictionary sequence.
+    /// The order at a place, from 0, in the sorted list of all valid orders.
     fn at(&self, mut place: BigUint) -> Vec<usize> {
         let trials = self.n * self.repetitions;
         let mut order: Vec<usize> = Vec::with_capacity(trials);
@@ -166,20 +164,20 @@ impl Completions {
         order
     }
 
-    /// The class of edge that chooses a realization; `None` if it may not come.
+    /// The class of the edge that chooses a realization; `None` if it may not come.
     fn class(&self, model: usize, left: u16, at: usize, last: Option<usize>) -> Option<u16> {
         debug_assert!(model < self.n);
-        let back = last.map_or(usize::MAX, |last| at - last);
+        let back = last.map(|last| at - last);
         match self.rule {
             _ if left == 0 => None,
-            Rule::Distance(d) if back < d as usize => None,
-            Rule::Run(_) if back == 1 => Some(Edge::GOES_ON),
+            Rule::Distance(d) if back.is_some_and(|back| back < d as usize) => None,
+            Rule::Run(_) if back == Some(1) => Some(Edge::GOES_ON),
             Rule::Distance(_) | Rule::Run(_) | Rule::None => Some(left),
         }
     }
 }
 
-/// How many numbers of a state say what is held.
+/// Number of held numbers of a state.
 fn held(rule: Rule) -> usize {
     match rule {
         Rule::None => 0,
@@ -188,8 +186,8 @@ fn held(rule: Rule) -> usize {
     }
 }
 
-/// Calls `f` with the class, the number of realizations and the state after it,
-/// for each choice that differs.
+/// Calls `f` with the class, the number of realizations and the next state, for each
+/// distinct choice.
 fn each_successor(key: &Key, rule: Rule, mut f: impl FnMut(u16, u16, Key)) {
     let (held, free) = key.split_at(held(rule));
     if let (Rule::Run(_), &[left, goes_on]) = (rule, held)
@@ -206,7 +204,7 @@ fn each_successor(key: &Key, rule: Rule, mut f: impl FnMut(u16, u16, Key)) {
         let freed = match rule {
             Rule::None => left,
             Rule::Run(k) => {
-                // k is below the repetitions, which fit.
+                // k is below the repetitions, which fit in 16 bits.
                 let k = u16::try_from(k).unwrap_or(u16::MAX);
                 next.extend([left, (k - 1).min(left)]);
                 held[0]
@@ -256,8 +254,7 @@ fn small(number: usize) -> u16 {
 mod tests {
     use super::*;
 
-    /// All orders of n × r in dictionary sequence that keep the rule, the slow
-    /// way.
+    /// All valid orders of n × r, sorted, by brute force.
     fn all(n: usize, r: usize, rule: Rule) -> Vec<Vec<usize>> {
         fn go(order: &mut Vec<usize>, left: &mut [usize], rule: Rule, out: &mut Vec<Vec<usize>>) {
             if left.iter().all(|l| *l == 0) {

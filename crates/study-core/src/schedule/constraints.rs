@@ -1,36 +1,36 @@
-//! `max_run` and `min_distance`: what an order may not do.
+//! The constraints `max_run` and `min_distance`.
 //!
 //! `max_run = k`: at most k trials in a row with the same realization.
 //! `min_distance = d`: positions of the same realization differ by at least d.
-//! A realization is its id; a hidden duplicate is another one.
+//! Realizations are distinguished by id; a hidden duplicate is another realization.
 
 use std::fmt;
 use study_base::text::ModelId;
 
-/// Where an order breaks a constraint.
+/// The first violation of a constraint by an order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Violation {
-    /// Position of the trial that breaks it, from 1.
+    /// Position of the trial that violates it, from 1.
     pub position: usize,
     /// Its realization.
     pub model: ModelId,
-    /// What it breaks.
+    /// The constraint.
     pub broken: Broken,
 }
 
-/// Which constraint is broken.
+/// A violated constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Broken {
-    /// More in a row than allowed.
+    /// Too many in a row.
     MaxRun {
         /// `max_run`
         limit: u32,
     },
-    /// Back too soon.
+    /// Too close to the last position.
     MinDistance {
         /// `min_distance`
         limit: u32,
-        /// Positions since the last time.
+        /// Distance to the last position.
         found: usize,
     },
 }
@@ -40,17 +40,19 @@ impl fmt::Display for Violation {
         write!(f, "position {}: `{}` ", self.position, self.model)?;
         match self.broken {
             Broken::MaxRun { limit } => {
-                write!(f, "comes {} times in a row (max_run = {limit})", limit + 1)
+                write!(f, "occurs {} times in a row (max_run = {limit})", limit + 1)
             }
             Broken::MinDistance { limit, found } => {
-                write!(f, "is {found} after its last time (min_distance = {limit})")
+                write!(
+                    f,
+                    "is {found} after its last position (min_distance = {limit})"
+                )
             }
         }
     }
 }
 
-/// The first place at which an order breaks a constraint; at one place `max_run`
-/// comes first.
+/// The first violation of a constraint; at the same position, `max_run` is reported.
 pub fn first_violation(
     models: &[&ModelId],
     max_run: Option<u32>,
@@ -80,8 +82,8 @@ pub fn first_violation(
     None
 }
 
-/// Whether the trial at `at` (an index) keeps the constraints with those around
-/// it, whatever the others do among themselves.
+/// Whether the trial at index `at` satisfies the constraints with respect to the other
+/// trials.
 pub(super) fn keeps(
     models: &[&ModelId],
     at: usize,
@@ -100,28 +102,27 @@ pub(super) fn keeps(
         && min_distance.is_none_or(|limit| nearest.is_none_or(|d| d >= limit as usize))
 }
 
-/// How far back the last `model` is from the end of `before`, from 1.
+/// Distance from the end of `before` to the last `model`, from 1.
 fn back(before: &[&ModelId], model: &ModelId) -> Option<usize> {
     before.iter().rev().position(|m| *m == model).map(|i| i + 1)
 }
 
-/// What the two constraints together come down to.
+/// The rule that the two constraints reduce to.
 ///
-/// A distance of two or more forbids every run, so that `max_run` adds nothing
-/// to it, and `max_run = 1` is a distance of two.
+/// A distance of two or more forbids every run, which makes `max_run` redundant, and
+/// `max_run = 1` is a distance of two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Rule {
     /// Every order is valid.
     None,
-    /// At most so many in a row, two or more.
+    /// At most this many in a row, two or more.
     Run(u32),
-    /// At least so far apart, two or more.
+    /// At least this distance, two or more.
     Distance(u32),
 }
 
 impl Rule {
-    /// The rule of a design in which every realization is felt `repetitions`
-    /// times.
+    /// The rule of a design with `repetitions` trials of each realization.
     pub(super) fn of(max_run: Option<u32>, min_distance: Option<u32>, repetitions: u32) -> Self {
         let apart = min_distance.unwrap_or(1);
         match max_run {
@@ -167,7 +168,7 @@ mod tests {
         assert_eq!(first("AABBA", Some(2), None), None);
         assert_eq!(
             first("ABBBA", Some(2), None).unwrap(),
-            "position 4: `B` comes 3 times in a row (max_run = 2)"
+            "position 4: `B` occurs 3 times in a row (max_run = 2)"
         );
         assert_eq!(first("ABBA", Some(1), None).unwrap()[..10], *"position 3");
     }
@@ -177,7 +178,7 @@ mod tests {
         assert_eq!(first("ABCABC", None, Some(3)), None);
         assert_eq!(
             first("ABCBAC", None, Some(3)).unwrap(),
-            "position 4: `B` is 2 after its last time (min_distance = 3)"
+            "position 4: `B` is 2 after its last position (min_distance = 3)"
         );
     }
 

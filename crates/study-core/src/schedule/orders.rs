@@ -1,4 +1,5 @@
-//! How each kind of order is made, as indices of realizations.
+//! Blocked and shuffled orders, Williams designs and Latin squares, as indices of
+//! realizations.
 //!
 //! Williams, E. J. (1949). Experimental designs balanced for the estimation of
 //! residual effects of treatments. Australian Journal of Scientific Research A
@@ -6,17 +7,16 @@
 
 use study_base::rng::Stream;
 
-/// A fresh permutation in each block; the same realization at positions that
-/// differ by at least `distance` (1: no constraint), across blocks too.
+/// A new random permutation in each block; positions of the same realization differ
+/// by at least `distance` (1: no constraint), also across blocks.
 ///
-/// Exactly uniform over all such orders by choosing uniformly at each place
-/// among the realizations that may come. At place q of a later block (from 0)
-/// the last `distance` − 1 of the block before that are still too near are
-/// max(0, `distance` − 1 − q), none of them used, so that n − q − that many may
-/// come: a number that no earlier choice changes, hence every order has the same
-/// probability.
+/// Choosing uniformly at each place among the realizations that may come is exactly
+/// uniform over all such orders: at place q (from 0) of a later block,
+/// max(0, `distance` − 1 − q) realizations of the block before are still too near, and
+/// none of them has been used in this block. The number of choices, n − q minus that,
+/// does not depend on earlier choices, so that every order has the same probability.
 ///
-/// `distance` is at most `n`, or a single block is asked for.
+/// `distance` is at most `n`, or there is a single block.
 pub(super) fn blocked(stream: &mut Stream, n: usize, blocks: usize, distance: usize) -> Vec<usize> {
     let mut order = Vec::with_capacity(n * blocks);
     let mut last: Vec<Option<usize>> = vec![None; n];
@@ -35,7 +35,7 @@ pub(super) fn blocked(stream: &mut Stream, n: usize, blocks: usize, distance: us
     order
 }
 
-/// All trials in one random order without constraint.
+/// All trials in one random order, without a constraint.
 pub(super) fn shuffled(stream: &mut Stream, n: usize, repetitions: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..n)
         .flat_map(|model| std::iter::repeat_n(model, repetitions))
@@ -44,23 +44,24 @@ pub(super) fn shuffled(stream: &mut Stream, n: usize, repetitions: usize) -> Vec
     order
 }
 
-/// Which realization each symbol of a Williams design or Latin square stands
-/// for; the same for all seats of a study.
+/// The realization of each symbol of a Williams design or Latin square; the same for
+/// all seats of a study.
 pub(super) fn symbols(seed: u64, n: usize) -> Vec<usize> {
     let mut symbols: Vec<usize> = (0..n).collect();
     Stream::new(seed, &["schedule", "symbols"]).shuffle(&mut symbols);
     symbols
 }
 
-/// How many lines a Williams design has: n for even n, 2 n for odd.
+/// Number of lines of a Williams design: n for even n, 2 n for odd n.
 pub fn williams_lines(n: usize) -> usize {
     if n.is_multiple_of(2) { n } else { 2 * n }
 }
 
-/// A line of the Williams design of `n` symbols, counted round.
+/// A line of the Williams design of `n` symbols; the number of the line is modulo the
+/// number of lines.
 ///
 /// Line i < n is 0, 1, n−1, 2, n−2, … with i added to each (mod n); for odd n,
-/// line n + i is line i backwards. Among all lines each symbol follows each
+/// line n + i is line i backwards. Over all lines, each symbol follows each
 /// other equally often.
 ///
 /// # Panics
@@ -84,8 +85,7 @@ pub fn williams_line(n: usize, line: u64) -> Vec<usize> {
     symbols
 }
 
-/// A line of the cyclic Latin square of `n` symbols, counted round: i, i+1, …
-/// (mod n).
+/// A line of the cyclic Latin square of `n` symbols, modulo n: i, i+1, … (mod n).
 ///
 /// # Panics
 /// If `n` is 0.
@@ -109,7 +109,7 @@ mod tests {
     /// Williams (1949); for n = 4 and 5 as in every textbook: 0 1 3 2 and
     /// 0 1 4 2 3.
     #[test]
-    fn the_first_line_of_a_williams_design_goes_to_and_fro() {
+    fn the_first_lines_are_those_of_williams() {
         assert_eq!(williams_line(4, 0), [0, 1, 3, 2]);
         assert_eq!(williams_line(5, 0), [0, 1, 4, 2, 3]);
         assert_eq!(williams_line(5, 6), [4, 3, 0, 2, 1]);
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_count_round() {
+    fn line_numbers_are_modulo_the_number_of_lines() {
         assert_eq!(williams_line(4, 4), williams_line(4, 0));
         assert_eq!(williams_line(5, 10), williams_line(5, 0));
         assert_eq!(latin_line(3, 5), [2, 0, 1]);

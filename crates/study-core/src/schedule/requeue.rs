@@ -1,31 +1,30 @@
-//! Where a failed trial comes back.
+//! Where a failed trial is inserted again.
 
 use super::constraints::keeps;
 use crate::protocol::{Design, Trial};
 use study_base::text::ModelId;
 
-/// What is still to come after an attempt has failed.
+/// The trials that remain after a failed attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Requeued {
-    /// The trials to come, first the next, the failed one among them.
+    /// The remaining trials in order, the failed one among them.
     pub queue: Vec<Trial>,
-    /// Whether no place was left that keeps `max_run` and `min_distance`.
+    /// Whether no place satisfied `max_run` and `min_distance`.
     pub constraint_broken: bool,
 }
 
-/// Puts a failed trial back at the end of its block; where that breaks a
-/// constraint, at the latest place in the rest of the block that breaks none; if
-/// there is none, at the end all the same, and says so.
+/// Inserts a failed trial at the end of its block; if that violates a constraint, at
+/// the latest place in the rest of the block that violates none; if there is none, at
+/// the end, flagged.
 ///
-/// `felt` are the attempts so far in the order in which the hand felt them, the
-/// failed one included; `rest` is the queue without it. A trial whose block has
-/// nothing left comes right away. Practice comes back within practice, where no
-/// constraint holds. Only pairs with the failed trial can become worse: the
-/// others move apart or stay.
-pub fn requeue(felt: &[&Trial], rest: &[Trial], failed: &Trial, design: &Design) -> Requeued {
+/// `presented` are the attempts so far in the order of presentation, the failed one
+/// included; `rest` is the queue without it. If its block has no trial left, the
+/// failed trial comes next. Practice is repeated within practice, where no constraint
+/// holds. Only distances to the failed trial can become smaller.
+pub fn requeue(presented: &[&Trial], rest: &[Trial], failed: &Trial, design: &Design) -> Requeued {
     let same_block = |t: &Trial| t.practice == failed.practice && t.block == failed.block;
     let end = rest.iter().rposition(same_block).map_or(0, |last| last + 1);
-    let mut models: Vec<&ModelId> = felt
+    let mut models: Vec<&ModelId> = presented
         .iter()
         .filter(|t| !t.practice)
         .map(|t| &t.model)

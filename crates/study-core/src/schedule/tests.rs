@@ -60,7 +60,7 @@ fn practice_comes_first_and_is_numbered_apart() {
 }
 
 #[test]
-fn practice_is_not_looked_at_by_the_constraints() {
+fn the_constraints_ignore_practice() {
     let mut p = design(2, 1, Order::Fixed);
     p.design.max_run = Some(1);
     p.design.practice = vec![p.models[0].id.clone()];
@@ -148,7 +148,7 @@ fn infeasible_designs_say_why() {
     p.design.max_run = Some(2);
     assert_eq!(
         message(&p, None, Seat::Row(1)),
-        "max_run = 2 cannot hold: the only realization is felt 3 times in a row"
+        "max_run = 2 cannot hold: the only realization has 3 trials in a row"
     );
     assert_eq!(
         message(&design(0, 3, Order::Blocked), None, Seat::Row(1)),
@@ -185,7 +185,7 @@ fn a_given_order_that_breaks_a_constraint_names_row_and_position() {
     assert!(plan(&p, Some(&orders), Seat::Row(1)).is_ok());
     assert_eq!(
         message(&p, Some(&orders), Seat::Row(2)),
-        "row 2, position 4: `C` comes 2 times in a row (max_run = 1)"
+        "row 2, position 4: `C` occurs 2 times in a row (max_run = 1)"
     );
     let mut p = design(2, 2, Order::Williams);
     p.design.max_run = Some(1);
@@ -199,15 +199,15 @@ fn faults_of_an_orders_file_are_named() {
     let said = |row| message(&p, Some(&orders), Seat::Row(row));
     assert_eq!(
         said(1),
-        "the file of orders, row 1: 5 positions; 6 are needed"
+        "the file of orders, row 1: 5 positions instead of 6"
     );
     assert_eq!(
         said(2),
-        "the file of orders, row 2, position 6: `X` is no scheduled realization"
+        "the file of orders, row 2, position 6: `X` is not a scheduled realization"
     );
     assert_eq!(
         said(3),
-        "the file of orders, row 3: `A` comes 3 times; repetitions = 2"
+        "the file of orders, row 3: `A` occurs 3 times, but repetitions = 2"
     );
     assert_eq!(said(4), "the file of orders has no row 4");
     assert_eq!(
@@ -240,7 +240,7 @@ fn there_is_no_row_zero() {
 }
 
 #[test]
-fn williams_balances_at_the_number_that_is_said_and_not_before() {
+fn williams_balances_at_the_stated_number_of_participants_and_not_before() {
     for (n, repetitions, expected) in [(4, 3, 4), (5, 3, 10), (6, 3, 2), (5, 2, 5), (3, 6, 1)] {
         let p = design(n, repetitions, Order::Williams);
         let said = balances(&Order::Williams, n, repetitions).unwrap();
@@ -358,7 +358,7 @@ fn it_comes_earlier_where_the_end_would_break_a_constraint() {
 }
 
 #[test]
-fn the_hand_felt_the_failed_attempt() {
+fn a_failed_attempt_counts_as_presented() {
     assert_eq!(
         returned("ABC|BCA", 2, Some(1), None),
         ("CBBCA".into(), true)
@@ -407,7 +407,7 @@ fn practice_comes_back_within_practice_and_breaks_nothing() {
 }
 
 #[test]
-fn a_practice_trial_before_is_nothing_that_a_constraint_looks_at() {
+fn a_practice_trial_before_does_not_enter_a_constraint() {
     let mut all = trials("A|AB");
     all[0].practice = true;
     all[0].block = 0;

@@ -5,7 +5,7 @@ use super::flow::Step;
 use super::phase::{Form, Phase};
 use crate::outcome::{Author, Event, FormId, Moment};
 use crate::protocol::question::MAX_TEXT_BYTES;
-use crate::protocol::{Answer, Question, QuestionKind};
+use crate::protocol::{Answer, AnswerError, Question, QuestionKind};
 use study_base::text::QuestionId;
 
 /// Why an input was not accepted; shown to the operator.
@@ -23,8 +23,8 @@ pub(super) enum InputRefused {
     TextTooLong,
     #[error("reason: {0}")]
     Reason(Box<InputRefused>),
-    #[error("{0}")]
-    Answer(String),
+    #[error(transparent)]
+    Answer(#[from] AnswerError),
     #[error("an answer is needed")]
     AnswerMissing,
     #[error("`{0}` is not asked here")]
@@ -186,9 +186,7 @@ impl Session {
         let (Some(asked), Some(from), true) = (asked, given, self.history.is_current(form)) else {
             return Err(InputRefused::NothingToCorrect);
         };
-        asked
-            .accepts(answer)
-            .map_err(|why| InputRefused::Answer(why.to_string()))?;
+        asked.accepts(answer)?;
         if from == answer {
             return Err(InputRefused::Unchanged);
         }
@@ -258,9 +256,7 @@ fn check(
         });
         match answer {
             Some(answer) => {
-                question
-                    .accepts(&answer)
-                    .map_err(|why| InputRefused::Answer(why.to_string()))?;
+                question.accepts(&answer)?;
                 checked.push((question.id.clone(), answer));
             }
             None if question.required => return Err(InputRefused::AnswerMissing),

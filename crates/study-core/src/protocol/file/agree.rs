@@ -1,5 +1,5 @@
-//! Whether the sections of a file agree: ids that collide, ids that nobody has,
-//! rules that the device cannot keep.
+//! Consistency of the sections of a file: colliding ids, unknown ids, rules that the
+//! device cannot fulfil.
 
 use super::{Named, models, questions};
 use crate::protocol::columns::{is_participants_column, is_ratings_column};
@@ -8,7 +8,7 @@ use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
 use study_base::text::{ModelId, QuestionId, Untrusted};
 
-/// What the sections hold, as far as it could be read.
+/// The sections, as far as they could be read.
 #[derive(Debug)]
 pub(super) struct Draft<'a> {
     pub(super) design: Option<&'a Design>,
@@ -43,9 +43,9 @@ impl Draft<'_> {
         models.chain(orders).collect()
     }
 
-    /// Reports every disagreement.
+    /// Reports every inconsistency.
     pub(super) fn agree(&self, document: &Document<'_>) {
-        self.something_to_feel_and_ask(document);
+        self.presence(document);
         self.model_ids(document);
         self.duplicates(document);
         self.practice(document);
@@ -54,7 +54,7 @@ impl Draft<'_> {
         self.analysis(document);
     }
 
-    /// A hidden duplicate without a file plays its original's.
+    /// Gives hidden duplicates without a file that of their original.
     pub(super) fn fill_duplicates(&mut self) {
         for i in 0..self.models.len() {
             let model = &self.models[i];
@@ -79,18 +79,16 @@ impl Draft<'_> {
             .map(ModelId::as_str)
     }
 
-    fn something_to_feel_and_ask(&self, document: &Document<'_>) {
+    fn presence(&self, document: &Document<'_>) {
         if self.models.iter().all(|m| m.role == Role::Practice) {
             document.fault(
-                Fault::error(
-                    "nothing is to be felt: no [[models]] with another role than practice",
-                )
-                .hint("add [[models]] with an id and a file"),
+                Fault::error("nothing to present: no [[models]] whose role is not practice")
+                    .hint("add [[models]] with an id and a file"),
             );
         }
         if self.questions.is_empty() {
             document.fault(
-                Fault::error("nothing is asked: no [[questions]]")
+                Fault::error("nothing to ask: no [[questions]]")
                     .hint("add [[questions]] with an id, a prompt and a kind"),
             );
         }
@@ -120,7 +118,9 @@ impl Draft<'_> {
             };
             let place = at(document, &model.path, "duplicate_of");
             if model.id.as_ref() == Some(of) {
-                document.fault(Fault::error(format!("`{of}` cannot repeat itself")).at(place));
+                document.fault(
+                    Fault::error(format!("`{of}` cannot be a duplicate of itself")).at(place),
+                );
                 continue;
             }
             let Some(original) = self.model(of) else {
@@ -136,14 +136,14 @@ impl Draft<'_> {
             } else if model.file.is_some() && original.file.is_some() && model.file != original.file
             {
                 document.fault(
-                    Fault::error(format!("a duplicate of `{of}` plays the same file"))
+                    Fault::error(format!("a duplicate of `{of}` has to have the same file"))
                         .at(at(document, &model.path, "file"))
                         .hint("leave `file` out"),
                 );
             } else if (model.role == Role::Practice) != (original.role == Role::Practice) {
                 document.fault(
                     Fault::error(format!(
-                        "a duplicate and its original, `{of}`, are both for practice or both not"
+                        "a duplicate and its original, `{of}`, have to be both for practice or both not"
                     ))
                     .at(place),
                 );
@@ -179,7 +179,7 @@ impl Draft<'_> {
                             Fault::error(format!("model `{name}` has no `file`"))
                                 .at(document.span_of(&model.path))
                                 .hint(format!(
-                                    "a {} device plays a model file; a sample mounted by hand says device = \"manual\"",
+                                    "a {} device plays a model file; a sample mounted by hand has device = \"manual\"",
                                     kind.as_str()
                                 )),
                         );
@@ -207,7 +207,7 @@ impl Draft<'_> {
         if let Some(name) = by_hand {
             document.fault(
                 Fault::error(format!(
-                    "`minimum_strokes` can never be reached by `{name}`: a sample mounted by hand reports no strokes"
+                    "`minimum_strokes` cannot be reached with `{name}`: a sample mounted by hand reports no strokes"
                 ))
                 .at(place)
                 .hint("leave it out, or ask for the strokes in `trial.reference`"),
@@ -215,7 +215,7 @@ impl Draft<'_> {
         } else if by_process {
             document.fault(
                 Fault::warning(
-                    "`minimum_strokes` needs telemetry; whether this process device has it is not known before it runs",
+                    "`minimum_strokes` needs telemetry, which this process device may not have",
                 )
                 .at(place),
             );
@@ -259,7 +259,7 @@ impl Draft<'_> {
                 } else {
                     continue;
                 };
-                // the same covariate of every model is one fault
+                // One fault for all realizations with the same covariate.
                 if !reported.contains(&name.as_str()) {
                     reported.push(name);
                     document.fault(fault.at(place));
@@ -299,7 +299,7 @@ impl Draft<'_> {
             Some(QuestionKind::Choice { .. } | QuestionKind::Text) => {
                 document.fault(
                     Fault::error(format!(
-                        "`{}` cannot be the primary question: its answers are no numbers",
+                        "`{}` cannot be the primary question: its answers are not numbers",
                         analysis.primary
                     ))
                     .at(place)
@@ -357,7 +357,7 @@ fn collision(id: &str, other: &str) -> Fault {
         Fault::error(format!("`{id}` is there twice"))
     } else {
         Fault::error(format!("`{id}` and `{other}` differ only in case"))
-            .label("some file systems and tools take them for the same")
+            .label("some file systems and tools do not distinguish them")
     }
 }
 

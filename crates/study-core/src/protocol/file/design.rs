@@ -65,6 +65,14 @@ const BREAKS: &[Key] = keys! {
     "at_least_s": Kind::not_negative("s"), "60", default("0");
 };
 
+impl Order {
+    /// The word in the protocol file; `file` for [`Order::File`].
+    pub fn as_str(&self) -> &'static str {
+        let found = Self::VALUES.iter().find(|(_, order)| order == self);
+        found.map_or("file", |(word, _)| word)
+    }
+}
+
 pub(super) fn read(mut section: Section<'_, '_>) -> Option<Design> {
     let participants = section.whole("participants");
     let repetitions = section.whole("repetitions");

@@ -1,4 +1,4 @@
-//! `orders.csv`: orders made elsewhere, one line a trial: `row,position,model`.
+//! `orders.csv`: orders from elsewhere, one line per trial: `row,position,model`.
 
 use crate::protocol::FileOrders;
 use std::collections::BTreeMap;
@@ -8,19 +8,19 @@ use study_base::text::{ModelId, Untrusted};
 
 const COLUMNS: [&str; 3] = ["row", "position", "model"];
 
-/// Most faults that are listed; a file of another kind has one a line.
+/// Most faults that are listed; a file of another format has one in each line.
 const MAX_FAULTS: usize = 20;
 
-/// Reads `orders.csv`. Positions of a row are 1, 2, 3, … in any order of lines;
-/// whether the realizations fit the design is the schedule's business. The
-/// orders are complete only if the findings hold no error.
+/// Reads `orders.csv`. The positions of a row are 1, 2, 3, …, the lines in any order.
+/// The schedule checks whether the realizations fit the design. The orders are
+/// complete only if the findings contain no error.
 pub fn parse_orders(path: &str, mut reader: impl BufRead) -> (FileOrders, Findings) {
     let mut bytes = Vec::new();
     if let Err(e) = reader.read_to_end(&mut bytes) {
         let mut findings = Findings::new(path, "");
         findings
             .faults
-            .push(Fault::error(format!("it could not be read: {e}")));
+            .push(Fault::error(format!("the file cannot be read: {e}")));
         return (FileOrders::new(), findings);
     }
     let text = match String::from_utf8(bytes) {
@@ -168,7 +168,7 @@ fn offset(position: &csv::Position) -> usize {
     usize::try_from(position.byte()).unwrap_or(usize::MAX)
 }
 
-/// The bytes without white space around them.
+/// The span without surrounding white space.
 fn trimmed(text: &str, start: usize, end: usize) -> std::ops::Range<usize> {
     let Some(line) = text.get(start..end) else {
         return start..start;

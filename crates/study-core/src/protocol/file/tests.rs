@@ -364,11 +364,11 @@ fn duplicates_practice_and_primary_name_what_is_there() {
     );
     assert_eq!(
         changed("id = \"b\"", "id = \"b\"\nduplicate_of = \"b\""),
-        ["`b` cannot repeat itself"]
+        ["`b` cannot be a duplicate of itself"]
     );
     assert_eq!(
         changed("id = \"b\"", "id = \"b\"\nduplicate_of = \"a\""),
-        ["a duplicate of `a` plays the same file"]
+        ["a duplicate of `a` has to have the same file"]
     );
     assert_eq!(
         changed("participants = 2", "participants = 2\npractice = [\"bb\"]"),
@@ -385,7 +385,7 @@ fn duplicates_practice_and_primary_name_what_is_there() {
     let words = words.replacen("from = 1\nto = 7\n", "", 1);
     assert_eq!(
         messages(&words),
-        ["`realism` cannot be the primary question: its answers are no numbers"]
+        ["`realism` cannot be the primary question: its answers are not numbers"]
     );
 }
 
@@ -395,10 +395,7 @@ fn strokes_are_counted_by_devices_with_telemetry_only() {
     assert!(messages(&format!("{LEAST}{trial}")).is_empty());
     let manual = LEAST.replacen("file = \"a.toml\"", "device = \"manual\"", 1) + trial;
     let found = messages(&manual);
-    assert!(
-        found[0].contains("can never be reached by `a`"),
-        "{found:?}"
-    );
+    assert!(found[0].contains("cannot be reached with `a`"), "{found:?}");
     let process = LEAST.replacen("\"simulated\"", "\"process\"", 1) + trial;
     let parsed = parse("p", &process);
     assert!(parsed.protocol.is_some());
@@ -460,7 +457,7 @@ fn another_format_is_one_clear_fault() {
     let foreign = LEAST.replace("study-protocol/1", "study-model/1");
     assert_eq!(
         messages(&foreign),
-        ["`study-model/1` is no format of a protocol"]
+        ["`study-model/1` is not a format of a protocol"]
     );
     let none = LEAST.replace("format = \"study-protocol/1\"", "");
     assert_eq!(messages(&none), ["the file has no `format`"]);
@@ -496,8 +493,8 @@ fn a_protocol_without_models_or_questions_is_refused() {
             "the file has no [design]",
             "the file has no [device]",
             "the file has no [analysis]",
-            "nothing is to be felt: no [[models]] with another role than practice",
-            "nothing is asked: no [[questions]]",
+            "nothing to present: no [[models]] whose role is not practice",
+            "nothing to ask: no [[questions]]",
         ]
     );
     assert!(!messages("").is_empty());
