@@ -13,12 +13,12 @@ use study_haptics::model::Realization;
 pub(super) struct Args {
     /// A protocol.toml or the folder that holds one
     protocol: PathBuf,
-    /// One JSON document on standard output
+    /// Print one JSON document
     #[arg(long)]
     json: bool,
 }
 
-/// The document of `--json`.
+/// The JSON document of `--json`.
 #[derive(Debug, Serialize)]
 struct Report<'a> {
     format: &'static str,

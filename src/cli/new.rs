@@ -1,4 +1,4 @@
-//! `study new`: a protocol to start from, or a replication of a study.
+//! `study new`: a commented protocol to start from, or a replication of a study.
 
 use super::{Console, Failure, load};
 use std::fs;
@@ -93,7 +93,7 @@ fn replication(results: &Path, today: &str, seed: u64) -> Result<Files, Failure>
     Ok(files)
 }
 
-/// The folder of a study's newest protocol version, and its number.
+/// The folder of a study's newest frozen protocol, and its version.
 fn frozen(results: &Path) -> Result<(PathBuf, u32), Failure> {
     let studies: Vec<PathBuf> = if results.join("protocol").is_dir() {
         vec![results.to_owned()]
@@ -122,7 +122,7 @@ fn frozen(results: &Path) -> Result<(PathBuf, u32), Failure> {
         .max_by_key(|(_, version)| *version)
         .ok_or_else(|| {
             Failure::results(format!(
-                "{}: there is no protocol in it",
+                "{}: the folder contains no protocol",
                 study.join("protocol").display()
             ))
         })
@@ -140,7 +140,7 @@ fn subfolders(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(folders)
 }
 
-/// The text of a protocol with another id and seed; comments and layout stay.
+/// The text of a protocol with another id and seed, otherwise unchanged.
 fn with_values(text: &str, id: &str, seed: u64) -> Result<String, Failure> {
     let spans = file::parse(load::FILE_NAME, text).spans;
     let mut edits = Vec::new();
@@ -190,7 +190,7 @@ fn refuse_unless_empty(dir: &Path) -> Result<(), Failure> {
     if full {
         return Err(
             Failure::input(format!("{}: the folder is not empty", dir.display()))
-                .hint("nothing is ever overwritten; name a new folder"),
+                .hint("files are never overwritten; name a new folder"),
         );
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! `study schedule`: the reproducible orders of a protocol, and their balance.
+//! `study schedule`: the orders of a protocol and their balance.
 
 mod table;
 
@@ -23,7 +23,7 @@ pub(super) struct Args {
     /// Rows to show, such as 7 or 1-40 [default: all planned participants]
     #[arg(long, value_name = "RANGE", value_parser = parse_rows)]
     rows: Option<RangeInclusive<u32>>,
-    /// Print row,trial,block,position,model,repetition,practice as CSV
+    /// Print CSV: row,trial,block,position,model,repetition,practice
     #[arg(long)]
     csv: bool,
     /// Folder of the results; the orders of a started study are not shown

@@ -1,4 +1,4 @@
-//! `study check`, `new` and `schema` as a user meets them.
+//! `study check`, `study new` and `study schema` on the command line.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -67,7 +67,7 @@ fn report(dir: &Path) -> (i32, Vec<String>, Vec<String>) {
 }
 
 #[test]
-fn the_shipped_protocols_are_in_order() {
+fn the_shipped_protocols_have_no_errors() {
     let (code, out, err) = run(Path::new(ROOT), &["check", "protocols/turn-signal"]);
     assert_eq!(code, 0, "{err}");
     assert!(
@@ -115,15 +115,15 @@ fn a_table_that_fails_its_certificate_is_refused_without_permission() {
         assert!(err.contains("FAIL: least m -"), "{err}");
         assert!(err.contains("uncertified = {"), "{err}");
     }
-    // permission that is not given is none
+    // `play = false` is no permission
     fs::write(&path, text.replace("play = true", "play = false")).unwrap();
     assert_eq!(run(dir.path(), &["check", "."]).0, 1);
 }
 
-/// What is mounted by hand has no force, so nothing is said of one, and no permission
-/// is needed; a device that is to play it after all needs it.
+/// A sample mounted by hand has no force: no certificate is shown and no permission is
+/// needed. Played on a device with `--device`, it needs permission.
 #[test]
-fn of_samples_mounted_by_hand_only_what_is_true_is_told() {
+fn a_sample_mounted_by_hand_has_no_certificate() {
     let dir = turn_signal();
     edit(dir.path(), "protocol.toml", "\"simulated\"", "\"manual\"");
     let path = dir.path().join("protocol.toml");
@@ -165,7 +165,7 @@ fn of_samples_mounted_by_hand_only_what_is_true_is_told() {
     assert!(out.contains("note: 1 sample is mounted by hand"), "{out}");
 }
 
-/// Errors first, then what can be doubted, and nothing that follows from an error.
+/// Errors come first, then warnings, without consequences of the errors.
 #[test]
 fn errors_come_before_warnings_and_nothing_twice() {
     let dir = turn_signal();
@@ -197,7 +197,7 @@ fn errors_come_before_warnings_and_nothing_twice() {
 }
 
 #[test]
-fn ten_faults_of_three_files_are_told_at_once() {
+fn ten_faults_of_three_files_are_reported_at_once() {
     let dir = turn_signal();
     let at = dir.path();
     let file = "protocol.toml";
@@ -264,7 +264,7 @@ fn a_recording_that_no_model_knows_is_an_error() {
 }
 
 #[test]
-fn an_order_that_cannot_be_is_an_error_with_its_reason() {
+fn an_infeasible_order_is_an_error_with_its_reason() {
     let dir = turn_signal();
     let order = "order = \"blocked\"\n";
     edit(
@@ -305,7 +305,7 @@ fn an_order_that_cannot_be_is_an_error_with_its_reason() {
 }
 
 #[test]
-fn a_balanced_order_says_at_how_many_participants() {
+fn a_warning_says_at_how_many_participants_an_order_is_balanced() {
     let dir = turn_signal();
     edit(
         dir.path(),
@@ -331,7 +331,7 @@ fn a_balanced_order_says_at_how_many_participants() {
 }
 
 #[test]
-fn what_is_no_protocol_is_one_clear_error() {
+fn a_path_without_a_protocol_is_one_clear_error() {
     let dir = TempDir::new().unwrap();
     for (args, said) in [
         (["check", "nowhere"], "there is no such file"),
@@ -352,7 +352,7 @@ fn what_is_no_protocol_is_one_clear_error() {
 }
 
 #[test]
-fn a_new_study_is_in_order_and_overwrites_nothing() {
+fn a_new_study_has_no_errors_and_overwrites_nothing() {
     let dir = TempDir::new().unwrap();
     let (code, out, err) = run(dir.path(), &["new", "Our Switch"]);
     assert_eq!((code, err.as_str()), (0, ""));

@@ -18,7 +18,7 @@ fn schema() -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// A key that is near to none: the reader answers with all that it knows.
+/// A key that resembles no other: the reader lists all known keys.
 const STRANGER: &str = "zzzzzzzzzzzzzzzzzzzzzzzz";
 
 /// The keys that the reader knows where `STRANGER` stands in `text`.
@@ -223,7 +223,7 @@ fn the_shipped_protocols_are_valid_and_broken_ones_are_not() {
     }
 }
 
-/// As much of JSON Schema as ours uses; any other keyword is a fault of the test.
+/// Validates by the part of JSON Schema that is used; another keyword fails the test.
 fn faults(root: &Value, schema: &Value, value: &Value, at: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut say = |what: String| found.push(format!("{at}: {what}"));

@@ -12,7 +12,7 @@ fn rows(given: &str) -> assert_cmd::assert::Assert {
 }
 
 #[test]
-fn rows_that_are_none_are_explained_with_exit_code_2() {
+fn invalid_rows_are_a_usage_error_with_an_explanation() {
     rows("0").code(2).stderr(contains("rows count from 1"));
     rows("40-1").code(2).stderr(contains("did you mean 1-40?"));
     rows("-3").code(2).stderr(contains("a range such as 1-40"));

@@ -1,8 +1,8 @@
-//! Orders that never change: whoever has a protocol and a row has the order.
+//! Orders that never change: a protocol and a row determine the order.
 //!
-//! Do not change these tests. A difference means that a running study would go
-//! on with other orders than it was planned with. `docs/schedule.py` makes the
-//! same orders.
+//! Do not change these tests. A difference means that a running study would
+//! continue with other orders than planned. `docs/schedule.py` makes the same
+//! orders.
 
 use crate::designs::{constrained, design};
 use study_core::protocol::Order::{Blocked, LatinSquare, Shuffled, Williams};

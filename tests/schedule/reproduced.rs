@@ -1,5 +1,5 @@
-//! The document is enough: a script written from `docs/schedule.md` alone makes
-//! the same orders.
+//! The specification is complete: a script written from `docs/schedule.md` alone
+//! makes the same orders.
 
 use crate::designs::constrained;
 use std::process::Command;

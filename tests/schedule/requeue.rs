@@ -1,5 +1,5 @@
-//! A failed trial that comes back: nothing is lost, nothing else moves, and a
-//! constraint is broken only where no place in the block keeps it.
+//! A failed trial is inserted again: no trial is lost, no other is moved, and a
+//! constraint is violated only if no place in the block satisfies it.
 
 use crate::designs::constrained;
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! Every valid order is exactly as likely as every other.
+//! All valid orders are equally likely.
 //!
 //! All orders of small designs are enumerated by brute force, the draws are
 //! counted, and Pearson's chi-square is compared with the upper and lower 0.1 %
@@ -75,7 +75,7 @@ fn is_uniform(protocol: &Protocol, orders: usize) {
         .map(|c| (f64::from(*c) - 100.0).powi(2) / 100.0);
     let chi2: f64 = squares.sum();
     let df = orders as f64 - 1.0;
-    // Draws that are more even than chance would be as wrong as less even ones.
+    // Counts that are closer to equal than chance allows would be wrong, too.
     let (low, high) = (point(df, 0.001), point(df, 0.999));
     assert!(
         low < chi2 && chi2 < high,

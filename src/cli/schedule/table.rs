@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn the_orders_stand_above_their_counts_and_a_verdict() {
+    fn orders_counts_and_a_summary_are_shown() {
         let mut p = protocol(4, 3);
         p.design.order = Order::Williams;
         p.design.max_run = Some(1);
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn an_uneven_design_says_how_far_it_is_from_even() {
+    fn an_unbalanced_design_is_described_by_its_range() {
         let mut p = protocol(5, 3);
         p.design.order = Order::Williams;
         p.design.participants = 12;

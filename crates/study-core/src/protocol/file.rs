@@ -22,6 +22,9 @@ pub use orders::parse_orders;
 
 use super::keys::{Key, Kind, keys};
 use super::{FORMAT, Protocol, Question};
+use agree::Sections;
+use models::PartialModel;
+use questions::PartialQuestion;
 use section::Section;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -201,7 +204,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let outro = questions::read(&mut root, "outro");
     let analysis = root.section("analysis").and_then(analysis::read);
 
-    let mut draft = agree::Draft {
+    let mut sections = Sections {
         design: design.as_ref(),
         device: device.as_ref(),
         minimum_strokes: trial.as_ref().map_or(0, |t| t.minimum_strokes),
@@ -212,20 +215,20 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         outro,
         analysis: analysis.as_ref(),
     };
-    named.extend(draft.files());
+    named.extend(sections.files());
     if !broken {
-        draft.agree(document);
+        sections.agree(document);
     }
-    draft.fill_duplicates();
-    let agree::Draft {
+    sections.fill_duplicates();
+    let Sections {
         models,
         questions,
         setup,
         intake,
         outro,
         ..
-    } = draft;
-    let models: Option<_> = models.into_iter().map(models::Draft::finish).collect();
+    } = sections;
+    let models: Option<_> = models.into_iter().map(PartialModel::finish).collect();
     Some(Protocol {
         study: study?,
         text: text?,
@@ -243,8 +246,8 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     })
 }
 
-fn all(drafts: Vec<questions::Draft>) -> Option<Vec<Question>> {
-    drafts.into_iter().map(questions::Draft::finish).collect()
+fn all(questions: Vec<PartialQuestion>) -> Option<Vec<Question>> {
+    questions.into_iter().map(PartialQuestion::finish).collect()
 }
 
 #[cfg(test)]

@@ -262,7 +262,7 @@ fn williams_balances_at_the_stated_number_of_participants_and_not_before() {
 }
 
 #[test]
-fn a_latin_square_evens_out_places_only() {
+fn a_latin_square_balances_places_only() {
     let p = design(4, 3, Order::LatinSquare);
     let said = balances(&Order::LatinSquare, 4, 3).unwrap();
     assert_eq!((said.participants, said.carry_over), (4, false));
@@ -342,7 +342,7 @@ fn a_failed_trial_comes_back_at_the_end_of_its_block() {
 }
 
 #[test]
-fn it_comes_earlier_where_the_end_would_break_a_constraint() {
+fn it_comes_earlier_where_the_end_would_violate_a_constraint() {
     assert_eq!(
         returned("ABC|ABC", 1, Some(1), None),
         ("BACABC".into(), false)
@@ -377,7 +377,7 @@ fn the_last_trial_of_a_block_comes_back_right_away_and_is_flagged() {
 }
 
 #[test]
-fn a_session_of_one_block_takes_it_at_its_end() {
+fn in_a_session_of_one_block_a_failed_trial_comes_at_the_end() {
     assert_eq!(
         returned("ABCABC", 1, Some(1), None),
         ("BCABCA".into(), false)
@@ -385,7 +385,7 @@ fn a_session_of_one_block_takes_it_at_its_end() {
 }
 
 #[test]
-fn practice_comes_back_within_practice_and_breaks_nothing() {
+fn practice_comes_back_within_practice_and_violates_nothing() {
     let mut all = trials("AB|AB");
     for t in &mut all[..2] {
         t.practice = true;

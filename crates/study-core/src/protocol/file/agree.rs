@@ -1,7 +1,9 @@
 //! Consistency of the sections of a file: colliding ids, unknown ids, rules that the
 //! device cannot fulfil.
 
-use super::{Named, models, questions};
+use super::Named;
+use super::models::PartialModel;
+use super::questions::PartialQuestion;
 use crate::protocol::columns::{is_participants_column, is_ratings_column};
 use crate::protocol::{AnalysisRules, Design, DeviceKind, DeviceRules, Order, QuestionKind, Role};
 use study_base::diagnostic::table::Document;
@@ -10,19 +12,19 @@ use study_base::text::{ModelId, QuestionId, Untrusted};
 
 /// The sections, as far as they could be read.
 #[derive(Debug)]
-pub(super) struct Draft<'a> {
+pub(super) struct Sections<'a> {
     pub(super) design: Option<&'a Design>,
     pub(super) device: Option<&'a DeviceRules>,
     pub(super) minimum_strokes: u32,
-    pub(super) models: Vec<models::Draft>,
-    pub(super) questions: Vec<questions::Draft>,
-    pub(super) setup: Vec<questions::Draft>,
-    pub(super) intake: Vec<questions::Draft>,
-    pub(super) outro: Vec<questions::Draft>,
+    pub(super) models: Vec<PartialModel>,
+    pub(super) questions: Vec<PartialQuestion>,
+    pub(super) setup: Vec<PartialQuestion>,
+    pub(super) intake: Vec<PartialQuestion>,
+    pub(super) outro: Vec<PartialQuestion>,
     pub(super) analysis: Option<&'a AnalysisRules>,
 }
 
-impl Draft<'_> {
+impl Sections<'_> {
     /// The other files that the protocol names.
     pub(super) fn files(&self) -> Vec<Named> {
         let models = self.models.iter().filter_map(|model| {
@@ -68,7 +70,7 @@ impl Draft<'_> {
         }
     }
 
-    fn model(&self, id: &ModelId) -> Option<&models::Draft> {
+    fn model(&self, id: &ModelId) -> Option<&PartialModel> {
         self.models.iter().find(|m| m.id.as_ref() == Some(id))
     }
 
@@ -327,7 +329,7 @@ impl Draft<'_> {
 
 fn column(
     document: &Document<'_>,
-    question: &questions::Draft,
+    question: &PartialQuestion,
     taken: &mut Vec<String>,
     is_fixed: fn(&str) -> bool,
     table: &str,

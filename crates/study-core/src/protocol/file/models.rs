@@ -32,7 +32,7 @@ pub(super) const MODELS: &[Key] = keys! {
 
 /// An entry that may be faulty in part.
 #[derive(Debug)]
-pub(super) struct Draft {
+pub(super) struct PartialModel {
     /// Such as `models[0]`.
     pub(super) path: String,
     pub(super) id: Option<ModelId>,
@@ -46,7 +46,7 @@ pub(super) struct Draft {
     pub(super) covariates: BTreeMap<String, f64>,
 }
 
-impl Draft {
+impl PartialModel {
     /// The entry, if its id could be read.
     pub(super) fn finish(self) -> Option<ModelEntry> {
         Some(ModelEntry {
@@ -61,9 +61,9 @@ impl Draft {
     }
 }
 
-pub(super) fn read(mut section: Section<'_, '_>) -> Draft {
+pub(super) fn read(mut section: Section<'_, '_>) -> PartialModel {
     let has_file = section.value("file").is_some();
-    Draft {
+    PartialModel {
         path: section.path().to_owned(),
         id: section.model_id("id"),
         file: section.path_of("file"),

@@ -87,7 +87,7 @@ const KINDS: [Variant<QuestionKind>; 5] = [
 
 /// A question that may be faulty in part.
 #[derive(Debug)]
-pub(super) struct Draft {
+pub(super) struct PartialQuestion {
     /// Such as `questions[0]`.
     pub(super) path: String,
     pub(super) id: Option<QuestionId>,
@@ -96,7 +96,7 @@ pub(super) struct Draft {
     required: Option<bool>,
 }
 
-impl Draft {
+impl PartialQuestion {
     /// The question, if every part could be read.
     pub(super) fn finish(self) -> Option<Question> {
         let kind = self.kind?;
@@ -111,9 +111,9 @@ impl Draft {
 }
 
 /// All questions of an array.
-pub(super) fn read(root: &mut Section<'_, '_>, name: &str) -> Vec<Draft> {
+pub(super) fn read(root: &mut Section<'_, '_>, name: &str) -> Vec<PartialQuestion> {
     (root.variants(name, &KINDS).into_iter())
-        .map(|(mut section, kind)| Draft {
+        .map(|(mut section, kind)| PartialQuestion {
             path: section.path().to_owned(),
             id: section.question_id("id"),
             prompt: section.text("prompt"),

@@ -224,7 +224,7 @@ strokes = 2
 }
 
 #[test]
-fn a_limit_that_is_no_limit_is_named() {
+fn a_limit_has_to_be_finite_and_positive() {
     for bad in ["nan", "-nan", "inf", "-1.0", "0"] {
         let found = changed("force_n = 12.0", &format!("force_n = {bad}"));
         assert_eq!(found.len(), 1, "{found:?}");
@@ -265,7 +265,7 @@ fn a_model_file_stays_inside_the_folder() {
 }
 
 #[test]
-fn ids_collide_without_regard_to_case() {
+fn ids_that_differ_only_in_case_collide() {
     assert_eq!(
         changed("id = \"b\"", "id = \"A\""),
         ["`A` and `a` differ only in case"]
@@ -279,7 +279,7 @@ fn ids_collide_without_regard_to_case() {
 }
 
 #[test]
-fn fixed_columns_are_taken() {
+fn questions_cannot_have_the_names_of_fixed_columns() {
     for (name, section, taken) in [
         ("trial", "questions", true),
         ("VAF", "questions", true),
@@ -304,7 +304,7 @@ fn fixed_columns_are_taken() {
 }
 
 #[test]
-fn scales_options_and_ranges_have_to_make_sense() {
+fn scales_options_and_ranges_are_checked() {
     assert_eq!(
         changed("from = 1", "from = 7"),
         ["the scale of `questions[0]` is reversed: from 7 to 7"]
@@ -357,7 +357,7 @@ fn a_vaf_is_at_most_one() {
 }
 
 #[test]
-fn duplicates_practice_and_primary_name_what_is_there() {
+fn duplicates_practice_and_primary_refer_to_existing_ids() {
     assert_eq!(
         changed("id = \"b\"", "id = \"b\"\nduplicate_of = \"c\""),
         ["there is no model `c`"]
@@ -390,7 +390,7 @@ fn duplicates_practice_and_primary_name_what_is_there() {
 }
 
 #[test]
-fn strokes_are_counted_by_devices_with_telemetry_only() {
+fn minimum_strokes_need_telemetry() {
     let trial = "[trial]\nminimum_strokes = 2\n";
     assert!(messages(&format!("{LEAST}{trial}")).is_empty());
     let manual = LEAST.replacen("file = \"a.toml\"", "device = \"manual\"", 1) + trial;
@@ -464,7 +464,7 @@ fn another_format_is_one_clear_fault() {
 }
 
 #[test]
-fn broken_syntax_does_not_drown_in_missing_keys() {
+fn broken_syntax_hides_missing_keys() {
     let found = changed("seed = 1", "seed = ");
     assert_eq!(found.len(), 1, "{found:?}");
     let found = changed("[design]", "[design");
@@ -501,7 +501,7 @@ fn a_protocol_without_models_or_questions_is_refused() {
 }
 
 #[test]
-fn places_are_kept_for_later_checks() {
+fn spans_are_recorded_for_later_checks() {
     let parsed = parse("p", LEAST);
     assert_eq!(&LEAST[parsed.spans["models[1].file"].clone()], "\"b.toml\"");
     assert_eq!(&LEAST[parsed.spans["design.order"].clone()], "\"blocked\"");
