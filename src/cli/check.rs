@@ -4,7 +4,7 @@ use super::{Console, Failure, load};
 use serde::Serialize;
 use std::path::PathBuf;
 use study_base::diagnostic::{Findings, Severity};
-use study_base::text::{ModelId, Untrusted};
+use study_base::text::{ModelId, Untrusted, counted};
 use study_core::protocol::{DeviceKind, ModelEntry, check};
 use study_haptics::model::Realization;
 
@@ -96,11 +96,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let (Some(loaded), Some(trials), Some(minutes)) = (loaded, trials, minutes) else {
         let mut failure = Failure::faults(findings);
         failure.message = match warnings {
-            0 => plural(errors, "fault"),
+            0 => counted(errors, "fault", "faults"),
             _ => format!(
                 "{}, {}",
-                plural(errors, "fault"),
-                plural(warnings, "warning")
+                counted(errors, "fault", "faults"),
+                counted(warnings, "warning", "warnings")
             ),
         };
         return Err(failure);
@@ -109,9 +109,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     console.out(format!(
         "{}: ok, {}, {}, about {minutes:.0} minutes, {}\n",
         loaded.protocol.study.id,
-        plural(loaded.protocol.models.len(), "model"),
-        plural(trials, "trial"),
-        plural(warnings, "warning"),
+        counted(loaded.protocol.models.len(), "model", "models"),
+        counted(trials, "trial", "trials"),
+        counted(warnings, "warning", "warnings"),
     ))?;
     console.out(certificates(&loaded))
 }
@@ -120,10 +120,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
 /// protocol names a file.
 fn played(loaded: &load::Loaded) -> impl Iterator<Item = (&ModelId, &Realization)> {
     let protocol = &loaded.protocol;
-    loaded.models.iter().filter(|(id, _)| {
-        let own = protocol.model(id).and_then(|m| m.device);
-        own.unwrap_or(protocol.device.kind) != DeviceKind::Manual
-    })
+    let by_hand = |m| protocol.device_of(m) == DeviceKind::Manual;
+    let by_hand = move |id| protocol.model(id).is_some_and(by_hand);
+    loaded.models.iter().filter(move |(id, _)| !by_hand(id))
 }
 
 fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
@@ -167,32 +166,22 @@ fn certificates(loaded: &load::Loaded) -> String {
     if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {
         out += &format!(
             "note: {failing} of {} fail their certificate; `uncertified` permits playback at up to {} N: {}\n",
-            plural(tables, "table"),
+            counted(tables, "table", "tables"),
             permission.force_n.get(),
             Untrusted(&permission.reason),
         );
     }
-    let kind = loaded.protocol.device.kind;
-    let by_hand = |m: &&ModelEntry| m.device.unwrap_or(kind) == DeviceKind::Manual;
-    let samples = loaded.protocol.models.iter().filter(by_hand).count();
+    let protocol = &loaded.protocol;
+    let by_hand = |m: &&ModelEntry| protocol.device_of(m) == DeviceKind::Manual;
+    let samples = protocol.models.iter().filter(by_hand).count();
     if samples > 0 {
-        let (sample, verb) = match samples {
-            1 => ("1 sample".to_owned(), "is"),
-            n => (format!("{n} samples"), "are"),
-        };
         out += &format!(
-            "note: {sample} {verb} mounted by hand; `study device codes {}` lists what to write on them\n",
+            "note: {} mounted by hand; `study device codes {}` lists what to write on them\n",
+            counted(samples, "sample is", "samples are"),
             loaded.path.display()
         );
     }
     out
-}
-
-fn plural(n: usize, word: &str) -> String {
-    match n {
-        1 => format!("1 {word}"),
-        n => format!("{n} {word}s"),
-    }
 }
 
 fn items(findings: &[Findings], severity: Severity) -> Vec<Item<'_>> {

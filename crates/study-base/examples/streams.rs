@@ -12,7 +12,7 @@ const TEXT: &str = "seed = 2007\nrepetition = 3\n";
 fn main() {
     let document = Document::parse(TEXT);
     let mut root = document.root();
-    let seed = root.i64("seed").and_then(|seed| u64::try_from(seed).ok());
+    let seed = root.u32("seed").unwrap_or_default();
     let repetitions = root.u32("repetitions");
     root.finish();
 
@@ -23,7 +23,7 @@ fn main() {
 
     // The same seed and path give the same numbers, on every machine and for ever.
     for row in ["1", "2"] {
-        let mut stream = Stream::new(seed.unwrap_or_default(), &["example", row]);
+        let mut stream = Stream::new(seed.into(), &["example", row]);
         let mut order = ["A", "B", "C", "D", "E"];
         stream.shuffle(&mut order);
         println!("row {row}: {}, then {:.3}", order.join(" "), stream.unit());

@@ -303,6 +303,11 @@ impl Protocol {
         self.models.iter().filter(|m| m.role != Role::Practice)
     }
 
+    /// The kind of device that plays a realization: its own or that of the study.
+    pub fn device_of(&self, model: &ModelEntry) -> DeviceKind {
+        model.device.unwrap_or(self.device.kind)
+    }
+
     /// The question that the analysis is about.
     pub fn primary(&self) -> Option<&Question> {
         self.questions

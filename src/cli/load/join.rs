@@ -118,7 +118,7 @@ pub(super) fn certificates(
             continue;
         };
         // a sample mounted by hand has no actuator
-        if entry.device.unwrap_or(protocol.device.kind) == DeviceKind::Manual {
+        if protocol.device_of(entry) == DeviceKind::Manual {
             continue;
         }
         let certificate = realization.certificate();

@@ -131,11 +131,6 @@ pub struct Value<'d, 't> {
 }
 
 impl<'d, 't> Table<'d, 't> {
-    /// The bytes of the table.
-    pub fn span(&self) -> Range<usize> {
-        self.span.clone()
-    }
-
     /// The table's path, as in `[design]`; empty at the top level.
     pub fn path(&self) -> &str {
         &self.path
@@ -168,19 +163,11 @@ impl<'d, 't> Table<'d, 't> {
     pub fn required(&mut self, key: &str) -> Option<Value<'d, 't>> {
         let value = self.value(key);
         if value.is_none() {
-            self.missing(key);
+            let fault = Fault::error(self.missing_message(key));
+            let place = Some(self.span.clone()).filter(|_| !self.path.is_empty());
+            self.document.fault(fault.at(place));
         }
         value
-    }
-
-    /// Reports that a key is missing.
-    pub fn missing(&self, key: &str) {
-        let fault = Fault::error(self.missing_message(key));
-        self.document.fault(if self.path.is_empty() {
-            fault
-        } else {
-            fault.at(self.span.clone())
-        });
     }
 
     fn missing_message(&self, key: &str) -> String {
@@ -209,27 +196,6 @@ impl<'d, 't> Table<'d, 't> {
     /// A whole number from 0 to 2³² − 1.
     pub fn u32(&mut self, key: &str) -> Option<u32> {
         self.value(key)?.u32()
-    }
-
-    /// A whole number.
-    pub fn i64(&mut self, key: &str) -> Option<i64> {
-        self.value(key)?.i64()
-    }
-
-    /// `true` or `false`.
-    pub fn bool(&mut self, key: &str) -> Option<bool> {
-        self.value(key)?.bool()
-    }
-
-    /// An array of text.
-    pub fn texts(&mut self, key: &str) -> Option<Vec<String>> {
-        Some(
-            self.value(key)?
-                .array()?
-                .into_iter()
-                .filter_map(|v| v.text())
-                .collect(),
-        )
     }
 
     /// An array of tables, `[[key]]`; empty if it is absent.
@@ -315,11 +281,6 @@ impl<'d, 't> Value<'d, 't> {
         }
     }
 
-    /// The bytes of the value.
-    pub fn span(&self) -> Range<usize> {
-        self.span.clone()
-    }
-
     /// Its path, such as `models[2].vaf`.
     pub fn path(&self) -> &str {
         &self.path
@@ -345,11 +306,6 @@ impl<'d, 't> Value<'d, 't> {
             "`{}` has to be {wanted}, not {found}",
             self.path
         )));
-    }
-
-    /// Whether the value is text.
-    pub fn is_text(&self) -> bool {
-        self.value.is_str()
     }
 
     /// Whether the value is a table.

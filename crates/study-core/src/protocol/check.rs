@@ -3,7 +3,7 @@
 //! No finding here prevents a study from running. Warnings that need the models'
 //! tables or the orders are given where these are loaded.
 
-use super::{Design, DeviceKind, Exclusion, Protocol, Question, QuestionKind, Role};
+use super::{Design, DeviceKind, Exclusion, ModelEntry, Protocol, Question, QuestionKind, Role};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use study_base::diagnostic::Fault;
@@ -88,16 +88,16 @@ pub fn minutes(protocol: &Protocol) -> f64 {
         None => protocol.trial.reference_min_s,
     };
     let trial = reference + pace::EXPLORE_S + answers_s(&protocol.questions);
-    let load = |kind: Option<DeviceKind>| match kind.unwrap_or(protocol.device.kind) {
+    let load = |model: &ModelEntry| match protocol.device_of(model) {
         DeviceKind::Manual => pace::MOUNT_S,
         DeviceKind::Simulated | DeviceKind::Serial | DeviceKind::Process => pace::LOAD_S,
     };
     let repetitions = f64::from(protocol.design.repetitions);
     for model in protocol.scheduled_models() {
-        seconds += repetitions * (trial + load(model.device));
+        seconds += repetitions * (trial + load(model));
     }
     for id in &protocol.design.practice {
-        seconds += trial + load(protocol.model(id).and_then(|m| m.device));
+        seconds += trial + protocol.model(id).map_or(0.0, load);
     }
     if let Some(breaks) = protocol.design.breaks {
         let counted = trials(protocol).saturating_sub(practice_trials(protocol));
@@ -124,7 +124,7 @@ fn practice_trials(protocol: &Protocol) -> u32 {
     u32::try_from(protocol.design.practice.len()).unwrap_or(u32::MAX)
 }
 
-fn tests(protocol: &Protocol) -> impl Iterator<Item = &super::ModelEntry> {
+fn tests(protocol: &Protocol) -> impl Iterator<Item = &ModelEntry> {
     protocol
         .models
         .iter()
@@ -262,7 +262,7 @@ fn duration(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
 
 fn roles(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     for (i, model) in protocol.models.iter().enumerate() {
-        let by_hand = model.device.unwrap_or(protocol.device.kind) == DeviceKind::Manual;
+        let by_hand = protocol.device_of(model) == DeviceKind::Manual;
         if model.role == Role::Physical && !by_hand {
             faults.push(
                 Fault::warning(format!(

@@ -1,88 +1,40 @@
 //! A small protocol without a file, for tests and examples.
 
-use super::*;
+use super::{ModelEntry, Protocol, Role, file};
 use std::collections::BTreeMap;
+use study_base::text::ModelId;
 
-/// Realizations `A`, `B`, … of role test, rated 1–7 for `realism` with an
-/// optional `comment`; order blocked; nothing else.
+const PROTOCOL: &str = r#"
+format = "study-protocol/1"
+study = { id = "example", title = "An example", seed = 2007 }
+design = { participants = 10, repetitions = 1, order = "blocked" }
+device = { kind = "simulated", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
+trial = { reference = "Operate the real switch." }
+models = [{ id = "A", file = "a.toml" }]
+analysis = { primary = "realism", realistic_from = 5 }
+
+[[questions]]
+id = "realism"
+kind = "rating"
+prompt = "How realistic did it feel?"
+from = 1
+to = 7
+labels = { 1 = "not at all realistic", 7 = "very realistic" }
+
+[[questions]]
+id = "comment"
+kind = "text"
+prompt = "Comment"
+"#;
+
+/// Realizations `A`, `B`, … of role test without files, rated 1–7 for `realism` with
+/// an optional `comment`; order blocked.
 pub fn protocol(models: usize, repetitions: u32) -> Protocol {
-    let limit = |value| Limit::new(value).expect("a positive number");
-    let id = |text: &str| QuestionId::new(text).expect("an identifier");
-    Protocol {
-        study: Study {
-            id: "example".to_owned(),
-            title: "An example".to_owned(),
-            seed: 2007,
-            authors: Vec::new(),
-            license: None,
-            ethics: None,
-            contact: None,
-            funding: None,
-            doi: None,
-        },
-        text: Text::default(),
-        consent: None,
-        design: Design {
-            participants: 10,
-            repetitions,
-            order: Order::Blocked,
-            max_run: None,
-            min_distance: None,
-            practice: Vec::new(),
-            breaks: None,
-            max_attempts: 3,
-        },
-        session: SessionRules {
-            entry: Entry::Participant,
-            resume_within_h: 4.0,
-        },
-        device: DeviceRules {
-            kind: DeviceKind::Simulated,
-            limits: Limits {
-                force_n: limit(12.0),
-                velocity_mm_s: limit(1000.0),
-            },
-            uncertified: None,
-        },
-        trial: TrialRules {
-            reference: Some("Operate the real switch.".to_owned()),
-            reference_min_s: 0.0,
-            minimum_strokes: 0,
-        },
-        models: (0..models).map(|i| model(&letter(i))).collect(),
-        questions: vec![
-            Question {
-                id: id("realism"),
-                prompt: "How realistic did it feel?".to_owned(),
-                kind: QuestionKind::Rating {
-                    from: 1,
-                    to: 7,
-                    labels: BTreeMap::from([
-                        (1, "not at all realistic".to_owned()),
-                        (7, "very realistic".to_owned()),
-                    ]),
-                },
-                required: true,
-            },
-            Question {
-                id: id("comment"),
-                prompt: "Comment".to_owned(),
-                kind: QuestionKind::Text,
-                required: false,
-            },
-        ],
-        setup: Vec::new(),
-        intake: Vec::new(),
-        outro: Vec::new(),
-        analysis: AnalysisRules {
-            primary: id("realism"),
-            vaf: None,
-            realistic_from: Some(5.0),
-            equivalence_margin: None,
-            unfinished: Unfinished::Include,
-            exclude: Vec::new(),
-        },
-    }
+    let parsed = file::parse("example", PROTOCOL);
+    let mut protocol = parsed.protocol.expect("the example has no fault");
+    protocol.design.repetitions = repetitions;
+    protocol.models = (0..models).map(|i| model(&letter(i))).collect();
+    protocol
 }
 
 /// An entry of role test without a file.
