@@ -192,8 +192,7 @@ fn the_template_of_a_new_study_has_only_declared_keys() {
             let word = bare.split(" =").next().unwrap_or_default();
             let key =
                 bare.contains(" = ") && word.chars().all(|c| c.is_ascii_lowercase() || c == '_');
-            let head = bare.starts_with('[') && bare.split(']').nth(1).is_some();
-            let head = head && !bare.contains(" is ");
+            let head = bare.starts_with('[');
             keys += usize::from(key);
             if key || head {
                 format!("{bare}\n")
