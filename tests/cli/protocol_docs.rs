@@ -1,7 +1,7 @@
 //! `docs/protocol.md` and the template of `study new` agree with the declarations of
 //! the protocol's keys.
 //!
-//! `STUDY_WRITE_DOCS=1 cargo test --test cli protocol_docs` writes the page again.
+//! `UPDATE_DOCS=1 cargo test --test cli protocol_docs` writes the page again.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -170,13 +170,13 @@ fn words(out: &mut String, keys: &[Key]) {
 fn the_reference_of_the_protocol_is_what_the_declarations_give() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/protocol.md");
     let page = page();
-    if std::env::var_os("STUDY_WRITE_DOCS").is_some() {
+    if std::env::var_os("UPDATE_DOCS").is_some() {
         fs::write(&path, &page).unwrap();
     }
     let written = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == page,
-        "docs/protocol.md is out of date: STUDY_WRITE_DOCS=1 writes it again"
+        "docs/protocol.md is out of date: UPDATE_DOCS=1 writes it again"
     );
 }
 
