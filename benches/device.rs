@@ -1,4 +1,4 @@
-//! How long simulated playbacks take: 150 of 12 s are a study of 10 × 15 trials.
+//! Run time of simulated playbacks: 150 playbacks of 12 s are a study of 10 × 15 trials.
 
 use divan::{Bencher, black_box};
 use std::num::NonZeroU16;
@@ -19,7 +19,7 @@ fn main() {
     divan::main();
 }
 
-/// A table of the size and look-up of the paper's at dx = 1 mm.
+/// A table of the size and lookup of those of the paper, with dx = 1 mm.
 fn realization() -> Realization {
     let x_mm: Vec<f64> = (2..=33).map(f64::from).collect();
     let branch = |friction: f64| Branch {
@@ -87,8 +87,7 @@ fn a_study_of_150_playbacks(bencher: Bencher) {
     });
 }
 
-/// What a servo period of a playback costs: table of 32 nodes, hand in motion.
-/// The time is that of a thousand periods.
+/// Time of a thousand servo periods of a playback: table of 32 nodes, moving hand.
 #[divan::bench(sample_count = 100)]
 fn a_thousand_servo_steps(bencher: Bencher) {
     let realization = realization();
@@ -120,8 +119,8 @@ fn a_thousand_servo_steps(bencher: Bencher) {
     assert_eq!(core.state(), ServoState::Playing);
 }
 
-/// The same with everything that a firmware does in it: watchdog, telemetry at
-/// 1 kHz with its frames, the simulated hand.
+/// The same with all tasks of a firmware: watchdog, telemetry frames at 1 kHz, simulated
+/// hand.
 #[divan::bench(sample_count = 100)]
 fn a_thousand_periods_of_the_simulated_device(bencher: Bencher) {
     let mut host = Playing::new(&realization());
@@ -129,7 +128,7 @@ fn a_thousand_periods_of_the_simulated_device(bencher: Bencher) {
     assert!(host.device.state().applies_force());
 }
 
-/// A host in front of a device that plays.
+/// A host connected to a playing device.
 struct Playing {
     device: Firmware,
     at: Duration,

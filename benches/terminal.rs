@@ -1,8 +1,8 @@
-//! What a person waits for: start to first frame, key to "saved", memory of a
-//! session; whole processes of `analyze` and `rehearse`.
+//! Response times of the real binary in a pseudo-terminal: start to first frame, key to
+//! "saved", memory of a session; run times of `analyze` and `rehearse`.
 //!
-//! The real binary in a pseudo-terminal. The disk's own append and sync, in the
-//! same folder, stands beside. `cargo bench --bench terminal`.
+//! Append and sync in the same folder are measured for comparison.
+//! `cargo bench --bench terminal`.
 
 #![allow(missing_docs, reason = "a bench")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a bench")]
@@ -21,7 +21,7 @@ const STARTS: usize = 30;
 const PROCESSES: usize = 20;
 
 fn main() {
-    // `cargo test --benches` runs this too; there is nothing to test here
+    // `cargo test --benches` runs this too; there is nothing to test
     if !std::env::args().any(|a| a == "--bench") {
         return;
     }
@@ -37,7 +37,7 @@ fn start(folder: &Path, id: &str) -> Terminal {
     Terminal::start(&arguments, folder, 24, 80)
 }
 
-/// Waits without sleeping long: the screen is asked every 100 µs.
+/// Waits for a screen, reading it every 100 µs.
 fn until(terminal: &Terminal, fine: impl Fn(&str) -> bool) {
     while !fine(&terminal.screen()) {
         std::thread::sleep(Duration::from_micros(100));
@@ -79,7 +79,7 @@ fn session(folder: &Path) {
         }
     }
     show("key to `saved ✓`: three events, each synced", saved);
-    show("the disk's own append and sync, three times", disk(folder));
+    show("append and sync of the disk, three times", disk(folder));
     println!("{:<48} {memory_kib} KiB", "resident memory of the session");
 }
 

@@ -31,20 +31,20 @@ const F3: &str = "\u{1b}OR";
 const F4: &str = "\u{1b}OS";
 const F10: &str = "\u{1b}[21~";
 
-/// A session with everything that can happen in it.
+/// A session with a remark, a bad trial, a correction, a quit and a resume.
 fn eventful(protocol: &Path, id: &str, trials: usize) {
     let folder = tempfile::tempdir().unwrap();
     let mut terminal = start(folder.path(), protocol);
-    // a remark while the first trial that counts plays
+    // a remark during the first counted trial
     play_until(&mut terminal, "trial 1 of");
     play_until(&mut terminal, "Enter: rate");
     dialog(&mut terminal, F2, "Tab: author", "motor hums\r");
-    // a busy machine may lose the playback, the remark does not end it
+    // a busy machine may lose the playback; the remark does not end it
     terminal.wait_until("the playback to go on", |s| {
         s.contains("Feel the device") || s.contains("DEVICE TROUBLE")
     });
     play_until(&mut terminal, "trial 2 of");
-    // a bad one
+    // a bad trial
     play_until(&mut terminal, "Enter: rate");
     dialog(
         &mut terminal,
@@ -62,7 +62,7 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     terminal.wait_until("the reason", |s| s.contains("Enter: correct"));
     terminal.keys("mistyped\r");
     terminal.wait_until("the dialog to close", |s| !s.contains("Enter: correct"));
-    // leave in the middle, and come back
+    // quit in the middle, and resume
     terminal.keys(F10);
     terminal.wait_for("Are you sure?");
     terminal.keys("y");
@@ -103,7 +103,7 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     assert_eq!(rows.iter().filter(|r| &r[corrected] == "true").count(), 1);
     let attempts = fs::read_to_string(results.join("attempts.csv")).unwrap();
     let again = counted.iter().filter(|r| &r[column("attempt")] == "2");
-    // the simulated device may trip as well, and that trial then comes back too
+    // the simulated device may fail as well, and that trial is then repeated too
     assert!(again.count() >= 1, "{attempts}");
     assert_eq!(
         attempts.matches("somebody came in").count(),
@@ -128,7 +128,7 @@ fn the_papers_study_with_a_correction_a_remark_a_bad_trial_a_quit_and_a_resume()
     eventful(&to, "turn-signal", 15);
 }
 
-/// The extended protocol with one repetition and short waits: nobody is tired here.
+/// The extended protocol with one repetition and short waits.
 fn shortened(folder: &Path) -> PathBuf {
     let to = folder.join("extended");
     let changes = [

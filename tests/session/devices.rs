@@ -1,7 +1,7 @@
-//! Whole sessions by keys on each way to a device.
+//! Whole sessions by keys on each kind of device.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-#![allow(clippy::print_stderr, reason = "what is skipped is told")]
+#![allow(clippy::print_stderr, reason = "what is skipped is printed")]
 
 use crate::support::player::{play_to_end, play_until};
 use crate::support::simulator::Simulator;
@@ -9,7 +9,7 @@ use crate::support::{PATIENT, Terminal, changed_protocol, repository, study};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The paper's protocol with one repetition, changed.
+/// The protocol of the paper with one repetition and other changes.
 fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
     let to = folder.join("protocol");
     let changes = [&[("repetitions = 3", "repetitions = 1"), PATIENT], changes].concat();
@@ -17,7 +17,7 @@ fn protocol(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
     to
 }
 
-/// A finished session; what was seen, and the rows of ratings.csv by column.
+/// Plays a whole session: the pages seen, and the rows of ratings.csv by column.
 fn session(folder: &Path, protocol: &Path, more: &[&str]) -> (Vec<String>, Vec<Row>) {
     let path = protocol.to_str().unwrap();
     let mut arguments = vec!["run", path, "--operator", "lw"];
@@ -52,7 +52,7 @@ fn a_session_on_a_child_program_is_real_data_with_telemetry() {
     }
     let folder = tempfile::tempdir().unwrap();
     let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
-    // the documented example, as if a motor were behind it
+    // the documented example, as if it drove a motor
     let example = fs::read_to_string(repository("docs/process_device.py")).unwrap();
     let real = example.replace(" simulated=True,", "");
     assert_ne!(real, example);
@@ -73,10 +73,10 @@ fn a_session_on_a_child_program_is_real_data_with_telemetry() {
     assert_eq!(fs::read_dir(telemetry).unwrap().count(), 5);
 }
 
-/// A program that is slow to say hello: what is waited for is on the screen, and a key
-/// leaves. Nothing has been made.
+/// While a program has not said hello, the screen shows it, and a key quits. Nothing is
+/// created.
 #[test]
-fn a_program_that_is_slow_to_say_hello_is_waited_for_in_sight() {
+fn the_screen_shows_that_a_program_has_not_said_hello() {
     let folder = tempfile::tempdir().unwrap();
     let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
     let path = protocol.to_str().unwrap();
@@ -90,7 +90,7 @@ fn a_program_that_is_slow_to_say_hello_is_waited_for_in_sight() {
         assert!(!terminal.alternate());
         assert_eq!(terminal.exit_code(), 0);
     }
-    // one that ends is told with its own words
+    // one that ends is reported with its last line
     let script = folder.path().join("broken.sh");
     fs::write(&script, "sleep 1; echo no encoder >&2; exit 7").unwrap();
     let command = format!("sh {}", script.display());
@@ -104,9 +104,9 @@ fn a_program_that_is_slow_to_say_hello_is_waited_for_in_sight() {
     assert!(!folder.path().join("results").exists());
 }
 
-/// A controller that ends in the middle of a trial: it is no cable that was pulled.
+/// A controller that ends during a trial is not reported as a disconnected cable.
 #[test]
-fn a_program_that_ends_is_told_with_its_status_and_its_last_words() {
+fn a_program_that_ends_is_reported_with_its_status_and_its_last_line() {
     let folder = tempfile::tempdir().unwrap();
     let protocol = protocol(folder.path(), &[("\"simulated\"", "\"process\"")]);
     let script = folder.path().join("c.sh");
@@ -131,7 +131,7 @@ fn a_program_that_ends_is_told_with_its_status_and_its_last_words() {
         let words: Vec<&str> = screen.split_whitespace().collect();
         words.join(" ")
     };
-    // A busy machine may take a moment to say how it ended.
+    // On a busy machine the exit status may come a moment later.
     for words in [
         "`sh c.sh` has ended",
         "exit status 7",
@@ -147,7 +147,7 @@ fn a_program_that_ends_is_told_with_its_status_and_its_last_words() {
 }
 
 #[test]
-fn info_asks_a_program_who_it_is() {
+fn info_shows_the_identity_of_a_program() {
     let folder = tempfile::tempdir().unwrap();
     let script = folder.path().join("c.sh");
     let hello = r#"{"say":"hello","format":"study-process/1","id":"rig-2","telemetry":true,"limits":{"force_n":9,"velocity_mm_s":500}}"#;
@@ -166,7 +166,7 @@ fn info_asks_a_program_who_it_is() {
     let (_, out, _) = study(&[&ask[..], &["--json"]].concat(), folder.path());
     let json: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(json["device"]["id"], "rig-2");
-    // device.toml names it as well as an argument does
+    // device.toml can name it as well
     fs::write(
         folder.path().join("device.toml"),
         "[process]\ncommand = [\"sh\", \"c.sh\"]\n",
@@ -174,7 +174,7 @@ fn info_asks_a_program_who_it_is() {
     .unwrap();
     let (code, out, _) = study(&["device", "info"], folder.path());
     assert!(code == 0 && out.contains("rig-2"), "{out}");
-    // what a program has no use for is not offered
+    // commands that cannot use a program do not offer the option
     for command in [&["device", "check"][..], &["record", "x.toml"]] {
         let arguments = [command, &["--command", "sh c.sh"]].concat();
         let (code, _, err) = study(&arguments, folder.path());
@@ -183,7 +183,7 @@ fn info_asks_a_program_who_it_is() {
     }
 }
 
-/// Samples have a code that names nothing; the codes are for who labels them.
+/// Codes on samples do not identify a realization; a command lists them for labelling.
 #[test]
 fn a_session_on_samples_mounted_by_hand_shows_their_codes_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
@@ -220,9 +220,9 @@ fn a_session_on_samples_mounted_by_hand_shows_their_codes_and_nothing_else() {
     }
 }
 
-/// One physical sample among tables, and Esc while it is being mounted.
+/// One physical sample among tables, with Esc during mounting.
 #[test]
-fn a_sample_among_tables_is_mounted_and_a_stopped_mounting_comes_again() {
+fn a_sample_among_tables_is_mounted_and_a_stopped_mounting_is_repeated() {
     let folder = tempfile::tempdir().unwrap();
     let manual = "id = \"lambda-0.9995\"\ndevice = \"manual\"";
     let protocol = protocol(folder.path(), &[("id = \"lambda-0.9995\"", manual)]);
@@ -241,7 +241,7 @@ fn a_sample_among_tables_is_mounted_and_a_stopped_mounting_comes_again() {
     assert_eq!((&*mounted["status"], &*mounted["attempt"]), ("ok", "2"));
 }
 
-/// Device on a port, program in a terminal.
+/// A device on a port and the program in a terminal.
 struct Rig {
     folder: tempfile::TempDir,
     device: Simulator,
@@ -275,7 +275,7 @@ impl Rig {
         play_until(&mut self.terminal, "P01", text);
     }
 
-    /// Plays to the end; the rows, and the journal's events.
+    /// Plays to the end: the rows, and the entries of the journal.
     fn finish(mut self) -> (Vec<Row>, Vec<serde_json::Value>) {
         play_to_end(&mut self.terminal, "P01");
         let (code, out, err) = study(&["verify", "results"], self.folder.path());
@@ -299,7 +299,7 @@ impl Rig {
     }
 }
 
-/// The part of an entry that says what happened.
+/// The event of an entry.
 fn event(entry: &serde_json::Value) -> &serde_json::Value {
     if entry["event"].is_string() {
         entry
@@ -332,14 +332,14 @@ fn no_rating_without_a_playback(entries: &[serde_json::Value]) {
 }
 
 #[test]
-fn a_session_over_a_port_with_telemetry_that_is_whole() {
+fn a_session_over_a_port_has_complete_telemetry() {
     let rig = Rig::start(&[]);
     let telemetry = rig
         .folder
         .path()
         .join("results/turn-signal/sessions/P01/1/telemetry");
     let folder = rig.folder.path().to_owned();
-    // the files are looked at before the folder goes with the rig
+    // the files are read before the rig deletes the folder
     let mut rig = rig;
     rig.to("Enter: close");
     let files: Vec<PathBuf> = fs::read_dir(&telemetry)
@@ -366,11 +366,11 @@ fn a_session_over_a_port_with_telemetry_that_is_whole() {
     assert_eq!((samples as usize, lost), (lines, 0));
 }
 
-/// Commissioned in the same folder: the verdict stands in the session.
+/// The verdict of a commissioning in the same folder is recorded in the session.
 #[test]
-fn a_commissioning_is_told_in_the_session_and_a_broken_device_fails_it() {
+fn a_commissioning_is_recorded_in_the_session_and_a_broken_device_fails_it() {
     let mut rig = Rig::start(&[]);
-    // the port has one owner
+    // only one program can open the port
     let port = rig.device.port.to_str().unwrap().to_owned();
     let check = ["device", "check", "--save", "--port", &port];
     let (code, _, err) = study(&check, rig.folder.path());
@@ -378,7 +378,7 @@ fn a_commissioning_is_told_in_the_session_and_a_broken_device_fails_it() {
     assert!(err.contains("another program is using it"), "{err}");
     rig.to("Operate the real switch");
     drop(rig.terminal);
-    // a busy machine may fail a time limit
+    // on a busy machine the check may miss a time limit
     let tries = (0..20).map(|_| study(&check, rig.folder.path()));
     let (_, out, _) = tries.into_iter().find(|(code, ..)| *code == 0).unwrap();
     assert!(out.contains("26 of 26 tests passed"), "{out}");
@@ -422,8 +422,8 @@ fn a_commissioning_is_told_in_the_session_and_a_broken_device_fails_it() {
     assert_eq!(document["device"]["serial"], "simulated-1");
 }
 
-/// The cable comes out while a table is waited for, while it plays, while the rating
-/// is typed and between two trials, and the device loses its power while it plays.
+/// The cable is pulled before a trial, during playback, while a rating is entered and
+/// between trials, and the device loses its power during playback.
 #[test]
 fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
     let mut rig = Rig::start(&[]);
@@ -465,7 +465,7 @@ fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
     assert!(failed.count() >= 3);
 }
 
-/// One frame in fifty is damaged, lost, doubled or late, each way.
+/// One frame in forty is corrupted, lost, duplicated, reordered or late, each way.
 #[test]
 fn a_bad_line_costs_telemetry_and_no_answer() {
     let faults = ["corrupt", "drop", "duplicate", "reorder", "delay"];
@@ -476,7 +476,7 @@ fn a_bad_line_costs_telemetry_and_no_answer() {
     assert_eq!(rows.len(), 5);
 }
 
-/// `study record` with a probe at a port: a recording that can be identified.
+/// `study record` with a probe at a port gives a recording that can be identified.
 #[test]
 fn a_recording_over_a_port_can_be_identified() {
     let folder = tempfile::tempdir().unwrap();
@@ -485,7 +485,7 @@ fn a_recording_over_a_port_can_be_identified() {
     let trajectory = folder.path().join("short.toml");
     let text = "format = \"study-trajectory/1\"\noffset_mm = 17.5\nduration_s = 4.0\nramp_s = 1.0\n[[parts]]\nkind = \"sine\"\namplitude_mm = 14.0\nfrequency_hz = 0.7\n";
     fs::write(&trajectory, text).unwrap();
-    // a busy machine may starve the probe
+    // on a busy machine the probe may be too late
     let record = |arguments: &[&str]| {
         let mut tries = (0..20).map(|_| study(arguments, folder.path()));
         tries.find(|(code, ..)| *code == 0).expect("a recording")
@@ -531,7 +531,7 @@ fn a_recording_over_a_port_can_be_identified() {
 }
 
 #[test]
-fn what_is_wrong_with_a_port_is_said_before_anything_is_created() {
+fn a_problem_with_a_port_is_reported_before_anything_is_created() {
     let folder = tempfile::tempdir().unwrap();
     let protocol = protocol(folder.path(), &[("\"simulated\"", "\"serial\"")]);
     let path = protocol.to_str().unwrap();

@@ -1,9 +1,9 @@
-//! `kill -9` of the real binary at random moments: what the screen called saved
-//! is on disk, and the session goes on.
+//! `kill -9` of the real binary at random moments: answers that the screen showed as
+//! saved are on disk, and the session can be resumed.
 //!
-//! 200 kills that lose nothing say that fewer than 1.5 % of such kills do (3/N at
-//! 95 %), no more. They cannot see a missing sync: the crash states in the tests
-//! of the store do.
+//! 200 kills without a loss show that fewer than 1.5 % of such kills lose an answer (3/N,
+//! 95 % confidence). They do not reveal a missing sync; the tests of the store do, with
+//! simulated crashes.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -21,7 +21,7 @@ fn saved(screen: &str) -> Option<usize> {
     after.split_whitespace().next()?.parse().ok()
 }
 
-/// Trials of a participant that the journal calls done, whatever came later.
+/// Number of completed trials in the journals of a participant.
 fn done(folder: &Path, participant: &str) -> usize {
     let Ok(study) = StudyFolder::open(&folder.join("results/turn-signal")) else {
         return 0;
@@ -68,7 +68,7 @@ fn kills(seed: u64, count: u32) {
         let kept = done(folder, &id);
         assert!(
             kept >= seen,
-            "kill {kill}: the screen called {seen} trials saved, {kept} are"
+            "kill {kill}: the screen showed {seen} trials as saved, {kept} are"
         );
         survived = survived.max(kept);
         if is_done(folder, &id) {
@@ -79,7 +79,7 @@ fn kills(seed: u64, count: u32) {
         survived > 0,
         "no trial was ever finished: nothing was tested"
     );
-    // what is left of the last session can be finished and is whole
+    // the last session can be finished and is complete
     let id = format!("P{participant:02}");
     let mut terminal = Terminal::start(
         &["run", protocol, "--participant", &id, "--operator", "x"],
@@ -103,11 +103,11 @@ fn is_done(folder: &Path, participant: &str) -> bool {
 }
 
 #[test]
-fn a_hundred_kills_lose_nothing_that_was_called_saved() {
+fn a_hundred_kills_lose_nothing_that_was_shown_as_saved() {
     kills(1, 100);
 }
 
 #[test]
-fn another_hundred_kills_lose_nothing_that_was_called_saved() {
+fn another_hundred_kills_lose_nothing_that_was_shown_as_saved() {
     kills(2, 100);
 }

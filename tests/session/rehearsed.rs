@@ -1,4 +1,4 @@
-//! Whole studies without people, through the real binary.
+//! Whole studies with simulated participants, with the real binary.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -17,8 +17,8 @@ fn rehearse(folder: &Path, protocol: &str, more: &[&str]) -> String {
     out
 }
 
-/// Samples are mounted by simulated hands; what needs a table and has none is refused
-/// before anything is made.
+/// Samples are mounted by simulated hands; a realization that needs a table and has none
+/// is refused before anything is created.
 #[test]
 fn a_study_of_samples_can_be_rehearsed() {
     let folder = tempfile::tempdir().unwrap();
@@ -104,7 +104,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_other_ratings_in_the_same
 }
 
 #[test]
-fn people_and_rehearsals_do_not_mix() {
+fn a_folder_with_sessions_of_people_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     rehearse(folder, "protocols/turn-signal", &["--participants", "1"]);

@@ -1,4 +1,5 @@
-//! Any size, any text, any keys: nothing panics, nothing steers the terminal.
+//! Any size, any text, any keys: nothing panics, no control sequence reaches the
+//! terminal.
 
 // A helper that unwraps is an assertion here.
 #![allow(clippy::unwrap_used)]
@@ -14,7 +15,7 @@ use study_core::protocol::{Answer, QuestionKind};
 use study_core::session::Screen;
 use study_core::session::view::View;
 
-/// Puts hostile words wherever a view has words.
+/// Replaces every text of a view by hostile text.
 fn poison(view: &mut View, text: &str, n: f64) {
     let t = || text.to_owned();
     view.notice = Some(t());

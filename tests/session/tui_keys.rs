@@ -1,4 +1,4 @@
-//! What keys, clicks and pasted text do.
+//! Effects of keys, clicks and pasted text.
 
 // A helper that unwraps is an assertion here.
 #![allow(clippy::unwrap_used)]
@@ -71,7 +71,7 @@ impl Desk {
         self.surface.event(&event, &self.view)
     }
 
-    /// Column and row of some text on the screen.
+    /// Column and row of a text on the screen.
     fn find(&mut self, text: &str) -> (u16, u16) {
         let look = self.look();
         let (y, line) = look
@@ -124,11 +124,11 @@ fn an_empty_comment_is_not_sent() {
 }
 
 #[test]
-fn without_a_choice_enter_sends_nothing_and_says_so() {
+fn without_a_choice_enter_sends_nothing_and_shows_a_notice() {
     let mut desk = Desk::with(rate());
     assert_eq!(desk.enter(), []);
     assert!(desk.look().contains("Choose a number from 1 to 7 first."));
-    // From the comment, the focus goes back to what is missing.
+    // The focus returns from the comment to the missing answer.
     desk.press(KeyCode::Tab);
     desk.types("so so");
     assert_eq!(desk.enter(), []);
@@ -155,7 +155,7 @@ fn esc_works_where_the_terminal_is_too_small_to_draw() {
     drawn(&mut desk.surface, &desk.view, None, 12, 3);
     assert_eq!(desk.press(KeyCode::Esc), [Input::Stop]);
     assert_eq!(desk.types(" "), [Input::Stop]);
-    // Nobody answers or leaves unseen, and a text hides no Space.
+    // No answer and no quitting unseen; Space is not taken for text.
     assert_eq!(desk.enter(), []);
     assert_eq!(desk.press(KeyCode::F(2)), []);
     assert_eq!(desk.types("x "), [Input::Stop]);
@@ -167,7 +167,7 @@ fn esc_works_where_the_terminal_is_too_small_to_draw() {
 }
 
 #[test]
-fn space_stops_what_is_armed_and_never_advances() {
+fn space_stops_a_loaded_device_and_never_advances() {
     for (name, view) in screens() {
         let armed = view.armed;
         let mut desk = Desk::at(view);
@@ -191,7 +191,7 @@ fn space_in_a_text_is_a_character_even_while_the_device_plays() {
 }
 
 #[test]
-fn a_remark_can_be_given_up_without_stopping_the_device() {
+fn a_remark_can_be_cancelled_without_stopping_the_device() {
     let mut desk = Desk::with(playing());
     desk.press(KeyCode::F(2));
     desk.types("no");
@@ -203,7 +203,7 @@ fn a_remark_can_be_given_up_without_stopping_the_device() {
 }
 
 #[test]
-fn a_remark_says_who_makes_it() {
+fn a_remark_has_an_author() {
     let mut desk = Desk::with(playing());
     desk.control('r');
     desk.press(KeyCode::Tab);
@@ -218,7 +218,7 @@ fn a_remark_says_who_makes_it() {
 }
 
 #[test]
-fn a_remark_survives_the_end_of_the_playback_and_a_trouble() {
+fn a_remark_survives_the_end_of_the_playback_and_a_fault() {
     let mut desk = Desk::with(playing());
     desk.press(KeyCode::F(2));
     desk.types("half a");
@@ -291,7 +291,7 @@ fn an_earlier_answer_is_corrected_with_a_reason() {
 }
 
 #[test]
-fn an_earlier_answer_can_be_taken_back() {
+fn an_earlier_answer_can_be_declined_afterwards() {
     let mut desk = Desk::with(rate());
     desk.control('e');
     desk.enter();
@@ -337,7 +337,7 @@ fn a_trial_is_marked_bad_only_with_a_reason_and_only_if_there_is_one() {
 }
 
 #[test]
-fn leaving_is_confirmed() {
+fn quitting_is_confirmed() {
     let mut desk = Desk::with(playing());
     assert_eq!(desk.press(KeyCode::F(10)), []);
     assert_eq!(desk.enter(), []);
@@ -380,7 +380,7 @@ fn a_stopped_trial_is_played_again_or_rated() {
 }
 
 #[test]
-fn enter_waits_for_what_the_session_waits_for() {
+fn enter_advances_only_when_the_session_allows_it() {
     let mut desk = Desk::with(Screen::Playing {
         since_s: 1.0,
         strokes_missing: 1,
@@ -416,7 +416,7 @@ fn a_click_on_a_box_chooses_it() {
     let (x, y) = desk.find("│  6  │");
     assert_eq!(desk.click(x + 3, y - 1), []);
     assert_eq!(desk.enter(), answers(vec![("realism", Answer::Rating(6))]));
-    // Between the boxes is nothing; below is the comment.
+    // A click between the boxes has no effect; the comment is below them.
     desk.click(x - 1, y);
     let (cx, cy) = desk.find("Comment");
     desk.click(cx + 4, cy + 1);
@@ -465,7 +465,7 @@ fn pasting_where_there_is_no_text_does_nothing() {
 }
 
 #[test]
-fn a_question_mark_is_help_or_a_character() {
+fn a_question_mark_is_help_or_text() {
     let mut desk = Desk::with(rate());
     desk.types("?");
     assert!(desk.look().contains("stop the device, always"));
@@ -476,7 +476,7 @@ fn a_question_mark_is_help_or_a_character() {
 }
 
 #[test]
-fn a_long_text_is_read_to_its_end_before_enter_goes_on() {
+fn a_long_text_is_read_to_its_end_before_enter_advances() {
     let lines: Vec<String> = (1..=60).map(|n| format!("line {n}")).collect();
     let mut desk = Desk::with(Screen::Message {
         kind: study_core::session::view::MessageKind::Instructions,
@@ -521,8 +521,8 @@ fn several_questions_are_answered_page_by_page() {
 }
 
 #[test]
-fn nothing_beyond_the_view_is_on_the_screen_while_it_plays() {
-    // Every word of the picture is one of the page's own or of the view.
+fn the_screen_shows_nothing_but_the_view_during_playback() {
+    // Every word on the screen is fixed or comes from the view.
     let mut desk = Desk::with(playing());
     desk.view.line.device = DeviceState::Running(Some(Counts {
         strokes: 4,

@@ -1,4 +1,4 @@
-//! Screens as pictures of their cells.
+//! Snapshots of all screens.
 
 // A helper that unwraps is an assertion here.
 #![allow(clippy::unwrap_used)]
@@ -9,7 +9,7 @@ use study::tui::{Colour, Surface};
 use study_core::session::Screen;
 use study_core::session::view::View;
 
-/// What is shown after some keys: function keys as `F2`, characters as they are,
+/// The screen after some keys: function keys as `F2`, characters as they are,
 /// `\n` Enter, `\t` Tab.
 fn after(view: &View, keys: &[&str], w: u16, h: u16) -> String {
     let mut surface = Surface::new(Colour::None);
@@ -66,7 +66,7 @@ fn a_smaller_terminal_says_what_is_needed() {
 }
 
 #[test]
-fn answers_as_they_are_made() {
+fn answers_as_they_are_entered() {
     let rated = view(form(vec![realism(), comment()]));
     insta::assert_snapshot!(
         "rated_80x24",
@@ -108,7 +108,7 @@ fn every_dialog() {
 }
 
 #[test]
-fn the_strip_is_drawn_when_it_is_asked_for() {
+fn the_strip_is_drawn_on_request() {
     let playing = view(Screen::Playing {
         since_s: 14.0,
         strokes_missing: 0,
@@ -125,7 +125,7 @@ fn the_strip_is_drawn_when_it_is_asked_for() {
 }
 
 #[test]
-fn colour_supports_and_never_carries() {
+fn no_information_depends_on_colour() {
     for (name, view) in screens() {
         let of = |colour| drawn(&mut Surface::new(colour), &view, Some(&strip()), 80, 24);
         let none = of(Colour::None);

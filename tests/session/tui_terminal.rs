@@ -1,5 +1,5 @@
-//! The terminal is given back on every way out. The operator runs in a child
-//! process on a pseudo-terminal: this test program again, with one ignored test.
+//! The terminal is restored on every way out. The interface runs in a child process on
+//! a pseudo-terminal: this test program again, with one ignored test.
 
 // A helper that unwraps is an assertion here.
 #![allow(clippy::unwrap_used)]
@@ -17,7 +17,7 @@ use study::runner::Operator as _;
 use study::tui::{Colour, Options, Tui};
 use study_core::session::{Input, Screen};
 
-/// Long enough that only a hang exceeds it.
+/// So long that only a program that hangs exceeds it.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 #[test]
@@ -59,7 +59,7 @@ fn child_operates_a_terminal() {
             }
         }
     };
-    // under another name first: whoever waits for the report reads it whole
+    // Renamed when complete, so that the parent never reads half of it.
     let written = report.clone() + ".part";
     std::fs::write(&written, end).unwrap();
     std::fs::rename(written, report).unwrap();
@@ -84,8 +84,7 @@ struct Desk {
 }
 
 impl Desk {
-    /// Starts the child; through a shell script if there is one, in which `RUN`
-    /// stands for it.
+    /// Starts the child, or a shell script in which `RUN` stands for it.
     fn start(shell: Option<&str>, vars: &[(&str, &str)]) -> Self {
         let size = PtySize {
             rows: 24,
@@ -152,7 +151,7 @@ impl Desk {
         }
     }
 
-    /// Waits until something is so.
+    /// Waits until a condition holds.
     fn until(&mut self, what: &str, so: impl Fn(&Self) -> bool) {
         let start = Instant::now();
         loop {
@@ -185,8 +184,8 @@ impl Desk {
         std::fs::read_to_string(&self.report).unwrap()
     }
 
-    fn is_given_back(&mut self) {
-        self.until("given back", |desk| {
+    fn is_restored(&mut self) {
+        self.until("restored", |desk| {
             let screen = desk.screen.screen();
             !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste()
         });
@@ -201,7 +200,7 @@ impl Desk {
 }
 
 #[test]
-fn leaving_gives_the_terminal_back() {
+fn quitting_restores_the_terminal() {
     let mut desk = Desk::start(None, &[]);
     desk.shows("Feel the device.");
     assert!(desk.screen.screen().alternate_screen());
@@ -209,7 +208,7 @@ fn leaving_gives_the_terminal_back() {
     desk.shows("Are you sure?");
     desk.types("y");
     assert_eq!(desk.report(), "quit");
-    desk.is_given_back();
+    desk.is_restored();
 }
 
 #[test]
@@ -224,17 +223,17 @@ fn signals_end_the_session_in_order() {
         desk.shows("Feel the device.");
         desk.signal(signal);
         assert_eq!(desk.report(), format!("abort: the program received {name}"));
-        desk.is_given_back();
+        desk.is_restored();
     }
 }
 
 #[test]
-fn after_the_session_a_signal_ends_the_program_as_ever() {
+fn after_the_session_a_signal_has_its_default_effect() {
     let mut desk = Desk::start(None, &[("TUI_CHILD_LINGERS", "1")]);
     desk.shows("Feel the device.");
     desk.types("\u{11}y");
     assert_eq!(desk.report(), "quit");
-    desk.is_given_back();
+    desk.is_restored();
     desk.signal(Signal::TERM);
     let start = Instant::now();
     while desk.child.try_wait().unwrap().is_none() {
@@ -244,22 +243,22 @@ fn after_the_session_a_signal_ends_the_program_as_ever() {
 }
 
 #[test]
-fn a_panic_in_any_thread_gives_the_terminal_back_and_ends_the_session() {
+fn a_panic_in_any_thread_restores_the_terminal_and_ends_the_session() {
     let mut desk = Desk::start(None, &[("TUI_CHILD_PANICS", "1")]);
     assert!(
         desk.report()
             .starts_with("gone: a part of the program failed")
     );
-    desk.is_given_back();
+    desk.is_restored();
     assert!(desk.seen.contains("planted"));
 }
 
 #[test]
-fn a_terminal_that_has_gone_away_ends_the_session_without_any_signal() {
-    // In a session of its own the child gets no SIGHUP.
+fn a_closed_terminal_ends_the_session_without_a_signal() {
+    // A child in a session of its own receives no SIGHUP.
     let mut desk = Desk::start(Some("setsid -w RUN"), &[]);
     desk.shows("Feel the device.");
-    // The reading thread lets go of the terminal when nobody listens.
+    // The reading thread closes the terminal when the receiver is gone.
     desk.output = channel().1;
     desk.types("?");
     desk.writer = None;
@@ -269,24 +268,24 @@ fn a_terminal_that_has_gone_away_ends_the_session_without_any_signal() {
 }
 
 #[test]
-fn ctrl_z_gives_the_terminal_to_the_shell_and_fg_takes_it_again() {
+fn ctrl_z_restores_the_terminal_and_fg_resumes_the_session() {
     let mut desk = Desk::start(Some("set -m; RUN; echo IN-THE-SHELL; fg"), &[]);
     desk.shows("Feel the device.");
     desk.types("\u{1a}");
     desk.until("in the shell", |desk| desk.seen.contains("IN-THE-SHELL"));
     let (before, _) = desk.seen.split_once("IN-THE-SHELL").unwrap();
-    assert!(before.contains("\u{1b}[?1049l"), "not given back first");
+    assert!(before.contains("\u{1b}[?1049l"), "not restored first");
     desk.until("back", |desk| desk.screen.screen().alternate_screen());
     desk.shows("Feel the device.");
     desk.types("\u{11}");
     desk.shows("Are you sure?");
     desk.types("y");
     assert_eq!(desk.report(), "quit");
-    desk.is_given_back();
+    desk.is_restored();
 }
 
 #[test]
-fn a_terminal_that_shows_nothing_is_refused_with_advice() {
+fn a_dumb_terminal_is_refused_with_a_hint() {
     let mut desk = Desk::start(None, &[("TERM", "dumb")]);
     let report = desk.report();
     assert!(
@@ -335,7 +334,7 @@ fn typed_and_pasted_text_of_any_language_arrives_whole() {
     assert!(report.contains("Rating(5)"), "{report}");
     let text = format!("{:?}", "日本 é 👍🏽 שלום\n=1+1");
     assert!(report.contains(&text), "{report}");
-    desk.is_given_back();
+    desk.is_restored();
 }
 
 #[test]

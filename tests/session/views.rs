@@ -1,4 +1,4 @@
-//! Views of every screen, and pictures of them.
+//! Views of every screen, and how to draw them.
 #![allow(dead_code)]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -103,7 +103,7 @@ pub(crate) fn form(questions: Vec<Question>) -> Screen {
     }
 }
 
-/// A study of samples that are mounted by hand.
+/// A study with samples that are mounted by hand.
 fn by_hand(screen: Screen, state: DeviceState) -> View {
     let mut view = view(screen);
     view.device = DeviceKind::Manual;
@@ -227,7 +227,7 @@ pub(crate) fn strip() -> Strip {
     }
 }
 
-/// Every screen once, by name.
+/// One view of every screen, with its name.
 pub(crate) fn screens() -> Vec<(&'static str, View)> {
     let text = |s: &str| s.to_owned();
     vec![
@@ -465,7 +465,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
     ]
 }
 
-/// What is drawn, as a buffer.
+/// Draws a view into a buffer.
 pub(crate) fn drawn(
     surface: &mut Surface,
     view: &View,
@@ -499,7 +499,7 @@ pub(crate) fn picture(buf: &Buffer) -> String {
     out
 }
 
-/// The picture of a view that nobody has typed into.
+/// The text of a view without any input.
 pub(crate) fn fresh(view: &View, w: u16, h: u16) -> String {
     picture(&drawn(&mut Surface::new(Colour::None), view, None, w, h))
 }

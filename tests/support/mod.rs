@@ -34,7 +34,7 @@ struct Emulator {
     shown: Shown,
 }
 
-/// What a person at the terminal sees.
+/// A page of the terminal.
 #[derive(Clone, Default, PartialEq, Eq)]
 pub struct Shown {
     /// The text.
@@ -154,7 +154,7 @@ impl Terminal {
         self.shown().alternate
     }
 
-    /// Types.
+    /// Types keys.
     pub fn keys(&mut self, keys: &str) {
         // A program that has ended reads no keys; the test sees that elsewhere.
         let _ = self.keys.write_all(keys.as_bytes());
@@ -223,7 +223,7 @@ impl Terminal {
             .unwrap_or(0)
     }
 
-    /// Another size.
+    /// Changes the size of the terminal.
     pub fn resize(&mut self, rows: u16, columns: u16) {
         self.master
             .resize(PtySize {
@@ -283,7 +283,7 @@ pub fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// A change to a protocol: a busy machine loses playbacks of its own.
+/// A change to a protocol: many attempts, since a busy machine may lose playbacks.
 pub const PATIENT: (&str, &str) = (
     "order = \"blocked\"\n",
     "order = \"blocked\"\nmax_attempts = 50\n",

@@ -7,23 +7,23 @@
 use super::{PATIENCE, Shown, Terminal};
 use std::time::{Duration, Instant};
 
-/// What the player did at a page.
+/// The action of the player at a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Did {
-    /// Nothing is asked at the moment.
+    /// The page asks for nothing.
     Waited,
-    /// Something was typed at one of these.
+    /// The first screen was filled in.
     Who,
     /// A page of questions was answered.
     Answered,
     /// A playback was ended to rate it.
     Felt,
-    /// Something else was confirmed.
+    /// Another page was confirmed.
     WentOn,
 }
 
-/// Between two looks at the screen.
-const LOOK: Duration = Duration::from_millis(3);
+/// Interval between two reads of the screen.
+const INTERVAL: Duration = Duration::from_millis(3);
 
 /// Does the one thing that the screen asks for, and waits for its effect.
 pub fn play(terminal: &mut Terminal, participant: &str) -> Did {
@@ -64,7 +64,7 @@ fn play_while(
     let mut seen: Vec<String> = Vec::new();
     let mut last = (String::new(), Instant::now());
     loop {
-        // One look decides: a later one may show another page.
+        // One read decides: a later one may show another page.
         let page = terminal.shown();
         if !goes_on(terminal, &page.text) {
             return seen;
@@ -82,7 +82,7 @@ fn play_while(
             seen.push(page.text.clone());
         }
         if act(terminal, participant, &page, None) == Did::Waited {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(INTERVAL);
         }
     }
 }
@@ -136,8 +136,8 @@ fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<I
     did
 }
 
-/// Whether it came to that before `until`, if there is one. Without one, patience
-/// decides, and the end of the program counts as well.
+/// Waits until a condition holds; false if `until` comes first or the program has ended.
+/// Fails after [`PATIENCE`].
 fn waited(
     terminal: &mut Terminal,
     until: Option<Instant>,
@@ -158,7 +158,7 @@ fn waited(
             "waited for {what}:\n{}",
             now.text
         );
-        std::thread::sleep(LOOK);
+        std::thread::sleep(INTERVAL);
     }
 }
 
@@ -185,8 +185,8 @@ fn without_clocks(page: &Shown) -> String {
     page.text.replace(|c: char| c.is_ascii_digit(), "")
 }
 
-/// An opinion that changes from trial to trial: somebody who always says the same
-/// is left out of an analysis.
+/// A rating that changes from trial to trial: a constant rater may be excluded from an
+/// analysis.
 fn rating(screen: &str) -> u32 {
     let (_, after) = screen.split_once("trial ").unwrap_or_default();
     let trial: String = after.chars().take_while(char::is_ascii_digit).collect();

@@ -1,4 +1,4 @@
-//! `study device simulate` as a child, with its cable.
+//! `study device simulate` as a child process.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -9,12 +9,12 @@ pub struct Simulator {
     child: Child,
     stdin: ChildStdin,
     stdout: BufReader<ChildStdout>,
-    /// A name that leads to the port, also after it was plugged in anew.
+    /// A link to the port that stays valid when the device is reconnected.
     pub port: PathBuf,
 }
 
 impl Simulator {
-    /// Starts one, with a watchdog that is patient with a busy machine.
+    /// Starts one with a long watchdog time, for a busy machine.
     pub fn start(folder: &Path, more: &[&str]) -> Self {
         let port = folder.join("port");
         let mut child = Command::new(env!("CARGO_BIN_EXE_study"))
@@ -37,7 +37,7 @@ impl Simulator {
         let path = simulator.line();
         assert!(
             Path::new(&path).exists(),
-            "the first line is no port: {path}"
+            "the first line is not a port: {path}"
         );
         simulator
     }
@@ -48,7 +48,7 @@ impl Simulator {
         line.trim().to_owned()
     }
 
-    /// Does something to it, and waits until it is done.
+    /// Sends a control command and waits until it is done.
     pub fn control(&mut self, what: &str) {
         writeln!(self.stdin, "{what}").unwrap();
         self.line();

@@ -108,7 +108,7 @@ impl Kept {
     }
 }
 
-/// So many seconds after ten o'clock.
+/// The moment `s` seconds after ten o'clock.
 pub fn at(seconds: u64) -> Moment {
     let start = chrono::DateTime::parse_from_rfc3339("2007-03-22T10:00:00+01:00").unwrap();
     Moment {
@@ -169,7 +169,7 @@ pub fn answered(trial: u32, attempt: u32, id: &str, answer: Answer) -> Event {
     }
 }
 
-/// A comment that steers a terminal, breaks a naive CSV and starts a formula.
+/// A comment with control sequences, CSV separators and the start of a formula.
 pub const HOSTILE: &str =
     "=1+1,\"quoted\"\r\nsecond line 👍🏽 \u{1b}[2J\u{9b}31m\u{0}tab\there {\"crc\":\" end";
 
@@ -211,8 +211,8 @@ pub fn failed(trial: u32, attempt: u32, queue: &[u32]) -> Event {
     }
 }
 
-/// Everything of a session with a failed attempt, a correction, a remark and a
-/// declined answer; 29 events.
+/// The 29 events of a session with a failed attempt, a correction, remarks and a
+/// declined answer.
 pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
     let remark = |text: &str| Event::Remark {
         by: Author::Participant,
@@ -273,7 +273,7 @@ pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
     events
 }
 
-/// As much telemetry as the playbacks among the events say that there was.
+/// Writes the telemetry that the playbacks among the events report.
 pub fn telemetry(session: &std::path::Path, events: &[Event]) {
     let folder = session.join("telemetry");
     std::fs::create_dir_all(&folder).unwrap();
