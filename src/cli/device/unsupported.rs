@@ -7,7 +7,7 @@ use crate::device::link::LinkError;
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Args {
     #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
-    ignored: Vec<String>,
+    _ignored: Vec<String>,
 }
 
 /// The error of every such command.
