@@ -1,5 +1,7 @@
 //! A session from the first screen to the last: state machine, terminal, kills.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod by_keys;
 #[path = "../support/designs.rs"]
 mod designs;
