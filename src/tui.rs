@@ -129,7 +129,7 @@ impl Tui {
                 frame.set_cursor_position(at);
             }
         });
-        drawn.map_err(OperatorError)?;
+        drawn?;
         self.terminal.allow_paste(!view.armed);
         self.drawn = Some(now);
         Ok(())
@@ -148,7 +148,7 @@ impl Tui {
         }
         self.suspend_since = None;
         self.drawn = None;
-        self.terminal.suspend().map_err(OperatorError)
+        Ok(self.terminal.suspend()?)
     }
 }
 
@@ -166,16 +166,12 @@ impl Operator for Tui {
             if let Some(signal) = self.terminal.take_signal() {
                 return Ok(vec![Input::Abort(format!("the program received {signal}"))]);
             }
-            if self.terminal.check().map_err(OperatorError)? {
+            if self.terminal.check()? {
                 self.drawn = None;
             }
             self.draw(view, strip)?;
             let left = until.saturating_duration_since(Instant::now());
-            match self
-                .terminal
-                .event(left.min(SLICE))
-                .map_err(OperatorError)?
-            {
+            match self.terminal.event(left.min(SLICE))? {
                 Some(Event::Mouse(mouse)) if mouse.kind == MouseEventKind::Moved => {}
                 Some(event) => {
                     self.drawn = None;

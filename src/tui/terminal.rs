@@ -19,6 +19,7 @@ use unix as platform;
 pub(crate) use platform::survive_file_size_limit;
 
 use super::TuiError;
+use crate::runner::OperatorError;
 use crossterm::event::{
     DisableBracketedPaste, DisableMouseCapture, EnableBracketedPaste, EnableMouseCapture, Event,
 };
@@ -59,6 +60,35 @@ thread_local! {
 
 /// How often the reading thread checks whether it should end.
 const READ_SLICE: Duration = Duration::from_millis(100);
+
+/// Why the terminal cannot be used any more.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum TerminalError {
+    /// A part of the program panicked and gave the terminal back.
+    #[error("a part of the program failed; see the message above")]
+    Panicked,
+    /// Closed, or its connection lost.
+    #[error("the terminal is gone")]
+    Gone,
+    /// Reading failed.
+    #[error("the terminal cannot be read: {0}")]
+    Read(io::Error),
+    /// Writing failed.
+    #[error("the terminal cannot be written: {0}")]
+    Write(io::Error),
+    /// The program could not stop itself, as Ctrl-Z asks.
+    #[error("the program cannot be suspended: {0}")]
+    Suspend(io::Error),
+    /// The terminal could not be entered again.
+    #[error("the terminal cannot be taken again: {0}")]
+    Resume(io::Error),
+}
+
+impl From<TerminalError> for OperatorError {
+    fn from(error: TerminalError) -> Self {
+        Self(error.to_string())
+    }
+}
 
 /// An open terminal.
 pub(super) struct Terminal {
@@ -123,14 +153,14 @@ impl Terminal {
     }
 
     /// Draws a page, unless the terminal has been restored in the meantime.
-    pub(super) fn draw(&mut self, page: impl FnOnce(&mut Frame<'_>)) -> Result<(), String> {
+    pub(super) fn draw(&mut self, page: impl FnOnce(&mut Frame<'_>)) -> Result<(), TerminalError> {
         let one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         if TAKEN.load(Ordering::SeqCst) {
             WRITES.set(true);
             let drawn = self.draw_whole(page);
             WRITES.set(false);
             drop(one);
-            drawn.map_err(|error| format!("the terminal cannot be written: {error}"))
+            drawn.map_err(TerminalError::Write)
         } else {
             drop(one);
             self.check().map(drop)
@@ -167,12 +197,12 @@ impl Terminal {
 
     /// Checks that the terminal is still usable. True if it was cleared and has to be
     /// drawn again.
-    pub(super) fn check(&mut self) -> Result<bool, String> {
+    pub(super) fn check(&mut self) -> Result<bool, TerminalError> {
         if PANICKED.load(Ordering::SeqCst) {
-            return Err("a part of the program failed; see the message above".to_owned());
+            return Err(TerminalError::Panicked);
         }
         if hung_up() {
-            return Err("the terminal is gone".to_owned());
+            return Err(TerminalError::Gone);
         }
         // Stopped and continued from outside: the shell may have changed the terminal.
         if self.signals.take_continued() {
@@ -184,32 +214,31 @@ impl Terminal {
     }
 
     /// The next event, within a time.
-    pub(super) fn event(&self, timeout: Duration) -> Result<Option<Event>, String> {
+    pub(super) fn event(&self, timeout: Duration) -> Result<Option<Event>, TerminalError> {
         match self.events.recv_timeout(timeout) {
             Ok(Ok(event)) => Ok(Some(event)),
-            Ok(Err(error)) => Err(format!("the terminal cannot be read: {error}")),
+            Ok(Err(error)) => Err(TerminalError::Read(error)),
             Err(RecvTimeoutError::Timeout) => Ok(None),
-            Err(RecvTimeoutError::Disconnected) => Err("the terminal is gone".to_owned()),
+            Err(RecvTimeoutError::Disconnected) => Err(TerminalError::Gone),
         }
     }
 
     /// Goes to the background, as Ctrl-Z asks, and comes back with `fg`.
-    pub(super) fn suspend(&mut self) -> Result<(), String> {
+    pub(super) fn suspend(&mut self) -> Result<(), TerminalError> {
         restore();
         let stopped = platform::suspend();
         self.signals.take_continued();
         self.again()?;
-        stopped.map_err(|error| format!("the program cannot be suspended: {error}"))
+        stopped.map_err(TerminalError::Suspend)
     }
 
-    fn again(&mut self) -> Result<(), String> {
-        let gone = |error: io::Error| format!("the terminal cannot be taken again: {error}");
-        take().map_err(gone)?;
+    fn again(&mut self) -> Result<(), TerminalError> {
+        take().map_err(TerminalError::Resume)?;
         // Not `clear`, which asks the terminal where its cursor is and would wait
         // for the thread that reads.
-        let size = self.screen.size().map_err(gone)?;
+        let size = self.screen.size().map_err(TerminalError::Resume)?;
         let area = Rect::new(0, 0, size.width, size.height);
-        self.screen.resize(area).map_err(gone)
+        self.screen.resize(area).map_err(TerminalError::Resume)
     }
 }
 

@@ -1,5 +1,6 @@
 //! A session from the first screen to the last, with a device and a store that
 //! the tests play. Every step of every test also passes the walls in `rig`.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod agreement;
 mod blinding;

@@ -100,7 +100,7 @@ impl<T: Copy + Default, const N: usize> FixedVec<T, N> {
         }
     }
 
-    /// The first [`FixedVec::CAPACITY`] of `items`.
+    /// The first `N` of `items`.
     pub fn of(items: &[T]) -> Self {
         let mut list = Self::new();
         for item in items {
@@ -108,9 +108,6 @@ impl<T: Copy + Default, const N: usize> FixedVec<T, N> {
         }
         list
     }
-
-    /// The largest number of values.
-    pub const CAPACITY: usize = N;
 
     /// Appends a value; false if the list is full.
     pub fn push(&mut self, item: T) -> bool {

@@ -1,7 +1,7 @@
 //! The history of a session: what its events add up to.
 //!
 //! This is the only place where a sequence of events is interpreted. A running
-//! session remembers by it, the tables are derived from it ([`rows`]) and the
+//! session remembers by it, the tables are derived from it (`rows`) and the
 //! results folder reads states and rows from it. Pure: no clock, no files.
 //!
 //! The rules, where an event leaves a choice:
