@@ -397,14 +397,26 @@ mod tests {
         ];
         let trend = |y: &[f64]| -3.0 * y[0] - y[1] + y[2] + 3.0 * y[3];
         let (mut not_above, mut zero, mut all) = (0, 0, 0);
+        let mut correlations = Vec::new();
         let mut sums = vec![vec![0.0; 4]; 6];
         let rows: Vec<Vec<f64>> = rows.iter().map(|r| r.to_vec()).collect();
         compose(&slices(&rows), 0, 5, 1, &mut sums, &mut |s, w| {
             not_above += if trend(s) <= 0.0 { w } else { 0 };
             zero += if trend(s) == 0.0 { w } else { 0 };
             all += w;
+            let r = crate::correlation::pearson(&[0.7, 0.75, 0.8, 0.85], s);
+            correlations.push((r.unwrap(), w));
         });
         let found = correlation(&rows, &[0.7, 0.75, 0.8, 0.85], &mut seeded()).unwrap();
+        // the ends are where the distribution function reaches .025 and .975
+        let share = |in_it: &dyn Fn(f64) -> bool| {
+            let weights = correlations.iter().filter(|(r, _)| in_it(*r));
+            weights.map(|(_, w)| *w).sum::<u64>() as f64 / all as f64
+        };
+        for (end, level) in [(found.percentile.0, 0.025), (found.percentile.1, 0.975)] {
+            assert!(share(&|r| r <= end + 1e-9) >= level);
+            assert!(share(&|r| r < end - 1e-9) < level);
+        }
         assert!(found.exact && zero > 0 && found.undefined_probability == 0.0);
         let expected = not_above as f64 / all as f64;
         assert!((found.p_le_zero - expected).abs() < 1e-15);

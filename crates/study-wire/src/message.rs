@@ -366,3 +366,80 @@ fn to_frame(out: &Writer) -> Frame {
     let body = out.done().unwrap_or_default();
     Frame::of(body).unwrap_or_else(|_| Frame::empty())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A body with a field changed.
+    fn with(message: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
+        let mut body = message.to_vec();
+        body[Header::LEN + at..][..bytes.len()].copy_from_slice(bytes);
+        body
+    }
+
+    fn body(frame: &Frame) -> Vec<u8> {
+        let mut decoder = crate::frame::Decoder::new();
+        let bodies = frame.as_bytes().iter().filter_map(|byte| {
+            let decoded = decoder.push(*byte)?;
+            Some(decoded.unwrap().to_vec())
+        });
+        bodies.last().unwrap()
+    }
+
+    #[test]
+    fn a_chunk_without_nodes_is_refused() {
+        let chunk = TableChunk {
+            first: 0,
+            nodes: FixedVec::of(&[Node::default()]),
+        };
+        let one = body(&Request::TableChunk(chunk).frame(1));
+        assert!(Request::decode(&one).is_ok());
+        let none = &with(&one, 2, &[0])[..Header::LEN + 3];
+        assert_eq!(Request::decode(none), Err(WireError::Field));
+        let four = with(&one, 2, &[4]);
+        assert_eq!(Request::decode(&four), Err(WireError::Field));
+    }
+
+    #[test]
+    fn an_identity_with_a_limit_of_zero_or_no_number_is_refused() {
+        let identity = Identity {
+            nonce: 1,
+            versions: [1, 1],
+            state: DeviceState::Idle,
+            fault: Fault::None,
+            flags: Flags::default(),
+            clock_ms: 0,
+            watchdog_ms: 30,
+            max_nodes: 2,
+            max_points: 0,
+            longest_ms: 1000,
+            servo_hz: 4000.0,
+            telemetry_hz: 0.0,
+            force_n: 9.0,
+            velocity_mm_s: 500.0,
+            stiffness_n_per_mm: 10.0,
+            damping_n_s_per_mm: 0.1,
+            stroke_mm: [-20.0, 20.0],
+            firmware: Name::new("f"),
+            serial: Name::new("s"),
+        };
+        let good = body(&Reply::Identity(identity).frame(1));
+        assert!(Reply::decode(&good).is_ok());
+        // servo_hz comes after 25 bytes, then telemetry_hz, which may be 0
+        for quantity in [0, 2, 3, 4, 5] {
+            for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+                let body = with(&good, 25 + 8 * quantity, &bad.to_le_bytes());
+                assert_eq!(
+                    Reply::decode(&body),
+                    Err(WireError::Field),
+                    "{quantity} {bad}"
+                );
+            }
+        }
+        for quantity in [1, 6, 7] {
+            let body = with(&good, 25 + 8 * quantity, &f64::NAN.to_le_bytes());
+            assert_eq!(Reply::decode(&body), Err(WireError::Field), "{quantity}");
+        }
+    }
+}
