@@ -404,7 +404,7 @@ mod tests {
             not_above += if trend(s) <= 0.0 { w } else { 0 };
             zero += if trend(s) == 0.0 { w } else { 0 };
             all += w;
-            let r = crate::correlation::pearson(&[0.7, 0.75, 0.8, 0.85], s);
+            let r = pearson(&[0.7, 0.75, 0.8, 0.85], s);
             correlations.push((r.unwrap(), w));
         });
         let found = correlation(&rows, &[0.7, 0.75, 0.8, 0.85], &mut seeded()).unwrap();
