@@ -1,4 +1,4 @@
-//! Walls: what `study analyze` prints, writes and refuses.
+//! Output, files and errors of `study analyze`.
 #![allow(clippy::unwrap_used)]
 
 use assert_cmd::Command;

@@ -45,7 +45,7 @@ fn some(s: usize, m: usize, r: usize) -> String {
 }
 
 #[test]
-fn a_realization_that_nobody_rated_takes_nothing_from_the_others() {
+fn a_realization_without_ratings_does_not_affect_the_others() {
     let empty = of(&table(
         |s, m, r| if m == 1 { String::new() } else { some(s, m, r) },
     ));
@@ -77,7 +77,7 @@ fn a_realization_that_nobody_rated_takes_nothing_from_the_others() {
 /// Trials numbered from 1 in each of two sessions: what came before a trial is
 /// not known, and no rating of the other session stands in for it.
 #[test]
-fn a_place_that_two_rows_claim_is_before_no_other() {
+fn an_ambiguous_trial_index_precedes_no_trial() {
     let twice = of(&table(some)
         .replace(",5\n", ",1\n")
         .replace(",6\n", ",2\n")
@@ -91,7 +91,7 @@ fn a_place_that_two_rows_claim_is_before_no_other() {
 /// Squares of 10³⁰⁸ exceed a double. What may be lost by that says so; no reason claims
 /// that ratings are missing.
 #[test]
-fn what_overflows_says_that_it_does() {
+fn overflow_is_given_as_a_reason() {
     let csv = table(|s, m, r| format!("{}e307", some(s, m, r)));
     let a = of(&csv);
     let why = |id: &str| a.values.reason(id).unwrap_or_else(|| panic!("{id}"));

@@ -1,4 +1,4 @@
-//! Walls: no table makes the analysis panic or print a number that is none, and
+//! No table makes the analysis panic or print a number that is not finite, and
 //! what must not matter does not.
 #![allow(clippy::unwrap_used)]
 

@@ -14,7 +14,7 @@ const WIDE: Page = Page {
 };
 
 /// The terminal page on one line.
-fn told(a: &Analysis) -> String {
+fn terminal(a: &Analysis) -> String {
     let text = page(&source(), a, WIDE);
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -32,12 +32,12 @@ fn incomplete() -> Analysis {
 }
 
 #[test]
-fn incomplete_tables_are_told_with_numbers_and_answered_by_the_mixed_model() {
+fn with_incomplete_tables_the_mixed_model_decides() {
     let a = incomplete();
     assert!(a.values.number("rmanova/F").is_none());
     let f = a.values.number("lmm_model/satterthwaite_F").unwrap();
     let text = words(&html(&a));
-    for text in [text.clone(), told(&a)] {
+    for text in [text.clone(), terminal(&a)] {
         assert!(!text.contains("too few subjects rated both"), "{text}");
         assert!(text.contains("none of 6 participants"), "{text}");
         assert!(
@@ -58,7 +58,7 @@ fn incomplete_tables_are_told_with_numbers_and_answered_by_the_mixed_model() {
 }
 
 #[test]
-fn an_undefined_test_of_equivalence_names_its_own_reason() {
+fn an_undefined_test_of_equivalence_gives_its_reason() {
     use study_core::protocol::Role;
     // Everybody rates a one above the reference: no variance, no test.
     let text = "study,participant,session,row,trial,block,position,planned_position,model,role,\
@@ -94,7 +94,7 @@ fn an_undefined_test_of_equivalence_names_its_own_reason() {
             .any(|m| m.role == Role::HiddenReference)
     );
     assert!(a.values.reason("reference/R/a/p_tost").is_some());
-    for text in [words(&html(&a)), told(&a)] {
+    for text in [words(&html(&a)), terminal(&a)] {
         assert!(!text.contains("margin was preregistered"), "{text}");
         assert!(
             text.contains("Equivalence within ± 0.5 was not tested: "),
@@ -102,11 +102,11 @@ fn an_undefined_test_of_equivalence_names_its_own_reason() {
         );
     }
     let without = analyze(&ratings, &Rules::default());
-    assert!(told(&without).contains("No equivalence margin was preregistered"));
+    assert!(terminal(&without).contains("No equivalence margin was preregistered"));
 }
 
 #[test]
-fn line_and_curve_are_held_against_half_the_level_and_tested_together() {
+fn linear_and_quadratic_terms_are_tested_at_half_the_level_and_jointly() {
     let mut csv = String::from("subject,model,rating,vaf,lambda\n");
     for s in 0..3 {
         for (m, lambda) in [0.9, 0.99, 0.999, 0.9999, 0.99999].iter().enumerate() {
@@ -119,14 +119,14 @@ fn line_and_curve_are_held_against_half_the_level_and_tested_together() {
         .values
         .number("covariate/log10_memory/quadratic/F")
         .unwrap();
-    for text in [words(&html(&a)), told(&a)] {
+    for text in [words(&html(&a)), terminal(&a)] {
         assert!(text.contains("each at the level .025"), "{text}");
         assert!(text.contains(&format!("F(2, 2) = {f:.2}, p")), "{text}");
     }
 }
 
 #[test]
-fn the_methods_count_what_was_rated_and_by_whom() {
+fn the_methods_give_the_numbers_of_participants_and_realizations() {
     // d is in the table, but nobody rated it.
     let all = ratings(4, &FIVE[..3], |s, m, k| 1.0 + ((m + s * k) % 4 + m) as f64);
     let csv = all.clone() + "S1,d,1,,0.9\n";
@@ -158,22 +158,22 @@ fn kept_of(csv: &str, keep: impl Fn(&str) -> bool) -> String {
 }
 
 #[test]
-fn one_participant_is_no_people_and_has_no_intervals() {
+fn a_single_participant_has_no_intervals() {
     let a = analysis_of(&ratings(1, &FIVE, |_, m, k| 1.0 + ((m * k) % 5) as f64));
     let text = words(&html(&a));
     assert!(!text.contains("t intervals over subjects"), "{text}");
     assert!(!text.contains("95 % t interval of the mean"), "{text}");
-    for text in [text, told(&a)] {
+    for text in [text, terminal(&a)] {
         assert!(text.contains("nly one participant is analysed"), "{text}");
         assert!(text.contains("there is only one participant"), "{text}");
     }
     let two = analysis_of(&ratings(2, &FIVE, |s, m, k| 1.0 + ((m * k + s) % 5) as f64));
     assert!(words(&html(&two)).contains("t intervals over subjects"));
-    assert!(!told(&two).contains("nly one participant"));
+    assert!(!terminal(&two).contains("nly one participant"));
 }
 
 #[test]
-fn with_everything_left_out_nothing_is_said_to_be_found() {
+fn with_all_rows_excluded_nothing_is_reported() {
     use study_core::analyze::Exclusion;
     let constant = ratings(3, &FIVE, |s, _, _| 2.0 + s as f64);
     let ratings = Ratings::read_csv("data.csv", constant.as_bytes(), None).unwrap();
@@ -190,7 +190,7 @@ fn with_everything_left_out_nothing_is_said_to_be_found() {
     let page = words(&document(&study, &Details::default(), &a, &[]));
     assert!(!page.contains("r = –"), "{page}");
     assert!(page.contains("No rating is included: there is nothing to analyse."));
-    for text in [page, told(&a)] {
+    for text in [page, terminal(&a)] {
         assert!(text.contains("there is nothing to analyse"), "{text}");
     }
 }
@@ -200,17 +200,17 @@ fn the_realization_that_alone_drives_r_is_named() {
     let a = analysis_of(&ratings(5, &FIVE, |s, m, _| {
         [3.0, 6.0][usize::from(m == 4)] + (s % 2) as f64
     }));
-    for text in [words(&html(&a)), told(&a)] {
-        let said =
+    for text in [words(&html(&a)), terminal(&a)] {
+        let expected =
             "Without e all means are equal: the correlation is driven by this realization alone.";
-        assert!(text.contains(said), "{text}");
+        assert!(text.contains(expected), "{text}");
     }
     let other = analysis_of(&ratings(5, &FIVE, |s, m, _| (m + s % 2) as f64));
-    assert!(!told(&other).contains("is driven by this"));
+    assert!(!terminal(&other).contains("is driven by this"));
 }
 
 #[test]
-fn the_terminal_tells_the_crossed_slope_the_needed_r_and_the_order() {
+fn the_terminal_shows_the_crossed_slope_the_critical_r_and_order_effects() {
     let csv = ratings(6, &FIVE, |s, m, k| {
         1.0 + ((m + s * k + m * k) % 4 + m) as f64
     });
@@ -225,8 +225,8 @@ fn the_terminal_tells_the_crossed_slope_the_needed_r_and_the_order() {
     });
     let a = analysis_of(&with_order);
     let get = |id: &str| a.values.number(id).unwrap();
-    let text = told(&a);
-    for said in [
+    let text = terminal(&a);
+    for expected in [
         format!(
             "random effects of subjects and realizations: b = {:.1}",
             get("lmm_vaf_crossed/slope")
@@ -238,13 +238,13 @@ fn the_terminal_tells_the_crossed_slope_the_needed_r_and_the_order() {
         "Do order and learning matter?".to_owned(),
         "points per trial, p ".to_owned(),
     ] {
-        assert!(text.contains(&said), "{said}: {text}");
+        assert!(text.contains(&expected), "{expected}: {text}");
     }
-    assert!(!told(&analysis_of(&csv)).contains("order and learning"));
+    assert!(!terminal(&analysis_of(&csv)).contains("order and learning"));
 }
 
 #[test]
-fn references_repeats_and_whom_they_screen_stand_in_tables() {
+fn references_and_duplicates_have_tables_and_screening_columns() {
     let mut csv = "study,participant,session,row,trial,block,position,planned_position,model,role,\
          repetition,practice,pilot,simulated,protocol_version,realism,corrected,strokes,attempt,\
          status,vaf\n"
@@ -270,13 +270,13 @@ fn references_repeats_and_whom_they_screen_stand_in_tables() {
     ratings.set_duplicates([("c", "a")]);
     let a = analyze(&ratings, &Rules::default());
     let text = words(&html(&a));
-    for said in [
+    for expected in [
         "Differences from R (hidden reference)",
         "Differences from L (low anchor)",
         "Hidden duplicates minus their originals",
         "mean of the references mean of the anchors mean |difference| of duplicates",
     ] {
-        assert!(text.contains(said), "{said}: {text}");
+        assert!(text.contains(expected), "{expected}: {text}");
     }
     let d = a.values.number("reference/R/b/mean_diff").unwrap();
     let shown = format!("b 4 {d:.3}").replace('-', "−");
@@ -299,7 +299,7 @@ fn ratings_of_three() -> String {
 }
 
 #[test]
-fn a_table_from_elsewhere_is_told_nothing_of_the_paper_and_of_lambda() {
+fn a_foreign_table_has_no_words_about_the_paper_or_lambda() {
     let foreign = analysis_of(&ratings_of_three());
     let mut csv = String::from("subject,model,rating,vaf,lambda\n");
     for s in 0..4 {
@@ -320,17 +320,17 @@ fn a_table_from_elsewhere_is_told_nothing_of_the_paper_and_of_lambda() {
         "lambda",
         "activeness",
     ] {
-        for text in [words(&html(&foreign)), told(&foreign)] {
+        for text in [words(&html(&foreign)), terminal(&foreign)] {
             assert!(!text.contains(word), "{word}: {text}");
         }
     }
     let text = words(&html(&own));
-    for said in [
+    for expected in [
         "as in Fig. 10 of Colton &amp; Hollerbach (World Haptics 2007)",
         "validation recording",
         "adjacent lambda",
     ] {
-        assert!(text.contains(said), "{said}: {text}");
+        assert!(text.contains(expected), "{expected}: {text}");
     }
 }
 
@@ -341,22 +341,22 @@ fn shared_vaf_explains_the_smallest_p() {
     let a = analysis_of(&ratings(5, &models, rate));
     let b = analysis_of(&ratings(5, &FIVE, rate));
     for (a, tied) in [(&a, true), (&b, false)] {
-        for text in [words(&html(a)), told(a)] {
-            let said = text.contains("Two realizations share a VAF with another");
-            assert_eq!(said, tied, "{text}");
+        for text in [words(&html(a)), terminal(a)] {
+            let mentioned = text.contains("Two realizations share a VAF with another");
+            assert_eq!(mentioned, tied, "{text}");
         }
     }
 }
 
 #[test]
-fn friedmans_p_is_accompanied_by_a_closer_one_unless_it_is_exact() {
+fn an_approximate_friedman_p_comes_with_iman_and_davenports() {
     let many = analysis_of(&ratings(30, &FIVE, |s, m, k| {
         1.0 + ((m + s * k + s * m) % 5 + m) as f64
     }));
     let few = analysis_of(&ratings_of_three());
     for (a, exact) in [(&many, false), (&few, true)] {
         assert_eq!(a.values.number("friedman/exact_p").is_some(), exact);
-        for text in [words(&html(a)), told(a)] {
+        for text in [words(&html(a)), terminal(a)] {
             let approximate = text.contains("by Iman and Davenport's F, p ");
             assert_eq!(approximate, !exact, "{text}");
         }
@@ -378,7 +378,7 @@ fn correlations_in_warnings_read_as_on_the_page() {
 }
 
 #[test]
-fn letters_are_explained_where_they_stand() {
+fn symbols_are_explained_only_where_they_occur() {
     let text = words(&html(&analysis_of(&ratings_of_three())));
     for letter in ["ε: ", "Generalised η²: ", "W: ", "α: ", "dz: "] {
         assert!(text.contains(letter), "{letter}: {text}");
@@ -407,7 +407,7 @@ fn page_and_terminal_agree_where_exact_and_approximate_p_do_not() {
     let test = a.difference_test().unwrap();
     assert_eq!(test.kind, TestKind::FriedmanExact);
     assert!(test.is_significant());
-    for text in [words(&html(&a)), told(&a)] {
+    for text in [words(&html(&a)), terminal(&a)] {
         let verdict = "Do the realizations differ? Yes, p = .042 (Friedman's test, exact).";
         assert!(text.contains(verdict), "{text}");
     }
@@ -423,14 +423,14 @@ fn page_and_terminal_give_the_same_verdicts() {
         "Variance components ",
     ];
     for (path, a) in golden() {
-        let (page, terminal) = (words(&html(a)), told(a));
+        let (page, printed) = (words(&html(a)), terminal(a));
         for question in questions {
             let sentence = |text: &str| {
                 let (_, rest) = text.split_once(question)?;
                 Some(rest.split(". ").next()?.to_owned())
             };
-            let (page, terminal) = (sentence(&page), sentence(&terminal));
-            assert_eq!(page, terminal, "{}: {question}", path.display());
+            let (page, printed) = (sentence(&page), sentence(&printed));
+            assert_eq!(page, printed, "{}: {question}", path.display());
         }
     }
 }

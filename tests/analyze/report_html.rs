@@ -137,7 +137,7 @@ fn the_answers_hold_the_numbers_of_the_analysis() {
 }
 
 #[test]
-fn what_is_absent_is_left_out_politely() {
+fn absent_results_are_left_out() {
     let a = analysis_of("subject,model,repetition,rating,vaf\nS1,a,1,4,\nS2,a,1,5,\n");
     let page = report(&a, &[]);
     assert!(!page.contains("Does VAF predict"));

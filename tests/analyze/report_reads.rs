@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use study::report::text::{Page, page};
 use study_core::analyze::Value;
 #[test]
-fn one_is_one_and_nothing_is_said_of_nothing() {
+fn counts_and_nouns_agree_and_empty_phrases_are_absent() {
     for (path, a) in golden() {
         let text = words(&html(a))
             + &page(
@@ -106,7 +106,7 @@ fn methods_and_results_hold_no_number_that_the_analysis_does_not() {
 }
 
 #[test]
-fn the_methods_tell_of_no_test_that_was_not_done() {
+fn the_methods_name_exactly_the_tests_that_were_done() {
     for (path, a) in golden() {
         let text = words(&html(a));
         let methods = part(&text, "Methods ", "The level of significance");
@@ -146,7 +146,7 @@ fn the_methods_tell_of_no_test_that_was_not_done() {
 }
 
 #[test]
-fn a_fit_that_is_singular_elsewhere_is_not_said_to_leave_no_realization() {
+fn a_singular_fit_is_attributed_to_the_right_variance() {
     // Subjects do not differ in their means, realizations do beyond VAF.
     let beyond = [0.0, 1.0, 0.0, 1.5, 1.0];
     let csv = ratings(6, &FIVE, |s, m, k| {
@@ -172,7 +172,7 @@ fn a_fit_that_is_singular_elsewhere_is_not_said_to_leave_no_realization() {
 }
 
 #[test]
-fn equal_means_are_told_where_they_limit_the_p() {
+fn tied_means_are_reported_where_they_limit_p() {
     // Four realizations alike, the one with the lowest VAF lower.
     let csv = ratings(
         5,
@@ -200,7 +200,7 @@ fn equal_means_are_told_where_they_limit_the_p() {
 }
 
 #[test]
-fn a_p_from_random_orders_names_its_own_bound() {
+fn a_monte_carlo_p_has_its_own_lower_bound() {
     let names: Vec<String> = (0..12).map(|m| format!("m{m:02}")).collect();
     let models: Vec<(&str, f64)> = (names.iter().enumerate())
         .map(|(m, n)| (n.as_str(), 0.5 + 0.01 * (m * m) as f64))
@@ -237,7 +237,7 @@ fn a_p_from_random_orders_names_its_own_bound() {
 }
 
 #[test]
-fn a_bar_in_a_name_parts_no_pair() {
+fn a_bar_in_a_name_does_not_split_a_pair() {
     let csv = ratings(6, &[("x|y", 0.7), ("z", 0.8)], |s, m, k| {
         ((s * (m + 1) + k) % 5) as f64
     });
@@ -261,7 +261,7 @@ fn three_columns_give_a_report_without_a_word_of_vaf() {
 }
 
 #[test]
-fn few_subjects_are_said_to_be_too_few_for_pairs() {
+fn the_smallest_possible_p_of_pairs_is_reported() {
     let a = analysis_of(&ratings(4, &FIVE, |s, m, k| 1.0 + (m + (s + k) % 2) as f64));
     let text = words(&html(&a));
     // ten pairs times 2/2⁴ is above 1
@@ -297,7 +297,7 @@ fn headings_are_in_order_and_tables_have_heads() {
 }
 
 #[test]
-fn the_terminal_page_stays_a_page() {
+fn the_terminal_page_is_bounded() {
     let names: Vec<String> = (0..300).map(|m| format!("m{m:03}")).collect();
     let models: Vec<(&str, f64)> = names.iter().map(|n| (n.as_str(), 0.5)).collect();
     let a = analysis_of(&ratings(2, &models, |_, m, k| 1.0 + ((m + k) % 3) as f64));

@@ -68,7 +68,7 @@ fn lost(a: &Analysis) -> (Vec<String>, usize) {
 }
 
 #[test]
-fn each_rule_leaves_out_whom_it_names_and_nobody_else() {
+fn each_rule_excludes_exactly_the_participants_it_describes() {
     let of = |rule| lost(&under(rule));
     let all = |who: &str| (vec![who.to_owned()], 6);
     assert_eq!(of(Exclusion::ConstantRater), all("P4"));
@@ -80,7 +80,7 @@ fn each_rule_leaves_out_whom_it_names_and_nobody_else() {
 }
 
 #[test]
-fn the_headline_stands_with_and_without_the_exclusions() {
+fn the_main_results_are_given_with_and_without_the_exclusions() {
     let a = under(Exclusion::HiddenReferenceBelow(4.0));
     let plain = analyze(&people(), &Rules::default());
     let r = plain.values.number("corr/pearson/r").unwrap();
@@ -122,7 +122,7 @@ fn rules_judge_the_same_rows_whatever_their_order() {
 }
 
 #[test]
-fn every_row_tells_whether_it_was_used_and_why_not() {
+fn every_row_states_whether_it_is_included_and_why_not() {
     let a = under(Exclusion::ConstantRater);
     let source = Source {
         title: "t".to_owned(),
@@ -186,7 +186,7 @@ fn references_and_anchors_are_contrasted_and_stay_out_of_the_comparisons() {
 }
 
 #[test]
-fn the_memory_stands_for_the_forgetting_factor() {
+fn the_memory_represents_the_forgetting_factor() {
     let mut text = String::from("subject,model,repetition,rating,vaf,lambda\n");
     // Memories 10, 100, 1000, 10000; means 2, 5, 6, 5 and a little more.
     let models = [
@@ -246,7 +246,7 @@ fn the_shares_of_the_variance_are_those_of_the_analysis_of_variance() {
 }
 
 #[test]
-fn whom_a_rule_leaves_out_has_finished_and_makes_it_no_early_look() {
+fn excluded_participants_count_as_finished_and_make_no_interim_analysis() {
     let rules = Rules {
         exclude: vec![Exclusion::ConstantRater],
         planned: Some(5),

@@ -1,4 +1,4 @@
-//! Walls: from a study's folder on disk to its analysis.
+//! The analysis of a study folder.
 #![allow(clippy::unwrap_used)]
 
 use crate::world::{at, fingerprints, real, session};
