@@ -9,7 +9,7 @@
 //! dense Cholesky factor. A variance on the boundary is exactly 0.
 //!
 //! Usage: [`LmmData::new`], then [`fit`], then the tests of [`LmmFit`] or
-//! [`kenward_roger`].
+//! [`kenward_roger`]; or [`adjusted_means`].
 //!
 //! `docs/statistics-mixed.md` derives the formulas. Sources: Bates, Mächler,
 //! Bolker & Walker (2015) for the profiled criterion; Satterthwaite (1946) and
@@ -19,6 +19,7 @@
 //! Not supported: effects of single observations (order, carry-over), other random
 //! slopes, weights.
 
+mod adjusted;
 mod data;
 mod differences;
 mod fit;
@@ -30,6 +31,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+pub use adjusted::{AdjustedMeans, adjusted_means};
 pub use data::{CellSummary, FixedEffects, LmmData};
 pub use fit::{Criterion, LmmFit, VarianceComponents, fit};
 pub use kenward_roger::kenward_roger;

@@ -254,6 +254,36 @@ impl LmmData {
         ratings
     }
 
+    /// The cell means, each as one rating.
+    pub(super) fn of_cell_means(&self) -> Self {
+        let mut table = self.clone();
+        for unit in table.patterns.iter_mut().flat_map(|p| &mut p.units) {
+            unit.n = 1.0;
+        }
+        (table.n, table.within) = (self.cells as f64, 0.0);
+        table
+    }
+
+    /// Whether the subjects link all realizations, directly or by way of others.
+    pub(super) fn connected(&self) -> bool {
+        let mut linked = vec![false; self.realizations.len()];
+        linked[0] = true;
+        loop {
+            let before = linked.clone();
+            for pattern in &self.patterns {
+                if pattern.units.iter().any(|u| linked[u.realization]) {
+                    pattern
+                        .units
+                        .iter()
+                        .for_each(|u| linked[u.realization] = true);
+                }
+            }
+            if linked == before {
+                return linked.iter().all(|l| *l);
+            }
+        }
+    }
+
     /// Number of ratings.
     pub fn ratings(&self) -> f64 {
         self.n

@@ -56,29 +56,36 @@ struct Uncertainty {
 
 impl Uncertainty {
     fn df(&self, l: &DVector<f64>) -> Option<f64> {
-        let f = l.dot(&(&self.covariance * l));
+        let f = quadratic(&self.covariance, l);
         let g = DVector::from_iterator(
             self.derivatives.len(),
-            self.derivatives.iter().map(|d| l.dot(&(d * l))),
+            self.derivatives.iter().map(|d| quadratic(d, l)),
         );
         let spread = g.dot(&(&self.inverse * &g));
         finite(f * f / spread).filter(|df| spread > 0.0 && *df > 0.0)
     }
 }
 
+/// l'Al; a contrast has few elements that are not 0.
+fn quadratic(a: &DMatrix<f64>, l: &DVector<f64>) -> f64 {
+    let used: Vec<usize> = (0..l.len()).filter(|&i| l[i] != 0.0).collect();
+    let row = |i: usize| l[i] * used.iter().map(|&j| a[(i, j)] * l[j]).sum::<f64>();
+    used.iter().map(|&i| row(i)).sum()
+}
+
 impl LmmFit<'_> {
     /// Tests Σ lᵢβᵢ = 0; `l` has an element for each fixed effect.
     pub fn t_test(&self, l: &[f64]) -> ContrastT {
-        let u = self.uncertainty();
-        self.t_with(l, u.as_ref())
+        self.t_tests(&[l.to_vec()])[0]
     }
 
     /// Tests each of several contrasts.
     pub fn t_tests(&self, contrasts: &[Vec<f64>]) -> Vec<ContrastT> {
+        let covariance = self.profile.inverse() * self.sigma2;
         let u = self.uncertainty();
         contrasts
             .iter()
-            .map(|l| self.t_with(l, u.as_ref()))
+            .map(|l| self.t_with(l, &covariance, u.as_ref()))
             .collect()
     }
 
@@ -90,10 +97,9 @@ impl LmmFit<'_> {
         )
     }
 
-    fn t_with(&self, l: &[f64], u: Option<&Uncertainty>) -> ContrastT {
+    fn t_with(&self, l: &[f64], covariance: &DMatrix<f64>, u: Option<&Uncertainty>) -> ContrastT {
         let scaled = self.scaled(l);
-        let covariance = self.profile.inverse() * self.sigma2;
-        let se = scaled.dot(&(&covariance * &scaled)).max(0.0).sqrt();
+        let se = quadratic(covariance, &scaled).max(0.0).sqrt();
         let estimate = self.estimate(l);
         let df = u.and_then(|u| u.df(&scaled));
         let t = finite(estimate / se);

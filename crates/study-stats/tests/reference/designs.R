@@ -1,0 +1,50 @@
+suppressMessages({library(lme4); library(lmerTest); library(emmeans)})
+options(digits=12)
+vafs <- c(.70,.74,.78,.79,.85,.88,.93,.95,.97)
+make <- function(seed, S, k, reps, sds, keep, level=function(s) 0, slope=1.5) {
+  set.seed(seed); m <- sds[2]*rnorm(k); u <- sds[1]*rnorm(S)
+  d <- NULL
+  for (s in 1:S) for (j in 1:k) { c <- sds[3]*rnorm(1)
+    n <- keep(s,j); e <- rnorm(6)
+    if (n>0) for (r in 1:n) d <- rbind(d, data.frame(s=s,m=j,
+      y=min(7,max(1,round(4+level(s)+u[s]+m[j]+slope*4*(vafs[j]-.8)+c+sds[4]*e[r])))))
+  }
+  d$x <- vafs[d$m]; d$s <- factor(d$s); d$m <- factor(d$m); d
+}
+designs <- list(
+ random_cells = make(1, 10, 6, 2, c(.7,.3,.4,.8), {set.seed(11); K<-matrix(sample(c(0,2,2,2,2,1),60,T),10); function(s,j) K[s,j]}),
+ blocks = make(2, 10, 5, 2, c(.8,.3,.5,.7), {B<-combn(5,3); function(s,j) if (j %in% B[,s]) 2 else 0}),
+ lenient_severe = make(3, 16, 7, 1, c(.4,.2,.4,.6), function(s,j) as.integer(if (s<=8) j<=5 else j>=3), level=function(s) if (s<=8) 1 else -1),
+ nobody_complete = make(4, 8, 5, 1, c(.8,.4,.4,.7), function(s,j) as.integer(j != (s-1)%%5+1)),
+ repetitions = make(5, 9, 5, 4, c(.7,.3,.5,.8), {set.seed(15); K<-matrix(sample(1:4,45,T),9); function(s,j) K[s,j]}),
+ few_subjects = make(6, 5, 9, 2, c(.6,.4,.4,.7), function(s,j) if ((s+j)%%6==0) 0 else if ((s*j)%%4==0) 1 else 2),
+ no_subject_variance = make(7, 8, 5, 2, c(0,.5,.5,.8), function(s,j) if ((s*3+j)%%7==0) 0 else 2),
+ no_cell_variance = make(8, 8, 6, 3, c(.8,.4,0,.9), function(s,j) if ((s+2*j)%%5==0) 0 else 1+(s+j)%%3)
+)
+ctl <- lmerControl(optimizer="nloptwrap", optCtrl=list(xtol_abs=1e-12,ftol_abs=1e-13,xtol_rel=1e-12,ftol_rel=1e-15,maxeval=100000),check.conv.singular="ignore")
+num <- function(...) paste(sapply(c(...), function(v) format(v, digits=10, scientific=NA)), collapse=" ")
+comp <- function(a, g) { v<-as.data.frame(VarCorr(a)); w<-v$vcov[v$grp==g]; if (length(w)) w else 0 }
+for (n in names(designs)) { d<-designs[[n]]
+  out <- character(); put <- function(...) out <<- c(out, paste(...))
+  rep <- any(table(d$s,d$m)>1); S<-nlevels(d$s); k<-nlevels(d$m)
+  put("covariate", num(vafs[1:k]))
+  for (s in 1:S) put("ratings", paste(sapply(1:k, function(j) { w<-d$y[d$s==s & d$m==j]; if (length(w)) paste(w, collapse="") else "." }), collapse=" "))
+  f <- if (rep) y~m+(1|s)+(1|s:m) else y~m+(1|s)
+  a <- lmer(f, d, control=ctl)
+  put("deviance", num(REMLcrit(lmer(update(f,~0+.),d,control=ctl))))
+  put("variances", num(comp(a,"s"), comp(a,"s:m"), sigma(a)^2))
+  e <- emmeans(a, ~m, lmer.df="satterthwaite")
+  t <- as.data.frame(summary(e))
+  for (j in 1:k) put("mean", j, num(unlist(t[j,2:6])))
+  p <- pairs(e, adjust="none")
+  t <- as.data.frame(summary(p, infer=c(TRUE,TRUE)))
+  ab <- combn(k,2)
+  for (i in 1:ncol(ab)) put("pair", ab[1,i], ab[2,i], num(unlist(t[i,c("estimate","SE","df","lower.CL","upper.CL","t.ratio","p.value")])))
+  w <- anova(a); put("F", num(w$`F value`, w$NumDF, w$DenDF, w$`Pr(>F)`))
+  f <- if (rep) y~x+(1|s)+(1|m)+(1|s:m) else y~x+(1|s)+(1|m)
+  b <- lmer(f, d, control=ctl)
+  z <- coef(summary(b))["x",]
+  put("slope", num(z))
+  put("slope_variances", num(comp(b,"s"), comp(b,"m"), comp(b,"s:m"), sigma(b)^2))
+  writeLines(out, paste0(n, ".txt"))
+}
