@@ -7,7 +7,9 @@ pub(super) use conditional::conditional;
 
 use super::{apa, sentences};
 use study_base::text::counted;
-use study_core::analyze::{Analysis, MAX_PAIRED, PreregisteredRule, TestKind, significant};
+use study_core::analyze::{
+    Analysis, MAX_PAIRED, PreregisteredRule, TestKind, group_id, significant,
+};
 use study_core::outcome::Role;
 
 /// The answer to a question. Names in it are untrusted.
@@ -62,7 +64,7 @@ fn target(a: &Analysis) -> Option<Answer> {
     let scale = a.scale.map_or_else(String::new, |(from, to)| {
         format!(" on a scale from {from} to {to}")
     });
-    let share = |id: &str| a.values.number(&format!("realistic/{id}/share"));
+    let share = |id: &str| a.about("realistic", &[id], "share");
     let changed = a.changed(PreregisteredRule::RealisticFrom);
     let realistic = match a.realistic_from.zip(share(best)) {
         Some((from, share)) => {
@@ -71,7 +73,11 @@ fn target(a: &Analysis) -> Option<Answer> {
             } else {
                 ""
             };
-            let ci = sentences::ci(a, &format!("realistic/{best}/ci95"), apa::percent);
+            let ci = sentences::ci(
+                a,
+                &format!("{}/ci95", group_id("realistic", &[best])),
+                apa::percent,
+            );
             let share = apa::percent(share);
             format!("{share} of its ratings are {from} or higher{later}{ci}")
         }
@@ -86,7 +92,11 @@ fn target(a: &Analysis) -> Option<Answer> {
         format!("{subject}, mean {}{scale}; {realistic}.", apa::two(mean)),
     );
     answer.main = against_references(a, best);
-    let ci = sentences::ci(a, &format!("desc/{best}/subject_mean/ci95"), apa::two);
+    let ci = sentences::ci(
+        a,
+        &format!("{}/subject_mean/ci95", group_id("desc", &[best])),
+        apa::two,
+    );
     if let (Some(m), false) = (a.described(best, "subject_mean/mean"), ci.is_empty()) {
         let m = apa::two(m);
         (answer.more).push(format!("The mean of {best} over subjects is {m}{ci}."));
@@ -123,7 +133,7 @@ fn against_references(a: &Analysis, best: &str) -> Vec<String> {
     references
         .filter(|m| m.role == Role::HiddenReference || m.role == Role::Physical)
         .filter_map(|m| {
-            let id = format!("reference/{}/{best}", m.id);
+            let id = group_id("reference", &[&m.id, best]);
             let get = |what: &str| a.values.number(&format!("{id}/{what}"));
             let difference = apa::two(get("mean_diff")?);
             let ci = sentences::ci(a, &format!("{id}/ci95"), apa::two);

@@ -1,7 +1,7 @@
 //! The CSV tables of `analysis/` (RFC 4180). Text is stored as typed.
 
 use super::Source;
-use study_core::analyze::{Analysis, Value};
+use study_core::analyze::{Analysis, MAX_PAIRED, Value, group_id, pair_id};
 
 /// A file of `analysis/`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -111,10 +111,10 @@ fn descriptives(a: &Analysis) -> Vec<Vec<String>> {
     head.extend((0..bins).map(|b| format!("count_{}", digits(from.unwrap_or(0.0) + b as f64))));
     let mut rows = vec![head];
     for m in &a.realizations {
-        let id = &m.id;
-        let get = |name: &str| number(v.number(&format!("desc/{id}/{name}")));
+        let desc = group_id("desc", &[&m.id]);
+        let get = |name: &str| number(v.number(&format!("{desc}/{name}")));
         let mut row = vec![
-            id.clone(),
+            m.id.clone(),
             m.role.as_str().to_owned(),
             m.duplicate_of.clone().unwrap_or_default(),
             number(m.vaf),
@@ -126,8 +126,8 @@ fn descriptives(a: &Analysis) -> Vec<Vec<String>> {
                 .map(|s| get(&format!("subject_mean/{s}"))),
         );
         row.push(get("cousineau_morey/ci95_half"));
-        row.push(number(v.number(&format!("realistic/{id}/share"))));
-        let hist = v.list(&format!("desc/{id}/hist")).unwrap_or(&[]);
+        row.push(number(a.about("realistic", &[&m.id], "share")));
+        let hist = v.list(&format!("{desc}/hist")).unwrap_or(&[]);
         row.extend((0..bins).map(|b| number(hist.get(b).copied())));
         rows.push(row);
     }
@@ -190,14 +190,23 @@ fn pairs(a: &Analysis) -> Vec<Vec<String>> {
     ];
     let mut rows = vec![cells(["pair"])];
     rows[0].extend(STATISTICS.map(str::to_owned));
-    for (id, _) in a.values.iter() {
-        let pair = id.strip_prefix("posthoc/");
-        let Some(pair) = pair.and_then(|p| p.strip_suffix("/mean_diff")) else {
-            continue;
-        };
-        let mut row = vec![pair.to_owned()];
-        row.extend(STATISTICS.map(|s| number(a.values.number(&format!("posthoc/{pair}/{s}")))));
-        rows.push(row);
+    rows[0].extend(cells(["first", "second"]));
+    let names: Vec<&str> = a.tested().map(|m| m.id.as_str()).collect();
+    for (i, first) in names
+        .iter()
+        .enumerate()
+        .filter(|_| names.len() <= MAX_PAIRED)
+    {
+        for second in &names[i + 1..] {
+            let id = pair_id("posthoc", first, second);
+            let get = |s: &str| a.values.number(&format!("{id}/{s}"));
+            if get("mean_diff").is_some() {
+                let mut row = vec![format!("{first}|{second}")];
+                row.extend(STATISTICS.map(|s| number(get(s))));
+                row.extend([(*first).to_owned(), (*second).to_owned()]);
+                rows.push(row);
+            }
+        }
     }
     rows
 }
@@ -219,15 +228,10 @@ fn subjects(a: &Analysis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["subject"])];
     rows[0].extend(STATISTICS.map(str::to_owned));
     rows[0].extend(cells(["r_with_vaf", "slope_on_vaf"]));
-    for (id, _) in a.values.iter() {
-        let subject = id.strip_prefix("subject/");
-        let Some(subject) = subject.and_then(|s| s.strip_suffix("/n")) else {
-            continue;
-        };
-        let get = |id: String| number(a.values.number(&id));
+    for subject in a.listed_subjects() {
         let mut row = vec![subject.to_owned()];
-        row.extend(STATISTICS.map(|s| get(format!("subject/{subject}/{s}"))));
-        row.extend(["r", "slope"].map(|s| get(format!("subject_corr/{subject}/{s}"))));
+        row.extend(STATISTICS.map(|s| number(a.about("subject", &[subject], s))));
+        row.extend(["r", "slope"].map(|s| number(a.about("subject_corr", &[subject], s))));
         rows.push(row);
     }
     rows

@@ -2,10 +2,44 @@
 
 use super::Source;
 use serde_json::{Map, Value as Json, json};
-use study_core::analyze::{Analysis, Value};
+use study_core::analyze::findings::{Direction, Estimate};
+use study_core::analyze::{Analysis, Finding, Value};
 
 /// Name and version of the format.
 pub const FORMAT: &str = "study-analysis/1";
+
+fn estimate(e: &Estimate) -> Json {
+    json!({"name": e.name, "value": e.value, "ci95": e.ci95.map(|(low, high)| [low, high])})
+}
+
+fn finding(f: &Finding) -> Json {
+    let test = f.test.as_ref().map(|t| {
+        let statistic = t.statistic.as_ref();
+        json!({
+            "name": t.kind.as_str(),
+            "symbol": statistic.map(|s| s.symbol),
+            "statistic": statistic.map(|s| s.value),
+            "df": statistic.map(|s| &s.df),
+            "p": t.p,
+            "level": t.level,
+            "comparisons": t.comparisons,
+        })
+    });
+    json!({
+        "question": f.question.id(),
+        "verdict": f.verdict.as_str(),
+        "undefined_because": f.reason(),
+        "direction": f.direction.map(Direction::as_str),
+        "realizations": f.names,
+        "test": test,
+        "n_participants": f.participants,
+        "n_realizations": f.realizations,
+        "estimate": f.estimate.as_ref().map(estimate),
+        "effect": f.effect.as_ref().map(estimate),
+        "caveats": f.caveats.iter()
+            .map(|w| json!({"code": w.code, "text": w.text})).collect::<Vec<_>>(),
+    })
+}
 
 /// The document, with a final line feed.
 pub fn document(source: &Source, analysis: &Analysis) -> String {
@@ -44,6 +78,8 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
                 "duplicate_of": m.duplicate_of,
                 "vaf": m.vaf,
             })).collect::<Vec<_>>(),
+        "alpha": analysis.alpha,
+        "findings": analysis.findings.iter().map(finding).collect::<Vec<_>>(),
         "exclusions": analysis.exclusions.iter()
             .map(|e| json!({
                 "rule": e.rule.to_string(),

@@ -11,7 +11,7 @@ use super::plot::{Axis, bars};
 use super::{Source, apa, sentences};
 use layout::{Grid, Paint, pad, wrap};
 use study_base::text::{Untrusted, counted, cut_middle};
-use study_core::analyze::{Analysis, RealizationSummary};
+use study_core::analyze::{Analysis, RealizationSummary, group_id};
 use study_core::outcome::Role;
 use unicode_width::UnicodeWidthStr as _;
 
@@ -195,7 +195,7 @@ fn table(
     let most = a
         .realizations
         .iter()
-        .filter_map(|m| v.list(&format!("desc/{}/hist", m.id)))
+        .filter_map(|m| v.list(&format!("{}/hist", group_id("desc", &[&m.id]))))
         .flatten()
         .copied()
         .fold(0.0, f64::max);
@@ -240,15 +240,17 @@ fn table(
             show(get("median"), 1),
         ];
         if hist.is_some() {
-            let counts = v.list(&format!("desc/{}/hist", m.id)).unwrap_or(&[]);
+            let counts = v
+                .list(&format!("{}/hist", group_id("desc", &[&m.id])))
+                .unwrap_or(&[]);
             row.push(bars(counts, most, gap));
         }
         row.push(show(m.vaf, digits));
         if at_least.is_some() {
-            let share = v.number(&format!("realistic/{}/share", m.id));
+            let share = a.about("realistic", &[&m.id], "share");
             row.push(apa::or_dash(share, apa::percent));
         }
-        let ci = v.interval(&format!("desc/{}/subject_mean/ci95", m.id));
+        let ci = v.interval(&format!("{}/subject_mean/ci95", group_id("desc", &[&m.id])));
         let ci = ci.map_or_else(String::new, |ci| {
             format!(" {}", apa::interval(ci, apa::two))
         });

@@ -183,7 +183,11 @@ fn changed(csv: &str, rating: impl Fn(f64) -> f64, name: impl Fn(&str) -> String
 }
 
 /// Groups that have the unit of a rating, or its origin.
-const WITH_UNITS: [&str; 16] = [
+const WITH_UNITS: [&str; 20] = [
+    "adjusted",
+    "finding",
+    "lmm_cells",
+    "pair",
     "desc",
     "desc_all",
     "subject",
@@ -234,6 +238,10 @@ fn a_shift_and_a_scale_leave_every_standardised_statistic() {
         "rmanova/ges",
         "posthoc/A|B/t",
         "icc_subjects/ICC2",
+        "lmm_cells/F",
+        "pair/A|B/p_holm",
+        "finding/differ/p",
+        "finding/best/p",
         "lmm_model/kenward_roger_F",
         "lmm_model/satterthwaite_F",
         "lmm_model/icc_subject",

@@ -65,6 +65,8 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             equivalence_margin: None,
             unfinished: Unfinished::Include,
             exclude: Vec::new(),
+            alpha: None,
+            construct: None,
         },
     }
 }

@@ -9,18 +9,23 @@
 //! rating" is tested over the means of the realizations, whatever the number of
 //! participants. Tests over participants hold for these realizations only.
 
+mod adjusted;
 mod cells;
 mod describe;
+mod design;
 mod deviation;
 mod draws;
 mod effects;
 mod exclude;
+pub mod findings;
 mod headline;
+mod identifiers;
 mod memory;
 mod mixed;
 mod order;
 mod ordinal;
 mod overflow;
+mod pairs;
 mod reference;
 mod select;
 mod subjects;
@@ -30,8 +35,11 @@ mod verdicts;
 mod warnings;
 
 pub use crate::protocol::Exclusion;
+pub use design::Design;
 pub use deviation::{Deviation, PreregisteredRule, deviations};
 pub use exclude::Applied;
+pub use findings::{Finding, Pair, Question, Verdict};
+pub use identifiers::{group_id, pair_id};
 pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
 pub use verdicts::{ALPHA, ComparedPairs, DecidingTest, MAX_PAIRED, TestKind, significant};
@@ -39,6 +47,7 @@ pub use warnings::Warning;
 
 use crate::outcome::ratings::{Practice, Ratings};
 use crate::protocol::{Protocol, Role, Unfinished};
+use adjusted::Adjusted;
 use cells::Cells;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -68,6 +77,10 @@ pub struct Rules {
     pub equivalence_margin: Option<f64>,
     /// Changes to these rules after the study began.
     pub deviations: Vec<Deviation>,
+    /// Level of significance of every test, two-sided.
+    pub alpha: f64,
+    /// What the ratings measure, as a noun; `None` if the study does not say.
+    pub construct: Option<String>,
 }
 
 impl Default for Rules {
@@ -83,6 +96,8 @@ impl Default for Rules {
             exclude: Vec::new(),
             equivalence_margin: None,
             deviations: Vec::new(),
+            alpha: ALPHA,
+            construct: None,
         }
     }
 }
@@ -114,6 +129,8 @@ impl Rules {
             exclude: protocol.analysis.exclude.clone(),
             equivalence_margin: protocol.analysis.equivalence_margin.filter(|_| primary),
             deviations: Vec::new(),
+            alpha: protocol.analysis.alpha.unwrap_or(ALPHA),
+            construct: protocol.analysis.construct.clone().filter(|_| primary),
         }
     }
 }
@@ -196,6 +213,18 @@ pub struct Analysis {
     pub realistic_from: Option<f64>,
     /// Lowest and highest rating of the scale.
     pub scale: Option<(f64, f64)>,
+    /// Level of significance of every test, two-sided.
+    pub alpha: f64,
+    /// What the ratings measure, as a noun. Untrusted.
+    pub construct: Option<String>,
+    /// Names of the covariates of the realizations. Untrusted.
+    pub covariates: Vec<String>,
+    /// Who rated which realizations.
+    pub design: Design,
+    /// The answers to the questions of the study, in the order of a report.
+    pub findings: Vec<Finding>,
+    /// The comparisons of pairs of realizations on which the findings rest.
+    pub pairs: Vec<Pair>,
 }
 
 impl Analysis {
@@ -250,6 +279,8 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         });
         headline::without_exclusions(&statistics(&Cells::of(&all), rules, progress), &mut values);
     }
+    let design = Design::of(&cells);
+    let (findings, pairs) = findings::findings(&cells, design, rules, &mut values);
     let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &values);
     Analysis {
         question: ratings.question.clone(),
@@ -274,6 +305,12 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         comments: comments(&used),
         realistic_from: rules.realistic_from,
         scale: rules.scale,
+        alpha: rules.alpha,
+        construct: rules.construct.clone(),
+        covariates: memory::covariates(&used),
+        design,
+        findings,
+        pairs,
         values,
         warnings,
         counts,
@@ -289,21 +326,30 @@ fn rows(ratings: &Ratings, keep: impl Fn(usize) -> bool) -> Cow<'_, Ratings> {
     }
 }
 
+/// What the statistics are computed from.
+struct Inputs<'a> {
+    cells: &'a Cells<'a>,
+    adjusted: &'a Adjusted,
+    rules: &'a Rules,
+}
+
 /// Computes a group of statistics.
-type Group = fn(&Cells<'_>, &Rules, &mut Values);
+type Group = fn(&Inputs<'_>, &mut Values);
 
 /// Independent groups of statistics, the slowest ones first.
-const GROUPS: [Group; 10] = [
-    order::order,
-    vaf::against_vaf,
-    |cells, _, values| ordinal::ordinal(cells, values),
-    effects::ranks_and_anova,
-    effects::agree,
-    |cells, _, values| mixed::mixed(cells, values),
-    describe::describe,
-    subjects::subjects,
-    effects::pairs,
-    reference::reference,
+const GROUPS: [Group; 12] = [
+    |i, values| order::order(i.cells, values),
+    |i, values| vaf::against_vaf(i.cells, i.adjusted, i.rules, values),
+    |i, values| ordinal::ordinal(i.cells, values),
+    |i, values| effects::ranks_and_anova(i.cells, values),
+    |i, values| effects::agree(i.cells, values),
+    |i, values| mixed::mixed(i.cells, values),
+    |i, values| describe::describe(i.cells, values),
+    |i, values| subjects::subjects(i.cells, values),
+    |i, values| effects::pairs(i.cells, values),
+    |i, values| reference::reference(i.cells, i.rules, values),
+    |i, values| adjusted::adjusted(i.cells, i.adjusted, values),
+    |i, values| pairs::pairs(i.cells, i.adjusted, values),
 ];
 
 /// All statistics. Each group runs on one thread, so the number of threads changes
@@ -312,11 +358,17 @@ fn statistics(cells: &Cells<'_>, rules: &Rules, progress: &Progress) -> Values {
     progress
         .groups
         .fetch_add(GROUPS.len() as u64, Ordering::Relaxed);
+    let adjusted = &Adjusted::of(cells);
+    let inputs = Inputs {
+        cells,
+        adjusted,
+        rules,
+    };
     let mut parts: Vec<(usize, Values)> = (GROUPS.iter().enumerate())
         .par_bridge()
         .map(|(index, group)| {
             let mut values = Values::default();
-            group(cells, rules, &mut values);
+            group(&inputs, &mut values);
             progress.done.fetch_add(1, Ordering::Relaxed);
             (index, values)
         })
@@ -326,7 +378,7 @@ fn statistics(cells: &Cells<'_>, rules: &Rules, progress: &Progress) -> Values {
     for (_, part) in parts {
         values.extend(part);
     }
-    memory::memory(cells, rules, &mut values);
+    memory::memory(cells, &mut values);
     headline::headline(cells, rules, &mut values);
     values
 }

@@ -280,6 +280,14 @@ pub struct AnalysisRules {
     pub unfinished: Unfinished,
     /// Exclusion rules stated before the data.
     pub exclude: Vec<Exclusion>,
+    /// Level of significance of every test, between 0 and 1. Not part of the fingerprint
+    /// if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alpha: Option<f64>,
+    /// What the primary question measures, as a noun. Not part of the fingerprint if
+    /// absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub construct: Option<String>,
 }
 
 words! {

@@ -2,7 +2,7 @@
 
 use super::Answer;
 use crate::report::{apa, sentences};
-use study_core::analyze::{Analysis, TestKind, Value};
+use study_core::analyze::{Analysis, TestKind, Value, group_id};
 use study_stats::permutation::DRAWS;
 
 /// Covariates in a list.
@@ -220,18 +220,16 @@ fn curvature(a: &Analysis) -> Option<String> {
 /// A sentence for each covariate other than the logarithm of the memory.
 fn others(a: &Analysis) -> Vec<String> {
     let v = &a.values;
-    let covariates = v.iter().filter_map(|(id, value)| {
-        let name = id.strip_prefix("covariate/")?.strip_suffix("/r")?;
-        // The memory in mm is covered by its logarithm.
-        let covered = name == "memory_mm" && v.number("covariate/log10_memory/r").is_some();
-        (name != "log10_memory" && !covered).then_some((name, value))
-    });
+    // The memory in mm is covered by its logarithm.
+    let covered = v.number("covariate/log10_memory/r").is_some();
+    let covariates = (a.covariates.iter()).filter(|name| *name != "memory_mm" || !covered);
     covariates
-        .filter_map(|(name, value)| {
+        .filter_map(|name| {
             let what = described(name);
-            match value {
+            let id = group_id("covariate", &[name]);
+            match v.get(&format!("{id}/r"))? {
                 Value::Number(r) => {
-                    let get = |what: &str| v.number(&format!("covariate/{name}/{what}"));
+                    let get = |what: &str| v.number(&format!("{id}/{what}"));
                     let p = get("p").map_or_else(String::new, |p| format!(", p {}", apa::p(p)));
                     let with_vaf = get("r_with_vaf").map_or_else(String::new, |r| {
                         format!(" (with VAF it correlates at r = {})", apa::r(r))

@@ -3,6 +3,7 @@
 use super::{Canvas, Drawn, Scene, drawn, head, name};
 use crate::report::csv::digits;
 use crate::report::svg::{Axis, Look, Mark, PALETTE, Panel, Span};
+use study_core::analyze::group_id;
 
 /// Largest number of bins of a histogram.
 const MAX_BINS: usize = 21;
@@ -17,7 +18,10 @@ pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
     let counts: Vec<&[f64]> = scene
         .models
         .iter()
-        .map(|m| v.list(&format!("desc/{}/hist", m.id)).unwrap_or(&[]))
+        .map(|m| {
+            v.list(&format!("{}/hist", group_id("desc", &[&m.id])))
+                .unwrap_or(&[])
+        })
         .collect();
     let drawable = (1..=MAX_PANELS).contains(&scene.models.len());
     if !drawable || !(1..=MAX_BINS).contains(&bins) || first.abs() > 1000.0 {

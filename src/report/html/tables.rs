@@ -3,7 +3,7 @@
 use super::safe;
 use crate::report::{answers, apa};
 use maud::{Markup, html};
-use study_core::analyze::{Analysis, RealizationSummary, Value, significant};
+use study_core::analyze::{Analysis, RealizationSummary, group_id, significant};
 use study_core::outcome::Role;
 
 /// Largest number of rows of a table; the CSV has all.
@@ -169,7 +169,7 @@ fn realizations(a: &Analysis) -> HtmlTable {
     let digits = apa::distinguishing_decimals(&vaf);
     for m in listed {
         let get = |what: &str| a.described(&m.id, what);
-        let ci = v.interval(&format!("desc/{}/subject_mean/ci95", m.id));
+        let ci = v.interval(&format!("{}/subject_mean/ci95", group_id("desc", &[&m.id])));
         let mut row = vec![
             apa::name(&m.id),
             role(m),
@@ -181,7 +181,7 @@ fn realizations(a: &Analysis) -> HtmlTable {
             apa::interval_or_dash(ci, apa::two),
         ];
         if share.is_some() {
-            let s = v.number(&format!("realistic/{}/share", m.id));
+            let s = a.about("realistic", &[&m.id], "share");
             row.push(apa::or_dash(s, apa::percent));
         }
         table.styled_row(!m.tested, row);
@@ -242,7 +242,7 @@ fn against_references(a: &Analysis) -> Vec<HtmlTable> {
             r.role.as_str().replace('-', " ")
         );
         let mut head = vec!["realization", "n", "difference", "95 % CI", "p (t, Holm)"];
-        let id = |t: &RealizationSummary| format!("reference/{}/{}", r.id, t.id);
+        let id = |t: &RealizationSummary| group_id("reference", &[&r.id, &t.id]);
         let contrast = |t: &RealizationSummary, what: &str| v.number(&format!("{}/{what}", id(t)));
         let equivalence = a.tested().any(|t| contrast(t, "p_tost").is_some());
         head.extend(equivalence.then_some("p (equivalence)"));
@@ -283,7 +283,7 @@ fn repeats(a: &Analysis) -> HtmlTable {
         &head,
     );
     for m in &a.realizations {
-        let id = format!("duplicate/{}", m.id);
+        let id = group_id("duplicate", &[&m.id]);
         let get = |what: &str| a.values.number(&format!("{id}/{what}"));
         let (Some(of), Some(difference)) = (&m.duplicate_of, get("mean_diff")) else {
             continue;
@@ -395,7 +395,7 @@ fn with_and_without(a: &Analysis) -> HtmlTable {
         both(what.to_owned(), id, shown);
     }
     for m in &a.realizations {
-        let id = format!("desc/{}/mean", m.id);
+        let id = format!("{}/mean", group_id("desc", &[&m.id]));
         both(format!("mean of {}", apa::name(&m.id)), &id, three);
     }
     table
@@ -413,7 +413,6 @@ fn subjects(a: &Analysis) -> Markup {
         "r with the others",
         "r with VAF",
     ];
-    let v = &a.values;
     // Columns of designs with a reference, an anchor or a repeat.
     let extra: Vec<(&str, &str)> = [
         ("hidden_reference_mean", "mean of the references"),
@@ -422,10 +421,8 @@ fn subjects(a: &Analysis) -> Markup {
     ]
     .into_iter()
     .filter(|(id, _)| {
-        let end = format!("/{id}");
-        v.iter().any(|(id, value)| {
-            id.starts_with("subject/") && id.ends_with(&end) && matches!(value, Value::Number(_))
-        })
+        a.listed_subjects()
+            .any(|s| a.about("subject", &[s], id).is_some())
     })
     .collect();
     head.extend(extra.iter().map(|(_, what)| *what));
@@ -433,12 +430,10 @@ fn subjects(a: &Analysis) -> Markup {
         "Screening of participants (nobody is excluded by it)",
         &head,
     );
-    let ids = v.iter().map(|(id, _)| id);
-    let names = ids.filter_map(|id| id.strip_prefix("subject/")?.strip_suffix("/n"));
     // A correlation of two points is always ±1.
     let enough = a.tested().count() > 2;
-    for s in names {
-        let get = |what: &str| v.number(&format!("subject/{s}/{what}"));
+    for s in a.listed_subjects() {
+        let get = |what: &str| a.about("subject", &[s], what);
         let r = |x: Option<f64>| apa::or_dash(x.filter(|_| enough), |x| apa::share(x, 2));
         let mut row = vec![
             apa::name(s),
@@ -449,7 +444,7 @@ fn subjects(a: &Analysis) -> Markup {
             show(get("longest_run"), 0),
             show(get("within_cell_sd"), 2),
             r(get("leave_one_out_r")),
-            r(v.number(&format!("subject_corr/{s}/r"))),
+            r(a.about("subject_corr", &[s], "r")),
         ];
         row.extend(extra.iter().map(|(id, _)| show(get(id), 2)));
         table.row(row);

@@ -1,7 +1,7 @@
 //! `desc/*`, `desc_all/*`, `design/*`, `univariate/*`, `regression/*`.
 
-use super::Rules;
 use super::cells::{Cells, CompleteTable, within};
+use super::identifiers::group_id;
 use super::values::Values;
 use study_stats::describe::{counts, lag1_autocorrelation, mean, quantile, sd, sorted};
 use study_stats::distribution::t_quantile;
@@ -14,7 +14,7 @@ pub(super) const ONE: &str = "fewer than two ratings";
 const ONE_SUBJECT: &str = "fewer than two subjects";
 pub(super) const NO_REPETITION: &str = "no cell has two ratings";
 
-pub(super) fn describe(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+pub(super) fn describe(cells: &Cells<'_>, values: &mut Values) {
     let table = cells.table(&cells.tested());
     let bins = whole_scale(cells);
     design(cells, &table, values);
@@ -100,9 +100,9 @@ fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
     }
     let subject_means = cells.subject_means();
     for (m, x) in by_model.iter().enumerate() {
-        let id = cells.model_name(m);
+        let id = group_id("desc", &[cells.model_name(m)]);
         let s = ascending(x, bins);
-        let mut g = values.group(format!("desc/{id}"), "no ratings");
+        let mut g = values.group(id.clone(), "no ratings");
         g.put("n", x.len() as f64);
         g.maybe("mean", mean(x));
         g.put_or("sd", sd(x), ONE);
@@ -115,7 +115,7 @@ fn by_model(cells: &Cells<'_>, bins: Option<(f64, f64)>, values: &mut Values) {
             g.list("hist", counts(x, low, high));
         }
         let x: &[f64] = &subject_means[m];
-        let mut g = values.group(format!("desc/{id}/subject_mean"), ONE_SUBJECT);
+        let mut g = values.group(format!("{id}/subject_mean"), ONE_SUBJECT);
         let centre = mean(x);
         let spread = sd(x);
         let sem = spread.map(|s| s / (x.len() as f64).sqrt());
@@ -155,8 +155,8 @@ fn cousineau_morey(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values
         let sem = sd(&column)
             .filter(|_| m >= 2)
             .map(|v| v / (s as f64).sqrt() * correction);
-        let id = cells.model_name(model);
-        let mut g = values.group(format!("desc/{id}/cousineau_morey"), why);
+        let id = group_id("desc", &[cells.model_name(model)]);
+        let mut g = values.group(format!("{id}/cousineau_morey"), why);
         g.maybe("sem", sem);
         g.maybe("ci95_half", sem.zip(t).map(|(a, b)| a * b));
     }

@@ -38,6 +38,8 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
         equivalence_margin,
         unfinished,
         exclude,
+        alpha,
+        construct,
     } = &after.analysis;
     let b = &before.analysis;
     let mut found = Vec::new();
@@ -85,6 +87,8 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
         rules(&b.exclude),
         rules(exclude),
     );
+    compare("alpha", &[], shown(&b.alpha), shown(alpha));
+    compare("construct", &[], shown(&b.construct), shown(construct));
     for new in &after.models {
         let Some(old) = before.model(&new.id) else {
             continue;

@@ -2,8 +2,8 @@
 //! `rmanova2/*`, `posthoc/*`, `icc_*`, `krippendorff_*`. All over the tested
 //! realizations.
 
-use super::Rules;
 use super::cells::{Cell, Cells, CompleteTable};
+use super::identifiers::pair_id;
 use super::values::Values;
 use study_stats::agreement::{Alpha, Coefficient, Icc, icc, krippendorff};
 use study_stats::anova::{Effect, one_way, two_way};
@@ -11,7 +11,7 @@ use study_stats::friedman::friedman;
 use study_stats::paired::{holm, paired};
 
 /// Largest number of realizations (times repetitions) of an analysis of variance.
-const MAX_COLUMNS: usize = 300;
+pub(super) const MAX_COLUMNS: usize = 300;
 
 /// Largest number of realizations that are compared pair by pair.
 pub const MAX_PAIRED: usize = 8;
@@ -23,18 +23,18 @@ const FEW: &str = "fewer than two complete subjects or realizations";
 const NO_END: &str = "the interval of ICC2 ends where Spearman–Brown's formula has its pole";
 const NO_ERROR: &str = "the ratings leave no variance of error";
 
-pub(super) fn ranks_and_anova(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+pub(super) fn ranks_and_anova(cells: &Cells<'_>, values: &mut Values) {
     let table = cells.table(&cells.tested());
     ranks(&table, values);
     anova(&table, values);
     anova_with_repetitions(cells, &table, values);
 }
 
-pub(super) fn pairs(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+pub(super) fn pairs(cells: &Cells<'_>, values: &mut Values) {
     posthoc(cells, &cells.table(&cells.tested()), values);
 }
 
-pub(super) fn agree(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+pub(super) fn agree(cells: &Cells<'_>, values: &mut Values) {
     let models = cells.tested();
     agreement(cells, &cells.table(&models), values);
     repetitions(cells, &models, values);
@@ -166,11 +166,6 @@ fn balanced(cells: &Cells<'_>, table: &CompleteTable) -> Option<(Vec<Vec<f64>>, 
     (rows.len() >= 2 && table.models.len() >= 2).then_some((rows, n))
 }
 
-/// The identifier of a pair of realizations, by name.
-pub(super) fn pair_id(a: &str, b: &str) -> String {
-    format!("posthoc/{a}|{b}")
-}
-
 fn posthoc(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
     let m = table.models.len();
     if !(2..=MAX_PAIRED).contains(&m) || table.rows.len() < 2 {
@@ -182,7 +177,7 @@ fn posthoc(cells: &Cells<'_>, table: &CompleteTable, values: &mut Values) {
         for b in a + 1..m {
             if let Some(p) = paired(&columns[a], &columns[b]) {
                 let name = |j: usize| cells.model_name(table.models[j]);
-                pairs.push((pair_id(name(a), name(b)), p));
+                pairs.push((pair_id("posthoc", name(a), name(b)), p));
             }
         }
     }

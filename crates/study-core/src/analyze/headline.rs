@@ -4,6 +4,7 @@
 
 use super::Rules;
 use super::cells::{Cells, within};
+use super::identifiers::group_id;
 use super::values::Values;
 use study_stats::anova::one_way;
 use study_stats::distribution::t_quantile;
@@ -13,7 +14,9 @@ pub(super) fn headline(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     if let Some(from) = rules.realistic_from {
         realistic(cells, from, values);
     }
-    explained(values);
+    for group in ["corr", "corr_adjusted"] {
+        explained(group, rules.alpha, values);
+    }
     components(cells, values);
 }
 
@@ -31,37 +34,40 @@ fn realistic(cells: &Cells<'_>, from: f64, values: &mut Values) {
     }
     for (m, clusters) in clusters.iter().enumerate() {
         let found = share(clusters);
-        let id = format!("realistic/{}", cells.model_name(m));
-        let mut g = values.group(id, "no ratings");
+        let id = group_id("realistic", &[cells.model_name(m)]);
+        let mut g = values.group(id.clone(), "no ratings");
         g.put("n", clusters.iter().map(|c| c.1).sum());
         g.maybe("share", found.map(|s| s.share));
         g.maybe("n_effective", found.map(|s| s.n_effective));
-        let mut g = values.group(
-            format!("realistic/{}", cells.model_name(m)),
-            "fewer than two subjects",
-        );
+        let mut g = values.group(id, "fewer than two subjects");
         g.interval("ci95", found.and_then(|s| s.ci95));
     }
 }
 
 /// The share of the variance between realizations that VAF explains: r² of the means
 /// and its adjusted version 1 − (1 − r²)(n − 1)/(n − 2) (Ezekiel 1930); and the
-/// critical |r|. The crossed model's share is computed with that model.
-fn explained(values: &mut Values) {
-    let n = values.number("corr/n_models").unwrap_or(0.0);
-    let r2 = values.number("corr/pearson/r").map(|r| r * r);
-    let needed = t_quantile(0.975, n - 2.0)
+/// critical |r| at the level of significance. The crossed model's share is computed
+/// with that model.
+fn explained(group: &str, alpha: f64, values: &mut Values) {
+    let Some(n) = values.number(&format!("{group}/n_models")) else {
+        return;
+    };
+    let r2 = values.number(&format!("{group}/pearson/r")).map(|r| r * r);
+    let needed = t_quantile(1.0 - alpha / 2.0, n - 2.0)
         .filter(|_| n >= 3.0)
         .map(|t| t / (n - 2.0 + t * t).sqrt());
     let why = "no correlation over realizations";
-    let mut g = values.group("corr/share", why);
+    let mut g = values.group(format!("{group}/share"), why);
     g.maybe("r2", r2);
     g.maybe(
         "r2_adjusted",
         r2.map(|r2| 1.0 - (1.0 - r2) * (n - 1.0) / (n - 2.0)),
     );
     values
-        .group("corr/pearson", "fewer than three realizations with a VAF")
+        .group(
+            format!("{group}/pearson"),
+            "fewer than three realizations with a VAF",
+        )
         .maybe("critical_r", needed);
 }
 
@@ -115,15 +121,18 @@ fn components(cells: &Cells<'_>, values: &mut Values) {
 }
 
 /// The statistics that are compared with and without the exclusions.
-const BOTH: [&str; 14] = [
+const BOTH: [&str; 17] = [
+    "adjusted/",
     "corr/n_models",
     "corr/pearson/",
     "corr/spearman/",
     "corr/kendall/",
     "corr/share/",
+    "corr_adjusted/pearson/",
     "desc/",
     "design/",
     "friedman/",
+    "lmm_cells/",
     "lmm_vaf_crossed/",
     "posthoc/",
     "realistic/",

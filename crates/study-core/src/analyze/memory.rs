@@ -5,9 +5,10 @@
 //! (`memory_mm`), else in samples, 1/(1 − λ). Only tested realizations with a VAF,
 //! so that each covariate can be compared with VAF.
 
-use super::Rules;
 use super::cells::Cells;
+use super::identifiers::group_id;
 use super::values::{Group, Values};
+use crate::outcome::ratings::Ratings;
 use std::collections::BTreeSet;
 use study_stats::correlation::pearson;
 use study_stats::describe::{is_constant, mean};
@@ -21,11 +22,16 @@ struct Point {
     mean: f64,
 }
 
-pub(super) fn memory(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+/// The names of all covariates, sorted.
+pub(super) fn covariates(ratings: &Ratings) -> Vec<String> {
+    let names = ratings.models.iter().flat_map(|m| m.covariates.keys());
+    let names: BTreeSet<&String> = names.collect();
+    names.into_iter().cloned().collect()
+}
+
+pub(super) fn memory(cells: &Cells<'_>, values: &mut Values) {
     let models = &cells.ratings.models;
-    let names: BTreeSet<&str> = (models.iter())
-        .flat_map(|m| m.covariates.keys().map(String::as_str))
-        .collect();
+    let names = covariates(cells.ratings);
     if names.is_empty() {
         return;
     }
@@ -42,7 +48,7 @@ pub(super) fn memory(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
     };
     for name in &names {
         let x = of(name);
-        let mut g = values.group(format!("covariate/{name}"), reason(x.as_deref()));
+        let mut g = values.group(group_id("covariate", &[name]), reason(x.as_deref()));
         linear(&mut g, x.as_deref(), &points);
     }
     let in_mm = of("memory_mm").filter(|x| x.iter().all(|v| *v > 0.0));

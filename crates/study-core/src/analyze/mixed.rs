@@ -6,6 +6,7 @@
 //! it has a random effect of the realization besides VAF.
 
 use super::cells::Cells;
+use super::identifiers::group_id;
 use super::values::{Group, Values};
 use study_stats::describe::{mean, sum_of_squares};
 use study_stats::distribution::chi2_upper;
@@ -215,7 +216,7 @@ fn model(cells: &Cells<'_>, data: &Data, values: &mut Values) {
             .collect();
         let means = reml.t_tests(&contrasts);
         for (&m, t) in table.realizations().iter().zip(means) {
-            let mut g = values.group(format!("lmm_model/emm/{}", cells.model_name(m)), NO_DF);
+            let mut g = values.group(group_id("lmm_model/emm", &[cells.model_name(m)]), NO_DF);
             g.put("estimate", t.estimate + cells.offset);
             g.put("se", t.se);
             let shift = |e: f64| e + cells.offset;

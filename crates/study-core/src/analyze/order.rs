@@ -1,14 +1,13 @@
 //! Learning and carry-over: `order_trial/*`, `order_previous_rating/*`,
 //! `order_repetition/*`.
 
-use super::Rules;
 use super::cells::Cells;
 use super::values::Values;
 use std::collections::BTreeMap;
 use study_stats::describe::Sum;
 use study_stats::two_way_slope::{TwoWaySlope, two_way_slope};
 
-pub(super) fn order(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
     let r = cells.ratings;
     // Rows of a subject are adjacent.
     let known: Vec<(usize, u32)> = (cells.order.iter())

@@ -7,6 +7,7 @@
 //! probability and no threshold.
 
 use super::cells::Cells;
+use super::identifiers::group_id;
 use super::values::{self, Values};
 use rayon::prelude::*;
 use study_stats::clm::{CategoryCount, CategoryCounts, ClmError, ClmFit, Predictor, clm};
@@ -307,8 +308,8 @@ fn none(g: &mut values::Group<'_>, what: &str) {
 fn put(fit: &ClmFit, labels: &[String], scale: &Scale<'_>, g: &mut values::Group<'_>) {
     g.put("loglik", fit.loglik);
     for ((name, beta), se) in scale.names.iter().zip(&fit.beta).zip(&fit.se) {
-        g.put(&format!("beta/{name}"), beta / scale.unit);
-        g.put(&format!("se/{name}"), se / scale.unit);
+        g.put(&group_id("beta", &[name]), beta / scale.unit);
+        g.put(&group_id("se", &[name]), se / scale.unit);
     }
     let shift = match fit.beta.first() {
         Some(beta) => beta / scale.unit * scale.origin,

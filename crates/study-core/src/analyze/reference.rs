@@ -5,6 +5,7 @@
 use super::Rules;
 use super::cells::Cells;
 use super::exclude;
+use super::identifiers::group_id;
 use super::values::Values;
 use crate::protocol::Role;
 use study_stats::describe::{mean, rounded};
@@ -39,7 +40,7 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
         let (r, t) = (cells.model_name(r), cells.model_name(*t));
         let test = one_sample(differences);
         let mut g = values.group(
-            format!("reference/{r}/{t}"),
+            group_id("reference", &[r, t]),
             if differences.len() < 2 {
                 "fewer than two subjects rated both"
             } else {
@@ -62,7 +63,10 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
         g.maybe("t_upper", e.map(|e| e.t_upper));
         g.maybe("p_tost", e.map(|e| e.p));
         g.interval("ci90", e.map(|e| e.ci90));
-        g.maybe("equivalent", e.map(|e| f64::from(u8::from(e.p < 0.05))));
+        g.maybe(
+            "equivalent",
+            e.map(|e| f64::from(u8::from(e.p < rules.alpha))),
+        );
     }
 }
 
@@ -73,11 +77,17 @@ fn duplicates(cells: &Cells<'_>, values: &mut Values) {
         let differences: Vec<f64> = pair.rows.iter().map(|r| rounded(r[0] - r[1])).collect();
         let sizes: Vec<f64> = differences.iter().map(|v| v.abs()).collect();
         let test = one_sample(&differences);
-        let id = format!("duplicate/{}", cells.model_name(d));
+        let id = group_id("duplicate", &[cells.model_name(d)]);
         let mut g = values.group(id, "fewer than two subjects");
         g.put("n", differences.len() as f64);
         g.maybe("mean_diff", test.map(|t| t.mean));
         g.interval("ci95", test.map(|t| t.ci95));
+        let why = match test {
+            Some(_) => "all differences are equal",
+            None => "fewer than two subjects",
+        };
+        g.put_or("t", test.and_then(|t| t.t), why);
+        g.put_or("p_t", test.and_then(|t| t.p), why);
         g.maybe("mean_absolute_diff", mean(&sizes));
     }
 }

@@ -1,9 +1,9 @@
 //! Screening of participants: `subject/*` and `screen/*`. Nobody is excluded here.
 
-use super::Rules;
 use super::cells::{Cells, CompleteTable, within};
 use super::describe::{NO_REPETITION, ONE};
 use super::exclude::{distances, pairs};
+use super::identifiers::group_id;
 use super::values::Values;
 use crate::protocol::Role;
 use study_stats::correlation::pearson;
@@ -12,7 +12,7 @@ use study_stats::describe::{mean, sd};
 /// Largest number of participants that are listed one by one.
 pub(super) const MAX_LISTED: usize = 5000;
 
-pub(super) fn subjects(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
+pub(super) fn subjects(cells: &Cells<'_>, values: &mut Values) {
     let r = cells.ratings;
     let n = r.subjects.len();
     let listed = n <= MAX_LISTED;
@@ -40,7 +40,7 @@ pub(super) fn subjects(cells: &Cells<'_>, _: &Rules, values: &mut Values) {
             continue;
         }
         let ordered = rows.iter().all(|&i| r.trial_index[i].is_some());
-        let mut g = values.group(format!("subject/{}", cells.subject_name(s)), "no ratings");
+        let mut g = values.group(group_id("subject", &[cells.subject_name(s)]), "no ratings");
         g.put("n", x.len() as f64);
         g.maybe("mean", mean(&x));
         g.put_or("sd", sd(&x), ONE);

@@ -5,8 +5,10 @@
 //! Only tested realizations with a VAF.
 
 use super::Rules;
+use super::adjusted::Adjusted;
 use super::cells::{Cells, CompleteTable};
 use super::draws::Draws;
+use super::identifiers::group_id;
 use super::subjects::MAX_LISTED;
 use super::values::Values;
 use study_base::text::Untrusted;
@@ -26,7 +28,12 @@ const FEW: &str = "fewer than three realizations with a VAF";
 /// Largest number of realizations to leave out one by one; the cost is quadratic.
 const MAX_LEFT_OUT: usize = 1000;
 
-pub(super) fn against_vaf(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
+pub(super) fn against_vaf(
+    cells: &Cells<'_>,
+    adjusted: &Adjusted,
+    rules: &Rules,
+    values: &mut Values,
+) {
     let models: Vec<usize> = cells
         .tested()
         .into_iter()
@@ -34,44 +41,79 @@ pub(super) fn against_vaf(cells: &Cells<'_>, rules: &Rules, values: &mut Values)
         .collect();
     let vaf: Vec<f64> = models.iter().filter_map(|&m| cells.vaf[m]).collect();
     let table = cells.table(&models);
-    between_realizations(cells, &models, &vaf, rules, values);
+    let by_model = cells.subject_means();
+    let raw = |m: usize| mean(&by_model[m]);
+    Points::of(cells, &models, raw).correlate("corr", rules, values);
+    if adjusted.design.is_complete() {
+        values.copy_group("corr/", "corr_adjusted/");
+    } else {
+        match &adjusted.means {
+            Ok(means) => {
+                let of = |m: usize| Some(means[adjusted.models.binary_search(&m).ok()?]);
+                Points::of(cells, &models, of).correlate("corr_adjusted", rules, values);
+            }
+            Err(why) => values
+                .group("corr_adjusted/pearson", why.to_string())
+                .none(&["r", "p_t"]),
+        }
+    }
     by_subject(cells, &table, &vaf, values);
     trend(&table, &vaf, values);
     resampled(&table, &vaf, rules, values);
     within(cells, &models, values);
 }
 
-/// Correlations over realizations, of VAF with the mean of the subjects' cell means.
-fn between_realizations(
-    cells: &Cells<'_>,
-    models: &[usize],
-    vaf: &[f64],
+/// The realizations as points.
+#[derive(Default)]
+struct Points<'a> {
+    vaf: Vec<f64>,
+    means: Vec<f64>,
+    names: Vec<&'a str>,
+}
+
+impl<'a> Points<'a> {
+    /// The realizations with a VAF and a mean.
+    fn of(cells: &'a Cells<'_>, models: &[usize], mean: impl Fn(usize) -> Option<f64>) -> Self {
+        let mut points = Self::default();
+        for &m in models {
+            if let (Some(vaf), Some(mean)) = (cells.vaf[m], mean(m)) {
+                points.vaf.push(vaf);
+                points.means.push(mean);
+                points.names.push(cells.model_name(m));
+            }
+        }
+        points
+    }
+
+    /// Correlations over realizations, as `corr/*` or `corr_adjusted/*`.
+    fn correlate(&self, group: &str, rules: &Rules, values: &mut Values) {
+        correlations(group, &self.vaf, &self.means, &self.names, rules, values);
+    }
+}
+
+/// Correlations over realizations of VAF with a mean rating.
+fn correlations(
+    group: &str,
+    x: &[f64],
+    y: &[f64],
+    names: &[&str],
     rules: &Rules,
     values: &mut Values,
 ) {
-    let by_model = cells.subject_means();
-    let (mut x, mut y, mut names) = (Vec::new(), Vec::new(), Vec::new());
-    for (&m, &v) in models.iter().zip(vaf) {
-        if let Some(mean) = mean(&by_model[m]) {
-            x.push(v);
-            y.push(mean);
-            names.push(cells.model_name(m));
-        }
-    }
     let n = x.len();
-    values.group("corr", "").put("n_models", n as f64);
+    values.group(group, "").put("n_models", n as f64);
     let why = if n < 3 {
         FEW
-    } else if is_constant(&x) {
+    } else if is_constant(x) {
         "all realizations have the same VAF"
     } else {
         "all realizations have the same mean rating"
     };
     // Two points always lie on a line.
     let enough = |r: Option<f64>| r.filter(|_| n >= 3);
-    let r = enough(pearson(&x, &y));
+    let r = enough(pearson(x, y));
     let line = "the means lie on a line";
-    let mut g = values.group("corr/pearson", why);
+    let mut g = values.group(format!("{group}/pearson"), why);
     g.maybe("r", r);
     g.put_or(
         "p_t",
@@ -88,19 +130,21 @@ fn between_realizations(
     g.put_or("ci95_hi", interval.map(|i| i.1), no_interval);
     let bf10 = r.and_then(|r| correlation_bf10(r, n));
     g.put_or("bf10", bf10, if r.is_some() { line } else { why });
-    let rho = enough(spearman(&x, &y));
-    values.group("corr/spearman", why).maybe("rho", rho);
+    let rho = enough(spearman(x, y));
     values
-        .group("corr/kendall", why)
-        .maybe("tau_b", enough(kendall(&x, &y)));
+        .group(format!("{group}/spearman"), why)
+        .maybe("rho", rho);
+    values
+        .group(format!("{group}/kendall"), why)
+        .maybe("tau_b", enough(kendall(x, y)));
     for (name, statistic) in [
         ("pearson", Statistic::Pearson),
         ("spearman", Statistic::Spearman),
         ("kendall", Statistic::Kendall),
     ] {
         let mut draws = Draws::new(rules.seed, "permutation");
-        let test = permutation::test(statistic, &x, &y, &mut draws);
-        let mut g = values.group(format!("corr/{name}"), why);
+        let test = permutation::test(statistic, x, y, &mut draws);
+        let mut g = values.group(format!("{group}/{name}"), why);
         let kind = if n > permutation::MAX_EXACT {
             "monte_carlo"
         } else {
@@ -110,11 +154,18 @@ fn between_realizations(
         g.maybe(&format!("p_{kind}_greater"), test.map(|t| t.greater));
         g.maybe("smallest_p_two_sided", test.map(|t| t.smallest));
     }
-    leave_one_out(&x, &y, &names, why, values);
+    leave_one_out(&format!("{group}/leave_one_out"), x, y, names, why, values);
 }
 
 /// The correlations without each realization in turn.
-fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut Values) {
+fn leave_one_out(
+    group: &str,
+    x: &[f64],
+    y: &[f64],
+    names: &[&str],
+    why: &str,
+    values: &mut Values,
+) {
     let n = x.len();
     let without = |i: usize, v: &[f64]| -> Vec<f64> {
         let kept = v.iter().enumerate().filter(|(j, _)| *j != i);
@@ -142,7 +193,7 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
             "mean ratings"
         };
         let mut g = values.group(
-            format!("corr/leave_one_out/{name}"),
+            group_id(group, &[name]),
             format!("without it all {left} are equal"),
         );
         g.maybe("pearson", both[0]);
@@ -165,7 +216,7 @@ fn leave_one_out(x: &[f64], y: &[f64], names: &[&str], why: &str, values: &mut V
         }
     }
     let why = lost.as_deref().unwrap_or(why);
-    let mut g = values.group("corr/leave_one_out", why);
+    let mut g = values.group(group, why);
     for (k, name) in ["pearson", "spearman"].iter().enumerate() {
         g.maybe(&format!("{name}_min"), complete.then_some(lowest[k]));
         g.maybe(&format!("{name}_max"), complete.then_some(highest[k]));
@@ -180,7 +231,7 @@ fn by_subject(cells: &Cells<'_>, table: &CompleteTable, vaf: &[f64], values: &mu
         let r = pearson(vaf, row);
         let b = slope(vaf, row);
         if table.subjects.len() <= MAX_LISTED {
-            let id = format!("subject_corr/{}", cells.subject_name(s));
+            let id = group_id("subject_corr", &[cells.subject_name(s)]);
             let mut g = values.group(id, "the subject rated all realizations alike");
             g.maybe("r", r);
             g.maybe("spearman", spearman(vaf, row));

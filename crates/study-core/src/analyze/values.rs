@@ -79,6 +79,17 @@ impl Values {
         }
     }
 
+    /// Copies the statistics whose identifiers start with `from` to identifiers that
+    /// start with `to`.
+    pub(super) fn copy_group(&mut self, from: &str, to: &str) {
+        let copies: Vec<(String, Value)> = (self.0.range(from.to_owned()..))
+            .map_while(|(id, value)| {
+                Some((format!("{to}{}", id.strip_prefix(from)?), value.clone()))
+            })
+            .collect();
+        self.0.extend(copies);
+    }
+
     /// Starts a group of statistics with a common prefix; `why` is the default reason
     /// of the undefined ones.
     pub(super) fn group(&mut self, prefix: impl Into<String>, why: impl Into<String>) -> Group<'_> {

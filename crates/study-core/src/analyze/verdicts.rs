@@ -3,7 +3,7 @@
 //! The report, the terminal page and the paragraphs take their verdicts from here, so
 //! that they cannot disagree. docs/report.md states the rules.
 
-use super::effects::pair_id;
+use super::identifiers::{group_id, pair_id};
 use super::values::Values;
 use super::{Analysis, RealizationSummary};
 
@@ -97,7 +97,27 @@ impl Analysis {
 
     /// A descriptive statistic of a realization, such as its `mean`.
     pub fn described(&self, model: &str, statistic: &str) -> Option<f64> {
-        self.values.number(&format!("desc/{model}/{statistic}"))
+        self.about("desc", &[model], statistic)
+    }
+
+    /// A statistic about something with a name, such as `realistic/M/share`.
+    pub fn about(&self, group: &str, names: &[&str], statistic: &str) -> Option<f64> {
+        let id = group_id(group, names);
+        self.values.number(&format!("{id}/{statistic}"))
+    }
+
+    /// The participants that are listed one by one. Untrusted.
+    pub fn listed_subjects(&self) -> impl Iterator<Item = &str> {
+        let listed = |s: &&str| {
+            let id = group_id("subject", &[s]);
+            self.values.get(&format!("{id}/n")).is_some()
+        };
+        self.subjects.iter().map(String::as_str).filter(listed)
+    }
+
+    /// The finding that answers a question.
+    pub fn finding(&self, question: &super::Question) -> Option<&super::Finding> {
+        self.findings.iter().find(|f| f.question == *question)
     }
 
     /// Mean rating and name of the tested realizations, highest mean first, equal ones by name.
@@ -131,7 +151,7 @@ impl Analysis {
     /// The test of whether two realizations differ, with Holm's correction: Wilcoxon's
     /// exact test; where it is undefined the paired t test.
     pub fn pair_test(&self, a: &str, b: &str) -> Option<DecidingTest> {
-        let id = pair_id(a.min(b), a.max(b));
+        let id = pair_id("posthoc", a, b);
         let wilcoxon = format!("{id}/p_wilcoxon_exact_holm");
         let t = format!("{id}/p_t_holm");
         let tests = [
@@ -143,13 +163,13 @@ impl Analysis {
 
     /// A statistic of a pair: a minus b, or the other way round if the names sort so.
     pub fn paired(&self, a: &str, b: &str, statistic: &str) -> Option<f64> {
-        let id = pair_id(a.min(b), a.max(b));
+        let id = pair_id("posthoc", a, b);
         self.values.number(&format!("{id}/{statistic}"))
     }
 
     /// Why two realizations were not compared, if they were not.
     pub fn pair_reason(&self, a: &str, b: &str) -> Option<&str> {
-        let id = pair_id(a.min(b), a.max(b));
+        let id = pair_id("posthoc", a, b);
         self.values.reason(&format!("{id}/p_t"))
     }
 

@@ -4,6 +4,7 @@ use super::Rules;
 use super::cells::Cells;
 use super::deviation::PreregisteredRule;
 use super::exclude::Applied;
+use super::identifiers::group_id;
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
 use super::values::Values;
@@ -288,8 +289,9 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
     let names = (cells.ratings.subjects.iter())
         .map(|s| s.id.as_str())
         .filter(|id| {
-            let n = values.number(&format!("subject/{id}/n")).unwrap_or(0.0);
-            n > 1.0 && values.number(&format!("subject/{id}/distinct")) == Some(1.0)
+            let id = group_id("subject", &[id]);
+            let n = values.number(&format!("{id}/n")).unwrap_or(0.0);
+            n > 1.0 && values.number(&format!("{id}/distinct")) == Some(1.0)
         })
         .take(5);
     let shown = names.collect::<Vec<_>>().join(", ");

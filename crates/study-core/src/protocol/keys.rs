@@ -175,6 +175,9 @@ impl Kind {
             }
             Self::Whole(least, most) => format!("a whole number from {least} to {most}"),
             Self::Number(range, _) => match range {
+                (Bound::Excluded(low), Bound::Excluded(high)) => {
+                    format!("a number between {low} and {high}")
+                }
                 (Bound::Excluded(low), _) => format!("a finite number above {low}"),
                 (Bound::Included(low), _) => format!("a finite number, {low} or more"),
                 (_, Bound::Included(high)) => format!("a finite number, at most {high}"),

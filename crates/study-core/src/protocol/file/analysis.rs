@@ -3,6 +3,7 @@
 use super::section::{Section, Variant, shapes};
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::{AnalysisRules, Exclusion, Unfinished};
+use std::ops::Bound;
 
 pub(super) const ANALYSIS: &[Key] = keys! {
     /// The id of the question that the analysis is about: a rating, a slider or a number
@@ -22,6 +23,10 @@ pub(super) const ANALYSIS: &[Key] = keys! {
     /// without any rule, so that the order of the rules does not matter. The report shows
     /// the results with and without them.
     "exclude": Kind::Variants(&EXCLUDE), "";
+    /// The level of significance of every test, two-sided. Without it the level is .05.
+    "alpha": Kind::Number((Bound::Excluded(0.0), Bound::Excluded(1.0)), ""), "0.01";
+    /// What the primary question measures, as a noun: the report uses it in its sentences.
+    "construct": Kind::Text, r#""pleasantness""#;
 };
 
 static EXCLUDE: Variants = Variants {
@@ -81,6 +86,8 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
     let realistic_from = section.number("realistic_from");
     let equivalence_margin = section.number("equivalence_margin");
     let unfinished = section.word("unfinished");
+    let alpha = section.number("alpha");
+    let construct = section.text("construct");
     let exclude = (section.variants("exclude", &RULES).into_iter())
         .filter_map(|(mut section, rule)| (rule?.read)(&mut section))
         .collect();
@@ -91,5 +98,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
         equivalence_margin,
         unfinished: unfinished?,
         exclude,
+        alpha,
+        construct,
     })
 }

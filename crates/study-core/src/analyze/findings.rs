@@ -1,0 +1,384 @@
+//! Findings: the answer to each question of the study.
+//!
+//! A finding has a verdict, the test that decided, what it rests on, an estimate and
+//! its caveats. The terminal page, the report, JSON, CSV and the paragraphs print
+//! findings and decide nothing. docs/report.md states which test decides: the choice
+//! depends on the design and never on a rating.
+
+mod differ;
+mod others;
+mod pairs;
+mod vaf;
+
+use super::Rules;
+use super::cells::Cells;
+use super::design::Design;
+use super::identifiers::group_id;
+use super::values::Values;
+use super::warnings::Warning;
+
+pub use pairs::Pair;
+
+/// A question of the study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Question {
+    /// Does VAF predict the rating?
+    Vaf,
+    /// Does the memory of the identification (the forgetting factor) matter?
+    Memory,
+    /// Does the realization with the highest mean differ from the second?
+    Best,
+    /// Do the realizations differ?
+    Differ,
+    /// Which pairs of realizations differ?
+    Pairs,
+    /// Do ratings drift over the session?
+    Order,
+    /// Does the realization with the highest mean differ from this reference?
+    Reference(String),
+    /// Is it equivalent to this reference, within the stated margin?
+    Equivalence(String),
+    /// Does this hidden duplicate differ from its original?
+    Repeat(String),
+}
+
+impl Question {
+    /// The identifier in `--json` and of its statistics, `finding/ID/*`.
+    pub fn id(&self) -> String {
+        match self {
+            Self::Vaf => "vaf".to_owned(),
+            Self::Memory => "memory".to_owned(),
+            Self::Best => "best".to_owned(),
+            Self::Differ => "differ".to_owned(),
+            Self::Pairs => "pairs".to_owned(),
+            Self::Order => "order".to_owned(),
+            Self::Reference(name) => group_id("reference", &[name]),
+            Self::Equivalence(name) => group_id("equivalence", &[name]),
+            Self::Repeat(name) => group_id("repeat", &[name]),
+        }
+    }
+}
+
+/// The answer to a question.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// The deciding test is significant.
+    Yes,
+    /// It is not: nothing is shown.
+    NotShown,
+    /// There is no such test, because of this.
+    Undefined(String),
+}
+
+impl Verdict {
+    /// The word in `--json`.
+    pub fn as_str(&self) -> &'static str {
+        match self {
+            Self::Yes => "yes",
+            Self::NotShown => "not shown",
+            Self::Undefined(_) => "undefined",
+        }
+    }
+}
+
+/// The direction of an effect that is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// The rating rises.
+    Up,
+    /// The rating falls.
+    Down,
+    /// The rating is a curved function.
+    Curved,
+}
+
+impl Direction {
+    /// The word in `--json`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Up => "up",
+            Self::Down => "down",
+            Self::Curved => "curved",
+        }
+    }
+
+    fn of(estimate: f64) -> Self {
+        if estimate > 0.0 { Self::Up } else { Self::Down }
+    }
+}
+
+/// A test that can decide a question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TestKind {
+    /// Repeated-measures analysis of variance of two realizations: a paired t test.
+    Anova,
+    /// The same with the Greenhouse–Geisser correction.
+    AnovaGreenhouseGeisser,
+    /// The same with the Huynh–Feldt correction.
+    AnovaHuynhFeldt,
+    /// F of the mixed model of all cell means, Satterthwaite's degrees of freedom.
+    MixedModel,
+    /// Friedman's test with its exact distribution.
+    FriedmanExact,
+    /// Friedman's test with Iman and Davenport's F.
+    Friedman,
+    /// Paired t test.
+    PairedT,
+    /// Contrast of the mixed model of all cell means.
+    MixedContrast,
+    /// Permutation test over all orders of the realizations.
+    PermutationExact,
+    /// Permutation test over random orders of the realizations.
+    PermutationMonteCarlo,
+    /// t test of a regression slope.
+    SlopeT,
+    /// Two one-sided t tests.
+    Equivalence,
+}
+
+impl TestKind {
+    /// The word in `--json`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Anova => "anova",
+            Self::AnovaGreenhouseGeisser => "anova-greenhouse-geisser",
+            Self::AnovaHuynhFeldt => "anova-huynh-feldt",
+            Self::MixedModel => "mixed-model",
+            Self::FriedmanExact => "friedman-exact",
+            Self::Friedman => "friedman",
+            Self::PairedT => "paired-t",
+            Self::MixedContrast => "mixed-contrast",
+            Self::PermutationExact => "permutation-exact",
+            Self::PermutationMonteCarlo => "permutation-monte-carlo",
+            Self::SlopeT => "slope-t",
+            Self::Equivalence => "equivalence",
+        }
+    }
+}
+
+/// A test statistic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Statistic {
+    /// `F`, `t`, `χ²` or `r`.
+    pub symbol: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its degrees of freedom, corrected where the test corrects them; may be empty.
+    pub df: Vec<f64>,
+}
+
+/// The test that decides a question.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Test {
+    /// Which test.
+    pub kind: TestKind,
+    /// Its statistic.
+    pub statistic: Option<Statistic>,
+    /// Its p, corrected for the number of comparisons.
+    pub p: f64,
+    /// The level against which p is held.
+    pub level: f64,
+    /// The number of tests for which p or the level is corrected; 1 if it is not.
+    pub comparisons: usize,
+}
+
+impl Test {
+    /// The test of a question that has only one.
+    fn single(kind: TestKind, p: f64, level: f64) -> Self {
+        Self {
+            kind,
+            statistic: None,
+            p,
+            level,
+            comparisons: 1,
+        }
+    }
+
+    fn with(mut self, symbol: &'static str, value: Option<f64>, df: &[Option<f64>]) -> Self {
+        let df: Option<Vec<f64>> = df.iter().copied().collect();
+        self.statistic = value.map(|value| Statistic {
+            symbol,
+            value,
+            df: df.unwrap_or_default(),
+        });
+        self
+    }
+
+    /// Whether it is significant.
+    pub fn is_significant(&self) -> bool {
+        self.p < self.level
+    }
+
+    fn verdict(&self) -> Verdict {
+        if self.is_significant() {
+            Verdict::Yes
+        } else {
+            Verdict::NotShown
+        }
+    }
+}
+
+/// An estimate or an effect size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// What is estimated: `r`, `difference`, `slope`, `dz`, `generalized eta squared` …
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its 95 % interval.
+    pub ci95: Option<(f64, f64)>,
+}
+
+impl Estimate {
+    fn of(name: &'static str, value: f64) -> Option<Self> {
+        Some(Self {
+            name,
+            value,
+            ci95: None,
+        })
+    }
+}
+
+/// The answer to a question, with what it rests on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// The question.
+    pub question: Question,
+    /// The answer.
+    pub verdict: Verdict,
+    /// The direction of the effect, where it is shown and has one.
+    pub direction: Option<Direction>,
+    /// The realizations that it is about, such as the best and the second. Untrusted.
+    pub names: Vec<String>,
+    /// The test that decided.
+    pub test: Option<Test>,
+    /// The participants on whom it rests.
+    pub participants: usize,
+    /// The realizations on which it rests.
+    pub realizations: usize,
+    /// The main estimate.
+    pub estimate: Option<Estimate>,
+    /// A standardized effect size.
+    pub effect: Option<Estimate>,
+    /// What limits it.
+    pub caveats: Vec<Warning>,
+}
+
+impl Finding {
+    /// A finding without a test.
+    fn undefined(question: Question, why: impl Into<String>, design: Design) -> Self {
+        Self {
+            question,
+            verdict: Verdict::Undefined(why.into()),
+            direction: None,
+            names: Vec::new(),
+            test: None,
+            participants: design.participants,
+            realizations: design.realizations,
+            estimate: None,
+            effect: None,
+            caveats: Vec::new(),
+        }
+    }
+
+    /// The finding that a test decides.
+    fn decided(question: Question, test: Test, design: Design) -> Self {
+        Self {
+            verdict: test.verdict(),
+            test: Some(test),
+            ..Self::undefined(question, "", design)
+        }
+    }
+
+    fn caveat(&mut self, code: &'static str, text: impl Into<String>) {
+        self.caveats.push(Warning {
+            code,
+            text: text.into(),
+        });
+    }
+
+    /// Whether it is a yes.
+    pub fn is_yes(&self) -> bool {
+        self.verdict == Verdict::Yes
+    }
+
+    /// Why there is no verdict.
+    pub fn reason(&self) -> Option<&str> {
+        match &self.verdict {
+            Verdict::Undefined(why) => Some(why),
+            Verdict::Yes | Verdict::NotShown => None,
+        }
+    }
+}
+
+/// What findings are made from.
+struct Facts<'a> {
+    cells: &'a Cells<'a>,
+    design: Design,
+    rules: &'a Rules,
+    values: &'a Values,
+    pairs: Vec<Pair>,
+    /// Adjusted mean and name of the tested realizations, highest first.
+    ranked: Vec<(f64, &'a str)>,
+}
+
+impl Facts<'_> {
+    fn number(&self, id: &str) -> Option<f64> {
+        self.values.number(id)
+    }
+}
+
+/// All findings, in the order of a report, and the comparisons of pairs. Their numbers
+/// are added to the statistics.
+pub(super) fn findings(
+    cells: &Cells<'_>,
+    design: Design,
+    rules: &Rules,
+    values: &mut Values,
+) -> (Vec<Finding>, Vec<Pair>) {
+    let facts = Facts {
+        cells,
+        design,
+        rules,
+        values,
+        pairs: pairs::all(cells, rules, values),
+        ranked: others::ranked(cells, values),
+    };
+    let mut found = others::against_references(&facts);
+    found.extend(vaf::vaf(&facts));
+    found.extend(others::memory(&facts));
+    found.extend(pairs::best(&facts));
+    found.extend(differ::differ(&facts));
+    found.extend(pairs::which(&facts));
+    found.extend(others::order(&facts));
+    found.extend(others::repeats(&facts));
+    let pairs = facts.pairs;
+    for finding in &found {
+        put(finding, values);
+    }
+    (found, pairs)
+}
+
+/// The numbers of a finding, as `finding/ID/*`.
+fn put(f: &Finding, values: &mut Values) {
+    let why = f.reason().unwrap_or("the question has no such number");
+    let verdict = match f.verdict {
+        Verdict::Yes => Some(1.0),
+        Verdict::NotShown => Some(0.0),
+        Verdict::Undefined(_) => None,
+    };
+    let mut g = values.group(format!("finding/{}", f.question.id()), why);
+    g.maybe("verdict", verdict);
+    g.maybe("p", f.test.as_ref().map(|t| t.p));
+    g.maybe("level", f.test.as_ref().map(|t| t.level));
+    let statistic = f.test.as_ref().and_then(|t| t.statistic.as_ref());
+    g.maybe("statistic", statistic.map(|s| s.value));
+    let df = |i: usize| statistic.and_then(|s| s.df.get(i).copied());
+    g.maybe("df1", df(0));
+    g.maybe("df2", df(1));
+    g.maybe("estimate", f.estimate.map(|e| e.value));
+    g.interval("ci95", f.estimate.and_then(|e| e.ci95));
+    g.maybe("effect", f.effect.map(|e| e.value));
+    g.put("n_participants", f.participants as f64);
+    g.put("n_realizations", f.realizations as f64);
+}

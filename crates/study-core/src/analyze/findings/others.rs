@@ -1,0 +1,176 @@
+//! Memory, order, references, hidden duplicates; and the ranking.
+
+use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind};
+use crate::analyze::cells::Cells;
+use crate::analyze::exclude;
+use crate::analyze::identifiers::group_id;
+use crate::analyze::values::Values;
+use crate::protocol::Role;
+
+/// Adjusted mean and name of the tested realizations, the highest mean first, equal
+/// ones by name.
+pub(super) fn ranked<'a>(cells: &'a Cells<'_>, values: &Values) -> Vec<(f64, &'a str)> {
+    let mut ranked: Vec<(f64, &str)> = (cells.tested().iter())
+        .filter_map(|&m| {
+            let name = cells.model_name(m);
+            let id = group_id("adjusted", &[name]);
+            Some((values.number(&format!("{id}/mean"))?, name))
+        })
+        .collect();
+    ranked.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(y.1)));
+    ranked
+}
+
+/// Whether the memory matters: a linear and a quadratic term, each at half the level.
+pub(super) fn memory(facts: &Facts<'_>) -> Option<Finding> {
+    const GROUP: &str = "covariate/log10_memory";
+    facts.values.get("covariate/log10_memory/r")?;
+    let get = |what: &str| facts.number(&format!("{GROUP}/{what}"));
+    let n = get("n_models").unwrap_or(0.0) as usize;
+    let curve = get("quadratic/p").map(|p| (p, get("quadratic/t"), get("quadratic/df")));
+    let level = facts.rules.alpha / if curve.is_some() { 2.0 } else { 1.0 };
+    let tested = |p: f64, t: Option<f64>, df: Option<f64>| Test {
+        comparisons: 1 + usize::from(curve.is_some()),
+        ..Test::single(TestKind::SlopeT, p, level).with("t", t, &[df])
+    };
+    let linear = get("p").map(|p| tested(p, get("t"), get("df")));
+    let curved = curve.map(|(p, t, df)| tested(p, t, df));
+    let r = get("r");
+    let yes = |test: &Option<Test>| test.as_ref().is_some_and(Test::is_significant);
+    let (test, direction) = match (linear, curved) {
+        (linear, _) if yes(&linear) => (linear, r.map(Direction::of)),
+        (Some(_), curved) if yes(&curved) => (curved, Some(Direction::Curved)),
+        (linear, _) => (linear, None),
+    };
+    let mut found = match test {
+        Some(test) => Finding::decided(Question::Memory, test, facts.design),
+        None => {
+            let reason = |what: &str| facts.values.reason(&format!("{GROUP}/{what}"));
+            let why = reason("r")
+                .or_else(|| reason("p"))
+                .unwrap_or("there is no test");
+            Finding::undefined(Question::Memory, why, facts.design)
+        }
+    };
+    found.realizations = n;
+    found.direction = direction;
+    found.estimate = r.and_then(|r| Estimate::of("r", r));
+    Some(found)
+}
+
+/// Whether ratings drift over the session.
+pub(super) fn order(facts: &Facts<'_>) -> Option<Finding> {
+    let get = |what: &str| facts.number(&format!("order_trial/{what}"));
+    let (slope, p) = (get("slope")?, get("p")?);
+    let test = Test::single(TestKind::SlopeT, p, facts.rules.alpha);
+    let test = test.with("t", get("t"), &[get("df")]);
+    let direction = Some(Direction::of(slope)).filter(|_| test.is_significant());
+    Some(Finding {
+        direction,
+        estimate: Estimate::of("slope", slope),
+        ..Finding::decided(Question::Order, test, facts.design)
+    })
+}
+
+/// The realization with the highest mean against each reference, anchor and physical
+/// sample: a difference, and equivalence within the stated margin.
+pub(super) fn against_references(facts: &Facts<'_>) -> Vec<Finding> {
+    let Some(&(_, best)) = facts.ranked.first() else {
+        return Vec::new();
+    };
+    let mut found = Vec::new();
+    for model in &facts.cells.ratings.models {
+        let reference = match model.role {
+            Role::HiddenReference | Role::Physical | Role::LowAnchor => &model.id,
+            Role::Test | Role::Practice => continue,
+        };
+        let id = group_id("reference", &[reference, best]);
+        let get = |what: &str| facts.number(&format!("{id}/{what}"));
+        let Some(difference) = get("mean_diff") else {
+            continue;
+        };
+        let n = get("n").unwrap_or(0.0);
+        let why = |what: &str| {
+            let reason = facts.values.reason(&format!("{id}/{what}"));
+            reason.unwrap_or("there is no test").to_owned()
+        };
+        let put = |found: Finding, ci: &str| Finding {
+            names: vec![best.to_owned(), reference.clone()],
+            participants: n as usize,
+            realizations: 2,
+            estimate: Some(Estimate {
+                name: "difference",
+                value: difference,
+                ci95: facts.values.interval(&format!("{id}/{ci}")),
+            }),
+            ..found
+        };
+        let question = Question::Reference(reference.clone());
+        let test = get("p_t_holm").map(|p| Test {
+            comparisons: facts.design.realizations,
+            ..Test::single(TestKind::PairedT, p, facts.rules.alpha).with(
+                "t",
+                get("t"),
+                &[Some(n - 1.0)],
+            )
+        });
+        let differs = match test {
+            Some(test) => Finding {
+                direction: Some(Direction::of(difference)).filter(|_| test.is_significant()),
+                ..Finding::decided(question, test, facts.design)
+            },
+            None => Finding::undefined(question, why("p_t"), facts.design),
+        };
+        found.push(put(differs, "ci95"));
+        if model.role == Role::LowAnchor || get("margin").is_none() {
+            continue;
+        }
+        let question = Question::Equivalence(reference.clone());
+        let equivalent = match get("p_tost") {
+            Some(p) => {
+                let test = Test::single(TestKind::Equivalence, p, facts.rules.alpha);
+                Finding::decided(question, test, facts.design)
+            }
+            None => Finding::undefined(question, why("p_tost"), facts.design),
+        };
+        found.push(put(equivalent, "ci95"));
+    }
+    found
+}
+
+/// Each hidden duplicate against its original.
+pub(super) fn repeats(facts: &Facts<'_>) -> Vec<Finding> {
+    let name = |m: usize| facts.cells.model_name(m).to_owned();
+    let pairs = exclude::pairs(facts.cells.ratings).into_iter();
+    pairs
+        .filter_map(|(duplicate, original)| {
+            let id = group_id("duplicate", &[&name(duplicate)]);
+            let get = |what: &str| facts.number(&format!("{id}/{what}"));
+            let difference = get("mean_diff")?;
+            let n = get("n")?;
+            let question = Question::Repeat(name(duplicate));
+            let found = match get("p_t") {
+                Some(p) => {
+                    let test = Test::single(TestKind::PairedT, p, facts.rules.alpha);
+                    let test = test.with("t", get("t"), &[Some(n - 1.0)]);
+                    Finding::decided(question, test, facts.design)
+                }
+                None => {
+                    let why = facts.values.reason(&format!("{id}/p_t"));
+                    Finding::undefined(question, why.unwrap_or("there is no test"), facts.design)
+                }
+            };
+            Some(Finding {
+                names: vec![name(duplicate), name(original)],
+                participants: n as usize,
+                realizations: 2,
+                estimate: Some(Estimate {
+                    name: "difference",
+                    value: difference,
+                    ci95: facts.values.interval(&format!("{id}/ci95")),
+                }),
+                ..found
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,101 @@
+//! Does VAF predict the rating?
+
+use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind};
+use study_base::apa;
+
+/// The group of statistics that decides: correlations with adjusted means, which are the
+/// means over participants if no cell is missing.
+const DECIDING: &str = "corr_adjusted";
+
+pub(super) fn vaf(facts: &Facts<'_>) -> Option<Finding> {
+    let cells = facts.cells;
+    let with_vaf = cells
+        .tested()
+        .into_iter()
+        .filter(|&m| cells.vaf[m].is_some());
+    let n = with_vaf.count();
+    if n == 0 {
+        return None;
+    }
+    let of = |what: &str| facts.number(&format!("{DECIDING}/{what}"));
+    let found = decided(facts).unwrap_or_else(|| {
+        let reason = |id: &str| facts.values.reason(&format!("{DECIDING}/pearson/{id}"));
+        let why = reason("r").unwrap_or("the permutation test is undefined");
+        Finding::undefined(Question::Vaf, why, facts.design)
+    });
+    let mut found = Finding {
+        realizations: n,
+        ..found
+    };
+    found.estimate = of("pearson/r").map(|value| Estimate {
+        name: "r",
+        value,
+        ci95: facts.values.interval(&format!("{DECIDING}/pearson/ci95")),
+    });
+    caveats(facts, &mut found);
+    Some(found)
+}
+
+fn decided(facts: &Facts<'_>) -> Option<Finding> {
+    let of = |what: &str| facts.number(&format!("{DECIDING}/pearson/{what}"));
+    let r = of("r")?;
+    let exact = of("p_exact_two_sided").map(|p| (TestKind::PermutationExact, p));
+    let random = || of("p_monte_carlo_two_sided").map(|p| (TestKind::PermutationMonteCarlo, p));
+    let (kind, p) = exact.or_else(random)?;
+    let test = Test::single(kind, p, facts.rules.alpha).with("r", Some(r), &[]);
+    let direction = Some(Direction::of(r)).filter(|_| test.is_significant());
+    Some(Finding {
+        direction,
+        ..Finding::decided(Question::Vaf, test, facts.design)
+    })
+}
+
+fn caveats(facts: &Facts<'_>, found: &mut Finding) {
+    let alpha = facts.rules.alpha;
+    let of = |what: &str| facts.number(&format!("{DECIDING}/pearson/{what}"));
+    let least = of("smallest_p_two_sided");
+    if let Some(least) = least.filter(|p| *p >= alpha) {
+        found.caveat(
+            "too-few",
+            format!(
+                "with these {} realizations no p below {} is possible",
+                found.realizations,
+                apa::bare_p(least)
+            ),
+        );
+    }
+    if let (
+        Some(Estimate {
+            ci95: Some((low, high)),
+            ..
+        }),
+        Some(test),
+    ) = (found.estimate, &found.test)
+        && (low * high > 0.0) != test.is_significant()
+        && (alpha - 0.05).abs() < 1e-12
+    {
+        found.caveat(
+            "interval-and-p",
+            "the confidence interval and p disagree: the interval (Fisher's z) assumes normally \
+             distributed VAF and means, the permutation test does not; rely on p",
+        );
+    }
+    let raw = facts.number("corr/pearson/r");
+    let raw_p = ["exact", "monte_carlo"].map(|kind| format!("corr/pearson/p_{kind}_two_sided"));
+    let raw_p = raw_p.iter().find_map(|id| facts.number(id));
+    if let (Some(raw), Some(r), Some(raw_p), Some(test), false) =
+        (raw, of("r"), raw_p, &found.test, facts.design.is_complete())
+        && (raw * r < 0.0 || (raw_p < alpha) != test.is_significant())
+    {
+        found.caveat(
+            "raw-and-adjusted",
+            format!(
+                "participants did not all rate the same realizations; the means as they are \
+                 correlate at r = {} (p {}), the adjusted means, on which this rests, at r = {}",
+                apa::r(raw),
+                apa::p(raw_p),
+                apa::r(r)
+            ),
+        );
+    }
+}
