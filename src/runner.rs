@@ -21,10 +21,10 @@ use std::sync::Arc;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::{ModelId, ParticipantId};
-use study_core::outcome::{Event, Moment};
+use study_core::outcome::Event;
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol};
-use study_core::session::{Effect, Ending, Input, Session, View, input::Claim};
+use study_core::session::{Effect, Ending, Input, Session, Unsaved, View, input::Claim};
 use study_core::store::{ClaimRequest, SeatKind, StudyFolder};
 use study_haptics::model::Realization;
 
@@ -101,17 +101,24 @@ pub struct Setup {
     pub threaded: bool,
 }
 
+/// How a session ended.
+#[derive(Debug, Clone, PartialEq)]
+#[must_use = "something may not be saved"]
+pub struct Ended {
+    /// How it was left.
+    pub ending: Ending,
+    /// What is not known to be on disk.
+    pub unsaved: Option<Unsaved>,
+}
+
 /// A running session with its device and its folder.
 pub struct Runner {
     setup: Setup,
     session: Session,
     saver: Option<Saver>,
     saved: u64,
-    pending: u64,
     strip: Option<Strip>,
     ended: Option<Ending>,
-    /// Events recorded before the journal was opened.
-    early: Vec<(Moment, Event)>,
     /// When the device last reported about the current playback.
     last_report: Option<Duration>,
     /// The code on the physical sample of each realization.
@@ -137,10 +144,8 @@ impl Runner {
             session,
             saver: None,
             saved: 0,
-            pending: 0,
             strip,
             ended: None,
-            early: Vec::new(),
             last_report: None,
             codes,
             has_telemetry: false,
@@ -151,10 +156,10 @@ impl Runner {
     }
 
     /// Runs the session to its end with an operator.
-    pub fn run(&mut self, operator: &mut dyn Operator) -> Ending {
+    pub fn run(&mut self, operator: &mut dyn Operator) -> Ended {
         loop {
             let view = self.view();
-            let timeout = if self.pending > 0 {
+            let timeout = if !view.line.all_saved {
                 SAVING
             } else if view.armed {
                 PLAYING
@@ -164,25 +169,27 @@ impl Runner {
             let inputs = operator
                 .next(&view, self.strip.as_ref(), timeout)
                 .unwrap_or_else(|gone| vec![Input::Abort(gone.0)]);
-            if let Some(ending) = self.step(inputs) {
-                return ending;
+            if let Some(ended) = self.step(inputs) {
+                return ended;
             }
         }
     }
 
     /// One turn: feeds the inputs, polls device and saver, ticks. `Some` when the session
     /// has ended.
-    pub fn step(&mut self, inputs: Vec<Input>) -> Option<Ending> {
+    pub fn step(&mut self, inputs: Vec<Input>) -> Option<Ended> {
         for input in inputs {
             self.feed(input);
         }
         self.poll_device();
         self.poll_saver();
         self.feed(Input::Tick);
-        if self.ended.is_some() {
-            self.close();
-        }
-        self.ended.clone()
+        let ending = self.ended.clone()?;
+        self.close();
+        Some(Ended {
+            ending,
+            unsaved: self.session.unsaved(),
+        })
     }
 
     /// The present view.
@@ -282,10 +289,7 @@ impl Runner {
                 None => error.to_string(),
             }),
             Ok((claimed, journal)) => {
-                let mut saver = Saver::new(claimed.folder, journal, self.setup.threaded);
-                for (at, event) in self.early.drain(..) {
-                    saver.send(Job::Append(at, event));
-                }
+                let saver = Saver::new(claimed.folder, journal, self.setup.threaded);
                 self.saver = Some(saver);
                 let identity = self.setup.device.identity();
                 Input::Claimed(Box::new(Claim {
@@ -307,11 +311,6 @@ impl Runner {
 
     fn record(&mut self, event: Event) {
         let at = self.setup.clock.now();
-        self.pending += 1;
-        if self.saver.is_none() {
-            self.early.push((at, event));
-            return;
-        }
         self.send(Job::Append(at, event));
     }
 
@@ -396,16 +395,19 @@ impl Runner {
     fn poll_saver(&mut self) {
         let events = self.saver.as_mut().map(Saver::drain).unwrap_or_default();
         for event in events {
-            let input = match event {
-                SaveEvent::Saved => {
-                    self.saved += 1;
-                    self.pending = self.pending.saturating_sub(1);
-                    Input::Saved { count: self.saved }
-                }
-                SaveEvent::Failed(why) => Input::SaveFailed(why),
-                SaveEvent::TelemetryLost(why) => Input::Notice(why),
-            };
+            let input = self.save_input(event);
             self.feed(input);
+        }
+    }
+
+    fn save_input(&mut self, event: SaveEvent) -> Input {
+        match event {
+            SaveEvent::Saved => {
+                self.saved += 1;
+                Input::Saved { count: self.saved }
+            }
+            SaveEvent::Failed(why) => Input::SaveFailed(why),
+            SaveEvent::TelemetryLost(why) => Input::Notice(why),
         }
     }
 
@@ -417,8 +419,13 @@ impl Runner {
 
     fn close(&mut self) {
         self.device_limp();
-        if let Some(saver) = self.saver.take() {
-            saver.finish();
+        let Some(saver) = self.saver.take() else {
+            return;
+        };
+        for event in saver.finish() {
+            let input = self.save_input(event);
+            // The session has ended: it only takes note of what is saved.
+            self.session.handle(input, self.setup.clock.now());
         }
     }
 

@@ -1,5 +1,7 @@
 //! `study run`: a session in the terminal.
 
+mod unsaved;
+
 use super::console::shell_command;
 use super::device_selection::{self, DeviceArgs, WaitDisplay};
 use super::{Console, Failure, Kind, load};
@@ -124,17 +126,20 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         auto_identify: false,
     };
     let mut runner = Runner::new(setup, config);
-    let ending = runner.run(&mut tui);
+    let ended = runner.run(&mut tui);
     let participant = runner.view().line.participant;
     drop(runner);
+    let resume = resume_command(args, &participant);
+    // While the terminal is open, a signal does not end the program.
+    let failure = ended.unsaved.map(|unsaved| {
+        let kept = unsaved::keep(&unsaved, &participant, &folder, &unsaved::places());
+        unsaved::failure(&unsaved, &kept, &folder, &resume)
+    });
     drop(tui);
-    finish(
-        console,
-        &folder,
-        &protocol,
-        &ending,
-        &resume_command(args, &participant),
-    )
+    match failure {
+        Some(failure) => Err(failure),
+        None => finish(console, &folder, &protocol, &ended.ending, &resume),
+    }
 }
 
 fn unusable(error: tui::TuiError) -> Failure {
@@ -233,8 +238,8 @@ fn resume_command(args: &Args, participant: &str) -> String {
     shell_command(&command)
 }
 
-/// Writes the derived tables and prints the next step, even if the tables cannot be
-/// written: the journals hold all data.
+/// After a session of which everything is saved: writes the derived tables and prints
+/// the next step, even if the tables cannot be written.
 fn finish(
     console: &mut Console,
     folder: &std::path::Path,

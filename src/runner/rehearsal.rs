@@ -95,8 +95,15 @@ pub fn run_one(
         }
         let felt = runner.felt().and_then(|id| impressions.get(id));
         let inputs = plan.turn(&view, rater, felt, clock);
-        if let Some(ending) = runner.step(inputs) {
-            return Ok(ending);
+        if let Some(ended) = runner.step(inputs) {
+            let why = match ended.unsaved {
+                None => return Ok(ended.ending),
+                Some(unsaved) => unsaved.why.unwrap_or_default(),
+            };
+            return Err(RehearsalError::NotSaved {
+                participant: participant.to_owned(),
+                why,
+            });
         }
     }
     Err(RehearsalError::Stuck {

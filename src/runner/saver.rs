@@ -9,8 +9,14 @@
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 use study_core::outcome::{Event, Moment, Sample};
 use study_core::store::{Journal, SessionFolder, TelemetryWriter};
+
+/// How long the end of a session waits for the disk. A disk may never answer.
+const LAST_WAIT: Duration = Duration::from_secs(5);
+/// Interval at which it is checked.
+const LAST_INTERVAL: Duration = Duration::from_millis(2);
 
 /// A job for the saver.
 #[derive(Debug)]
@@ -90,8 +96,9 @@ impl Saver {
                         let _ = send.send(event);
                     }
                 }
-                // The session has ended: there is nobody to report to.
-                let _ = worker.end_telemetry();
+                for event in worker.end_telemetry() {
+                    let _ = send.send(event);
+                }
             });
             Mode::Thread {
                 jobs,
@@ -140,17 +147,32 @@ impl Saver {
         }
     }
 
-    /// Finishes all queued jobs and closes the folder.
-    pub fn finish(self) {
+    /// Finishes all queued jobs and closes the folder; returns the last events. Gives up
+    /// waiting for a disk that does not answer.
+    pub fn finish(self) -> Vec<SaveEvent> {
         match self.mode {
-            Mode::Inline { mut worker, .. } => {
-                // The session has ended: there is nobody to report to.
-                let _ = worker.end_telemetry();
+            Mode::Inline {
+                mut worker,
+                mut events,
+            } => {
+                events.extend(worker.end_telemetry());
+                events
             }
-            Mode::Thread { jobs, handle, .. } => {
+            Mode::Thread {
+                jobs,
+                events,
+                handle,
+                ..
+            } => {
                 drop(jobs);
-                // A panic in it has been reported by the hook.
-                let _ = handle.join();
+                let most = LAST_WAIT.as_millis() / LAST_INTERVAL.as_millis();
+                for _ in 0..most {
+                    if handle.is_finished() {
+                        break;
+                    }
+                    std::thread::sleep(LAST_INTERVAL);
+                }
+                events.try_iter().collect()
             }
         }
     }

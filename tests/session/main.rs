@@ -6,8 +6,11 @@ mod by_keys;
 #[path = "../support/designs.rs"]
 mod designs;
 mod devices;
+mod dying_disk;
 mod flow;
 mod kill;
+#[path = "../store/memory.rs"]
+mod memory;
 mod rehearsed;
 #[path = "../support/mod.rs"]
 mod support;
@@ -15,4 +18,7 @@ mod tui_hostile;
 mod tui_keys;
 mod tui_pictures;
 mod tui_terminal;
+mod unsaved;
 mod views;
+#[path = "../support/world.rs"]
+mod world;

@@ -23,6 +23,7 @@ fn poison(view: &mut View, text: &str, n: f64) {
     view.line.operator = t();
     view.line.elapsed_s = n;
     view.can_mark_bad = Some(t());
+    view.unsaved = vec![t(); 8];
     for earlier in &mut view.correctable {
         earlier.title = t();
         earlier.question.prompt = t();

@@ -195,6 +195,14 @@ pub(crate) fn view(screen: Screen) -> View {
         ],
         can_mark_bad: Some("trial 7".to_owned()),
         armed,
+        unsaved: match screen {
+            Screen::SaveTrouble { .. } => vec![
+                "trial 7: realism = 5".to_owned(),
+                "trial 7: comment = crisp, but the middle detent comes late".to_owned(),
+                "1 record of the course of the session".to_owned(),
+            ],
+            _ => Vec::new(),
+        },
         can_advance,
         screen,
     }

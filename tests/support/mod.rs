@@ -98,6 +98,17 @@ pub struct Terminal {
 impl Terminal {
     /// Starts `study` with arguments in a folder.
     pub fn start(arguments: &[&str], folder: &Path, rows: u16, columns: u16) -> Self {
+        Self::start_with(arguments, folder, rows, columns, &[])
+    }
+
+    /// The same with environment variables.
+    pub fn start_with(
+        arguments: &[&str],
+        folder: &Path,
+        rows: u16,
+        columns: u16,
+        variables: &[(&str, &Path)],
+    ) -> Self {
         let pair = native_pty_system()
             .openpty(PtySize {
                 rows,
@@ -110,6 +121,9 @@ impl Terminal {
         command.args(arguments);
         command.cwd(folder);
         command.env("TERM", "xterm-256color");
+        for (name, value) in variables {
+            command.env(name, value);
+        }
         let child = pair.slave.spawn_command(command).unwrap();
         drop(pair.slave);
         let screen = Arc::new(Mutex::new(Emulator {
@@ -200,6 +214,11 @@ impl Terminal {
     /// Whether the program still runs.
     pub fn runs(&mut self) -> bool {
         self.child.try_wait().unwrap().is_none()
+    }
+
+    /// The process, while it runs.
+    pub fn process(&self) -> Option<u32> {
+        self.child.process_id()
     }
 
     /// Sends a signal by name, such as `KILL`.

@@ -32,10 +32,12 @@ mod phase;
 mod project_view;
 mod saving;
 mod trial;
+mod unsaved;
 pub mod view;
 
 pub use input::{Claim, Effect, Ending, Input};
 pub use opening::MAX_OPERATOR;
+pub use unsaved::Unsaved;
 pub use view::{Screen, View};
 
 use crate::outcome::fold::History;
@@ -204,10 +206,7 @@ impl Session {
     /// Sends an event to the store and adds it to the history.
     fn record(&mut self, event: Event, at: Moment) {
         self.history.apply(&event, at);
-        self.saves.sent += 1;
-        if let Event::TrialDone { trial, .. } = &event {
-            self.saves.done.insert(*trial, self.saves.sent);
-        }
+        self.saves.send(event.clone(), at);
         self.out.push(Effect::Record(event));
     }
 

@@ -19,6 +19,8 @@ pub struct DialogView<'a> {
     pub dialog: &'a Dialog,
     /// Whether Esc also stops a loaded or playing device.
     pub armed: bool,
+    /// What is in memory only because saving has failed.
+    pub unsaved: &'a [String],
     /// The styles.
     pub theme: Theme,
 }
@@ -49,6 +51,24 @@ pub fn answer_words(answer: &Answer, columns: usize) -> String {
     }
 }
 
+/// The names of what is not saved as lines of safe text; the last one counts those for
+/// which there is no room.
+pub fn unsaved_lines(names: &[String], most: usize, columns: usize) -> Vec<String> {
+    let shown = if names.len() > most {
+        most.saturating_sub(1)
+    } else {
+        names.len()
+    };
+    let mut lines: Vec<String> = names[..shown]
+        .iter()
+        .map(|name| wrap::one_line(name, columns))
+        .collect();
+    if shown < names.len() {
+        lines.push(format!("… and {} more", names.len() - shown));
+    }
+    lines
+}
+
 impl DialogView<'_> {
     /// The title and the area of the dialog.
     fn place(&self, area: Rect) -> (&'static str, Rect) {
@@ -62,6 +82,7 @@ impl DialogView<'_> {
             },
             Dialog::MarkBad { .. } => ("Mark as bad", 68, 10),
             Dialog::Decline { .. } => ("Decline this question", 68, 10),
+            Dialog::Confirm(Confirm::Quit) if !self.unsaved.is_empty() => ("NOT SAVED", 72, 15),
             Dialog::Confirm(_) => ("Are you sure?", 60, 8),
         };
         (title, middle(area, width, height.min(area.height)))
@@ -243,6 +264,21 @@ impl DialogView<'_> {
         }
     }
 
+    /// Asks whether to quit although saving has failed.
+    fn leave_unsaved(&self, buf: &mut Buffer, inside: Rect) {
+        let columns = usize::from(inside.width);
+        let words = "This is in memory only, not on the disk:";
+        left(buf, row(inside, 1), &styled(words, self.theme.trouble()));
+        let names = unsaved_lines(self.unsaved, 5, columns);
+        left_all(buf, rows(inside, 2, 5), &names, self.theme.strong());
+        let words = "Enter on the page below tries to save it again. If you quit, it is tried \
+                     once more; what still cannot be saved is written to a file in your home \
+                     folder or the folder for temporary files, and the program says which.";
+        let lines = wrap::paragraph(words, columns.max(1), 4);
+        left_all(buf, rows(inside, 8, 4), &lines, self.theme.text());
+        self.keys(buf, inside, &[("y", "quit"), ("n", "back")]);
+    }
+
     fn ask(&self, buf: &mut Buffer, inside: Rect, words: &str, keys: &[(&str, &str)]) {
         let lines = wrap::paragraph(words, usize::from(inside.width).max(1), 3);
         left_all(buf, rows(inside, 1, 3), &lines, self.theme.text());
@@ -271,12 +307,12 @@ impl Widget for &DialogView<'_> {
                 let words = "Why is the question declined? The reason is stored.";
                 self.ask(buf, inside, words, &[("Enter", "decline")]);
             }
+            Dialog::Confirm(Confirm::Quit) if !self.unsaved.is_empty() => {
+                self.leave_unsaved(buf, inside);
+            }
             Dialog::Confirm(confirm) => {
                 let (words, yes) = match confirm {
-                    Confirm::Quit => (
-                        "Quit the session? All answers are kept, and it can be resumed later.",
-                        "quit",
-                    ),
+                    Confirm::Quit => ("Quit the session? It can be resumed later.", "quit"),
                     Confirm::DropOut => (
                         "Does the participant drop out? This ends their part in the study.",
                         "drop out",

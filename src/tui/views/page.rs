@@ -96,6 +96,7 @@ impl<'a> Page<'a> {
         Some(DialogView {
             dialog: self.state.dialog()?,
             armed: self.view.armed,
+            unsaved: &self.view.unsaved,
             theme: self.theme,
         })
     }
@@ -220,7 +221,11 @@ impl<'a> Page<'a> {
             "Esc stops the device."
         };
         let leave = if self.state.dialog() == Some(&Dialog::Confirm(Confirm::Quit)) {
-            "Quit the session? y: yes, n: no."
+            if self.view.unsaved.is_empty() {
+                "Quit the session? y: yes, n: no."
+            } else {
+                "The last answer is NOT SAVED. Quit the session? y: yes, n: no."
+            }
         } else {
             ""
         };

@@ -1,5 +1,6 @@
 //! Faults of the device or the disk: what happened, what it means, what to do.
 
+use super::dialogs::unsaved_lines;
 use crate::tui::theme::Theme;
 use crate::tui::widgets::{centre, frame, left_all, middle, row, rows, styled};
 use crate::tui::wrap;
@@ -9,12 +10,15 @@ use ratatui::widgets::Widget;
 use study_core::protocol::DeviceKind;
 use study_core::session::{Screen, View};
 
+/// Columns for the name of something that is not saved.
+const NAME: usize = 40;
+
 /// A framed message about a fault.
 #[derive(Debug)]
 pub struct Trouble<'a> {
     title: &'static str,
     what: &'a str,
-    then: &'static str,
+    then: String,
     theme: Theme,
 }
 
@@ -25,7 +29,7 @@ impl<'a> Trouble<'a> {
             Screen::DeviceTrouble { what, can_go_on } => (
                 "DEVICE TROUBLE",
                 what,
-                if *can_go_on {
+                (if *can_go_on {
                     "The device produces no force. Check the device, then press Enter: an \
                      interrupted trial is repeated later. No answer is lost."
                 } else if view.device == DeviceKind::Process {
@@ -38,13 +42,17 @@ impl<'a> Trouble<'a> {
                     "The device produces no force. Check its power and its cable; the \
                      session continues when it answers again. F10 quits: the session can \
                      be resumed later, and no answer is lost."
-                },
+                })
+                .to_owned(),
             ),
             Screen::SaveTrouble { what } => (
                 "NOT SAVED",
                 what,
-                "The last answer is in memory only. Do not close this window. Free space on \
-                 the disk or reconnect it, then press Enter to try again.",
+                format!(
+                    "In memory only: {}. Do not close this window. Free space on the disk or \
+                     reconnect it, then press Enter to try again.",
+                    unsaved_lines(&view.unsaved, 4, NAME).join("; ")
+                ),
             ),
             _ => return None,
         };
@@ -63,7 +71,7 @@ impl Widget for &Trouble<'_> {
         let columns = usize::from(wide.saturating_sub(6)).max(1);
         let room = usize::from(area.height.saturating_sub(6) / 2).max(1);
         let what = wrap::paragraph(self.what, columns, room);
-        let then = wrap::paragraph(self.then, columns, room.max(4));
+        let then = wrap::paragraph(&self.then, columns, room.max(6));
         let what_rows = u16::try_from(what.len()).unwrap_or(1);
         let then_rows = u16::try_from(then.len()).unwrap_or(1);
         let place = middle(area, wide, what_rows + then_rows + 7);

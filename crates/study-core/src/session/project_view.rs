@@ -32,6 +32,10 @@ impl Session {
                 .filter(|_| self.overlay().is_none())
                 .map(|(_, _, title)| title),
             armed: self.phase.armed(),
+            unsaved: match &self.saves.trouble {
+                Some(_) => self.unsaved_names(),
+                None => Vec::new(),
+            },
             can_advance: can_advance(&screen),
             screen,
         }
@@ -220,7 +224,7 @@ impl Session {
             .collect()
     }
 
-    fn form_title(&self, form: FormId) -> String {
+    pub(super) fn form_title(&self, form: FormId) -> String {
         match form {
             FormId::Setup => "set-up".to_owned(),
             FormId::Intake => "intake".to_owned(),

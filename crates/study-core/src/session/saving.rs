@@ -3,13 +3,15 @@
 use super::phase::{CLOCK_STEP_S, LEAVE_WITHIN_S, Phase};
 use super::{Effect, Ending, Session};
 use crate::outcome::{Event, Failure, Moment};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
-/// How many events of this process are sent to the store and how many are on disk.
+/// Which events of this process are on disk.
 #[derive(Debug, Default)]
 pub(super) struct SaveState {
-    pub(super) sent: u64,
+    /// Number of events on disk.
     pub(super) saved: u64,
+    /// The later events, in order: they are not known to be on disk.
+    pub(super) unsaved: VecDeque<(Moment, Event)>,
     /// Trial → number of events sent when it was completed.
     pub(super) done: BTreeMap<u32, u64>,
     /// Why saving failed.
@@ -19,8 +21,20 @@ pub(super) struct SaveState {
 }
 
 impl SaveState {
+    /// Number of events sent to the store.
+    fn sent(&self) -> u64 {
+        self.saved + self.unsaved.len() as u64
+    }
+
+    pub(super) fn send(&mut self, event: Event, at: Moment) {
+        self.unsaved.push_back((at, event));
+        if let Some((_, Event::TrialDone { trial, .. })) = self.unsaved.back() {
+            self.done.insert(*trial, self.sent());
+        }
+    }
+
     pub(super) fn all_saved(&self) -> bool {
-        self.saved >= self.sent
+        self.unsaved.is_empty()
     }
 
     /// Whether the completion of a trial is on disk. Trials read from the journal
@@ -32,7 +46,9 @@ impl SaveState {
 
 impl Session {
     pub(super) fn saved(&mut self, count: u64, at: Moment) {
-        self.saves.saved = self.saves.saved.max(count.min(self.saves.sent));
+        while self.saves.saved < count && self.saves.unsaved.pop_front().is_some() {
+            self.saves.saved += 1;
+        }
         if self.saves.all_saved() {
             self.saves.trouble = None;
             self.saves.retrying = false;

@@ -28,6 +28,9 @@ pub struct View {
     pub can_mark_bad: Option<String>,
     /// Whether a table is loaded or playing, so that Space stops it.
     pub armed: bool,
+    /// What is in memory only because saving has failed, such as "trial 3: realism = 5";
+    /// empty otherwise.
+    pub unsaved: Vec<String>,
     /// Whether Enter has an effect now.
     pub can_advance: bool,
 }

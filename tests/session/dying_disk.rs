@@ -1,0 +1,292 @@
+//! A disk that fails at every call from some call on: what the session says is saved is
+//! saved, and its end names the rest.
+
+use crate::memory::{Crash, MemoryDisk};
+use crate::world::{Kept, at};
+use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+use study::device::manual::Manual;
+use study::runner::clock::VirtualClock;
+use study::runner::{Ended, Runner, Setup};
+use study_core::outcome::Event;
+use study_core::protocol::{Answer, DeviceKind};
+use study_core::session::{Config, Ending, Input, Screen, View};
+use study_core::store::disk::{Appender, Disk, Item, Lock};
+use study_core::store::{SeatKind, StudyFolder};
+
+/// A disk whose calls all fail with EIO from one call on.
+#[derive(Debug, Clone)]
+struct Dying {
+    disk: MemoryDisk,
+    calls: Arc<AtomicUsize>,
+    from: usize,
+}
+
+struct DyingFile(Box<dyn Appender>, Dying);
+
+impl Dying {
+    fn call(&self) -> io::Result<()> {
+        if self.calls.fetch_add(1, Ordering::SeqCst) < self.from {
+            return Ok(());
+        }
+        // EIO has the same number on all Unix systems.
+        Err(io::Error::from_raw_os_error(5))
+    }
+}
+
+impl Appender for DyingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.1.call()?;
+        self.0.write(bytes)
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.1.call()?;
+        self.0.sync()
+    }
+}
+
+impl Disk for Dying {
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        self.call()?;
+        self.disk.create_folder(path)
+    }
+
+    fn sync_folder(&self, path: &Path) -> io::Result<()> {
+        self.call()?;
+        self.disk.sync_folder(path)
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn Appender>> {
+        self.call()?;
+        Ok(Box::new(DyingFile(self.disk.create(path)?, self.clone())))
+    }
+
+    fn open(&self, path: &Path) -> io::Result<Box<dyn Appender>> {
+        self.call()?;
+        Ok(Box::new(DyingFile(self.disk.open(path)?, self.clone())))
+    }
+
+    fn truncate(&self, path: &Path, bytes: u64) -> io::Result<()> {
+        self.call()?;
+        self.disk.truncate(path, bytes)
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.call()?;
+        self.disk.rename(from, to)
+    }
+
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        self.call()?;
+        self.disk.remove_file(path)
+    }
+
+    fn remove_folder(&self, path: &Path) -> io::Result<()> {
+        self.call()?;
+        self.disk.remove_folder(path)
+    }
+
+    fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
+        self.call()?;
+        self.disk.read(path)
+    }
+
+    fn list(&self, path: &Path) -> io::Result<Vec<Item>> {
+        self.call()?;
+        self.disk.list(path)
+    }
+
+    fn lock(&self, path: &Path) -> io::Result<Option<Lock>> {
+        self.call()?;
+        self.disk.lock(path)
+    }
+
+    fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>> {
+        self.call()?;
+        self.disk.free_bytes(path)
+    }
+}
+
+/// What an operator does who plays until something is not saved, tries once more to save
+/// it, and then leaves.
+struct Operator {
+    leave: Input,
+    retried: bool,
+    /// The numbers of ratings entered.
+    rated: i64,
+}
+
+impl Operator {
+    fn turn(&mut self, view: &View) -> Vec<Input> {
+        match &view.screen {
+            Screen::Who { .. } if view.notice.is_some() => vec![self.leave.clone()],
+            Screen::SaveTrouble { .. } if !self.retried => {
+                self.retried = true;
+                vec![Input::RetrySave]
+            }
+            Screen::SaveTrouble { .. } => vec![self.leave.clone()],
+            Screen::Message { .. }
+            | Screen::Reference { .. }
+            | Screen::Mount { .. }
+            | Screen::Playing { .. }
+            | Screen::End { .. } => vec![Input::Advance],
+            Screen::Stopped { .. } => vec![Input::RateStopped],
+            Screen::Form { questions, .. } => {
+                let mut answers = Vec::new();
+                for question in questions {
+                    let answer = if question.id.as_str() == "realism" {
+                        self.rated += 1;
+                        Answer::Rating(self.rated)
+                    } else {
+                        Answer::Text(format!("about {}", self.rated))
+                    };
+                    answers.push((question.id.clone(), answer));
+                }
+                vec![Input::Answer(answers)]
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+struct Session {
+    ended: Ended,
+    /// Ratings entered.
+    rated: i64,
+    /// The last view, and the most trials that a view has shown as saved.
+    last: View,
+    saved: u32,
+    on_disk: Vec<Event>,
+    calls: usize,
+}
+
+fn session(from: usize, leave: &Input) -> Option<Session> {
+    let mut kept = Kept::new();
+    kept.protocol.device.kind = DeviceKind::Manual;
+    let disk = MemoryDisk::new();
+    let dying = Dying {
+        disk: disk.clone(),
+        calls: Arc::default(),
+        from,
+    };
+    let results = Path::new("results");
+    let frozen = kept.frozen();
+    let study =
+        StudyFolder::open_or_create_on(Arc::new(dying.clone()), results, &frozen, at(0)).ok()?;
+    let path = study.path().to_owned();
+    let clock = VirtualClock::starting_at(at(0).wall);
+    let setup = Setup {
+        protocol: Arc::new(kept.protocol.clone()),
+        orders: None,
+        models: BTreeMap::new(),
+        fingerprints: kept.fingerprints.clone(),
+        study,
+        kind: SeatKind::Real,
+        rows: None,
+        device_kind: DeviceKind::Manual,
+        device: Box::new(Manual::default()),
+        device_check: None,
+        clock: Box::new(clock.clone()),
+        live: false,
+        threaded: false,
+    };
+    let config = Config {
+        participant: "P01".to_owned(),
+        operator: "lw".to_owned(),
+        auto_identify: true,
+    };
+    let mut runner = Runner::new(setup, config);
+    let mut operator = Operator {
+        leave: leave.clone(),
+        retried: false,
+        rated: 0,
+    };
+    let mut last = runner.view();
+    let mut saved = 0;
+    for _ in 0..10_000 {
+        clock.advance(Duration::from_millis(500));
+        let view = runner.view();
+        saved = saved.max(view.line.trials_saved);
+        if !matches!(view.screen, Screen::Saving) {
+            last = view.clone();
+        }
+        if let Some(ended) = runner.step(operator.turn(&view)) {
+            drop(runner);
+            let found = StudyFolder::open_on(Arc::new(disk.after(Crash::OnlySynced)), &path);
+            let sessions = found.unwrap().sessions().unwrap();
+            let entries = sessions.into_iter().flat_map(|s| s.entries);
+            return Some(Session {
+                ended,
+                rated: operator.rated,
+                last,
+                saved,
+                on_disk: entries.map(|e| e.event).collect(),
+                calls: dying.calls.load(Ordering::SeqCst),
+            });
+        }
+    }
+    panic!("it does not end: {:?}", runner.view().screen)
+}
+
+fn ratings<'a>(events: impl IntoIterator<Item = &'a Event>) -> Vec<i64> {
+    let rating = |event: &Event| match event {
+        Event::Answered {
+            answer: Answer::Rating(n),
+            ..
+        } => Some(*n),
+        _ => None,
+    };
+    events.into_iter().filter_map(rating).collect()
+}
+
+#[test]
+fn nothing_is_lost_without_being_named_whenever_the_disk_dies() {
+    let whole = session(usize::MAX, &Input::Quit).unwrap();
+    assert_eq!(whole.ended.ending, Ending::Finished);
+    assert_eq!(whole.ended.unsaved, None);
+    assert_eq!(ratings(&whole.on_disk), [1, 2, 3]);
+    let mut unsaved_answers = 0;
+    for leave in [Input::Quit, Input::Abort("SIGTERM".to_owned())] {
+        for from in 0..whole.calls {
+            let Some(session) = session(from, &leave) else {
+                continue;
+            };
+            let done = |e: &&Event| matches!(e, Event::TrialDone { .. });
+            let done = session.on_disk.iter().filter(done).count();
+            assert!(
+                session.saved as usize <= done,
+                "call {from}: shown as saved"
+            );
+            let Some(unsaved) = &session.ended.unsaved else {
+                assert_eq!(
+                    ratings(&session.on_disk),
+                    (1..=session.rated).collect::<Vec<_>>()
+                );
+                continue;
+            };
+            let events: Vec<&Event> = unsaved.events.iter().map(|(_, e)| e).collect();
+            let mut all = ratings(&session.on_disk);
+            // What could not be synced may still be on the disk.
+            all.extend(ratings(events.iter().copied()));
+            all.dedup();
+            assert_eq!(all, (1..=session.rated).collect::<Vec<_>>(), "call {from}");
+            assert!(unsaved.why.is_some(), "call {from}");
+            for rating in ratings(events) {
+                unsaved_answers += 1;
+                let named = |names: &[String]| {
+                    let end = format!(": realism = {rating}");
+                    names.iter().any(|name| name.ends_with(&end))
+                };
+                assert!(named(&unsaved.what), "call {from}: {:?}", unsaved.what);
+                assert!(named(&session.last.unsaved), "call {from}: on the screen");
+                assert!(!session.last.line.all_saved, "call {from}");
+            }
+        }
+    }
+    assert!(unsaved_answers > 0, "nothing was tested");
+}
