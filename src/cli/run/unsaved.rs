@@ -165,7 +165,7 @@ mod tests {
         assert_eq!(lines[2]["event"], "paused");
         assert!(lines[2]["wall"].is_string() && lines.len() == 3);
         assert_ne!(first, second, "a file is never written twice");
-        let refused = keep(&unsaved(), "P01", results, &[none.clone()]);
+        let refused = keep(&unsaved(), "P01", results, std::slice::from_ref(&none));
         let words = refused.as_ref().unwrap_err().to_string();
         assert!(words.starts_with(&none.display().to_string()), "{words}");
         let failure = failure(&unsaved(), &refused, results, "study run x");
