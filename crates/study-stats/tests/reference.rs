@@ -7,8 +7,8 @@
 #![allow(clippy::unwrap_used)]
 
 use study_stats::lmm::{
-    AdjustedMeans, CellSummary, ContrastT, Criterion, FixedEffects, LmmData, RandomEffects,
-    adjusted_means, fit,
+    AdjustedMeans, CellSummary, ContrastF, ContrastT, Criterion, FixedEffects, LmmData,
+    RandomEffects, adjusted_means, fit,
 };
 
 /// Name and text of each file.
@@ -107,6 +107,11 @@ impl Design {
         adjusted_means(&LmmData::new(&self.cells, FixedEffects::Intercept).unwrap()).unwrap()
     }
 
+    /// The mixed model of the ratings with a mean for each realization.
+    fn ratings_model(&self) -> LmmData {
+        LmmData::new(&self.cells, FixedEffects::Realizations).unwrap()
+    }
+
     /// Compares numbers, each with its relative and absolute tolerance.
     fn near(&self, what: &str, found: &[f64], expected: &[f64], tolerances: &[f64]) {
         assert_eq!(found.len(), expected.len(), "{} {what}", self.name);
@@ -126,53 +131,77 @@ const VALUE: f64 = 2e-6;
 const VARIANCE: f64 = 2e-5;
 const DF: f64 = 2e-4;
 
-fn numbers(t: &ContrastT) -> [f64; 5] {
+/// Estimate, standard error, degrees of freedom, interval, t, p.
+fn numbers(t: &ContrastT) -> [f64; 7] {
     let (low, high) = t.ci95.unwrap();
-    [t.estimate, t.se, t.df.unwrap(), low, high]
+    let (df, t_value, p) = (t.df.unwrap(), t.t.unwrap(), t.p.unwrap());
+    [t.estimate, t.se, df, low, high, t_value, p]
+}
+
+/// Tolerances of [`numbers`].
+const CONTRAST: [f64; 7] = [VALUE, VARIANCE, DF, VARIANCE, VARIANCE, VARIANCE, VARIANCE];
+
+/// Compares means, pairs, F and variances with the lines of this prefix.
+fn compare(
+    design: &Design,
+    prefix: &str,
+    (means, pairs, f): (&[ContrastT], &[ContrastT], ContrastF),
+    variances: &[f64; 3],
+) {
+    let rows = |key: &str| design.rows(&format!("{prefix}{key}"));
+    assert_eq!(
+        (rows("mean").len(), rows("pair").len()),
+        (means.len(), pairs.len())
+    );
+    for (t, expected) in means.iter().zip(rows("mean")) {
+        design.near("mean", &numbers(t)[..5], expected, &CONTRAST);
+    }
+    for (t, expected) in pairs.iter().zip(rows("pair")) {
+        design.near("pair", &numbers(t), expected, &CONTRAST);
+    }
+    let found = [f.f, f.df1, f.df2.unwrap(), f.p.unwrap()];
+    let tolerances = [VARIANCE, 0.0, DF, VARIANCE];
+    design.near("F", &found, rows("F")[0], &tolerances);
+    design.near("variances", variances, rows("variances")[0], &[VARIANCE; 3]);
 }
 
 #[test]
 fn adjusted_means_agree_with_emmeans() {
     for design in DESIGNS.map(Design::read) {
         let found = design.adjusted();
-        let expected = design.rows("mean");
-        assert_eq!(expected.len(), found.means.len());
-        for (t, expected) in found.means.iter().zip(expected) {
-            let tolerances = [VALUE, VARIANCE, DF, VARIANCE, VARIANCE];
-            design.near("mean", &numbers(t), &expected[1..], &tolerances);
-        }
         let v = found.variances;
-        let variances = [v.intercept, v.cell, v.error];
-        let expected = design.rows("variances")[0];
-        design.near("variances", &variances, expected, &[VARIANCE; 3]);
-        let boundary = expected[0] < 1e-9 || design.repeats() && expected[1] < 1e-9;
-        assert_eq!(found.singular, boundary, "{}", design.name);
+        let of = (&found.means[..], &found.pairs[..], found.effect.unwrap());
+        compare(&design, "cell_", of, &[v.intercept, 0.0, v.error]);
+        assert_eq!(found.singular, design.rows("cell_variances")[0][0] < 1e-9);
         assert!(found.connected);
     }
 }
 
 #[test]
-fn differences_of_adjusted_means_agree_with_emmeans() {
+fn models_of_all_ratings_agree_with_emmeans() {
     for design in DESIGNS.map(Design::read) {
-        let found = design.adjusted();
-        let expected = design.rows("pair");
-        assert_eq!(expected.len(), found.pairs.len());
-        for (t, expected) in found.pairs.iter().zip(expected) {
-            let mut all = numbers(t).to_vec();
-            all.extend([t.t.unwrap(), t.p.unwrap()]);
-            let tolerances = [VALUE, VARIANCE, DF, VARIANCE, VARIANCE, VARIANCE, VARIANCE];
-            design.near("pair", &all, &expected[2..], &tolerances);
-        }
-    }
-}
-
-#[test]
-fn the_test_of_equal_means_agrees_with_lmer_test() {
-    for design in DESIGNS.map(Design::read) {
-        let f = design.adjusted().effect.unwrap();
-        let found = [f.f, f.df1, f.df2.unwrap(), f.p.unwrap()];
-        let tolerances = [VARIANCE, 0.0, DF, VARIANCE];
-        design.near("F", &found, design.rows("F")[0], &tolerances);
+        let table = design.ratings_model();
+        let random = RandomEffects {
+            cell: design.repeats(),
+            ..RandomEffects::default()
+        };
+        let found = fit(&table, random, Criterion::Reml).unwrap();
+        let k = table.realizations().len();
+        let unit = |i: usize| (0..k).map(move |j| f64::from(u8::from(i == j)));
+        let means: Vec<Vec<f64>> = (0..k).map(|i| unit(i).collect()).collect();
+        let pairs = (0..k).flat_map(|a| (a + 1..k).map(move |b| (a, b)));
+        let pairs: Vec<Vec<f64>> = pairs
+            .map(|(a, b)| unit(a).zip(unit(b)).map(|(x, y)| x - y).collect())
+            .collect();
+        let of = (&found.t_tests(&means)[..], &found.t_tests(&pairs)[..]);
+        let v = found.variances;
+        let variances = [v.intercept, v.cell, v.error];
+        compare(
+            &design,
+            "",
+            (of.0, of.1, found.f_test().unwrap()),
+            &variances,
+        );
     }
 }
 

@@ -2,14 +2,13 @@
 //! had rated it.
 //!
 //! Where cells are missing, the mean over the ratings of a realization depends on who
-//! rated it. The marginal means of the mixed model with a mean for each realization and a
-//! random intercept of the subject do not (Searle, Speed & Milliken 1980). The intercept
-//! of the cell belongs to the model if any cell has two ratings: ratings of one cell are
-//! not independent. In complete tables with equally many ratings per cell the adjusted
-//! means are the raw ones.
+//! rated it. The marginal means of the mixed model cell mean ~ realization + (1 | subject),
+//! by REML, do not (Searle, Speed & Milliken 1980). Each cell counts once, however often
+//! it was rated: repeated ratings are not independent. In complete tables the adjusted
+//! means are the means over subjects.
 
 use super::data::{FixedEffects, LmmData};
-use super::fit::{Criterion, NO_ERROR, VarianceComponents, fit};
+use super::fit::{Criterion, VarianceComponents, fit};
 use super::satterthwaite::{ContrastF, ContrastT};
 use super::{LmmError, RandomEffects};
 
@@ -25,38 +24,27 @@ pub struct AdjustedMeans {
     pub pairs: Vec<ContrastT>,
     /// The test that all means are equal.
     pub effect: Option<ContrastF>,
-    /// The variance components; without an intercept of the cell, `error` contains it.
+    /// The variances: of the subjects, and of the cell means (`error`).
     pub variances: VarianceComponents,
-    /// Whether the model has an intercept of the cell.
-    pub has_cell: bool,
-    /// Whether a variance is 0.
+    /// Whether the variance of the subjects is 0.
     pub singular: bool,
     /// Whether subjects link all realizations: if not, some differences compare different
     /// subjects only.
     pub connected: bool,
 }
 
-/// Adjusted means of the ratings of `table`, whatever its fixed effects.
+/// Adjusted means of the cells of `table`, whatever its fixed effects.
 ///
 /// # Errors
 /// If there are fewer than two realizations or the model has no fit.
 pub fn adjusted_means(table: &LmmData) -> Result<AdjustedMeans, LmmError> {
-    let mut table = table.with_fixed_effects(FixedEffects::Realizations)?;
+    let table = table.with_fixed_effects(FixedEffects::Realizations)?;
+    let table = table.of_cell_means();
     let k = table.realizations.len();
     if k < 2 {
         return Err(LmmError::OneRealization);
     }
-    let mut has_cell = table.n > table.cells as f64;
-    if has_cell && table.within <= NO_ERROR * table.n {
-        // Repeated ratings agree: σ² → 0, and each cell weighs the same.
-        table = table.of_cell_means();
-        has_cell = false;
-    }
-    let random = RandomEffects {
-        cell: has_cell,
-        ..RandomEffects::default()
-    };
-    let found = fit(&table, random, Criterion::Reml)?;
+    let found = fit(&table, RandomEffects::default(), Criterion::Reml)?;
     let unit = |i: usize| -> Vec<f64> { (0..k).map(|j| f64::from(u8::from(i == j))).collect() };
     let pairs = (0..k).flat_map(|a| (a + 1..k).map(move |b| (a, b)));
     let difference = |(a, b): (usize, usize)| {
@@ -72,7 +60,6 @@ pub fn adjusted_means(table: &LmmData) -> Result<AdjustedMeans, LmmError> {
         pairs,
         effect: found.f_test(),
         variances: found.variances,
-        has_cell,
         singular: found.singular,
         connected: table.connected(),
         realizations: table.realizations.clone(),
@@ -130,29 +117,22 @@ mod tests {
     }
 
     #[test]
-    fn a_complete_table_has_its_raw_means() {
+    fn a_complete_table_has_the_means_over_subjects() {
         let cells: Vec<(usize, usize, Vec<f64>)> = (0..12)
-            .map(|i| {
-                (
-                    i / 3,
-                    i % 3,
-                    vec![((i * i) % 7) as f64, ((i * 5) % 7) as f64],
-                )
-            })
+            .map(|i| (i / 3, i % 3, vec![((i * i) % 7) as f64; 1 + i % 2]))
             .collect();
         let borrowed: Vec<_> = cells.iter().map(|c| (c.0, c.1, &c.2[..])).collect();
         let found = adjusted_means(&table(&borrowed)).unwrap();
-        assert!(found.has_cell && found.connected);
+        assert!(found.connected);
         for (j, t) in found.means.iter().enumerate() {
             let own = cells.iter().filter(|c| c.1 == j);
-            let mean = own.flat_map(|c| &c.2).sum::<f64>() / 8.0;
+            let mean = own.map(|c| c.2[0]).sum::<f64>() / 4.0;
             assert!((t.estimate - mean).abs() < 1e-9, "{j}: {t:?}, {mean}");
         }
     }
 
-    /// The cell means carry all information; their number of ratings does not matter.
     #[test]
-    fn ratings_that_always_agree_count_once() {
+    fn the_number_of_ratings_of_a_cell_does_not_matter() {
         let y = [3.0, 5.0, 4.0, 2.0, 3.0, 5.0, 6.0, 7.0, 6.0];
         let cells = |n: usize| -> Vec<(usize, usize, Vec<f64>)> {
             let copies = |i: usize| vec![y[i]; if i.is_multiple_of(2) { n } else { 1 }];
@@ -163,7 +143,6 @@ mod tests {
             let cells: Vec<_> = cells.iter().map(|c| (c.0, c.1, &c.2[..])).collect();
             adjusted_means(&table(&cells)).unwrap()
         });
-        assert!(!found[1].has_cell);
         for (a, b) in found[0].pairs.iter().zip(&found[1].pairs) {
             assert!((a.estimate - b.estimate).abs() < 1e-9 && (a.se - b.se).abs() < 1e-6);
         }

@@ -79,7 +79,7 @@ fn deviance(p: &Profile, criterion: Criterion, weight: f64) -> Option<f64> {
 }
 
 /// A smaller share of the variance of the ratings is not an error variance but rounding.
-pub(super) const NO_ERROR: f64 = 1e-13;
+const NO_ERROR: f64 = 1e-13;
 
 /// Whether the effects can be separated.
 fn identified(table: &LmmData, random: RandomEffects) -> Result<(), LmmError> {
