@@ -2,19 +2,19 @@
 //!
 //! Nothing is inferred here: statistics and verdicts are looked up in the analysis,
 //! and what is absent is left out. Text from the data is escaped on its way to a
-//! terminal, to HTML and to SVG; CSV and JSON store it as it is.
+//! terminal, to HTML and to a picture; CSV and JSON store it as it is.
 
 mod answers;
 mod apa;
+pub mod chart;
 pub mod csv;
 pub mod figures;
 pub mod html;
 pub mod identification;
 pub mod json;
+pub mod picture;
 pub mod plot;
-pub mod png;
 mod sentences;
-pub mod svg;
 pub mod text;
 
 /// What was analysed, for the head of a report.

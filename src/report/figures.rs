@@ -2,15 +2,16 @@
 //!
 //! Means of subject × realization cells and of repetitions are computed here from the
 //! included rows; all other statistics are looked up in the analysis. Figures that the
-//! data do not allow are left out. Each figure has two widths: one for paper and
-//! screens, one for phones.
+//! data do not allow are left out. Each figure has two widths, those of two
+//! columns and of one column of a journal.
 
 mod counts;
 mod means;
 mod subjects;
 mod traces;
 
-use super::svg::{Axis, Figure};
+use super::chart::{Axis, Figure};
+use super::picture::POINTS;
 use std::collections::BTreeMap;
 use study_core::analyze::{Analysis, RealizationSummary};
 use study_core::outcome::Role;
@@ -50,9 +51,9 @@ pub struct Drawn {
     pub name: &'static str,
     /// Caption. Untrusted.
     pub caption: String,
-    /// Version for paper and screens.
+    /// Version of two columns' width, for paper and screens.
     pub wide: Figure,
-    /// Version for phones.
+    /// Version of one column's width, for paper and phones.
     pub narrow: Figure,
     /// The data of the figure, as CSV.
     pub data: String,
@@ -66,12 +67,14 @@ struct Canvas {
     narrow: bool,
 }
 
+/// Two columns of a journal, 181 mm.
 const WIDE: Canvas = Canvas {
-    width: 680.0,
+    width: 181.0 / 25.4 * 72.0 / POINTS,
     narrow: false,
 };
+/// One column of a journal, 88.9 mm; also for phones.
 const NARROW: Canvas = Canvas {
-    width: 344.0,
+    width: 88.9 / 25.4 * 72.0 / POINTS,
     narrow: true,
 };
 
@@ -94,7 +97,8 @@ impl Canvas {
 /// All figures that the data allow, in the order of the report.
 pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
     let scene = Scene::of(a);
-    [
+    let note = note(a);
+    let all = [
         means::fig10(&scene),
         means::fig11(&scene),
         means::against_vaf(&scene),
@@ -105,8 +109,27 @@ pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
         traces::traces(&scene, traces),
     ]
     .into_iter()
-    .flatten()
+    .flatten();
+    all.map(|mut drawn| {
+        drawn.wide.note.clone_from(&note);
+        drawn.narrow.note.clone_from(&note);
+        drawn
+    })
     .collect()
+}
+
+/// What the files of the figures say about data that are not all from participants.
+fn note(a: &Analysis) -> Option<String> {
+    let c = &a.counts;
+    let real = c.participants > c.pilots + c.simulated;
+    let text = match (real, c.pilots, c.simulated) {
+        (_, 0, 0) => return None,
+        (true, _, _) => "includes pilot or simulated data",
+        (false, 0, _) => "simulated data, no participants",
+        (false, _, 0) => "pilot data, no participants",
+        (false, _, _) => "pilot and simulated data, no participants",
+    };
+    Some(text.to_owned())
 }
 
 /// Data that several figures use.

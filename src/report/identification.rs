@@ -7,7 +7,7 @@
 
 mod spectrum;
 
-use super::svg::{
+use super::chart::{
     Axis, ColourBar, Dash, Figure, Look, Mark, Note, PALETTE, Panel, Span, ramp, share,
 };
 use std::fmt::Write as _;

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use study::report::Source;
 use study::report::figures::{self, Trace};
 use study::report::html::{Details, document};
+use study::report::picture::png::Painter;
 use study_core::analyze::{
     Analysis, Comment, Deviation, Exclusion, PreregisteredRule, Rules, analyze,
 };
@@ -231,7 +232,9 @@ fn hostile_names_and_comments_stay_text() {
             "{}",
             f.name
         );
-        study::report::png::Painter::default().png(&svg).unwrap();
+        let picture = f.wide.picture();
+        Painter::default().png(&picture).unwrap();
+        assert!(picture.to_pdf().starts_with(b"%PDF-"));
     }
 }
 

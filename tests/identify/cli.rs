@@ -216,9 +216,9 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
     );
 }
 
-/// SVG, PNG and CSV.
+/// SVG, PNG, PDF and CSV.
 #[test]
-fn each_figure_comes_in_three_files() {
+fn each_figure_comes_in_four_files() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("figures");
     identify(&[TRAINING, "--validate", VALIDATION])
@@ -236,7 +236,8 @@ fn each_figure_comes_in_three_files() {
         let read = |ending: &str| fs::read(out.join(format!("{figure}.{ending}"))).unwrap();
         assert!(read("svg").starts_with(b"<svg"), "{figure}");
         assert!(read("png").starts_with(b"\x89PNG\r\n\x1a\n"), "{figure}");
+        assert!(read("pdf").starts_with(b"%PDF-"), "{figure}");
         assert!(read("csv").iter().filter(|b| **b == b'\n').count() > 4);
     }
-    assert_eq!(fs::read_dir(&out).unwrap().count(), 15);
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 20);
 }

@@ -2,11 +2,11 @@
 
 use super::super::{Failure, Kind};
 use crate::report::Source;
+use crate::report::chart::Figure;
 use crate::report::figures::{self, Drawn, Trace};
 use crate::report::html::{self, Details};
-use crate::report::png::{Painter, PngError};
+use crate::report::picture::png::{Painter, PngError};
 use rayon::prelude::*;
-use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -23,6 +23,9 @@ const MAX_SAMPLES: usize = 200_000;
 
 /// Largest number of playbacks of a realization that are shown.
 const MAX_TRACES: usize = 3;
+
+/// End of the name of a figure that is one column wide.
+const COLUMN: &str = "-column";
 
 /// A file of `analysis/`.
 pub(super) struct Output {
@@ -47,38 +50,41 @@ pub(super) fn files(
         name: "report.html".to_owned(),
         content: document.into_bytes(),
     }];
-    let pictures = pictures.map_err(|e| Failure::new(Kind::Bug, e))?;
-    for (figure, (svg, png)) in drawn.into_iter().zip(pictures) {
-        let mut add = |ending: &str, content: Vec<u8>| {
-            files.push(Output {
-                name: format!("figures/{}.{ending}", figure.name),
-                content,
-            });
-        };
-        add("svg", svg.into_bytes());
-        add("png", png);
-        add("csv", figure.data.clone().into_bytes());
+    files.extend(pictures.map_err(|e| Failure::new(Kind::Bug, e))?);
+    for figure in drawn {
+        files.push(Output {
+            name: format!("figures/{}.csv", figure.name),
+            content: figure.data.into_bytes(),
+        });
     }
     Ok(files)
 }
 
-/// SVG and PNG of each figure. Each is drawn by one thread, so the number of threads
-/// changes no byte.
-fn pictures(drawn: &[Drawn]) -> Result<Vec<(String, Vec<u8>)>, PngError> {
+/// SVG, PNG and PDF of each figure, two columns wide and one column wide. Each is drawn
+/// by one thread, so the number of threads changes no byte.
+fn pictures(drawn: &[Drawn]) -> Result<Vec<Output>, PngError> {
     let painter = Painter::default();
-    let figures = drawn.par_iter().with_max_len(1);
-    let svgs: Vec<String> = figures.map(|figure| figure.wide.to_svg()).collect();
-    // The largest first, so that the load is balanced.
-    let mut order: Vec<usize> = (0..svgs.len()).collect();
-    order.sort_by_key(|&i| Reverse(svgs[i].len()));
-    let mut pngs: Vec<(usize, Vec<u8>)> = (order.into_iter().par_bridge())
-        .map(|i| painter.png(&svgs[i]).map(|png| (i, png)))
-        .collect::<Result<_, _>>()?;
-    pngs.sort_by_key(|(i, _)| *i);
-    Ok(svgs
-        .into_iter()
-        .zip(pngs.into_iter().map(|p| p.1))
-        .collect())
+    let figures = drawn.iter().flat_map(|d| {
+        let column = format!("{}{COLUMN}", d.name);
+        [(d.name.to_owned(), &d.wide), (column, &d.narrow)]
+    });
+    let figures: Vec<(String, &Figure)> = figures.collect();
+    let files = figures.par_iter().with_max_len(1).map(|(name, figure)| {
+        let picture = figure.picture();
+        let named = |ending: &str, content| Output {
+            name: format!("figures/{name}.{ending}"),
+            content,
+        };
+        painter.png(&picture).map(|png| {
+            [
+                named("svg", picture.to_svg().into_bytes()),
+                named("png", png),
+                named("pdf", picture.to_pdf()),
+            ]
+        })
+    });
+    let files: Vec<[Output; 3]> = files.collect::<Result<_, _>>()?;
+    Ok(files.into_iter().flatten().collect())
 }
 
 /// Facts about the study besides its ratings.
@@ -294,13 +300,12 @@ pub(super) fn clear_figures(dir: &Path, files: &[Output]) {
     };
     for item in items.flatten() {
         let name = format!("figures/{}", item.file_name().to_string_lossy());
-        let ours = [".svg", ".png", ".csv"].iter().any(|e| name.ends_with(e));
-        if ours
-            && !files.iter().any(|f| f.name == name)
-            && figures::NAMES
-                .iter()
-                .any(|n| name.starts_with(&format!("figures/{n}.")))
-        {
+        let ours = figures::NAMES.iter().any(|n| {
+            let rest = name.strip_prefix(&format!("figures/{n}"));
+            let rest = rest.map(|r| r.strip_prefix(COLUMN).unwrap_or(r));
+            matches!(rest, Some(".svg" | ".png" | ".pdf" | ".csv"))
+        });
+        if ours && !files.iter().any(|f| f.name == name) {
             // A remaining outdated figure is no reason to fail.
             let _ = fs::remove_file(item.path());
         }

@@ -4,7 +4,7 @@ use super::super::trajectory::{refuse_to_overwrite, write_file};
 use super::args::{Args, MethodName};
 use super::{Failure, Kind, Results};
 use crate::report::identification::{self, Drawing, GridCell};
-use crate::report::png::Painter;
+use crate::report::picture::png::Painter;
 use std::fs;
 use std::path::{Path, PathBuf};
 use study_base::text::{ModelId, Untrusted};
@@ -65,7 +65,7 @@ pub(super) fn write(dir: &Path, files: &[OutputFile], force: bool) -> Result<(),
     Ok(())
 }
 
-/// The figures as SVG, PNG and CSV, and notes on figures that need more cells.
+/// The figures as SVG, PNG, PDF and CSV, and notes on figures that need more cells.
 pub(super) fn figures(
     results: &Results<'_>,
     dir: &Path,
@@ -114,12 +114,13 @@ pub(super) fn figures(
     let mut files = Vec::new();
     for drawing in drawings {
         let path = |ending: &str| dir.join(format!("{}.{ending}", drawing.name));
-        let svg = drawing.figure.to_svg();
+        let picture = drawing.figure.picture();
         let png = painter
-            .png(&svg)
+            .png(&picture)
             .map_err(|e| Failure::new(Kind::Bug, e.to_string()))?;
-        files.push((path("svg"), svg.into_bytes()));
+        files.push((path("svg"), picture.to_svg().into_bytes()));
         files.push((path("png"), png));
+        files.push((path("pdf"), picture.to_pdf()));
         files.push((path("csv"), drawing.csv.into_bytes()));
     }
     Ok((files, missing))

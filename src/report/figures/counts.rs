@@ -1,8 +1,8 @@
 //! Histograms of the ratings, by realization.
 
 use super::{Canvas, Drawn, Scene, drawn, head, name};
+use crate::report::chart::{Axis, Look, Mark, PALETTE, Panel, Span};
 use crate::report::csv::digits;
-use crate::report::svg::{Axis, Look, Mark, PALETTE, Panel, Span};
 use study_core::analyze::group_id;
 
 /// Largest number of bins of a histogram.

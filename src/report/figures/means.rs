@@ -1,9 +1,9 @@
 //! Means of the realizations: Fig. 10, Fig. 11, and the mean rating against VAF.
 
 use super::{Canvas, Drawn, Scene, cell, drawn, head};
+use crate::report::chart::{Anchor, Axis, Figure, Look, Mark, Note, Panel, Whisker};
+use crate::report::chart::{PALETTE, SMALL, for_names, shortened, text_width};
 use crate::report::csv::digits;
-use crate::report::svg::{Anchor, Axis, Figure, Look, Mark, Note, Panel, Whisker};
-use crate::report::svg::{PALETTE, SMALL, for_names, shortened, text_width};
 use crate::report::{apa, sentences};
 
 /// Index, mean and standard deviation of each realization.

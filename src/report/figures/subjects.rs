@@ -2,7 +2,7 @@
 
 use super::{Canvas, Drawn, Scene, cell, drawn, head, name};
 use crate::report::apa;
-use crate::report::svg::{
+use crate::report::chart::{
     Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, SMALL, Span, for_names, ramp, share,
     shortened, text_width,
 };

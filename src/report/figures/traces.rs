@@ -1,7 +1,7 @@
 //! Force against position in some playbacks.
 
 use super::{Canvas, Drawn, Scene, Trace, drawn, head};
-use crate::report::svg::{Axis, Look, Mark, Panel};
+use crate::report::chart::{Axis, Look, Mark, Panel};
 
 /// Largest number of points of a trace.
 const MAX_POINTS: usize = 400;

@@ -4,7 +4,7 @@
 pub(super) const CSS: &str = "
 :root { color-scheme: only light; }
 * { box-sizing: border-box; }
-body { margin: 0 auto; padding: 1.5rem 1.25rem 3rem; max-width: 46rem; background: #fff; color: #1a1a1a;
+body { margin: 0 auto; padding: 1.5rem 1.25rem 3rem; max-width: 50rem; background: #fff; color: #1a1a1a;
   font: 16px/1.5 'Liberation Sans', Arial, Helvetica, sans-serif; overflow-wrap: anywhere; }
 h1 { font-size: 1.6rem; line-height: 1.25; margin: 0 0 .3rem; }
 h2 { font-size: 1.25rem; margin: 2.4rem 0 .6rem; padding-bottom: .2rem; border-bottom: 2px solid #1a1a1a; }
@@ -20,7 +20,7 @@ p { margin: .35rem 0; }
 .apart h2 { margin-top: 1rem; }
 figure { margin: 1.4rem 0 2rem; }
 figcaption { font-size: .92rem; margin-top: .3rem; }
-svg { display: block; max-width: 100%; height: auto; }
+svg { display: block; width: 100%; height: auto; }
 .narrow { display: none; }
 .scroll { overflow-x: auto; margin: .6rem 0; }
 table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; overflow-wrap: normal; }

@@ -34,11 +34,7 @@ fn equal_figures_give_equal_bytes() {
 #[test]
 fn what_is_not_finite_is_not_drawn_and_what_is_far_out_stays_near() {
     let svg = sample().to_svg();
-    assert_eq!(
-        svg.matches("<circle").count(),
-        3,
-        "two of them and the legend's"
-    );
+    assert_eq!(svg.matches("h0").count(), 3, "two and the legend's");
     assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     assert!(!svg.split('"').any(|part| part.len() > 400), "{svg}");
 }
@@ -64,7 +60,9 @@ fn hostile_text_stays_text() {
 
 #[test]
 fn ids_begin_with_the_figures_own_and_are_unique() {
-    let svg = sample().to_svg();
+    let mut figure = sample();
+    figure.panels.push(figure.panels[0].clone());
+    let svg = figure.to_svg();
     let ids: Vec<&str> = svg
         .split(" id=\"")
         .skip(1)
@@ -180,4 +178,12 @@ fn dots_in_one_place_are_drawn_once() {
     let panel = panel.with(Look::nth(0), Mark::Dots(points));
     let svg = Figure::new("f", "", 400.0, 200.0).with(panel).to_svg();
     assert_eq!(svg.matches("h0").count(), 2);
+}
+
+#[test]
+fn a_note_about_the_data_is_in_the_picture() {
+    let mut figure = sample();
+    assert!(!figure.to_svg().contains("<desc>"));
+    figure.note = Some("a < b \u{202e}".to_owned());
+    assert!(figure.to_svg().contains("<desc>a &lt; b \\u{202e}</desc>"));
 }

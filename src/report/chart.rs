@@ -1,34 +1,31 @@
-//! Static figures as SVG: axes, ticks, legends, marks.
+//! Charts: axes, ticks, legends, marks.
 //!
 //! A [`Figure`] is a grid of [`Panel`]s; a panel has two axes, series and notes.
-//! Lengths are in CSS pixels, data in the units of their axis. This is no general
+//! Lengths are in px of a [`Picture`], data in the units of their axis. This is no general
 //! plotting library: it has what the figures of this program need.
 //!
 //! Invariants: equal figures give equal bytes, on every machine and in every
 //! locale; ids start with the figure's own, so that one page can contain several;
 //! text from the data is escaped and cannot leave its element; values that are not
 //! finite are not drawn; marks outside the axes are clipped. Colours are safe for
-//! colour-blind readers and repeated by shape, dash or hatching, so that a figure can
+//! colour-blind readers and repeated by shape or dash, so that a figure can
 //! be read in greyscale.
 
 mod axis;
 mod draw;
 mod frame;
 mod look;
-mod out;
 
+pub use super::picture::{Anchor, Colour, text_width};
 pub use axis::{Axis, Ticks};
 pub(in crate::report) use draw::share;
 pub(in crate::report) use frame::for_names;
-pub use look::{Colour, Dash, Fill, Look, PALETTE, Shape, ramp};
+pub use look::{Dash, Look, PALETTE, Shape, ramp};
 
-use out::Out;
+use super::picture::Picture;
 use study_base::text::{Untrusted, cut_middle};
 
-/// The fonts of all text, first the one that is bundled for PNG.
-pub const FONT_FAMILY: &str = "Liberation Sans, Arial, Helvetica, sans-serif";
-
-/// Size of tick labels and notes, px.
+/// Size of tick labels and notes, px: 8 pt on paper.
 pub const SMALL: f64 = 12.0;
 
 /// Size of axis labels and titles, px.
@@ -41,6 +38,9 @@ pub struct Figure {
     pub id: String,
     /// Text alternative for screen readers. Untrusted.
     pub title: String,
+    /// What a reader of the file must know, such as that the data are simulated.
+    /// Untrusted.
+    pub note: Option<String>,
     /// Width, px.
     pub width: f64,
     /// Height, px.
@@ -144,17 +144,6 @@ pub struct Note {
     pub rim: bool,
 }
 
-/// Which part of a text is at its position.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Anchor {
-    /// Its start.
-    Start,
-    /// Its middle.
-    Middle,
-    /// Its end.
-    End,
-}
-
 /// Legend of a heat map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourBar {
@@ -172,6 +161,7 @@ impl Figure {
         Self {
             id: id.to_owned(),
             title: title.to_owned(),
+            note: None,
             width,
             height,
             columns: 1,
@@ -186,14 +176,21 @@ impl Figure {
         self
     }
 
-    /// The SVG document, which can also be embedded in HTML.
-    pub fn to_svg(&self) -> String {
-        let mut out = Out::new(&self.id);
-        out.open(&self.title, self.width, self.height);
+    /// The picture.
+    pub fn picture(&self) -> Picture {
+        let mut out = Picture::new(&self.id, &self.title, self.width, self.height);
+        if let Some(note) = &self.note {
+            out.set_note(note);
+        }
         for (panel, frame) in self.panels.iter().zip(frame::frames(self)) {
             draw::panel(&mut out, panel, &frame);
         }
-        out.close()
+        out
+    }
+
+    /// The SVG document, which can also be embedded in HTML.
+    pub fn to_svg(&self) -> String {
+        self.picture().to_svg()
     }
 }
 
@@ -282,24 +279,6 @@ impl Note {
         self.anchor = anchor;
         self
     }
-}
-
-/// Width of a text in the figures' font, px: an estimate for layout, rather too wide.
-pub fn text_width(text: &str, size: f64) -> f64 {
-    use unicode_width::UnicodeWidthChar as _;
-    let em = |c: char| match c {
-        'i' | 'j' | 'l' | '\'' | '|' | '.' | ',' | ':' | ';' | '!' | 'I' | ' ' => 0.30,
-        'f' | 't' | 'r' | '(' | ')' | '-' | '/' => 0.38,
-        'm' | 'w' | 'M' | 'W' | '%' | '@' => 0.90,
-        c if c.is_uppercase() => 0.72,
-        c => match c.width().unwrap_or(0) {
-            0 => 0.0,
-            1 => 0.58,
-            _ => 1.02,
-        },
-    };
-    let shown = Untrusted(text).to_string();
-    shown.chars().map(em).sum::<f64>() * size
 }
 
 /// A text shortened to at most about `room` px.

@@ -1,46 +1,6 @@
-//! Colours, marker shapes, dashes and hatching.
+//! Palette, marker shapes, dashes.
 
-/// An sRGB colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Colour(pub u8, pub u8, pub u8);
-
-impl Colour {
-    /// Colour of text and axes.
-    pub const INK: Self = Self(0x1a, 0x1a, 0x1a);
-    /// Colour of secondary text.
-    pub const GREY: Self = Self(0x59, 0x59, 0x59);
-    /// Colour of grid lines.
-    pub const FAINT: Self = Self(0xdd, 0xdd, 0xdd);
-    /// Background.
-    pub const WHITE: Self = Self(0xff, 0xff, 0xff);
-
-    /// The colour as `#rrggbb`.
-    pub fn hex(self) -> String {
-        format!("#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
-    }
-
-    /// Relative luminance (WCAG 2), from 0 (black) to 1 (white).
-    pub fn luminance(self) -> f64 {
-        let linear = |c: u8| {
-            let c = f64::from(c) / 255.0;
-            if c <= 0.040_45 {
-                c / 12.92
-            } else {
-                libm::pow((c + 0.055) / 1.055, 2.4)
-            }
-        };
-        0.2126 * linear(self.0) + 0.7152 * linear(self.1) + 0.0722 * linear(self.2)
-    }
-
-    /// Black or white, whichever has the higher contrast on this colour: at least 4.5 to 1.
-    pub fn text_on(self) -> Self {
-        if self.luminance() > 0.18 {
-            Self(0, 0, 0)
-        } else {
-            Self::WHITE
-        }
-    }
-}
+use super::Colour;
 
 /// Eight colours after Okabe & Ito (2008), darkened for white paper, ordered so that
 /// neighbours also differ in lightness.
@@ -111,31 +71,17 @@ const DASHES: [Dash; 5] = [
 ];
 
 impl Dash {
-    pub(super) fn pattern(self) -> Option<&'static str> {
+    /// Lengths of dashes and gaps, px; empty for a solid line.
+    pub(super) fn pattern(self) -> &'static [f32] {
         match self {
-            Self::Solid => None,
-            Self::Dashed => Some("6 4"),
-            Self::Dotted => Some("1.5 3"),
-            Self::DashDot => Some("8 3 2 3"),
-            Self::Long => Some("12 4"),
+            Self::Solid => &[],
+            Self::Dashed => &[6.0, 4.0],
+            Self::Dotted => &[1.5, 3.0],
+            Self::DashDot => &[8.0, 3.0, 2.0, 3.0],
+            Self::Long => &[12.0, 4.0],
         }
     }
 }
-
-/// Fills of boxes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fill {
-    /// Solid.
-    Solid,
-    /// Hatched, rising lines.
-    Rising,
-    /// Hatched, falling lines.
-    Falling,
-    /// Cross-hatched.
-    Crossed,
-}
-
-const FILLS: [Fill; 4] = [Fill::Solid, Fill::Rising, Fill::Falling, Fill::Crossed];
 
 /// Appearance of marks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -146,8 +92,6 @@ pub struct Look {
     pub shape: Shape,
     /// Dash of lines.
     pub dash: Dash,
-    /// Fill of boxes.
-    pub fill: Fill,
     /// Width of lines, px.
     pub stroke: f64,
     /// Diameter of points, px.
@@ -157,15 +101,13 @@ pub struct Look {
 }
 
 impl Look {
-    /// The appearance of the n-th series: adjacent series differ in colour, shape, dash
-    /// and hatching.
+    /// The appearance of the n-th series: adjacent series differ in colour, shape and dash.
     pub fn nth(n: usize) -> Self {
         Self {
             colour: PALETTE[n % PALETTE.len()],
             // When the colours repeat, each gets the next shape.
             shape: SHAPES[(n + n / PALETTE.len()) % SHAPES.len()],
             dash: DASHES[n % DASHES.len()],
-            fill: FILLS[n % FILLS.len()],
             stroke: 1.5,
             size: 8.0,
             opacity: 1.0,
@@ -177,7 +119,6 @@ impl Look {
         Self {
             colour,
             dash: Dash::Solid,
-            fill: Fill::Solid,
             shape: Shape::Disc,
             ..Self::nth(0)
         }
