@@ -283,6 +283,23 @@ mod tests {
         );
     }
 
+    /// 253 bytes without a zero, then one zero: the longest block that ends in a zero.
+    #[test]
+    fn a_longest_frame_whose_checksum_ends_in_zero_keeps_that_zero() {
+        let body = (1..=u32::from(u16::MAX))
+            .map(|n| {
+                let mut body = [0xAA; MAX_BODY];
+                body[0] = (n % 255 + 1) as u8;
+                body[1] = (n / 255 % 255 + 1) as u8;
+                body
+            })
+            .find(|body| matches!(crc32(body).to_le_bytes(), [(1..), (1..), (1..), 0]))
+            .unwrap();
+        let frame = Frame::of(&body).unwrap();
+        assert_eq!(frame.as_bytes()[1], 0xFE);
+        assert_eq!(decoded(frame.as_bytes()), [Ok(body.to_vec())]);
+    }
+
     #[test]
     fn invalid_frames_are_reported_with_their_error() {
         for (bytes, expected) in [

@@ -45,6 +45,19 @@ pub enum Lookup {
     Nearest,
 }
 
+impl Lookup {
+    /// The node to use, and the weight of the next one, for a position between `left`
+    /// and the next node; `weight` is the fraction of the way, in [0, 1).
+    #[inline]
+    pub fn between(self, left: usize, weight: f64) -> (usize, f64) {
+        match self {
+            Self::Linear => (left, weight),
+            Self::Floor => (left, 0.0),
+            Self::Nearest => (left + usize::from(weight > 0.5), 0.0),
+        }
+    }
+}
+
 /// Rule that gives the direction state z from the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Direction {
@@ -153,7 +166,8 @@ fn branch_force_n(branch: &BranchView<'_>, left: usize, weight: f64, motion: Mot
 }
 
 /// Index of the node to the left of x and the weight of the next node, in [0, 1).
-fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
+/// Beyond the ends the parameters are constant.
+pub fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
     let last = nodes.len() - 1;
     // NaN uses the first node.
     if x_mm.is_nan() || x_mm <= nodes[0] {
@@ -164,16 +178,18 @@ fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
     }
     let left = nodes.partition_point(|node| *node <= x_mm) - 1;
     let weight = (x_mm - nodes[left]) / (nodes[left + 1] - nodes[left]);
-    match lookup {
-        Lookup::Linear => (left, weight),
-        Lookup::Floor => (left, 0.0),
-        Lookup::Nearest => (left + usize::from(weight > 0.5), 0.0),
-    }
+    lookup.between(left, weight)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_nearest_node_changes_at_the_midpoint() {
+        let at = |x_mm| locate(&[0.0, 1.0, 2.0], Lookup::Nearest, x_mm);
+        assert_eq!([0.5, 0.51, 1.49].map(at), [(0, 0.0), (1, 0.0), (1, 0.0)]);
+    }
 
     fn table(lookup: Lookup) -> ([f64; 3], [f64; 3], [f64; 3], Lookup) {
         ([0.0, 1.0, 2.0], [0.0, 2.0, 0.0], [0.0; 3], lookup)

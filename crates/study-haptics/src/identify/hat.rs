@@ -15,7 +15,7 @@
 use super::banded::{Banded, Bound};
 use super::samples::Theta;
 use crate::recording::Recording;
-use study_wire::predict::{Direction, DirectionState, Lookup, Motion};
+use study_wire::predict::{Direction, DirectionState, Lookup, Motion, locate};
 
 /// Unknowns per node: m, b·B_SCALE, F in + and in −.
 const PER_NODE: usize = 6;
@@ -149,21 +149,5 @@ fn add_ridges(normal: &mut Banded, nodes: usize, information: f64, penalty: Pena
                 add(&second, on_force);
             }
         }
-    }
-}
-
-/// The left node of a look-up and the weight of the next one; constant beyond the
-/// ends, as in prediction.
-fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
-    let right = nodes.partition_point(|node| *node <= x_mm);
-    if right == 0 || right == nodes.len() {
-        return (right.saturating_sub(1), 0.0);
-    }
-    let left = right - 1;
-    let share = (x_mm - nodes[left]) / (nodes[right] - nodes[left]);
-    match lookup {
-        Lookup::Linear => (left, share),
-        Lookup::Floor => (left, 0.0),
-        Lookup::Nearest => (left + usize::from(share > 0.5), 0.0),
     }
 }

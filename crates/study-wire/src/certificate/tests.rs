@@ -72,6 +72,15 @@ fn a_negative_mass_or_damping_fails_where_it_is_and_is_counted() {
 }
 
 #[test]
+fn only_a_rounding_error_below_zero_passes() {
+    for (b, passes) in [(-1e-10, true), (-1e-8, false), (-1e-4, false)] {
+        let mut t = plain();
+        t.0[0][1] = [b; 3];
+        assert_eq!(t.linear().passes(), passes, "{b}");
+    }
+}
+
+#[test]
 fn a_negative_stiffness_is_no_fault() {
     let mut t = plain();
     t.0[0][2] = [-3.0; 3];

@@ -252,3 +252,21 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_of_more_points_than_the_device_holds_is_refused() {
+        let begin = |points| PathBegin {
+            points,
+            rate_hz: 1000.0,
+            force_n: 1.0,
+            velocity_mm_s: 1.0,
+        };
+        let mut path = PathBuffer::<3>::new();
+        assert_eq!(path.begin(&begin(3)), Ok(()));
+        assert_eq!(path.begin(&begin(4)), Err((Refusal::TooMany, 3)));
+    }
+}

@@ -139,11 +139,7 @@ impl Cursor {
             }
             self.left = left;
             let weight = (x - nodes.x_mm[left]) / (nodes.x_mm[left + 1] - nodes.x_mm[left]);
-            match nodes.lookup {
-                Lookup::Linear => (left, weight),
-                Lookup::Floor => (left, 0.0),
-                Lookup::Nearest => (left + usize::from(weight > 0.5), 0.0),
-            }
+            nodes.lookup.between(left, weight)
         };
         let offset = if self.negative { last + 1 } else { 0 };
         Position {
