@@ -20,12 +20,14 @@
 
 pub(crate) mod counts;
 pub(crate) mod newton;
+mod parallel;
 #[cfg(test)]
 pub(crate) mod tests;
 
 use crate::matrix::{Cholesky, SymmetricMatrix};
 pub use counts::{CategoryCount, CategoryCounts, Predictor};
 use newton::{Evaluation, maximise};
+pub use parallel::{ProportionalOdds, proportional_odds};
 
 /// Why an ordinal model has no estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -39,6 +41,9 @@ pub enum ClmError {
     /// A mixed model needs two subjects.
     #[error("one subject has no variance between subjects")]
     OneSubject,
+    /// Slope and realizations cannot be separated.
+    #[error("fewer than three realizations with a covariate")]
+    FewRealizations,
     /// The likelihood has no maximum: an estimate is infinite.
     #[error(
         "complete separation: the ratings of some realizations do not overlap with others, so an estimate is infinite"

@@ -18,6 +18,7 @@
 //! its derivative in σ² is ½ Σᵢ (f₁² + f₂), with f₁ and f₂ the derivatives in b at 0. If
 //! it is not positive and no σ > 0 has a higher likelihood, the estimate is 0.
 
+mod crossed;
 mod hermite;
 mod laplace;
 mod mode;
@@ -28,6 +29,7 @@ mod tests;
 use super::clm::counts::CategoryCounts;
 use super::clm::newton::{Evaluation, Maximum, maximise};
 use super::clm::{ClmError, ClmFit, clm, fit_of, logistic};
+pub use crossed::{CrossedClmm, clmm_crossed};
 use std::sync::LazyLock;
 
 /// Number of nodes of the reported quadrature.

@@ -1,7 +1,7 @@
 //! Correlation of two columns: Pearson, Spearman, Kendall, repeated measures.
 
 use super::describe::{is_constant, mean, products_about, squares_about};
-use super::distribution::{normal_quantile, t_two_sided};
+use super::distribution::{normal_quantile, normal_upper, t_two_sided};
 use super::finite;
 use super::rank::{doubled_ranks, mid_ranks};
 
@@ -64,6 +64,18 @@ pub fn fisher_interval(r: f64, weight: f64) -> Option<(f64, f64)> {
     let half = normal_quantile(0.975)? / weight.sqrt();
     let z = r.atanh();
     Some(((z - half).tanh(), (z + half).tanh()))
+}
+
+/// p of the test that a correlation lies within ±`margin`: the larger one of two
+/// one-sided tests by Fisher's z (Goertzen & Cribbie 2010). `weight` is n − 3 for a plain
+/// correlation. `None` for |r| = 1 or unless `weight` > 0 and 0 < `margin` < 1.
+pub fn p_equivalence(r: f64, weight: f64, margin: f64) -> Option<f64> {
+    if !(r.abs() < 1.0 && weight > 0.0 && margin > 0.0 && margin < 1.0) {
+        return None;
+    }
+    Some(normal_upper(
+        (margin.atanh() - r.abs().atanh()) * weight.sqrt(),
+    ))
 }
 
 /// A repeated-measures correlation.
@@ -131,6 +143,14 @@ mod tests {
         assert_eq!(pearson(&nearly, &[1.0, 2.0, 3.0]), None);
         assert_eq!(spearman(&nearly, &[1.0, 2.0, 3.0]), None);
         assert_eq!(kendall(&nearly, &[1.0, 2.0, 3.0]), None);
+    }
+
+    /// By hand: (0.4 − 0.1)·√25 = 1.5, and P(Z > 1.5) = .0668072.
+    #[test]
+    fn a_small_correlation_is_within_the_margin() {
+        let p = p_equivalence(-0.1f64.tanh(), 25.0, 0.4f64.tanh()).unwrap();
+        assert!((p - 0.066_807_2).abs() < 1e-7, "{p}");
+        assert_eq!(p_equivalence(0.1, 0.0, 0.5), None);
     }
 
     #[test]

@@ -10,7 +10,9 @@
 //! | Which pairs differ? Are they equivalent? | [`paired`] |
 //! | Are the ratings correlated with a covariate? | [`correlation`], [`permutation`] (exact p), [`bootstrap`] (interval), [`bayes`] |
 //! | What is the slope on a covariate? | [`regression`], [`two_way_slope`] (beside two fixed factors), [`lmm`] (random effects) |
-//! | Do the raters agree? | [`agreement`] |
+//! | Do the raters agree? | [`agreement`], [`disagreement`] (interaction of subject and realization) |
+//! | Does a rating depend on the one before? | [`carry_over`] |
+//! | How large an effect would be found? | [`power`] |
 //! | How large is a share of trials? | [`proportion`] |
 //! | Can a printed mean and standard deviation be right? | [`grim`] |
 //! | Tail probabilities, quantiles, ranks | [`distribution`], [`rank`] |
@@ -37,10 +39,12 @@ pub mod agreement;
 pub mod anova;
 pub mod bayes;
 pub mod bootstrap;
+pub mod carry_over;
 pub mod clm;
 pub mod clmm;
 pub mod correlation;
 pub mod describe;
+pub mod disagreement;
 pub mod distribution;
 pub mod friedman;
 pub mod grim;
@@ -48,6 +52,7 @@ pub mod lmm;
 mod matrix;
 pub mod paired;
 pub mod permutation;
+pub mod power;
 pub mod proportion;
 pub mod random;
 pub mod rank;

@@ -27,6 +27,7 @@ mod kenward_roger;
 mod optimize;
 mod profile;
 mod satterthwaite;
+mod slope_variance;
 mod start;
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ pub use data::{CellSummary, FixedEffects, LmmData};
 pub use fit::{Criterion, LmmFit, VarianceComponents, fit};
 pub use kenward_roger::kenward_roger;
 pub use satterthwaite::{ContrastF, ContrastT};
+pub use slope_variance::{SlopeVariance, slope_variance};
 
 /// The random effects of a model; every model has a subject intercept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

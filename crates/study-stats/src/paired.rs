@@ -48,13 +48,13 @@ pub fn one_sample(x: &[f64]) -> Option<OneSample> {
 /// Equivalence test by two one-sided t tests (Schuirmann 1987).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Equivalence {
-    /// t of the test that the mean is above −margin.
+    /// t of the test that the estimate is above −margin.
     pub t_lower: f64,
-    /// t of the test that the mean is below +margin.
+    /// t of the test that the estimate is below +margin.
     pub t_upper: f64,
-    /// The larger of the two p; below .05 the mean is shown to lie within ±margin.
+    /// The larger of the two p; below .05 the estimate is shown to lie within ±margin.
     pub p: f64,
-    /// mean ± t(.95, n−1)·sd/√n; within ±margin where p is below .05.
+    /// estimate ± t(.95, df)·se; within ±margin where p is below .05.
     pub ci90: (f64, f64),
 }
 
@@ -63,18 +63,24 @@ pub struct Equivalence {
 pub fn equivalence(x: &[f64], margin: f64) -> Option<Equivalence> {
     let test = one_sample(x)?;
     let sem = test.sd / (test.n as f64).sqrt();
-    if !(margin > 0.0 && sem > 0.0) {
+    equivalence_of(test.mean, sem, test.n as f64 - 1.0, margin)
+}
+
+/// Tests whether an estimate, such as a slope or a contrast, lies within ±`margin`, given
+/// its standard error and degrees of freedom. `None` unless `se`, `df` and `margin` are
+/// above 0.
+pub fn equivalence_of(estimate: f64, se: f64, df: f64, margin: f64) -> Option<Equivalence> {
+    if !(margin > 0.0 && se > 0.0) {
         return None;
     }
-    let df = test.n as f64 - 1.0;
-    let t_lower = finite((test.mean + margin) / sem)?;
-    let t_upper_margin = finite((test.mean - margin) / sem)?;
-    let half = t_quantile(0.95, df)? * sem;
+    let t_lower = finite((estimate + margin) / se)?;
+    let t_upper_margin = finite((estimate - margin) / se)?;
+    let half = t_quantile(0.95, df)? * se;
     Some(Equivalence {
         t_lower,
         t_upper: t_upper_margin,
         p: t_upper(t_lower, df)?.max(t_upper(-t_upper_margin, df)?),
-        ci90: (test.mean - half, test.mean + half),
+        ci90: (estimate - half, estimate + half),
     })
 }
 

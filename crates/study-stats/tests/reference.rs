@@ -6,9 +6,12 @@
 //! realization, a digit for each rating, `.` for a missing cell.
 #![allow(clippy::unwrap_used)]
 
+use study_stats::clm::{CategoryCount, CategoryCounts, Predictor};
+use study_stats::clmm::clmm_crossed;
+use study_stats::disagreement::disagreement;
 use study_stats::lmm::{
     AdjustedMeans, CellSummary, ContrastF, ContrastT, Criterion, FixedEffects, LmmData,
-    RandomEffects, adjusted_means, fit,
+    RandomEffects, adjusted_means, fit, slope_variance,
 };
 
 /// Name and text of each file.
@@ -44,6 +47,10 @@ const DESIGNS: [(&str, &str); 8] = [
 
 struct Design {
     name: &'static str,
+    /// The covariate of each realization.
+    x: Vec<f64>,
+    /// Subject, realization, rating.
+    ratings: Vec<(u32, u32, u32)>,
     cells: Vec<CellSummary>,
     /// The lines of expected values: a key and its numbers.
     expected: Vec<(&'static str, Vec<f64>)>,
@@ -53,15 +60,17 @@ impl Design {
     fn read((name, text): (&'static str, &'static str)) -> Self {
         let mut design = Self {
             name,
+            x: Vec::new(),
+            ratings: Vec::new(),
             cells: Vec::new(),
             expected: Vec::new(),
         };
-        let (mut x, mut subject) = (Vec::new(), 0);
+        let mut subject = 0;
         for line in text.lines() {
             let (key, rest) = line.split_once(' ').unwrap();
             let words = rest.split(' ');
             match key {
-                "covariate" => x = words.map(|w| w.parse().unwrap()).collect(),
+                "covariate" => design.x = words.map(|w| w.parse().unwrap()).collect(),
                 "ratings" => {
                     for (realization, digits) in words.enumerate() {
                         let ratings: Vec<f64> = digits
@@ -72,12 +81,15 @@ impl Design {
                         if ratings.is_empty() {
                             continue;
                         }
+                        let place = (subject as u32, realization as u32);
+                        let rated = ratings.iter().map(|y| (place.0, place.1, *y as u32));
+                        design.ratings.extend(rated);
                         let n = ratings.len();
                         let mean = ratings.iter().sum::<f64>() / n as f64;
                         design.cells.push(CellSummary {
                             subject,
                             realization,
-                            x: x[realization],
+                            x: design.x[realization],
                             n,
                             mean,
                             within: ratings.iter().map(|r| (r - mean).powi(2)).sum(),
@@ -105,6 +117,26 @@ impl Design {
 
     fn adjusted(&self) -> AdjustedMeans {
         adjusted_means(&LmmData::new(&self.cells, FixedEffects::Intercept).unwrap()).unwrap()
+    }
+
+    /// Counts of the ratings for an ordinal model with the covariate.
+    fn counts(&self) -> CategoryCounts {
+        let mut used: Vec<u32> = self.ratings.iter().map(|r| r.2).collect();
+        used.sort_unstable();
+        used.dedup();
+        let predictors = self.x.iter().map(|&x| Predictor {
+            column: 0,
+            x: x - 0.8,
+        });
+        let counts: Vec<CategoryCount> = (self.ratings.iter())
+            .map(|&(subject, predictor, rating)| CategoryCount {
+                subject,
+                predictor,
+                category: used.partition_point(|u| *u < rating) as u32,
+                n: 1,
+            })
+            .collect();
+        CategoryCounts::new(predictors.collect(), 1, used.len(), &counts)
     }
 
     /// The mixed model of the ratings with a mean for each realization.
@@ -223,5 +255,61 @@ fn the_crossed_slope_agrees_with_lmer_test() {
         let variances = [v.intercept, v.realization, v.cell, v.error];
         let expected = design.rows("slope_variances")[0];
         design.near("slope variances", &variances, expected, &[VARIANCE; 4]);
+    }
+}
+
+/// The likelihood is flat in the variance of slopes, where R stops early.
+#[test]
+fn the_variance_of_slopes_agrees_with_lmer() {
+    for design in DESIGNS.map(Design::read) {
+        let table = LmmData::new(&design.cells, FixedEffects::Covariate { centre: 0.8 }).unwrap();
+        let found = slope_variance(&table).unwrap();
+        let row = [found.variance, found.chi2];
+        design.near(
+            "slope variance",
+            &row,
+            design.rows("slope_variance")[0],
+            &[2e-3, 1e-5],
+        );
+        let p = found.p.unwrap();
+        assert!(p > 0.0 && p <= 1.0 && (found.chi2 > 1e-9 || p > 0.999));
+    }
+}
+
+#[test]
+fn the_interaction_agrees_with_lm() {
+    for design in DESIGNS.map(Design::read) {
+        let found = disagreement(&design.cells);
+        assert_eq!(found.is_some(), design.repeats(), "{}", design.name);
+        if let Some(found) = found {
+            let row = [found.f, found.df1, found.df2, found.p.unwrap()];
+            design.near(
+                "interaction",
+                &row,
+                design.rows("interaction")[0],
+                &[1e-8; 4],
+            );
+        }
+    }
+}
+
+/// ordinal stops when its gradient is small. Its standard errors are not compared: it takes
+/// them from differences of the likelihood, which lose half of the digits.
+#[test]
+fn the_crossed_ordinal_model_agrees_with_ordinal() {
+    for design in DESIGNS.map(Design::read) {
+        let found = clmm_crossed(&design.counts()).unwrap();
+        let fit = &found.fit;
+        let row = [
+            fit.loglik,
+            fit.beta[0],
+            found.sd_subject,
+            found.sd_realization,
+            found.null_loglik,
+        ];
+        let mut expected = design.rows("ordinal")[0].to_vec();
+        expected.remove(2);
+        let tolerances = [1e-6, 1e-3, 1e-3, 1e-3, 1e-6];
+        design.near("ordinal", &row, &expected, &tolerances);
     }
 }

@@ -207,6 +207,16 @@ impl CategoryCounts {
             .collect()
     }
 
+    /// The rows of the design.
+    pub(crate) fn predictors(&self) -> &[Predictor] {
+        &self.predictors
+    }
+
+    /// Number of predictors with a rating.
+    pub(crate) fn realizations_used(&self) -> usize {
+        self.extent.iter().flatten().count()
+    }
+
     /// aₖ of every place, without the random intercept.
     pub(crate) fn linear(&self, at: &[f64]) -> Vec<f64> {
         let t = self.thresholds;

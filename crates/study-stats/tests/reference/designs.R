@@ -1,4 +1,4 @@
-suppressMessages({library(lme4); library(lmerTest); library(emmeans)})
+suppressMessages({library(lme4); library(lmerTest); library(emmeans); library(ordinal)})
 options(digits=12)
 vafs <- c(.70,.74,.78,.79,.85,.88,.93,.95,.97)
 make <- function(seed, S, k, reps, sds, keep, level=function(s) 0, slope=1.5) {
@@ -49,5 +49,15 @@ for (n in names(designs)) { d<-designs[[n]]
   z <- coef(summary(b))["x",]
   put("slope", num(z))
   put("slope_variances", num(comp(b,"s"), comp(b,"m"), comp(b,"s:m"), sigma(b)^2))
+  # Variance of the subjects' slopes: likelihood ratio of the restricted likelihoods.
+  f <- if (rep) y~x+(1+x|s)+(1|m)+(1|s:m) else y~x+(1+x|s)+(1|m)
+  c2 <- lmer(f, transform(d, x=x-.8), control=ctl)
+  put("slope_variance", num(as.data.frame(VarCorr(c2))$vcov[which(as.data.frame(VarCorr(c2))$var1=="x" & is.na(as.data.frame(VarCorr(c2))$var2))], REMLcrit(b)-REMLcrit(c2)))
+  # Interaction of fixed subjects and realizations against repeated ratings.
+  if (rep) { w <- anova(lm(y~s+m,d), lm(y~s*m,d)); put("interaction", num(w$F[2], w$Df[2], w$Res.Df[2], w$`Pr(>F)`[2])) }
+  # Ordinal models: crossed random effects by Laplace's method; proportional odds.
+  d$o <- ordered(d$y); cc <- clmm.control(gradTol=1e-8, maxIter=500)
+  o1 <- clmm(o~x+(1|s)+(1|m), data=d, control=cc); o0 <- clmm(o~1+(1|s)+(1|m), data=d, control=cc)
+  put("ordinal", num(o1$logLik, o1$beta, sqrt(vcov(o1)["x","x"]), o1$ST$s, o1$ST$m, o0$logLik))
   writeLines(out, paste0(n, ".txt"))
 }
