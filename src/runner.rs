@@ -25,7 +25,7 @@ use study_core::outcome::Event;
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol};
 use study_core::session::{Effect, Ending, Input, Session, Unsaved, View, input::Claim};
-use study_core::store::{ClaimRequest, SeatKind, StudyFolder};
+use study_core::store::{ClaimRequest, Receipt, SeatKind, StudyFolder};
 use study_haptics::model::Realization;
 
 /// Longest wait for an input while nothing else is expected: clocks on the screen move.
@@ -109,6 +109,8 @@ pub struct Ended {
     pub ending: Ending,
     /// What is not known to be on disk.
     pub unsaved: Option<Unsaved>,
+    /// The last record that is on disk.
+    pub receipt: Option<Receipt>,
 }
 
 /// A running session with its device and its folder.
@@ -119,6 +121,7 @@ pub struct Runner {
     saved: u64,
     strip: Option<Strip>,
     ended: Option<Ending>,
+    receipt: Option<Receipt>,
     /// When the device last reported about the current playback.
     last_report: Option<Duration>,
     /// The code on the physical sample of each realization.
@@ -146,6 +149,7 @@ impl Runner {
             saved: 0,
             strip,
             ended: None,
+            receipt: None,
             last_report: None,
             codes,
             has_telemetry: false,
@@ -189,6 +193,7 @@ impl Runner {
         Some(Ended {
             ending,
             unsaved: self.session.unsaved(),
+            receipt: self.receipt.clone(),
         })
     }
 
@@ -395,20 +400,25 @@ impl Runner {
     fn poll_saver(&mut self) {
         let events = self.saver.as_mut().map(Saver::drain).unwrap_or_default();
         for event in events {
-            let input = self.save_input(event);
-            self.feed(input);
+            if let Some(input) = self.save_input(event) {
+                self.feed(input);
+            }
         }
     }
 
-    fn save_input(&mut self, event: SaveEvent) -> Input {
-        match event {
+    fn save_input(&mut self, event: SaveEvent) -> Option<Input> {
+        Some(match event {
             SaveEvent::Saved => {
                 self.saved += 1;
                 Input::Saved { count: self.saved }
             }
             SaveEvent::Failed(why) => Input::SaveFailed(why),
             SaveEvent::TelemetryLost(why) => Input::Notice(why),
-        }
+            SaveEvent::Left(receipt) => {
+                self.receipt = Some(receipt);
+                return None;
+            }
+        })
     }
 
     fn send(&mut self, job: Job) {
@@ -423,9 +433,10 @@ impl Runner {
             return;
         };
         for event in saver.finish() {
-            let input = self.save_input(event);
             // The session has ended: it only takes note of what is saved.
-            self.session.handle(input, self.setup.clock.now());
+            if let Some(input) = self.save_input(event) {
+                self.session.handle(input, self.setup.clock.now());
+            }
         }
     }
 

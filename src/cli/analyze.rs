@@ -76,6 +76,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         .hint(format!("name one, such as {}", studies[0].path().display())));
     }
     let several = studies.len() > 1;
+    let mut truncated = Ok(());
     for (i, study) in studies.iter().enumerate() {
         if i > 0 {
             console.out(format!("\n{}\n\n", "─".repeat(60)))?;
@@ -106,8 +107,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             None => Some(folder.join("analysis")),
         };
         show(args, &input, out.as_deref(), console)?;
+        truncated = truncated.and(study_folder::whole(study, &sessions));
     }
-    Ok(())
+    truncated
 }
 
 /// An analysis with everything its report needs.

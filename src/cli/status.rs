@@ -16,6 +16,7 @@ pub(super) struct Args {
 
 /// Prints the participants and their states, never an order.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let mut truncated = Ok(());
     for (n, study) in study_folder::studies(&args.results)?.iter().enumerate() {
         if n > 0 {
             console.out("\n")?;
@@ -27,8 +28,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             console,
         );
         console.out(of_study(study, &sessions))?;
+        truncated = truncated.and(study_folder::whole(study, &sessions));
     }
-    Ok(())
+    truncated
 }
 
 fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {

@@ -126,6 +126,24 @@ pub(super) fn warn(study: &StudyFolder, warnings: &[String], console: &mut Conso
     }
 }
 
+/// The failure to report, after everything was printed, if acknowledged records are
+/// missing at the end of a journal.
+pub(super) fn whole(study: &StudyFolder, sessions: &[SessionData]) -> Result<(), Failure> {
+    let truncated = sessions.iter().filter(|s| s.truncated);
+    let who: Vec<&str> = truncated.map(|s| s.participant.as_str()).collect();
+    if who.is_empty() {
+        return Ok(());
+    }
+    let path = study.path().display();
+    let what = format!(
+        "{path}: saved answers are missing: the journal of {} is truncated",
+        who.join(", ")
+    );
+    Err(Failure::results(what).hint(format!(
+        "restore the session's folder from the mirror or a copy; `study verify {path}` lists all findings"
+    )))
+}
+
 /// Warns that the tables of a printed analysis could not be written.
 pub(super) fn tables_unwritten(failure: &Failure, console: &mut Console) {
     console.say(format!(

@@ -1,7 +1,7 @@
 //! `study verify`
 
 use super::{Console, Failure, study_folder};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use study_base::text::{Untrusted, counted};
 use study_core::store::{Finding, SessionData, StudyFolder, layout};
 
@@ -16,6 +16,9 @@ pub(super) struct Args {
     /// Let --rebuild remove participants without a journal from the tables
     #[arg(long, requires = "rebuild")]
     drop_missing: bool,
+    /// Also compare every file with a copy, such as the mirror of `study run --mirror`
+    #[arg(long, value_name = "DIR")]
+    against: Option<PathBuf>,
 }
 
 /// Prints the findings and fails if there is a problem.
@@ -28,6 +31,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         }
         let mut found = study.verify(protocol.as_ref().ok().map(|l| &l.protocol))?;
         found.extend(study_folder::frozen_versions(&study, None));
+        if let Some(copy) = &args.against {
+            found.extend(study.verify_against(&copy_of(&study, copy)?)?);
+        }
         console.out(of_study(&study, &study.sessions()?, &found))?;
         problems += count_problems(&found);
     }
@@ -35,6 +41,23 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         0 => Ok(()),
         n => Err(Failure::results(problems_found(n))),
     }
+}
+
+/// The folder of a study's copy: DIR, or the study's folder in it.
+fn copy_of(study: &StudyFolder, dir: &Path) -> Result<PathBuf, Failure> {
+    let inside = dir.join(&study.manifest().study);
+    let folders = [dir.to_owned(), inside];
+    let mut copies = folders.into_iter();
+    let copy = copies.find(|folder| folder.join(layout::MANIFEST).exists());
+    copy.ok_or_else(|| {
+        let none = format!(
+            "{}: contains no copy of the study `{}`",
+            dir.display(),
+            Untrusted(&study.manifest().study)
+        );
+        Failure::results(none)
+            .hint("--against names the folder given as --mirror, or a copy of the study's folder")
+    })
 }
 
 fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) -> String {
@@ -62,7 +85,7 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData], found: &[Finding]) ->
         counted(events, "event", "events"),
     ));
     out.push_str(
-        "Not checked: the numbers in telemetry files (only their files and lines are counted) and analysis/.\n",
+        "Not checked: the numbers in telemetry files of earlier releases (only their files and lines are counted) and analysis/.\n",
     );
     if found
         .iter()

@@ -1,17 +1,18 @@
 //! Saves journal and telemetry of one session outside the session loop.
 //!
-//! Jobs are done in order. [`SaveEvent::Saved`] acknowledges an event after its line is
-//! on disk, in the order of the events. After a failed write nothing is acknowledged
+//! Jobs are done in order; events that wait together are written together, with one
+//! sync. [`SaveEvent::Saved`] acknowledges an event after its line is on disk, in the
+//! order of the events. After a failed write nothing is acknowledged
 //! and nothing is lost until [`Job::Retry`] has written every unsaved event into a new
-//! segment of the journal. Telemetry that cannot be written is dropped and reported: no
-//! answer waits for it.
+//! segment of the journal. Telemetry that cannot be written is dropped and reported, and
+//! the journal says so: no answer waits for it.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
-use study_core::outcome::{Event, Moment, Sample};
-use study_core::store::{Journal, SessionFolder, TelemetryWriter};
+use study_core::outcome::{Event, Moment, Sample, TelemetryFile};
+use study_core::store::{Journal, Receipt, SessionFolder, TelemetryWriter};
 
 /// How long the end of a session waits for the disk. A disk may never answer.
 const LAST_WAIT: Duration = Duration::from_secs(5);
@@ -47,6 +48,8 @@ pub enum SaveEvent {
     Failed(String),
     /// The telemetry of the attempt could not be saved; answers are not affected.
     TelemetryLost(String),
+    /// The session was left: the last record of its journal.
+    Left(Receipt),
 }
 
 /// The saver of one session; holds the lock of its folder.
@@ -71,9 +74,33 @@ enum Mode {
 struct Worker {
     folder: SessionFolder,
     journal: Journal,
-    telemetry: Option<TelemetryWriter>,
-    unsaved: VecDeque<(Moment, Event)>,
+    telemetry: Option<Telemetry>,
+    /// What became of the last telemetry file, until its playback is recorded.
+    ended: Option<Ended>,
+    unsaved: VecDeque<Unsaved>,
     broken: bool,
+}
+
+/// The telemetry of the attempt under way.
+struct Telemetry {
+    trial: u32,
+    attempt: u32,
+    /// The file, or why there is none.
+    file: Result<TelemetryWriter, String>,
+}
+
+/// A completed telemetry file, or why there is none.
+struct Ended {
+    trial: u32,
+    attempt: u32,
+    file: Result<TelemetryFile, String>,
+}
+
+struct Unsaved {
+    at: Moment,
+    event: Event,
+    /// Whether the session waits for it; it does not know of what the saver adds.
+    awaited: bool,
 }
 
 impl Saver {
@@ -83,6 +110,7 @@ impl Saver {
             folder,
             journal,
             telemetry: None,
+            ended: None,
             unsaved: VecDeque::new(),
             broken: false,
         });
@@ -91,12 +119,17 @@ impl Saver {
             let (send, events) = channel();
             let handle = std::thread::spawn(move || {
                 while let Ok(job) = queue.recv() {
-                    for event in worker.work(job) {
+                    let mut events = worker.work(job);
+                    for job in queue.try_iter() {
+                        events.extend(worker.work(job));
+                    }
+                    events.extend(worker.save());
+                    for event in events {
                         // The work goes on even if the session loop has ended.
                         let _ = send.send(event);
                     }
                 }
-                for event in worker.end_telemetry() {
+                for event in worker.finish() {
                     let _ = send.send(event);
                 }
             });
@@ -118,7 +151,10 @@ impl Saver {
     /// Queues a job.
     pub fn send(&mut self, job: Job) {
         match &mut self.mode {
-            Mode::Inline { worker, events } => events.extend(worker.work(job)),
+            Mode::Inline { worker, events } => {
+                events.extend(worker.work(job));
+                events.extend(worker.save());
+            }
             Mode::Thread { jobs, .. } => {
                 // The thread ends early only by a panic; then no event comes back, and
                 // nothing is shown as saved.
@@ -151,11 +187,8 @@ impl Saver {
     /// waiting for a disk that does not answer.
     pub fn finish(self) -> Vec<SaveEvent> {
         match self.mode {
-            Mode::Inline {
-                mut worker,
-                mut events,
-            } => {
-                events.extend(worker.end_telemetry());
+            Mode::Inline { worker, mut events } => {
+                events.extend(worker.finish());
                 events
             }
             Mode::Thread {
@@ -179,14 +212,12 @@ impl Saver {
 }
 
 impl Worker {
+    /// Does a job; [`Worker::save`] must follow.
     fn work(&mut self, job: Job) -> Vec<SaveEvent> {
         match job {
             Job::Append(at, event) => {
-                self.unsaved.push_back((at, event));
-                if self.broken {
-                    return Vec::new();
-                }
-                self.append()
+                self.queue(at, event);
+                Vec::new()
             }
             Job::Retry => {
                 if !self.broken {
@@ -195,29 +226,35 @@ impl Worker {
                 match self.journal.new_segment() {
                     Ok(()) => {
                         self.broken = false;
-                        self.append()
+                        Vec::new()
                     }
                     Err(error) => vec![SaveEvent::Failed(error.to_string())],
                 }
             }
             Job::TelemetryBegin { trial, attempt } => {
                 let mut events = self.end_telemetry();
-                match self.folder.telemetry(trial, attempt) {
-                    Ok(telemetry) => {
-                        self.telemetry = Some(telemetry);
-                    }
-                    Err(error) => events.push(SaveEvent::TelemetryLost(error.to_string())),
-                }
+                let file = self.folder.telemetry(trial, attempt);
+                let file = file.map_err(|error| error.to_string());
+                events.extend(file.as_ref().err().cloned().map(SaveEvent::TelemetryLost));
+                self.telemetry = Some(Telemetry {
+                    trial,
+                    attempt,
+                    file,
+                });
                 events
             }
             Job::Telemetry(samples) => {
                 let Some(telemetry) = &mut self.telemetry else {
                     return Vec::new();
                 };
-                match telemetry.write(&samples) {
+                let written = match &mut telemetry.file {
+                    Ok(file) => file.write(&samples),
+                    Err(_) => return Vec::new(),
+                };
+                match written {
                     Ok(()) => Vec::new(),
                     Err(error) => {
-                        self.telemetry = None;
+                        telemetry.file = Err(error.to_string());
                         vec![SaveEvent::TelemetryLost(error.to_string())]
                     }
                 }
@@ -226,30 +263,85 @@ impl Worker {
         }
     }
 
-    fn append(&mut self) -> Vec<SaveEvent> {
-        let mut events = Vec::new();
-        while let Some((at, event)) = self.unsaved.front() {
-            match self.journal.append(*at, event) {
-                Ok(_) => {
-                    self.unsaved.pop_front();
-                    events.push(SaveEvent::Saved);
-                }
-                Err(error) => {
-                    self.broken = true;
-                    events.push(SaveEvent::Failed(error.to_string()));
-                    break;
-                }
+    /// Queues an event. The end of a playback also says what became of its telemetry.
+    fn queue(&mut self, at: Moment, mut event: Event) {
+        if let Event::PlaybackEnded {
+            trial,
+            attempt,
+            telemetry,
+            ..
+        } = &mut event
+            && let Some(ended) = self.ended.take()
+            && (ended.trial, ended.attempt) == (*trial, *attempt)
+        {
+            match ended.file {
+                Ok(file) => *telemetry = Some(file),
+                Err(reason) => self.unsaved.push_back(Unsaved {
+                    at,
+                    event: Event::TelemetryLost {
+                        trial: *trial,
+                        attempt: *attempt,
+                        reason,
+                    },
+                    awaited: false,
+                }),
             }
         }
+        self.unsaved.push_back(Unsaved {
+            at,
+            event,
+            awaited: true,
+        });
+    }
+
+    /// Writes every unsaved event, unless an earlier write failed.
+    fn save(&mut self) -> Vec<SaveEvent> {
+        if self.broken || self.unsaved.is_empty() {
+            return Vec::new();
+        }
+        let events: Vec<(Moment, &Event)> = self.unsaved.iter().map(|u| (u.at, &u.event)).collect();
+        match self.journal.append_all(&events) {
+            Ok(_) => {
+                let saved = self.unsaved.drain(..).filter(|u| u.awaited);
+                saved.map(|_| SaveEvent::Saved).collect()
+            }
+            Err(error) => {
+                self.broken = true;
+                vec![SaveEvent::Failed(error.to_string())]
+            }
+        }
+    }
+
+    /// Finishes the telemetry file.
+    fn end_telemetry(&mut self) -> Vec<SaveEvent> {
+        let Some(Telemetry {
+            trial,
+            attempt,
+            file,
+        }) = self.telemetry.take()
+        else {
+            return Vec::new();
+        };
+        let mut events = Vec::new();
+        let file = file.and_then(|file| {
+            file.finish().map_err(|error| {
+                events.push(SaveEvent::TelemetryLost(error.to_string()));
+                error.to_string()
+            })
+        });
+        self.ended = Some(Ended {
+            trial,
+            attempt,
+            file,
+        });
         events
     }
 
-    /// Finishes the telemetry file. A truncated one is recognised by the number of
-    /// samples in the journal.
-    fn end_telemetry(&mut self) -> Vec<SaveEvent> {
-        match self.telemetry.take().map(TelemetryWriter::finish) {
-            Some(Err(error)) => vec![SaveEvent::TelemetryLost(error.to_string())],
-            Some(Ok(())) | None => Vec::new(),
-        }
+    /// Finishes what is under way, and writes the receipt if it can be written.
+    fn finish(mut self) -> Vec<SaveEvent> {
+        let mut events = self.end_telemetry();
+        let receipt = self.journal.receipt();
+        events.extend(receipt.ok().flatten().map(SaveEvent::Left));
+        events
     }
 }

@@ -132,6 +132,108 @@ fn analyze_and_status_warn_of_a_damaged_journal_and_an_altered_protocol() {
     assert!(told, "{}", json["warnings"]);
 }
 
+/// The journal of P01 without its last lines.
+fn truncate(folder: &Path, lines: usize) {
+    let journal = folder.join("sessions/P01/1/journal.jsonl");
+    let text = std::fs::read_to_string(&journal).unwrap();
+    let all: Vec<&str> = text.split_inclusive('\n').collect();
+    std::fs::write(&journal, all[..all.len() - lines].concat()).unwrap();
+}
+
+#[test]
+fn a_journal_without_its_last_lines_is_told_by_every_command() {
+    for lines in [1, 5] {
+        let results = tempfile::tempdir().unwrap();
+        let folder = turn_signal(results.path());
+        truncate(&folder, lines);
+        let said = predicate::str::is_match(
+            "sessions/P01/1: journal.jsonl, line [0-9]+: the journal is truncated: record",
+        )
+        .unwrap();
+        for command in ["status", "analyze"] {
+            study_command()
+                .arg(command)
+                .arg(results.path())
+                .assert()
+                .code(4)
+                .stdout(predicate::str::contains("P01").or(predicate::str::contains("ratings")))
+                .stderr(said.clone())
+                .stderr(predicate::str::contains("the journal of P01 is truncated"));
+        }
+        let printed = study_command()
+            .args(["analyze", "--json"])
+            .arg(results.path())
+            .assert()
+            .code(4);
+        let json: serde_json::Value = serde_json::from_slice(&printed.get_output().stdout).unwrap();
+        assert_eq!(json["warnings"][0]["code"], "damaged-results");
+        study_command()
+            .arg("verify")
+            .arg(results.path())
+            .assert()
+            .code(4)
+            .stdout(said);
+    }
+}
+
+/// It was written before there were heads.
+#[test]
+fn a_journal_of_an_earlier_release_is_reported_as_not_protected() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    for id in ["P01", "P02"] {
+        let session = folder.join("sessions").join(id).join("1");
+        std::fs::remove_file(session.join("head.json")).unwrap();
+    }
+    let verify = |code| {
+        let mut command = study_command();
+        command.arg("verify").arg(results.path());
+        command.assert().code(code)
+    };
+    verify(4).stdout(predicate::str::contains("sessions/P01/1: head.json: missing").count(1));
+    study_command()
+        .args(["verify", "results/turn-signal-example"])
+        .assert()
+        .success()
+        .stdout(predicate::str::contains(
+            "note: results/turn-signal-example/sessions: 10 journals of an earlier release",
+        ));
+}
+
+#[test]
+fn verify_finds_each_difference_from_a_copy() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let copies = tempfile::tempdir().unwrap();
+    let copy = copies.path().join("turn-signal");
+    crate::support::copy_folder(&folder, &copy);
+    let against = |dir: &Path| {
+        let mut command = study_command();
+        command.arg("verify").arg(results.path());
+        command.arg("--against").arg(dir).assert()
+    };
+    against(copies.path()).success();
+    against(&copy).success();
+    against(results.path().parent().unwrap())
+        .code(4)
+        .stderr(predicate::str::contains("contains no copy of the study"));
+    truncate(&copy, 1);
+    std::fs::remove_dir_all(copy.join("sessions/P02/1/telemetry")).unwrap();
+    std::fs::write(copy.join("sessions/P02/1/notes.txt"), "x").unwrap();
+    against(&copy)
+        .code(4)
+        .stdout(predicate::str::contains(
+            "sessions/P01/1/journal.jsonl: the last ",
+        ))
+        .stdout(predicate::str::contains(
+            "sessions/P02/1/telemetry: missing in the copy",
+        ))
+        .stdout(predicate::str::contains(
+            "sessions/P02/1/notes.txt: only in the copy",
+        ))
+        .stdout(predicate::str::contains("problem: ").count(3));
+}
+
 #[test]
 fn participant_sets_a_state_and_refuses_what_is_no_id() {
     let results = tempfile::tempdir().unwrap();

@@ -3,127 +3,47 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::memory::{CRASHES, Crash, Fault, MemoryDisk};
-use crate::world::{Kept, at, protocol, real, session};
+use crate::process::{Told, finishes, noticed, open, process};
+use crate::world::protocol;
 use std::io::ErrorKind;
 use std::path::Path;
-use std::sync::Arc;
-use study_core::outcome::Event;
-use study_core::protocol::Seat;
-use study_core::store::{StoreError, StudyFolder};
+use study_core::store::StoreError;
 
-/// What a process was told is on disk.
-#[derive(Debug, Default)]
-struct Told {
-    claimed: bool,
-    events: Vec<Event>,
-}
-
-/// A short session: what it says does not matter here.
-fn script(seat: Seat) -> Vec<Event> {
-    let mut events = session("P01", 1, seat);
-    events.truncate(9);
-    events.push(Event::Finished);
-    events
-}
-
-fn open(disk: &MemoryDisk) -> Result<StudyFolder, StoreError> {
-    let kept = Kept::new();
-    StudyFolder::open_or_create_on(
-        Arc::new(disk.clone()),
-        Path::new("results"),
-        &kept.frozen(),
-        at(0),
-    )
-}
-
-/// Runs the session of P01 from wherever it stands to its end, as a runner would:
-/// a record that fails goes to a new segment.
-fn run(disk: &MemoryDisk, told: &mut Told) -> Result<(), StoreError> {
-    let study = open(disk)?;
-    let mut claimed = study.claim(&real("P01"))?;
-    told.claimed = true;
-    assert_eq!((claimed.session, claimed.seat), (1, Seat::Row(1)));
-    let all = script(claimed.seat);
-    let had: Vec<Event> = claimed.entries.iter().map(|e| e.event.clone()).collect();
-    assert_eq!(had, all[..had.len()], "what was read is what was written");
-    assert!(
-        had.len() >= told.events.len(),
-        "an acknowledged event is lost"
-    );
-    assert!(
-        had.len() <= told.events.len() + 1,
-        "only one can be in doubt"
-    );
-    told.events = had;
-    let mut journal = claimed.folder.journal()?;
-    for (n, event) in all.iter().enumerate().skip(told.events.len()) {
-        let moment = at(n as u64);
-        let mut seq = journal.append(moment, event);
-        for _ in 0..3 {
-            if seq.is_err() {
-                assert!(
-                    matches!(
-                        journal.append(moment, event),
-                        Err(StoreError::SegmentFailed { .. })
-                    ),
-                    "a file is not touched after a failure"
-                );
-                seq = journal
-                    .new_segment()
-                    .and_then(|()| journal.append(moment, event));
-            }
-        }
-        assert_eq!(seq?, n as u64 + 1);
-        told.events.push(event.clone());
-    }
-    study.refresh(&protocol())?;
-    Ok(())
+fn p01() -> Told {
+    Told::of("P01")
 }
 
 /// The next process finds the disk so, finishes the session, and all is well.
-fn comes_back(disk: &MemoryDisk, told: &mut Told, why: &str) {
-    // The claim comes first; if every event is on disk the session is over.
-    let over = told.events.last() == Some(&Event::Finished);
-    match run(disk, told) {
-        Ok(()) => {}
-        Err(StoreError::Finished { .. }) => {
-            let study = open(disk).unwrap();
-            study.refresh(&protocol()).unwrap();
-            let sessions = study.sessions().unwrap();
-            let events: Vec<Event> = sessions[0]
-                .entries
-                .iter()
-                .map(|e| e.event.clone())
-                .collect();
-            assert_eq!(events, script(Seat::Row(1)), "{why}");
-        }
-        Err(e) => panic!("{why}: over {over}: {e}"),
-    }
-    let study = open(disk).unwrap();
-    let wrong: Vec<_> = study
-        .verify(Some(&protocol()))
-        .unwrap()
-        .into_iter()
-        // The harness writes none.
-        .filter(|f| f.is_problem && !f.place.contains("telemetry"))
-        .collect();
-    assert_eq!(wrong, [], "{why}");
+fn comes_back(disk: &MemoryDisk, told: &Told, why: &str) {
+    noticed(disk, std::slice::from_ref(told)).unwrap_or_else(|e| panic!("{why}: {e}"));
+    finishes(disk, &mut told.clone()).unwrap_or_else(|e| panic!("{why}: {e}"));
 }
 
 fn calls_of_a_session() -> usize {
     let disk = MemoryDisk::new();
-    run(&disk, &mut Told::default()).unwrap();
+    process(&disk, &mut p01()).unwrap();
     disk.calls()
 }
 
 /// The call that writes the event with this number, from 0.
 fn call_of_event(number: usize) -> usize {
     let disk = MemoryDisk::new();
-    let study = open(&disk).unwrap();
-    let mut claimed = study.claim(&real("P01")).unwrap();
-    let _journal = claimed.folder.journal().unwrap();
-    // A write and a sync for each event.
-    disk.calls() + 2 * number
+    let mut told = p01();
+    told.until = Some(number);
+    process(&disk, &mut told).unwrap();
+    assert_eq!(told.events.len(), number);
+    // After the last event come the receipt and the tables.
+    let all = disk.calls();
+    let disk = MemoryDisk::new();
+    let counts = (0..all).filter(|call| {
+        let again = disk.after(Crash::Process);
+        again.plan(*call, Fault::Kill);
+        let mut told = p01();
+        told.until = Some(number);
+        let _ = process(&again, &mut told);
+        told.events.len() < number
+    });
+    counts.count()
 }
 
 #[test]
@@ -135,21 +55,13 @@ fn nothing_acknowledged_is_lost_by_a_kill_or_loss_of_power_at_any_call() {
         for call in 0..calls {
             let disk = MemoryDisk::new();
             disk.plan(call, fault);
-            let mut told = Told::default();
+            let mut told = p01();
             // Drops of a dead process touch nothing: the disk says no.
-            let _ = run(&disk, &mut told);
+            let _ = process(&disk, &mut told);
             assert!(disk.is_dead());
             for crash in CRASHES {
-                let found = disk.after(crash);
-                let mut told = Told {
-                    claimed: told.claimed,
-                    events: told.events.clone(),
-                };
-                comes_back(
-                    &found,
-                    &mut told,
-                    &format!("{fault:?} at {call}, {crash:?}"),
-                );
+                let why = format!("{fault:?} at {call}, {crash:?}");
+                comes_back(&disk.after(crash), &told, &why);
                 states += 1;
             }
         }
@@ -159,37 +71,25 @@ fn nothing_acknowledged_is_lost_by_a_kill_or_loss_of_power_at_any_call() {
 
 #[test]
 fn recovery_can_be_killed_at_each_step_and_run_again() {
+    let in_event = call_of_event(6);
     for first in [Crash::Half, Crash::Zeros] {
         let disk = MemoryDisk::new();
-        disk.plan(call_of_event(6), Fault::KillInWrite);
-        let mut told = Told::default();
-        let _ = run(&disk, &mut told);
-        assert!(told.claimed && !told.events.is_empty());
+        disk.plan(in_event, Fault::KillInWrite);
+        let mut told = p01();
+        let _ = process(&disk, &mut told);
+        assert_eq!(told.events.len(), 6);
         let torn = disk.after(first);
         let whole = torn.after(Crash::Process);
-        let _ = run(
-            &whole,
-            &mut Told {
-                claimed: true,
-                events: told.events.clone(),
-            },
-        );
+        process(&whole, &mut told.clone()).unwrap();
         for fault in [Fault::Kill, Fault::KillInWrite] {
             for call in 0..whole.calls() {
                 let second = torn.after(Crash::Process);
                 second.plan(call, fault);
-                let mut again = Told {
-                    claimed: true,
-                    events: told.events.clone(),
-                };
-                let _ = run(&second, &mut again);
+                let mut told = told.clone();
+                let _ = process(&second, &mut told);
                 for crash in CRASHES {
-                    let mut told = Told {
-                        claimed: true,
-                        events: again.events.clone(),
-                    };
                     let why = format!("{first:?}, {fault:?} at {call}, {crash:?}");
-                    comes_back(&second.after(crash), &mut told, &why);
+                    comes_back(&second.after(crash), &told, &why);
                 }
             }
         }
@@ -204,45 +104,93 @@ fn a_disk_error_at_any_call_is_never_an_ok() {
         Fault::Error(ErrorKind::StorageFull),
         Fault::Short(ErrorKind::StorageFull),
         Fault::Error(ErrorKind::Interrupted),
+        Fault::From(ErrorKind::Other),
     ];
     for fault in faults {
         for call in 0..calls {
             let disk = MemoryDisk::new();
             disk.plan(call, fault);
-            let mut told = Told::default();
-            let _ = run(&disk, &mut told);
+            let mut told = p01();
+            let _ = process(&disk, &mut told);
             for crash in [Crash::OnlySynced, Crash::Zeros] {
-                let mut told = Told {
-                    claimed: told.claimed,
-                    events: told.events.clone(),
-                };
                 let why = format!("{fault:?} at {call}, {crash:?}");
-                comes_back(&disk.after(crash), &mut told, &why);
+                comes_back(&disk.after(crash), &told, &why);
             }
         }
     }
 }
 
-/// How many of the crash states after a whole session lose what was acknowledged.
+/// A process may die between the creation of a name and its sync, and the next one
+/// finds the name although it is not on the medium.
+#[test]
+fn a_session_that_was_resumed_after_a_kill_survives_a_loss_of_power() {
+    for call in 0..calls_of_a_session() {
+        let disk = MemoryDisk::new();
+        disk.plan(call, Fault::Kill);
+        let mut told = p01();
+        let _ = process(&disk, &mut told);
+        let resumed = disk.after(Crash::Process);
+        let ended = process(&resumed, &mut told);
+        let over = matches!(ended, Err(StoreError::Finished { .. }));
+        assert!(over || ended.is_ok(), "{call}: {ended:?}");
+        let why = format!("killed at {call}, resumed, power lost");
+        comes_back(&resumed.after(Crash::OnlySynced), &told, &why);
+    }
+}
+
+/// The tables then name a participant whose claim never reached the medium.
+#[test]
+fn tables_that_were_derived_after_a_kill_do_not_outlive_their_journals() {
+    for call in 0..calls_of_a_session() {
+        let disk = MemoryDisk::new();
+        disk.plan(call, Fault::Kill);
+        let mut told = p01();
+        let _ = process(&disk, &mut told);
+        let started = disk.after(Crash::Process);
+        open(&started).unwrap().refresh(&protocol()).unwrap();
+        for crash in [Crash::OnlySynced, Crash::BytesOnly] {
+            let why = format!("killed at {call}, tables derived, {crash:?}");
+            comes_back(&started.after(crash), &told, &why);
+        }
+    }
+}
+
+/// The second process reads from the cache what the disk refused to take from the first.
+#[test]
+fn what_a_failed_sync_left_in_the_cache_is_written_again_by_the_next_process() {
+    let calls = calls_of_a_session();
+    let mut failed = 0;
+    for call in 0..calls {
+        let disk = MemoryDisk::new();
+        // Nothing can be written any more: the process gives up.
+        disk.plan(call, Fault::From(ErrorKind::Other));
+        let mut told = p01();
+        failed += usize::from(process(&disk, &mut told).is_err());
+        let next = disk.after(Crash::Process);
+        let ended = process(&next, &mut told);
+        let over = matches!(ended, Err(StoreError::Finished { .. }));
+        assert!(over || ended.is_ok(), "{call}: {ended:?}");
+        let why = format!("failing from {call}, resumed, power lost");
+        comes_back(&next.after(Crash::OnlySynced), &told, &why);
+    }
+    assert_eq!(failed, calls);
+}
+
+/// Whether a loss of power after a whole session loses what was acknowledged.
 fn lost_with(plant: impl Fn(&MemoryDisk)) -> bool {
     let disk = MemoryDisk::new();
     plant(&disk);
-    let mut told = Told::default();
-    run(&disk, &mut told).unwrap();
-    let found = disk.after(Crash::OnlySynced);
-    let Ok(study) = StudyFolder::open_on(Arc::new(found), Path::new("results/small")) else {
-        return true;
-    };
-    study
-        .sessions()
-        .unwrap()
-        .iter()
-        .all(|s| s.entries.len() < told.events.len())
+    let mut told = p01();
+    process(&disk, &mut told).unwrap();
+    noticed(&disk.after(Crash::OnlySynced), &[told]).is_err()
 }
 
 #[test]
 fn the_harness_sees_a_missing_sync_of_a_file_and_of_a_folder() {
+    let is_file = |p: &Path| p.extension().is_some();
     assert!(!lost_with(|_| {}));
-    assert!(lost_with(MemoryDisk::plant_no_file_sync));
-    assert!(lost_with(MemoryDisk::plant_no_folder_sync));
+    assert!(lost_with(|disk| disk.plant_no_sync(is_file)));
+    assert!(lost_with(
+        |disk| disk.plant_no_sync(|p| p.extension().is_none())
+    ));
 }

@@ -12,7 +12,7 @@ use study_core::protocol::Seat;
 use study_core::store::disk::Disk as _;
 use study_core::store::journal_record::{self, Claim, Record};
 use study_core::store::replay::{Replay, Segment, replay};
-use study_core::store::{DamageKind, StudyFolder};
+use study_core::store::{DamageKind, HeadFile, StudyFolder};
 
 /// The lines of a whole session, each with its line end.
 fn lines() -> Vec<Vec<u8>> {
@@ -21,6 +21,7 @@ fn lines() -> Vec<Vec<u8>> {
         session: 1,
         seat: Some(Seat::Row(1)),
         protocol_version: 1,
+        head: false,
     });
     let events = session("P01", 1, Seat::Row(1));
     let events = events
@@ -55,7 +56,7 @@ fn segment(bytes: &[u8]) -> [Segment; 1] {
 #[test]
 fn a_journal_of_version_1_is_read_as_it_was_meant() {
     let golden = include_bytes!("../golden/journal_v1/journal.jsonl");
-    let read = replay(&segment(golden));
+    let read = replay(&segment(golden), &HeadFile::None);
     assert_eq!(read.damage, []);
     assert_eq!(read.claim.as_ref().unwrap().seat, Some(Seat::Row(1)));
     let events: Vec<Event> = read.entries.iter().map(|e| e.event.clone()).collect();
@@ -68,7 +69,7 @@ fn a_journal_of_version_1_is_read_as_it_was_meant() {
 /// What is read of damaged bytes, against the records that were written. `hit` is
 /// the line that the damage is in, `intact` what the whole bytes give.
 fn check_damage(bytes: &[u8], hit: u64, intact: &Replay, why: &str) {
-    let read = replay(&segment(bytes));
+    let read = replay(&segment(bytes), &HeadFile::None);
     assert_ne!(read.damage, intact.damage, "{why}: not noticed");
     let expected: BTreeMap<u64, &Event> =
         intact.entries.iter().map(|e| (e.seq, &e.event)).collect();
@@ -86,7 +87,7 @@ fn check_damage(bytes: &[u8], hit: u64, intact: &Replay, why: &str) {
 fn every_missing_byte_is_noticed_and_costs_one_record() {
     let lines = lines();
     let whole = lines.concat();
-    let intact = replay(&segment(&whole));
+    let intact = replay(&segment(&whole), &HeadFile::None);
     assert_eq!(intact.damage, []);
     let mut start = 0;
     for (line, n) in lines.iter().zip(0..) {
@@ -107,7 +108,7 @@ fn every_flipped_bit_is_noticed_and_costs_one_record() {
         let first = n.saturating_sub(1);
         let near = &lines[first..lines.len().min(n + 2)];
         let whole = near.concat();
-        let intact = replay(&segment(&whole));
+        let intact = replay(&segment(&whole), &HeadFile::None);
         let start = if n == 0 { 0 } else { near[0].len() };
         for byte in start..start + lines[n].len() {
             for bit in 0..8 {
@@ -124,7 +125,7 @@ fn every_flipped_bit_is_noticed_and_costs_one_record() {
 fn a_missing_a_doubled_and_a_changed_line_are_told_apart() {
     let lines = lines();
     let kinds = |lines: &[Vec<u8>]| -> Vec<DamageKind> {
-        let read = replay(&segment(&lines.concat()));
+        let read = replay(&segment(&lines.concat()), &HeadFile::None);
         read.damage.into_iter().map(|d| d.kind).collect()
     };
     let mut without = lines.clone();
@@ -160,7 +161,7 @@ fn a_tail_cut_at_any_byte_leaves_every_line_before_it() {
     for cut in 0..whole.len() {
         for zeros in [0, 1, 700] {
             let bytes = [&whole[..cut], &vec![0; zeros]].concat();
-            let read = replay(&segment(&bytes));
+            let read = replay(&segment(&bytes), &HeadFile::None);
             let mut end = 0;
             let complete = lines
                 .iter()
@@ -179,6 +180,17 @@ fn a_tail_cut_at_any_byte_leaves_every_line_before_it() {
 
 fn small() -> &'static Path {
     Path::new("results/small")
+}
+
+/// A disk with an unfinished session of so many events, the last of which was not
+/// acknowledged: `head.json` names the one before.
+fn interrupted(events: usize) -> MemoryDisk {
+    let head = Path::new("results/small/sessions/P01/1/head.json");
+    let before = unfinished(events - 1).read(head).unwrap();
+    let disk = unfinished(events);
+    disk.remove_file(head).unwrap();
+    disk.create(head).unwrap().write_all(&before).unwrap();
+    disk
 }
 
 /// A disk with an unfinished session of so many events.
@@ -206,7 +218,7 @@ fn journal_path() -> std::path::PathBuf {
 
 #[test]
 fn a_torn_tail_is_set_apart_and_the_session_goes_on() {
-    let whole = unfinished(12).read(&journal_path()).unwrap();
+    let whole = interrupted(12).read(&journal_path()).unwrap();
     let last = whole[..whole.len() - 1]
         .iter()
         .rposition(|b| *b == b'\n')
@@ -214,7 +226,7 @@ fn a_torn_tail_is_set_apart_and_the_session_goes_on() {
         + 1;
     for cut in last..=whole.len() {
         for zeros in [0, 5] {
-            let disk = unfinished(12);
+            let disk = interrupted(12);
             disk.truncate(&journal_path(), cut as u64).unwrap();
             let mut file = disk.open(&journal_path()).unwrap();
             file.write_all(&vec![0; zeros]).unwrap();

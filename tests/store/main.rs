@@ -1,5 +1,6 @@
 //! The results folder: journals, crashes, ledger, derived tables.
 
+mod chains;
 mod commands;
 mod crash;
 #[path = "../support/designs.rs"]
@@ -9,6 +10,8 @@ mod example_study;
 mod folder;
 mod journal;
 mod memory;
+mod mirrors;
+mod process;
 mod processes;
 #[path = "../support/mod.rs"]
 mod support;

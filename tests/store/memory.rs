@@ -3,14 +3,19 @@
 //!
 //! The rules are the strict ones that POSIX allows: the bytes of a file are on the
 //! medium after a sync of the file, its name after a sync of the folder, and after
-//! a failed sync the bytes in doubt are lost although a later sync says "ok".
+//! a failed sync the bytes in doubt are lost although a later sync says "ok". What is
+//! not on the medium when the power goes may be there or not, each name and each file
+//! by itself ([`Crash::Strict`]); a journaling file system keeps the order of names and
+//! writes them with every sync ([`Crash::Ext4`]).
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, Mutex};
-use study_core::store::disk::{Appender, Disk, Item, Lock};
+use std::time::Duration;
+use study_base::rng::Stream;
+use study_core::store::disk::{Appender, Disk, Item, ItemKind, Lock};
 
 /// What happens at the chosen call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +28,12 @@ pub enum Fault {
     Error(io::ErrorKind),
     /// A write takes half of the bytes, then the next one fails.
     Short(io::ErrorKind),
+    /// This call and every later one fails; on a full disk those that need space.
+    From(io::ErrorKind),
+    /// Everything on the disk is removed.
+    Removed,
+    /// This call and every later one takes a while.
+    Slow,
 }
 
 /// What is found after the machine starts again.
@@ -40,6 +51,11 @@ pub enum Crash {
     Zeros,
     /// All bytes, of unsynced names none.
     BytesOnly,
+    /// By chance any of the unsynced names, and of each file any part of the unsynced
+    /// bytes, or zeros.
+    Strict(u64),
+    /// By chance as on ext4: names in their order, all of them with every sync.
+    Ext4(u64),
 }
 
 pub const CRASHES: [Crash; 6] = [
@@ -50,6 +66,15 @@ pub const CRASHES: [Crash; 6] = [
     Crash::Zeros,
     Crash::BytesOnly,
 ];
+
+/// What a call does, for faults that concern only some.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Call {
+    Write,
+    Create,
+    Sync,
+    Other,
+}
 
 #[derive(Debug, Clone)]
 enum Node {
@@ -65,6 +90,16 @@ enum Node {
     },
 }
 
+/// A name that was set or removed and is not on the medium under the strict rules.
+#[derive(Debug, Clone)]
+struct Renaming {
+    /// Its number, from 1.
+    at: usize,
+    folder: usize,
+    /// Each name with its file, or that it is gone: two for a renaming.
+    names: Vec<(String, Option<usize>)>,
+}
+
 #[derive(Debug)]
 struct State {
     nodes: Vec<Node>,
@@ -72,9 +107,14 @@ struct State {
     plan: Option<(usize, Fault)>,
     dead: bool,
     fail_next_write: Option<io::ErrorKind>,
-    /// Planted bugs: a sync that does nothing.
-    no_file_sync: bool,
-    no_folder_sync: bool,
+    /// Names that are not on the medium, in order.
+    renamings: Vec<Renaming>,
+    /// Number of names that were set or removed so far.
+    clock: usize,
+    /// The same at the last sync of anything.
+    last_sync: usize,
+    /// A planted bug: a sync of these does nothing.
+    no_sync: Option<fn(&Path) -> bool>,
 }
 
 /// The disk; clones are the same disk.
@@ -95,6 +135,108 @@ impl Drop for Guard {
 struct File {
     disk: MemoryDisk,
     node: usize,
+    path: PathBuf,
+}
+
+impl Renaming {
+    fn apply(&self, names: &mut BTreeMap<String, usize>) {
+        for (name, node) in &self.names {
+            match node {
+                Some(node) => names.insert(name.clone(), *node),
+                None => names.remove(name),
+            };
+        }
+    }
+}
+
+impl State {
+    /// The nodes, but nothing of the files that have no name any more.
+    fn reachable(&self) -> Vec<Node> {
+        let mut named = BTreeSet::from([0]);
+        for node in &self.nodes {
+            if let Node::Folder { names, synced } = node {
+                named.extend(names.values().chain(synced.values()));
+            }
+        }
+        named.extend(
+            self.renamings
+                .iter()
+                .flat_map(|r| r.names.iter().filter_map(|n| n.1)),
+        );
+        let gone = Node::File {
+            bytes: Vec::new(),
+            synced: Vec::new(),
+            poisoned: false,
+        };
+        let nodes = self.nodes.iter().enumerate();
+        nodes
+            .map(|(at, node)| match named.contains(&at) {
+                true => node.clone(),
+                false => gone.clone(),
+            })
+            .collect()
+    }
+
+    /// Leaves what is on the medium, and of the rest what the crash says.
+    fn lose_power(&mut self, crash: Crash) {
+        let mut chance = match crash {
+            Crash::Strict(seed) | Crash::Ext4(seed) => Stream::new(seed, &["crash"]),
+            _ => Stream::new(0, &["crash"]),
+        };
+        for node in &mut self.nodes {
+            match node {
+                Node::File {
+                    bytes,
+                    synced,
+                    poisoned,
+                } => {
+                    *bytes = found_bytes(bytes, synced, crash, &mut chance);
+                    synced.clone_from(bytes);
+                    *poisoned = false;
+                }
+                Node::Folder { names, synced } => match crash {
+                    Crash::NamesOnly | Crash::Half | Crash::Zeros => synced.clone_from(names),
+                    _ => names.clone_from(synced),
+                },
+            }
+        }
+        let mut renamings = std::mem::take(&mut self.renamings);
+        match crash {
+            Crash::Strict(_) => renamings.retain(|_| chance.below(2) == 0),
+            Crash::Ext4(_) => {
+                let done = renamings.partition_point(|r| r.at <= self.last_sync);
+                let more = chance.below((renamings.len() - done) as u64 + 1) as usize;
+                renamings.truncate(done + more);
+            }
+            _ => renamings.clear(),
+        }
+        for renaming in renamings {
+            if let Node::Folder { names, synced } = &mut self.nodes[renaming.folder] {
+                renaming.apply(names);
+                synced.clone_from(names);
+            }
+        }
+    }
+}
+
+/// What is found of a file.
+fn found_bytes(bytes: &[u8], synced: &[u8], crash: Crash, chance: &mut Stream) -> Vec<u8> {
+    let Some(new) = bytes.strip_prefix(synced) else {
+        return synced.to_vec();
+    };
+    let (kept, zeros) = match crash {
+        Crash::Process | Crash::BytesOnly => (new.len(), 0),
+        Crash::Half => (new.len() / 2, 0),
+        Crash::Zeros => (0, new.len()),
+        Crash::OnlySynced | Crash::NamesOnly => (0, 0),
+        Crash::Strict(_) | Crash::Ext4(_) => {
+            let mut to = |n: usize| chance.below(n as u64 + 1) as usize;
+            // Often none or all.
+            let kept = [0, new.len(), to(new.len())][to(2)];
+            (kept, [0, to(new.len() - kept)][to(1)])
+        }
+    };
+    [synced, &new[..kept], &vec![0; zeros]].concat()
 }
 
 impl MemoryDisk {
@@ -113,8 +255,10 @@ impl MemoryDisk {
                 plan: None,
                 dead: false,
                 fail_next_write: None,
-                no_file_sync: false,
-                no_folder_sync: false,
+                renamings: Vec::new(),
+                clock: 0,
+                last_sync: 0,
+                no_sync: None,
             })),
             locks: Arc::default(),
         }
@@ -125,12 +269,10 @@ impl MemoryDisk {
         self.state.lock().unwrap().plan = Some((call, fault));
     }
 
-    pub fn plant_no_file_sync(&self) {
-        self.state.lock().unwrap().no_file_sync = true;
-    }
-
-    pub fn plant_no_folder_sync(&self) {
-        self.state.lock().unwrap().no_folder_sync = true;
+    /// Plants a bug, also for the processes that come after: syncs of these files and
+    /// folders say "ok" and do nothing.
+    pub fn plant_no_sync(&self, of: fn(&Path) -> bool) {
+        self.state.lock().unwrap().no_sync = Some(of);
     }
 
     pub fn calls(&self) -> usize {
@@ -143,42 +285,24 @@ impl MemoryDisk {
 
     /// The disk that the next process finds.
     pub fn after(&self, crash: Crash) -> Self {
-        let state = self.state.lock().unwrap();
-        let nodes = state
-            .nodes
-            .iter()
-            .map(|node| match node {
-                Node::File { bytes, synced, .. } => {
-                    let new = bytes.strip_prefix(&synced[..]);
-                    let kept = match (crash, new) {
-                        (Crash::Process | Crash::BytesOnly, _) => bytes.clone(),
-                        (Crash::Half, Some(new)) => [&synced[..], &new[..new.len() / 2]].concat(),
-                        (Crash::Zeros, Some(new)) => [synced.clone(), vec![0; new.len()]].concat(),
-                        _ => synced.clone(),
-                    };
-                    Node::File {
-                        synced: kept.clone(),
-                        bytes: kept,
-                        poisoned: false,
-                    }
-                }
-                Node::Folder { names, synced } => {
-                    let kept = match crash {
-                        Crash::OnlySynced | Crash::BytesOnly => synced.clone(),
-                        _ => names.clone(),
-                    };
-                    Node::Folder {
-                        synced: kept.clone(),
-                        names: kept,
-                    }
-                }
-            })
-            .collect();
-        Self::of(nodes)
+        let disk = Self::of(Vec::new());
+        {
+            let state = self.state.lock().unwrap();
+            let mut next = disk.state.lock().unwrap();
+            next.nodes = state.reachable();
+            next.renamings.clone_from(&state.renamings);
+            (next.clock, next.last_sync) = (state.clock, state.last_sync);
+            next.no_sync = state.no_sync;
+            if crash != Crash::Process {
+                next.lose_power(crash);
+            }
+        }
+        disk
     }
 
     /// Counts the call and does what the plan says.
-    fn call(&self, is_write: bool) -> io::Result<Option<Fault>> {
+    fn call(&self, kind: Call) -> io::Result<Option<Fault>> {
+        let is_write = kind == Call::Write;
         let mut state = self.state.lock().unwrap();
         if state.dead {
             return Err(io::Error::other("the process is dead"));
@@ -189,7 +313,28 @@ impl MemoryDisk {
             return Err(kind.into());
         }
         match state.plan {
+            Some((planned, Fault::From(error))) if planned <= number => {
+                let needs_space = matches!(kind, Call::Write | Call::Create);
+                match error {
+                    io::ErrorKind::StorageFull if !needs_space => Ok(None),
+                    _ => Err(error.into()),
+                }
+            }
+            Some((planned, Fault::Slow)) if planned <= number => {
+                std::thread::sleep(Duration::from_micros(20));
+                Ok(None)
+            }
             Some((planned, fault)) if planned == number => match fault {
+                Fault::Removed => {
+                    let root = Node::Folder {
+                        names: BTreeMap::new(),
+                        synced: BTreeMap::new(),
+                    };
+                    state.nodes[0] = root;
+                    state.renamings.clear();
+                    Ok(None)
+                }
+                Fault::From(_) | Fault::Slow => Ok(None),
                 Fault::Kill => {
                     state.dead = true;
                     Err(io::Error::other("killed"))
@@ -221,45 +366,73 @@ impl MemoryDisk {
         Ok(at)
     }
 
-    fn change<T>(
-        &self,
-        path: &Path,
-        f: impl FnOnce(&mut Vec<Node>, usize, String) -> io::Result<T>,
-    ) -> io::Result<T> {
-        let mut state = self.state.lock().unwrap();
-        let folder = Self::find(&state, path.parent().unwrap_or(Path::new("")))?;
+    /// Sets or removes names of one folder, as one change.
+    fn set(state: &mut State, folder: usize, names: Vec<(String, Option<usize>)>) {
+        state.clock += 1;
+        let renaming = Renaming {
+            at: state.clock,
+            folder,
+            names,
+        };
+        if let Node::Folder { names, .. } = &mut state.nodes[folder] {
+            renaming.apply(names);
+        }
+        state.renamings.push(renaming);
+    }
+
+    /// The folder of a path, the last part of the path, and what it leads to.
+    fn place(state: &State, path: &Path) -> io::Result<(usize, String, Option<usize>)> {
+        let folder = Self::find(state, path.parent().unwrap_or(Path::new("")))?;
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-        f(&mut state.nodes, folder, name)
+        let Node::Folder { names, .. } = &state.nodes[folder] else {
+            return Err(io::ErrorKind::NotADirectory.into());
+        };
+        let node = names.get(&name).copied();
+        Ok((folder, name, node))
     }
 
     fn add(&self, path: &Path, node: Node) -> io::Result<usize> {
-        self.change(path, |nodes, folder, name| {
-            let next = nodes.len();
-            let Node::Folder { names, .. } = &mut nodes[folder] else {
-                return Err(io::ErrorKind::NotADirectory.into());
-            };
-            if names.contains_key(&name) {
-                return Err(io::ErrorKind::AlreadyExists.into());
-            }
-            names.insert(name, next);
-            nodes.push(node);
-            Ok(next)
-        })
+        let mut state = self.state.lock().unwrap();
+        let (folder, name, known) = Self::place(&state, path)?;
+        if known.is_some() {
+            return Err(io::ErrorKind::AlreadyExists.into());
+        }
+        let next = state.nodes.len();
+        state.nodes.push(node);
+        Self::set(&mut state, folder, vec![(name, Some(next))]);
+        Ok(next)
     }
 
-    fn take(&self, path: &Path) -> io::Result<usize> {
-        self.change(path, |nodes, folder, name| {
-            let Node::Folder { names, .. } = &mut nodes[folder] else {
-                return Err(io::ErrorKind::NotADirectory.into());
-            };
-            names.remove(&name).ok_or(io::ErrorKind::NotFound.into())
-        })
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        let mut state = self.state.lock().unwrap();
+        let (folder, name, known) = Self::place(&state, path)?;
+        known.ok_or(io::ErrorKind::NotFound)?;
+        Self::set(&mut state, folder, vec![(name, None)]);
+        Ok(())
+    }
+
+    /// Every file with its bytes, by path.
+    pub fn files(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+        let state = self.state.lock().unwrap();
+        let mut files = BTreeMap::new();
+        let mut open = vec![(PathBuf::new(), 0)];
+        while let Some((path, node)) = open.pop() {
+            match &state.nodes[node] {
+                Node::File { bytes, .. } => {
+                    files.insert(path, bytes.clone());
+                }
+                Node::Folder { names, .. } => {
+                    open.extend(names.iter().map(|(name, node)| (path.join(name), *node)));
+                }
+            }
+        }
+        files
     }
 }
 
 impl Appender for File {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let fault = self.disk.call(true)?;
+        let fault = self.disk.call(Call::Write)?;
         let mut state = self.disk.state.lock().unwrap();
         let taken = if fault.is_some() {
             bytes.len() / 2
@@ -283,9 +456,18 @@ impl Appender for File {
     }
 
     fn sync(&mut self) -> io::Result<()> {
-        let called = self.disk.call(false);
+        let called = self.disk.call(Call::Sync);
         let mut state = self.disk.state.lock().unwrap();
-        let lazy = state.no_file_sync;
+        let lazy = state.no_sync.is_some_and(|of| of(&self.path));
+        let found = MemoryDisk::find(&state, &self.path);
+        if called.is_ok() && !lazy {
+            // A file that was removed meanwhile is nowhere.
+            if found.is_ok_and(|found| found == self.node) {
+                state.last_sync = state.clock;
+            } else {
+                return Err(io::ErrorKind::NotFound.into());
+            }
+        }
         if let Node::File {
             bytes,
             synced,
@@ -304,7 +486,7 @@ impl Appender for File {
 
 impl Disk for MemoryDisk {
     fn create_folder(&self, path: &Path) -> io::Result<()> {
-        self.call(false)?;
+        self.call(Call::Create)?;
         let node = Node::Folder {
             names: BTreeMap::new(),
             synced: BTreeMap::new(),
@@ -313,20 +495,22 @@ impl Disk for MemoryDisk {
     }
 
     fn sync_folder(&self, path: &Path) -> io::Result<()> {
-        self.call(false)?;
+        self.call(Call::Sync)?;
         let mut state = self.state.lock().unwrap();
         let at = Self::find(&state, path)?;
-        let lazy = state.no_folder_sync;
-        if let Node::Folder { names, synced } = &mut state.nodes[at]
-            && !lazy
-        {
+        if state.no_sync.is_some_and(|of| of(path)) {
+            return Ok(());
+        }
+        if let Node::Folder { names, synced } = &mut state.nodes[at] {
             synced.clone_from(names);
         }
+        state.renamings.retain(|r| r.folder != at);
+        state.last_sync = state.clock;
         Ok(())
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn Appender>> {
-        self.call(false)?;
+        self.call(Call::Create)?;
         let node = self.add(
             path,
             Node::File {
@@ -338,55 +522,62 @@ impl Disk for MemoryDisk {
         Ok(Box::new(File {
             disk: self.clone(),
             node,
+            path: path.to_owned(),
         }))
     }
 
     fn open(&self, path: &Path) -> io::Result<Box<dyn Appender>> {
-        self.call(false)?;
+        self.call(Call::Other)?;
         let node = Self::find(&self.state.lock().unwrap(), path)?;
         Ok(Box::new(File {
             disk: self.clone(),
             node,
+            path: path.to_owned(),
         }))
     }
 
     fn truncate(&self, path: &Path, to: u64) -> io::Result<()> {
-        self.call(false)?;
+        self.call(Call::Other)?;
         let mut state = self.state.lock().unwrap();
         let node = Self::find(&state, path)?;
         if let Node::File { bytes, synced, .. } = &mut state.nodes[node] {
             bytes.truncate(usize::try_from(to).unwrap());
             synced.clone_from(bytes);
         }
+        state.last_sync = state.clock;
         Ok(())
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.call(false)?;
-        let node = self.take(from)?;
-        self.change(to, |nodes, folder, name| {
-            if let Node::Folder { names, .. } = &mut nodes[folder] {
-                names.insert(name, node);
-            }
-            Ok(())
-        })
+        self.call(Call::Other)?;
+        let mut state = self.state.lock().unwrap();
+        let (old, from, node) = Self::place(&state, from)?;
+        let node = node.ok_or(io::ErrorKind::NotFound)?;
+        let (new, to, _) = Self::place(&state, to)?;
+        if old == new {
+            Self::set(&mut state, old, vec![(from, None), (to, Some(node))]);
+        } else {
+            Self::set(&mut state, new, vec![(to, Some(node))]);
+            Self::set(&mut state, old, vec![(from, None)]);
+        }
+        Ok(())
     }
 
     fn remove_file(&self, path: &Path) -> io::Result<()> {
-        self.call(false)?;
-        self.take(path).map(|_| ())
+        self.call(Call::Other)?;
+        self.remove(path)
     }
 
     fn remove_folder(&self, path: &Path) -> io::Result<()> {
         if !self.list(path)?.is_empty() {
             return Err(io::ErrorKind::DirectoryNotEmpty.into());
         }
-        self.call(false)?;
-        self.take(path).map(|_| ())
+        self.call(Call::Other)?;
+        self.remove(path)
     }
 
     fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
-        self.call(false)?;
+        self.call(Call::Other)?;
         let state = self.state.lock().unwrap();
         match &state.nodes[Self::find(&state, path)?] {
             Node::File { bytes, .. } => Ok(bytes.clone()),
@@ -395,7 +586,7 @@ impl Disk for MemoryDisk {
     }
 
     fn list(&self, path: &Path) -> io::Result<Vec<Item>> {
-        self.call(false)?;
+        self.call(Call::Other)?;
         let state = self.state.lock().unwrap();
         match &state.nodes[Self::find(&state, path)?] {
             Node::File { .. } => Err(io::ErrorKind::NotADirectory.into()),
@@ -403,20 +594,23 @@ impl Disk for MemoryDisk {
                 .iter()
                 .map(|(name, node)| Item {
                     name: name.clone(),
-                    is_folder: matches!(state.nodes[*node], Node::Folder { .. }),
+                    kind: match state.nodes[*node] {
+                        Node::Folder { .. } => ItemKind::Folder,
+                        Node::File { .. } => ItemKind::File,
+                    },
                 })
                 .collect()),
         }
     }
 
     fn lock(&self, path: &Path) -> io::Result<Option<Lock>> {
-        self.call(false)?;
+        self.call(Call::Other)?;
         let new = self.locks.lock().unwrap().insert(path.to_owned());
         Ok(new.then(|| -> Lock { Box::new(Guard(Arc::clone(&self.locks), path.to_owned())) }))
     }
 
     fn free_bytes(&self, _path: &Path) -> io::Result<Option<u64>> {
-        self.call(false)?;
+        self.call(Call::Other)?;
         Ok(Some(1 << 30))
     }
 }

@@ -197,6 +197,7 @@ pub fn ended(trial: u32, attempt: u32) -> Event {
             samples_lost: 0,
         },
         stopped: false,
+        telemetry: None,
     }
 }
 

@@ -12,7 +12,9 @@ pub mod fold;
 pub mod ratings;
 pub mod rows;
 
-pub use event::{Author, Choice, Entry, Event, Failure, FormId, Moment, Playback, Start, State};
+pub use event::{
+    Author, Choice, Entry, Event, Failure, FormId, Moment, Playback, Start, State, TelemetryFile,
+};
 pub use rows::{AttemptEvent, AttemptRow, ParticipantRow, RatingRow, Status};
 
 /// A row says what its realization is; readers of rows need no protocol for it.

@@ -22,10 +22,14 @@ mod reveals;
 mod atomic;
 mod derive;
 mod error;
+mod head;
 mod journal;
 mod ledger;
+mod mirror;
 mod missing_sessions;
 mod participant;
+mod receipt;
+mod sealed;
 mod session_folder;
 mod session_lock;
 mod sessions;
@@ -36,10 +40,13 @@ mod verify;
 
 pub use derive::{Derived, participants};
 pub use error::{StoreError, plain};
+pub use head::{Head, HeadFile};
 pub use journal::Journal;
 pub use ledger::{ClaimRequest, Claimed, SeatKind, next_row};
 pub use manifest::Manifest;
+pub use mirror::Copies;
 pub use participant::{StateChange, StateRequest};
+pub use receipt::Receipt;
 pub use replay::{Damage, DamageKind};
 pub use session_folder::SessionFolder;
 pub use session_lock::RESERVE_BYTES;
@@ -53,6 +60,9 @@ use crate::protocol::Protocol;
 use crate::protocol::fingerprint::Fingerprints;
 use disk::{Disk, Lock, RealDisk};
 use error::At as _;
+use mirror::catch_up::catch_up;
+use mirror::{MirrorDisk, Side};
+use participant::remove_all;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -75,6 +85,7 @@ pub struct StudyFolder {
     disk: Arc<dyn Disk>,
     path: PathBuf,
     manifest: Manifest,
+    mirror: Option<MirrorDisk>,
 }
 
 /// Number of attempts to lock a study and the pause between two of them.
@@ -107,21 +118,10 @@ impl StudyFolder {
     ) -> Result<Self, StoreError> {
         let study = &frozen.protocol.study.id;
         let path = results.join(study);
-        for folder in results
-            .ancestors()
-            .filter(|a| !a.as_os_str().is_empty())
-            .collect::<Vec<_>>()
-            .into_iter()
-            .rev()
-            .chain([path.as_path()])
-        {
-            let known = disk.list(folder);
-            if known.is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound) {
-                atomic::folder(disk.as_ref(), folder)?;
-            }
-        }
+        make_folders(disk.as_ref(), &path)?;
         let lock = lock_study(disk.as_ref(), &path)?;
-        let manifest = match Manifest::read(disk.as_ref(), &path) {
+        settle_names(disk.as_ref(), &path)?;
+        let manifest = match Manifest::read_intact(disk.as_ref(), &path) {
             Ok(manifest) => {
                 check_unchanged(&path, &manifest, frozen)?;
                 manifest
@@ -140,7 +140,68 @@ impl StudyFolder {
             disk,
             path,
             manifest,
+            mirror: None,
         })
+    }
+
+    /// As [`StudyFolder::open_or_create`]; everything that is written from then on is
+    /// also written to the folder `mirror`, which must exist. First the copy that is
+    /// behind is brought up to date; the sentences say which.
+    ///
+    /// # Errors
+    /// As [`StudyFolder::open_or_create`]; if the mirror cannot be used, or if both
+    /// copies were continued without the other.
+    pub fn open_or_create_mirrored(
+        results: &Path,
+        mirror: &Path,
+        frozen: &Frozen<'_>,
+        at: Moment,
+    ) -> Result<(Self, Vec<String>), StoreError> {
+        let disk: Arc<dyn Disk> = Arc::new(RealDisk);
+        // A name may lead elsewhere; a folder that does not exist is no link.
+        let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let (a, b) = (real(results), real(mirror));
+        if a.starts_with(&b) || b.starts_with(&a) {
+            return Err(StoreError::MirrorInside {
+                results: results.to_owned(),
+                mirror: mirror.to_owned(),
+            });
+        }
+        Self::open_or_create_mirrored_on([(disk.clone(), results), (disk, mirror)], frozen, at)
+    }
+
+    /// The same on the given disks: of the results, and of the mirror.
+    ///
+    /// # Errors
+    /// As [`StudyFolder::open_or_create_mirrored`].
+    pub fn open_or_create_mirrored_on(
+        sides: [(Arc<dyn Disk>, &Path); 2],
+        frozen: &Frozen<'_>,
+        at: Moment,
+    ) -> Result<(Self, Vec<String>), StoreError> {
+        let [results, mirror] = sides.map(|(disk, root)| Side {
+            disk,
+            root: root.to_owned(),
+        });
+        mirror
+            .disk
+            .list(&mirror.root)
+            .map_err(|source| StoreError::NoMirror {
+                path: mirror.root.clone(),
+                source,
+            })?;
+        make_folders(results.disk.as_ref(), &results.root)?;
+        let notices = catch_up(&results, &mirror, &frozen.protocol.study.id)?;
+        let root = results.root.clone();
+        let disk = MirrorDisk::new(results, mirror);
+        let study = Self::open_or_create_on(Arc::new(disk.clone()), &root, frozen, at)?;
+        let mirror = Some(disk);
+        Ok((Self { mirror, ..study }, notices))
+    }
+
+    /// Which of results and mirror are up to date; `None` without a mirror.
+    pub fn copies(&self) -> Option<Copies> {
+        self.mirror.as_ref().map(MirrorDisk::copies)
     }
 
     /// Opens the folder of an existing study.
@@ -161,6 +222,7 @@ impl StudyFolder {
             disk,
             path: path.to_owned(),
             manifest,
+            mirror: None,
         })
     }
 
@@ -190,7 +252,7 @@ impl StudyFolder {
         at: Moment,
     ) -> Result<u32, StoreError> {
         let _lock = self.lock()?;
-        let mut manifest = Manifest::read(self.disk.as_ref(), &self.path)?;
+        let mut manifest = Manifest::read_intact(self.disk.as_ref(), &self.path)?;
         let newest = manifest.newest();
         let version = newest.version;
         if manifest.study != frozen.protocol.study.id
@@ -215,10 +277,42 @@ impl StudyFolder {
         Ok(version + 1)
     }
 
-    /// Prevents other processes from claiming, amending and deriving.
+    /// Prevents other processes from claiming, amending and deriving. What is read
+    /// afterwards by a name of the study's folder stays there.
     fn lock(&self) -> Result<Lock, StoreError> {
-        lock_study(self.disk.as_ref(), &self.path)
+        let lock = lock_study(self.disk.as_ref(), &self.path)?;
+        self.disk.sync_folder(&self.path).at(&self.path)?;
+        Ok(lock)
     }
+}
+
+/// Creates a folder and those around it, as far as they do not exist.
+fn make_folders(disk: &dyn Disk, path: &Path) -> Result<(), StoreError> {
+    let folders = path.ancestors().filter(|a| !a.as_os_str().is_empty());
+    for folder in folders.collect::<Vec<_>>().into_iter().rev() {
+        let known = disk.list(folder);
+        if known.is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound) {
+            atomic::folder(disk, folder)?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns when the names of and in a study's folder are on the medium: the process
+/// that created them may have died before its syncs.
+fn settle_names(disk: &dyn Disk, study: &Path) -> Result<(), StoreError> {
+    for (level, folder) in study.ancestors().enumerate() {
+        let folder = match folder.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => folder,
+        };
+        match disk.sync_folder(folder) {
+            // Beyond the folder around the results nothing may be ours.
+            Err(e) if level <= 2 => return Err(e).at(folder),
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Waits for the lock of a study's folder, at most 30 s. It is normally held for the

@@ -164,6 +164,15 @@ fn null_as_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Erro
     Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
+/// A completed telemetry file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TelemetryFile {
+    /// File name in the session's folder `telemetry`.
+    pub file: String,
+    /// SHA-256 of the file in hexadecimal.
+    pub sha256: String,
+}
+
 /// The first event of every session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Start {
@@ -283,6 +292,19 @@ pub enum Event {
         playback: Playback,
         /// Whether it was stopped by Esc, Space or a pause.
         stopped: bool,
+        /// Its telemetry, if a file of it was completed; not in journals of earlier
+        /// releases.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        telemetry: Option<TelemetryFile>,
+    },
+    /// The telemetry of the attempt could not be saved, or only in part.
+    TelemetryLost {
+        /// [`Trial::trial`].
+        trial: u32,
+        /// Attempt, from 1.
+        attempt: u32,
+        /// Reason.
+        reason: String,
     },
     /// The attempt does not count.
     AttemptFailed {

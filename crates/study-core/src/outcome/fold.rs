@@ -151,6 +151,7 @@ impl History {
             | Event::Corrected { .. }
             | Event::ClockStepped { .. }
             | Event::Revealed { .. }
+            | Event::TelemetryLost { .. }
             | Event::StateSet { .. } => {}
             _ => self.last_activity = Some(at),
         }
@@ -216,6 +217,7 @@ impl History {
                 attempt,
                 playback,
                 stopped,
+                telemetry: _,
             } => {
                 if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
                     attempt.ended = Some(Ended {
@@ -262,6 +264,7 @@ impl History {
             | Event::Unpaused { .. }
             | Event::ClockStepped { .. }
             | Event::Interrupted { .. }
+            | Event::TelemetryLost { .. }
             | Event::Revealed { .. } => {}
         }
     }

@@ -117,6 +117,8 @@ impl Session {
             attempt: open.attempt.number,
             playback,
             stopped: aborted,
+            // The saver knows the file.
+            telemetry: None,
         };
         self.record(ended, at);
         self.after_playback(at);

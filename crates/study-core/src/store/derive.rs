@@ -5,7 +5,7 @@
 
 use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
-use super::{StudyFolder, atomic, layout, tables};
+use super::{StudyFolder, atomic, journal, layout, tables};
 use crate::outcome::fold::attempt_rows;
 use crate::outcome::{AttemptRow, ParticipantRow, RatingRow, State};
 use crate::protocol::Protocol;
@@ -56,11 +56,24 @@ impl StudyFolder {
                 who: who.join(", "),
             });
         }
+        // Nothing may be in a table that a loss of power can still take from a journal.
+        self.settle(&sessions)?;
         let derived = Derived::of(&sessions, protocol);
         for (name, bytes) in derived.tables(protocol).at(&self.path)? {
             atomic::replace_if_new(self.disk.as_ref(), &self.path.join(name), &bytes)?;
         }
         Ok(derived)
+    }
+}
+
+impl StudyFolder {
+    /// Returns when every journal is on the medium.
+    fn settle(&self, sessions: &[SessionData]) -> Result<(), StoreError> {
+        for session in sessions.iter().filter(|s| !s.settled) {
+            journal::settle(self.disk.as_ref(), &session.path)?;
+            self.settle_names(&session.participant)?;
+        }
+        Ok(())
     }
 }
 

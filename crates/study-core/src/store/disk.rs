@@ -39,7 +39,8 @@ pub trait Appender: Send {
     /// Returns when everything that was written is on the medium.
     ///
     /// # Errors
-    /// Of the operating system. Data written before may then be lost.
+    /// Of the operating system, or the file was removed. Data written before may then
+    /// be lost.
     fn sync(&mut self) -> io::Result<()>;
 
     /// Writes all bytes, continuing after an interruption or a short write.
@@ -64,8 +65,40 @@ pub trait Appender: Send {
 pub struct Item {
     /// Its name; bytes that are not UTF-8 are replaced.
     pub name: String,
+    /// What it is.
+    pub kind: ItemKind,
+}
+
+impl Item {
     /// Whether it is a folder.
-    pub is_folder: bool,
+    pub fn is_folder(&self) -> bool {
+        self.kind == ItemKind::Folder
+    }
+}
+
+/// What an entry of a folder is; a link is not followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ItemKind {
+    /// A file.
+    File,
+    /// A folder.
+    Folder,
+    /// A symbolic link.
+    Link,
+    /// Anything else, such as a pipe.
+    Other,
+}
+
+impl ItemKind {
+    /// The word for it in a sentence.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::File => "a file",
+            Self::Folder => "a folder",
+            Self::Link => "a symbolic link",
+            Self::Other => "neither a file nor a folder",
+        }
+    }
 }
 
 /// A file system. No file is opened, created, truncated or removed through a symbolic
@@ -102,6 +135,18 @@ pub trait Disk: fmt::Debug + Send + Sync {
     fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>>;
 }
 
+fn kind_of(known: std::fs::FileType) -> ItemKind {
+    if known.is_symlink() {
+        ItemKind::Link
+    } else if known.is_dir() {
+        ItemKind::Folder
+    } else if known.is_file() {
+        ItemKind::File
+    } else {
+        ItemKind::Other
+    }
+}
+
 /// The file system of the operating system.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RealDisk;
@@ -114,7 +159,14 @@ impl Appender for RealFile {
     }
 
     fn sync(&mut self) -> io::Result<()> {
-        self.0.sync_data()
+        self.0.sync_data()?;
+        if system::is_removed(&self.0)? {
+            return Err(io::Error::new(
+                io::ErrorKind::NotFound,
+                "the file was removed while it was open",
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -179,7 +231,7 @@ impl Disk for RealDisk {
             }
             items.push(Item {
                 name,
-                is_folder: entry.file_type()?.is_dir(),
+                kind: kind_of(entry.file_type()?),
             });
         }
         items.sort();
@@ -234,7 +286,7 @@ mod tests {
         assert!(disk.lock(&folder).unwrap().is_some());
         let names = |path: &Path| -> Vec<(String, bool)> {
             let items = disk.list(path).unwrap().into_iter();
-            items.map(|i| (i.name, i.is_folder)).collect()
+            items.map(|i| (i.name.clone(), i.is_folder())).collect()
         };
         assert_eq!(names(&folder), [("old".to_owned(), false)]);
         assert_eq!(names(home.path()), [("P01".to_owned(), true)]);

@@ -1,5 +1,6 @@
 //! Errors of the results folder.
 
+use super::disk::ItemKind;
 use crate::outcome::State;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -47,6 +48,38 @@ pub enum StoreError {
         path: PathBuf,
         /// Damage.
         what: String,
+    },
+    /// A file or a link in the place of a folder.
+    #[error("{}: {found} in the place of a folder", .path.display())]
+    WrongKind {
+        /// Where it is.
+        path: PathBuf,
+        /// What it is.
+        found: &'static str,
+    },
+    /// The mirror is no folder that can be used.
+    #[error("the mirror {}: {}", .path.display(), plain(.source))]
+    NoMirror {
+        /// The mirror.
+        path: PathBuf,
+        /// Cause.
+        source: io::Error,
+    },
+    /// The mirror would contain the results or be contained in them.
+    #[error("the mirror {} and the results {} are not apart", .mirror.display(), .results.display())]
+    MirrorInside {
+        /// The results folder.
+        results: PathBuf,
+        /// The mirror.
+        mirror: PathBuf,
+    },
+    /// Both copies have something that the other does not have.
+    #[error("{} and its mirror {} have each been continued without the other", .results.display(), .mirror.display())]
+    MirrorDiffers {
+        /// In the results folder.
+        results: PathBuf,
+        /// In the mirror.
+        mirror: PathBuf,
     },
     /// The study in the folder has other stimuli.
     #[error("{}: the stimuli are not those of the running study `{}`", .path.display(), Untrusted(.study))]
@@ -210,6 +243,19 @@ impl StoreError {
             Self::Newer { .. } => {
                 "use the version of study that wrote it, or a later one".to_owned()
             }
+            Self::WrongKind { found, .. } if *found == ItemKind::Link.as_str() => {
+                "replace the link by the folder that it leads to".to_owned()
+            }
+            Self::WrongKind { .. } => "move it elsewhere".to_owned(),
+            Self::NoMirror { .. } => {
+                "connect the disk, or create the folder; nothing is mirrored into a folder that does not exist".to_owned()
+            }
+            Self::MirrorInside { .. } => {
+                "the mirror must be a folder of its own, on another disk".to_owned()
+            }
+            Self::MirrorDiffers { .. } => {
+                "compare them with `study verify RESULTS --against MIRROR`, move one of them elsewhere, then start again".to_owned()
+            }
             Self::StimulusChanged { .. } => {
                 "changed stimuli are a new study: give the protocol another study id".to_owned()
             }
@@ -246,6 +292,8 @@ impl StoreError {
             self,
             Self::StimulusChanged { .. }
                 | Self::NotAmended { .. }
+                | Self::NoMirror { .. }
+                | Self::MirrorInside { .. }
                 | Self::NothingToAmend { .. }
                 | Self::Finished { .. }
                 | Self::InState { .. }

@@ -1,15 +1,21 @@
 //! Writing the journal of one session.
 //!
-//! Each record is one write followed by a sync; [`Journal::append`] returns only
-//! when the record is on the medium. After a failed write or sync the file is not
-//! touched again, because a second sync can succeed although data were lost.
+//! Each record is one write; [`Journal::append`] returns only when the record and then
+//! `head.json` are on the medium. After a failed write or sync the file is not touched
+//! again, because a second sync can succeed although data were lost.
 //! [`Journal::new_segment`] continues in another file.
+//!
+//! For the same reason a journal that is continued by another process continues in a new
+//! segment, which first repeats every record that was not acknowledged: the process
+//! before may have been told that its sync failed.
 
 use super::disk::{Appender, Disk};
 use super::error::{At as _, StoreError};
-use super::journal_record::{self, Record};
+use super::head::{Head, HeadFile};
+use super::journal_record::{self, LineError, Record};
 use super::layout;
-use super::replay::{Replay, Segment, replay};
+use super::receipt::Receipt;
+use super::replay::{Replay, Segment, lines_after, replay};
 use super::session_lock::SessionLock;
 use crate::outcome::{Event, Moment};
 use std::fmt;
@@ -47,65 +53,103 @@ impl fmt::Debug for Journal {
 }
 
 impl Journal {
-    /// Opens the last segment to continue after the last record.
-    pub(super) fn open(lock: Arc<SessionLock>, from: &Recovered) -> Result<Self, StoreError> {
+    /// Continues a journal: in a new segment, unless this process created the first one.
+    pub(super) fn open(lock: Arc<SessionLock>, from: Recovered) -> Result<Self, StoreError> {
         let path = lock.path.join(layout::segment(from.segment));
         let file = lock.disk.open(&path).at(&path)?;
-        Ok(Self {
+        let mut journal = Self {
             lock,
             file,
             path,
             segment: from.segment,
             next_seq: from.replay.next_seq,
-            prev: from.replay.prev.clone(),
+            prev: from.replay.prev,
             failed: None,
-        })
+        };
+        if !from.is_new {
+            journal.new_segment()?;
+        }
+        if !from.in_doubt.is_empty() {
+            journal.write(&from.in_doubt)?;
+            let last = journal.next_seq - 1;
+            journal.write_head(last, &journal.prev)?;
+        }
+        Ok(journal)
     }
 
     /// Writes an event and returns its sequence number when it is on the medium.
     ///
     /// # Errors
-    /// [`StoreError`]: the event is not acknowledged, whatever the file contains.
-    /// After a failed write or sync call [`Journal::new_segment`] and append the same
-    /// event again.
+    /// As [`Journal::append_all`].
     pub fn append(&mut self, at: Moment, event: &Event) -> Result<u64, StoreError> {
-        self.record(&Record::Event(at, event.clone()))
+        self.append_all(&[(at, event)])
     }
 
-    pub(super) fn record(&mut self, record: &Record) -> Result<u64, StoreError> {
+    /// Writes events, with one sync for all; returns the sequence number of the last one
+    /// when they are on the medium.
+    ///
+    /// # Errors
+    /// [`StoreError`]: no event is acknowledged, whatever the file contains. After a
+    /// failed write or sync call [`Journal::new_segment`] and append the same events
+    /// again.
+    pub fn append_all(&mut self, events: &[(Moment, &Event)]) -> Result<u64, StoreError> {
+        let records = events
+            .iter()
+            .map(|(at, event)| Record::Event(*at, (*event).clone()));
+        self.records(&records.collect::<Vec<_>>())
+    }
+
+    pub(super) fn records(&mut self, records: &[Record]) -> Result<u64, StoreError> {
         if self.failed.is_some() {
             return Err(StoreError::SegmentFailed {
                 path: self.path.clone(),
             });
         }
-        let unstorable = |e: journal_record::LineError| StoreError::Unstorable {
+        let unstorable = |e: LineError| StoreError::Unstorable {
             path: self.path.clone(),
             what: e.to_string(),
         };
-        let mut bytes =
-            journal_record::encode(self.next_seq, &self.prev, record).map_err(unstorable)?;
-        // A record that cannot be read back now would be lost unnoticed later.
-        journal_record::decode(&bytes).map_err(unstorable)?;
-        let hash = journal_record::hash(&bytes);
-        bytes.push(b'\n');
-        let written = self.file.write_all(&bytes).and_then(|()| self.file.sync());
-        if let Err(e) = written {
-            self.failed = Some(if super::error::is_full(&e) {
+        let (mut next, mut prev) = (self.next_seq, self.prev.clone());
+        let mut lines = Vec::with_capacity(records.len());
+        for record in records {
+            let line = journal_record::encode(next, &prev, record).map_err(unstorable)?;
+            // A record that cannot be read back now would be lost unnoticed later.
+            journal_record::decode(&line).map_err(unstorable)?;
+            prev = journal_record::hash(&line);
+            next += 1;
+            lines.push(line);
+        }
+        let last = next.saturating_sub(1);
+        let written = self.write(&lines);
+        if let Err(e) = written.and_then(|()| self.write_head(last, &prev)) {
+            self.failed = Some(if e.is_full() {
                 SegmentFailure::Full
             } else {
                 SegmentFailure::Other
             });
-            return Err(e).at(&self.path);
+            return Err(e);
         }
-        let seq = self.next_seq;
-        self.next_seq += 1;
-        self.prev = hash;
-        Ok(seq)
+        (self.next_seq, self.prev) = (next, prev);
+        Ok(last)
+    }
+
+    /// Writes lines without their line ends and returns when they are on the medium.
+    fn write(&mut self, lines: &[Vec<u8>]) -> Result<(), StoreError> {
+        let written = lines.iter().try_for_each(|line| {
+            let mut line = line.clone();
+            line.push(b'\n');
+            self.file.write_all(&line)
+        });
+        written.and_then(|()| self.file.sync()).at(&self.path)
+    }
+
+    fn write_head(&self, seq: u64, hash: &str) -> Result<(), StoreError> {
+        Head::new(seq, hash, self.segment).write(self.lock.disk.as_ref(), &self.lock.path)
     }
 
     /// Continues in a new file (`journal-2.jsonl`, …) of the same folder; on a full
-    /// disk it first frees the reserve. The failed record must be appended again. It
-    /// keeps its sequence number, and a reader takes two equal lines as one.
+    /// disk it first frees the reserve. The failed records must be appended again. They
+    /// keep their sequence numbers, and a reader takes two equal lines as one.
     ///
     /// # Errors
     /// [`StoreError`]; the call can be repeated.
@@ -132,56 +176,86 @@ impl Journal {
         self.failed = None;
         Ok(())
     }
+
+    /// Writes `receipt.json`: what this journal contains now that the session is left.
+    /// `None` if nothing was ever acknowledged.
+    ///
+    /// # Errors
+    /// [`StoreError`] if it cannot be written; no answer depends on it.
+    pub fn receipt(&self) -> Result<Option<Receipt>, StoreError> {
+        let Some(last) = self.next_seq.checked_sub(1) else {
+            return Ok(None);
+        };
+        let receipt = Receipt::new(last, &self.prev);
+        receipt.write(self.lock.disk.as_ref(), &self.lock.path)?;
+        Ok(Some(receipt))
+    }
 }
 
 /// The segments of a journal, in order; none if there is no journal.
 pub(super) fn segments(disk: &dyn Disk, folder: &Path) -> Result<Vec<Segment>, StoreError> {
-    let items = disk.list(folder).at(folder)?;
-    let mut numbers: Vec<u32> = items
-        .iter()
-        .filter(|i| !i.is_folder)
-        .filter_map(|i| layout::segment_number(&i.name))
-        .collect();
-    numbers.sort_unstable();
     let read = |number: u32| {
         let name = layout::segment(number);
         let path = folder.join(&name);
         let bytes = disk.read(&path).at(&path)?;
         Ok(Segment { name, bytes })
     };
+    let numbers = segment_numbers(disk, folder)?;
     numbers.into_iter().map(read).collect()
+}
+
+/// The numbers of the segments in a session's folder, in order.
+fn segment_numbers(disk: &dyn Disk, folder: &Path) -> Result<Vec<u32>, StoreError> {
+    let items = disk.list(folder).at(folder)?;
+    let mut numbers: Vec<u32> = items
+        .iter()
+        .filter_map(|i| layout::segment_number(&i.name))
+        .collect();
+    numbers.sort_unstable();
+    Ok(numbers)
 }
 
 /// A journal that can be continued.
 #[derive(Debug)]
 pub(super) struct Recovered {
     /// Number of the last segment.
-    pub(super) segment: u32,
+    segment: u32,
+    /// Whether this process created it.
+    is_new: bool,
+    /// The lines that were not acknowledged.
+    in_doubt: Vec<Vec<u8>>,
     pub(super) replay: Replay,
     /// Messages to the operator about repairs and damage.
     pub(super) notices: Vec<String>,
 }
 
-/// Prepares the journal of a locked session for writing: creates the first segment
-/// if there is none and moves an incomplete last line to a file of its own. Damaged
-/// lines before it stay where they are.
+/// Prepares the journal of a locked session for writing: makes what is there durable,
+/// creates the first segment if there is none, and moves an incomplete end to a file of
+/// its own. Damaged lines before it stay where they are.
 ///
 /// After an interruption at any step the call can be repeated: the bytes are copied
 /// and on the medium before they are cut off, and an equal copy is not made twice.
 ///
 /// # Errors
-/// [`StoreError::Newer`] for a journal of a later version, or the disk's.
+/// [`StoreError::Newer`] for a journal of a later version, [`StoreError::Damaged`] if
+/// nothing is left of a journal, or the disk's.
 pub(super) fn recover(lock: &SessionLock) -> Result<Recovered, StoreError> {
     let (disk, folder) = (lock.disk.as_ref(), lock.path.as_path());
-    let items = disk.list(folder).at(folder)?;
-    let number = |i: &super::disk::Item| layout::segment_number(&i.name);
-    if !items.iter().any(|i| number(i).is_some()) {
+    let head = Head::read(disk, folder)?;
+    let is_new = head == HeadFile::None && segment_numbers(disk, folder)?.is_empty();
+    if is_new {
         let path = folder.join(layout::segment(1));
         disk.create(&path).at(&path)?;
-        disk.sync_folder(folder).at(folder)?;
     }
+    settle(disk, folder)?;
     let mut segments = segments(disk, folder)?;
-    let first = replay(&segments);
+    let first = replay(&segments, &head);
+    if first.records == 0 && first.is_truncated() {
+        return Err(StoreError::Damaged {
+            path: folder.to_owned(),
+            what: "its journal is missing, although answers were saved".to_owned(),
+        });
+    }
     let mut notices = Vec::new();
     if let Some(last) = segments.last_mut() {
         let path = folder.join(&last.name);
@@ -191,7 +265,7 @@ pub(super) fn recover(lock: &SessionLock) -> Result<Recovered, StoreError> {
             disk.truncate(&path, tail.keep as u64).at(&path)?;
             last.bytes.truncate(tail.keep);
             notices.push(format!(
-                "the last line of {} was incomplete; its {} bytes are in {copy}",
+                "the end of {} was incomplete; its {} bytes are in {copy}",
                 last.name, tail.torn
             ));
         }
@@ -204,7 +278,7 @@ pub(super) fn recover(lock: &SessionLock) -> Result<Recovered, StoreError> {
             last.bytes.push(b'\n');
         }
     }
-    let replay = replay(&segments);
+    let replay = replay(&segments, &head);
     if let Some(found) = replay.newer() {
         let path = folder.to_owned();
         return Err(StoreError::Newer { path, found });
@@ -215,9 +289,23 @@ pub(super) fn recover(lock: &SessionLock) -> Result<Recovered, StoreError> {
         segment: last
             .and_then(|s| layout::segment_number(&s.name))
             .unwrap_or(1),
+        is_new,
+        in_doubt: lines_after(&segments, head.head().map(|head| head.seq)),
         replay,
         notices,
     })
+}
+
+/// Returns when the segments of a journal and their names are on the medium: the
+/// process that wrote them may have died before its syncs.
+pub(super) fn settle(disk: &dyn Disk, folder: &Path) -> Result<(), StoreError> {
+    for number in segment_numbers(disk, folder)? {
+        let path = folder.join(layout::segment(number));
+        disk.open(&path)
+            .and_then(|mut file| file.sync())
+            .at(&path)?;
+    }
+    disk.sync_folder(folder).at(folder)
 }
 
 /// Copies bytes to the first free `torn-<n>.bin` unless one contains them already.

@@ -54,6 +54,10 @@ pub struct Claim {
     pub seat: Option<Seat>,
     /// Newest version of the protocol at that time.
     pub protocol_version: u32,
+    /// Whether the last acknowledged record is in `head.json`; not in journals of
+    /// earlier releases.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub head: bool,
 }
 
 /// A valid line.
@@ -195,14 +199,17 @@ pub fn decode(bytes: &[u8]) -> Result<Line, LineError> {
 
 /// `prev` of the line after this one.
 pub fn hash(line: &[u8]) -> String {
-    let digest = Sha256::digest(line);
-    digest[..8].iter().map(|b| format!("{b:02x}")).collect()
+    hex(&Sha256::digest(line)[..8])
 }
 
 /// SHA-256 of a file's bytes in hexadecimal.
 pub(super) fn sha256(bytes: &[u8]) -> String {
-    let digest = Sha256::digest(bytes);
-    digest.iter().map(|b| format!("{b:02x}")).collect()
+    hex(&Sha256::digest(bytes))
+}
+
+/// Bytes in hexadecimal.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 #[cfg(test)]
@@ -262,6 +269,7 @@ mod tests {
                 ..Playback::default()
             },
             stopped: false,
+            telemetry: None,
         };
         let bytes = encode(1, NO_LINE, &Record::Event(at, event)).unwrap();
         let Record::Event(_, Event::PlaybackEnded { playback, .. }) =

@@ -13,6 +13,10 @@ pub const PROTOCOL: &str = "protocol.toml";
 pub const SESSIONS: &str = "sessions";
 /// Record of a participant whose data were erased.
 pub const TOMBSTONE: &str = "tombstone.json";
+/// The last acknowledged record of a session's journal.
+pub const HEAD: &str = "head.json";
+/// Written when a session is left: its last record.
+pub const RECEIPT: &str = "receipt.json";
 /// Folder of a session's telemetry, one file for each attempt.
 pub const TELEMETRY: &str = "telemetry";
 /// File that reserves disk space for the last records of a session.
@@ -28,10 +32,20 @@ pub const ATTEMPTS: &str = "attempts.csv";
 /// Derived: one row for each participant.
 pub const PARTICIPANTS: &str = "participants.csv";
 
+/// What a session's folder contains beside the segments of its journal.
+pub const OF_SESSION: [&str; 5] = [HEAD, ".head.json.tmp", RECEIPT, TELEMETRY, RESERVE];
+
 /// The derived tables.
 pub const TABLES: [&str; 3] = [RATINGS, ATTEMPTS, PARTICIPANTS];
 /// Derived by `study analyze`: the results of the analysis.
 pub const ANALYSIS: &str = "analysis";
+
+/// Whether a file is needed only for a while: by an open session, or until it is
+/// renamed.
+pub fn is_passing(name: &str) -> bool {
+    let hidden = name.starts_with('.');
+    name == RESERVE || name == PROBE || (hidden && name.ends_with(".tmp"))
+}
 
 /// Folder of the frozen copy of a version of the protocol.
 pub fn protocol(study: &Path, version: u32) -> PathBuf {

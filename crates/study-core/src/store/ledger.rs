@@ -94,7 +94,7 @@ impl StudyFolder {
     /// in case; if no row is free or the disk is full; if the format is newer.
     pub fn claim(&self, request: &ClaimRequest) -> Result<Claimed, StoreError> {
         let _lock = self.lock()?;
-        let newest = Manifest::read(self.disk.as_ref(), &self.path)?
+        let newest = Manifest::read_intact(self.disk.as_ref(), &self.path)?
             .newest()
             .version;
         if newest != self.version() {
@@ -125,40 +125,52 @@ impl StudyFolder {
         // Other processes may have written since the sessions were read.
         let mut recovered = journal::recover(&lock)?;
         notices.append(&mut recovered.notices);
-        check_standing(request, number, &recovered.replay.history.standing)?;
-        if recovered.replay.records == 0 {
-            let seat = next_seat(request, &all)?;
-            let claim = Claim {
-                participant: request.participant.clone(),
-                session: number,
-                seat: Some(seat),
-                protocol_version: self.version(),
-            };
-            let mut journal = Journal::open(Arc::clone(&lock), &recovered)?;
-            journal.record(&Record::Claim(claim))?;
-            drop(journal);
-            recovered = journal::recover(&lock)?;
-        }
         let replay = &recovered.replay;
-        let seat = replay.seat().ok_or_else(|| StoreError::Damaged {
-            path: folder.clone(),
-            what: "claim and first event are damaged, so its row of the schedule is unknown"
-                .to_owned(),
-        })?;
+        check_standing(request, number, &replay.history.standing)?;
+        let is_new = replay.records == 0;
+        let seat = match is_new {
+            true => next_seat(request, &all)?,
+            false => replay.seat().ok_or_else(|| StoreError::Damaged {
+                path: folder.clone(),
+                what: "claim and first event are damaged, so its row of the schedule is unknown"
+                    .to_owned(),
+            })?,
+        };
         check_kind(request, seat)?;
-        self.keep_reserve(&folder)?;
         let protocol_version = replay
             .history
             .start()
             .map_or(self.version(), |start| start.protocol_version);
         let entries = replay.entries.clone();
+        let mut journal = Journal::open(Arc::clone(&lock), recovered)?;
+        if is_new {
+            let seat = Some(seat);
+            journal.records(&[self.claim_record(&request.participant, number, seat)])?;
+        }
+        self.keep_reserve(&folder)?;
         Ok(Claimed {
             session: number,
             seat,
             entries,
             protocol_version,
-            folder: SessionFolder::new(lock, recovered),
+            folder: SessionFolder::new(lock, journal),
             notices,
+        })
+    }
+
+    /// The first record of a new journal.
+    pub(super) fn claim_record(
+        &self,
+        id: &ParticipantId,
+        session: u32,
+        seat: Option<Seat>,
+    ) -> Record {
+        Record::Claim(Claim {
+            participant: id.clone(),
+            session,
+            seat,
+            protocol_version: self.version(),
+            head: true,
         })
     }
 
@@ -214,7 +226,8 @@ impl StudyFolder {
         disk.sync_folder(&participant).at(&participant)
     }
 
-    /// Locks a session's folder.
+    /// Locks a session's folder and makes its name durable: the process that created it
+    /// may have died before its syncs.
     ///
     /// # Errors
     /// [`StoreError::Open`] if another process has it open, or the disk's.
@@ -227,6 +240,7 @@ impl StudyFolder {
         match self.disk.lock(&path).at(&path)? {
             Some(lock) => {
                 let disk = Arc::clone(&self.disk);
+                self.settle_names(id)?;
                 Ok(Arc::new(SessionLock::new(disk, path, lock)))
             }
             None => Err(StoreError::Open {
@@ -235,6 +249,17 @@ impl StudyFolder {
                 path,
             }),
         }
+    }
+
+    /// Returns when the names of a participant's sessions are on the medium.
+    pub(super) fn settle_names(&self, id: &ParticipantId) -> Result<(), StoreError> {
+        for folder in [
+            layout::participant(&self.path, id),
+            self.path.join(layout::SESSIONS),
+        ] {
+            self.disk.sync_folder(&folder).at(&folder)?;
+        }
+        Ok(())
     }
 
     /// Writes the reserve before anything is claimed, so that a full or read-only
@@ -277,7 +302,9 @@ impl StudyFolder {
 fn write_reserve(disk: &dyn Disk, path: &Path) -> io::Result<()> {
     let mut file = disk.create(path)?;
     // Not zeros: some file systems allocate no space for those.
-    let bytes: Vec<u8> = (0..RESERVE_BYTES).map(|i| (i % 251) as u8 ^ 0x5a).collect();
+    let pattern: Vec<u8> = (1..=251).collect();
+    let mut bytes = pattern.repeat(RESERVE_BYTES as usize / pattern.len() + 1);
+    bytes.truncate(RESERVE_BYTES as usize);
     file.write_all(&bytes)?;
     file.sync()
 }

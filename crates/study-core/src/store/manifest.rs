@@ -2,11 +2,11 @@
 //!
 //! A version exists when `study.json` names it; its files are on the medium before.
 
-use super::atomic;
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
 use super::journal_record::sha256;
 use super::layout;
+use super::{atomic, sealed};
 use crate::outcome::Moment;
 use crate::protocol::fingerprint::Fingerprints;
 use chrono::{DateTime, FixedOffset};
@@ -30,6 +30,10 @@ pub struct Manifest {
     pub created: DateTime<FixedOffset>,
     /// Versions of the protocol, from 1, without gaps.
     pub versions: Vec<Version>,
+    /// Whether the file agreed with its checksum when it was read; `None` for one of an
+    /// earlier release, which has none.
+    #[serde(skip)]
+    pub(super) intact: Option<bool>,
 }
 
 /// A frozen version of the protocol.
@@ -49,6 +53,9 @@ pub struct Version {
     pub files: BTreeMap<String, String>,
 }
 
+/// What is wrong with a file that does not agree with its own checksum.
+pub(super) const CHECKSUM: &str = "its checksum does not match; restore it from a copy";
+
 #[derive(Deserialize)]
 struct FormatOnly {
     format: String,
@@ -63,7 +70,14 @@ impl Manifest {
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
             created: at.wall,
             versions: vec![first],
+            intact: Some(true),
         }
+    }
+
+    /// Whether this is the other manifest, possibly with later versions.
+    pub(super) fn continues(&self, other: &Self) -> bool {
+        (&self.study, self.created) == (&other.study, other.created)
+            && self.versions.starts_with(&other.versions)
     }
 
     /// The newest version of the protocol.
@@ -99,7 +113,9 @@ impl Manifest {
                 found: format,
             });
         }
-        let manifest: Self = serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
+        let mut manifest: Self =
+            serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
+        manifest.intact = sealed::is_intact(&bytes);
         let numbered = (1..).zip(&manifest.versions).all(|(n, v)| v.version == n);
         if manifest.versions.is_empty() || !numbered {
             return Err(damaged("the versions are not numbered 1, 2, …".to_owned()));
@@ -113,12 +129,20 @@ impl Manifest {
 
     /// Replaces the manifest of a study's folder.
     pub(super) fn write(&self, disk: &dyn Disk, study: &Path) -> Result<(), StoreError> {
-        let mut text = serde_json::to_string_pretty(self).map_err(|e| StoreError::Unstorable {
-            path: study.join(layout::MANIFEST),
-            what: e.to_string(),
-        })?;
-        text.push('\n');
-        atomic::replace(disk, &study.join(layout::MANIFEST), text.as_bytes())
+        let path = study.join(layout::MANIFEST);
+        atomic::replace(disk, &path, &sealed::seal(self, &path)?)
+    }
+
+    /// As [`Manifest::read`], for a study that is to be changed: its checksum must match.
+    pub(super) fn read_intact(disk: &dyn Disk, study: &Path) -> Result<Self, StoreError> {
+        let manifest = Self::read(disk, study)?;
+        if manifest.intact == Some(false) {
+            return Err(StoreError::Damaged {
+                path: study.join(layout::MANIFEST),
+                what: CHECKSUM.to_owned(),
+            });
+        }
+        Ok(manifest)
     }
 }
 

@@ -1,10 +1,12 @@
 //! Sessions that the derived tables contain although their journals are missing.
 //!
 //! Such a session was lost or removed. It is reported, and the tables are not
-//! overwritten without an explicit request.
+//! overwritten without an explicit request. A participant who had only been claimed
+//! gave nothing that could be lost: a crash can leave such a row.
 
 use super::sessions::SessionData;
 use super::{StudyFolder, layout};
+use crate::outcome::State;
 use crate::protocol::columns::ParticipantColumn;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -68,7 +70,7 @@ impl StudyFolder {
     }
 }
 
-/// Participant and session of each row of a table.
+/// Participant and session of each row of a table that is more than a claim.
 fn named(table: &[u8]) -> BTreeSet<(String, String)> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(table);
     let Ok(header) = reader.headers() else {
@@ -82,9 +84,19 @@ fn named(table: &[u8]) -> BTreeSet<(String, String)> {
     ) else {
         return BTreeSet::new();
     };
+    // A state is only in participants.csv.
+    let (state, started) = (
+        find(ParticipantColumn::State),
+        find(ParticipantColumn::StartedAt),
+    );
+    let is_claim = |r: &csv::StringRecord| {
+        let cell = |column: Option<usize>| column.and_then(|at| r.get(at));
+        cell(state) == Some(State::Unfinished.as_str()) && cell(started) == Some("")
+    };
     reader
         .records()
         .filter_map(Result::ok)
+        .filter(|r| !is_claim(r))
         .filter_map(|r| Some((r.get(id)?.to_owned(), r.get(session)?.to_owned())))
         .collect()
 }

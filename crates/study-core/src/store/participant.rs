@@ -6,7 +6,6 @@
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
 use super::journal::{self, Journal};
-use super::journal_record::{Claim, Record};
 use super::sessions::SessionData;
 use super::tombstone::{ErasedSession, Tombstone};
 use super::{StudyFolder, layout};
@@ -63,7 +62,10 @@ impl StudyFolder {
                     participant: id.clone(),
                 });
             }
-            // Files remain if the earlier erasure was interrupted.
+            // Files remain if the earlier erasure was interrupted, and the tombstone may
+            // not be on the medium.
+            let folder = layout::participant(&self.path, id);
+            self.disk.sync_folder(&folder).at(&folder)?;
             return Ok(StateChange {
                 before: Some(stone.state),
                 freed_row: None,
@@ -155,14 +157,10 @@ impl StudyFolder {
         let lock = self.lock_session(&request.participant, number)?;
         let mut recovered = journal::recover(&lock)?;
         notices.append(&mut recovered.notices);
-        let mut journal = Journal::open(lock, &recovered)?;
-        if recovered.replay.records == 0 {
-            journal.record(&Record::Claim(Claim {
-                participant: request.participant.clone(),
-                session: number,
-                seat: None,
-                protocol_version: self.version(),
-            }))?;
+        let is_new = recovered.replay.records == 0;
+        let mut journal = Journal::open(lock, recovered)?;
+        if is_new {
+            journal.records(&[self.claim_record(&request.participant, number, None)])?;
         }
         let event = Event::StateSet {
             state: request.state,
@@ -183,13 +181,12 @@ impl StudyFolder {
         let mut sessions = Vec::new();
         for session in own {
             locks.push(self.lock_session(id, session.session)?);
-            let segments = journal::segments(self.disk.as_ref(), &session.path)?;
-            let replay = super::replay::replay(&segments);
+            let read = self.session(id, session.session)?;
             sessions.push(ErasedSession {
                 session: session.session,
                 seat: session.seat,
-                lines: replay.records,
-                last_hash: replay.prev,
+                lines: read.records,
+                last_hash: read.last_hash,
             });
         }
         let stone = Tombstone::new(id, request.state, &request.reason, at, sessions);
@@ -216,7 +213,7 @@ impl StudyFolder {
     /// returns whether there was one.
     fn remove_analysis(&self) -> Result<bool, StoreError> {
         let items = self.disk.list(&self.path).at(&self.path)?;
-        let is_analysis = |i: &super::disk::Item| i.name == layout::ANALYSIS && i.is_folder;
+        let is_analysis = |i: &super::disk::Item| i.name == layout::ANALYSIS && i.is_folder();
         if !items.iter().any(is_analysis) {
             return Ok(false);
         }
@@ -227,10 +224,10 @@ impl StudyFolder {
 }
 
 /// Removes a folder and its content without following links.
-fn remove_all(disk: &dyn Disk, folder: &Path) -> Result<(), StoreError> {
+pub(super) fn remove_all(disk: &dyn Disk, folder: &Path) -> Result<(), StoreError> {
     for item in disk.list(folder).at(folder)? {
         let path = folder.join(&item.name);
-        if item.is_folder {
+        if item.is_folder() {
             remove_all(disk, &path)?;
         } else {
             disk.remove_file(&path).at(&path)?;

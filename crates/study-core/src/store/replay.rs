@@ -1,13 +1,18 @@
 //! Reading the segments of a journal.
 //!
 //! Nothing is repaired here. A line that cannot be read affects no other line: every
-//! valid line is used, wherever it is. All damage is listed as [`Damage`].
+//! valid line is used, wherever it is. All damage is listed as [`Damage`]. Unreadable
+//! lines at the end of a segment are what a crash leaves of records that were not
+//! acknowledged, unless the head ([`super::head`]) says that they were.
 
+use super::head::HeadFile;
 use super::journal_record::{self, Claim, Line, LineError, PREFIX, Record};
+use super::layout::{self, HEAD};
 use crate::outcome::Entry;
 use crate::outcome::fold::History;
 use crate::protocol::Seat;
 use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// One file of a journal, in order.
@@ -33,9 +38,17 @@ pub struct Damage {
 /// A kind of damage.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DamageKind {
-    /// The last line is incomplete: it was never acknowledged. Number of bytes that
-    /// are not part of a record.
+    /// The end cannot be read or has no line end: it was never acknowledged. Number of
+    /// bytes that are not part of a record.
     Torn(usize),
+    /// Acknowledged records are missing at the end: the first and the last of them.
+    Truncated(u64, u64),
+    /// The last acknowledged record is another one.
+    Changed(u64),
+    /// `head.json` cannot be read.
+    Head,
+    /// There is no `head.json` although the claim says that there is one.
+    NoHead,
     /// The line cannot be read.
     Unreadable(LineError),
     /// Whole lines are missing: the expected and the found sequence number.
@@ -52,11 +65,37 @@ pub enum DamageKind {
 
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, line {}: ", self.file, self.line)?;
         match &self.kind {
+            DamageKind::Head => {
+                return write!(
+                    f,
+                    "{HEAD}: damaged; the end of the journal is not protected"
+                );
+            }
+            DamageKind::NoHead => {
+                return write!(
+                    f,
+                    "{HEAD}: missing; the end of the journal is not protected"
+                );
+            }
+            _ => write!(f, "{}, line {}: ", self.file, self.line)?,
+        }
+        match &self.kind {
+            DamageKind::Head | DamageKind::NoHead => Ok(()),
+            DamageKind::Truncated(from, to) if from == to => {
+                write!(
+                    f,
+                    "the journal is truncated: record {to} was saved and is missing"
+                )
+            }
+            DamageKind::Truncated(from, to) => write!(
+                f,
+                "the journal is truncated: records {from} to {to} were saved and are missing"
+            ),
+            DamageKind::Changed(seq) => write!(f, "record {seq} is not the one that was saved"),
             DamageKind::Torn(0) => write!(f, "the last line has no line end"),
             DamageKind::Torn(bytes) => {
-                write!(f, "the last line is incomplete ({bytes} bytes)")
+                write!(f, "the end is incomplete ({bytes} bytes)")
             }
             DamageKind::Unreadable(why) => write!(f, "damaged: {why}"),
             DamageKind::Missing(due, found) => {
@@ -77,7 +116,7 @@ impl fmt::Display for Damage {
 /// The end of the last segment.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tail {
-    /// Number of bytes up to the end of the last valid record.
+    /// Number of bytes up to the end of the last valid or damaged record.
     pub keep: usize,
     /// Number of bytes after it.
     pub torn: usize,
@@ -104,6 +143,10 @@ pub struct Replay {
     pub prev: String,
     /// The end of the last segment.
     pub tail: Tail,
+    /// Whether every record was acknowledged and is therefore on the medium.
+    pub settled: bool,
+    /// Hash of each record by sequence number, in ascending order.
+    pub(super) hashes: Vec<(u64, String)>,
 }
 
 impl Replay {
@@ -124,33 +167,86 @@ impl Replay {
             _ => None,
         })
     }
+
+    /// Whether acknowledged records are missing at the end.
+    pub fn is_truncated(&self) -> bool {
+        let truncated = |d: &Damage| matches!(d.kind, DamageKind::Truncated(..));
+        self.damage.iter().any(truncated)
+    }
 }
 
-/// Reads the segments of one journal, in order.
-pub fn replay(segments: &[Segment]) -> Replay {
+/// Reads the segments of one journal, in order, and compares them with its head.
+pub fn replay(segments: &[Segment], head: &HeadFile) -> Replay {
     let mut reader = Reader {
         out: Replay {
             prev: journal_record::NO_LINE.to_owned(),
             ..Replay::default()
         },
-        seen: Vec::new(),
         lost: 0,
+        bad: Vec::new(),
     };
-    for segment in segments {
+    let mut rest = segments;
+    while let Some((segment, after)) = rest.split_first() {
         reader.segment(segment);
+        // Unreadable lines at the end were acknowledged if what follows is more than the
+        // next record.
+        let end = head.head().map(|head| head.seq + 1);
+        let follows = after.iter().find_map(first_seq).or(end);
+        if follows.is_some_and(|seq| seq > reader.out.next_seq) {
+            reader.bad_lines(segment);
+        }
+        reader.torn(segment);
+        rest = after;
     }
-    reader.finish(segments)
+    reader.finish(segments, head)
+}
+
+/// Sequence number of the first record of a segment.
+fn first_seq(segment: &Segment) -> Option<u64> {
+    let mut records = records(segment);
+    records.next().map(|(_, line)| line.seq)
+}
+
+/// The valid records of a segment and their bytes.
+fn records(segment: &Segment) -> impl Iterator<Item = (&[u8], Line)> {
+    let lines = segment.bytes.split(|b| *b == b'\n');
+    lines.flat_map(pieces).filter_map(whole)
+}
+
+/// The valid lines with a sequence number after `seq`, in order and without line ends;
+/// all if it is `None`.
+pub(super) fn lines_after(segments: &[Segment], seq: Option<u64>) -> Vec<Vec<u8>> {
+    let mut lines = BTreeMap::new();
+    for segment in segments {
+        for (raw, line) in records(segment) {
+            if seq.is_none_or(|seq| line.seq > seq) {
+                lines.entry(line.seq).or_insert_with(|| raw.to_vec());
+            }
+        }
+    }
+    lines.into_values().collect()
 }
 
 struct Reader {
     out: Replay,
-    /// Hash of each record by sequence number, in ascending order.
-    seen: Vec<(u64, String)>,
     /// Unreadable lines since the last record.
     lost: u64,
+    /// Unreadable lines of the present segment, after which no record came yet.
+    bad: Vec<BadLine>,
+}
+
+/// A line without any record.
+struct BadLine {
+    /// In the segment, from 1.
+    number: usize,
+    why: LineError,
+    hash: String,
+    /// End of the line in the segment.
+    end: usize,
 }
 
 impl Reader {
+    /// Reads a segment up to its last record.
     fn segment(&mut self, segment: &Segment) {
         let mut from = 0;
         let mut number = 0;
@@ -160,23 +256,40 @@ impl Reader {
             let rest = &segment.bytes[from..];
             match rest.iter().position(|b| *b == b'\n') {
                 Some(end) => {
-                    self.ended_line(segment, number, &rest[..end]);
+                    self.ended_line(segment, number, from, &rest[..end]);
                     from += end + 1;
-                    self.out.tail.keep = from;
                 }
                 None => {
-                    self.tail(segment, number, from);
+                    self.unended_line(segment, number, from);
                     break;
                 }
             }
         }
     }
 
-    fn ended_line(&mut self, segment: &Segment, number: usize, bytes: &[u8]) {
+    fn ended_line(&mut self, segment: &Segment, number: usize, from: usize, bytes: &[u8]) {
+        let end = from + bytes.len() + 1;
         let why = match journal_record::decode(bytes) {
-            Ok(line) => return self.record(segment, number, bytes, line),
+            Ok(line) => {
+                self.bad_lines(segment);
+                self.record(segment, number, bytes, line);
+                self.out.tail.keep = end;
+                return;
+            }
             Err(why) => why,
         };
+        if !pieces(bytes).any(|piece| whole(piece).is_some()) {
+            let hash = journal_record::hash(bytes);
+            self.bad.push(BadLine {
+                number,
+                why,
+                hash,
+                end,
+            });
+            return;
+        }
+        self.bad_lines(segment);
+        self.out.tail.keep = end;
         // Two records are on one line if the line end between them is damaged.
         self.damage(segment, number, DamageKind::Unreadable(why));
         let mut lost = 0;
@@ -192,24 +305,40 @@ impl Reader {
         }
     }
 
-    fn tail(&mut self, segment: &Segment, number: usize, from: usize) {
-        let bytes = &segment.bytes[from..];
-        let mut keep = from;
+    fn unended_line(&mut self, segment: &Segment, number: usize, from: usize) {
         let mut at = from;
-        for piece in pieces(bytes) {
+        for piece in pieces(&segment.bytes[from..]) {
             if let Some((raw, line)) = whole(piece) {
-                keep = at + raw.len();
+                self.bad_lines(segment);
                 self.record(segment, number, raw, line);
+                self.out.tail.keep = at + raw.len();
+                self.out.tail.unended = true;
             }
             at += piece.len();
         }
-        let torn = segment.bytes.len() - keep;
-        self.out.tail = Tail {
-            keep,
-            torn,
-            unended: keep > from,
-        };
-        self.damage(segment, number, DamageKind::Torn(torn));
+    }
+
+    /// Unreadable lines before a record: each may have been one.
+    fn bad_lines(&mut self, segment: &Segment) {
+        for bad in std::mem::take(&mut self.bad) {
+            self.damage(segment, bad.number, DamageKind::Unreadable(bad.why));
+            self.lost += 1;
+            self.out.prev = bad.hash;
+            self.out.tail.keep = bad.end;
+        }
+    }
+
+    /// What is left at the end of a segment was never acknowledged.
+    fn torn(&mut self, segment: &Segment) {
+        self.bad.clear();
+        let tail = &mut self.out.tail;
+        tail.torn = segment.bytes.len() - tail.keep;
+        if tail.torn > 0 || tail.unended {
+            let before = &segment.bytes[..tail.keep];
+            let line = before.iter().filter(|b| **b == b'\n').count() + 1;
+            let kind = DamageKind::Torn(tail.torn);
+            self.damage(segment, line, kind);
+        }
     }
 
     fn record(&mut self, segment: &Segment, number: usize, raw: &[u8], line: Line) {
@@ -217,8 +346,9 @@ impl Reader {
         let due = self.out.next_seq;
         if line.seq < due {
             // After a failed write the same record is written again.
-            if let Ok(at) = self.seen.binary_search_by_key(&line.seq, |(seq, _)| *seq) {
-                if self.seen[at].1 != hash {
+            let seen = &self.out.hashes;
+            if let Ok(at) = seen.binary_search_by_key(&line.seq, |(seq, _)| *seq) {
+                if seen[at].1 != hash {
                     self.damage(segment, number, DamageKind::Conflict(line.seq));
                 }
                 return;
@@ -239,8 +369,8 @@ impl Reader {
         }
         self.lost = 0;
         self.out.next_seq = due.max(line.seq + 1);
-        let place = self.seen.partition_point(|(seq, _)| *seq < line.seq);
-        self.seen.insert(place, (line.seq, hash.clone()));
+        let place = self.out.hashes.partition_point(|(seq, _)| *seq < line.seq);
+        self.out.hashes.insert(place, (line.seq, hash.clone()));
         self.out.prev = hash;
         self.out.records += 1;
         match line.record {
@@ -262,15 +392,58 @@ impl Reader {
         });
     }
 
-    fn finish(mut self, segments: &[Segment]) -> Replay {
+    fn finish(mut self, segments: &[Segment], head: &HeadFile) -> Replay {
         self.out.next_seq += self.lost;
+        self.compare(segments, head);
         self.out.entries.sort_by_key(|e| e.seq);
         self.out.history = History::of(&self.out.entries);
         if let (None, Some(first), true) = (&self.out.claim, segments.first(), self.out.records > 0)
         {
-            self.damage(&first.clone(), 1, DamageKind::NoClaim);
+            self.damage(first, 1, DamageKind::NoClaim);
         }
         self.out
+    }
+
+    /// Compares the end of the journal with its head. What is found wrong stays wrong
+    /// when the journal is continued: the next record follows the head.
+    fn compare(&mut self, segments: &[Segment], head: &HeadFile) {
+        let last = self.out.hashes.last().map(|(seq, _)| *seq);
+        let promised = self.out.claim.as_ref().is_some_and(|c| c.head);
+        let kind = match head {
+            HeadFile::Damaged => Some(DamageKind::Head),
+            // It is written after the claim and before the first event.
+            HeadFile::None if promised && last > Some(0) => Some(DamageKind::NoHead),
+            _ => None,
+        };
+        self.out.damage.extend(kind.map(|kind| Damage {
+            file: HEAD.to_owned(),
+            line: 1,
+            kind,
+        }));
+        let head = head.head();
+        self.out.settled = last.is_none_or(|last| head.is_some_and(|head| last <= head.seq));
+        let Some(head) = head else {
+            return;
+        };
+        let kind = match self.out.hashes.iter().rfind(|(seq, _)| *seq == head.seq) {
+            Some((_, hash)) if *hash == head.hash => return,
+            Some(_) => DamageKind::Changed(head.seq),
+            None if head.seq >= self.out.next_seq => {
+                DamageKind::Truncated(self.out.next_seq, head.seq)
+            }
+            // Missing inside the journal, and already reported.
+            None => return,
+        };
+        if last.is_none_or(|last| last <= head.seq) {
+            self.out.next_seq = head.seq + 1;
+            self.out.prev.clone_from(&head.hash);
+        }
+        let (file, bytes) = match segments.last() {
+            Some(segment) => (segment.name.clone(), &segment.bytes[..]),
+            None => (layout::segment(1), &[][..]),
+        };
+        let line = bytes.iter().filter(|b| **b == b'\n').count();
+        self.out.damage.push(Damage { file, line, kind });
     }
 }
 

@@ -1,7 +1,7 @@
 //! The folder of a claimed session: its journal and telemetry.
 
 use super::error::StoreError;
-use super::journal::{Journal, Recovered};
+use super::journal::Journal;
 use super::session_lock::SessionLock;
 use super::telemetry::TelemetryWriter;
 use std::path::Path;
@@ -12,12 +12,12 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct SessionFolder {
     lock: Arc<SessionLock>,
-    /// The journal until it is opened.
-    journal: Option<Recovered>,
+    /// The journal until it is taken.
+    journal: Option<Journal>,
 }
 
 impl SessionFolder {
-    pub(super) fn new(lock: Arc<SessionLock>, journal: Recovered) -> Self {
+    pub(super) fn new(lock: Arc<SessionLock>, journal: Journal) -> Self {
         Self {
             lock,
             journal: Some(journal),
@@ -29,19 +29,14 @@ impl SessionFolder {
         &self.lock.path
     }
 
-    /// Opens the journal for writing.
+    /// The journal, open for writing.
     ///
     /// # Errors
-    /// [`StoreError::JournalTaken`] on the second call, or the disk's.
+    /// [`StoreError::JournalTaken`] on the second call.
     pub fn journal(&mut self) -> Result<Journal, StoreError> {
-        let Some(recovered) = &self.journal else {
-            return Err(StoreError::JournalTaken {
-                path: self.lock.path.clone(),
-            });
-        };
-        let journal = Journal::open(Arc::clone(&self.lock), recovered)?;
-        self.journal = None;
-        Ok(journal)
+        self.journal.take().ok_or_else(|| StoreError::JournalTaken {
+            path: self.lock.path.clone(),
+        })
     }
 
     /// Creates a file for the telemetry of an attempt; an existing one is never

@@ -1,6 +1,8 @@
 //! Reading the sessions of a study.
 
+use super::disk::Disk;
 use super::error::{At as _, StoreError};
+use super::head::Head;
 use super::journal_record::Claim;
 use super::replay::{Damage, replay};
 use super::tombstone::Tombstone;
@@ -35,6 +37,19 @@ pub struct SessionData {
     pub tombstone: Option<Tombstone>,
     /// Whether the journal contains any record.
     pub claimed: bool,
+    /// Whether acknowledged records are missing at the end of the journal.
+    pub truncated: bool,
+    /// Whether `head.json` tells which record is the last; it does not in journals of
+    /// earlier releases.
+    pub protected: bool,
+    /// Whether every record was acknowledged and is therefore on the medium.
+    pub(super) settled: bool,
+    /// Number of records, including the claim.
+    pub(super) records: u64,
+    /// Hash of each record by sequence number, in ascending order.
+    pub(super) hashes: Vec<(u64, String)>,
+    /// Hash of the last record.
+    pub(super) last_hash: String,
     /// The claim, if it could be read.
     pub(super) claim: Option<Claim>,
     /// File name of the last segment of the journal.
@@ -84,16 +99,20 @@ impl StudyFolder {
     }
 
     /// The ids of all participants with a folder, in byte order.
+    ///
+    /// # Errors
+    /// [`StoreError::WrongKind`] if something else has the name of a participant or of
+    /// the folder of all sessions.
     pub(super) fn participant_ids(&self) -> Result<Vec<ParticipantId>, StoreError> {
+        check_kind(self.disk.as_ref(), &self.path, |name| {
+            [layout::SESSIONS, layout::PROTOCOLS].contains(&name)
+        })?;
         let folder = self.path.join(layout::SESSIONS);
-        let items = match self.disk.list(&folder) {
-            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-            listed => listed.at(&folder)?,
-        };
-        let mut ids: Vec<ParticipantId> = items
+        let is_id = |name: &str| ParticipantId::new(name).is_ok();
+        let names = check_kind(self.disk.as_ref(), &folder, is_id)?;
+        let mut ids: Vec<ParticipantId> = names
             .into_iter()
-            .filter(|i| i.is_folder)
-            .filter_map(|i| ParticipantId::new(i.name).ok())
+            .filter_map(|name| ParticipantId::new(name).ok())
             .collect();
         ids.sort();
         Ok(ids)
@@ -113,6 +132,12 @@ impl StudyFolder {
                 damage: Vec::new(),
                 tombstone: Some(tombstone),
                 claimed: true,
+                truncated: false,
+                protected: true,
+                settled: true,
+                records: 0,
+                hashes: Vec::new(),
+                last_hash: String::new(),
                 claim: None,
                 last_file: None,
             }]);
@@ -124,15 +149,9 @@ impl StudyFolder {
     }
 
     pub(super) fn session_numbers(&self, folder: &Path) -> Result<Vec<u32>, StoreError> {
-        let items = match self.disk.list(folder) {
-            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-            listed => listed.at(folder)?,
-        };
-        let mut numbers: Vec<u32> = items
-            .iter()
-            .filter(|i| i.is_folder)
-            .filter_map(|i| layout::number(&i.name))
-            .collect();
+        let is_session = |name: &str| layout::number(name).is_some();
+        let names = check_kind(self.disk.as_ref(), folder, is_session)?;
+        let mut numbers: Vec<u32> = names.iter().filter_map(|n| layout::number(n)).collect();
         numbers.sort_unstable();
         Ok(numbers)
     }
@@ -145,12 +164,19 @@ impl StudyFolder {
     ) -> Result<SessionData, StoreError> {
         let path = layout::session(&self.path, id, number);
         let segments = journal::segments(self.disk.as_ref(), &path)?;
-        let replay = replay(&segments);
+        let head = Head::read(self.disk.as_ref(), &path)?;
+        let replay = replay(&segments, &head);
         Ok(SessionData {
             participant: id.clone(),
             session: number,
             seat: replay.seat(),
             claimed: replay.records > 0,
+            truncated: replay.is_truncated(),
+            protected: head.head().is_some(),
+            settled: replay.settled,
+            records: replay.records,
+            hashes: replay.hashes,
+            last_hash: replay.prev,
             path,
             history: replay.history,
             entries: replay.entries,
@@ -159,5 +185,29 @@ impl StudyFolder {
             claim: replay.claim,
             last_file: segments.last().map(|s| s.name.clone()),
         })
+    }
+}
+
+/// The names in a folder that must be folders; none if the folder does not exist.
+///
+/// # Errors
+/// [`StoreError::WrongKind`] if one of them is a file or a link: what it contains would
+/// otherwise be left out without a word.
+pub(super) fn check_kind(
+    disk: &dyn Disk,
+    folder: &Path,
+    must: impl Fn(&str) -> bool,
+) -> Result<Vec<String>, StoreError> {
+    let items = match disk.list(folder) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        listed => listed.at(folder)?,
+    };
+    let found: Vec<_> = items.into_iter().filter(|i| must(&i.name)).collect();
+    match found.iter().find(|i| !i.is_folder()) {
+        Some(item) => Err(StoreError::WrongKind {
+            path: folder.join(&item.name),
+            found: item.kind.as_str(),
+        }),
+        None => Ok(found.into_iter().map(|i| i.name).collect()),
     }
 }

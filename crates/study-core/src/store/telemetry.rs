@@ -5,11 +5,14 @@
 
 use super::disk::Appender;
 use super::error::{At as _, StoreError};
-use super::layout;
+use super::journal_record::hex;
 use super::session_lock::SessionLock;
-use crate::outcome::Sample;
+use super::sessions::check_kind;
+use super::{atomic, layout};
 use crate::outcome::cell::Row as _;
+use crate::outcome::{Sample, TelemetryFile};
 use crate::protocol::columns::SampleColumn;
+use sha2::{Digest as _, Sha256};
 use std::fmt;
 use std::io;
 use std::io::Write as _;
@@ -30,7 +33,10 @@ pub struct TelemetryWriter {
     lock: Arc<SessionLock>,
     file: Box<dyn Appender>,
     path: PathBuf,
+    name: String,
     buffer: Vec<u8>,
+    /// Of everything that was written.
+    digest: Sha256,
 }
 
 impl fmt::Debug for TelemetryWriter {
@@ -48,15 +54,17 @@ impl TelemetryWriter {
         attempt: u32,
     ) -> Result<Self, StoreError> {
         let folder = lock.path.join(layout::TELEMETRY);
-        match lock.disk.create_folder(&folder) {
-            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e).at(&folder),
-            _ => {}
-        }
+        atomic::folder(lock.disk.as_ref(), &folder)?;
+        // A link would lead out of the results folder.
+        check_kind(lock.disk.as_ref(), &lock.path, |name| {
+            name == layout::TELEMETRY
+        })?;
         let mut copy = 1;
-        let (path, file) = loop {
-            let path = folder.join(layout::telemetry(trial, attempt, copy));
+        let (name, path, file) = loop {
+            let name = layout::telemetry(trial, attempt, copy);
+            let path = folder.join(&name);
             match lock.disk.create(&path) {
-                Ok(file) => break (path, file),
+                Ok(file) => break (name, path, file),
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => copy += 1,
                 Err(e) => return Err(e).at(&path),
             }
@@ -67,7 +75,9 @@ impl TelemetryWriter {
             lock,
             file,
             path,
+            name,
             buffer,
+            digest: Sha256::new(),
         })
     }
 
@@ -96,6 +106,7 @@ impl TelemetryWriter {
             return Err(io::Error::from(io::ErrorKind::StorageFull)).at(&self.path);
         }
         self.file.write_all(&self.buffer).at(&self.path)?;
+        self.digest.update(&self.buffer);
         self.buffer.clear();
         Ok(())
     }
@@ -104,11 +115,15 @@ impl TelemetryWriter {
     ///
     /// # Errors
     /// [`StoreError`] of the write or the sync.
-    pub fn finish(mut self) -> Result<(), StoreError> {
+    pub fn finish(mut self) -> Result<TelemetryFile, StoreError> {
         self.flush()?;
         self.file.sync().at(&self.path)?;
         let folder = self.lock.path.join(layout::TELEMETRY);
-        self.lock.disk.sync_folder(&folder).at(&folder)
+        self.lock.disk.sync_folder(&folder).at(&folder)?;
+        Ok(TelemetryFile {
+            file: self.name.clone(),
+            sha256: hex(&self.digest.finalize_reset()),
+        })
     }
 }
 

@@ -6,14 +6,15 @@ use super::derive::Derived;
 use super::error::{At as _, StoreError, plain};
 use super::journal_record::sha256;
 use super::ledger::SeatKind;
-use super::manifest::Manifest;
+use super::manifest::{CHECKSUM, Manifest};
+use super::receipt::Receipt;
 use super::replay::DamageKind;
 use super::sessions::SessionData;
 use super::{StudyFolder, layout};
 use crate::outcome::{Event, State};
 use crate::protocol::{Protocol, Seat};
 use std::collections::{BTreeMap, BTreeSet};
-use study_base::text::{ParticipantId, Untrusted};
+use study_base::text::{ParticipantId, Untrusted, counted};
 
 /// A finding of the verification of a results folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,6 +82,7 @@ impl StudyFolder {
         for session in sessions {
             self.verify_session(session, &mut found)?;
         }
+        verify_protection(sessions, &mut found);
         verify_rows(sessions, &mut found);
         for missing in self.missing_sessions(sessions) {
             let what = format!(
@@ -94,6 +96,9 @@ impl StudyFolder {
 
     fn verify_frozen(&self, found: &mut Vec<Finding>) -> Result<(), StoreError> {
         let manifest = Manifest::read(self.disk.as_ref(), &self.path)?;
+        if manifest.intact == Some(false) {
+            found.push(Finding::problem(layout::MANIFEST, CHECKSUM));
+        }
         for version in &manifest.versions {
             let folder = layout::protocol(&self.path, version.version);
             for (name, hash) in &version.files {
@@ -124,8 +129,9 @@ impl StudyFolder {
         let mut ids: Vec<ParticipantId> = Vec::new();
         for item in items {
             let place = format!("{}/{}", layout::SESSIONS, Untrusted(&item.name));
+            let is_folder = item.is_folder();
             match ParticipantId::new(item.name) {
-                Ok(id) if item.is_folder => {
+                Ok(id) if is_folder => {
                     if let Some(other) = ids.iter().find(|i| i.collides_with(&id)) {
                         found.push(Finding::problem(
                             &place,
@@ -155,7 +161,7 @@ impl StudyFolder {
     ) -> Result<(), StoreError> {
         let folder = layout::participant(&self.path, id);
         for item in self.disk.list(&folder).at(&folder)? {
-            let is_session = item.is_folder && layout::number(&item.name).is_some();
+            let is_session = item.is_folder() && layout::number(&item.name).is_some();
             let place = format!("{place}/{}", Untrusted(&item.name));
             if is_session && erased {
                 found.push(Finding::problem(
@@ -194,11 +200,11 @@ impl StudyFolder {
             ));
             return Ok(());
         }
-        // An incomplete last line was never acknowledged.
-        let under_way = session.is_unfinished();
+        // An incomplete end was never acknowledged.
+        let open_end = session.is_unfinished() || session.protected;
         for damage in &session.damage {
             let expected =
-                is_torn(damage) && (under_way || Some(&damage.file) != session.last_file.as_ref());
+                is_torn(damage) && (open_end || Some(&damage.file) != session.last_file.as_ref());
             found.push(Finding {
                 is_problem: !expected,
                 place: place.clone(),
@@ -215,9 +221,10 @@ impl StudyFolder {
             found.push(Finding::problem(&place, whose));
         }
         self.verify_start(session, &place, found);
+        self.verify_receipt(session, &place, found);
         for item in self.disk.list(&session.path).at(&session.path)? {
             let known = layout::segment_number(&item.name).is_some()
-                || [layout::TELEMETRY, layout::RESERVE].contains(&item.name.as_str());
+                || layout::OF_SESSION.contains(&item.name.as_str());
             let place = format!("{place}/{}", Untrusted(&item.name));
             if layout::is_torn(&item.name) {
                 found.push(Finding::note(
@@ -229,6 +236,24 @@ impl StudyFolder {
             }
         }
         Ok(())
+    }
+
+    /// Compares the receipt with the record that it names.
+    fn verify_receipt(&self, session: &SessionData, place: &str, found: &mut Vec<Finding>) {
+        let place = format!("{place}/{}", layout::RECEIPT);
+        let what = match Receipt::read(self.disk.as_ref(), &session.path) {
+            Ok(None) => return,
+            Ok(Some(receipt)) => {
+                let seq = receipt.seq;
+                if session.hashes.contains(&(seq, receipt.hash)) {
+                    return;
+                }
+                format!("record {seq} is missing or changed")
+            }
+            Err(StoreError::Damaged { what, .. }) => what,
+            Err(e) => e.to_string(),
+        };
+        found.push(Finding::problem(place, what));
     }
 
     fn verify_start(&self, session: &SessionData, place: &str, found: &mut Vec<Finding>) {
@@ -284,6 +309,20 @@ impl StudyFolder {
             }
         }
         Ok(())
+    }
+}
+
+/// Notes which journals have no head: their ends could be missing unnoticed.
+fn verify_protection(sessions: &[SessionData], found: &mut Vec<Finding>) {
+    let without = |s: &&SessionData| s.claimed && !s.protected && s.damage.is_empty();
+    let names: Vec<String> = sessions.iter().filter(without).map(place_of).collect();
+    if let Some(first) = names.first() {
+        let what = format!(
+            "{} of an earlier release (such as {first}): no {} shows whether records are missing at the end",
+            counted(names.len(), "journal", "journals"),
+            layout::HEAD
+        );
+        found.push(Finding::note(layout::SESSIONS, what));
     }
 }
 

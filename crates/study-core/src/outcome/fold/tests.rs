@@ -77,6 +77,7 @@ fn play(trial: u32, attempt: u32, samples: u64) -> [Event; 3] {
                 ..Playback::default()
             },
             stopped: false,
+            telemetry: None,
         },
     ]
 }

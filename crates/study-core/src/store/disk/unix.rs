@@ -1,16 +1,28 @@
 //! What only Unix offers: permissions, syncs and locks of folders, free space.
 
 use rustix::fs::{OFlags, statvfs};
+use rustix::io::Errno;
 use std::fs::{DirBuilder, File, OpenOptions};
 use std::io;
-use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
+use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _, OpenOptionsExt as _};
 use std::path::Path;
 
 /// Opens a file, but not through a symbolic link, and without waiting for the other
 /// end of a pipe. Only the owner can read a new one.
 pub(super) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits();
-    options.mode(0o600).custom_flags(flags as i32).open(path)
+    let opened = options.mode(0o600).custom_flags(flags as i32).open(path);
+    opened.map_err(|e| match e.raw_os_error() {
+        Some(number) if number == Errno::LOOP.raw_os_error() => {
+            io::Error::other("it is a symbolic link")
+        }
+        _ => e,
+    })
+}
+
+/// Whether an open file has no name any more.
+pub(super) fn is_removed(file: &File) -> io::Result<bool> {
+    Ok(file.metadata()?.nlink() == 0)
 }
 
 /// Creates a folder that only its owner can enter.

@@ -1,74 +1,143 @@
 //! Comparing the telemetry files with the journal.
 //!
-//! Only files and lines are counted; the numbers in them have no checksum. A file
-//! with fewer samples than the journal reports is not a problem: a crash or a full
-//! disk ends a file early.
+//! A file that the journal names is compared by its hash. Files of earlier releases
+//! and of attempts that a crash interrupted have none: their lines are counted. Fewer
+//! lines than samples are not a problem: a crash or a full disk ends a file early.
 
 use super::Finding;
-use crate::store::sessions::SessionData;
+use crate::outcome::{Event, TelemetryFile};
+use crate::store::journal_record::sha256;
+use crate::store::sessions::{SessionData, check_kind};
 use crate::store::telemetry::header;
 use crate::store::{StoreError, StudyFolder, layout, plain};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 impl StudyFolder {
-    /// Compares the telemetry files of a session with the number of samples of each
-    /// playback in the journal. A playback without a confirmed end has none.
+    /// Compares the telemetry files of a session with each playback in the journal. A
+    /// playback without a confirmed end has none.
     pub(super) fn verify_telemetry(
         &self,
         session: &SessionData,
         place: &str,
         found: &mut Vec<Finding>,
     ) -> Result<(), StoreError> {
+        let folder = format!("{place}/{}", layout::TELEMETRY);
+        let is_telemetry = |name: &str| name == layout::TELEMETRY;
+        match check_kind(self.disk.as_ref(), &session.path, is_telemetry) {
+            Err(StoreError::WrongKind { found: what, .. }) => {
+                let what = format!("{what} in the place of a folder");
+                found.push(Finding::problem(folder, what));
+                return Ok(());
+            }
+            other => other.map(drop)?,
+        }
+        // Attempts of which the journal says more than the number of samples.
+        let mut known = BTreeSet::new();
+        for entry in &session.entries {
+            match &entry.event {
+                Event::TelemetryLost {
+                    trial,
+                    attempt,
+                    reason,
+                } => {
+                    known.insert((*trial, *attempt));
+                    let name = layout::telemetry(*trial, *attempt, 1);
+                    let what = format!("not saved, or only in part: {reason}");
+                    found.push(Finding::note(format!("{folder}/{name}"), what));
+                }
+                Event::PlaybackEnded {
+                    trial,
+                    attempt,
+                    playback,
+                    telemetry: Some(file),
+                    ..
+                } => {
+                    known.insert((*trial, *attempt));
+                    self.verify_hash(session, file, playback.samples, &folder, found);
+                }
+                _ => {}
+            }
+        }
         let mut counted: BTreeMap<(u32, u32), u64> = BTreeMap::new();
         for (trial, attempt) in session.history.all_attempts() {
             let samples = attempt.ended.map_or(0, |e| e.playback.samples);
-            if samples > 0 {
+            if samples > 0 && !known.contains(&(trial, attempt.number)) {
                 *counted.entry((trial, attempt.number)).or_default() += samples;
             }
         }
-        let folder = session.path.join(layout::TELEMETRY);
         for ((trial, attempt), samples) in counted {
-            let name = layout::telemetry(trial, attempt, 1);
-            let place = format!("{place}/{}/{name}", layout::TELEMETRY);
-            let (mut exists, mut lines, mut foreign) = (false, 0, false);
-            for copy in 1.. {
-                match self
-                    .disk
-                    .read(&folder.join(layout::telemetry(trial, attempt, copy)))
-                {
-                    Ok(bytes) => {
-                        exists = true;
-                        match lines_of(&bytes) {
-                            Some(n) => lines += n,
-                            None => foreign = true,
-                        }
-                    }
-                    Err(e) if e.kind() == io::ErrorKind::NotFound => break,
-                    Err(e) => {
-                        found.push(Finding::problem(&place, plain(&e)));
-                        exists = true;
-                        foreign = true;
-                        break;
-                    }
-                }
-            }
-            if !exists {
-                let what = format!("missing; the journal reports {samples} samples");
-                found.push(Finding::problem(place, what));
-            } else if foreign {
-                found.push(Finding::problem(place, "not a telemetry file of study"));
-            } else if lines < samples {
-                found.push(Finding::note(
-                    place,
-                    format!(
-                        "contains {lines} of {samples} samples; a crash or a full disk ends a file early"
-                    ),
-                ));
-            }
+            self.count_lines(session, (trial, attempt), samples, &folder, found);
         }
         Ok(())
     }
+
+    /// Compares a file with the hash that the journal has of it.
+    fn verify_hash(
+        &self,
+        session: &SessionData,
+        file: &TelemetryFile,
+        samples: u64,
+        folder: &str,
+        found: &mut Vec<Finding>,
+    ) {
+        let place = format!("{folder}/{}", file.file);
+        let path = session.path.join(layout::TELEMETRY).join(&file.file);
+        let is_name = !file.file.contains(['/', '\\', '\0']);
+        let read = self.disk.read(&path);
+        let what = match read.as_deref() {
+            Ok(bytes) if is_name && sha256(bytes) == file.sha256 => {
+                found.extend(too_few(lines_of(bytes).unwrap_or(0), samples, &place));
+                return;
+            }
+            Ok(_) => "not the file that was recorded (its SHA-256 differs from the journal)".into(),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => missing(samples),
+            Err(e) => plain(e),
+        };
+        found.push(Finding::problem(place, what));
+    }
+
+    /// Compares the number of lines of all files of an attempt with its samples.
+    fn count_lines(
+        &self,
+        session: &SessionData,
+        (trial, attempt): (u32, u32),
+        samples: u64,
+        folder: &str,
+        found: &mut Vec<Finding>,
+    ) {
+        let place = format!("{folder}/{}", layout::telemetry(trial, attempt, 1));
+        let (mut exists, mut lines) = (false, 0);
+        for copy in 1.. {
+            let name = layout::telemetry(trial, attempt, copy);
+            let read = self
+                .disk
+                .read(&session.path.join(layout::TELEMETRY).join(name));
+            match read.map(|bytes| lines_of(&bytes)) {
+                Ok(Some(n)) => (exists, lines) = (true, lines + n),
+                Ok(None) => {
+                    let what = "not a telemetry file of study";
+                    return found.push(Finding::problem(place, what));
+                }
+                Err(e) if e.kind() == io::ErrorKind::NotFound => break,
+                Err(e) => return found.push(Finding::problem(place, plain(&e))),
+            }
+        }
+        match exists {
+            true => found.extend(too_few(lines, samples, &place)),
+            false => found.push(Finding::problem(place, missing(samples))),
+        }
+    }
+}
+
+fn missing(samples: u64) -> String {
+    format!("missing; the journal reports {samples} samples")
+}
+
+fn too_few(lines: u64, samples: u64, place: &str) -> Option<Finding> {
+    let what =
+        format!("contains {lines} of {samples} samples; a crash or a full disk ends a file early");
+    (lines < samples).then(|| Finding::note(place, what))
 }
 
 /// Number of complete sample lines of a file; `None` if its first line is not the
