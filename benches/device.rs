@@ -10,7 +10,7 @@ use study::rater::Impression;
 use study_base::limits::{Limit, Limits};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::message::{
-    Commit, FixedVec, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, TableCrc,
+    Commit, FixedVec, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, UploadCrc,
 };
 use study_wire::predict::{Direction, Lookup, Motion};
 use study_wire::servo::{Rendering, Servo, ServoSettings, ServoState};
@@ -157,7 +157,7 @@ impl Playing {
         };
         let branch =
             |b: &Branch, i: usize| [b.m_kg[i], b.b_n_s_per_mm[i], b.k_n_per_mm[i], b.f0_n[i]];
-        let mut crc = TableCrc::of(&begin);
+        let mut crc = UploadCrc::of_table(&begin);
         playing.say(Request::Hello(Hello { nonce: 1 }));
         playing.say(Request::TableBegin(begin));
         for i in 0..table.x_mm.len() {

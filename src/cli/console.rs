@@ -20,16 +20,6 @@ pub struct Console {
     pub width: usize,
 }
 
-impl std::fmt::Debug for Console {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Console")
-            .field("colour", &self.colour)
-            .field("terminal", &self.terminal)
-            .field("width", &self.width)
-            .finish_non_exhaustive()
-    }
-}
-
 /// Work that takes less time shows no progress bar.
 pub(super) const PATIENCE: std::time::Duration = std::time::Duration::from_secs(1);
 
@@ -116,6 +106,14 @@ impl Console {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Prints a JSON document to standard output.
+    ///
+    /// # Errors
+    /// As [`Console::out`].
+    pub fn json(&mut self, document: &serde_json::Value) -> Result<(), Failure> {
+        self.out(format!("{document:#}\n"))
     }
 
     /// Prints a message of one line to standard error.

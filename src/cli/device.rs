@@ -12,7 +12,7 @@ mod single_playback;
 #[cfg(not(unix))]
 mod unsupported;
 
-use super::{Console, Failure, Kind, load};
+use super::{Console, Failure, load};
 use serialport::SerialPortType;
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
@@ -99,6 +99,7 @@ fn codes(path: &Path, console: &mut Console) -> Result<(), Failure> {
 }
 
 /// A serial port and the connected device, as far as the system knows.
+#[derive(serde::Serialize)]
 struct ListedPort {
     path: String,
     what: String,
@@ -107,7 +108,7 @@ struct ListedPort {
 
 fn list(json: bool, console: &mut Console) -> Result<(), Failure> {
     let found = serialport::available_ports()
-        .map_err(|e| Failure::new(Kind::Device, format!("cannot list the serial ports: {e}")))?;
+        .map_err(|e| Failure::device(format!("cannot list the serial ports: {e}")))?;
     let mut ports: Vec<ListedPort> = found
         .into_iter()
         .map(|port| {
@@ -121,12 +122,8 @@ fn list(json: bool, console: &mut Console) -> Result<(), Failure> {
         .collect();
     ports.sort_by(|a, b| a.path.cmp(&b.path));
     if json {
-        let ports: Vec<_> = ports
-            .iter()
-            .map(|p| serde_json::json!({"path": p.path, "what": p.what, "serial_number": p.serial_number}))
-            .collect();
         let document = serde_json::json!({"format": "study-device-list/1", "ports": ports});
-        return console.out(format!("{document:#}\n"));
+        return console.json(&document);
     }
     if ports.is_empty() {
         return console.out("no serial ports on this machine\n");

@@ -1,6 +1,6 @@
 //! Selection of the device from the protocol, the arguments and `device.toml`.
 
-use super::{Console, Failure, Kind};
+use super::{Console, Failure};
 use crate::device::host::HostSettings;
 use crate::device::link::LinkedDevice;
 use crate::device::manual::{Manual, WithManual};
@@ -127,12 +127,9 @@ impl DeviceAddress {
             given => given,
         };
         match (program, port) {
-            (true, true) => Err(Failure::new(
-                Kind::Usage,
-                "both a port and a program are given",
-            )
-            .hint("choose one: --port PATH or --command COMMAND")),
-            (false, false) => Err(Failure::new(Kind::Usage, "no device is given").hint(
+            (true, true) => Err(Failure::usage("both a port and a program are given")
+                .hint("choose one: --port PATH or --command COMMAND")),
+            (false, false) => Err(Failure::usage("no device is given").hint(
                 format!(
                     "--port PATH or --command \"PROGRAM ARGUMENTS\", or [serial] or [process] in {CONFIG_FILE}; `study device list` shows the ports"
                 ),
@@ -159,11 +156,9 @@ impl DeviceAddress {
                     "--command" => "process",
                     _ => "serial",
                 };
-                Err(Failure::new(
-                    Kind::Usage,
-                    format!("{argument} does not apply to a {} device", kind.as_str()),
-                )
-                .hint(format!(
+                let kind = kind.as_str();
+                let failure = format!("{argument} does not apply to a {kind} device");
+                Err(Failure::usage(failure).hint(format!(
                     "set kind = \"{other}\" in the protocol, or use --device {other} for a pilot session"
                 )))
             }
@@ -178,7 +173,7 @@ impl DeviceAddress {
             None => DeviceConfig::read(Path::new(CONFIG_FILE))?.process.command,
         };
         command.filter(|c| !c.is_empty()).ok_or_else(|| {
-            Failure::new(Kind::Usage, "a process device needs a program").hint(format!(
+            Failure::usage("a process device needs a program").hint(format!(
                 "--command \"PROGRAM ARGUMENTS\", or [process] command = [\"PROGRAM\", \"ARGUMENT\"] in {CONFIG_FILE}"
             ))
         })
@@ -218,7 +213,7 @@ impl SerialPortArgs {
         let port = given.or(config.port);
         if port.is_none() && usb_serial.is_none() {
             return Err(
-                Failure::new(Kind::Usage, "a serial device needs a port").hint(format!(
+                Failure::usage("a serial device needs a port").hint(format!(
                     "--port PATH, or [serial] port = \"PATH\" in {CONFIG_FILE}; `study device list` lists the ports"
                 )),
             );
@@ -288,10 +283,10 @@ pub(super) fn open(
 ) -> Result<Option<Box<dyn Device>>, Failure> {
     address.check_kind(kind)?;
     let device: Box<dyn Device> = match kind {
-        DeviceKind::Simulated => Box::new(VirtualDevice::new(Options {
-            seed: protocol.study.seed,
-            ..Options::default()
-        })),
+        DeviceKind::Simulated => {
+            let options = Options::seeded(protocol.study.seed);
+            Box::new(VirtualDevice::new(options))
+        }
         DeviceKind::Serial => Box::new(address.serial.open_serial(HostSettings::default())?),
         DeviceKind::Process => match address.open_program(display)? {
             Some(device) => Box::new(device),
@@ -354,13 +349,13 @@ fn program_failure(error: &DeviceError) -> Failure {
         DeviceError::Lost(reason) => reason.clone(),
         error => error.to_string(),
     };
-    Failure::new(Kind::Device, Untrusted(&text))
+    Failure::device(Untrusted(&text))
         .hint("start it by hand: its first line has to be its hello (docs/devices.md, section 3)")
 }
 
 fn port_failure(error: &DeviceError) -> Failure {
     let text = error.to_string();
-    Failure::new(Kind::Device, Untrusted(&text)).hint(
+    Failure::device(Untrusted(&text)).hint(
         "`study device list` lists the ports; `study device info --port PATH` identifies a device",
     )
 }

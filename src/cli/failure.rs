@@ -49,6 +49,16 @@ impl Failure {
         Self::new(Kind::Input, message)
     }
 
+    /// A failure because of wrong usage.
+    pub fn usage(message: impl fmt::Display) -> Self {
+        Self::new(Kind::Usage, message)
+    }
+
+    /// A failure because of the device.
+    pub fn device(message: impl fmt::Display) -> Self {
+        Self::new(Kind::Device, message)
+    }
+
     /// A failure because of the results folder.
     pub fn results(message: impl fmt::Display) -> Self {
         Self::new(Kind::Results, message)

@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     check_distinct(&args.training, &training, &recordings, &repeats)?;
     if args.thin {
-        let (thinned, removed) = signal::thin(&training, signal::Dwell::default());
+        let (thinned, removed) = signal::thin(&training);
         console.say(format!(
             "{removed} samples of dwells removed from the training recording"
         ));

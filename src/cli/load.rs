@@ -64,10 +64,8 @@ impl Loaded {
 /// # Errors
 /// [`Failure`] with all faults of all files if any of them is an error.
 pub fn load(path: &Path) -> Result<Loaded, Failure> {
-    match examine(path) {
-        (Some(loaded), _) => Ok(loaded),
-        (None, findings) => Err(Failure::faults(findings)),
-    }
+    let (loaded, findings) = examine(path);
+    loaded.ok_or_else(|| Failure::faults(findings))
 }
 
 /// Loads the frozen protocol of a running study in order to read its data: tables
@@ -76,10 +74,8 @@ pub fn load(path: &Path) -> Result<Loaded, Failure> {
 /// # Errors
 /// As [`load`].
 pub fn load_frozen(path: &Path) -> Result<Loaded, Failure> {
-    match open(path, false) {
-        (Some(loaded), _) => Ok(loaded),
-        (None, findings) => Err(Failure::faults(findings)),
-    }
+    let (loaded, findings) = open(path, false);
+    loaded.ok_or_else(|| Failure::faults(findings))
 }
 
 /// Loads the protocol at `path`; returns all errors and warnings, and the protocol if
@@ -101,12 +97,12 @@ fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
         Err(problem) => {
             let fault = Fault::error(problem.to_string())
                 .hint("PROTOCOL is a protocol.toml or the folder that holds one");
-            return (None, vec![alone(shown, fault)]);
+            return (None, vec![Findings::alone(shown, fault)]);
         }
     };
     let text = match text_of(&bytes) {
         Ok(text) => text,
-        Err(fault) => return (None, vec![alone(shown, fault)]),
+        Err(fault) => return (None, vec![Findings::alone(shown, fault)]),
     };
     let Parsed {
         protocol,
@@ -213,20 +209,19 @@ impl<'f> OtherFiles<'f> {
         })?;
         let shown = path.display().to_string();
         let mut realization = None;
-        let findings = if name.orders {
-            let (orders, findings) = file::parse_orders(&shown, bytes.as_slice());
-            if !findings.has_errors() {
-                self.orders = Some(orders);
-            }
-            findings
-        } else {
-            match text_of(&bytes) {
-                Ok(text) => {
-                    let (read, findings) = study_haptics::model::file::parse(&shown, text);
-                    realization = read;
-                    findings
+        let findings = match text_of(&bytes) {
+            Err(fault) => Findings::alone(shown, fault),
+            Ok(text) if name.orders => {
+                let (orders, findings) = file::parse_orders(&shown, text);
+                if !findings.has_errors() {
+                    self.orders = Some(orders);
                 }
-                Err(fault) => alone(shown, fault),
+                findings
+            }
+            Ok(text) => {
+                let (read, findings) = study_haptics::model::file::parse(&shown, text);
+                realization = read;
+                findings
             }
         };
         self.opened.push(Opened {
@@ -291,12 +286,6 @@ impl<'f> OtherFiles<'f> {
             .filter(|f| !f.faults.is_empty())
             .collect()
     }
-}
-
-fn alone(path: String, fault: Fault) -> Findings {
-    let mut findings = Findings::new(path, "");
-    findings.faults.push(fault);
-    findings
 }
 
 fn text_of(bytes: &[u8]) -> Result<&str, Fault> {

@@ -9,7 +9,7 @@ use super::device_selection::SerialPortArgs;
 use super::trajectory::{
     picture, rate, read_plant, read_trajectory, refuse_to_overwrite, write_file,
 };
-use super::{Console, Failure, Kind};
+use super::{Console, Failure};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use study_base::text::Untrusted;
@@ -83,11 +83,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return wire::run(args, console);
     }
     if args.port.port.is_some() || args.port.baud.is_some() {
-        return Err(Failure::new(
-            Kind::Usage,
-            "--port and --baud do not apply to the simulated probe",
-        )
-        .hint("--device serial records with the probe on that port"));
+        return Err(
+            Failure::usage("--port and --baud do not apply to the simulated probe")
+                .hint("--device serial records with the probe on that port"),
+        );
     }
     let trajectory = read_trajectory(&args.trajectory, console)?;
     let (name, target) = read_plant(&args.plant, console)?;

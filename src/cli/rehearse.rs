@@ -91,16 +91,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let clock =
             VirtualClock::starting_at(first_day() + chrono::Days::new(u64::from(number - 1)));
         let device_seed = seed.wrapping_add(u64::from(number) << 32);
-        let options = Options {
-            seed: device_seed,
-            telemetry_hz: f64::from(args.telemetry),
-            faults: if args.faults {
-                FaultPlan::random(device_seed, FAULT_PROBABILITY)
-            } else {
-                FaultPlan::none()
-            },
-            ..Options::default()
-        };
+        let mut options = Options::seeded(device_seed);
+        options.device.telemetry_hz = f64::from(args.telemetry);
+        if args.faults {
+            options.faults = FaultPlan::random(device_seed, FAULT_PROBABILITY);
+        }
         let folder_of_study = match study.take() {
             Some(first) => first,
             None => StudyFolder::open(&folder)?,

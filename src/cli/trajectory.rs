@@ -3,7 +3,7 @@
 pub(super) mod picture;
 
 use super::{Console, Failure};
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::io::{BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
@@ -121,26 +121,13 @@ fn page(trajectory: &Trajectory, width: usize) -> String {
         ("velocity, mm/s", |m| m.v_mm_s),
     ] {
         let value = |t_s: f64| of(trajectory.at(t_s));
-        out.push_str(&picture::curve(
-            heading,
-            "s",
-            [0.0, total_s],
-            columns,
-            CURVE_ROWS,
-            value,
-        ));
+        let times = [0.0, total_s];
+        out += &picture::curve(heading, "s", times, columns, CURVE_ROWS, value);
     }
     let to_hz = (SHOWN_SPECTRUM * trajectory.top_hz()).min(100.0);
     let bands = spectrum::bands(trajectory, to_hz, columns);
-    out.push_str(&picture::columns(
-        "spectrum of the position, mm (logarithmic, four decades)",
-        "Hz",
-        [0.0, to_hz],
-        &bands,
-        1e-4,
-        SPECTRUM_ROWS,
-    ));
-    out
+    let heading = "spectrum of the position, mm (logarithmic, four decades)";
+    out + &picture::columns(heading, "Hz", [0.0, to_hz], &bands, 1e-4, SPECTRUM_ROWS)
 }
 
 /// Reads a small text file.
@@ -213,11 +200,7 @@ pub(super) fn write_file(
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".part");
     let part = path.with_file_name(name);
-    let written = OpenOptions::new()
-        .write(true)
-        .create(true)
-        .truncate(true)
-        .open(&part)
+    let written = fs::File::create(&part)
         .and_then(|file| {
             let mut sink = BufWriter::with_capacity(1 << 16, file);
             content(&mut sink)?;

@@ -11,6 +11,7 @@ mod uploads;
 
 use super::link::LinkError;
 use exchange::Exchange;
+use std::fmt::Display;
 use std::time::Duration;
 use study_wire::frame::crc32;
 use study_wire::message::Identity;
@@ -95,13 +96,13 @@ pub enum CheckFailure {
 }
 
 impl CheckFailure {
-    pub(super) fn violation(what: impl Into<String>) -> Self {
-        Self::Violation(what.into())
+    pub(super) fn violation(what: impl Display) -> Self {
+        Self::Violation(what.to_string())
     }
 }
 
 /// A violation with this observation.
-pub(super) fn fail<T>(seen: impl Into<String>) -> Result<T, CheckFailure> {
+pub(super) fn fail<T>(seen: impl Display) -> Result<T, CheckFailure> {
     Err(CheckFailure::violation(seen))
 }
 
@@ -165,7 +166,7 @@ pub fn identify(connection: &mut dyn Connection, nonce: u32) -> Result<Identity,
 
 /// Quantile of sorted values by the nearest rank, `fraction` between 0 and 1; `None`
 /// without values.
-fn quantile(sorted: &[f64], fraction: f64) -> Option<f64> {
+pub fn quantile(sorted: &[f64], fraction: f64) -> Option<f64> {
     let rank = (fraction * sorted.len() as f64).ceil() as usize;
     let last = sorted.len().checked_sub(1)?;
     sorted.get(rank.saturating_sub(1).min(last)).copied()

@@ -19,7 +19,7 @@ pub enum InjectedFault {
     Unplug,
 }
 
-/// Which loads have which fault.
+/// Which loads have which fault; by default none.
 #[derive(Debug, Default)]
 pub struct FaultPlan {
     named: BTreeMap<u32, InjectedFault>,
@@ -34,11 +34,6 @@ pub(super) struct PlannedFault {
 }
 
 impl FaultPlan {
-    /// A plan without faults.
-    pub fn none() -> Self {
-        Self::default()
-    }
-
     /// Adds a fault at load number `load`, from 1; faults of the playback occur half a
     /// second after its start.
     #[must_use]
@@ -84,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_planned_fault_affects_only_its_load() {
-        let mut plan = FaultPlan::none().with(2, InjectedFault::Trip);
+        let mut plan = FaultPlan::default().with(2, InjectedFault::Trip);
         assert_eq!(plan.for_load(1), None);
         assert_eq!(plan.for_load(2).map(|f| f.fault), Some(InjectedFault::Trip));
         assert_eq!(plan.for_load(3), None);

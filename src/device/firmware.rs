@@ -16,9 +16,9 @@ use body::Body;
 pub use flaw::Flaw;
 use flaw::FlawInjector;
 use std::time::Duration;
-use study_base::limits::{Limit, Limits};
+use study_base::limits::Limits;
 use study_haptics::plant::{HandParameters, Parameters};
-use study_wire::handler::{Bounds, Drive, Handler, Measured, Profile};
+use study_wire::handler::{Bounds, Drive, Handler, Measured, Out, Profile};
 use study_wire::message::{DeviceState, Fault, Flags, Loaded, Name};
 use study_wire::servo::ServoSettings;
 
@@ -63,16 +63,12 @@ impl Default for Options {
     /// 4 kHz servo, 1 kHz telemetry, 15 N, 1 m/s, 30 ms, seed 0; the smallest mass
     /// compensates that of the slider.
     fn default() -> Self {
-        let limit = |value| Limit::new(value).expect("a positive constant");
         let hand = HandParameters::default();
         Self {
             seed: 0,
             servo_hz: 4000.0,
             telemetry_hz: 1000.0,
-            limits: Limits {
-                force_n: limit(15.0),
-                velocity_mm_s: limit(1000.0),
-            },
+            limits: Limits::new(15.0, 1000.0).expect("positive constants"),
             watchdog_ms: 30,
             hand,
             target: Parameters::a(),
@@ -84,11 +80,13 @@ impl Default for Options {
     }
 }
 
+type AllHandler = Handler<MAX_NODES, MAX_POINTS>;
+
 /// A simulated device.
 #[derive(Debug)]
 pub struct Firmware {
     options: Options,
-    handler: Box<Handler<MAX_NODES, MAX_POINTS>>,
+    handler: Box<AllHandler>,
     body: Body,
     /// Servo periods since the beginning.
     ticks: u64,
@@ -106,7 +104,6 @@ pub struct Firmware {
 }
 
 /// A time in which the processor hangs.
-
 #[derive(Debug, Clone, Copy)]
 struct Stall {
     since: Duration,
@@ -183,11 +180,9 @@ impl Firmware {
     }
 
     fn handle(&mut self, bytes: &[u8], at: Duration) {
-        let now_ms = self.clock(at);
-        let sent = &mut self.sent;
-        self.handler
-            .receive(bytes, now_ms, &mut |bytes| sent.extend_from_slice(bytes));
-        self.update_body();
+        self.with_handler(at, |handler, now_ms, out| {
+            handler.receive(bytes, now_ms, out)
+        });
     }
 
     /// Takes the bytes to be sent.
@@ -244,11 +239,22 @@ impl Firmware {
     /// Trips, as by a guard, a button or a fault of the drive.
     pub fn trip(&mut self, fault: Fault, at: Duration) {
         self.advance(at);
+        self.with_handler(at, |handler, now_ms, out| handler.trip(fault, now_ms, out));
+    }
+
+    /// Calls the handler at `at`, then lets hand and motor follow its state.
+    fn with_handler<T>(
+        &mut self,
+        at: Duration,
+        call: impl FnOnce(&mut AllHandler, u32, Out<'_>) -> T,
+    ) -> T {
         let now_ms = self.clock(at);
         let sent = &mut self.sent;
-        self.handler
-            .trip(fault, now_ms, &mut |bytes| sent.extend_from_slice(bytes));
+        let result = call(&mut self.handler, now_ms, &mut |bytes| {
+            sent.extend_from_slice(bytes)
+        });
         self.update_body();
+        result
     }
 
     // If it were inlined, every step would need half a megabyte of stack.
@@ -283,10 +289,8 @@ impl Firmware {
         }
         self.stall = None;
         if self.handler.state().applies_force() {
-            let now_ms = self.clock(at);
-            let sent = &mut self.sent;
-            self.handler.trip(Fault::Overrun, now_ms, &mut |bytes| {
-                sent.extend_from_slice(bytes);
+            self.with_handler(at, |handler, now_ms, out| {
+                handler.trip(Fault::Overrun, now_ms, out)
             });
         }
         let unread = std::mem::take(&mut self.unread);
@@ -295,13 +299,10 @@ impl Firmware {
     }
 
     fn servo(&mut self, at: Duration) {
-        let now_ms = self.clock(at);
         let measured = self.body.measure();
-        let sent = &mut self.sent;
-        let drive = self
-            .handler
-            .servo(measured, now_ms, &mut |bytes| sent.extend_from_slice(bytes));
-        self.update_body();
+        let drive = self.with_handler(at, |handler, now_ms, out| {
+            handler.servo(measured, now_ms, out)
+        });
         self.body.drive(drive);
     }
 

@@ -12,7 +12,7 @@
 mod clock;
 mod replies;
 mod stage;
-mod upload;
+pub(super) mod upload;
 
 pub use clock::DeviceClock;
 
@@ -21,7 +21,7 @@ use stage::Stage;
 use std::collections::VecDeque;
 use std::num::NonZeroU16;
 use std::time::Duration;
-use study_base::limits::{Limit, Limits};
+use study_base::limits::Limits;
 use study_base::text::{Untrusted, is_unsafe};
 use study_wire::frame::Decoder;
 use study_wire::message::{self, Heartbeat, Hello, Play, Reply, Request, Stop, WireError};
@@ -104,7 +104,7 @@ pub struct Health {
 }
 
 /// The host's side of a connection.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Host {
     stage: Stage,
     identity: Option<message::Identity>,
@@ -140,29 +140,10 @@ impl Host {
     /// A host without a port. `nonce` distinguishes its connections from others.
     pub fn new(nonce: u32, settings: HostSettings) -> Self {
         Self {
-            stage: Stage::Disconnected,
-            identity: None,
-            decoder: Decoder::new(),
-            out: Vec::new(),
-            reports: Vec::new(),
             nonce,
-            sequence: 0,
-            pending: None,
-            queue: VecDeque::new(),
-            rearm_retry: None,
-            crc: 0,
-            playback: 0,
-            received: 0,
-            lost: 0,
-            reported: (0, 0),
-            heartbeat_count: 0,
-            next_heartbeat: Some(Duration::ZERO),
-            pending_heartbeats: VecDeque::new(),
-            silent_since: None,
-            alive_at: None,
             settings,
-            failure: None,
-            health: Health::default(),
+            next_heartbeat: Some(Duration::ZERO),
+            ..Self::default()
         }
     }
 
@@ -217,10 +198,7 @@ impl Host {
         std::mem::take(&mut self.reports)
     }
 
-    /// See [`Device::load`](super::Device::load).
-    ///
-    /// # Errors
-    /// [`DeviceError`] as there.
+    /// [`Device::load`](super::Device::load), with its errors.
     pub fn load(
         &mut self,
         what: &Stimulus<'_>,
@@ -228,20 +206,13 @@ impl Host {
         at: Duration,
     ) -> Result<(), DeviceError> {
         let table = what.need_table()?;
-        let Some(own) = self.identity().filter(|_| self.stage.known()) else {
+        let known = self.identity.as_ref().filter(|_| self.stage.known());
+        let owned = known.and_then(|device| Some((identity(device)?, device)));
+        let Some((own, device)) = owned else {
             return Err(DeviceError::Lost(self.stage.as_str().to_owned()));
         };
-        if !matches!(
-            self.stage,
-            Stage::Idle | Stage::Loading { .. } | Stage::Loaded { .. }
-        ) {
-            return Err(DeviceError::WrongState {
-                command: "load",
-                state: self.stage.as_str(),
-            });
-        }
-        let Some(device) = &self.identity else {
-            return Err(DeviceError::Lost(self.stage.as_str().to_owned()));
+        let (Stage::Idle | Stage::Loading { .. } | Stage::Loaded { .. }) = self.stage else {
+            return Err(self.wrong_state("load"));
         };
         let limits = limits.capped_at(own.limits);
         let upload = upload::of(table, limits, what.allow_uncertified, device)
@@ -262,16 +233,17 @@ impl Host {
         Ok(())
     }
 
-    /// See [`Device::start`](super::Device::start).
-    ///
-    /// # Errors
-    /// [`DeviceError`] as there.
+    fn wrong_state(&self, command: &'static str) -> DeviceError {
+        DeviceError::WrongState {
+            command,
+            state: self.stage.as_str(),
+        }
+    }
+
+    /// [`Device::start`](super::Device::start), with its errors.
     pub fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
         let (Stage::Loaded { .. }, Some(device)) = (self.stage, &self.identity) else {
-            return Err(DeviceError::WrongState {
-                command: "start",
-                state: self.stage.as_str(),
-            });
+            return Err(self.wrong_state("start"));
         };
         self.playback = self.playback.wrapping_add(1).max(1);
         let play = Play {
@@ -286,10 +258,7 @@ impl Host {
         Ok(())
     }
 
-    /// See [`Device::stop`](super::Device::stop).
-    ///
-    /// # Errors
-    /// [`DeviceError`] as there.
+    /// [`Device::stop`](super::Device::stop), with its errors.
     pub fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
         match self.stage {
             Stage::Playing { .. } => self.ask_to_stop(at),
@@ -300,12 +269,7 @@ impl Host {
             // STOP has been sent, or the end has been reported.
             Stage::Stopping { .. } | Stage::AwaitingOutcome | Stage::Idle => {}
             Stage::Disconnected | Stage::Connecting | Stage::Silent { .. } => {}
-            Stage::Loading { .. } | Stage::Loaded { .. } => {
-                return Err(DeviceError::WrongState {
-                    command: "stop",
-                    state: self.stage.as_str(),
-                });
-            }
+            Stage::Loading { .. } | Stage::Loaded { .. } => return Err(self.wrong_state("stop")),
         }
         Ok(())
     }
@@ -525,10 +489,7 @@ fn identity(device: &message::Identity) -> Option<Identity> {
         id: display_name(&device.serial),
         simulated: device.flags.simulated,
         telemetry: device.flags.telemetry,
-        limits: Limits {
-            force_n: Limit::new(device.force_n).ok()?,
-            velocity_mm_s: Limit::new(device.velocity_mm_s).ok()?,
-        },
+        limits: Limits::new(device.force_n, device.velocity_mm_s).ok()?,
     })
 }
 

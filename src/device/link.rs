@@ -25,35 +25,26 @@ use study_wire::message;
 
 /// Why a link cannot be opened or has ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum LinkError {
-    /// No port has this path.
     #[error("there is no such port")]
     NoSuchPort,
-    /// No connected USB device has this serial number.
     #[error("no connected USB device has the serial number {0}")]
     NoSuchUsbSerial(String),
-    /// The user may not open the port.
     #[error("permission denied; the user needs access to serial ports")]
     NoPermission,
-    /// Another program has opened the port.
     #[error("another program is using it")]
     InUse,
-    /// The path is not a serial port.
     #[error("it is not a serial port")]
     NotSerial,
-    /// The port does not support this rate, bits per second.
     #[error("it does not support {0} baud")]
     BaudRate(u32),
-    /// The device was disconnected.
     #[error("unplugged")]
     Unplugged,
-    /// The port accepts no bytes.
     #[error("the port accepts no data")]
     WriteTimeout,
-    /// The operating system has no support for serial devices in this program.
     #[error("serial devices are not supported on this system; use Linux or macOS")]
     Unsupported,
-    /// Any other error of the operating system.
     #[error("the port fails: {0}")]
     System(String),
 }

@@ -11,7 +11,7 @@
 use super::{Device, DeviceError, Identity, Report, Stimulus};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
-use study_base::limits::{Limit, Limits};
+use study_base::limits::Limits;
 use study_base::rng::Stream;
 use study_base::text::ModelId;
 use study_core::outcome::Playback;
@@ -67,21 +67,14 @@ enum Phase {
     },
 }
 
-/// Force, N, and velocity, mm/s: no limit in practice, because a sample has no motor.
-const UNLIMITED: [f64; 2] = [1e3, 1e5];
-
 impl Device for Manual {
     fn identity(&self) -> Identity {
-        let [force_n, velocity_mm_s] =
-            UNLIMITED.map(|value| Limit::new(value).expect("a positive constant"));
         Identity {
             id: "manual".to_owned(),
             simulated: false,
             telemetry: false,
-            limits: Limits {
-                force_n,
-                velocity_mm_s,
-            },
+            // No limit in practice, because a sample has no motor.
+            limits: Limits::new(1e3, 1e5).expect("positive constants"),
         }
     }
 
@@ -145,6 +138,15 @@ impl WithManual {
             by_hand: false,
         }
     }
+
+    /// Who presents the current stimulus.
+    fn current(&mut self) -> &mut dyn Device {
+        if self.by_hand {
+            &mut self.person
+        } else {
+            &mut *self.device
+        }
+    }
 }
 
 impl Device for WithManual {
@@ -161,27 +163,15 @@ impl Device for WithManual {
         // No force while the experimenter mounts a sample.
         self.limp(at);
         self.by_hand = what.by_hand;
-        if what.by_hand {
-            self.person.load(what, limits, at)
-        } else {
-            self.device.load(what, limits, at)
-        }
+        self.current().load(what, limits, at)
     }
 
     fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
-        if self.by_hand {
-            self.person.start(at)
-        } else {
-            self.device.start(at)
-        }
+        self.current().start(at)
     }
 
     fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
-        if self.by_hand {
-            self.person.stop(at)
-        } else {
-            self.device.stop(at)
-        }
+        self.current().stop(at)
     }
 
     fn limp(&mut self, at: Duration) {

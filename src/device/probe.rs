@@ -7,9 +7,10 @@
 use super::check::exchange::Exchange;
 use super::check::{CheckFailure, Connection, fail};
 use std::time::Duration;
+use study_haptics::plant::Measurement;
 use study_wire::message::{
-    Commit, DeviceState, EventKind, FixedVec, Identity, PathBegin, PathChunk, PathCrc,
-    RecordedPoint, Request, fixed,
+    Commit, DeviceState, FixedVec, Identity, PathBegin, PathChunk, RecordedPoint, Request,
+    UploadCrc, fixed,
 };
 
 /// Time between two requests for the state.
@@ -28,18 +29,8 @@ pub struct ProbePath {
     pub force_n: f64,
 }
 
-/// Samples of a recording, one for each position.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ProbeRecording {
-    /// Position, mm.
-    pub x_mm: Vec<f64>,
-    /// Force that the probe applies, N.
-    pub f_n: Vec<f64>,
-    /// Acceleration, m/s².
-    pub a_m_s2: Vec<f64>,
-}
-
-/// Records along a path. `progress` receives the completed fraction, 0 to 1.
+/// Records along a path, one sample for each position. `progress` receives the completed
+/// fraction, 0 to 1.
 ///
 /// # Errors
 /// [`CheckFailure`] if there is no device or no probe, if the path is refused, and after
@@ -49,7 +40,7 @@ pub fn record(
     nonce: u32,
     path: &ProbePath,
     progress: &mut dyn FnMut(f64),
-) -> Result<(Identity, ProbeRecording), CheckFailure> {
+) -> Result<(Identity, Measurement), CheckFailure> {
     let mut exchange = Exchange::new(connection, nonce);
     let result = follow(&mut exchange, path, progress);
     // Also after a failure, which is reported first.
@@ -61,7 +52,7 @@ fn follow(
     exchange: &mut Exchange<'_>,
     path: &ProbePath,
     progress: &mut dyn FnMut(f64),
-) -> Result<(Identity, ProbeRecording), CheckFailure> {
+) -> Result<(Identity, Measurement), CheckFailure> {
     exchange.hello()?;
     exchange.reset()?;
     let device = exchange.identity()?;
@@ -89,22 +80,15 @@ fn follow(
     let until = exchange.now() + duration + APPROACH_TIMEOUT;
     loop {
         exchange.wait(POLL_INTERVAL)?;
-        let received: usize = exchange
-            .recorded
-            .iter()
-            .map(|r| r.points.as_slice().len())
-            .sum();
+        let sizes = exchange.recorded.iter().map(|r| r.points.as_slice().len());
+        let received: usize = sizes.sum();
         progress(received as f64 / path.x_mm.len() as f64);
-        let latched = exchange
-            .events
-            .iter()
-            .find(|e| e.kind == EventKind::Latched);
-        if let Some(event) = latched {
-            return fail(event.fault.as_str());
+        if let Some(event) = exchange.latched() {
+            return fail(event.fault);
         }
         let outcome = exchange.outcome()?;
         if outcome.state.latched() {
-            return fail(outcome.fault.as_str());
+            return fail(outcome.fault);
         }
         if outcome.state == DeviceState::Loaded {
             break;
@@ -126,20 +110,16 @@ fn follow(
             x_nm.len()
         ));
     }
-    let forces: Option<Vec<f64>> = points
-        .iter()
-        .map(|p| p.force_un.map(fixed::from_un))
-        .collect();
-    let f_n = forces.ok_or_else(|| CheckFailure::violation("it has no force sensor"))?;
-    let recording = ProbeRecording {
+    let forces = points.iter().map(|p| p.force_un.map(fixed::from_un));
+    let f_n: Option<Vec<f64>> = forces.collect();
+    let accelerations = points.iter().map(|p| fixed::from_um_s2(p.a_um_s2));
+    let measured = Measurement {
+        t_s: (0..points.len()).map(|i| i as f64 / path.rate_hz).collect(),
         x_mm: points.iter().map(|p| fixed::from_nm(p.x_nm)).collect(),
-        f_n,
-        a_m_s2: points
-            .iter()
-            .map(|p| fixed::from_um_s2(p.a_um_s2))
-            .collect(),
+        a_m_s2: accelerations.collect(),
+        f_n: f_n.ok_or_else(|| CheckFailure::violation("it has no force sensor"))?,
     };
-    Ok((device, recording))
+    Ok((device, measured))
 }
 
 fn upload(
@@ -155,7 +135,7 @@ fn upload(
         force_n: path.force_n.min(device.force_n),
         velocity_mm_s: device.velocity_mm_s,
     };
-    let mut crc = PathCrc::of(&begin);
+    let mut crc = UploadCrc::of_path(&begin);
     for x_nm in x_nm {
         crc.point(*x_nm);
     }

@@ -4,37 +4,27 @@
 //! about how the table feels or whether it is passive.
 
 use study_haptics::model::{Branch, Realization};
-use study_wire::predict::Direction;
 
 /// Why a table cannot be played.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum TableError {
-    /// Fewer than two nodes.
     #[error("it has fewer than two nodes")]
     TooFewNodes,
-    /// More nodes than the wire format can carry.
     #[error("it has {0} nodes; at most 65535 can be sent")]
     TooManyNodes(usize),
-    /// A position is NaN or infinite.
     #[error("a position is not a finite number")]
     PositionNotFinite,
-    /// Two consecutive positions are not in ascending order, mm.
     #[error("positions do not ascend: {0} mm is followed by {1} mm")]
     NotAscending(f64, f64),
-    /// The identified range is empty or not finite, mm.
     #[error("the trained range {0} to {1} mm is invalid")]
     Range(f64, f64),
-    /// The trained speed is not finite and positive, mm/s.
     #[error("the trained speed {0} mm/s is invalid")]
     Speed(f64),
-    /// The length of the direction rule is not finite and positive, mm.
     #[error("the direction's delta_mm {0} is invalid")]
     Delta(f64),
-    /// A parameter does not have one value per node: branch, parameter, number of values,
-    /// number of nodes.
     #[error("{0} {1} has {2} values for {3} nodes")]
     Length(&'static str, &'static str, usize, usize),
-    /// A parameter is NaN or infinite: branch, parameter, number of the node from 1.
     #[error("{0} {1} is not a finite number at node {2}")]
     ParameterNotFinite(&'static str, &'static str, usize),
 }
@@ -64,10 +54,8 @@ pub fn check(realization: &Realization) -> Result<(), TableError> {
     if !positive(realization.trained.v_mm_s) {
         return Err(TableError::Speed(realization.trained.v_mm_s));
     }
-    match realization.direction {
-        Direction::Play { delta_mm } | Direction::Dahl { delta_mm } if !positive(delta_mm) => {
-            Err(TableError::Delta(delta_mm))
-        }
+    match realization.direction.delta_mm() {
+        Some(delta_mm) if !positive(delta_mm) => Err(TableError::Delta(delta_mm)),
         _ => Ok(()),
     }
 }

@@ -16,7 +16,6 @@ use super::link::memory::{Line, Noise};
 use super::{Device, DeviceError, Identity, Report, Stimulus};
 use std::time::Duration;
 use study_base::limits::Limits;
-use study_haptics::plant::HandParameters;
 use study_wire::message::Fault;
 
 /// Latency in each direction, about that of a USB serial adapter.
@@ -30,45 +29,25 @@ const UNPLUGGED_FOR: Duration = Duration::from_secs(2);
 /// How long the line is dead after a lost playback.
 const DEAD_FOR: Duration = Duration::from_millis(1500);
 
-/// Options of a simulated device.
-#[derive(Debug)]
+/// Options of a simulated device. Without faults by default.
+#[derive(Debug, Default)]
 pub struct Options {
-    /// Seed of the hand's motion in each playback.
-    pub seed: u64,
-    /// Servo periods per second, limited to 500 … 20,000; 4000 for NaN.
-    pub servo_hz: f64,
-    /// Telemetry samples per second, at most one per servo period.
-    pub telemetry_hz: f64,
-    /// Limits of the device.
-    pub limits: Limits,
+    /// The device side; its telemetry rate is also the one that is requested.
+    pub device: firmware::Options,
     /// Injected faults of the device.
     pub faults: FaultPlan,
     /// Injected faults of the line, in both directions.
     pub noise: Noise,
     /// See [`HostSettings::supervision_timeout`].
     pub supervision_timeout: Option<Duration>,
-    /// Hand and slider.
-    pub hand: HandParameters,
-    /// Smallest mass that is rendered, kg. Minus infinity renders every table unchanged,
-    /// which may be unstable with any hand.
-    pub least_mass_kg: f64,
 }
 
-impl Default for Options {
-    /// The defaults of [`firmware::Options`], 1 kHz telemetry, no faults.
-    fn default() -> Self {
-        let device = firmware::Options::default();
-        Self {
-            seed: device.seed,
-            servo_hz: device.servo_hz,
-            telemetry_hz: 1000.0,
-            limits: device.limits,
-            faults: FaultPlan::none(),
-            noise: Noise::default(),
-            supervision_timeout: None,
-            hand: device.hand,
-            least_mass_kg: device.least_mass_kg,
-        }
+impl Options {
+    /// The defaults with a seed of the device.
+    pub fn seeded(seed: u64) -> Self {
+        let mut options = Self::default();
+        options.device.seed = seed;
+        options
     }
 }
 
@@ -96,29 +75,20 @@ pub struct VirtualDevice {
 impl VirtualDevice {
     /// A connected device, limp and without a table.
     pub fn new(options: Options) -> Self {
-        let telemetry_hz = options.telemetry_hz.max(0.1);
-        let host = Host::new(
-            0,
-            HostSettings {
-                supervision_timeout: options.supervision_timeout,
-                telemetry_hz,
-            },
-        );
-        let firmware = Firmware::new(firmware::Options {
-            seed: options.seed,
-            servo_hz: options.servo_hz,
+        let telemetry_hz = options.device.telemetry_hz.max(0.1);
+        let settings = HostSettings {
+            supervision_timeout: options.supervision_timeout,
             telemetry_hz,
-            limits: options.limits,
-            hand: options.hand,
-            least_mass_kg: options.least_mass_kg,
-            ..firmware::Options::default()
-        });
-        let line = |name| Line::new(LATENCY, Noise::default(), options.seed, name);
+        };
+        let line = |name| Line::new(LATENCY, Noise::default(), options.device.seed, name);
         let mut device = Self {
-            host,
-            firmware,
+            host: Host::new(0, settings),
             to_device: line("there"),
             to_host: line("back"),
+            firmware: Firmware::new(firmware::Options {
+                telemetry_hz,
+                ..options.device
+            }),
             faults: options.faults,
             loads: 0,
             planned_fault: None,
@@ -169,15 +139,9 @@ impl VirtualDevice {
 
     /// When something happens next while nothing is playing; `None` if nothing is due.
     fn due(&self) -> Option<Duration> {
-        [
-            self.host.next(),
-            self.to_device.next(),
-            self.to_host.next(),
-            self.dead_until,
-        ]
-        .into_iter()
-        .flatten()
-        .min()
+        let lines = [self.to_device.next(), self.to_host.next()];
+        let all = lines.into_iter().chain([self.host.next(), self.dead_until]);
+        all.flatten().min()
     }
 
     fn step(&mut self) {
@@ -220,19 +184,19 @@ impl VirtualDevice {
             InjectedFault::Trip | InjectedFault::RefuseLoad => {
                 self.firmware.trip(Fault::External, self.now)
             }
-            InjectedFault::LosePlayback => {
-                self.to_device.set_dead(true);
-                self.to_host.set_dead(true);
-                self.dead_until = Some(self.now + DEAD_FOR);
-            }
+            InjectedFault::LosePlayback => self.kill_lines(DEAD_FOR),
             InjectedFault::Unplug => {
-                self.to_device.set_dead(true);
-                self.to_host.set_dead(true);
+                self.kill_lines(UNPLUGGED_FOR);
                 self.unplugged = true;
                 self.host.disconnected("unplugged");
-                self.dead_until = Some(self.now + UNPLUGGED_FOR);
             }
         }
+    }
+
+    fn kill_lines(&mut self, time: Duration) {
+        self.to_device.set_dead(true);
+        self.to_host.set_dead(true);
+        self.dead_until = Some(self.now + time);
     }
 
     /// Executes a command at `at`, after simulating everything before it.
@@ -276,10 +240,8 @@ impl Device for VirtualDevice {
         self.loads += 1;
         self.planned_fault = self.faults.for_load(self.loads);
         self.fault_at = None;
-        if self
-            .planned_fault
-            .is_some_and(|planned| planned.fault == InjectedFault::RefuseLoad)
-        {
+        let planned = self.planned_fault.map(|planned| planned.fault);
+        if planned == Some(InjectedFault::RefuseLoad) {
             return Err(DeviceError::Refused("an injected fault".to_owned()));
         }
         self.command(at, |host, at| host.load(what, limits, at))

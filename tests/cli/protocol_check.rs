@@ -295,6 +295,12 @@ fn an_infeasible_order_is_an_error_with_its_reason() {
     assert_eq!(report(dir.path()).1, ["line 2 has 2 of 3 columns"]);
     fs::write(
         dir.path().join("orders.csv"),
+        b"row,position,model\n1,1,\xff\n",
+    )
+    .unwrap();
+    assert_eq!(report(dir.path()).1, ["line 2 is not UTF-8"]);
+    fs::write(
+        dir.path().join("orders.csv"),
         "row,position,model\n1,1,lambda-0.9991\n",
     )
     .unwrap();

@@ -90,10 +90,7 @@ fn stopped(reports: &[Report]) -> Playback {
 
 /// Plays for twelve seconds and stops.
 fn played(realization: &Realization, seed: u64) -> (Playback, Vec<Sample>) {
-    let options = Options {
-        seed,
-        ..Options::default()
-    };
+    let options = Options::seeded(seed);
     let mut device = playing(options, realization);
     let mut reports = device.poll(ms(12_030));
     device.stop(ms(12_030)).unwrap();
@@ -143,13 +140,7 @@ fn a_playback_of_twelve_seconds_has_strokes_telemetry_and_no_loss() {
 #[test]
 fn the_frequency_of_polling_has_no_influence() {
     let once = played(&ordinary(), 7);
-    let mut device = playing(
-        Options {
-            seed: 7,
-            ..Options::default()
-        },
-        &ordinary(),
-    );
+    let mut device = playing(Options::seeded(7), &ordinary());
     let mut reports = Vec::new();
     for now in (30..=12_030).step_by(7) {
         reports.extend(device.poll(ms(now)));
@@ -185,10 +176,7 @@ fn an_active_table_shows_in_the_energy_and_the_switches() {
 fn a_table_of_negative_mass_can_be_played_without_a_fault() {
     for seed in 0..5 {
         let mut device = playing(
-            Options {
-                seed,
-                ..Options::default()
-            },
+            Options::seeded(seed),
             &detents(-1.2, 0.015, Direction::Sign),
         );
         let reports = device.poll(ms(12_022));
@@ -341,7 +329,7 @@ fn a_table_that_fails_its_certificate_needs_a_permission() {
 #[test]
 fn each_injected_fault_has_its_effect() {
     let with = |fault| Options {
-        faults: FaultPlan::none().with(1, fault),
+        faults: FaultPlan::default().with(1, fault),
         ..Options::default()
     };
     let mut device = VirtualDevice::new(with(InjectedFault::RefuseLoad));
@@ -403,10 +391,8 @@ fn each_injected_fault_has_its_effect() {
 
 #[test]
 fn the_lower_of_the_two_force_limits_holds() {
-    let options = Options {
-        limits: limits(4.0),
-        ..Options::default()
-    };
+    let mut options = Options::default();
+    options.device.limits = limits(4.0);
     let mut device = playing(options, &ordinary());
     let felt = samples(&device.poll(ms(8000)));
     let most = felt.iter().map(|s| s.force_command_n.abs());
@@ -464,7 +450,7 @@ proptest! {
         force_n in 0.5..20.0f64,
         seed in any::<u64>(),
     ) {
-        let mut device = VirtualDevice::new(Options { seed, ..Options::default() });
+        let mut device = VirtualDevice::new(Options::seeded(seed));
         device.load(&Stimulus::of_table(&table), limits(force_n), ms(0)).unwrap();
         device.poll(ms(100));
         // a table beyond the device's stroke is refused

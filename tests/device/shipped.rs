@@ -58,10 +58,7 @@ fn every_shipped_realization_plays_without_faults_and_supplies_little_energy() {
     assert_eq!(shipped.len(), 16);
     for (id, realization) in shipped {
         for seed in 0..3 {
-            let options = Options {
-                seed,
-                ..Options::default()
-            };
+            let options = Options::seeded(seed);
             let playback = played(&realization, options, UNCERTIFIED_N).unwrap();
             // a table that starts on the flank of a detent supplies a few mJ
             assert!(
@@ -85,16 +82,13 @@ fn playbacks_of_each_realization() {
         let mut line = format!("{id:32} {least:6.2} kg");
         for (least_mass_kg, force_n) in [
             (f64::NEG_INFINITY, UNCERTIFIED_N),
-            (Options::default().least_mass_kg, UNCERTIFIED_N),
-            (Options::default().least_mass_kg, 12.0),
+            (Options::default().device.least_mass_kg, UNCERTIFIED_N),
+            (Options::default().device.least_mass_kg, 12.0),
         ] {
             let playbacks: Vec<_> = (0..20)
                 .map(|seed| {
-                    let options = Options {
-                        seed,
-                        least_mass_kg,
-                        ..Options::default()
-                    };
+                    let mut options = Options::seeded(seed);
+                    options.device.least_mass_kg = least_mass_kg;
                     played(&realization, options, force_n)
                 })
                 .collect();

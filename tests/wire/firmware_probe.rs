@@ -4,7 +4,7 @@
 
 use crate::support::{Host, ms};
 use study::device::firmware::Options;
-use study_wire::message::probe::PathCrc;
+use study_wire::message::UploadCrc;
 use study_wire::message::{
     Commit, DeviceState, Fault, FixedVec, Loaded, PathBegin, PathChunk, Record, Refusal, Reply,
     Request, fixed,
@@ -22,7 +22,7 @@ fn a_path_is_followed_and_recorded() {
         force_n: 15.0,
         velocity_mm_s: 200.0,
     };
-    let mut crc = PathCrc::of(&begin);
+    let mut crc = UploadCrc::of_path(&begin);
     x_nm.iter().for_each(|x| crc.point(*x));
     let crc = crc.value();
     assert_eq!(host.ack(Request::PathBegin(begin)).refusal, Refusal::None);
@@ -82,7 +82,7 @@ fn recording(x_mm: impl Fn(f64) -> f64, force_n: f64) -> (Host, u32) {
     let x_nm: Vec<i32> = (0..500)
         .map(|i| fixed::nm(x_mm(f64::from(i) * 1e-3)))
         .collect();
-    let mut crc = PathCrc::of(&begin);
+    let mut crc = UploadCrc::of_path(&begin);
     x_nm.iter().for_each(|x| crc.point(*x));
     host.ack(Request::PathBegin(begin));
     for (i, some) in x_nm.chunks(PathChunk::MAX_POINTS).enumerate() {

@@ -230,7 +230,7 @@ fn every_request_in_every_state_has_the_specified_result() {
 
     let nodes = detents(0.05, 0.02);
     let begin = begin(&nodes);
-    let mut crc = study_wire::message::TableCrc::of(&begin);
+    let mut crc = study_wire::message::UploadCrc::of_table(&begin);
     nodes.iter().for_each(|node| crc.node(node));
     let crc = crc.value();
     let path = PathBegin {

@@ -11,10 +11,9 @@ use std::num::NonZeroU16;
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
 use study_wire::frame::{Decoder, Frame, MAX_BODY};
-use study_wire::message::probe::PathCrc;
 use study_wire::message::{
     Commit, DeviceState, FixedVec, Heartbeat, Hello, PathBegin, PathChunk, Play, Record, Reply,
-    Request, Stop, TableBegin, TableChunk, TableCrc, kind,
+    Request, Stop, TableBegin, TableChunk, UploadCrc, kind,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -231,7 +230,7 @@ impl Fuzz {
             uncertified_n: Some(9.0),
             ..begin(&nodes)
         };
-        let mut crc = TableCrc::of(&begin);
+        let mut crc = UploadCrc::of_table(&begin);
         nodes.iter().for_each(|node| crc.node(node));
         self.crc = crc.value();
         self.say(Request::TableBegin(begin));
@@ -262,7 +261,7 @@ impl Fuzz {
             velocity_mm_s: 1000.0,
         };
         let x_nm: Vec<i32> = (0..2000).map(|i| 17_500_000 + 6_000 * i).collect();
-        let mut crc = PathCrc::of(&begin);
+        let mut crc = UploadCrc::of_path(&begin);
         x_nm.iter().for_each(|x| crc.point(*x));
         self.crc = crc.value();
         self.say(Request::PathBegin(begin));

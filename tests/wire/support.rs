@@ -9,7 +9,7 @@ use study::device::firmware::{Firmware, Options};
 use study_wire::frame::Decoder;
 use study_wire::message::{
     Ack, Commit, FixedVec, Heartbeat, Hello, Node, Outcome, Play, Pulse, Refusal, Reply, Request,
-    Stop, TableBegin, TableChunk, TableCrc,
+    Stop, TableBegin, TableChunk, UploadCrc, kind,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -90,7 +90,7 @@ impl Host {
         self.device.receive(bytes, self.at);
         let mut answer = None;
         for reply in self.read() {
-            if reply.is_answer() && answer.is_none() {
+            if reply.kind() < kind::TELEMETRY && answer.is_none() {
                 answer = Some(reply);
             } else {
                 self.heard.push(reply);
@@ -147,7 +147,7 @@ impl Host {
 
     /// Uploads a table; the reply to COMMIT or the first refusal, and the CRC.
     pub(crate) fn upload(&mut self, begin: TableBegin, nodes: &[Node]) -> (Ack, u32) {
-        let mut crc = TableCrc::of(&begin);
+        let mut crc = UploadCrc::of_table(&begin);
         nodes.iter().for_each(|node| crc.node(node));
         let first = self.ack(Request::TableBegin(begin));
         if first.refusal != Refusal::None {

@@ -14,12 +14,11 @@ use self::requests::requests;
 use std::num::NonZeroU16;
 use study_wire::frame::{Decoder, crc32};
 use study_wire::handler::{Bounds, Handler, Measured, Profile};
-use study_wire::message::probe::PathCrc;
 use study_wire::message::{
     Ack, Commit, DeviceState, Event, EventKind, Fault, FixedVec, Flags, Heartbeat, Hello, Identity,
     Loaded, Name, Node, Outcome, PathBegin, PathChunk, Play, Pulse, Record, Recorded,
-    RecordedPoint, Refusal, Reply, Request, Stop, TableBegin, TableChunk, TableCrc, Telemetry,
-    TelemetrySample, WireError, fixed, kind,
+    RecordedPoint, Refusal, Reply, Request, Stop, TableBegin, TableChunk, Telemetry,
+    TelemetrySample, UploadCrc, WireError, fixed, kind,
 };
 use study_wire::predict::{Direction, Lookup, Motion};
 use study_wire::servo::ServoSettings;
@@ -227,10 +226,10 @@ fn every_reply_has_the_specified_bytes() {
 
 #[test]
 fn the_crc_of_an_upload_is_that_of_its_consecutive_fields() {
-    let mut crc = TableCrc::of(&begin());
+    let mut crc = UploadCrc::of_table(&begin());
     nodes().iter().for_each(|node| crc.node(node));
     assert_eq!(crc.value(), TABLE_CRC);
-    let mut crc = PathCrc::of(&PathBegin {
+    let mut crc = UploadCrc::of_path(&PathBegin {
         points: 3,
         rate_hz: 1000.0,
         force_n: 20.0,

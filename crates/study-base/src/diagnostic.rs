@@ -101,6 +101,14 @@ impl Findings {
         }
     }
 
+    /// A single fault of a file whose text is not shown.
+    pub fn alone(path: impl Into<String>, fault: Fault) -> Self {
+        Self {
+            faults: vec![fault],
+            ..Self::new(path, "")
+        }
+    }
+
     /// Whether any fault is an error.
     pub fn has_errors(&self) -> bool {
         self.count(Severity::Error) > 0
@@ -108,10 +116,8 @@ impl Findings {
 
     /// Number of faults of a severity.
     pub fn count(&self, severity: Severity) -> usize {
-        self.faults
-            .iter()
-            .filter(|f| f.severity == severity)
-            .count()
+        let faults = self.faults.iter();
+        faults.filter(|f| f.severity == severity).count()
     }
 
     /// The faults of one severity.

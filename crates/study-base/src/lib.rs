@@ -2,6 +2,7 @@
 //!
 //! * [`text`]: text of unknown origin, safe to print ([`text::Untrusted`]), and
 //!   identifiers that are safe in file names.
+//! * [`named!`]: enumerations whose values have names in files.
 //! * [`limits`]: bounds that are finite and positive by construction.
 //! * [`diagnostic`]: faults of a file with line, caret and suggestion, and a TOML
 //!   reader that reports every fault rather than the first.
@@ -14,5 +15,6 @@
 pub mod apa;
 pub mod diagnostic;
 pub mod limits;
+mod named;
 pub mod rng;
 pub mod text;

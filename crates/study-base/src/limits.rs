@@ -72,6 +72,17 @@ pub struct Limits {
 }
 
 impl Limits {
+    /// Checks a force, N, and a speed, mm/s.
+    ///
+    /// # Errors
+    /// [`BadLimit`] for the first that is not finite and positive.
+    pub fn new(force_n: f64, velocity_mm_s: f64) -> Result<Self, BadLimit> {
+        Ok(Self {
+            force_n: Limit::new(force_n)?,
+            velocity_mm_s: Limit::new(velocity_mm_s)?,
+        })
+    }
+
     /// The smaller of the two, for each limit.
     #[must_use]
     pub fn capped_at(self, device: Self) -> Self {

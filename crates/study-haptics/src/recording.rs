@@ -18,7 +18,6 @@ mod write;
 pub(crate) use column::{mean_and_variance, range};
 pub use write::{Columns, write};
 
-use std::fmt;
 use std::io::BufRead;
 
 /// A recording as columns, with the SHA-256 hash of the bytes it was read from.
@@ -60,15 +59,12 @@ impl Recording {
     pub fn select(&self, indices: &[usize]) -> Self {
         let pick = |column: &[f64]| indices.iter().map(|i| column[*i]).collect();
         Self {
-            name: self.name.clone(),
             t_s: pick(&self.t_s),
             x_mm: pick(&self.x_mm),
             v_mm_s: pick(&self.v_mm_s),
             a_m_s2: pick(&self.a_m_s2),
             f_n: pick(&self.f_n),
-            header: self.header.clone(),
-            sha256: self.sha256.clone(),
-            warnings: self.warnings.clone(),
+            ..self.clone()
         }
     }
 
@@ -97,82 +93,34 @@ impl Recording {
 }
 
 /// What is doubtful about a recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum Warning {
-    /// A column was absent and was computed from x.
+    #[error("no column {column}: computed as the {formula}")]
     Derived {
-        /// The column.
         column: &'static str,
-        /// How it was computed, such as `central difference of x_mm`.
         formula: &'static str,
     },
-    /// Samples are missing.
+    /// Intervals longer than 1.5 median ones.
+    #[error("{count} gap{} in time, the longest {longest_s:.4} s at {at_s:.4} s", if *.count == 1 { "" } else { "s" })]
     Gaps {
-        /// Number of intervals longer than 1.5 median ones.
         count: usize,
-        /// The longest, s.
         longest_s: f64,
-        /// Start of the longest, s.
         at_s: f64,
     },
-    /// The target was moved in one direction only.
+    #[error("the target moves in one direction only")]
     OneDirection,
-    /// A column does not have the scale of the differences of x.
-    Scale {
-        /// The column.
-        column: &'static str,
-        /// The difference of x over the value of the column, by regression.
-        ratio: f64,
-    },
-    /// A column has the same value in every row.
-    Constant {
-        /// The column.
-        column: &'static str,
-    },
-    /// The columns of position and force seem to be swapped.
+    #[error("the differences of x_mm are {ratio:.3e} times {column}: check its unit and sign")]
+    Scale { column: &'static str, ratio: f64 },
+    #[error("{column} is the same in every row")]
+    Constant { column: &'static str },
+    /// With the shares of the variance of each column that the other does not explain.
+    #[error("x_mm and f_n seem to be swapped: f_n is {smoother:.0} times smoother than x_mm, is one-sided, and explains {:.0} % of the variance of x_mm, which explains {:.0} % of that of f_n; check the column names", 100.0 * (1.0 - .of_position), 100.0 * (1.0 - .of_force))]
     Swapped {
-        /// The smoothness of the force over that of the position.
         smoother: f64,
-        /// Share of the force's variance that the position does not explain.
         of_force: f64,
-        /// Share of the position's variance that the force does not explain.
         of_position: f64,
     },
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Derived { column, formula } => {
-                write!(f, "no column {column}: computed as the {formula}")
-            }
-            Self::Gaps {
-                count,
-                longest_s,
-                at_s,
-            } => write!(
-                f,
-                "{count} gap{} in time, the longest {longest_s:.4} s at {at_s:.4} s",
-                if *count == 1 { "" } else { "s" }
-            ),
-            Self::OneDirection => f.write_str("the target moves in one direction only"),
-            Self::Scale { column, ratio } => write!(
-                f,
-                "the differences of x_mm are {ratio:.3e} times {column}: check its unit and sign"
-            ),
-            Self::Constant { column } => write!(f, "{column} is the same in every row"),
-            Self::Swapped {
-                smoother,
-                of_force,
-                of_position,
-            } => write!(
-                f,
-                "x_mm and f_n seem to be swapped: f_n is {smoother:.0} times smoother than x_mm, is one-sided, and explains {:.0} % of the variance of x_mm, which explains {:.0} % of that of f_n; check the column names",
-                100.0 * (1.0 - of_position),
-                100.0 * (1.0 - of_force)
-            ),
-        }
-    }
 }
 
 /// Why a file is not a valid recording, and at which line.
@@ -189,74 +137,37 @@ pub struct RecordingError {
 
 /// What is wrong with a file that should be a recording.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum RecordingFault {
-    /// It could not be read.
     #[error("cannot be read: {0}")]
     Io(#[source] std::io::Error),
-    /// There is no line of column names.
     #[error("the file ends before a line of column names such as t_s,x_mm,f_n")]
     NoColumns,
-    /// A required column is missing.
     #[error("no column {missing}; the columns are {found}")]
     MissingColumn {
-        /// Its name.
         missing: &'static str,
-        /// The columns of the file.
         found: String,
     },
-    /// A column occurs twice.
     #[error("two columns are called {0}")]
     DoubleColumn(&'static str),
-    /// A row is longer or shorter than the line of column names.
     #[error("{found} fields, but there are {expected} columns")]
-    Ragged {
-        /// Number of fields in this row.
-        found: usize,
-        /// Number of columns.
-        expected: usize,
-    },
-    /// A field is not a number.
+    Ragged { found: usize, expected: usize },
     #[error("{column} is `{text}`, which is not a number")]
-    NotANumber {
-        /// The column.
-        column: &'static str,
-        /// The field, truncated and escaped.
-        text: String,
-    },
-    /// A number is NaN or infinite.
+    NotANumber { column: &'static str, text: String },
     #[error("{column} is {value}, which cannot be a measurement")]
-    NotFinite {
-        /// The column.
-        column: &'static str,
-        /// The number.
-        value: f64,
-    },
-    /// Time does not increase.
+    NotFinite { column: &'static str, value: f64 },
     #[error("t_s goes from {before} to {now}: time has to increase")]
-    Time {
-        /// Time of the previous row, s.
-        before: f64,
-        /// Time of this row, s.
-        now: f64,
-    },
-    /// There are too few rows.
+    Time { before: f64, now: f64 },
     #[error("{0} rows: a recording has at least {least}", least = rows::MIN_ROWS)]
     TooShort(usize),
-    /// There are too many rows.
     #[error("more than {most} rows: shorten the recording or lower its sampling rate", most = rows::MAX_ROWS)]
     TooLong,
-    /// A line is too long to be a row of numbers.
     #[error("the line is longer than {most} bytes", most = rows::MAX_LINE_BYTES)]
     LongLine,
-    /// Position or force does not vary.
     #[error("{0} is the same in every row: nothing was measured")]
     Constant(&'static str),
-    /// The stroke is too small to be in millimetres.
     #[error("the stroke is {stroke_mm} mm: x_mm seems to be in metres, multiply it by 1000")]
-    Metres {
-        /// Highest minus lowest x.
-        stroke_mm: f64,
-    },
+    Metres { stroke_mm: f64 },
 }
 
 /// Reads a recording.

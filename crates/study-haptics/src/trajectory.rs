@@ -66,11 +66,7 @@ impl Trajectory {
     /// The motion at time `t_s`, s.
     pub fn at(&self, t_s: f64) -> Motion {
         if !(t_s > 0.0 && t_s < self.total_s()) {
-            return Motion {
-                x_mm: self.offset_mm,
-                v_mm_s: 0.0,
-                a_m_s2: 0.0,
-            };
+            return Motion::at_rest(self.offset_mm);
         }
         // deviation from the offset and its derivatives, in mm and s throughout
         let mut deviation = [0.0; 3];

@@ -1,8 +1,6 @@
 //! Passivity certificate: whether a table can supply energy to the hand.
 //!
-//! The code uses only `core` and slices, so that a device can check a table before it
-//! accepts it. It does not allocate and does not fail on a valid table (see
-//! [`super::predict`]).
+//! A device checks a table with the same code before it accepts it.
 //!
 //! A table with parameters interpolated in x is passive in continuous time if
 //!
@@ -142,10 +140,7 @@ pub fn certify(table: &TableView<'_>, direction: Direction, range: Range) -> Cer
         mass_kg: 0.0,
     };
     let nodes = table.x_mm.len();
-    let delta_mm = match direction {
-        Direction::Sign => None,
-        Direction::Play { delta_mm } | Direction::Dahl { delta_mm } => Some(delta_mm),
-    };
+    let delta_mm = direction.delta_mm();
     for (branch, sign) in [(&table.positive, 1.0), (&table.negative, -1.0)] {
         for i in 0..nodes {
             let (m, b) = (branch.m_kg[i], branch.b_n_s_per_mm[i]);
@@ -303,25 +298,6 @@ impl Certificate {
 /// Damping that the device itself needs to render a spring, K T (½ + n), N·s/m.
 pub fn spring_damping_n_s_per_m(stiffness_n_per_mm: f64, rate_hz: f64, delay: f64) -> f64 {
     1000.0 * stiffness_n_per_mm * (0.5 + delay) / rate_hz
-}
-
-/// Damping that the device itself needs to render a mass without low-pass filtering of
-/// the acceleration, 2 m/T, N·s/m.
-pub fn mass_damping_n_s_per_m(mass_kg: f64, rate_hz: f64) -> f64 {
-    2.0 * mass_kg * rate_hz
-}
-
-/// Largest stiffness without limit cycles from the encoder's resolution, N/mm:
-/// min(2b/T, 2 f_c/Δ) (Abbott & Okamura 2005), with damping b in N·s/m, Coulomb
-/// friction f_c in N and resolution Δ in mm.
-pub fn stiffest_n_per_mm(
-    damping_n_s_per_m: f64,
-    rate_hz: f64,
-    friction_n: f64,
-    resolution_mm: f64,
-) -> f64 {
-    let by_damping = 2.0 * damping_n_s_per_m * rate_hz / 1000.0;
-    by_damping.min(2.0 * friction_n / resolution_mm)
 }
 
 impl fmt::Display for Certificate {

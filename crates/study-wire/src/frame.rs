@@ -7,8 +7,6 @@
 //! A frame contains no zero byte, so a receiver that starts in the middle of a frame
 //! is synchronized at the next zero. Each frame has a zero on both sides, so noise
 //! before a frame does not damage it. Repeated zeros have no meaning.
-//!
-//! The code uses only `core` and slices. The buffer of [`Decoder`] has a fixed size.
 
 use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc};

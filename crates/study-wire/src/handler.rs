@@ -10,10 +10,9 @@
 //!
 //! The simulated device does the same. `docs/wire.md` is the specification.
 //!
-//! The code uses only `core`, `libm`, `crc` and slices: no clock, no allocation and
-//! no panic, whatever bytes it receives. `NODES` is the capacity for the nodes of a
-//! table, 72 bytes each; `POINTS` is the capacity for the points of a path, 4 bytes
-//! each. All calls must come from one context or exclude each other.
+//! It has no clock and does not panic, whatever bytes it receives. `NODES` is the capacity
+//! for the nodes of a table, 72 bytes each; `POINTS` is the capacity for the points of a
+//! path, 4 bytes each. All calls must come from one context or exclude each other.
 //!
 //! Invariants:
 //!

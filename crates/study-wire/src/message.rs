@@ -6,7 +6,7 @@
 //! exact for encoder counts and always finite.
 //!
 //! A body is `version, type, sequence number (u16), fields` and is sent in a
-//! [`frame`](super::frame). The code uses only `core` and slices.
+//! [`frame`](super::frame).
 
 mod bytes;
 pub mod code;
@@ -22,10 +22,10 @@ use core::fmt;
 use core::num::NonZeroU16;
 
 pub use code::{DeviceState, EventKind, Fault, Loaded, Refusal};
-pub use probe::{PathBegin, PathChunk, PathCrc};
+pub use probe::{PathBegin, PathChunk};
 pub use reply::{Ack, Flags, Identity, Name, Outcome, Pulse};
 pub use stream::{Event, Recorded, RecordedPoint, Telemetry, TelemetrySample};
-pub use table::{Node, TableBegin, TableChunk, TableCrc};
+pub use table::{Node, TableBegin, TableChunk, UploadCrc};
 
 /// The version of the wire format that this module implements.
 pub const VERSION: u8 = 1;
@@ -267,6 +267,14 @@ macro_rules! messages {
                 #[doc = concat!("[`super::", stringify!($direction), "::", stringify!($variant), "`]")]
                 pub const $constant: u8 = $kind;
             )+)+
+
+            /// The name of a message type in docs/wire.md.
+            pub fn name(kind: u8) -> &'static str {
+                match kind {
+                    $($($kind => stringify!($constant),)+)+
+                    _ => "a message of an unknown type",
+                }
+            }
         }
 
         // Every message fits into a frame.
@@ -336,13 +344,6 @@ impl Request {
             self,
             Self::Hello(_) | Self::Limp | Self::Heartbeat(_) | Self::State
         )
-    }
-}
-
-impl Reply {
-    /// Whether it answers a request.
-    pub fn is_answer(&self) -> bool {
-        self.kind() < kind::TELEMETRY
     }
 }
 

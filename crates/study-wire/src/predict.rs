@@ -1,8 +1,7 @@
 //! The force of a realization: F = m·a + b·v + k·x + F0 with interpolated parameters.
 //!
-//! The code uses only `core` and slices, so the same source runs on a device. It does
-//! not allocate and does not panic on a valid table: all slices have the same length
-//! of at least two, and `x_mm` is strictly ascending.
+//! Nothing panics on a valid table: all slices have the same length of at least two, and
+//! `x_mm` is strictly ascending.
 //!
 //! A direction state z in [−1, 1] combines the branches for the two directions:
 //! F = (1+z)/2 · F⁺ + (1−z)/2 · F⁻. With [`Direction::Sign`] z is the sign of v, as
@@ -56,6 +55,18 @@ impl Lookup {
             Self::Nearest => (left + usize::from(weight > 0.5), 0.0),
         }
     }
+
+    /// Each look-up with its name in files, in the order of the codes on the wire.
+    pub const NAMES: [(&'static str, Self); 3] = [
+        ("linear", Self::Linear),
+        ("floor", Self::Floor),
+        ("nearest", Self::Nearest),
+    ];
+
+    /// The name in files.
+    pub fn as_str(self) -> &'static str {
+        Self::NAMES[self as usize].0
+    }
 }
 
 /// Rule that gives the direction state z from the motion.
@@ -75,6 +86,25 @@ pub enum Direction {
     },
 }
 
+impl Direction {
+    /// The name in files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Sign => "sign",
+            Self::Play { .. } => "play",
+            Self::Dahl { .. } => "dahl",
+        }
+    }
+
+    /// δ, mm, if the rule has one.
+    pub fn delta_mm(self) -> Option<f64> {
+        match self {
+            Self::Sign => None,
+            Self::Play { delta_mm } | Self::Dahl { delta_mm } => Some(delta_mm),
+        }
+    }
+}
+
 /// Position, velocity and acceleration at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
@@ -84,6 +114,22 @@ pub struct Motion {
     pub v_mm_s: f64,
     /// Acceleration, m/s².
     pub a_m_s2: f64,
+}
+
+impl Motion {
+    /// At rest at a position, mm.
+    pub fn at_rest(x_mm: f64) -> Self {
+        Self {
+            x_mm,
+            v_mm_s: 0.0,
+            a_m_s2: 0.0,
+        }
+    }
+
+    /// Whether all three are finite.
+    pub fn is_finite(&self) -> bool {
+        self.x_mm.is_finite() && self.v_mm_s.is_finite() && self.a_m_s2.is_finite()
+    }
 }
 
 /// The direction state z with its memory of the last position.

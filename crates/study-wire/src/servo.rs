@@ -1,9 +1,7 @@
 //! The servo step: from the measured motion to the commanded force.
 //!
-//! The code uses only `core`, `libm` and slices, so the same source runs on the
-//! device and in the simulation. It has no clock, does not allocate and does not
-//! panic on a valid table. Whoever owns the motor calls [`Servo::step`] once per
-//! servo period; the host never closes the force loop over a link.
+//! It has no clock and does not panic on a valid table. Whoever owns the motor calls
+//! [`Servo::step`] once per servo period; the host never closes the force loop over a link.
 //!
 //! Each period performs these steps in order:
 //!
@@ -228,12 +226,8 @@ impl Servo {
     }
 
     fn trip_cause(&self, what: &Rendering<'_>, motion: Motion) -> Option<Trip> {
-        let Motion {
-            x_mm,
-            v_mm_s,
-            a_m_s2,
-        } = motion;
-        if !(x_mm.is_finite() && v_mm_s.is_finite() && a_m_s2.is_finite()) {
+        let Motion { x_mm, v_mm_s, .. } = motion;
+        if !motion.is_finite() {
             return Some(Trip::NotANumber);
         }
         let beyond = self.settings.overtravel_mm;

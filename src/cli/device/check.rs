@@ -49,7 +49,7 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
     let address = connection.address.clone();
     let device = check::identify(&mut connection, nonce()).map_err(|error| {
         let (address, error) = (Untrusted(&address), error.to_string());
-        Failure::new(Kind::Device, format!("{address}: {}", Untrusted(&error)))
+        Failure::device(format!("{address}: {}", Untrusted(&error)))
             .hint("check its power, the baud rate, and that it implements docs/wire.md")
     })?;
     if args.json {
@@ -58,59 +58,62 @@ pub(in crate::cli) fn info(args: &InfoArgs, console: &mut Console) -> Result<(),
             "port": address,
             "device": described(&device),
         });
-        return console.out(format!("{document:#}\n"));
+        return console.json(&document);
     }
     let [low, high] = device.stroke_mm;
-    let flags = [
+    let [oldest, newest] = device.versions;
+    let features = [
         (device.flags.simulated, "simulated: nothing is measured"),
         (device.flags.telemetry, "telemetry"),
         (device.flags.force_sensor, "force sensor"),
         (device.flags.probe, "probe mode"),
     ];
-    let flags: Vec<&str> = flags.iter().filter(|f| f.0).map(|f| f.1).collect();
     let mut lines = vec![
         ("serial number", display_name(&device.serial)),
         ("firmware", display_name(&device.firmware)),
-        (
-            "wire format",
-            format!("{} to {}", device.versions[0], device.versions[1]),
-        ),
-        ("features", flags.join(", ")),
-        ("force", format!("at most {} N", device.force_n)),
-        ("velocity", format!("at most {} mm/s", device.velocity_mm_s)),
+        ("wire format", format!("{oldest} to {newest}")),
+        ("features", list(&features)),
+        ("force", at_most(device.force_n, "N")),
+        ("velocity", at_most(device.velocity_mm_s, "mm/s")),
         ("stroke", format!("{low} to {high} mm")),
-        (
-            "stiffness",
-            format!("at most {} N/mm", device.stiffness_n_per_mm),
-        ),
-        (
-            "damping",
-            format!("at most {} N·s/mm", device.damping_n_s_per_mm),
-        ),
+        ("stiffness", at_most(device.stiffness_n_per_mm, "N/mm")),
+        ("damping", at_most(device.damping_n_s_per_mm, "N·s/mm")),
         ("servo", format!("{} Hz", device.servo_hz)),
-        ("telemetry", format!("at most {} Hz", device.telemetry_hz)),
+        ("telemetry", at_most(device.telemetry_hz, "Hz")),
         ("watchdog", format!("{} ms", device.watchdog_ms)),
-        ("tables", format!("at most {} nodes", device.max_nodes)),
+        ("tables", at_most(device.max_nodes.into(), "nodes")),
         (
             "playbacks",
-            format!("at most {} s", f64::from(device.longest_ms) / 1e3),
+            at_most(f64::from(device.longest_ms) / 1e3, "s"),
         ),
-        ("state", device.state.as_str().to_owned()),
+        ("state", device.state.to_string()),
     ];
     if device.fault != Fault::None {
-        lines.push(("fault", device.fault.as_str().to_owned()));
+        lines.push(("fault", device.fault.to_string()));
     }
     console.out(aligned(&lines))
 }
 
+fn at_most(value: f64, unit: &str) -> String {
+    format!("at most {value} {unit}")
+}
+
+/// The features that a device has.
+fn list(features: &[(bool, &str)]) -> String {
+    let present = features.iter().filter(|(present, _)| *present);
+    let names: Vec<&str> = present.map(|(_, name)| *name).collect();
+    names.join(", ")
+}
+
 /// Prints identity and limits of a controller program.
 fn program(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
-    let opened = args
-        .address
-        .open_program(&mut WaitDisplay::in_a_line(console))?;
-    let Some(device) = opened else { return Ok(()) };
+    let mut display = WaitDisplay::in_a_line(console);
+    let Some(device) = args.address.open_program(&mut display)? else {
+        return Ok(());
+    };
     let (command, device) = (device.command().join(" "), device.identity());
-    let [force_n, velocity_mm_s] = [device.limits.force_n, device.limits.velocity_mm_s];
+    let force_n = device.limits.force_n.get();
+    let velocity_mm_s = device.limits.velocity_mm_s.get();
     if args.json {
         let document = serde_json::json!({
             "format": "study-device-info/1",
@@ -120,24 +123,23 @@ fn program(args: &InfoArgs, console: &mut Console) -> Result<(), Failure> {
                 "language": process::FORMAT,
                 "simulated": device.simulated,
                 "telemetry": device.telemetry,
-                "force_n": force_n.get(),
-                "velocity_mm_s": velocity_mm_s.get(),
+                "force_n": force_n,
+                "velocity_mm_s": velocity_mm_s,
             },
         });
-        return console.out(format!("{document:#}\n"));
+        return console.json(&document);
     }
-    let flags = [
+    let features = [
         (device.simulated, "simulated: every session is a pilot"),
         (device.telemetry, "telemetry"),
     ];
-    let flags: Vec<&str> = flags.iter().filter(|f| f.0).map(|f| f.1).collect();
     let lines = [
         ("program", Untrusted(&command).to_string()),
         ("id", Untrusted(&device.id).to_string()),
         ("messages", process::FORMAT.to_owned()),
-        ("features", flags.join(", ")),
-        ("force", format!("at most {} N", force_n.get())),
-        ("velocity", format!("at most {} mm/s", velocity_mm_s.get())),
+        ("features", list(&features)),
+        ("force", at_most(force_n, "N")),
+        ("velocity", at_most(velocity_mm_s, "mm/s")),
     ];
     console.out(aligned(&lines))
 }
@@ -209,7 +211,7 @@ pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(
             "latency_ms": result.latency_ms,
             "models": rendered,
         });
-        console.out(format!("{document:#}\n"))?;
+        console.json(&document)?;
     } else {
         console.out(format!("{}\n", result.summary()))?;
     }
@@ -248,12 +250,9 @@ fn line(verdict: &Verdict) -> String {
 
 fn failed(address: &str, result: &Commissioning) -> Failure {
     let clauses = result.failed_clauses().join(", ");
-    Failure::new(
-        Kind::Device,
-        format!(
-            "{}: it violates clause {clauses} of docs/wire.md",
-            Untrusted(address)
-        ),
-    )
+    Failure::device(format!(
+        "{}: it violates clause {clauses} of docs/wire.md",
+        Untrusted(address)
+    ))
     .hint("do not use it with participants before this is corrected")
 }

@@ -12,9 +12,9 @@ use crate::device::process::ProcessDevice;
 use crate::device::{Device, Stimulus};
 use std::io::BufRead as _;
 use std::path::PathBuf;
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
-use study_base::limits::{Limit, Limits};
+use study_base::limits::Limits;
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::predict::{Direction, Lookup};
 
@@ -44,11 +44,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         }
         None => constant_force(),
     };
-    let limit = |value| Limit::new(value).map_err(|e| Failure::new(Kind::Bug, e));
-    let limits = Limits {
-        force_n: limit(9.0)?,
-        velocity_mm_s: limit(1000.0)?,
-    };
+    let limits = Limits::new(9.0, 1000.0).map_err(|e| Failure::new(Kind::Bug, e))?;
     let mut device = match args.address.is_program()? {
         false => ActiveDevice::Linked(args.address.serial.open_serial(HostSettings::default())?),
         true => match args
@@ -59,14 +55,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             None => return Ok(()),
         },
     };
-    let (sender, lines) = channel();
-    std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if sender.send(line).is_err() {
-                return;
-            }
-        }
-    });
+    let lines = input_lines();
     let playback = single_playback::play(
         device.any(),
         &Stimulus::of_table(&table),
@@ -78,7 +67,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             }
         },
     )
-    .map_err(|e| Failure::new(Kind::Device, e))?;
+    .map_err(|e| Failure::device(e))?;
     console.out(format!(
         "{:.1} s, {} samples, {} lost, {} strokes, least energy {:.4} J, {:.1} switches/s, {} clamps\n{}",
         playback.exploration_s,
@@ -90,6 +79,19 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         playback.clamp_count,
         device.health(),
     ))
+}
+
+/// Lines of standard input that are not blank; its end is ignored.
+pub(super) fn input_lines() -> Receiver<String> {
+    let (sender, lines) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if !line.trim().is_empty() && sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    lines
 }
 
 /// The device, of either kind.

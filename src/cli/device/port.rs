@@ -1,7 +1,7 @@
 //! A serial port as the connection of a device test.
 
+use crate::cli::Failure;
 use crate::cli::device_selection::SerialPortArgs;
-use crate::cli::{Failure, Kind};
 use crate::device::check::Connection;
 use crate::device::link::{Link, LinkError, Opener as _};
 use std::time::{Duration, Instant};
@@ -21,7 +21,7 @@ impl PortConnection {
         let mut opener = port.serial()?;
         let link = opener.open().map_err(|e| {
             let address = opener.address();
-            Failure::new(Kind::Device, format!("{}: {e}", Untrusted(&address)))
+            Failure::device(format!("{}: {e}", Untrusted(&address)))
                 .hint("`study device list` lists the ports")
         })?;
         Ok(Self {

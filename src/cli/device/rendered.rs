@@ -6,7 +6,7 @@
 
 use super::single_playback;
 use crate::cli::device_selection::SerialPortArgs;
-use crate::cli::{Console, Failure, Kind, load};
+use crate::cli::{Console, Failure, load};
 use crate::device::host::HostSettings;
 use crate::device::{Report, Stimulus};
 use crate::runner::playback_limits;
@@ -97,11 +97,11 @@ pub(super) fn compare_all(
         let playback =
             single_playback::play(&mut device, &stimulus, limits, PLAYBACK, &mut collect);
         let playback = playback.map_err(|e| {
-            Failure::new(Kind::Device, format!("{}: {e}", entry.id))
+            Failure::device(format!("{}: {e}", entry.id))
                 .hint("hold the handle during the playback")
         })?;
-        let (score, measured) = compare(table, &samples)
-            .map_err(|e| Failure::new(Kind::Device, format!("{}: {e}", entry.id)))?;
+        let (score, measured) =
+            compare(table, &samples).map_err(|e| Failure::device(format!("{}: {e}", entry.id)))?;
         let rendered = Rendered {
             model: entry.id.to_string(),
             vaf: score.vaf,

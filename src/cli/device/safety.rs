@@ -6,7 +6,8 @@
 //! result holds for the simulated device on this machine under its present load.
 
 use super::hold;
-use crate::cli::{Console, Failure, Kind};
+use crate::cli::{Console, Failure};
+use crate::device::check::quantile;
 use crate::device::firmware::{Firmware, Options};
 use crate::device::link::memory::Noise;
 use crate::device::link::pty::{Control, Simulator};
@@ -64,7 +65,7 @@ const MAX_TRIES: u32 = 5;
 const ZERO_FOR: Duration = Duration::from_millis(100);
 
 fn failed(why: impl std::fmt::Display) -> Failure {
-    Failure::new(Kind::Device, why)
+    Failure::device(why)
 }
 
 /// Measures every accident and prints the times.
@@ -89,10 +90,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         }
         progress.finish_and_clear();
         times_ms.sort_by(f64::total_cmp);
-        let at = |fraction: f64| {
-            let rank = (fraction * times_ms.len() as f64).ceil() as usize;
-            times_ms[rank.saturating_sub(1).min(times_ms.len() - 1)]
-        };
+        let at = |fraction: f64| quantile(&times_ms, fraction).unwrap_or_default();
         let allowed = accident.allowed_ms();
         late += times_ms.iter().filter(|t| **t > allowed).count();
         console.out(format!(

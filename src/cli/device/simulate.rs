@@ -1,14 +1,12 @@
 //! `study device simulate`: a device on a pseudo-terminal.
 
-use crate::cli::{Console, Failure, Kind};
+use crate::cli::{Console, Failure};
 use crate::device::firmware::{Firmware, Flaw, Options};
 use crate::device::link::memory::Noise;
 use crate::device::link::pty::{Control, Simulator};
-use std::io::BufRead as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 /// Arguments of `study device simulate`.
@@ -59,29 +57,21 @@ const CONTROLS: &str = "unplug, plug, reset, trip, stall MS, quit";
 /// Additional delay of a frame with the fault `delay`.
 const EXTRA_DELAY: Duration = Duration::from_millis(20);
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum LineFault {
-    Corrupt,
-    Drop,
-    Duplicate,
-    Reorder,
-    Delay,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A fault of the link and the fraction of frames that have it.
+#[derive(Debug, Clone, Copy)]
 struct FaultArg {
-    what: LineFault,
+    what: fn(&mut Noise) -> &mut f64,
     fraction: f64,
 }
 
 fn fault(given: &str) -> Result<FaultArg, ArgumentError> {
     let (name, fraction) = given.split_once('=').unwrap_or((given, "0.01"));
-    let what = match name {
-        "corrupt" => LineFault::Corrupt,
-        "drop" => LineFault::Drop,
-        "duplicate" => LineFault::Duplicate,
-        "reorder" => LineFault::Reorder,
-        "delay" => LineFault::Delay,
+    let what: fn(&mut Noise) -> &mut f64 = match name {
+        "corrupt" => |noise| &mut noise.corrupt,
+        "drop" => |noise| &mut noise.drop,
+        "duplicate" => |noise| &mut noise.duplicate,
+        "reorder" => |noise| &mut noise.reorder,
+        "delay" => |noise| &mut noise.delay,
         _ => return Err(ArgumentError::UnknownFault),
     };
     match fraction.parse() {
@@ -96,13 +86,7 @@ fn noise(faults: &[FaultArg]) -> Noise {
         ..Noise::default()
     };
     for FaultArg { what, fraction } in faults {
-        *match what {
-            LineFault::Corrupt => &mut noise.corrupt,
-            LineFault::Drop => &mut noise.drop,
-            LineFault::Duplicate => &mut noise.duplicate,
-            LineFault::Reorder => &mut noise.reorder,
-            LineFault::Delay => &mut noise.delay,
-        } = *fraction;
+        *what(&mut noise) = *fraction;
     }
     noise
 }
@@ -141,19 +125,21 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         flaw: args.flaw,
         ..Options::default()
     });
-    let failed = |e: crate::device::link::LinkError| Failure::new(Kind::Device, e);
+    let failed = |e: crate::device::link::LinkError| Failure::device(e);
     let mut simulator = Simulator::open(firmware, noise(&args.fault), args.seed, args.link.clone())
         .map_err(failed)?;
-    console.out(format!("{}\n", simulator.path().unwrap_or_default()))?;
+    let port = |simulator: &Simulator| format!("{}\n", simulator.path().unwrap_or_default());
+    console.out(port(&simulator))?;
     console.say(format!(
         "simulated device with a servo rate of {} Hz; nothing that it reports is measured",
         args.rate
     ));
+    let check = "study device check --port";
     console.say(format!(
-        "in another terminal: study device check --port {}",
-        simulator.path().unwrap_or_default()
+        "in another terminal: {check} {}",
+        port(&simulator).trim_end()
     ));
-    let lines = lines();
+    let lines = super::hold::input_lines();
     let ended = ended();
     while !ended.load(Ordering::Relaxed) {
         for _ in 0..64 {
@@ -165,12 +151,10 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
                 Some(Command::Control(what)) => {
                     simulator.control(what).map_err(failed)?;
                     // Confirms that the command was executed.
-                    match what {
-                        Control::Plug => {
-                            console.out(format!("{}\n", simulator.path().unwrap_or_default()))?
-                        }
-                        _ => console.out(format!("{}\n", line.trim()))?,
-                    }
+                    console.out(match what {
+                        Control::Plug => port(&simulator),
+                        _ => format!("{}\n", line.trim()),
+                    })?;
                 }
                 None => console.say(format!("unknown command; use one of: {CONTROLS}")),
             }
@@ -187,20 +171,6 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         timing.paused.as_secs_f64() * 1e3,
     ));
     Ok(())
-}
-
-/// Lines of standard input; its end is ignored.
-fn lines() -> Receiver<String> {
-    let (sender, lines) = channel();
-    std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines() {
-            let Ok(line) = line else { return };
-            if !line.trim().is_empty() && sender.send(line).is_err() {
-                return;
-            }
-        }
-    });
-    lines
 }
 
 /// A flag that is set by the signals that ask a program to end.

@@ -1,6 +1,6 @@
 //! The simulated device on systems without pseudo-terminals.
 
-use crate::cli::{Failure, Kind};
+use crate::cli::Failure;
 use crate::device::link::LinkError;
 
 /// Arguments of a command that is not supported; all are ignored.
@@ -12,6 +12,6 @@ pub(in crate::cli) struct Args {
 
 /// The error of every such command.
 pub(in crate::cli) fn failure() -> Failure {
-    Failure::new(Kind::Device, LinkError::Unsupported)
+    Failure::device(LinkError::Unsupported)
         .hint("`study rehearse` and the simulated device of `study run` work on every system")
 }

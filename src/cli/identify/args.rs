@@ -1,6 +1,6 @@
 //! The arguments of `study identify`, and the grid that they describe.
 
-use super::{Failure, Kind};
+use super::Failure;
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
@@ -42,79 +42,57 @@ pub(super) enum ArgumentError {
     Choice,
 }
 
-/// A value of an option with its name and help text.
-type Choice<T> = (T, &'static str, &'static str);
+/// A value of an option with its help text.
+type Choice<T> = (T, &'static str);
 
 const ACCELERATIONS: [Choice<Acceleration>; 2] = [
-    (
-        Acceleration::Accelerometer,
-        "accelerometer",
-        "The column a_m_s2",
-    ),
+    (Acceleration::Accelerometer, "The column a_m_s2"),
     (
         Acceleration::Encoder,
-        "encoder",
         "The second difference of the position",
     ),
 ];
 const RESAMPLES: [Choice<Resample>; 3] = [
     (
         Resample::Point,
-        "point",
         "Interpolate between means over equal 5 µm counts",
     ),
-    (Resample::Bin, "bin", "Mean over the bin around the node"),
-    (
-        Resample::Hat,
-        "hat",
-        "Mean weighted by the distance from the node",
-    ),
+    (Resample::Bin, "Mean over the bin around the node"),
+    (Resample::Hat, "Mean weighted by the distance from the node"),
 ];
 const LOOKUPS: [Choice<Lookup>; 3] = [
-    (Lookup::Linear, "linear", "Interpolate linearly"),
-    (Lookup::Floor, "floor", "Take the node to the left"),
-    (Lookup::Nearest, "nearest", "Take the nearest node"),
+    (Lookup::Linear, "Interpolate linearly"),
+    (Lookup::Floor, "Take the node to the left"),
+    (Lookup::Nearest, "Take the nearest node"),
 ];
 const STARTS: [Choice<Start>; 2] = [
-    (Start::Cold, "cold", "From zero and P = 10⁶ I"),
-    (
-        Start::Warm,
-        "warm",
-        "From a backward pass over the first samples",
-    ),
+    (Start::Cold, "From zero and P = 10⁶ I"),
+    (Start::Warm, "From a backward pass over the first samples"),
 ];
 const SORTS: [Choice<Sort>; 2] = [
-    (
-        Sort::Ascending,
-        "ascending",
-        "Ascending x in both directions",
-    ),
-    (Sort::Travel, "travel", "In the direction of travel"),
+    (Sort::Ascending, "Ascending x in both directions"),
+    (Sort::Travel, "In the direction of travel"),
 ];
 const WINDOWS: [Choice<Window>; 2] = [
-    (
-        Window::Exponential,
-        "exponential",
-        "Sum of a forward and a backward EWLS",
-    ),
-    (Window::Tricube, "tricube", "Smooth, with finite support"),
+    (Window::Exponential, "Sum of a forward and a backward EWLS"),
+    (Window::Tricube, "Smooth, with finite support"),
 ];
-const BOUNDS: [Choice<bool>; 2] = [
-    (true, "on", "Require m, b >= 0"),
-    (false, "off", "No bounds"),
-];
+const BOUNDS: [Choice<bool>; 2] = [(true, "Require m, b >= 0"), (false, "No bounds")];
 
-/// Parses an option with a fixed set of values.
+/// Parses an option with a fixed set of values that have these names.
 fn choice<T: Copy + Send + Sync + 'static>(
     choices: &'static [Choice<T>],
+    name: fn(T) -> &'static str,
 ) -> impl TypedValueParser<Value = T> {
-    let names = choices
-        .iter()
-        .map(|(_, name, help)| PossibleValue::new(*name).help(*help));
-    PossibleValuesParser::new(names).try_map(|given| {
-        let found = choices.iter().find(|(_, name, _)| *name == given);
-        found.map(|(value, ..)| *value).ok_or(ArgumentError::Choice)
+    let names = (choices.iter()).map(|(value, help)| PossibleValue::new(name(*value)).help(*help));
+    PossibleValuesParser::new(names).try_map(move |given| {
+        let found = choices.iter().find(|(value, _)| name(*value) == given);
+        found.map(|(value, _)| *value).ok_or(ArgumentError::Choice)
     })
+}
+
+fn switch(on: bool) -> &'static str {
+    if on { "on" } else { "off" }
 }
 
 /// Arguments of `study identify`.
@@ -141,7 +119,7 @@ pub(in crate::cli) struct Args {
     pub(super) filter: Option<f64>,
 
     /// Source of the acceleration
-    #[arg(long, value_name = "SOURCE", value_parser = choice(&ACCELERATIONS), default_value = "accelerometer")]
+    #[arg(long, value_name = "SOURCE", value_parser = choice(&ACCELERATIONS, Acceleration::as_str), default_value = "accelerometer")]
     pub(super) acceleration: Acceleration,
 
     /// Remove most samples of dwells from the training recording
@@ -161,23 +139,23 @@ pub(in crate::cli) struct Args {
     pub(super) dx: Vec<Numbers>,
 
     /// Resampling of the estimates at the nodes [default: bin]
-    #[arg(long, value_name = "METHOD", value_parser = choice(&RESAMPLES))]
+    #[arg(long, value_name = "METHOD", value_parser = choice(&RESAMPLES, Resample::as_str))]
     pub(super) resample: Option<Resample>,
 
     /// Look-up of parameters between nodes
-    #[arg(long, value_name = "RULE", value_parser = choice(&LOOKUPS), default_value = "linear")]
+    #[arg(long, value_name = "RULE", value_parser = choice(&LOOKUPS, Lookup::as_str), default_value = "linear")]
     pub(super) lookup: Lookup,
 
     /// Initial state of the recursion [default: cold]
-    #[arg(long, value_name = "START", value_parser = choice(&STARTS))]
+    #[arg(long, value_name = "START", value_parser = choice(&STARTS, Start::as_str))]
     pub(super) start: Option<Start>,
 
     /// Order of the samples in the recursion [default: ascending]
-    #[arg(long, value_name = "ORDER", value_parser = choice(&SORTS))]
+    #[arg(long, value_name = "ORDER", value_parser = choice(&SORTS, Sort::as_str))]
     pub(super) sort: Option<Sort>,
 
     /// Shape of the weights of two-sided [default: tricube]
-    #[arg(long, value_name = "SHAPE", value_parser = choice(&WINDOWS))]
+    #[arg(long, value_name = "SHAPE", value_parser = choice(&WINDOWS, Window::as_str))]
     pub(super) window: Option<Window>,
 
     /// Width of the weights of two-sided in mm, instead of --lambda
@@ -197,7 +175,7 @@ pub(in crate::cli) struct Args {
     pub(super) ridge: Vec<f64>,
 
     /// Whether m, b >= 0 for two-sided (default: off) and hat tables (default: on)
-    #[arg(long, value_name = "SWITCH", value_parser = choice(&BOUNDS))]
+    #[arg(long, value_name = "SWITCH", value_parser = choice(&BOUNDS, switch))]
     pub(super) bounds: Option<bool>,
 
     /// Number of segments of the segments baseline [default: 12]
@@ -297,8 +275,8 @@ impl NamedPath {
 
 fn number(text: &str) -> Result<f64, ArgumentError> {
     let text = text.trim();
-    text.parse()
-        .map_err(|_| ArgumentError::NotANumber(text.to_owned()))
+    let number = text.parse();
+    number.map_err(|_| ArgumentError::NotANumber(text.to_owned()))
 }
 
 /// One entry of a list: a number, or the numbers of a range.
@@ -369,17 +347,13 @@ fn increments(given: &str) -> Result<Numbers, ArgumentError> {
 }
 
 fn positive(given: &str) -> Result<f64, ArgumentError> {
-    match number(given)? {
-        value if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err(ArgumentError::NotPositive),
-    }
+    let value = Some(number(given)?).filter(|v| *v > 0.0 && v.is_finite());
+    value.ok_or(ArgumentError::NotPositive)
 }
 
 fn ridge(given: &str) -> Result<f64, ArgumentError> {
-    match number(given)? {
-        value if value >= 0.0 && value.is_finite() => Ok(value),
-        _ => Err(ArgumentError::Ridge),
-    }
+    let value = Some(number(given)?).filter(|v| *v >= 0.0 && v.is_finite());
+    value.ok_or(ArgumentError::Ridge)
 }
 
 /// The range of the paper's grid.
@@ -480,17 +454,10 @@ impl Args {
     /// accepted, so that one script can identify baselines as well.
     fn check_options_apply(&self) -> Result<(), Failure> {
         use MethodName::{Constrained, Ewls, Hat, Segments, Static, TwoSided};
+        let (lambda, dx) = (!self.lambda.is_empty(), !self.dx.is_empty());
         let given: [(&str, bool, &[MethodName]); 9] = [
-            (
-                "--lambda",
-                !self.lambda.is_empty(),
-                &[Ewls, Constrained, TwoSided],
-            ),
-            (
-                "--dx",
-                !self.dx.is_empty(),
-                &[Ewls, Constrained, TwoSided, Hat, Static],
-            ),
+            ("--lambda", lambda, &[Ewls, Constrained, TwoSided]),
+            ("--dx", dx, &[Ewls, Constrained, TwoSided, Hat, Static]),
             ("--window", self.window.is_some(), &[TwoSided]),
             ("--width", self.width.is_some(), &[TwoSided]),
             ("--direction", self.direction.is_some(), &[Hat]),
@@ -499,14 +466,13 @@ impl Args {
             ("--bounds", self.bounds.is_some(), &[TwoSided, Hat]),
             ("--segments", self.segments.is_some(), &[Segments]),
         ];
-        match given
-            .iter()
-            .find(|(_, given, methods)| *given && !methods.contains(&self.method))
-        {
-            Some((flag, _, _)) => Err(Failure::new(
-                Kind::Usage,
-                format!("{flag} does not apply to this method"),
-            )),
+        let useless = |(_, given, methods): &&(_, bool, &[MethodName])| {
+            *given && !methods.contains(&self.method)
+        };
+        match given.iter().find(useless) {
+            Some((flag, _, _)) => Err(Failure::usage(format!(
+                "{flag} does not apply to this method"
+            ))),
             None => Ok(()),
         }
     }

@@ -9,7 +9,6 @@ use study_haptics::identify::Method;
 use study_haptics::identify::grid::Cell;
 use study_haptics::identify::vaf::Score;
 use study_haptics::identify::validation::{Accuracy, JUST_NOTICEABLE_N};
-use study_haptics::model::file::lookup_name;
 use study_haptics::recording::Recording;
 use study_wire::certificate::Certificate;
 use unicode_width::UnicodeWidthStr as _;
@@ -30,15 +29,16 @@ pub(super) fn json(results: &Results<'_>) -> String {
                     .collect()
             };
             let warnings: Vec<String> = cell.warnings.iter().map(ToString::to_string).collect();
+            let [start, sort] = start_and_sort(cell.method);
             json!({
                 "method": cell.method.as_str(),
                 "lambda": provenance.lambda,
                 "memory_mm": provenance.memory_mm,
                 "dx_mm": provenance.dx_mm,
                 "resample": provenance.resample,
-                "lookup": lookup_name(cell.realization.lookup),
-                "start": start(cell.method),
-                "sort": sort(cell.method),
+                "lookup": cell.realization.lookup.as_str(),
+                "start": start,
+                "sort": sort,
                 "estimator": provenance.method,
                 "filter": provenance.filter,
                 "nodes": cell.realization.x_mm.len(),
@@ -137,17 +137,11 @@ fn certificate(certificate: &Certificate) -> Value {
     })
 }
 
-fn start(method: Method) -> Option<&'static str> {
+/// The names of start and sort, for the methods that have them.
+fn start_and_sort(method: Method) -> [Option<&'static str>; 2] {
     match method {
-        Method::Ewls(options) => Some(options.start.as_str()),
-        _ => None,
-    }
-}
-
-fn sort(method: Method) -> Option<&'static str> {
-    match method {
-        Method::Ewls(options) => Some(options.sort.as_str()),
-        _ => None,
+        Method::Ewls(options) => [Some(options.start.as_str()), Some(options.sort.as_str())],
+        _ => [None; 2],
     }
 }
 
@@ -312,16 +306,13 @@ fn short_name(named: &NamedPath) -> String {
 /// The settings that all cells share.
 fn settings(cell: &Cell) -> String {
     let mut parts = vec![cell.method.as_str().to_owned()];
-    if let Some(start) = start(cell.method) {
-        parts.push(format!("{start} start"));
-    }
-    if let Some(sort) = sort(cell.method) {
-        parts.push(format!("{sort} in x"));
-    }
+    let [start, sort] = start_and_sort(cell.method);
+    parts.extend(start.map(|start| format!("{start} start")));
+    parts.extend(sort.map(|sort| format!("{sort} in x")));
     if let Some(resample) = &cell.realization.provenance.resample {
         parts.push(format!("{resample} resampling"));
     }
-    parts.push(format!("{} look-up", lookup_name(cell.realization.lookup)));
+    parts.push(format!("{} look-up", cell.realization.lookup.as_str()));
     parts.join(", ")
 }
 
@@ -329,12 +320,9 @@ fn heads(results: &Results<'_>) -> Vec<String> {
     let mut heads: Vec<String> = ["", "lambda", "L mm", "dx mm"].map(String::from).to_vec();
     for (named, _) in &results.recordings {
         heads.push(format!("VAF {}", short_name(named)));
-        heads.push("bias N".into());
-        heads.push("residual N".into());
+        heads.extend(["bias N", "residual N"].map(String::from));
     }
-    heads.push("m<0".into());
-    heads.push("b<0".into());
-    heads.push("passive".into());
+    heads.extend(["m<0", "b<0", "passive"].map(String::from));
     heads
 }
 
@@ -357,19 +345,12 @@ fn row(cell: &Cell, best: bool) -> Vec<String> {
         row.push(format!("{:+.4}", score.bias_n));
         row.push(format!("{:.4}", score.residual_n));
     }
-    row.push(format!("{:.0} %", 100.0 * cell.certificate.negative_mass));
-    row.push(format!(
-        "{:.0} %",
-        100.0 * cell.certificate.negative_damping
-    ));
-    row.push(
-        if cell.certificate.passes() {
-            "PASS"
-        } else {
-            "FAIL"
-        }
-        .into(),
-    );
+    let certificate = &cell.certificate;
+    for share in [certificate.negative_mass, certificate.negative_damping] {
+        row.push(format!("{:.0} %", 100.0 * share));
+    }
+    let passes = certificate.passes();
+    row.push(if passes { "PASS" } else { "FAIL" }.to_owned());
     row
 }
 

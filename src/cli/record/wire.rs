@@ -5,12 +5,12 @@ use super::{Args, embedded, filter_line, finish, recording_bytes};
 use crate::cli::console::shell_command;
 use crate::cli::device::port::PortConnection;
 use crate::cli::trajectory::{read_trajectory, refuse_to_overwrite};
-use crate::cli::{Console, Failure, Kind};
+use crate::cli::{Console, Failure};
 use crate::device::host::display_name;
+use crate::device::link::nonce;
 use crate::device::probe::{self, ProbePath};
 use study_base::limits::Limit;
 use study_base::text::Untrusted;
-use study_haptics::plant::Measurement;
 use study_haptics::trajectory;
 
 /// The command line of this recording. A port set in `device.toml` is read from there
@@ -43,37 +43,25 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let filter = args.low_pass()?;
     // bounded by the longest trajectory and the highest sampling rate
     let samples = (trajectory.total_s() * args.rate + 1e-6).floor() as usize + 1;
-    let t_s: Vec<f64> = (0..samples).map(|i| i as f64 / args.rate).collect();
+    let x_mm = |i: usize| trajectory.at(i as f64 / args.rate).x_mm;
     let path = ProbePath {
-        x_mm: t_s.iter().map(|t| trajectory.at(*t).x_mm).collect(),
+        x_mm: (0..samples).map(x_mm).collect(),
         rate_hz: args.rate,
         force_n,
     };
     let mut connection = PortConnection::open(&args.port)?;
     let address = connection.address.clone();
     let progress = crate::cli::console::progress(100, "% of the path");
-    let recorded = probe::record(
-        &mut connection,
-        crate::device::link::nonce(),
-        &path,
-        &mut |share| {
-            progress.set_position((100.0 * share) as u64);
-        },
-    );
+    let mut done = |share: f64| progress.set_position((100.0 * share) as u64);
+    let recorded = probe::record(&mut connection, nonce(), &path, &mut done);
     progress.finish_and_clear();
-    let (device, recorded) = recorded.map_err(|why| {
+    let (device, measured) = recorded.map_err(|why| {
         let why = why.to_string();
         let (address, why) = (Untrusted(&address), Untrusted(&why));
-        Failure::new(Kind::Device, format!("{address}: {why}")).hint(
+        Failure::device(format!("{address}: {why}")).hint(
             "nothing was recorded; `study device info` shows the limits of the probe, `study trajectory` the extremes of the trajectory",
         )
     })?;
-    let measured = Measurement {
-        t_s,
-        x_mm: recorded.x_mm,
-        a_m_s2: recorded.a_m_s2,
-        f_n: recorded.f_n,
-    };
     let what = match device.flags.simulated {
         true => "simulated, not measured: the simulated probe at the end of a wire",
         false => "measured by a probe",
@@ -86,11 +74,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         Untrusted(&command_line(args)),
         env!("CARGO_PKG_VERSION"),
     );
-    header.push_str(&filter_line(args));
-    header.push_str(&embedded(
-        "TRAJECTORY",
-        &trajectory::file::write(&trajectory),
-    ));
+    header += &filter_line(args);
+    header += &embedded("TRAJECTORY", &trajectory::file::write(&trajectory));
     let bytes = recording_bytes(&trajectory, &measured, filter, args.rate, &header);
     finish(args, &bytes, console)
 }

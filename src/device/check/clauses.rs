@@ -1,7 +1,7 @@
 //! The clauses that can be tested from outside, in the order of the tests: messages
 //! first, then uploads, then playbacks.
 
-use super::exchange::{Exchange, name};
+use super::exchange::{Exchange, unexpected};
 use super::playing;
 use super::uploads::Upload;
 use super::{CheckFailure, Clause, ClauseResult, fail, quantile};
@@ -153,9 +153,9 @@ fn noise(exchange: &mut Exchange<'_>) -> ClauseResult {
         let mut bytes = piece.to_vec();
         bytes.extend_from_slice(Request::State.frame(sequence).as_bytes());
         if exchange.send(&bytes, sequence, RETRY_INTERVAL)?.is_none() {
+            let length = piece.len();
             return fail(format!(
-                "no answer to the frame after {} bytes of noise",
-                piece.len()
+                "no answer to the frame after {length} bytes of noise"
             ));
         }
     }
@@ -186,13 +186,16 @@ fn expect_refusal_of(
     what: &str,
 ) -> Result<(), CheckFailure> {
     match refusal_of(exchange, body)? {
-        Some((refusal, _)) if refusal == reason => Ok(()),
-        Some((refusal, _)) => fail(format!(
-            "{what}: {} instead of: {}",
-            refusal.as_str(),
-            reason.as_str()
-        )),
+        Some((refusal, _)) => same_refusal(refusal, reason, what),
         None => fail(format!("{what}: no answer")),
+    }
+}
+
+fn same_refusal(found: Refusal, required: Refusal, what: &str) -> Result<(), CheckFailure> {
+    if found == required {
+        Ok(())
+    } else {
+        fail(format!("{what}: {found} instead of: {required}"))
     }
 }
 
@@ -230,7 +233,7 @@ fn other_version(exchange: &mut Exchange<'_>) -> ClauseResult {
         Some((Refusal::Version, detail)) if (1..250).contains(&detail) => {
             Ok(format!("version 250: it supports {detail}"))
         }
-        Some((refusal, detail)) => fail(format!("version 250: {} ({detail})", refusal.as_str())),
+        Some((refusal, detail)) => fail(format!("version 250: {refusal} ({detail})")),
         None => fail("version 250: no answer"),
     }
 }
@@ -241,11 +244,9 @@ fn any_limp(exchange: &mut Exchange<'_>) -> ClauseResult {
         refusal_of(exchange, body)?;
         let state = exchange.outcome()?.state;
         if state != DeviceState::Limp {
+            let (version, length) = (body[0], body.len());
             return fail(format!(
-                "after a LIMP of version {} and {} bytes {}",
-                body[0],
-                body.len(),
-                state.as_str()
+                "after a LIMP of version {version} and {length} bytes {state}"
             ));
         }
     }
@@ -253,40 +254,31 @@ fn any_limp(exchange: &mut Exchange<'_>) -> ClauseResult {
 }
 
 fn repeats(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let device = exchange.identity()?;
-    let table = Upload::passive(&device, 0.0);
+    let table = Upload::passive(exchange, 0.0)?;
     exchange.expect_done(Request::TableBegin(table.begin))?;
     let chunks = table.chunks();
     let sequence = exchange.next_sequence();
     let first = chunks[0].frame(sequence);
     let mut replies = Vec::new();
     for _ in 0..3 {
-        let received = exchange.send(first.as_bytes(), sequence, RETRY_INTERVAL)?;
-        let received =
-            received.ok_or_else(|| CheckFailure::violation("a repeat is not answered"))?;
-        replies.push(received.body);
+        match exchange.send(first.as_bytes(), sequence, RETRY_INTERVAL)? {
+            Some(received) => replies.push(received.body),
+            None => return fail("a repeat is not answered"),
+        }
     }
     if replies.iter().any(|body| *body != replies[0]) {
         return fail("the reply to a repeat differs");
     }
     // Other bytes with the same number.
-    let received = exchange.send(
-        chunks[1].frame(sequence).as_bytes(),
-        sequence,
-        RETRY_INTERVAL,
-    )?;
+    let other = chunks[1].frame(sequence);
+    let received = exchange.send(other.as_bytes(), sequence, RETRY_INTERVAL)?;
     match received.map(|received| received.reply) {
         Some(Reply::Ack(ack)) if ack.refusal == Refusal::Reused => {}
-        _ => {
-            return fail("other bytes with a used number are not refused");
-        }
+        _ => return fail("other bytes with a used number are not refused"),
     }
-    // A number that was overtaken.
-    let old = sequence.wrapping_sub(1);
-    if exchange
-        .send(chunks[1].frame(old).as_bytes(), old, RETRY_INTERVAL)?
-        .is_some()
-    {
+    let overtaken = sequence.wrapping_sub(1);
+    let frame = chunks[1].frame(overtaken);
+    if (exchange.send(frame.as_bytes(), overtaken, RETRY_INTERVAL)?).is_some() {
         return fail("an overtaken request is answered");
     }
     // If the chunk was executed once, the table is complete now.
@@ -296,22 +288,16 @@ fn repeats(exchange: &mut Exchange<'_>) -> ClauseResult {
 }
 
 fn another_connection(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let device = exchange.identity()?;
-    Upload::passive(&device, 0.0).load(exchange)?;
-    let identity = exchange.hello()?;
-    if identity.state != DeviceState::Limp || identity.fault != Fault::NewConnection {
-        return fail(format!(
-            "{}: {}",
-            identity.state.as_str(),
-            identity.fault.as_str()
-        ));
+    Upload::passive(exchange, 0.0)?.load(exchange)?;
+    let Identity { state, fault, .. } = exchange.hello()?;
+    if state != DeviceState::Limp || fault != Fault::NewConnection {
+        return fail(format!("{state}: {fault}"));
     }
-    Ok(identity.fault.as_str().to_owned())
+    Ok(fault.to_string())
 }
 
 fn latched(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let device = exchange.identity()?;
-    let table = Upload::passive(&device, 0.0);
+    let table = Upload::passive(exchange, 0.0)?;
     table.load(exchange)?;
     exchange.limp()?;
     exchange.expect_refusal(Request::TableBegin(table.begin), Refusal::WrongState)?;
@@ -321,7 +307,7 @@ fn latched(exchange: &mut Exchange<'_>) -> ClauseResult {
     exchange.wait(Duration::from_secs(1))?;
     let state = exchange.outcome()?.state;
     if state != DeviceState::Limp {
-        return fail(format!("a second later {}", state.as_str()));
+        return fail(format!("a second later {state}"));
     }
     exchange.reset()?;
     // The table is no longer loaded.
@@ -334,7 +320,7 @@ fn beat(exchange: &mut Exchange<'_>, count: u32, deadline_ms: u32) -> Result<boo
     let beat = Heartbeat { count, deadline_ms };
     match exchange.ask(Request::Heartbeat(beat))?.reply {
         Reply::Pulse(pulse) => Ok(pulse.fresh),
-        other => fail(format!("HEARTBEAT is answered by {}", name(other.kind()))),
+        other => unexpected(Request::Heartbeat(beat), &other),
     }
 }
 
@@ -342,26 +328,22 @@ fn stale_heartbeats(exchange: &mut Exchange<'_>) -> ClauseResult {
     exchange.sends_heartbeats = false;
     let now_ms = exchange.outcome()?.clock_ms;
     let newest = exchange.beat_count().wrapping_add(1000);
-    let soon = now_ms.wrapping_add(200);
-    for (what, count, deadline_ms, fresh) in [
-        ("a new heartbeat", newest, soon, true),
-        ("a repeated heartbeat", newest, soon, false),
-        ("an older heartbeat", newest.wrapping_sub(1), soon, false),
-        (
-            "an expired heartbeat",
-            newest.wrapping_add(1),
-            now_ms.wrapping_sub(1),
-            false,
-        ),
+    // What is sent, its distance from the newest heartbeat, its time to live, ms.
+    for (what, after, ahead_ms, fresh) in [
+        ("a new heartbeat", 0, 200, true),
+        ("a repeated heartbeat", 0, 200, false),
+        ("an older heartbeat", -1, 200, false),
+        ("an expired heartbeat", 1, -1, false),
         (
             "a heartbeat with a deadline in the far future",
-            newest.wrapping_add(2),
-            now_ms.wrapping_add(60_000),
+            2,
+            60_000,
             false,
         ),
-        ("the next heartbeat", newest.wrapping_add(3), soon, true),
+        ("the next heartbeat", 3, 200, true),
     ] {
-        if beat(exchange, count, deadline_ms)? != fresh {
+        let count = newest.wrapping_add_signed(after);
+        if beat(exchange, count, now_ms.wrapping_add_signed(ahead_ms))? != fresh {
             let not = if fresh { "not " } else { "" };
             return fail(format!("{what} is {not}fresh"));
         }
@@ -370,23 +352,21 @@ fn stale_heartbeats(exchange: &mut Exchange<'_>) -> ClauseResult {
 }
 
 fn no_heartbeat(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let device = exchange.identity()?;
-    let table = Upload::passive(&device, 0.0);
+    let table = Upload::passive(exchange, 0.0)?;
     exchange.sends_heartbeats = false;
     // A new connection has received no heartbeat.
     let hello = exchange.hello()?;
     if hello.state != DeviceState::Idle {
-        return fail(hello.state.as_str());
+        return fail(hello.state);
     }
-    exchange.wait(Duration::from_millis(u64::from(device.watchdog_ms) + 20))?;
+    exchange.wait(Duration::from_millis(u64::from(hello.watchdog_ms) + 20))?;
     table.send(exchange)?;
     exchange.expect_refusal(table.commit(), Refusal::NoHeartbeat)?;
     Ok("COMMIT refused".to_owned())
 }
 
 fn order(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let device = exchange.identity()?;
-    let table = Upload::with_nodes(&device, 0.0, 8);
+    let table = Upload::with_nodes(exchange, 0.0, 8)?;
     exchange.expect_done(Request::TableBegin(table.begin))?;
     let chunks = table.chunks();
     exchange.expect_done(chunks[0])?;
@@ -407,16 +387,14 @@ fn order(exchange: &mut Exchange<'_>) -> ClauseResult {
 }
 
 fn checksum(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let device = exchange.identity()?;
-    let table = Upload::passive(&device, 0.0);
+    let table = Upload::passive(exchange, 0.0)?;
     table.send(exchange)?;
-    let wrong = message::Commit {
-        crc: table.crc() ^ 1,
-    };
+    let crc = table.crc() ^ 1;
+    let wrong = message::Commit { crc };
     exchange.expect_refusal(Request::TableCommit(wrong), Refusal::Checksum)?;
     let state = exchange.outcome()?.state;
     if state != DeviceState::Idle {
-        return fail(state.as_str());
+        return fail(state);
     }
     table.load(exchange)?;
     Ok("refused, and accepted with the correct CRC".to_owned())
@@ -424,72 +402,61 @@ fn checksum(exchange: &mut Exchange<'_>) -> ClauseResult {
 
 fn bad_tables(exchange: &mut Exchange<'_>) -> ClauseResult {
     let device = exchange.identity()?;
-    let mut cases: Vec<(&str, Upload, Refusal)> = Vec::new();
-    let mut case = |what, reason, damage: &dyn Fn(&mut Upload)| {
-        let mut table = Upload::passive(&device, 0.0);
+    let mut count = 0;
+    let mut refused = |reason, what, damage: &dyn Fn(&mut Upload)| {
+        let mut table = Upload::passive(exchange, 0.0)?;
         damage(&mut table);
-        cases.push((what, table, reason));
+        table.send(exchange)?;
+        count += 1;
+        same_refusal(exchange.ack(table.commit())?.refusal, reason, what)
     };
-    case(
-        "a parameter that is not a number",
+    refused(
         Refusal::BadTable,
+        "a parameter that is not a number",
         &|t| {
             t.nodes[1].positive[3] = f64::NAN;
         },
-    );
-    case("an infinite parameter", Refusal::BadTable, &|t| {
+    )?;
+    refused(Refusal::BadTable, "an infinite parameter", &|t| {
         t.nodes[2].negative[0] = f64::INFINITY;
-    });
-    case("positions that do not ascend", Refusal::BadTable, &|t| {
+    })?;
+    refused(Refusal::BadTable, "positions that do not ascend", &|t| {
         t.nodes[2].x_mm = t.nodes[1].x_mm;
-    });
-    case("one node", Refusal::BadTable, &|t| {
+    })?;
+    refused(Refusal::BadTable, "one node", &|t| {
         t.nodes.truncate(1);
         t.begin.nodes = 1;
-    });
-    case("an empty range", Refusal::BadTable, &|t| {
+    })?;
+    refused(Refusal::BadTable, "an empty range", &|t| {
         t.begin.range_mm.swap(0, 1);
-    });
-    case("a force limit above the device's", Refusal::Limit, &|t| {
+    })?;
+    refused(Refusal::Limit, "a force limit above the device's", &|t| {
         t.begin.force_n = 1.01 * device.force_n;
-    });
-    case("a force limit that is not a number", Refusal::Limit, &|t| {
+    })?;
+    refused(Refusal::Limit, "a force limit that is not a number", &|t| {
         t.begin.force_n = f64::NAN;
-    });
-    case(
-        "a velocity limit above the device's",
+    })?;
+    refused(
         Refusal::Limit,
+        "a velocity limit above the device's",
         &|t| {
             t.begin.velocity_mm_s = 1.01 * device.velocity_mm_s;
         },
-    );
-    case("a range beyond the stroke", Refusal::Limit, &|t| {
+    )?;
+    refused(Refusal::Limit, "a range beyond the stroke", &|t| {
         t.begin.range_mm[1] = device.stroke_mm[1] + 1.0;
-    });
-    case("a damping above the device's", Refusal::Limit, &|t| {
+    })?;
+    refused(Refusal::Limit, "a damping above the device's", &|t| {
         for node in &mut t.nodes {
             node.positive[1] = 2.0 * device.damping_n_s_per_mm;
             node.negative[1] = 2.0 * device.damping_n_s_per_mm;
         }
-    });
-    let count = cases.len();
-    for (what, table, reason) in cases {
-        table.send(exchange)?;
-        let ack = exchange.ack(table.commit())?;
-        if ack.refusal != reason {
-            return fail(format!(
-                "{what}: {} instead of: {}",
-                ack.refusal.as_str(),
-                reason.as_str()
-            ));
-        }
-    }
+    })?;
     Ok(format!("{count} tables"))
 }
 
 fn uncertified(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let device = exchange.identity()?;
-    let mut table = Upload::uncertified(&device);
+    let mut table = Upload::uncertified(exchange)?;
     table.send(exchange)?;
     exchange.expect_refusal(table.commit(), Refusal::Uncertified)?;
     let cap_n = 0.5 * table.begin.force_n;
@@ -500,14 +467,13 @@ fn uncertified(exchange: &mut Exchange<'_>) -> ClauseResult {
         return fail(format!("with a cap of {cap_n} N its limit is {limit_n} N"));
     }
     // A table that passes is not capped.
-    let mut table = Upload::passive(&device, 0.0);
+    let mut table = Upload::passive(exchange, 0.0)?;
     table.begin.uncertified_n = Some(cap_n);
     table.load(exchange)?;
-    let limit_n = exchange.outcome()?.limit_n;
-    if (limit_n - table.begin.force_n).abs() > 1e-9 {
+    let (limit_n, force_n) = (exchange.outcome()?.limit_n, table.begin.force_n);
+    if (limit_n - force_n).abs() > 1e-9 {
         return fail(format!(
-            "a passive table is limited to {limit_n} N instead of {} N",
-            table.begin.force_n
+            "a passive table is limited to {limit_n} N instead of {force_n} N"
         ));
     }
     Ok(format!("refused; with permission capped at {cap_n} N"))
@@ -515,7 +481,7 @@ fn uncertified(exchange: &mut Exchange<'_>) -> ClauseResult {
 
 fn largest(exchange: &mut Exchange<'_>) -> ClauseResult {
     let device = exchange.identity()?;
-    let table = Upload::with_nodes(&device, 0.0, device.max_nodes);
+    let table = Upload::with_nodes(exchange, 0.0, device.max_nodes)?;
     let begin = exchange.now();
     table.send(exchange)?;
     let sent = exchange.now();
@@ -538,7 +504,7 @@ fn largest(exchange: &mut Exchange<'_>) -> ClauseResult {
 
 fn wrong_play(exchange: &mut Exchange<'_>) -> ClauseResult {
     let device = exchange.identity()?;
-    let table = Upload::passive(&device, 0.0);
+    let table = Upload::passive(exchange, 0.0)?;
     table.load(exchange)?;
     let play = table.play(exchange, 1000);
     let other = message::Play {

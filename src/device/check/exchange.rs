@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 use study_wire::frame::{Decoder, Frame};
 use study_wire::message::{
-    Ack, DeviceState, Event, Heartbeat, Hello, Identity, Outcome, Pulse, Recorded, Refusal, Reply,
-    Request, Telemetry, VERSION, kind,
+    Ack, DeviceState, Event, EventKind, Heartbeat, Hello, Identity, Outcome, Pulse, Recorded,
+    Refusal, Reply, Request, Telemetry, VERSION, kind,
 };
 
 /// Longest single wait for bytes.
@@ -202,18 +202,14 @@ impl<'w> Exchange<'w> {
         }
         Err(CheckFailure::Disconnected(format!(
             "no answer to {} after {MAX_TRIES} tries",
-            name(request.kind())
+            kind::name(request.kind())
         )))
     }
 
     pub(crate) fn ack(&mut self, request: Request) -> Result<Ack, CheckFailure> {
         match self.ask(request)?.reply {
             Reply::Ack(ack) if ack.request == request.kind() => Ok(ack),
-            other => fail(format!(
-                "{} is answered by {}",
-                name(request.kind()),
-                name(other.kind())
-            )),
+            other => unexpected(request, &other),
         }
     }
 
@@ -222,12 +218,10 @@ impl<'w> Exchange<'w> {
         let ack = self.ack(request)?;
         match ack.refusal {
             Refusal::None => Ok(ack),
-            refusal => fail(format!(
-                "{} is refused: {} ({})",
-                name(request.kind()),
-                refusal.as_str(),
-                ack.detail
-            )),
+            refusal => {
+                let (what, detail) = (kind::name(request.kind()), ack.detail);
+                fail(format!("{what} is refused: {refusal} ({detail})"))
+            }
         }
     }
 
@@ -239,22 +233,23 @@ impl<'w> Exchange<'w> {
     ) -> Result<Ack, CheckFailure> {
         let ack = self.ack(request)?;
         if ack.refusal == why {
-            Ok(ack)
-        } else {
-            fail(format!(
-                "{}: {}, and not: {}",
-                name(request.kind()),
-                ack.refusal.as_str(),
-                why.as_str()
-            ))
+            return Ok(ack);
         }
+        let what = kind::name(request.kind());
+        fail(format!("{what}: {}, and not: {why}", ack.refusal))
     }
 
     pub(crate) fn outcome(&mut self) -> Result<Outcome, CheckFailure> {
         match self.ask(Request::State)?.reply {
             Reply::Outcome(outcome) => Ok(outcome),
-            other => fail(format!("STATE is answered by {}", name(other.kind()))),
+            other => unexpected(Request::State, &other),
         }
+    }
+
+    /// The event that reports a latched state, if there was one.
+    pub(crate) fn latched(&self) -> Option<Event> {
+        let mut events = self.events.iter();
+        events.find(|e| e.kind == EventKind::Latched).copied()
     }
 
     pub(crate) fn limp(&mut self) -> Result<(), CheckFailure> {
@@ -268,7 +263,8 @@ impl<'w> Exchange<'w> {
     pub(crate) fn hello(&mut self) -> Result<Identity, CheckFailure> {
         self.nonce = self.nonce.wrapping_add(1);
         let sent = self.now();
-        let received = self.ask(Request::Hello(Hello { nonce: self.nonce }))?;
+        let request = Request::Hello(Hello { nonce: self.nonce });
+        let received = self.ask(request)?;
         if let Reply::Ack(ack) = received.reply
             && ack.refusal == Refusal::Version
         {
@@ -278,10 +274,7 @@ impl<'w> Exchange<'w> {
             )));
         }
         let Reply::Identity(identity) = received.reply else {
-            return fail(format!(
-                "HELLO is answered by {}",
-                name(received.reply.kind())
-            ));
+            return unexpected(request, &received.reply);
         };
         if identity.nonce != self.nonce {
             return fail("its nonce is not that of HELLO");
@@ -306,13 +299,7 @@ impl<'w> Exchange<'w> {
                 Refusal::Moving if self.now() < until => {
                     self.wait(Duration::from_millis(50))?;
                 }
-                refusal => {
-                    return fail(format!(
-                        "REARM: {}, {}",
-                        refusal.as_str(),
-                        ack.state.as_str()
-                    ));
-                }
+                refusal => return fail(format!("REARM: {refusal}, {}", ack.state)),
             }
         }
         self.telemetry.clear();
@@ -332,30 +319,8 @@ impl<'w> Exchange<'w> {
     }
 }
 
-/// Name of a message type in docs/wire.md.
-pub(super) fn name(kind: u8) -> &'static str {
-    match kind {
-        kind::HELLO => "HELLO",
-        kind::TABLE_BEGIN => "TABLE_BEGIN",
-        kind::TABLE_CHUNK => "TABLE_CHUNK",
-        kind::TABLE_COMMIT => "TABLE_COMMIT",
-        kind::PLAY => "PLAY",
-        kind::STOP => "STOP",
-        kind::LIMP => "LIMP",
-        kind::HEARTBEAT => "HEARTBEAT",
-        kind::REARM => "REARM",
-        kind::STATE => "STATE",
-        kind::PATH_BEGIN => "PATH_BEGIN",
-        kind::PATH_CHUNK => "PATH_CHUNK",
-        kind::PATH_COMMIT => "PATH_COMMIT",
-        kind::RECORD => "RECORD",
-        kind::ACK => "ACK",
-        kind::IDENTITY => "IDENTITY",
-        kind::OUTCOME => "OUTCOME",
-        kind::PULSE => "PULSE",
-        kind::TELEMETRY => "TELEMETRY",
-        kind::EVENT => "EVENT",
-        kind::RECORDED => "RECORDED",
-        _ => "a message of an unknown type",
-    }
+/// A reply of the wrong type.
+pub(super) fn unexpected<T>(request: Request, reply: &Reply) -> Result<T, CheckFailure> {
+    let [request, reply] = [request.kind(), reply.kind()].map(kind::name);
+    fail(format!("{request} is answered by {reply}"))
 }

@@ -28,7 +28,7 @@ fn play(
     longest_ms: u32,
 ) -> Result<Playback, CheckFailure> {
     let device = exchange.identity()?;
-    let table = Upload::passive(&device, force_n);
+    let table = Upload::passive(exchange, force_n)?;
     table.load(exchange)?;
     let rate = device.telemetry_hz.clamp(1.0, 1000.0);
     // `as` saturates.
@@ -39,7 +39,7 @@ fn play(
     };
     let started = exchange.expect_done(Request::Play(play))?;
     if started.state != DeviceState::Ramp {
-        return fail(format!("PLAY: {}", started.state.as_str()));
+        return fail(format!("PLAY: {}", started.state));
     }
     Ok(Playback {
         number: play.playback,
@@ -68,17 +68,22 @@ fn samples(exchange: &Exchange<'_>, playback: &Playback) -> (Vec<TelemetrySample
     (all, missed)
 }
 
-/// Checks that the device is still playing. A trip during a test is usually caused by
-/// the hand and not by the device.
-fn still_plays(exchange: &mut Exchange<'_>) -> Result<(), CheckFailure> {
+/// Plays for `time` and checks that the device is still playing. A trip during a test is
+/// usually caused by the hand and not by the device.
+fn play_for(
+    exchange: &mut Exchange<'_>,
+    force_n: f64,
+    time: Duration,
+) -> Result<Playback, CheckFailure> {
+    let playback = play(exchange, force_n, 60_000)?;
+    exchange.wait(time)?;
     let outcome = exchange.outcome()?;
     if outcome.state.applies_force() {
-        return Ok(());
+        return Ok(playback);
     }
     fail(format!(
         "the playback ended early: {}, {}; hold the handle near the middle of its stroke",
-        outcome.state.as_str(),
-        outcome.fault.as_str()
+        outcome.state, outcome.fault
     ))
 }
 
@@ -87,9 +92,7 @@ pub(super) fn telemetry(exchange: &mut Exchange<'_>) -> ClauseResult {
     if !device.flags.telemetry {
         return Ok("no telemetry".to_owned());
     }
-    let playback = play(exchange, 0.0, 60_000)?;
-    exchange.wait(2 * SECOND)?;
-    still_plays(exchange)?;
+    let playback = play_for(exchange, 0.0, 2 * SECOND)?;
     exchange.expect_done(stop_request(&playback))?;
     exchange.wait(SECOND / 10)?;
     let outcome = exchange.outcome()?;
@@ -135,9 +138,7 @@ pub(super) fn telemetry(exchange: &mut Exchange<'_>) -> ClauseResult {
 pub(super) fn clamp(exchange: &mut Exchange<'_>) -> ClauseResult {
     let device = exchange.identity()?;
     let limit_n = super::FORCE_N.min(device.force_n);
-    let playback = play(exchange, 3.0 * limit_n, 60_000)?;
-    exchange.wait(SECOND)?;
-    still_plays(exchange)?;
+    let playback = play_for(exchange, 3.0 * limit_n, SECOND)?;
     exchange.expect_done(stop_request(&playback))?;
     exchange.wait(SECOND / 10)?;
     let outcome = exchange.outcome()?;
@@ -201,29 +202,25 @@ fn end_with(
 }
 
 pub(super) fn stop(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let playback = play(exchange, 1.0, 60_000)?;
-    exchange.wait(SECOND)?;
-    still_plays(exchange)?;
+    let playback = play_for(exchange, 1.0, SECOND)?;
     let (ack, outcome, seen, late) = end_with(exchange, &playback, stop_request(&playback))?;
     if ack.state.applies_force() {
-        return fail(format!("STOP: {}", ack.state.as_str()));
+        return fail(format!("STOP: {}", ack.state));
     }
     if late {
         return fail(seen);
     }
     if outcome.state != DeviceState::Loaded {
-        return fail(format!("then {}", outcome.state.as_str()));
+        return fail(format!("then {}", outcome.state));
     }
     Ok(seen)
 }
 
 pub(super) fn limp(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let playback = play(exchange, 1.0, 60_000)?;
-    exchange.wait(SECOND / 2)?;
-    still_plays(exchange)?;
+    let playback = play_for(exchange, 1.0, SECOND / 2)?;
     let (ack, outcome, seen, late) = end_with(exchange, &playback, Request::Limp)?;
     if ack.state != DeviceState::Limp || outcome.state != DeviceState::Limp {
-        return fail(format!("LIMP: {}", outcome.state.as_str()));
+        return fail(format!("LIMP: {}", outcome.state));
     }
     if late {
         return fail(seen);
@@ -237,40 +234,32 @@ pub(super) fn longest(exchange: &mut Exchange<'_>) -> ClauseResult {
     exchange.wait(SECOND)?;
     let outcome = exchange.outcome()?;
     let lasted_ms = 1e3 * f64::from(outcome.ticks) / playback.servo_hz;
-    let seen = format!(
-        "{lasted_ms:.0} ms of {LONGEST_MS} ms, {}",
-        outcome.fault.as_str()
-    );
+    let seen = format!("{lasted_ms:.0} ms of {LONGEST_MS} ms, {}", outcome.fault);
     let ended = outcome.state == DeviceState::Loaded && outcome.fault == Fault::Longest;
     if ended && (lasted_ms - f64::from(LONGEST_MS)).abs() <= CLOCK_RESOLUTION_MS + 1.0 {
         Ok(seen)
     } else {
-        fail(format!("{seen}, {}", outcome.state.as_str()))
+        fail(format!("{seen}, {}", outcome.state))
     }
 }
 
 /// Stops the heartbeats during a playback. Returns the time from the last fresh heartbeat
 /// to limp on the device's clock, ms.
 fn stop_heartbeats(exchange: &mut Exchange<'_>) -> Result<(f64, Playback), CheckFailure> {
-    let playback = play(exchange, 1.0, 60_000)?;
-    exchange.wait(SECOND / 2)?;
-    still_plays(exchange)?;
+    let playback = play_for(exchange, 1.0, SECOND / 2)?;
     exchange.sends_heartbeats = false;
     // Messages in transit.
     exchange.wait(SECOND / 50)?;
-    let heard = exchange.pulses.iter().rev().find(|p| p.fresh);
-    let heard_ms = heard
-        .ok_or_else(|| CheckFailure::violation("no heartbeat was fresh"))?
-        .clock_ms;
+    let Some(heard) = exchange.pulses.iter().rev().find(|p| p.fresh) else {
+        return fail("no heartbeat was fresh");
+    };
+    let heard_ms = heard.clock_ms;
     exchange.wait(SECOND / 2)?;
-    let event = exchange
-        .events
-        .iter()
-        .find(|e| e.kind == EventKind::Latched)
-        .copied()
-        .ok_or_else(|| CheckFailure::violation("it continues without heartbeats"))?;
+    let Some(event) = exchange.latched() else {
+        return fail("it continues without heartbeats");
+    };
     if event.fault != Fault::Watchdog {
-        return fail(event.fault.as_str());
+        return fail(event.fault);
     }
     let after_ms = f64::from(event.clock_ms.wrapping_sub(heard_ms));
     Ok((after_ms, playback))
@@ -289,7 +278,7 @@ pub(super) fn watchdog(exchange: &mut Exchange<'_>) -> ClauseResult {
     exchange.wait(SECOND / 5)?;
     let later = exchange.outcome()?;
     if later.state != DeviceState::Limp || later.ticks != outcome.ticks {
-        return fail(format!("{seen}, then {}", later.state.as_str()));
+        return fail(format!("{seen}, then {}", later.state));
     }
     let (all, _) = samples(exchange, &playback);
     let last_tick = all.last().map_or(0, |s| s.tick);
@@ -301,9 +290,7 @@ pub(super) fn watchdog(exchange: &mut Exchange<'_>) -> ClauseResult {
 
 /// A driver's queue of heartbeats can outlive the host; their deadline ends it.
 pub(super) fn deadline(exchange: &mut Exchange<'_>) -> ClauseResult {
-    let playback = play(exchange, 1.0, 60_000)?;
-    exchange.wait(SECOND / 2)?;
-    still_plays(exchange)?;
+    let playback = play_for(exchange, 1.0, SECOND / 2)?;
     exchange.sends_heartbeats = false;
     let now_ms = exchange.outcome()?.clock_ms;
     // All heartbeats are made now and delivered later.
@@ -321,12 +308,9 @@ pub(super) fn deadline(exchange: &mut Exchange<'_>) -> ClauseResult {
         }
         exchange.wait(SECOND / 200)?;
     }
-    let event = exchange
-        .events
-        .iter()
-        .find(|e| e.kind == EventKind::Latched)
-        .copied()
-        .ok_or_else(|| CheckFailure::violation("it continues with expired heartbeats"))?;
+    let Some(event) = exchange.latched() else {
+        return fail("it continues with expired heartbeats");
+    };
     let after_ms = f64::from(event.clock_ms.wrapping_sub(deadline_ms) as i32);
     let seen = format!("limp {after_ms:.0} ms after the deadline, {late} heartbeats not fresh");
     let outcome = exchange.outcome()?;

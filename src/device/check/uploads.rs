@@ -2,9 +2,8 @@
 
 use super::exchange::Exchange;
 use super::{CheckFailure, FORCE_N};
-use study_wire::message::{
-    Ack, Commit, FixedVec, Identity, Node, Play, Request, TableBegin, TableChunk, TableCrc,
-};
+use crate::device::host::upload::requests;
+use study_wire::message::{Ack, Commit, Node, Play, Request, TableBegin};
 use study_wire::predict::{Direction, Lookup};
 
 /// Damping of the tables, N·s/mm.
@@ -19,11 +18,16 @@ pub(super) struct Upload {
 
 impl Upload {
     /// A passive table of damping and a constant force, within the device's limits.
-    pub(super) fn passive(device: &Identity, force_n: f64) -> Self {
-        Self::with_nodes(device, force_n, 4)
+    pub(super) fn passive(exchange: &Exchange<'_>, force_n: f64) -> Result<Self, CheckFailure> {
+        Self::with_nodes(exchange, force_n, 4)
     }
 
-    pub(super) fn with_nodes(device: &Identity, force_n: f64, count: u16) -> Self {
+    pub(super) fn with_nodes(
+        exchange: &Exchange<'_>,
+        force_n: f64,
+        count: u16,
+    ) -> Result<Self, CheckFailure> {
+        let device = exchange.identity()?;
         let [low, high] = device.stroke_mm;
         let margin = 0.1 * (high - low);
         let range_mm = [low + margin, high - margin];
@@ -36,7 +40,7 @@ impl Upload {
                 negative: parameters,
             })
             .collect();
-        Self {
+        Ok(Self {
             begin: TableBegin {
                 nodes: count,
                 lookup: Lookup::Linear,
@@ -48,25 +52,21 @@ impl Upload {
                 uncertified_n: None,
             },
             nodes,
-        }
+        })
     }
 
     /// A table with a negative mass, which fails the certificate.
-    pub(super) fn uncertified(device: &Identity) -> Self {
-        let mut upload = Self::passive(device, 0.0);
+    pub(super) fn uncertified(exchange: &Exchange<'_>) -> Result<Self, CheckFailure> {
+        let mut upload = Self::passive(exchange, 0.0)?;
         for node in &mut upload.nodes {
             node.positive[0] = -0.2;
             node.negative[0] = -0.2;
         }
-        upload
+        Ok(upload)
     }
 
     pub(super) fn crc(&self) -> u32 {
-        let mut crc = TableCrc::of(&self.begin);
-        for node in &self.nodes {
-            crc.node(node);
-        }
-        crc.value()
+        requests(self.begin, &self.nodes).crc
     }
 
     pub(super) fn commit(&self) -> Request {
@@ -74,16 +74,9 @@ impl Upload {
     }
 
     pub(super) fn chunks(&self) -> Vec<Request> {
-        let chunks = self.nodes.chunks(TableChunk::MAX_NODES).enumerate();
-        chunks
-            .map(|(i, nodes)| {
-                Request::TableChunk(TableChunk {
-                    // A table has fewer than 65,536 nodes.
-                    first: (i * TableChunk::MAX_NODES) as u16,
-                    nodes: FixedVec::of(nodes),
-                })
-            })
-            .collect()
+        let mut all = requests(self.begin, &self.nodes).requests;
+        all.retain(|request| matches!(request, Request::TableChunk(_)));
+        all
     }
 
     /// Sends everything except COMMIT.

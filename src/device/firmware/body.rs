@@ -105,7 +105,7 @@ impl Body {
                 let x_mm = self.motion().x_mm;
                 Holder::Probe(Box::new(ProbeContact {
                     target: Target::new(self.target.clone(), x_mm).ok(),
-                    motion: still(x_mm),
+                    motion: Motion::at_rest(x_mm),
                     next: None,
                     force_n: 0.0,
                     max_n: 0.0,
@@ -139,7 +139,7 @@ impl Body {
 
     fn motion(&self) -> Motion {
         match &self.holder {
-            Holder::Nobody { x_mm } => still(*x_mm),
+            Holder::Nobody { x_mm } => Motion::at_rest(*x_mm),
             Holder::Hand { hand, .. } => hand.motion(),
             Holder::Probe(contact) => contact.motion,
         }
@@ -227,16 +227,8 @@ impl ProbeContact {
             self.motion = next;
         } else {
             self.force_n = self.force_n.clamp(-self.max_n, self.max_n);
-            self.motion = still(from.x_mm);
+            self.motion = Motion::at_rest(from.x_mm);
         }
-    }
-}
-
-fn still(x_mm: f64) -> Motion {
-    Motion {
-        x_mm,
-        v_mm_s: 0.0,
-        a_m_s2: 0.0,
     }
 }
 

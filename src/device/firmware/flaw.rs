@@ -294,12 +294,11 @@ fn other_version(header: Header, clock_ms: u32) -> Vec<u8> {
 }
 
 fn ack(header: Header, refusal: Refusal, state: DeviceState, clock_ms: u32) -> Vec<u8> {
-    let fault = Fault::None;
     let reply = Reply::Ack(Ack {
         request: header.kind,
         refusal,
         state,
-        fault,
+        fault: Fault::None,
         clock_ms,
         detail: if refusal == Refusal::Version { 2 } else { 0 },
     });

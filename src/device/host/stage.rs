@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 /// The host's view of the device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) enum Stage {
     /// There is no port.
+    #[default]
     Disconnected,
     /// LIMP and HELLO have been sent.
     Connecting,

@@ -4,14 +4,33 @@ use crate::device::table::{self, TableError};
 use study_base::limits::Limits;
 use study_haptics::model::{Branch, Realization};
 use study_wire::message::{
-    Commit, FixedVec, Identity, Node, Request, TableBegin, TableChunk, TableCrc,
+    Commit, FixedVec, Identity, Node, Request, TableBegin, TableChunk, UploadCrc,
 };
 
 /// The requests of an upload in order, and the CRC of the table.
 #[derive(Debug)]
-pub(super) struct Upload {
-    pub(super) requests: Vec<Request>,
-    pub(super) crc: u32,
+pub(in crate::device) struct Upload {
+    pub(in crate::device) requests: Vec<Request>,
+    pub(in crate::device) crc: u32,
+}
+
+/// The requests that upload these nodes.
+pub(in crate::device) fn requests(begin: TableBegin, nodes: &[Node]) -> Upload {
+    let mut crc = UploadCrc::of_table(&begin);
+    nodes.iter().for_each(|node| crc.node(node));
+    let crc = crc.value();
+    let chunks = nodes.chunks(TableChunk::MAX_NODES).enumerate();
+    let chunks = chunks.map(|(i, nodes)| {
+        Request::TableChunk(TableChunk {
+            // A table has fewer than 65,536 nodes.
+            first: (i * TableChunk::MAX_NODES) as u16,
+            nodes: FixedVec::of(nodes),
+        })
+    });
+    let mut requests = vec![Request::TableBegin(begin)];
+    requests.extend(chunks);
+    requests.push(Request::TableCommit(Commit { crc }));
+    Upload { requests, crc }
 }
 
 /// Builds the upload of a table. If the table fails its certificate or is stiffer than
@@ -51,21 +70,7 @@ pub(super) fn of(
             negative: parameters(&table.negative, i),
         })
         .collect();
-    let mut crc = TableCrc::of(&begin);
-    for node in &all {
-        crc.node(node);
-    }
-    let crc = crc.value();
-    let mut requests = vec![Request::TableBegin(begin)];
-    for (i, nodes) in all.chunks(TableChunk::MAX_NODES).enumerate() {
-        requests.push(Request::TableChunk(TableChunk {
-            // fewer than 65,536 nodes
-            first: (i * TableChunk::MAX_NODES) as u16,
-            nodes: FixedVec::of(nodes),
-        }));
-    }
-    requests.push(Request::TableCommit(Commit { crc }));
-    Ok(Upload { requests, crc })
+    Ok(requests(begin, &all))
 }
 
 fn parameters(branch: &Branch, node: usize) -> [f64; 4] {

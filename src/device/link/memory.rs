@@ -24,18 +24,6 @@ pub struct Noise {
     pub extra_delay: Duration,
 }
 
-impl Noise {
-    fn fractions(&self) -> [f64; 5] {
-        [
-            self.corrupt,
-            self.drop,
-            self.duplicate,
-            self.reorder,
-            self.delay,
-        ]
-    }
-}
-
 /// One direction of a line.
 #[derive(Debug)]
 pub struct Line {
@@ -75,7 +63,8 @@ impl Line {
             return;
         }
         let mut due = at + self.latency;
-        let fractions = self.noise.fractions();
+        let n = self.noise;
+        let fractions = [n.corrupt, n.drop, n.duplicate, n.reorder, n.delay];
         if fractions.iter().all(|fraction| *fraction <= 0.0) {
             self.queue.push_back((due, bytes));
             return;

@@ -186,22 +186,15 @@ impl Running {
         // The program may have ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
-        let name = Untrusted(&self.name);
-        let mut text = match (failure, ended) {
-            (ChildFailure::Closed, Some(status)) => {
-                format!("the program `{name}` has ended {}", how(status))
-            }
-            (ChildFailure::Closed, None) => {
-                format!("the program `{name}` has closed its standard streams")
-            }
-            (ChildFailure::Violation(reason), Some(status)) => {
-                let reason = Untrusted(reason);
-                format!("the program `{name}` has ended {}: {reason}", how(status))
-            }
-            (ChildFailure::Violation(reason), None) => {
-                format!("the program `{name}`: {}", Untrusted(reason))
-            }
-        };
+        let mut text = format!("the program `{}`", Untrusted(&self.name));
+        match (ended, failure) {
+            (Some(status), _) => text += &format!(" has ended {}", how(status)),
+            (None, ChildFailure::Closed) => text += " has closed its standard streams",
+            (None, ChildFailure::Violation(_)) => {}
+        }
+        if let ChildFailure::Violation(reason) = failure {
+            text += &format!(": {}", Untrusted(reason));
+        }
         if let Some(last) = self.last_line() {
             let last = messages::short_text(&last);
             text.push_str(&format!("; its last error message: {}", Untrusted(&last)));

@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 use study_base::limits::Limits;
 use study_base::text::Untrusted;
 use study_core::outcome::{Playback, Sample};
-use study_wire::predict::{Direction, Lookup};
 
 /// Version of the messages, stated in the program's `hello`.
 pub const FORMAT: &str = "study-process/1";
@@ -218,19 +217,10 @@ pub(super) fn load(number: u64, what: &Stimulus<'_>, limits: Limits) -> String {
                 "k_n_per_mm": b.k_n_per_mm, "f0_n": b.f0_n,
             })
         };
-        let (rule, delta_mm) = match table.direction {
-            Direction::Sign => ("sign", None),
-            Direction::Play { delta_mm } => ("play", Some(delta_mm)),
-            Direction::Dahl { delta_mm } => ("dahl", Some(delta_mm)),
-        };
-        let lookup = match table.lookup {
-            Lookup::Linear => "linear",
-            Lookup::Floor => "floor",
-            Lookup::Nearest => "nearest",
-        };
+        let direction = table.direction;
         json!({
-            "lookup": lookup,
-            "direction": {"rule": rule, "delta_mm": delta_mm},
+            "lookup": table.lookup.as_str(),
+            "direction": {"rule": direction.as_str(), "delta_mm": direction.delta_mm()},
             "trained": {"x_mm": table.trained.x_mm, "v_mm_s": table.trained.v_mm_s},
             "x_mm": table.x_mm,
             "positive": branch(&table.positive),

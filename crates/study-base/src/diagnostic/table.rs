@@ -12,11 +12,12 @@
 //! The span of every value that is read is recorded under its path
 //! (`models[2].vaf`), for later checks: see [`Document::span_of`].
 
-use super::{Fault, did_you_mean};
+use super::{Fault, Findings, did_you_mean};
 use crate::text::Untrusted;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -28,13 +29,7 @@ const MAX_SYNTAX_FAULTS: usize = 20;
 #[derive(Debug)]
 pub struct Document<'t> {
     root: Spanned<DeTable<'t>>,
-    notes: RefCell<Notes>,
-}
-
-#[derive(Debug, Default)]
-struct Notes {
-    faults: Vec<Fault>,
-    spans: BTreeMap<String, Range<usize>>,
+    notes: RefCell<Read>,
 }
 
 /// The result of reading: the faults and the span of each value.
@@ -44,6 +39,21 @@ pub struct Read {
     pub faults: Vec<Fault>,
     /// Path of a value (`models[2].vaf`, `design`) → its bytes.
     pub spans: BTreeMap<String, Range<usize>>,
+}
+
+/// Reads a whole file; `path` is for messages. `None` if and only if the findings
+/// contain an error.
+pub fn parse<T>(
+    path: &str,
+    text: &str,
+    read: impl FnOnce(Table<'_, '_>) -> Option<T>,
+) -> (Option<T>, Findings) {
+    let document = Document::parse(text);
+    let value = read(document.root());
+    let mut findings = Findings::new(path, text);
+    findings.faults = document.finish().faults;
+    findings.sort();
+    (value.filter(|_| !findings.has_errors()), findings)
 }
 
 impl<'t> Document<'t> {
@@ -68,7 +78,7 @@ impl<'t> Document<'t> {
         }
         Self {
             root,
-            notes: RefCell::new(Notes {
+            notes: RefCell::new(Read {
                 faults,
                 spans: BTreeMap::new(),
             }),
@@ -103,11 +113,7 @@ impl<'t> Document<'t> {
 
     /// All faults and spans.
     pub fn finish(self) -> Read {
-        let notes = self.notes.into_inner();
-        Read {
-            faults: notes.faults,
-            spans: notes.spans,
-        }
+        self.notes.into_inner()
     }
 }
 
@@ -170,6 +176,32 @@ impl<'d, 't> Table<'d, 't> {
         value
     }
 
+    /// Whether the rest of the file, such as `a plant file`, can be read as `format`. A
+    /// newer format is refused by its number alone: its unknown keys are not mistakes.
+    pub fn has_format(&mut self, format: &str, what: &str) -> bool {
+        let value = self.required("format");
+        let Some((given, value)) = value.and_then(|value| Some((value.text()?, value))) else {
+            // most likely forgotten: report the faults of the rest as well
+            return true;
+        };
+        if given == format {
+            return true;
+        }
+        let newer = match (version(&given), version(format)) {
+            (Some((theirs, n)), Some((ours, own))) => theirs == ours && n > own,
+            _ => false,
+        };
+        let fault = Fault::error(format!("this is not a {format} file"));
+        value.fault(if newer {
+            fault
+                .label("a newer format")
+                .hint("it was written by a newer version of study, which can read it")
+        } else {
+            fault.hint(format!("{what} begins with format = \"{format}\""))
+        });
+        false
+    }
+
     fn missing_message(&self, key: &str) -> String {
         if self.path.is_empty() {
             format!("the file has no `{key}`")
@@ -210,8 +242,7 @@ impl<'d, 't> Table<'d, 't> {
 
     /// One of a fixed set of words; another text is a fault that lists them.
     pub fn word<T: Copy>(&mut self, key: &str, words: &[(&'static str, T)]) -> Option<T> {
-        let value = self.value(key)?;
-        value.word(words)
+        self.value(key)?.word(words)
     }
 
     /// Adds a fault about the value of a key, or about the table if it is absent.
@@ -266,6 +297,12 @@ impl<'d, 't> Table<'d, 't> {
     }
 }
 
+/// The name of a format and its version, such as `study-plant/1`.
+fn version(format: &str) -> Option<(&str, u32)> {
+    let (name, number) = format.split_once('/')?;
+    Some((name, number.parse().ok()?))
+}
+
 impl<'d, 't> Value<'d, 't> {
     fn new(document: &'d Document<'t>, value: &'d Spanned<DeValue<'t>>, path: String) -> Self {
         document
@@ -291,7 +328,14 @@ impl<'d, 't> Value<'d, 't> {
         self.document.fault(fault.at(self.span.clone()));
     }
 
-    fn mismatch(&self, wanted: &str) {
+    /// Adds a fault about this value: its path, then the problem. Always `None`, what a
+    /// reader then has.
+    pub fn refuse<T>(&self, problem: impl Display) -> Option<T> {
+        self.fault(Fault::error(format!("`{}` {problem}", self.path)));
+        None
+    }
+
+    fn mismatch<T>(&self, wanted: &str) -> Option<T> {
         let found = match self.value {
             DeValue::String(_) => "text",
             DeValue::Integer(_) if self.whole().is_none() => "one beyond 64 bits",
@@ -302,10 +346,7 @@ impl<'d, 't> Value<'d, 't> {
             DeValue::Array(_) => "a list",
             DeValue::Table(_) => "a table",
         };
-        self.fault(Fault::error(format!(
-            "`{}` has to be {wanted}, not {found}",
-            self.path
-        )));
+        self.refuse(format_args!("has to be {wanted}, not {found}"))
     }
 
     /// Whether the value is a table.
@@ -316,10 +357,7 @@ impl<'d, 't> Value<'d, 't> {
     /// The value as text.
     pub fn text(&self) -> Option<String> {
         let text = self.value.as_str().map(str::to_owned);
-        if text.is_none() {
-            self.mismatch("text in quotes");
-        }
-        text
+        text.or_else(|| self.mismatch("text in quotes"))
     }
 
     /// The value as a number, which can be NaN or infinite: both are legal TOML.
@@ -329,10 +367,7 @@ impl<'d, 't> Value<'d, 't> {
             DeValue::Integer(_) => self.whole().map(|n| n as f64),
             _ => None,
         };
-        if number.is_none() {
-            self.mismatch("a number");
-        }
-        number
+        number.or_else(|| self.mismatch("a number"))
     }
 
     fn whole(&self) -> Option<i64> {
@@ -344,41 +379,27 @@ impl<'d, 't> Value<'d, 't> {
 
     /// The value as a whole number.
     pub fn i64(&self) -> Option<i64> {
-        let number = self.whole();
-        if number.is_none() {
-            self.mismatch("a whole number");
-        }
-        number
+        self.whole().or_else(|| self.mismatch("a whole number"))
     }
 
     /// The value as a whole number from 0 to 2³² − 1.
     pub fn u32(&self) -> Option<u32> {
         let number = self.i64()?;
-        let small = u32::try_from(number).ok();
-        if small.is_none() {
-            self.fault(Fault::error(format!(
-                "`{}` has to be from 0 to {}, not {number}",
-                self.path,
-                u32::MAX
-            )));
-        }
-        small
+        let most = u32::MAX;
+        let problem = format!("has to be from 0 to {most}, not {number}");
+        u32::try_from(number).ok().or_else(|| self.refuse(problem))
     }
 
     /// The value as `true` or `false`.
     pub fn bool(&self) -> Option<bool> {
         let flag = self.value.as_bool();
-        if flag.is_none() {
-            self.mismatch("true or false");
-        }
-        flag
+        flag.or_else(|| self.mismatch("true or false"))
     }
 
     /// The value as a table.
     pub fn table(self) -> Option<Table<'d, 't>> {
         let Some(table) = self.value.as_table() else {
-            self.mismatch("a table");
-            return None;
+            return self.mismatch("a table");
         };
         Some(Table {
             document: self.document,
@@ -392,16 +413,10 @@ impl<'d, 't> Value<'d, 't> {
     /// The value as a list.
     pub fn array(&self) -> Option<Vec<Value<'d, 't>>> {
         let Some(array) = self.value.as_array() else {
-            self.mismatch("a list");
-            return None;
+            return self.mismatch("a list");
         };
-        Some(
-            array
-                .iter()
-                .enumerate()
-                .map(|(i, v)| Value::new(self.document, v, format!("{}[{i}]", self.path)))
-                .collect(),
-        )
+        let item = |(i, v)| Value::new(self.document, v, format!("{}[{i}]", self.path));
+        Some(array.iter().enumerate().map(item).collect())
     }
 
     /// The value as one of a fixed set of words.

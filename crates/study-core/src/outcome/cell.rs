@@ -89,17 +89,8 @@ fields! {
     DeviceKind: |kind, _| Cell::text(kind.as_str());
     Status: |status, _| Cell::text(status.as_str());
     State: |state, _| Cell::text(state.as_str());
-    Failure: |failure, _| Cell::text(match failure {
-        Failure::DeviceFault => "device-fault",
-        Failure::PlaybackLost => "playback-lost",
-        Failure::MarkedBad => "marked-bad",
-        Failure::Stopped => "stopped",
-        Failure::Interrupted => "interrupted",
-    });
-    Author: |author, _| Cell::text(match author {
-        Author::Participant => "participant",
-        Author::Experimenter => "experimenter",
-    });
+    Failure: |failure, _| Cell::text(failure.as_str());
+    Author: |author, _| Cell::text(author.as_str());
     Answer: |answer, _| match answer {
         Answer::Rating(n) => Cell::Whole((*n).into()),
         Answer::Number(x) => Cell::Number(*x),

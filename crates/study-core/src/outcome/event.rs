@@ -8,6 +8,7 @@ use crate::protocol::fingerprint::Fingerprints;
 use crate::protocol::{Answer, DeviceKind, Seat, Trial};
 use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
+use study_base::named;
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 
 /// A point in time by both clocks. Durations come from the monotonic clock; the
@@ -38,14 +39,16 @@ pub struct Entry {
     pub event: Event,
 }
 
-/// Who entered something.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Author {
-    /// Participant.
-    Participant,
-    /// Operator.
-    Experimenter,
+named! {
+    /// Who entered something.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    Author {
+        /// Participant.
+        Participant = "participant",
+        /// Operator.
+        Experimenter = "experimenter",
+    }
 }
 
 /// The form in which a question is asked.
@@ -67,20 +70,22 @@ pub enum FormId {
     Outro,
 }
 
-/// Why an attempt failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Failure {
-    /// The device reported a fault or refused.
-    DeviceFault,
-    /// The start or end of the playback was not confirmed.
-    PlaybackLost,
-    /// The operator marked it as bad.
-    MarkedBad,
-    /// Stopped by Esc or a pause and played again instead of rated.
-    Stopped,
-    /// The program ended during the attempt.
-    Interrupted,
+named! {
+    /// Why an attempt failed; the names are those in `attempts.csv`.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    Failure {
+        /// The device reported a fault or refused.
+        DeviceFault = "device-fault",
+        /// The start or end of the playback was not confirmed.
+        PlaybackLost = "playback-lost",
+        /// The operator marked it as bad.
+        MarkedBad = "marked-bad",
+        /// Stopped by Esc or a pause and played again instead of rated.
+        Stopped = "stopped",
+        /// The program ended during the attempt.
+        Interrupted = "interrupted",
+    }
 }
 
 /// The operator's choice on resuming a session after a long gap.
@@ -95,40 +100,30 @@ pub enum Choice {
     DropOut,
 }
 
-/// The state of a participant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum State {
-    /// Started, not finished.
-    Unfinished,
-    /// All trials and forms are completed.
-    Done,
-    /// Started by mistake, before the first rating.
-    Void,
-    /// Did not come.
-    NoShow,
-    /// Dropped out during the session.
-    DroppedOut,
-    /// Excluded from the analysis.
-    Excluded,
-    /// Withdrew consent.
-    Withdrawn,
+named! {
+    /// The state of a participant.
+    #[derive(Default, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    State {
+        /// Started, not finished.
+        #[default]
+        Unfinished = "unfinished",
+        /// All trials and forms are completed.
+        Done = "done",
+        /// Started by mistake, before the first rating.
+        Void = "void",
+        /// Did not come.
+        NoShow = "no-show",
+        /// Dropped out during the session.
+        DroppedOut = "dropped-out",
+        /// Excluded from the analysis.
+        Excluded = "excluded",
+        /// Withdrew consent.
+        Withdrawn = "withdrawn",
+    }
 }
 
 impl State {
-    /// The value on the command line and in `participants.csv`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Unfinished => "unfinished",
-            Self::Done => "done",
-            Self::Void => "void",
-            Self::NoShow => "no-show",
-            Self::DroppedOut => "dropped-out",
-            Self::Excluded => "excluded",
-            Self::Withdrawn => "withdrawn",
-        }
-    }
-
     /// Whether a participant in this state keeps their row of the schedule; otherwise
     /// the next participant gets it.
     pub fn keeps_row(self) -> bool {
@@ -204,8 +199,15 @@ pub struct Start {
 }
 
 /// Something that happened in a session.
+///
+/// In all events `trial` is [`Trial::trial`], `attempt` counts from 1, and `queue` has the
+/// trials still to come, the next one first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
+#[allow(
+    missing_docs,
+    reason = "fields that several events have are described above"
+)]
 pub enum Event {
     /// The session started: the first event, exactly once.
     SessionStarted(Box<Start>),
@@ -222,71 +224,51 @@ pub enum Event {
         /// The operator's choice; `None` if the gap was short enough to continue
         /// without one.
         choice: Option<Choice>,
-        /// Trials still to come, the next one first.
         queue: Vec<u32>,
     },
     /// The participant decided on the consent document.
     Consented {
-        /// Title of the document.
         document: String,
-        /// Version of the document.
         version: String,
         /// Whether they agreed.
         accepted: bool,
-        /// Who entered it.
         by: Author,
     },
     /// A question was answered for the first time.
     Answered {
-        /// Form.
         #[serde(rename = "place")]
         form: FormId,
-        /// Question.
         question: QuestionId,
-        /// Answer.
         answer: Answer,
     },
     /// An earlier answer was changed.
     Corrected {
-        /// Form.
         #[serde(rename = "place")]
         form: FormId,
-        /// Question.
         question: QuestionId,
         /// Answer before.
         from: Option<Answer>,
         /// Answer after.
         to: Answer,
-        /// Reason.
         reason: String,
         /// Who corrected it.
         by: Author,
     },
     /// A realization was requested from the device.
     AttemptStarted {
-        /// [`Trial::trial`].
         trial: u32,
-        /// Attempt, from 1.
         attempt: u32,
         /// Its position in the order as felt, from 1.
         position: u32,
-        /// Realization.
         model: ModelId,
         /// Duration of the reference prompt, s.
         reference_s: f64,
     },
     /// The device confirmed that it plays.
-    PlaybackStarted {
-        /// [`Trial::trial`].
-        trial: u32,
-        /// Attempt, from 1.
-        attempt: u32,
-    },
+    PlaybackStarted { trial: u32, attempt: u32 },
     /// The device confirmed that it has stopped. Only now can the trial be rated.
     PlaybackEnded {
-        /// [`Trial::trial`].
         trial: u32,
-        /// Attempt, from 1.
         attempt: u32,
         /// The device's report.
         playback: Playback,
@@ -308,38 +290,30 @@ pub enum Event {
     },
     /// The attempt does not count.
     AttemptFailed {
-        /// [`Trial::trial`].
         trial: u32,
-        /// Attempt, from 1.
         attempt: u32,
-        /// Cause.
         failure: Failure,
         /// The device's message or the operator's reason.
         detail: String,
-        /// Trials still to come, the next one first.
         queue: Vec<u32>,
         /// Whether the trial's new place violates `max_run` or `min_distance`.
         constraint_broken: bool,
     },
     /// All questions of an attempt are answered: the trial is completed.
     TrialDone {
-        /// [`Trial::trial`].
         trial: u32,
-        /// Attempt, from 1.
         attempt: u32,
         /// From the opening of the rating to its confirmation, s.
         response_s: f64,
     },
     /// The trial was closed after `max_attempts` failures.
     TrialClosed {
-        /// [`Trial::trial`].
         trial: u32,
         /// Last attempt.
         attempt: u32,
     },
     /// A remark was entered.
     Remark {
-        /// Who entered it.
         by: Author,
         /// Trial during which it was entered, if any.
         trial: Option<u32>,
@@ -351,39 +325,25 @@ pub enum Event {
     /// A pause began.
     Paused,
     /// The pause ended.
-    Unpaused {
-        /// Its duration, s.
-        paused_s: f64,
-    },
+    Unpaused { paused_s: f64 },
     /// A scheduled break began.
     BreakStarted {
         /// Number of closed trials before it, without practice.
         after: u32,
     },
     /// The break ended.
-    BreakEnded {
-        /// Its duration, s.
-        rested_s: f64,
-    },
+    BreakEnded { rested_s: f64 },
     /// The wall clock stepped relative to the monotonic clock.
     ClockStepped {
         /// Size of the step, s; positive forward.
         by_s: f64,
     },
     /// The program was left before the end of the session.
-    Interrupted {
-        /// Reason.
-        reason: String,
-    },
+    Interrupted { reason: String },
     /// Every trial is closed and every form answered.
     Finished,
     /// The operator set the participant's state from outside a session.
-    StateSet {
-        /// New state.
-        state: State,
-        /// Reason.
-        reason: String,
-    },
+    StateSet { state: State, reason: String },
     /// The order was shown to somebody during the study.
     Revealed {
         /// Reason; may be empty.

@@ -62,21 +62,12 @@ pub struct History {
 }
 
 /// The state of a session and the reason for it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Standing {
     /// State.
     pub state: State,
     /// Reason; empty where the session itself determined the state.
     pub reason: String,
-}
-
-impl Default for Standing {
-    fn default() -> Self {
-        Self {
-            state: State::Unfinished,
-            reason: String::new(),
-        }
-    }
 }
 
 /// The participant's decision on the consent document.

@@ -8,29 +8,19 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 
-/// The outcome of a trial.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// Rated.
-    Ok,
-    /// Abandoned after the last permitted attempt.
-    Failed,
-    /// The primary question was declined.
-    Declined,
-    /// Not reached, or the primary question was left empty.
-    Missing,
-}
-
-impl Status {
-    /// As in `ratings.csv`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Failed => "failed",
-            Self::Declined => "declined",
-            Self::Missing => "missing",
-        }
+study_base::named! {
+    /// The outcome of a trial.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    Status {
+        /// Rated.
+        Ok = "ok",
+        /// Abandoned after the last permitted attempt.
+        Failed = "failed",
+        /// The primary question was declined.
+        Declined = "declined",
+        /// Not reached, or the primary question was left empty.
+        Missing = "missing",
     }
 }
 
@@ -78,19 +68,20 @@ pub struct RatingRow {
     pub covariates: BTreeMap<String, f64>,
 }
 
-/// What a row of `attempts.csv` is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "AttemptColumn::What has the meanings")]
-pub enum AttemptEvent {
-    Attempt,
-    Answer,
-    Correction,
-    Failure,
-    Closed,
-    Remark,
-    Resume,
-    State,
-    Reveal,
+study_base::named! {
+    /// What a row of `attempts.csv` is about.
+    #[allow(missing_docs, reason = "AttemptColumn::What has the meanings")]
+    AttemptEvent {
+        Attempt = "attempt",
+        Answer = "answer",
+        Correction = "correction",
+        Failure = "failure",
+        Closed = "closed",
+        Remark = "remark",
+        Resume = "resume",
+        State = "state",
+        Reveal = "reveal",
+    }
 }
 
 impl AttemptEvent {
@@ -108,21 +99,6 @@ impl AttemptEvent {
             Event::Revealed { .. } => Self::Reveal,
             _ => return None,
         })
-    }
-
-    /// As in `attempts.csv`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Attempt => "attempt",
-            Self::Answer => "answer",
-            Self::Correction => "correction",
-            Self::Failure => "failure",
-            Self::Closed => "closed",
-            Self::Remark => "remark",
-            Self::Resume => "resume",
-            Self::State => "state",
-            Self::Reveal => "reveal",
-        }
     }
 }
 

@@ -7,7 +7,7 @@ use super::{Design, DeviceKind, Exclusion, ModelEntry, Protocol, Question, Quest
 use std::collections::BTreeMap;
 use std::ops::Range;
 use study_base::diagnostic::Fault;
-use study_base::text::ModelId;
+use study_base::text::{ModelId, counted};
 
 /// Number of test realizations from which a correlation over them is informative.
 const ENOUGH_REALIZATIONS: usize = 8;
@@ -143,13 +143,9 @@ fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
             critical_r(n)
         ),
     };
-    let word = if n == 1 {
-        "realization"
-    } else {
-        "realizations"
-    };
+    let count = counted(n, "test realization", "test realizations");
     faults.push(
-        Fault::warning(format!("{n} test {word}: {so}"))
+        Fault::warning(format!("{count}: {so}"))
             .at(spans.get("models").cloned().or(spans.get("models[0]").cloned()).map(first_line))
             .hint(format!(
                 "what differs between realizations is tested over realizations, not over ratings; {ENOUGH_REALIZATIONS} or more are better"

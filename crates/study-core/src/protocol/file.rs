@@ -93,28 +93,24 @@ pub struct Named {
 
 /// Reads a protocol file; `path` is only for messages.
 pub fn parse(path: &str, text: &str) -> Parsed {
-    let mut findings = Findings::new(path, text);
-    if text.len() > MAX_FILE_BYTES {
-        findings.text.clear();
-        findings.faults.push(Fault::error(format!(
-            "the file has {} bytes, more than {MAX_FILE_BYTES}",
-            text.len()
-        )));
+    let length = text.len();
+    if length > MAX_FILE_BYTES {
+        let what = format!("the file has {length} bytes, more than {MAX_FILE_BYTES}");
         return Parsed {
             protocol: None,
-            findings,
+            findings: Findings::alone(path, Fault::error(what)),
             spans: BTreeMap::new(),
             named: Vec::new(),
         };
     }
+    let mut findings = Findings::new(path, text);
     let document = Document::parse(text);
     let broken = document.fault_count();
     let mut named = Vec::new();
-    let protocol = if format_is_known(&document, broken > 0) {
-        read(&document, broken > 0, &mut named)
-    } else {
-        None
-    };
+    let known = format_is_known(&document, broken > 0);
+    let protocol = known
+        .then(|| read(&document, broken > 0, &mut named))
+        .flatten();
     let read = document.finish();
     findings.faults = read.faults;
     drop_echoes(&mut findings.faults, broken);
@@ -167,19 +163,15 @@ fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
     }
     let version =
         |format: &str| -> Option<u32> { format.strip_prefix("study-protocol/")?.parse().ok() };
-    let fault = match (version(&format), version(FORMAT)) {
+    let given = Untrusted(&format);
+    value.fault(match (version(&format), version(FORMAT)) {
         (Some(theirs), Some(ours)) if theirs > ours => Fault::error(format!(
-            "the format `{}` is newer than this program, which reads `{FORMAT}`",
-            Untrusted(&format)
+            "the format `{given}` is newer than this program, which reads `{FORMAT}`"
         ))
         .hint("use a newer version of study"),
-        _ => Fault::error(format!(
-            "`{}` is not a format of a protocol",
-            Untrusted(&format)
-        ))
-        .label(format!("`{FORMAT}` is")),
-    };
-    value.fault(fault);
+        _ => Fault::error(format!("`{given}` is not a format of a protocol"))
+            .label(format!("`{FORMAT}` is")),
+    });
     false
 }
 
@@ -193,11 +185,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let session = root.section("session").and_then(general::session);
     let device = root.section("device").and_then(device::read);
     let trial = root.section("trial").and_then(general::trial);
-    let models = root
-        .sections("models")
-        .into_iter()
-        .map(models::read)
-        .collect();
+    let models = root.sections("models").into_iter().map(models::read);
     let questions = questions::read(&mut root, "questions");
     let setup = questions::read(&mut root, "setup");
     let intake = questions::read(&mut root, "intake");
@@ -208,7 +196,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         design: design.as_ref(),
         device: device.as_ref(),
         minimum_strokes: trial.as_ref().map_or(0, |t| t.minimum_strokes),
-        models,
+        models: models.collect(),
         questions,
         setup,
         intake,

@@ -238,29 +238,23 @@ impl Key {
 
     /// The same, but it cannot be left out.
     #[must_use]
-    pub const fn required(self) -> Self {
-        Self {
-            absent: Absent::Error,
-            ..self
-        }
+    pub const fn required(mut self) -> Self {
+        self.absent = Absent::Error;
+        self
     }
 
     /// The same, with a default in TOML.
     #[must_use]
-    pub const fn default(self, toml: &'static str) -> Self {
-        Self {
-            absent: Absent::Default(toml),
-            ..self
-        }
+    pub const fn default(mut self, toml: &'static str) -> Self {
+        self.absent = Absent::Default(toml);
+        self
     }
 
     /// The same, with a value that follows from something else, in words.
     #[must_use]
-    pub const fn derived(self, from: &'static str) -> Self {
-        Self {
-            absent: Absent::Derived(from),
-            ..self
-        }
+    pub const fn derived(mut self, from: &'static str) -> Self {
+        self.absent = Absent::Derived(from);
+        self
     }
 }
 

@@ -88,34 +88,22 @@ pub enum Answer {
 
 /// Why an answer is not accepted, as a request to the person who gave it.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum AnswerError {
-    /// Declined without a reason.
     #[error("say why it is declined")]
     NoReason,
-    /// Outside a scale, with its ends.
     #[error("choose {0} to {1}")]
     OffScale(f64, f64),
-    /// Outside the range of a number.
     #[error("{}", range(*.min, *.max))]
-    OutOfRange {
-        /// Smallest number that is accepted.
-        min: Option<f64>,
-        /// Largest number that is accepted.
-        max: Option<f64>,
-    },
-    /// Not an option of the list, or chosen too often.
+    OutOfRange { min: Option<f64>, max: Option<f64> },
     #[error("choose from the list")]
     NotAnOption,
-    /// No option chosen, although one is required.
     #[error("choose one")]
     NothingChosen,
-    /// No text, although it is required.
     #[error("an answer is needed")]
     Empty,
-    /// Text longer than [`MAX_TEXT_BYTES`].
     #[error("at most {MAX_TEXT_BYTES} bytes")]
     TooLong,
-    /// An answer to another kind of question.
     #[error("the answer is of another kind than the question")]
     OtherKind,
 }
@@ -164,6 +152,7 @@ impl Question {
     /// [`AnswerError`] if the answer is not accepted.
     pub fn accepts(&self, answer: &Answer) -> Result<(), AnswerError> {
         let when = |refused: bool, error| if refused { Err(error) } else { Ok(()) };
+        let fits = |text: &str| when(text.len() > MAX_TEXT_BYTES, AnswerError::TooLong);
         match (&self.kind, answer) {
             (_, Answer::Declined { reason }) => {
                 when(reason.trim().is_empty(), AnswerError::NoReason)?;
@@ -198,14 +187,6 @@ impl Question {
             }
             _ => Err(AnswerError::OtherKind),
         }
-    }
-}
-
-fn fits(text: &str) -> Result<(), AnswerError> {
-    if text.len() > MAX_TEXT_BYTES {
-        Err(AnswerError::TooLong)
-    } else {
-        Ok(())
     }
 }
 

@@ -233,14 +233,8 @@ fn ewls_tables(
         .into_par_iter()
         .flat_map_iter(|(direction, lambdas)| {
             let samples = training.directions()[direction];
-            pass(
-                processor,
-                options,
-                samples,
-                direction == 1,
-                lambdas,
-                &runs[direction],
-            )
+            let (backward, runs) = (direction == 1, &runs[direction]);
+            pass(processor, options, samples, backward, lambdas, runs)
         })
         .collect();
     let (plus, minus) = sums.split_at(lambdas.len());

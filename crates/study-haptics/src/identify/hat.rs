@@ -14,8 +14,9 @@
 
 use super::banded::{Banded, Bound};
 use super::samples::Theta;
+use super::vaf::motion;
 use crate::recording::Recording;
-use study_wire::predict::{Direction, DirectionState, Lookup, Motion, locate};
+use study_wire::predict::{Direction, DirectionState, Lookup, locate};
 
 /// Unknowns per node: m, b·B_SCALE, F in + and in −.
 const PER_NODE: usize = 6;
@@ -57,11 +58,7 @@ pub(super) fn table(
     let mut weight = vec![[0.0; 2]; nodes.len()];
     let mut state = DirectionState::default();
     for i in 0..recording.len() {
-        let motion = Motion {
-            x_mm: recording.x_mm[i],
-            v_mm_s: recording.v_mm_s[i],
-            a_m_s2: recording.a_m_s2[i],
-        };
+        let motion = motion(recording, i);
         let z = state.step(rule, motion);
         let sides = [0.5 * (1.0 + z), 0.5 * (1.0 - z)];
         let features = [motion.a_m_s2, motion.v_mm_s / B_SCALE, 1.0];
@@ -93,15 +90,8 @@ pub(super) fn table(
     }
     let information = recording.len() as f64 / nodes.len() as f64;
     add_ridges(&mut normal, nodes.len(), information, penalty);
-    let bounds: Vec<Bound> = (0..n)
-        .map(|i| {
-            if i % 3 == 2 {
-                Bound::Free
-            } else {
-                penalty.dynamics
-            }
-        })
-        .collect();
+    let of_node = [penalty.dynamics, penalty.dynamics, Bound::Free];
+    let bounds = of_node.repeat(n / 3);
     let x = normal.solve_bounded(&right, &bounds)?;
     if !x.iter().all(|value| value.is_finite()) {
         return None;

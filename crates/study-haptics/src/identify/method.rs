@@ -8,6 +8,7 @@
 use super::IdentifyError;
 use super::resample::Resample;
 use std::fmt;
+use study_base::named;
 use study_wire::predict::Direction;
 
 /// An estimator with its options.
@@ -138,41 +139,23 @@ impl Ewls {
     }
 }
 
-/// Initial state of the recursion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Start {
-    /// θ = 0 and P = 10⁶ I.
-    Cold,
-    /// The state after a backward pass over the first 3/(1 − λ) samples.
-    Warm,
-}
-
-impl Start {
-    /// The name in arguments and model files.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Cold => "cold",
-            Self::Warm => "warm",
-        }
+named! {
+    /// Initial state of the recursion.
+    Start {
+        /// θ = 0 and P = 10⁶ I.
+        Cold = "cold",
+        /// The state after a backward pass over the first 3/(1 − λ) samples.
+        Warm = "warm",
     }
 }
 
-/// Order of the samples in the recursion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sort {
-    /// Ascending x in both directions.
-    Ascending,
-    /// The direction of travel: ascending in +, descending in −.
-    Travel,
-}
-
-impl Sort {
-    /// The name in arguments and model files.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Ascending => "ascending",
-            Self::Travel => "travel",
-        }
+named! {
+    /// Order of the samples in the recursion.
+    Sort {
+        /// Ascending x in both directions.
+        Ascending = "ascending",
+        /// The direction of travel: ascending in +, descending in −.
+        Travel = "travel",
     }
 }
 
@@ -187,22 +170,13 @@ pub struct TwoSided {
     pub bounded: bool,
 }
 
-/// The weight of a sample by its distance from a node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Window {
-    /// e^(−|x − node|/L), the sum of a forward and a backward EWLS.
-    Exponential,
-    /// (1 − |u|³)³ with u = (x − node)/(3L), 0 for |u| > 1.
-    Tricube,
-}
-
-impl Window {
-    /// The name in arguments and model files.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Exponential => "exponential",
-            Self::Tricube => "tricube",
-        }
+named! {
+    /// The weight of a sample by its distance from a node.
+    Window {
+        /// e^(−|x − node|/L), the sum of a forward and a backward EWLS.
+        Exponential = "exponential",
+        /// (1 − |u|³)³ with u = (x − node)/(3L), 0 for |u| > 1.
+        Tricube = "tricube",
     }
 }
 
@@ -253,15 +227,6 @@ pub enum State {
 }
 
 impl State {
-    /// The name in arguments and model files.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Sign => "sign",
-            Self::Play(_) => "play",
-            Self::Dahl(_) => "dahl",
-        }
-    }
-
     /// The direction rule with a given δ, mm.
     pub(super) fn with(self, delta_mm: f64) -> Direction {
         match self {

@@ -2,96 +2,51 @@
 
 use super::resample::MAX_NODES;
 use super::samples::Theta;
-use std::fmt;
-
 /// Number of samples after which an estimate rests on ten samples per parameter.
 pub(super) const START_UP_SAMPLES: usize = 40;
 
 /// Why identification failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum IdentifyError {
-    /// λ is out of range.
     #[error("lambda has to be above 0 and at most 1, not {0}")]
     Lambda(f64),
-    /// dx is not a positive length.
     #[error("dx has to be a length above 0 mm, not {0}")]
     Dx(f64),
-    /// Fewer than two nodes fit in the range of the recording.
     #[error("dx = {dx_mm} mm leaves {nodes} nodes in {low} to {high} mm: a table has at least two")]
     TooCoarse {
-        /// Resampling increment, mm.
         dx_mm: f64,
-        /// Number of nodes that fit.
         nodes: usize,
-        /// Lower end of the range common to both directions, mm.
         low: f64,
-        /// Upper end of the range common to both directions, mm.
         high: f64,
     },
-    /// More nodes than a table can have.
     #[error(
         "dx = {dx_mm} mm gives more than {most} nodes in {low} to {high} mm",
         most = MAX_NODES
     )]
-    TooFine {
-        /// Resampling increment, mm.
-        dx_mm: f64,
-        /// Lower end of the range common to both directions, mm.
-        low: f64,
-        /// Upper end of the range common to both directions, mm.
-        high: f64,
-    },
-    /// There is only one direction of travel.
+    TooFine { dx_mm: f64, low: f64, high: f64 },
     #[error("{recording} has no samples with v {0} 0: both directions are needed", if *.positive { '>' } else { '<' })]
-    OneDirection {
-        /// Name of the recording.
-        recording: String,
-        /// Whether the missing direction is v > 0.
-        positive: bool,
-    },
-    /// The two directions cover no common positions.
+    OneDirection { recording: String, positive: bool },
     #[error("{0}: the two directions have no range of x in common")]
     NoOverlap(String),
-    /// An option that is a length is not positive.
     #[error("{option} has to be a length above 0 mm, not {value}")]
-    Length {
-        /// The option.
-        option: &'static str,
-        /// Its value, mm.
-        value: f64,
-    },
-    /// The weight of a penalty is negative or not finite.
+    Length { option: &'static str, value: f64 },
     #[error("{option} has to be 0 or more, not {value}")]
-    Ridge {
-        /// The option.
-        option: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// A number of segments that no table can have.
+    Ridge { option: &'static str, value: f64 },
     #[error("{0} segments: a table has 1 to {most}", most = MAX_NODES - 1)]
     Segments(usize),
-    /// Too few samples around every node.
     #[error(
         "too few samples for four parameters within {width_mm} mm of the nodes: choose a larger width"
     )]
-    Narrow {
-        /// L, mm.
-        width_mm: f64,
-    },
-    /// The normal equations are singular.
+    Narrow { width_mm: f64 },
     #[error(
         "the recording leaves parameters of the table undetermined: choose a larger ridge or a larger dx"
     )]
     Undetermined,
-    /// An estimate of the recursion is not finite.
     #[error(
         "the estimates with lambda = {lambda} diverge: the recording does not excite all parameters; choose a larger lambda"
     )]
-    Diverged {
-        /// The forgetting factor.
-        lambda: f64,
-    },
+    Diverged { lambda: f64 },
 }
 
 /// Why nodes were interpolated between their neighbours.
@@ -103,90 +58,44 @@ pub enum Cause {
     FewSamples,
 }
 
-/// What is doubtful about a realization.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Warning {
-    /// Nodes were interpolated between their neighbours.
-    Filled {
-        /// Why.
-        cause: Cause,
-        /// Number of nodes in the + direction.
-        positive: usize,
-        /// Number of nodes in the − direction.
-        negative: usize,
-        /// Nodes of the table.
-        of: usize,
-    },
-    /// Nodes at which the recursion has seen few samples.
-    StartUp {
-        /// Number of nodes.
-        nodes: usize,
-        /// Position of the highest of them, mm.
-        to_mm: f64,
-    },
-    /// The static force of some nodes is far outside the measured range.
-    Implausible {
-        /// Number of nodes, in both directions.
-        nodes: usize,
-        /// The most extreme force, N.
-        force_n: f64,
-        /// Position of that force, mm.
-        at_mm: f64,
-    },
-    /// The best δ is at an end of the scan.
-    DeltaAtEnd {
-        /// The best δ, mm.
-        delta_mm: f64,
-    },
-    /// The spring has a negative stiffness and is unstable.
-    NegativeSpring {
-        /// Stiffness, N/mm.
-        k_n_per_mm: f64,
-    },
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Cause {
+    fn as_str(self) -> &'static str {
         match self {
-            Self::Filled {
-                cause,
-                positive,
-                negative,
-                of,
-            } => {
-                let cause = match cause {
-                    Cause::NoSamples => "no samples",
-                    Cause::FewSamples => "too few samples",
-                };
-                write!(
-                    f,
-                    "{positive} of {of} nodes in + and {negative} in - have {cause} around them and were interpolated"
-                )
-            }
-            Self::StartUp { nodes, to_mm } => write!(
-                f,
-                "{nodes} nodes, the last at {to_mm:.2} mm, rest on fewer than {START_UP_SAMPLES} samples"
-            ),
-            Self::Implausible {
-                nodes,
-                force_n,
-                at_mm,
-            } => write!(
-                f,
-                "the static force of {nodes} nodes is far outside the measured range, the most extreme {force_n:.1} N at {at_mm:.2} mm"
-            ),
-            Self::DeltaAtEnd { delta_mm } => write!(
-                f,
-                "the best delta, {delta_mm} mm, is at an end of the scan: a better one may lie beyond it"
-            ),
-            Self::NegativeSpring { k_n_per_mm } => {
-                write!(
-                    f,
-                    "the stiffness of the spring is negative: {k_n_per_mm:.4} N/mm"
-                )
-            }
+            Self::NoSamples => "no samples",
+            Self::FewSamples => "too few samples",
         }
     }
+}
+
+/// What is doubtful about a realization.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
+pub enum Warning {
+    #[error("{positive} of {of} nodes in + and {negative} in - have {} around them and were interpolated", .cause.as_str())]
+    Filled {
+        cause: Cause,
+        positive: usize,
+        negative: usize,
+        of: usize,
+    },
+    #[error(
+        "{nodes} nodes, the last at {to_mm:.2} mm, rest on fewer than {START_UP_SAMPLES} samples"
+    )]
+    StartUp { nodes: usize, to_mm: f64 },
+    #[error(
+        "the static force of {nodes} nodes is far outside the measured range, the most extreme {force_n:.1} N at {at_mm:.2} mm"
+    )]
+    Implausible {
+        nodes: usize,
+        force_n: f64,
+        at_mm: f64,
+    },
+    #[error(
+        "the best delta, {delta_mm} mm, is at an end of the scan: a better one may lie beyond it"
+    )]
+    DeltaAtEnd { delta_mm: f64 },
+    #[error("the stiffness of the spring is negative: {k_n_per_mm:.4} N/mm")]
+    NegativeSpring { k_n_per_mm: f64 },
 }
 
 /// A warning about nodes whose static force lies outside the measured range, low to

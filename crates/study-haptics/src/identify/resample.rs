@@ -22,25 +22,15 @@ const COUNT_MM: f64 = 0.005;
 /// Most nodes of a table; more are a mistake in dx.
 pub const MAX_NODES: usize = crate::model::file::MAX_NODES;
 
-/// How the parameters at a node follow from the estimates around it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Resample {
-    /// Interpolated between means over equal encoder counts.
-    Point,
-    /// The mean over the bin around the node.
-    Bin,
-    /// The mean weighted by the distance from the node.
-    Hat,
-}
-
-impl Resample {
-    /// The name in model files and arguments.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Point => "point",
-            Self::Bin => "bin",
-            Self::Hat => "hat",
-        }
+study_base::named! {
+    /// How the parameters at a node follow from the estimates around it.
+    Resample {
+        /// Interpolated between means over equal encoder counts.
+        Point = "point",
+        /// The mean over the bin around the node.
+        Bin = "bin",
+        /// The mean weighted by the distance from the node.
+        Hat = "hat",
     }
 }
 

@@ -17,20 +17,21 @@ pub mod thin;
 
 pub use excitation::Excitation;
 pub use filter::LowPass;
-pub use thin::{Dwell, thin};
+pub use thin::thin;
 
 use crate::recording::Recording;
 
 /// A sampling interval may differ from the mean one by this share.
 const INTERVAL_TOLERANCE: f64 = 0.1;
 
-/// The source of the acceleration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Acceleration {
-    /// The column of the recording, filtered like the others.
-    Accelerometer,
-    /// The second central difference of the filtered position.
-    Encoder,
+study_base::named! {
+    /// The source of the acceleration.
+    Acceleration {
+        /// The column of the recording, filtered like the others.
+        Accelerometer = "accelerometer",
+        /// The second central difference of the filtered position.
+        Encoder = "encoder",
+    }
 }
 
 /// How signals are prepared.
@@ -44,29 +45,19 @@ pub struct Settings {
 
 /// Why signals cannot be prepared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum SignalError {
-    /// The corner frequency is out of range.
     #[error(
         "the corner frequency of the filter has to be above 0 and below half the sampling rate of {rate_hz} Hz, not {corner_hz}"
     )]
-    Corner {
-        /// Corner frequency, Hz.
-        corner_hz: f64,
-        /// Sampling rate, Hz.
-        rate_hz: f64,
-    },
-    /// A filter needs equally spaced samples.
+    Corner { corner_hz: f64, rate_hz: f64 },
     #[error(
         "{recording}: the sampling interval at {at_s} s is {interval_s} s instead of {mean_s} s: a filter needs a recording without gaps"
     )]
     Uneven {
-        /// Name of the recording.
         recording: String,
-        /// Start of the interval, s.
         at_s: f64,
-        /// Its length, s.
         interval_s: f64,
-        /// The mean interval, s.
         mean_s: f64,
     },
 }

@@ -21,6 +21,15 @@ pub struct Score {
     pub residual_n: f64,
 }
 
+/// The motion of a sample.
+pub(super) fn motion(recording: &Recording, i: usize) -> Motion {
+    Motion {
+        x_mm: recording.x_mm[i],
+        v_mm_s: recording.v_mm_s[i],
+        a_m_s2: recording.a_m_s2[i],
+    }
+}
+
 /// The predicted force of each sample, N.
 pub fn predict<'r>(
     realization: &'r Realization,
@@ -30,11 +39,7 @@ pub fn predict<'r>(
     let rule = realization.direction;
     let mut state = DirectionState::default();
     (0..recording.len()).map(move |i| {
-        let motion = Motion {
-            x_mm: recording.x_mm[i],
-            v_mm_s: recording.v_mm_s[i],
-            a_m_s2: recording.a_m_s2[i],
-        };
+        let motion = motion(recording, i);
         force_n(&table, state.step(rule, motion), motion)
     })
 }

@@ -5,9 +5,6 @@
 //! do not ascend, lists of different lengths, reversed ranges. Writing is reproducible:
 //! the same realization gives the same bytes, numbers have the fewest digits that read
 //! back as the same number, and `parse(write(r)) == r` for every valid `r`.
-//!
-//! A file of a newer format is refused by its number alone, because its unknown keys are
-//! not mistakes.
 
 mod write;
 
@@ -15,7 +12,7 @@ pub use write::write;
 
 use super::{Branch, FORMAT, Provenance, Realization, Trained};
 use std::collections::BTreeMap;
-use study_base::diagnostic::table::{Document, Table, Value};
+use study_base::diagnostic::table::{self, Table, Value};
 use study_base::diagnostic::{Fault, Findings};
 use study_base::limits::Limit;
 use study_base::text::{ModelId, Untrusted};
@@ -24,46 +21,21 @@ use study_wire::predict::{Direction, Lookup};
 /// Most nodes of a table.
 pub const MAX_NODES: usize = 20_000;
 
-/// The values of `lookup`.
-const LOOKUPS: [(&str, Lookup); 3] = [
-    ("linear", Lookup::Linear),
-    ("floor", Lookup::Floor),
-    ("nearest", Lookup::Nearest),
-];
-
 /// The keys of a branch, in the order of [`Branch`].
 const PARAMETERS: [&str; 4] = ["m_kg", "b_n_s_per_mm", "k_n_per_mm", "f0_n"];
-
-/// The name of a look-up in model files and arguments.
-pub fn lookup_name(lookup: Lookup) -> &'static str {
-    match lookup {
-        Lookup::Linear => "linear",
-        Lookup::Floor => "floor",
-        Lookup::Nearest => "nearest",
-    }
-}
 
 /// Reads a model file; `path` is for messages. `None` if and only if the findings
 /// contain an error.
 pub fn parse(path: &str, text: &str) -> (Option<Realization>, Findings) {
-    let document = Document::parse(text);
-    let realization = read(&document);
-    let mut findings = Findings::new(path, text);
-    findings.faults = document.finish().faults;
-    findings.sort();
-    let good = !findings.has_errors();
-    (realization.filter(|_| good), findings)
+    table::parse(path, text, read)
 }
 
-fn read(document: &Document<'_>) -> Option<Realization> {
-    let mut root = document.root();
-    if !has_known_format(&mut root) {
+fn read(mut root: Table<'_, '_>) -> Option<Realization> {
+    if !root.has_format(FORMAT, "a model file") {
         return None;
     }
     let id = id(&mut root);
-    let lookup = root
-        .required("lookup")
-        .and_then(|value| value.word(&LOOKUPS));
+    let lookup = root.required("lookup").and_then(|v| v.word(&Lookup::NAMES));
     let direction = root.required("direction").and_then(direction);
     let trained = root.required("trained").and_then(trained);
     let x_mm = root.required("x_mm").and_then(|value| positions(&value));
@@ -93,33 +65,6 @@ fn read(document: &Document<'_>) -> Option<Realization> {
         positive: positive?,
         negative: negative?,
     })
-}
-
-/// Whether the rest of the file can be read as [`FORMAT`].
-fn has_known_format(root: &mut Table<'_, '_>) -> bool {
-    let Some(value) = root.required("format") else {
-        // most likely forgotten: report the faults of the rest as well
-        return true;
-    };
-    let Some(given) = value.text() else {
-        return true;
-    };
-    if given == FORMAT {
-        return true;
-    }
-    let fault = Fault::error(format!("this is not a {FORMAT} file"));
-    let newer = given
-        .strip_prefix("study-model/")
-        .and_then(|n| n.parse::<u32>().ok())
-        .is_some_and(|n| n > 1);
-    value.fault(if newer {
-        fault
-            .label("a newer format")
-            .hint("it was written by a newer version of study, which can read it")
-    } else {
-        fault.hint(format!("a model file begins with format = \"{FORMAT}\""))
-    });
-    false
 }
 
 fn id(root: &mut Table<'_, '_>) -> Option<String> {
@@ -163,21 +108,8 @@ fn trained(value: Value<'_, '_>) -> Option<Trained> {
         let numbers = numbers(&value)?;
         match numbers[..] {
             [low, high] if low < high => Some([low, high]),
-            [_, _] => {
-                value.fault(Fault::error(format!(
-                    "`{}` has to ascend: lowest, then highest position",
-                    value.path()
-                )));
-                None
-            }
-            _ => {
-                value.fault(Fault::error(format!(
-                    "`{}` has to be two numbers, not {}",
-                    value.path(),
-                    numbers.len()
-                )));
-                None
-            }
+            [_, _] => value.refuse("has to ascend: lowest, then highest position"),
+            _ => value.refuse(format_args!("has to be two numbers, not {}", numbers.len())),
         }
     });
     let v_mm_s = table.required("v_mm_s").and_then(|v| positive(&v));
@@ -190,28 +122,23 @@ fn trained(value: Value<'_, '_>) -> Option<Trained> {
 
 fn positions(value: &Value<'_, '_>) -> Option<Vec<f64>> {
     let numbers = numbers(value)?;
-    if !(2..=MAX_NODES).contains(&numbers.len()) {
-        value.fault(Fault::error(format!(
-            "`{}` has {} nodes: a table has 2 to {MAX_NODES}",
-            value.path(),
-            numbers.len()
-        )));
-        return None;
+    let nodes = numbers.len();
+    if !(2..=MAX_NODES).contains(&nodes) {
+        return value.refuse(format_args!(
+            "has {nodes} nodes: a table has 2 to {MAX_NODES}"
+        ));
     }
     let values = value.array()?;
-    let mut ascends = true;
+    let mut all = Some(());
     for (pair, value) in numbers.windows(2).zip(&values[1..]) {
-        if pair[1] <= pair[0] {
-            value.fault(Fault::error(format!(
-                "`{}` is {} after {}: positions have to ascend",
-                value.path(),
-                pair[1],
-                pair[0]
-            )));
-            ascends = false;
+        let [before, x] = [pair[0], pair[1]];
+        if x <= before {
+            all = value.refuse(format_args!(
+                "is {x} after {before}: positions have to ascend"
+            ));
         }
     }
-    ascends.then_some(numbers)
+    all.map(|()| numbers)
 }
 
 fn provenance(value: Value<'_, '_>) -> Option<Provenance> {
@@ -222,11 +149,9 @@ fn provenance(value: Value<'_, '_>) -> Option<Provenance> {
         if lambda > 0.0 && lambda <= 1.0 {
             return Some(lambda);
         }
-        value.fault(Fault::error(format!(
-            "`{}` has to be above 0 and at most 1, not {lambda}",
-            value.path()
-        )));
-        None
+        value.refuse(format_args!(
+            "has to be above 0 and at most 1, not {lambda}"
+        ))
     });
     let memory_mm = table.value("memory_mm").and_then(|v| positive(&v));
     let dx_mm = table.value("dx_mm").and_then(|v| positive(&v));
@@ -284,14 +209,10 @@ fn branch(value: Value<'_, '_>, nodes: Option<usize>) -> Option<Branch> {
     let [m_kg, b_n_s_per_mm, k_n_per_mm, f0_n] = PARAMETERS.map(|key| {
         let value = table.required(key)?;
         let numbers = numbers(&value)?;
+        let n = numbers.len();
         match nodes {
-            Some(nodes) if nodes != numbers.len() => {
-                value.fault(Fault::error(format!(
-                    "`{}` has {} numbers where `x_mm` has {nodes}",
-                    value.path(),
-                    numbers.len()
-                )));
-                None
+            Some(nodes) if nodes != n => {
+                value.refuse(format_args!("has {n} numbers where `x_mm` has {nodes}"))
             }
             _ => Some(numbers),
         }
@@ -317,25 +238,17 @@ fn finite(value: &Value<'_, '_>) -> Option<f64> {
     if number.is_finite() {
         return Some(number);
     }
-    value.fault(Fault::error(format!(
-        "`{}` has to be a finite number, not {number}",
-        value.path()
-    )));
-    None
+    value.refuse(format_args!("has to be a finite number, not {number}"))
 }
 
 fn positive(value: &Value<'_, '_>) -> Option<f64> {
     let number = value.f64()?;
-    match Limit::new(number) {
-        Ok(limit) => Some(limit.get()),
-        Err(_) => {
-            value.fault(Fault::error(format!(
-                "`{}` has to be a finite number above zero, not {number}",
-                value.path()
-            )));
-            None
-        }
+    if Limit::new(number).is_ok() {
+        return Some(number);
     }
+    value.refuse(format_args!(
+        "has to be a finite number above zero, not {number}"
+    ))
 }
 
 #[cfg(test)]

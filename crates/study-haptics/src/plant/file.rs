@@ -7,7 +7,7 @@
 
 use super::parameters::{Extremum, Parameters};
 use std::fmt::Write as _;
-use study_base::diagnostic::table::{Document, Table, Value};
+use study_base::diagnostic::table::{self, Table, Value};
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::Untrusted;
 
@@ -46,30 +46,16 @@ fn numbers(p: &mut Parameters) -> [(&'static str, &mut f64); 21] {
 /// Reads a plant file; `path` is for messages. `None` if and only if the findings
 /// contain an error.
 pub fn parse(path: &str, text: &str) -> (Option<Parameters>, Findings) {
-    let document = Document::parse(text);
-    let parameters = read(&document);
-    let mut findings = Findings::new(path, text);
-    findings.faults = document.finish().faults;
-    findings.sort();
-    if !findings.has_errors()
-        && let Some(Err(bad)) = parameters.as_ref().map(Parameters::check)
-    {
+    let (parameters, mut findings) = table::parse(path, text, read);
+    if let Some(Err(bad)) = parameters.as_ref().map(Parameters::check) {
         findings.faults.push(Fault::error(bad.to_string()));
+        return (None, findings);
     }
-    let good = !findings.has_errors();
-    (parameters.filter(|_| good), findings)
+    (parameters, findings)
 }
 
-fn read(document: &Document<'_>) -> Option<Parameters> {
-    let mut root = document.root();
-    if let Some(format) = root.required("format")
-        && let Some(given) = format.text()
-        && given != FORMAT
-    {
-        format.fault(
-            Fault::error(format!("this is not a {FORMAT} file"))
-                .hint(format!("a plant file begins with format = \"{FORMAT}\"")),
-        );
+fn read(mut root: Table<'_, '_>) -> Option<Parameters> {
+    if !root.has_format(FORMAT, "a plant file") {
         return None;
     }
     let like = root.value("like").map(|value| {
@@ -115,25 +101,17 @@ fn value<'d, 't>(root: &mut Table<'d, 't>, key: &str, required: bool) -> Option<
 fn pair(value: &Value<'_, '_>) -> Option<[f64; 2]> {
     let numbers: Vec<f64> = value.array()?.iter().filter_map(Value::f64).collect();
     let pair = <[f64; 2]>::try_from(numbers).ok();
-    if pair.is_none() {
-        value.fault(Fault::error(format!(
-            "`{}` has to be two numbers",
-            value.path()
-        )));
-    }
-    pair
+    pair.or_else(|| value.refuse("has to be two numbers"))
 }
 
 /// `[{ at_mm = 5, width_mm = 1.5 }, …]`
 fn extrema(value: Value<'_, '_>) -> Option<Vec<Extremum>> {
     let all = value.array()?;
     if all.len() > MAX_EXTREMA {
-        value.fault(Fault::error(format!(
-            "`{}` has {} entries: at most {MAX_EXTREMA} are allowed",
-            value.path(),
-            all.len()
-        )));
-        return None;
+        let n = all.len();
+        return value.refuse(format_args!(
+            "has {n} entries: at most {MAX_EXTREMA} are allowed"
+        ));
     }
     all.into_iter()
         .map(|value| {

@@ -82,11 +82,7 @@ impl Hand {
             parameters,
             ends_mm,
             variation,
-            motion: Motion {
-                x_mm: low_mm,
-                v_mm_s: 0.0,
-                a_m_s2: 0.0,
-            },
+            motion: Motion::at_rest(low_mm),
             stroke: Stroke {
                 from_mm: low_mm,
                 by_mm: 0.0,

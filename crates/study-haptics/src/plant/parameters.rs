@@ -131,15 +131,12 @@ impl Parameters {
     /// [`PlantError`] for the first parameter that is out of range, such as a number that
     /// is not finite, a mass or length that is not positive, or stops in the wrong order.
     pub fn check(&self) -> Result<(), PlantError> {
-        let require = |satisfied: bool, parameter, requirement| {
-            if satisfied {
-                Ok(())
-            } else {
-                Err(PlantError {
-                    parameter,
-                    requirement,
-                })
-            }
+        let require = |satisfied: bool, parameter, requirement| match satisfied {
+            true => Ok(()),
+            false => Err(PlantError {
+                parameter,
+                requirement,
+            }),
         };
         for (parameter, value) in [
             ("follower mass", self.follower_kg),
@@ -149,11 +146,8 @@ impl Parameters {
             ("preload", self.preload_n),
             ("contact stiffness", self.contact_n_per_mm),
         ] {
-            require(
-                value.is_finite() && value > 0.0,
-                parameter,
-                "finite and above zero",
-            )?;
+            let good = value.is_finite() && value > 0.0;
+            require(good, parameter, "finite and above zero")?;
         }
         for (parameter, value) in [
             ("handle mass", self.handle_kg),
@@ -170,11 +164,8 @@ impl Parameters {
             ("stop stiffness", self.stop_n_per_mm),
             ("stop damping", self.stop_n_s_per_m),
         ] {
-            require(
-                value.is_finite() && value >= 0.0,
-                parameter,
-                "finite and not negative",
-            )?;
+            let good = value.is_finite() && value >= 0.0;
+            require(good, parameter, "finite and not negative")?;
         }
         require(
             self.slope.is_finite() && self.preload_at_mm.is_finite(),

@@ -79,15 +79,6 @@ pub struct Measurement {
     pub f_n: Vec<f64>,
 }
 
-/// The limits of a target: its end stops.
-fn envelope_of_target(target: &Parameters) -> Envelope {
-    Envelope {
-        travel_mm: target.stops_mm,
-        velocity_mm_s: None,
-        acceleration_m_s2: None,
-    }
-}
-
 impl Probe {
     /// Compares a trajectory with the limits of this probe and of the target.
     ///
@@ -98,10 +89,12 @@ impl Probe {
         trajectory: &Trajectory,
         target: &Parameters,
     ) -> Result<(), Vec<Violation>> {
-        let envelopes = [
-            ("the probe", self.envelope),
-            ("the target", envelope_of_target(target)),
-        ];
+        let stops = Envelope {
+            travel_mm: target.stops_mm,
+            velocity_mm_s: None,
+            acceleration_m_s2: None,
+        };
+        let envelopes = [("the probe", self.envelope), ("the target", stops)];
         check::check(trajectory, &envelopes)
     }
 

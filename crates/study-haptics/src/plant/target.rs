@@ -77,28 +77,26 @@ impl Target {
         let apart = motion.x_mm - self.y_mm;
         let closing = motion.v_mm_s - self.y_mm_s;
         let half = 0.5 * p.backlash_mm;
-        let damping = p.contact_n_s_per_m * 1e-3;
-        if apart > half {
-            (p.contact_n_per_mm * (apart - half) + damping * closing).max(0.0)
-        } else if apart < -half {
-            (p.contact_n_per_mm * (apart + half) + damping * closing).min(0.0)
-        } else {
-            0.0
-        }
+        let damping_n = p.contact_n_s_per_m * 1e-3 * closing;
+        pushed_back_n(apart, [-half, half], p.contact_n_per_mm, damping_n)
     }
 
     /// The force of the probe against an end stop, N.
     fn stop_n(&self, motion: Motion) -> f64 {
         let p = &self.parameters;
-        let [low, high] = p.stops_mm;
-        let damping = p.stop_n_s_per_m * 1e-3;
-        if motion.x_mm > high {
-            (p.stop_n_per_mm * (motion.x_mm - high) + damping * motion.v_mm_s).max(0.0)
-        } else if motion.x_mm < low {
-            (p.stop_n_per_mm * (motion.x_mm - low) + damping * motion.v_mm_s).min(0.0)
-        } else {
-            0.0
-        }
+        let damping_n = p.stop_n_s_per_m * 1e-3 * motion.v_mm_s;
+        pushed_back_n(motion.x_mm, p.stops_mm, p.stop_n_per_mm, damping_n)
+    }
+}
+
+/// The force of a spring and a damper beyond either end of a range; it never pulls.
+fn pushed_back_n(x_mm: f64, [low, high]: [f64; 2], n_per_mm: f64, damping_n: f64) -> f64 {
+    if x_mm > high {
+        (n_per_mm * (x_mm - high) + damping_n).max(0.0)
+    } else if x_mm < low {
+        (n_per_mm * (x_mm - low) + damping_n).min(0.0)
+    } else {
+        0.0
     }
 }
 

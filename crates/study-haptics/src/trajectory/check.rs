@@ -153,21 +153,16 @@ impl Monitor {
             violation: None,
         };
         let [low, high] = envelope.travel_mm;
-        let mut all = vec![
-            one(Quantity::Travel, -1.0, low),
-            one(Quantity::Travel, 1.0, high),
-        ];
-        all.extend(
-            envelope
-                .velocity_mm_s
-                .map(|v| one(Quantity::Velocity, 1.0, v.get())),
-        );
-        all.extend(
-            envelope
-                .acceleration_m_s2
-                .map(|a| one(Quantity::Acceleration, 1.0, a.get())),
-        );
-        all
+        let travel = [(-1.0, low), (1.0, high)];
+        let travel = travel.map(|(sign, limit)| one(Quantity::Travel, sign, limit));
+        let upper = |quantity, limit: Option<Limit>| limit.map(|l| one(quantity, 1.0, l.get()));
+        let velocity = upper(Quantity::Velocity, envelope.velocity_mm_s);
+        let acceleration = upper(Quantity::Acceleration, envelope.acceleration_m_s2);
+        travel
+            .into_iter()
+            .chain(velocity)
+            .chain(acceleration)
+            .collect()
     }
 
     fn observe(&mut self, t_s: f64, motion: Motion) {

@@ -6,9 +6,9 @@
 
 use super::parts::{PRBS_ORDERS, Part, Prbs, Shape, Sine, Steps, Sweep};
 use super::{Envelope, FORMAT, MAX_DURATION_S, MAX_PARTS, MAX_RAMP_S, Trajectory};
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::ops::RangeInclusive;
-use study_base::diagnostic::table::{Document, Table, Value};
+use study_base::diagnostic::table::{self, Table, Value};
 use study_base::diagnostic::{Fault, Findings};
 use study_base::limits::Limit;
 
@@ -28,26 +28,11 @@ const SHAPES: [(&str, Shape); 2] = [("triangular", Shape::Triangular), ("linear"
 /// Reads a trajectory file; `path` is for messages. `None` if and only if the findings
 /// contain an error.
 pub fn parse(path: &str, text: &str) -> (Option<Trajectory>, Findings) {
-    let document = Document::parse(text);
-    let trajectory = read(&document);
-    let mut findings = Findings::new(path, text);
-    findings.faults = document.finish().faults;
-    findings.sort();
-    let good = !findings.has_errors();
-    (trajectory.filter(|_| good), findings)
+    table::parse(path, text, read)
 }
 
-fn read(document: &Document<'_>) -> Option<Trajectory> {
-    let mut root = document.root();
-    if let Some(format) = root.required("format")
-        && let Some(given) = format.text()
-        && given != FORMAT
-    {
-        format.fault(
-            Fault::error(format!("this is not a {FORMAT} file")).hint(format!(
-                "a trajectory file begins with format = \"{FORMAT}\""
-            )),
-        );
+fn read(mut root: Table<'_, '_>) -> Option<Trajectory> {
+    if !root.has_format(FORMAT, "a trajectory file") {
         return None;
     }
     let title = root.text("title");
@@ -111,17 +96,19 @@ const STEPS: [Key; 3] = [
 
 /// A number in a range; NaN is in no range.
 fn number(value: &Value<'_, '_>, range: &RangeInclusive<f64>) -> Option<f64> {
-    let number = value.f64()?;
+    in_range(value, value.f64()?, range)
+}
+
+fn in_range<T: PartialOrd + Display>(
+    value: &Value<'_, '_>,
+    number: T,
+    range: &RangeInclusive<T>,
+) -> Option<T> {
     if range.contains(&number) {
         return Some(number);
     }
-    value.fault(Fault::error(format!(
-        "`{}` has to be from {} to {}, not {number}",
-        value.path(),
-        range.start(),
-        range.end()
-    )));
-    None
+    let (low, high) = (range.start(), range.end());
+    value.refuse(format_args!("has to be from {low} to {high}, not {number}"))
 }
 
 /// The numbers of a table, in the order of the keys; reports the faults of all.
@@ -146,13 +133,7 @@ fn limits(mut table: Table<'_, '_>) -> Option<Envelope> {
         let numbers: Vec<f64> = value.array()?.iter().filter_map(Value::f64).collect();
         match numbers[..] {
             [low, high] if low < high && low.is_finite() && high.is_finite() => Some([low, high]),
-            _ => {
-                value.fault(Fault::error(format!(
-                    "`{}` has to be two numbers, the lower first",
-                    value.path()
-                )));
-                None
-            }
+            _ => value.refuse("has to be two numbers, the lower first"),
         }
     });
     let mut limit = |key: &str| {
@@ -212,19 +193,8 @@ fn sweep(table: &mut Table<'_, '_>) -> Option<Part> {
 }
 
 fn prbs(table: &mut Table<'_, '_>) -> Option<Part> {
-    let order = table.required("order").and_then(|value| {
-        let order = value.u32()?;
-        if !PRBS_ORDERS.contains(&order) {
-            value.fault(Fault::error(format!(
-                "`{}` has to be from {} to {}, not {order}",
-                value.path(),
-                PRBS_ORDERS.start(),
-                PRBS_ORDERS.end()
-            )));
-            return None;
-        }
-        Some(order)
-    });
+    let order = table.required("order");
+    let order = order.and_then(|value| in_range(&value, value.u32()?, &PRBS_ORDERS));
     let [amplitude_mm, bit_s, rise_s] = numbers(table, &PRBS)?;
     if rise_s > bit_s {
         table.fault_at(
@@ -247,11 +217,7 @@ fn steps(table: &mut Table<'_, '_>) -> Option<Part> {
         let next = levels.iter().cycle().skip(1);
         let apart = levels.iter().zip(next).all(|(a, b)| a != b);
         if !(2..=MAX_LEVELS).contains(&levels.len()) || !apart {
-            value.fault(Fault::error(format!(
-                "`{}` has to be 2 to {MAX_LEVELS} levels, each different from the one before (the first follows the last)",
-                value.path()
-            )));
-            return None;
+            return value.refuse(format_args!("has to be 2 to {MAX_LEVELS} levels, each different from the one before (the first follows the last)"));
         }
         Some(levels)
     });
@@ -295,11 +261,8 @@ pub fn write(trajectory: &Trajectory) -> String {
         line(&mut out, "kind", format!("\"{kind}\""));
         match part {
             Part::Sine(p) => {
-                lines(
-                    &mut out,
-                    &SINE,
-                    [p.amplitude_mm, p.frequency_hz, p.phase_deg],
-                );
+                let values = [p.amplitude_mm, p.frequency_hz, p.phase_deg];
+                lines(&mut out, &SINE, values);
             }
             Part::Sweep(p) => {
                 let values = [p.amplitude_mm, p.from_hz, p.to_hz, p.period_s, p.phase_deg];
@@ -330,7 +293,7 @@ fn lines<const N: usize>(out: &mut String, keys: &[Key; N], values: [f64; N]) {
     }
 }
 
-fn line(out: &mut String, key: &str, value: impl std::fmt::Display) {
+fn line(out: &mut String, key: &str, value: impl Display) {
     // writing to a String cannot fail
     let _ = writeln!(out, "{key} = {value}");
 }

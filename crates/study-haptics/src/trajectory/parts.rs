@@ -139,10 +139,8 @@ impl Part {
 impl Sine {
     fn at(&self, t_s: f64) -> [f64; 3] {
         let w = TAU * self.frequency_hz;
-        sinusoid(
-            self.amplitude_mm,
-            [w * t_s + self.phase_deg.to_radians(), w, 0.0],
-        )
+        let phase = w * t_s + self.phase_deg.to_radians();
+        sinusoid(self.amplitude_mm, [phase, w, 0.0])
     }
 }
 

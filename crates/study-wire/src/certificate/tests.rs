@@ -234,9 +234,4 @@ fn a_sampled_spring_needs_the_damping_of_colgate_and_schenkel() {
     }
     // one period of delay triples it
     assert!((spring_damping_n_s_per_m(5.0, 1000.0, 1.0) - 7.5).abs() < 1e-12);
-    // a mass of 0.5 kg, not low-passed, at 4 kHz
-    assert!((mass_damping_n_s_per_m(0.5, 4000.0) - 4000.0).abs() < 1e-9);
-    // 2 N·s/m at 1 kHz carries 4 N/mm; 0.01 N over 5 µm carries 4 N/mm as well
-    assert!((stiffest_n_per_mm(2.0, 1000.0, 1.0, 0.005) - 4.0).abs() < 1e-12);
-    assert!((stiffest_n_per_mm(9.0, 1000.0, 0.01, 0.005) - 4.0).abs() < 1e-12);
 }

@@ -1,9 +1,11 @@
 //! Probe mode: the motor moves the handle along a path while the force is measured.
 
-use super::table::{Bounds, Refused};
+use super::table::{Bounds, Refused, require};
 use super::{Drive, Handler, Measured, Out};
-use crate::message::probe::PathCrc;
-use crate::message::{DeviceState, Fault, PathBegin, PathChunk, RecordedPoint, Refusal, fixed};
+
+use crate::message::{
+    DeviceState, Fault, PathBegin, PathChunk, RecordedPoint, Refusal, UploadCrc, fixed,
+};
 
 /// Largest deviation from the path, mm.
 const MAX_DEVIATION_MM: f64 = 5.0;
@@ -18,7 +20,7 @@ pub(super) struct PathBuffer<const N: usize> {
     x_nm: [i32; N],
     len: usize,
     begin: Option<PathBegin>,
-    crc: PathCrc,
+    crc: UploadCrc,
     /// Position of the handle at the start of the approach.
     from_mm: Option<f64>,
     /// Duration of the approach, servo periods.
@@ -33,7 +35,7 @@ impl<const N: usize> PathBuffer<N> {
             x_nm: [0; N],
             len: 0,
             begin: None,
-            crc: PathCrc::default(),
+            crc: UploadCrc::default(),
             from_mm: None,
             approach: 0,
             ticks: 0,
@@ -47,10 +49,9 @@ impl<const N: usize> PathBuffer<N> {
 
     pub(super) fn begin(&mut self, begin: &PathBegin) -> Result<(), Refused> {
         self.clear();
-        if begin.points as usize > N {
-            return Err((Refusal::TooMany, N as u32));
-        }
-        self.crc = PathCrc::of(begin);
+        let fits = begin.points as usize <= N;
+        require(fits, Refusal::TooMany, N as u32)?;
+        self.crc = UploadCrc::of_path(begin);
         self.begin = Some(*begin);
         Ok(())
     }
@@ -60,12 +61,10 @@ impl<const N: usize> PathBuffer<N> {
             return Err((Refusal::WrongState, 0));
         };
         let points = chunk.x_nm.as_slice();
-        if chunk.first as usize != self.len {
-            return Err((Refusal::Order, self.len as u32));
-        }
-        if self.len + points.len() > begin.points as usize {
-            return Err((Refusal::TooMany, begin.points));
-        }
+        let next = chunk.first as usize == self.len;
+        require(next, Refusal::Order, self.len as u32)?;
+        let fits = self.len + points.len() <= begin.points as usize;
+        require(fits, Refusal::TooMany, begin.points)?;
         for point in points {
             self.x_nm[self.len] = *point;
             self.crc.point(*point);
@@ -84,31 +83,22 @@ impl<const N: usize> PathBuffer<N> {
         let Some(begin) = &self.begin else {
             return Err((Refusal::WrongState, 0));
         };
-        if self.len != begin.points as usize {
-            return Err((Refusal::Incomplete, self.len as u32));
-        }
-        if self.crc.value() != crc {
-            return Err((Refusal::Checksum, self.crc.value()));
-        }
+        let (points, own_crc) = (self.len as u32, self.crc.value());
+        require(points == begin.points, Refusal::Incomplete, points)?;
+        require(own_crc == crc, Refusal::Checksum, own_crc)?;
         let within = |value: f64, most: f64| value.is_finite() && value > 0.0 && value <= most;
-        if self.len < 2 || !within(begin.rate_hz, servo_hz) {
-            return Err((Refusal::BadTable, self.len as u32));
-        }
-        if !within(begin.force_n, bounds.force_n) {
-            return Err((Refusal::Limit, 1));
-        }
-        if !within(begin.velocity_mm_s, bounds.velocity_mm_s) {
-            return Err((Refusal::Limit, 2));
-        }
+        let sampled = points >= 2 && within(begin.rate_hz, servo_hz);
+        require(sampled, Refusal::BadTable, points)?;
+        require(within(begin.force_n, bounds.force_n), Refusal::Limit, 1)?;
+        let velocity = within(begin.velocity_mm_s, bounds.velocity_mm_s);
+        require(velocity, Refusal::Limit, 2)?;
+        let [low, high] = bounds.stroke_mm;
         for (i, x_nm) in self.x_nm[..self.len].iter().enumerate() {
             let x_mm = fixed::from_nm(*x_nm);
             let before_mm = fixed::from_nm(self.x_nm[i.saturating_sub(1)]);
-            if x_mm < bounds.stroke_mm[0] || x_mm > bounds.stroke_mm[1] {
-                return Err((Refusal::Limit, 3));
-            }
-            if libm::fabs(x_mm - before_mm) * begin.rate_hz > begin.velocity_mm_s {
-                return Err((Refusal::BadTable, i as u32));
-            }
+            require((low..=high).contains(&x_mm), Refusal::Limit, 3)?;
+            let slow = libm::fabs(x_mm - before_mm) * begin.rate_hz <= begin.velocity_mm_s;
+            require(slow, Refusal::BadTable, i as u32)?;
         }
         Ok(begin.force_n)
     }
@@ -184,10 +174,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         let servo_hz = self.profile.servo.servo_hz;
         let motion = measured.motion;
         let bounds = self.profile.bounds;
-        let finite = motion.x_mm.is_finite()
-            && motion.v_mm_s.is_finite()
-            && motion.a_m_s2.is_finite()
-            && measured.force_n.unwrap_or(0.0).is_finite();
+        let finite = motion.is_finite() && measured.force_n.is_none_or(f64::is_finite);
         // With `<=` a limit that is NaN trips.
         let slow = libm::fabs(motion.v_mm_s) <= self.path.velocity_mm_s();
         let inside = motion.x_mm >= bounds.stroke_mm[0] && motion.x_mm <= bounds.stroke_mm[1];

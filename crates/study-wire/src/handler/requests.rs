@@ -1,7 +1,7 @@
 //! Execution of the requests.
 
 use super::run::{Run, count};
-use super::table::Refused;
+use super::table::{Refused, require};
 use super::{Alive, Handler, LastRequest, Out};
 use crate::frame::crc32;
 use crate::message::{
@@ -157,19 +157,12 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
 
     /// Whether an upload may go on.
     fn may_continue(&self) -> Answer {
-        if self.state == DeviceState::Idle {
-            Ok(())
-        } else {
-            Err((Refusal::WrongState, 0))
-        }
+        require(self.state == DeviceState::Idle, Refusal::WrongState, 0)
     }
 
     fn may_probe(&self) -> Answer {
-        if POINTS == 0 || !self.profile.flags.probe {
-            Err((Refusal::NoProbe, 0))
-        } else {
-            Ok(())
-        }
+        let probe = POINTS > 0 && self.profile.flags.probe;
+        require(probe, Refusal::NoProbe, 0)
     }
 
     /// Loads a valid upload if the host is alive.
@@ -211,24 +204,18 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 
     fn may_start(&self, loaded: Loaded, playback: u32, crc: u32, now_ms: u32) -> Answer {
-        if self.state != DeviceState::Loaded {
-            Err((Refusal::WrongState, 0))
-        } else if self.loaded != loaded || self.crc != crc {
-            Err((Refusal::OtherTable, self.crc))
-        } else if playback == 0 {
-            Err((Refusal::Malformed, 0))
-        } else if !self.alive(now_ms) {
-            Err((Refusal::NoHeartbeat, 0))
-        } else {
-            Ok(())
-        }
+        require(self.state == DeviceState::Loaded, Refusal::WrongState, 0)?;
+        let same = self.loaded == loaded && self.crc == crc;
+        require(same, Refusal::OtherTable, self.crc)?;
+        require(playback != 0, Refusal::Malformed, 0)?;
+        require(self.alive(now_ms), Refusal::NoHeartbeat, 0)
     }
 
     fn start_playback(&mut self, play: Play, now_ms: u32) -> Answer {
         self.may_start(Loaded::Table, play.playback, play.crc, now_ms)?;
-        if !(1..=self.profile.longest_ms).contains(&play.longest_ms) {
-            return Err((Refusal::Duration, self.profile.longest_ms));
-        }
+        let longest_ms = self.profile.longest_ms;
+        let possible = (1..=longest_ms).contains(&play.longest_ms);
+        require(possible, Refusal::Duration, longest_ms)?;
         let servo_hz = self.profile.servo.servo_hz;
         let least = libm::ceil(servo_hz / self.profile.telemetry_hz) as u32;
         let least = NonZeroU32::new(least).unwrap_or(NonZeroU32::MIN);
@@ -255,9 +242,8 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 
     fn stop(&mut self, stop: Stop) -> Answer {
-        if stop.playback == 0 || stop.playback != self.run.playback {
-            return Err((Refusal::OtherPlayback, self.run.playback));
-        }
+        let current = stop.playback != 0 && stop.playback == self.run.playback;
+        require(current, Refusal::OtherPlayback, self.run.playback)?;
         // The playback may have ended by itself in the meantime.
         if self.state.applies_force() {
             self.end();
@@ -269,9 +255,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         if !self.state.latched() {
             return Ok(());
         }
-        if !self.at_rest() {
-            return Err((Refusal::Moving, 0));
-        }
+        require(self.at_rest(), Refusal::Moving, 0)?;
         self.state = DeviceState::Idle;
         self.fault = Fault::None;
         Ok(())

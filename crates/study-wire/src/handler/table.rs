@@ -1,8 +1,8 @@
 //! The uploaded table and the checks before it may be played.
 
 use crate::certificate::{self, Certificate};
-use crate::message::{Node, Refusal, TableBegin, TableChunk, TableCrc};
-use crate::predict::{BranchView, Direction, Lookup, TableView};
+use crate::message::{Node, Refusal, TableBegin, TableChunk, UploadCrc};
+use crate::predict::{BranchView, Lookup, TableView};
 
 /// Limits of a device for every upload.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +28,7 @@ pub(super) struct TableBuffer<const N: usize> {
     negative: [[f64; N]; 4],
     len: usize,
     pub(super) begin: Option<TableBegin>,
-    crc: TableCrc,
+    crc: UploadCrc,
 }
 
 /// A refusal and its detail, see [`Refusal`].
@@ -42,17 +42,16 @@ impl<const N: usize> TableBuffer<N> {
             negative: [[0.0; N]; 4],
             len: 0,
             begin: None,
-            crc: TableCrc::default(),
+            crc: UploadCrc::default(),
         }
     }
 
     /// Begins a new upload in place of the old one.
     pub(super) fn begin(&mut self, begin: &TableBegin) -> Result<(), Refused> {
         self.clear();
-        if usize::from(begin.nodes) > N {
-            return Err((Refusal::TooMany, N as u32));
-        }
-        self.crc = TableCrc::of(begin);
+        let fits = usize::from(begin.nodes) <= N;
+        require(fits, Refusal::TooMany, N as u32)?;
+        self.crc = UploadCrc::of_table(begin);
         self.begin = Some(*begin);
         Ok(())
     }
@@ -67,12 +66,10 @@ impl<const N: usize> TableBuffer<N> {
             return Err((Refusal::WrongState, 0));
         };
         let nodes = chunk.nodes.as_slice();
-        if usize::from(chunk.first) != self.len {
-            return Err((Refusal::Order, self.len as u32));
-        }
-        if self.len + nodes.len() > usize::from(begin.nodes) {
-            return Err((Refusal::TooMany, u32::from(begin.nodes)));
-        }
+        let next = usize::from(chunk.first) == self.len;
+        require(next, Refusal::Order, self.len as u32)?;
+        let fits = self.len + nodes.len() <= usize::from(begin.nodes);
+        require(fits, Refusal::TooMany, u32::from(begin.nodes))?;
         for node in nodes {
             self.add(node);
         }
@@ -109,12 +106,9 @@ impl<const N: usize> TableBuffer<N> {
         let Some(begin) = &self.begin else {
             return Err((Refusal::WrongState, 0));
         };
-        if self.len != usize::from(begin.nodes) {
-            return Err((Refusal::Incomplete, self.len as u32));
-        }
-        if self.crc() != crc {
-            return Err((Refusal::Checksum, self.crc()));
-        }
+        let complete = self.len == usize::from(begin.nodes);
+        require(complete, Refusal::Incomplete, self.len as u32)?;
+        require(self.crc() == crc, Refusal::Checksum, self.crc())?;
         self.check_evaluable(begin)?;
         check_limits(begin, bounds)?;
         let range = certificate::Range {
@@ -145,12 +139,9 @@ impl<const N: usize> TableBuffer<N> {
             }
         }
         let [low, high] = begin.range_mm;
-        let delta_mm = match begin.direction {
-            Direction::Sign => 1.0,
-            Direction::Play { delta_mm } | Direction::Dahl { delta_mm } => delta_mm,
-        };
         let ordered = low.is_finite() && high.is_finite() && low < high;
-        if ordered && positive(delta_mm) && positive(begin.trained_mm_s) {
+        let known = begin.direction.delta_mm().is_none_or(positive);
+        if ordered && known && positive(begin.trained_mm_s) {
             Ok(())
         } else {
             bad(self.len)
@@ -174,39 +165,35 @@ fn check_limits(begin: &TableBegin, bounds: &Bounds) -> Result<(), Refused> {
     let cap_fits = begin
         .uncertified_n
         .is_none_or(|cap| within(cap, bounds.force_n));
-    let [low, high] = begin.range_mm;
-    if !within(begin.force_n, bounds.force_n) || !cap_fits {
-        Err((Refusal::Limit, 1))
-    } else if !within(begin.velocity_mm_s, bounds.velocity_mm_s) {
-        Err((Refusal::Limit, 2))
-    } else if low < bounds.stroke_mm[0] || high > bounds.stroke_mm[1] {
-        Err((Refusal::Limit, 3))
-    } else {
-        Ok(())
-    }
+    let ([low, high], [lowest, highest]) = (begin.range_mm, bounds.stroke_mm);
+    let force = within(begin.force_n, bounds.force_n) && cap_fits;
+    require(force, Refusal::Limit, 1)?;
+    let velocity = within(begin.velocity_mm_s, bounds.velocity_mm_s);
+    require(velocity, Refusal::Limit, 2)?;
+    require(low >= lowest && high <= highest, Refusal::Limit, 3)
 }
 
 /// Conditions for playing a table without the explicit permission to play it
 /// uncertified.
 fn check_physics(certificate: &Certificate, bounds: &Bounds) -> Result<(), Refused> {
-    if !certificate.mass.holds() {
-        Err((Refusal::Uncertified, 1))
-    } else if !certificate.damping.holds() {
-        Err((Refusal::Uncertified, 2))
-    } else if !certificate.hysteresis.holds() {
-        Err((Refusal::Uncertified, 3))
-    } else if !at_most(certificate.stiffness_n_per_mm, bounds.stiffness_n_per_mm) {
-        Err((Refusal::Limit, 4))
-    } else if !at_most(certificate.damping_n_s_per_mm, bounds.damping_n_s_per_mm) {
-        Err((Refusal::Limit, 5))
-    } else {
-        Ok(())
-    }
+    let c = certificate;
+    require(c.mass.holds(), Refusal::Uncertified, 1)?;
+    require(c.damping.holds(), Refusal::Uncertified, 2)?;
+    require(c.hysteresis.holds(), Refusal::Uncertified, 3)?;
+    // NaN is not within a bound.
+    let stiffness = c.stiffness_n_per_mm <= bounds.stiffness_n_per_mm;
+    require(stiffness, Refusal::Limit, 4)?;
+    let damping = c.damping_n_s_per_mm <= bounds.damping_n_s_per_mm;
+    require(damping, Refusal::Limit, 5)
 }
 
-/// False if `value` is NaN.
-fn at_most(value: f64, most: f64) -> bool {
-    value <= most
+/// A refusal with its detail unless `satisfied`.
+pub(super) fn require(satisfied: bool, refusal: Refusal, detail: u32) -> Result<(), Refused> {
+    if satisfied {
+        Ok(())
+    } else {
+        Err((refusal, detail))
+    }
 }
 
 fn positive(value: f64) -> bool {

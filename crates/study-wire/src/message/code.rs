@@ -38,6 +38,12 @@ macro_rules! codes {
             }
         }
 
+        impl core::fmt::Display for $name {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.write_str(self.as_str())
+            }
+        }
+
         impl Field for $name {
             const MAX_LEN: usize = 1;
 

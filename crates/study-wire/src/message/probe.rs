@@ -1,8 +1,7 @@
 //! Upload of a path for a probe: PATH_BEGIN, PATH_CHUNK.
 
 use super::FixedVec;
-use super::bytes::{Field as _, Writer, fields};
-use crate::frame::RunningCrc;
+use super::bytes::fields;
 
 fields! {
     /// Properties of a path.
@@ -30,32 +29,7 @@ fields! {
     }
 }
 
-/// Accumulates the CRC of a path.
-#[derive(Debug, Clone, Default)]
-pub struct PathCrc(RunningCrc);
-
 impl PathChunk {
     /// Largest number of points in one chunk.
     pub const MAX_POINTS: usize = 56;
-}
-
-impl PathCrc {
-    /// Starts with the fields of PATH_BEGIN.
-    pub fn of(begin: &PathBegin) -> Self {
-        let mut crc = RunningCrc::new();
-        let mut out = Writer::new();
-        begin.write(&mut out);
-        crc.update(out.done().unwrap_or_default());
-        Self(crc)
-    }
-
-    /// Adds the next point.
-    pub fn point(&mut self, x_nm: i32) {
-        self.0.update(&x_nm.to_le_bytes());
-    }
-
-    /// The CRC of everything so far.
-    pub fn value(&self) -> u32 {
-        self.0.value()
-    }
 }

@@ -153,11 +153,28 @@ impl Field for Flags {
     const MAX_LEN: usize = 1;
 
     fn write(&self, out: &mut Writer) {
-        self.bits().write(out);
+        let flags = [
+            self.force_sensor,
+            self.simulated,
+            self.telemetry,
+            self.probe,
+        ];
+        let bits = flags
+            .iter()
+            .rev()
+            .fold(0, |bits, flag| bits << 1 | u8::from(*flag));
+        bits.write(out);
     }
 
     fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
-        Self::from_bits(u8::read(from)?).ok_or(WireError::Field)
+        let bits = u8::read(from)?;
+        let flags = Self {
+            force_sensor: bits & 1 != 0,
+            simulated: bits & 2 != 0,
+            telemetry: bits & 4 != 0,
+            probe: bits & 8 != 0,
+        };
+        (bits < 16).then_some(flags).ok_or(WireError::Field)
     }
 }
 
@@ -170,24 +187,6 @@ impl Field for Name {
 
     fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
         Ok(Self(from.array()?))
-    }
-}
-
-impl Flags {
-    fn bits(self) -> u8 {
-        u8::from(self.force_sensor)
-            | u8::from(self.simulated) << 1
-            | u8::from(self.telemetry) << 2
-            | u8::from(self.probe) << 3
-    }
-
-    fn from_bits(bits: u8) -> Option<Self> {
-        (bits < 16).then_some(Self {
-            force_sensor: bits & 1 != 0,
-            simulated: bits & 2 != 0,
-            telemetry: bits & 4 != 0,
-            probe: bits & 8 != 0,
-        })
     }
 }
 

@@ -4,6 +4,7 @@
 //! invalid table with its own code.
 
 use super::bytes::{Field, Reader, Writer, fields};
+use super::probe::PathBegin;
 use super::{FixedVec, WireError};
 use crate::frame::RunningCrc;
 use crate::predict::{Direction, Lookup};
@@ -54,29 +55,20 @@ fields! {
     }
 }
 
-/// Accumulates the CRC of a table.
-#[derive(Debug, Clone, Default)]
-pub struct TableCrc(RunningCrc);
-
 /// The order on the wire is not that of the fields.
 impl Field for TableBegin {
     const MAX_LEN: usize = 2 + 1 + 1 + 1 + 8 * 7;
 
     fn write(&self, out: &mut Writer) {
-        let (rule, delta_mm) = match self.direction {
-            Direction::Sign => (0u8, 0.0),
-            Direction::Play { delta_mm } => (1, delta_mm),
-            Direction::Dahl { delta_mm } => (2, delta_mm),
-        };
-        let lookup: u8 = match self.lookup {
-            Lookup::Linear => 0,
-            Lookup::Floor => 1,
-            Lookup::Nearest => 2,
+        let rule = match self.direction {
+            Direction::Sign => 0,
+            Direction::Play { .. } => 1,
+            Direction::Dahl { .. } => 2,
         };
         self.nodes.write(out);
-        [lookup, rule].write(out);
+        [self.lookup as u8, rule].write(out);
         self.uncertified_n.is_some().write(out);
-        delta_mm.write(out);
+        self.direction.delta_mm().unwrap_or(0.0).write(out);
         self.range_mm.write(out);
         self.trained_mm_s.write(out);
         self.force_n.write(out);
@@ -97,14 +89,10 @@ impl Field for TableBegin {
             velocity_mm_s,
             cap_n,
         ] = <[f64; 7]>::read(from)?;
+        let lookup = Lookup::NAMES.get(usize::from(lookup));
         Ok(Self {
             nodes,
-            lookup: match lookup {
-                0 => Lookup::Linear,
-                1 => Lookup::Floor,
-                2 => Lookup::Nearest,
-                _ => return Err(WireError::Field),
-            },
+            lookup: lookup.ok_or(WireError::Field)?.1,
             direction: match rule {
                 0 => Direction::Sign,
                 1 => Direction::Play { delta_mm },
@@ -125,25 +113,44 @@ impl TableChunk {
     pub const MAX_NODES: usize = 3;
 }
 
-impl TableCrc {
-    /// Starts with the fields of TABLE_BEGIN.
-    pub fn of(begin: &TableBegin) -> Self {
-        let mut crc = RunningCrc::new();
-        let mut out = Writer::new();
-        begin.write(&mut out);
-        crc.update(out.done().unwrap_or_default());
-        Self(crc)
+/// Accumulates the CRC of an upload: the fields of BEGIN, then every node or point.
+#[derive(Debug, Clone, Default)]
+pub struct UploadCrc(RunningCrc);
+
+impl UploadCrc {
+    /// Starts with TABLE_BEGIN.
+    pub fn of_table(begin: &TableBegin) -> Self {
+        Self::default().with(begin)
     }
 
-    /// Adds the next node.
+    /// Starts with PATH_BEGIN.
+    pub fn of_path(begin: &PathBegin) -> Self {
+        Self::default().with(begin)
+    }
+
+    /// Adds the next node of a table.
     pub fn node(&mut self, node: &Node) {
-        let mut out = Writer::new();
-        node.write(&mut out);
-        self.0.update(out.done().unwrap_or_default());
+        self.add(node);
+    }
+
+    /// Adds the next point of a path, nm.
+    pub fn point(&mut self, x_nm: i32) {
+        self.add(&x_nm);
     }
 
     /// The CRC of everything so far.
     pub fn value(&self) -> u32 {
         self.0.value()
+    }
+
+    fn with(mut self, begin: &impl Field) -> Self {
+        self.add(begin);
+        self
+    }
+
+    fn add(&mut self, part: &impl Field) {
+        let mut out = Writer::new();
+        part.write(&mut out);
+        self.0.update(out.done().unwrap_or_default());
     }
 }

@@ -99,16 +99,10 @@ impl Sections<'_> {
     fn model_ids(&self, document: &Document<'_>) {
         for (i, model) in self.models.iter().enumerate() {
             let Some(id) = &model.id else { continue };
-            let earlier = self.models[..i]
-                .iter()
-                .filter_map(|m| m.id.as_ref())
-                .find(|other| other.collides_with(id));
-            if let Some(other) = earlier {
-                document.fault(collision(id.as_str(), other.as_str()).at(at(
-                    document,
-                    &model.path,
-                    "id",
-                )));
+            let mut earlier = self.models[..i].iter().filter_map(|m| m.id.as_ref());
+            if let Some(other) = earlier.find(|other| other.collides_with(id)) {
+                let place = at(document, &model.path, "id");
+                document.fault(collision(id.as_str(), other.as_str()).at(place));
             }
         }
     }
@@ -228,36 +222,24 @@ impl Sections<'_> {
     /// `participants.csv` for those that are asked once.
     fn columns(&self, document: &Document<'_>) {
         let mut taken: Vec<String> = Vec::new();
+        let (fixed_once, participants) = (is_participants_column, "participants.csv");
+        let (fixed_in_ratings, ratings) = (is_ratings_column, "ratings.csv");
         for question in &self.questions {
-            column(
-                document,
-                question,
-                &mut taken,
-                is_ratings_column,
-                "ratings.csv",
-            );
+            column(document, question, &mut taken, fixed_in_ratings, ratings);
         }
         let mut once: Vec<String> = Vec::new();
         for question in self.setup.iter().chain(&self.intake).chain(&self.outro) {
-            column(
-                document,
-                question,
-                &mut once,
-                is_participants_column,
-                "participants.csv",
-            );
+            column(document, question, &mut once, fixed_once, participants);
         }
         let mut reported: Vec<&str> = Vec::new();
         for model in &self.models {
             for name in model.covariates.keys() {
                 let place = document.span_of(&format!("{}.covariates.{name}", model.path));
                 let fault = if is_ratings_column(name) {
-                    fixed(name, "ratings.csv")
+                    fixed(name, ratings)
                 } else if taken.iter().any(|t| t.eq_ignore_ascii_case(name)) {
-                    Fault::error(format!(
-                        "`{}` is a question and a covariate",
-                        Untrusted(name)
-                    ))
+                    let name = Untrusted(name);
+                    Fault::error(format!("`{name}` is a question and a covariate"))
                 } else {
                     continue;
                 };
@@ -275,21 +257,12 @@ impl Sections<'_> {
             return;
         };
         let place = document.span_of("analysis.primary");
-        let asked = self
-            .questions
-            .iter()
-            .find(|q| q.id.as_ref() == Some(&analysis.primary));
-        let Some(question) = asked else {
+        let primary = &analysis.primary;
+        let mut questions = self.questions.iter();
+        let Some(question) = questions.find(|q| q.id.as_ref() == Some(primary)) else {
             let ids = self.questions.iter().filter_map(|q| q.id.as_ref());
-            document.fault(
-                unknown(
-                    "question",
-                    analysis.primary.as_str(),
-                    ids.map(QuestionId::as_str),
-                )
-                .at(place),
-            );
-            return;
+            let fault = unknown("question", primary.as_str(), ids.map(QuestionId::as_str));
+            return document.fault(fault.at(place));
         };
         let (from, to) = match &question.kind {
             Some(QuestionKind::Rating { from, to, .. }) => (*from as f64, *to as f64),
@@ -299,29 +272,20 @@ impl Sections<'_> {
                 max.unwrap_or(f64::INFINITY),
             ),
             Some(QuestionKind::Choice { .. } | QuestionKind::Text) => {
-                document.fault(
-                    Fault::error(format!(
-                        "`{}` cannot be the primary question: its answers are not numbers",
-                        analysis.primary
-                    ))
-                    .at(place)
-                    .hint("a rating, a slider or a number can"),
-                );
-                return;
+                let what = "cannot be the primary question: its answers are not numbers";
+                let fault = Fault::error(format!("`{primary}` {what}")).at(place);
+                return document.fault(fault.hint("a rating, a slider or a number can"));
             }
             None => return,
         };
-        if analysis
-            .realistic_from
-            .is_some_and(|r| !(from..=to).contains(&r))
-        {
+        let least = analysis.realistic_from;
+        if least.is_some_and(|r| !(from..=to).contains(&r)) {
+            let what = format!("`analysis.realistic_from` is outside the scale of `{primary}`");
+            let place = document.span_of("analysis.realistic_from");
             document.fault(
-                Fault::error(format!(
-                    "`analysis.realistic_from` is outside the scale of `{}`",
-                    analysis.primary
-                ))
-                .at(document.span_of("analysis.realistic_from"))
-                .label(format!("{from} to {to}")),
+                Fault::error(what)
+                    .at(place)
+                    .label(format!("{from} to {to}")),
             );
         }
     }

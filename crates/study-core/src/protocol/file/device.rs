@@ -4,7 +4,7 @@ use super::section::Section;
 use crate::protocol::keys::{Key, Kind, Words as _, keys};
 use crate::protocol::{DeviceKind, DeviceRules, Uncertified};
 use study_base::diagnostic::Fault;
-use study_base::limits::{Limit, Limits};
+use study_base::limits::Limits;
 
 pub(super) const DEVICE: &[Key] = keys! {
     /// The kind of device that plays the realizations. Port, baud rate and command belong
@@ -58,10 +58,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
         limits: match limits {
             Some(limits) => limits,
             // A sample mounted by hand plays no table: these limits are never used.
-            None if !given => Limits {
-                force_n: Limit::new(12.0).ok()?,
-                velocity_mm_s: Limit::new(1000.0).ok()?,
-            },
+            None if !given => Limits::new(12.0, 1000.0).ok()?,
             None => return None,
         },
         uncertified,

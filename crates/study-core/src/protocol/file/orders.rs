@@ -2,7 +2,7 @@
 
 use crate::protocol::FileOrders;
 use std::collections::BTreeMap;
-use std::io::BufRead;
+use std::ops::Range;
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::{ModelId, Untrusted};
 
@@ -14,35 +14,12 @@ const MAX_FAULTS: usize = 20;
 /// Reads `orders.csv`. The positions of a row are 1, 2, 3, …, the lines in any order.
 /// The schedule checks whether the realizations fit the design. The orders are
 /// complete only if the findings contain no error.
-pub fn parse_orders(path: &str, mut reader: impl BufRead) -> (FileOrders, Findings) {
-    let mut bytes = Vec::new();
-    if let Err(e) = reader.read_to_end(&mut bytes) {
-        let mut findings = Findings::new(path, "");
-        findings
-            .faults
-            .push(Fault::error(format!("the file cannot be read: {e}")));
-        return (FileOrders::new(), findings);
-    }
-    let text = match String::from_utf8(bytes) {
-        Ok(text) => text,
-        Err(e) => {
-            let line = e.as_bytes()[..e.utf8_error().valid_up_to()]
-                .iter()
-                .filter(|b| **b == b'\n')
-                .count()
-                + 1;
-            let mut findings = Findings::new(path, "");
-            findings
-                .faults
-                .push(Fault::error(format!("line {line} is not UTF-8")));
-            return (FileOrders::new(), findings);
-        }
-    };
+pub fn parse_orders(path: &str, text: &str) -> (FileOrders, Findings) {
     let mut lines = Lines {
-        findings: Findings::new(path, text.as_str()),
+        findings: Findings::new(path, text),
         rows: BTreeMap::new(),
     };
-    lines.read(&text);
+    lines.read(text);
     lines.finish()
 }
 
@@ -77,15 +54,12 @@ impl Lines {
             let span = trimmed(text, start, end);
             if header_seen {
                 self.line(&record, span);
-            } else {
-                header_seen = true;
-                if record.iter().ne(COLUMNS) {
-                    self.fault(
-                        Fault::error(format!("the first line has to be `{}`", COLUMNS.join(",")))
-                            .at(span),
-                    );
-                    return;
-                }
+                continue;
+            }
+            header_seen = true;
+            if record.iter().ne(COLUMNS) {
+                let what = format!("the first line has to be `{}`", COLUMNS.join(","));
+                return self.fault(Fault::error(what).at(span));
             }
         }
         if !header_seen {
@@ -96,29 +70,20 @@ impl Lines {
         }
     }
 
-    fn line(&mut self, record: &csv::StringRecord, span: std::ops::Range<usize>) {
-        if record.len() != COLUMNS.len() {
+    fn line(&mut self, record: &csv::StringRecord, span: Range<usize>) {
+        let (found, wanted) = (record.len(), COLUMNS.len());
+        if found != wanted {
             let (line, _) = self.findings.line_and_column(span.start);
-            self.fault(
-                Fault::error(format!(
-                    "line {line} has {} of {} columns",
-                    record.len(),
-                    COLUMNS.len()
-                ))
-                .at(span),
-            );
-            return;
+            let what = format!("line {line} has {found} of {wanted} columns");
+            return self.fault(Fault::error(what).at(span));
         }
         let row = self.number("row", &record[0], &span);
         let position = self.number("position", &record[1], &span);
-        let model = match ModelId::new(&record[2]) {
-            Ok(model) => Some(model),
-            Err(bad) => {
-                self.fault(Fault::error(bad.to_string()).at(span.clone()));
-                None
-            }
-        };
-        let (Some(row), Some(position), Some(model)) = (row, position, model) else {
+        let model = ModelId::new(&record[2]);
+        if let Err(bad) = &model {
+            self.fault(Fault::error(bad.to_string()).at(span.clone()));
+        }
+        let (Some(row), Some(position), Ok(model)) = (row, position, model) else {
             return;
         };
         let positions = self.rows.entry(row).or_default();
@@ -127,16 +92,12 @@ impl Lines {
         }
     }
 
-    fn number(&mut self, what: &str, given: &str, span: &std::ops::Range<usize>) -> Option<u32> {
+    fn number(&mut self, what: &str, given: &str, span: &Range<usize>) -> Option<u32> {
         let number = given.parse().ok().filter(|n| *n > 0);
         if number.is_none() {
-            self.fault(
-                Fault::error(format!(
-                    "{what} has to be a whole number from 1, not `{}`",
-                    Untrusted(given)
-                ))
-                .at(span.clone()),
-            );
+            let given = Untrusted(given);
+            let what = format!("{what} has to be a whole number from 1, not `{given}`");
+            self.fault(Fault::error(what).at(span.clone()));
         }
         number
     }
@@ -150,10 +111,8 @@ impl Lines {
     fn finish(mut self) -> (FileOrders, Findings) {
         let mut orders = FileOrders::new();
         for (row, positions) in std::mem::take(&mut self.rows) {
-            let gap = (1..)
-                .zip(positions.keys())
-                .find(|(want, have)| want != *have);
-            if let Some((want, _)) = gap
+            let mut places = (1..).zip(positions.keys());
+            if let Some((want, _)) = places.find(|(want, have)| want != *have)
                 && !self.findings.has_errors()
             {
                 self.fault(Fault::error(format!("row {row} has no position {want}")));
@@ -169,7 +128,7 @@ fn offset(position: &csv::Position) -> usize {
 }
 
 /// The span without surrounding white space.
-fn trimmed(text: &str, start: usize, end: usize) -> std::ops::Range<usize> {
+fn trimmed(text: &str, start: usize, end: usize) -> Range<usize> {
     let Some(line) = text.get(start..end) else {
         return start..start;
     };
@@ -182,14 +141,14 @@ mod tests {
     use super::*;
 
     fn messages(text: &str) -> Vec<String> {
-        let (_, findings) = parse_orders("orders.csv", text.as_bytes());
+        let (_, findings) = parse_orders("orders.csv", text);
         findings.faults.into_iter().map(|f| f.message).collect()
     }
 
     #[test]
     fn lines_in_any_order_become_rows_by_position() {
         let text = "\u{feff}row,position,model\r\n2,2,a\r\n2,1,b\r\n1,1,a\r\n1,2,b\r\n";
-        let (orders, findings) = parse_orders("orders.csv", text.as_bytes());
+        let (orders, findings) = parse_orders("orders.csv", text);
         assert_eq!(findings.faults, []);
         let row = |n: u32| -> Vec<&str> { orders[&n].iter().map(ModelId::as_str).collect() };
         assert_eq!(row(1), ["a", "b"]);
@@ -209,7 +168,7 @@ mod tests {
                 "row 1 has position 1 twice",
             ]
         );
-        let (_, findings) = parse_orders("orders.csv", text.as_bytes());
+        let (_, findings) = parse_orders("orders.csv", text);
         let last = findings.faults[4].span.clone().unwrap();
         assert_eq!(&text[last], "1,1,b");
     }
@@ -224,13 +183,6 @@ mod tests {
         assert_eq!(
             messages("subject,position,model\n1,1,a\n"),
             ["the first line has to be `row,position,model`"]
-        );
-        assert_eq!(
-            parse_orders("o", &b"row,position,model\n1,1,\xff\n"[..])
-                .1
-                .faults[0]
-                .message,
-            "line 2 is not UTF-8"
         );
     }
 }

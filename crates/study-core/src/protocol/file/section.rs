@@ -131,12 +131,7 @@ impl<'d, 't> Section<'d, 't> {
         }
         let fault = |what: String| Fault::error(what).hint(hint);
         match self.path() {
-            "" if name == "format" => self
-                .document
-                .fault(fault(format!("the file has no `{name}`"))),
-            "" => self
-                .document
-                .fault(fault(format!("the file has no [{name}]"))),
+            "" => (self.document).fault(fault(format!("the file has no [{name}]"))),
             place => self.fault_at(name, fault(format!("[{place}] has no `{name}`"))),
         }
     }
@@ -148,10 +143,8 @@ impl<'d, 't> Section<'d, 't> {
 
     /// A list of texts, each with its value.
     pub(super) fn texts(&mut self, name: &str) -> Vec<(Value<'d, 't>, String)> {
-        let Some(list) = self.value(name) else {
-            return Vec::new();
-        };
-        let Some(values) = list.array() else {
+        let list = self.value(name);
+        let Some((values, list)) = list.and_then(|list| Some((list.array()?, list))) else {
             return Vec::new();
         };
         if matches!(self.key(name).kind, Kind::Texts(least) if values.len() < least) {
@@ -173,14 +166,13 @@ impl<'d, 't> Section<'d, 't> {
             let number = value.i64()?;
             match kind {
                 Kind::Whole(least, _) if number < least => {
-                    out_of_range(&value, &kind.describe(), number);
+                    out_of_range(&value, &kind.describe(), number)
                 }
                 Kind::Whole(_, most) if number > most => {
-                    out_of_range(&value, &format!("at most {most}"), number);
+                    out_of_range(&value, &format!("at most {most}"), number)
                 }
-                _ => return T::try_from(number).ok(),
+                _ => T::try_from(number).ok(),
             }
-            None
         });
         number.or_else(|| self.default(name)?.parse().ok())
     }
@@ -366,13 +358,11 @@ impl<'d, 't> Section<'d, 't> {
 /// Text, not empty and not longer than [`MAX_FIELD_BYTES`].
 pub(super) fn text(value: &Value<'_, '_>) -> Option<String> {
     let text = value.text()?;
-    if text.len() > MAX_FIELD_BYTES {
-        value.fault(Fault::error(format!(
-            "`{}` is {} bytes long, more than {MAX_FIELD_BYTES}",
-            value.path(),
-            text.len()
-        )));
-        return None;
+    let length = text.len();
+    if length > MAX_FIELD_BYTES {
+        return value.refuse(format_args!(
+            "is {length} bytes long, more than {MAX_FIELD_BYTES}"
+        ));
     }
     if text.trim().is_empty() {
         value.fault(
@@ -387,11 +377,10 @@ pub(super) fn text(value: &Value<'_, '_>) -> Option<String> {
 /// A finite number in the range of its type.
 pub(super) fn number(value: &Value<'_, '_>, kind: Kind) -> Option<f64> {
     let number = value.f64()?;
-    if !kind.admits(number) {
-        out_of_range(value, &kind.describe(), number);
-        return None;
+    if kind.admits(number) {
+        return Some(number);
     }
-    Some(number)
+    out_of_range(value, &kind.describe(), number)
 }
 
 /// An identifier.
@@ -403,11 +392,8 @@ fn parsed<T: FromStr<Err = BadId>>(value: &Value<'_, '_>) -> Option<T> {
     id.ok()
 }
 
-fn out_of_range(value: &Value<'_, '_>, expected: &str, number: impl Display) {
-    value.fault(Fault::error(format!(
-        "`{}` has to be {expected}, not {number}",
-        value.path()
-    )));
+fn out_of_range<T>(value: &Value<'_, '_>, expected: &str, number: impl Display) -> Option<T> {
+    value.refuse(format_args!("has to be {expected}, not {number}"))
 }
 
 /// Which keys a section needs, as a hint.

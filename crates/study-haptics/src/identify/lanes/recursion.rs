@@ -307,13 +307,7 @@ fn stretch<const SUM: bool, const MOMENTS: bool>(
 /// Passes one state back over the first samples.
 fn back(processor: Processor, samples: &Samples, first: usize, state: &mut State) {
     let samples = samples.reordered(&(0..first).rev().collect::<Vec<_>>());
-    dispatch(
-        processor,
-        &samples,
-        std::slice::from_mut(state),
-        &[],
-        &mut [],
-        false,
-    );
+    let states = std::slice::from_mut(state);
+    dispatch(processor, &samples, states, &[], &mut [], false);
     state.rescale();
 }

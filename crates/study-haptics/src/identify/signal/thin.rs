@@ -7,39 +7,25 @@
 
 use crate::recording::Recording;
 
-/// The definition of a dwell and how much of it is kept.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dwell {
-    /// A dwell lasts as long as x stays this close to its first position, mm.
-    pub within_mm: f64,
-    /// Most samples kept of a dwell.
-    pub keep: usize,
-}
-
-impl Default for Dwell {
-    /// Within two counts of a 5 µm encoder; eight samples are kept.
-    fn default() -> Self {
-        Self {
-            within_mm: 0.01,
-            keep: 8,
-        }
-    }
-}
+/// A dwell lasts as long as x stays this close to its first position, mm: two counts of a
+/// 5 µm encoder.
+const WITHIN_MM: f64 = 0.01;
+/// Most samples kept of a dwell.
+const KEEP: usize = 8;
 
 /// The recording without most samples of its dwells, and the number of samples removed.
-/// At least one sample of a dwell is kept. Filter first: the result has gaps in time.
-pub fn thin(recording: &Recording, dwell: Dwell) -> (Recording, usize) {
+/// Filter first: the result has gaps in time.
+pub fn thin(recording: &Recording) -> (Recording, usize) {
     let x = &recording.x_mm;
-    let most = dwell.keep.max(1);
     let mut kept: Vec<usize> = Vec::with_capacity(x.len());
     let mut from = 0;
     while from < x.len() {
         let length = x[from..]
             .iter()
-            .take_while(|later| (*later - x[from]).abs() <= dwell.within_mm)
+            .take_while(|later| (*later - x[from]).abs() <= WITHIN_MM)
             .count()
             .max(1);
-        let few = length.min(most);
+        let few = length.min(KEEP);
         kept.extend((0..few).map(|i| from + i * length / few));
         from += length;
     }
@@ -64,7 +50,7 @@ mod tests {
 
     #[test]
     fn a_dwell_is_thinned_and_a_motion_is_not() {
-        let (thinned, removed) = thin(&recording(1000), Dwell::default());
+        let (thinned, removed) = thin(&recording(1000));
         assert_eq!(removed, 992);
         assert_eq!(thinned.len(), 208);
         let rest: Vec<f64> = thinned.t_s[100..108].to_vec();
@@ -78,7 +64,7 @@ mod tests {
     #[test]
     fn without_a_dwell_nothing_is_removed() {
         let moving = recording(3);
-        let (thinned, removed) = thin(&moving, Dwell::default());
+        let (thinned, removed) = thin(&moving);
         assert_eq!((removed, thinned), (0, moving));
     }
 }

@@ -1,10 +1,8 @@
 //! The text of a model file.
 
-use super::{FORMAT, PARAMETERS, lookup_name};
+use super::{FORMAT, PARAMETERS};
 use crate::model::{Branch, Realization};
 use std::fmt::Write as _;
-use study_wire::predict::Direction;
-
 /// Numbers of a list per line.
 const PER_LINE: usize = 6;
 
@@ -14,11 +12,11 @@ pub fn write(realization: &Realization) -> String {
     let mut out = Text::default();
     out.text("format", FORMAT);
     out.text("id", &r.id);
-    out.text("lookup", lookup_name(r.lookup));
-    let direction = match r.direction {
-        Direction::Sign => "{ rule = \"sign\" }".to_owned(),
-        Direction::Play { delta_mm } => format!("{{ rule = \"play\", delta_mm = {delta_mm:?} }}"),
-        Direction::Dahl { delta_mm } => format!("{{ rule = \"dahl\", delta_mm = {delta_mm:?} }}"),
+    out.text("lookup", r.lookup.as_str());
+    let rule = r.direction.as_str();
+    let direction = match r.direction.delta_mm() {
+        None => format!("{{ rule = \"{rule}\" }}"),
+        Some(delta_mm) => format!("{{ rule = \"{rule}\", delta_mm = {delta_mm:?} }}"),
     };
     out.raw("direction", &direction);
     let [low, high] = r.trained.x_mm;
