@@ -19,7 +19,7 @@ pub(super) struct Args {
 /// Freezes a new version of wording or analysis.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let reason = study_folder::reason(&args.reason)?;
-    let loaded = load::load(&args.protocol)?;
+    let loaded = load::load_for(&args.protocol, &args.results)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
     let id = &loaded.protocol.study.id;
     let mut studies = study_folder::studies(&args.results)?;

@@ -13,6 +13,7 @@ use study_base::text::ModelId;
 use study_core::protocol::file::{self, Named, Parsed};
 use study_core::protocol::fingerprint::{self, Fingerprints};
 use study_core::protocol::{FileOrders, Order, Protocol, check};
+use study_core::store::layout;
 use study_haptics::model::Realization;
 
 mod join;
@@ -68,24 +69,57 @@ pub fn load(path: &Path) -> Result<Loaded, Failure> {
     loaded.ok_or_else(|| Failure::faults(findings))
 }
 
+/// The same for a study that may have started in `results`, a results folder or the
+/// folder of the study in it. Such a study goes on even if not all its orders can be
+/// made.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_for(path: &Path, results: &Path) -> Result<Loaded, Failure> {
+    let (loaded, findings) = open(path, Purpose::Sessions(results));
+    loaded.ok_or_else(|| Failure::faults(findings))
+}
+
 /// Loads the frozen protocol of a running study in order to read its data: tables
 /// that must not be played are accepted.
 ///
 /// # Errors
 /// As [`load`].
 pub fn load_frozen(path: &Path) -> Result<Loaded, Failure> {
-    let (loaded, findings) = open(path, false);
+    let (loaded, findings) = open(path, Purpose::Data);
     loaded.ok_or_else(|| Failure::faults(findings))
 }
 
 /// Loads the protocol at `path`; returns all errors and warnings, and the protocol if
 /// there are no errors.
 pub fn examine(path: &Path) -> (Option<Loaded>, Vec<Findings>) {
-    open(path, true)
+    open(path, Purpose::Design)
 }
 
-/// With `to_play`, tables that fail their certificate are errors unless permitted.
-fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
+/// What a protocol is loaded for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Purpose<'a> {
+    /// Everything it contains must be possible.
+    Design,
+    /// Sessions of a study that may have started in this folder.
+    Sessions(&'a Path),
+    /// Reading the data of a study that has started.
+    Data,
+}
+
+impl Purpose<'_> {
+    fn has_started(self, study: &str) -> bool {
+        match self {
+            Self::Design => false,
+            Self::Sessions(results) => [results.join(study), results.to_owned()]
+                .iter()
+                .any(|folder| folder.join(layout::MANIFEST).exists()),
+            Self::Data => true,
+        }
+    }
+}
+
+fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     let path = if path.is_dir() {
         path.join(FILE_NAME)
     } else {
@@ -127,13 +161,14 @@ fn open(path: &Path, to_play: bool) -> (Option<Loaded>, Vec<Findings>) {
     };
     others.assign(&protocol);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
-    if to_play {
+    if purpose != Purpose::Data {
         join::certificates(&protocol, &others, &spans, &mut findings);
     }
     let orders = others.orders.take();
     // An order whose file is missing cannot be checked.
     if orders.is_some() || !matches!(protocol.design.order, Order::File(_)) {
-        join::orders(&protocol, orders.as_ref(), &spans, &mut findings);
+        let started = purpose.has_started(&protocol.study.id);
+        join::orders(&protocol, orders.as_ref(), started, &spans, &mut findings);
     }
     let unread = others.unread(&protocol);
     findings
@@ -332,4 +367,48 @@ fn read_capped(path: &Path, most: usize) -> Result<Vec<u8>, ReadError> {
         return Err(ReadError::TooLarge(most));
     }
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The order of row 1 is valid, that of row 2 is not.
+    const PROTOCOL: &str = r#"
+format = "study-protocol/1"
+study = { id = "example", title = "An example", seed = 2007 }
+design = { participants = 1, repetitions = 3, order = "williams", min_distance = 3 }
+device = { kind = "manual", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
+trial = { reference = "Operate the real switch." }
+models = [{ id = "A" }, { id = "B" }, { id = "C" }, { id = "D" }, { id = "E" }]
+analysis = { primary = "realism" }
+
+[[questions]]
+id = "realism"
+kind = "rating"
+prompt = "How realistic did it feel?"
+from = 1
+to = 7
+labels = { 1 = "not at all realistic", 7 = "very realistic" }
+"#;
+
+    #[test]
+    fn a_study_that_has_started_goes_on_even_if_some_of_its_orders_are_invalid() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(FILE_NAME);
+        fs::write(&path, PROTOCOL).unwrap();
+        assert!(load(&path).is_err());
+        let results = folder.path().join("results");
+        assert!(load_for(&path, &results).is_err());
+
+        let study = results.join("example");
+        fs::create_dir_all(&study).unwrap();
+        fs::write(study.join(layout::MANIFEST), "").unwrap();
+        for results in [&results, &study] {
+            let loaded = load_for(&path, results).unwrap();
+            let mut faults = loaded.findings.iter().flat_map(|f| &f.faults);
+            assert!(faults.any(|f| f.message.starts_with("row 2, position 12: ")));
+        }
+        assert!(load_frozen(&path).is_ok());
+    }
 }

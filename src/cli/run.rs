@@ -48,7 +48,7 @@ pub(super) struct Args {
 /// Runs the command.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     tui::check_platform().map_err(unusable)?;
-    let loaded = load::load(&args.protocol)?;
+    let loaded = load::load_for(&args.protocol, &args.results)?;
     console.warnings_in_short(&loaded.findings, &args.protocol);
     let kind = args.device.kind.unwrap_or(loaded.protocol.device.kind);
     // Checks come before the device, and the device before the terminal, so that an

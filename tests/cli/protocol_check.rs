@@ -310,6 +310,30 @@ fn an_infeasible_order_is_an_error_with_its_reason() {
     );
 }
 
+/// The order of row 1 is valid, that of row 2 is not.
+#[test]
+fn given_orders_are_checked_beyond_the_planned_participants() {
+    let dir = turn_signal();
+    let design = "order = \"williams\"\nmin_distance = 3\n";
+    edit(dir.path(), "protocol.toml", "order = \"blocked\"\n", design);
+    edit(
+        dir.path(),
+        "protocol.toml",
+        "participants = 10",
+        "participants = 1",
+    );
+    let (code, errors, _) = report(dir.path());
+    assert_eq!(code, 1);
+    assert_eq!(errors.len(), 1, "{errors:?}");
+    assert!(errors[0].starts_with("row 2, position 12: "), "{errors:?}");
+
+    // A rehearsal says so before it begins.
+    let (code, _, err) = run(dir.path(), &["rehearse", ".", "--participants", "3"]);
+    assert_eq!(code, 1);
+    assert!(err.contains("row 2, position 12: "), "{err}");
+    assert!(!dir.path().join("rehearsal").exists());
+}
+
 #[test]
 fn a_warning_says_at_how_many_participants_an_order_is_balanced() {
     let dir = turn_signal();

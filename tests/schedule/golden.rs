@@ -104,6 +104,25 @@ fn shuffled_orders_under_max_run_1_never_change() {
     );
 }
 
+/// More than the states can count. Computed by inclusion and exclusion in Python 3.11 with
+/// binomial convolutions; for smaller designs that script agrees with `docs/schedule.py`.
+#[test]
+fn large_shuffled_orders_under_max_run_never_change() {
+    assert_eq!(
+        order(&constrained(30, 10, Shuffled, Some(1), None), Seat::Row(1)),
+        "JYTIOTHRPFaSZcMVGbJHaTDCEWEBVXNOKTXcVRTMLHAaIBQMPVZXDVOVaJWJNcQDNWUKIbCLRLE\
+             PEBAFXAXWJLHYHADHXFBKCOJFXNdUbKWPBICRQYESHaOdCdYSBCZJQAJUEbMPdSaOZRSUCYIHGR\
+             PZLTAbXIcCSDYKTXUGbURNOZDKPTPGcBNTSFRaMDAEZcCGVMcdZISaYINQKdSLRELOMaNUVQYdc\
+             QRIScNbQOKYWcWLdFZFBDVdAMGMLAWQEZBPXdaPDKUQFKUJbELTDGVHNGAHUFJGWbBGbIFMWCOY"
+    );
+    assert_eq!(
+        order(&constrained(20, 8, Shuffled, Some(3), None), Seat::Row(1)),
+        "QCOOASKEAEQPFTJJIHLQNMPTBRNBQMNSPGRITKAQSPOBMGCGPKITDRGCAOQGLOHIIBRSJAFEHTD\
+             FDRDQOHGFHDBJITPMFFQHSKMICJLJKSRCPOPDHSBDANKMSECTTLRJNEMDBCGICNJFLFERBLKONL\
+             KAEGALHMEN"
+    );
+}
+
 #[test]
 fn shuffled_orders_under_max_run_2_never_change() {
     assert_eq!(

@@ -3,7 +3,9 @@
 mod command;
 #[path = "../support/designs.rs"]
 mod designs;
+mod faults;
 mod golden;
 mod reproduced;
 mod requeue;
+mod second;
 mod uniform;

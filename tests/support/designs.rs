@@ -6,7 +6,7 @@ use study_base::limits::{Limit, Limits};
 use study_base::text::{ModelId, QuestionId};
 use study_core::protocol::*;
 
-/// Realizations `A`, `B`, … and nothing beside the design.
+/// Realizations `A`, `B`, … `Z`, `a`, … and nothing beside the design.
 pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol {
     let limit = |value| Limit::new(value).expect("a positive number");
     Protocol {
@@ -51,6 +51,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             minimum_strokes: 0,
         },
         models: (b'A'..=b'Z')
+            .chain(b'a'..=b'z')
             .take(models)
             .map(|c| model(&char::from(c).to_string()))
             .collect(),

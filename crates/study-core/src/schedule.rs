@@ -19,15 +19,17 @@
 pub mod balance;
 mod completions;
 pub mod constraints;
+mod inclusion;
 pub mod orders;
 mod requeue;
 
 pub use crate::protocol::{Seat, Trial};
-pub use requeue::{Requeued, requeue};
+pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
 use crate::protocol::{Design, FileOrders, Order, Protocol};
 use completions::Completions;
 use constraints::{Rule, Violation};
+use inclusion::Inclusion;
 use std::collections::HashMap;
 use study_base::rng::Stream;
 use study_base::text::ModelId;
@@ -209,16 +211,36 @@ pub struct Planner {
 enum Source {
     Blocked { distance: usize },
     Shuffled,
-    ShuffledWithin(Box<Completions>),
+    ShuffledWithin(Counted),
     Lines { of: Lines, symbols: Vec<usize> },
     Fixed,
     File(FileOrders),
+}
+
+/// The valid orders of a shuffled design under a rule, counted by either method. Both
+/// have the same order at each place.
+#[derive(Debug)]
+enum Counted {
+    States(Completions),
+    Terms(Inclusion),
 }
 
 #[derive(Debug, Clone, Copy)]
 enum Lines {
     Williams,
     Latin,
+}
+
+impl Lines {
+    /// Number of rows after which the orders repeat.
+    fn cycle(self, realizations: usize, repetitions: u32) -> u32 {
+        let order = match self {
+            Self::Williams => Order::Williams,
+            Self::Latin => Order::LatinSquare,
+        };
+        let rows = balance::balances(&order, realizations, repetitions).map(|b| b.participants);
+        rows.and_then(|rows| u32::try_from(rows).ok()).unwrap_or(1)
+    }
 }
 
 impl Planner {
@@ -244,15 +266,15 @@ impl Planner {
             },
             Order::Shuffled => match rule {
                 Rule::None => Source::Shuffled,
-                rule => Source::ShuffledWithin(Box::new(
-                    Completions::count(models.len(), repetitions, rule).ok_or_else(|| {
-                        ScheduleError::TooManyStates {
+                rule => {
+                    Source::ShuffledWithin(counted(models.len(), repetitions, rule).ok_or_else(
+                        || ScheduleError::TooManyStates {
                             realizations: models.len(),
                             repetitions: design.repetitions,
                             constraint: rule.to_string(),
-                        }
-                    })?,
-                )),
+                        },
+                    )?)
+                }
             },
             Order::Williams => Source::Lines {
                 of: Lines::Williams,
@@ -290,11 +312,41 @@ impl Planner {
         if seat.number() == 0 {
             return Err(ScheduleError::SeatZero(seat));
         }
+        Ok(self.trials(&self.valid_order(seat)?))
+    }
+
+    /// Checks the orders of the planned rows, and all orders that are given: the whole
+    /// cycle of a Williams design or Latin square, and every row of the file. Pilots,
+    /// simulated participants and replacements can take any of them.
+    ///
+    /// # Errors
+    /// [`ScheduleError`] for the first order that is missing, incomplete or breaks a
+    /// constraint.
+    pub fn verify(&self, participants: u32) -> Result<(), ScheduleError> {
+        let check = |row| self.valid_order(Seat::Row(row)).map(drop);
+        match &self.source {
+            // Random orders are valid.
+            Source::Blocked { .. } | Source::Shuffled | Source::ShuffledWithin(_) => Ok(()),
+            Source::Fixed => check(1),
+            Source::Lines { of, .. } => {
+                (1..=of.cycle(self.models.len(), self.repetitions)).try_for_each(check)
+            }
+            Source::File(file) => {
+                let missing = (1..=participants).find(|row| !file.contains_key(row));
+                let rows = file.keys().copied();
+                rows.chain(missing).try_for_each(check)
+            }
+        }
+    }
+
+    /// The order of a seat; verified if it is given.
+    fn valid_order(&self, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
         let order = self.order(seat)?;
-        if !matches!(
+        let random = matches!(
             self.source,
             Source::Blocked { .. } | Source::Shuffled | Source::ShuffledWithin(_)
-        ) {
+        );
+        if !random && (self.max_run.is_some() || self.min_distance.is_some()) {
             let models: Vec<&ModelId> = order.iter().map(|&m| &self.models[m]).collect();
             if let Some(violation) =
                 constraints::first_violation(&models, self.max_run, self.min_distance)
@@ -302,7 +354,7 @@ impl Planner {
                 return Err(ScheduleError::Broken { seat, violation });
             }
         }
-        Ok(self.trials(&order))
+        Ok(order)
     }
 
     /// Indices of realizations in the order of a seat.
@@ -318,7 +370,8 @@ impl Planner {
                 orders::blocked(&mut stream(), n, repetitions, *distance)
             }
             Source::Shuffled => orders::shuffled(&mut stream(), n, repetitions),
-            Source::ShuffledWithin(completions) => completions.draw(&mut stream()),
+            Source::ShuffledWithin(Counted::States(states)) => states.draw(&mut stream()),
+            Source::ShuffledWithin(Counted::Terms(terms)) => terms.draw(&mut stream()),
             Source::Lines { of, symbols } => {
                 let first = u64::from(self.repetitions) * u64::from(seat.number() - 1);
                 (0..u64::from(self.repetitions))
@@ -423,6 +476,13 @@ impl Planner {
         }
         trials
     }
+}
+
+/// Counts the valid orders; `None` if the design is too large for both methods.
+fn counted(n: usize, repetitions: usize, rule: Rule) -> Option<Counted> {
+    let states = || Completions::count(n, repetitions, rule).map(Counted::States);
+    let terms = || Inclusion::count(n, repetitions, rule).map(Counted::Terms);
+    states().or_else(terms)
 }
 
 /// The rule that the constraints of the design reduce to, if there is a valid order.

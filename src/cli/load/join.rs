@@ -1,15 +1,12 @@
 //! Checks that need the protocol, the model files and the orders together.
 
 use super::OtherFiles;
-use study_base::diagnostic::{Fault, Findings, did_you_mean};
+use study_base::diagnostic::{Fault, Findings, Severity, did_you_mean};
 use study_base::text::Untrusted;
 use study_core::protocol::check::Spans;
-use study_core::protocol::{DeviceKind, FileOrders, Order, Protocol, Role, Seat};
+use study_core::protocol::{DeviceKind, FileOrders, Order, Protocol, Role};
 use study_core::schedule::balance::balances;
 use study_core::schedule::{Planner, ScheduleError};
-
-/// Largest number of rows whose order is checked.
-const MAX_ROWS: u32 = 200;
 
 /// Takes VAFs missing in the protocol from the model files and compares the others.
 pub(super) fn vaf(
@@ -151,24 +148,27 @@ fn tolerance(written: &str) -> f64 {
     0.5 * 10f64.powi(-digits.max(2)) + EXACT
 }
 
-/// Reports the first planned row whose order cannot be made, and whether a balanced
-/// order is balanced for the planned number of participants.
+/// Reports the first order that cannot be made, and whether a balanced order is
+/// balanced for the planned number of participants. For a study that has started, an
+/// order that cannot be made is a warning: others can.
 pub(super) fn orders(
     protocol: &Protocol,
     orders: Option<&FileOrders>,
+    started: bool,
     spans: &Spans,
     findings: &mut Findings,
 ) {
-    let planned = protocol.design.participants.min(MAX_ROWS);
-    let tried = Planner::new(protocol, orders).and_then(|planner| {
-        (1..=planned).try_for_each(|row| planner.plan(Seat::Row(row)).map(drop))
-    });
+    let participants = protocol.design.participants;
+    let tried = Planner::new(protocol, orders).and_then(|planner| planner.verify(participants));
     if let Err(error) = tried {
         let place = keys(&error, protocol)
             .iter()
             .find_map(|key| spans.get(*key))
             .cloned();
         let mut fault = Fault::error(error.to_string()).at(place);
+        if started {
+            fault.severity = Severity::Warning;
+        }
         fault.hint = error.hint().map(str::to_owned);
         findings.faults.push(fault);
         return;

@@ -9,6 +9,9 @@ use study_core::schedule::balance::{Balance, Balances, Spread, balances};
 /// Ids up to this length are used in the tables.
 const SHORT: usize = 3;
 
+/// Counts are shown for up to so many realizations; of more, nobody reads them.
+const MAX_COUNTED: usize = 100;
+
 /// The text of `study schedule`: orders, counts and a summary of the balance. Lines
 /// have at most `width` columns if the numbers allow it.
 pub(super) fn render(
@@ -45,11 +48,28 @@ pub(super) fn render(
         (Some((row, _)), _) => format!("row {row}"),
         _ => return out,
     };
+    if models.len() <= MAX_COUNTED {
+        balance_tables(&mut out, &codes, &balance, &rows, width);
+    } else {
+        let _ = writeln!(
+            out,
+            "\nThe counts of more than {MAX_COUNTED} realizations are not shown; --csv prints the orders."
+        );
+    }
+    out.push('\n');
+    for line in verdict(&protocol.design, &balance) {
+        let _ = writeln!(out, "{line}");
+    }
+    out
+}
+
+/// Counts by place, by position and of carry-over.
+fn balance_tables(out: &mut String, codes: &Codes, balance: &Balance, rows: &str, width: usize) {
     if balance.blocks > 1 {
         let _ = writeln!(out, "\nOccurrences at each place of a block, {rows}");
         counts(
-            &mut out,
-            &codes,
+            out,
+            codes,
             &numbers(&balance.by_place),
             &balance.by_place,
             width,
@@ -57,8 +77,8 @@ pub(super) fn render(
     }
     let _ = writeln!(out, "\nOccurrences at each position of the session, {rows}");
     counts(
-        &mut out,
-        &codes,
+        out,
+        codes,
         &numbers(&balance.by_position),
         &balance.by_position,
         width,
@@ -68,30 +88,19 @@ pub(super) fn render(
             out,
             "\nOccurrences of the column directly after the line, within blocks, {rows}"
         );
-        counts(&mut out, &codes, &codes.names, &balance.carry_over, width);
+        counts(out, codes, &codes.names, &balance.carry_over, width);
         let _ = writeln!(
             out,
             "\nOccurrences of the column at the start of a block after one that ends with the line, {rows}"
         );
-        counts(
-            &mut out,
-            &codes,
-            &codes.names,
-            &balance.between_blocks,
-            width,
-        );
+        counts(out, codes, &codes.names, &balance.between_blocks, width);
     } else {
         let _ = writeln!(
             out,
             "\nOccurrences of the column directly after the line, {rows}"
         );
-        counts(&mut out, &codes, &codes.names, &balance.carry_over, width);
+        counts(out, codes, &codes.names, &balance.carry_over, width);
     }
-    out.push('\n');
-    for line in verdict(&protocol.design, &balance) {
-        let _ = writeln!(out, "{line}");
-    }
-    out
 }
 
 /// Short codes of the realizations in the tables.
@@ -373,6 +382,16 @@ mod tests {
             let trials = orders.split_whitespace().filter(|w| *w != "│");
             assert_eq!(trials.count(), 36, "{text}");
         }
+    }
+
+    #[test]
+    fn counts_of_very_many_realizations_are_not_shown() {
+        let text = rendered(&protocol(100, 1), 1, 80);
+        assert!(text.contains("Occurrences at each position"), "{text}");
+        let text = rendered(&protocol(101, 1), 1, 80);
+        assert!(!text.contains("Occurrences"), "{text}");
+        assert!(text.contains("more than 100 realizations"), "{text}");
+        assert!(text.contains("Positions: unbalanced"), "{text}");
     }
 
     #[test]

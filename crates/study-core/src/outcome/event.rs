@@ -225,6 +225,10 @@ pub enum Event {
         /// without one.
         choice: Option<Choice>,
         queue: Vec<u32>,
+        /// Whether a restart of the block makes the order violate `max_run` or
+        /// `min_distance`.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        constraint_broken: bool,
     },
     /// The participant decided on the consent document.
     Consented {
@@ -296,7 +300,8 @@ pub enum Event {
         /// The device's message or the operator's reason.
         detail: String,
         queue: Vec<u32>,
-        /// Whether the trial's new place violates `max_run` or `min_distance`.
+        /// Whether the order of the trials still to come violates `max_run` or
+        /// `min_distance`.
         constraint_broken: bool,
     },
     /// All questions of an attempt are answered: the trial is completed.

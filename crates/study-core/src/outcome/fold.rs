@@ -10,7 +10,8 @@
 //!   restart of its block sent the trial back. Only its answers count.
 //! * An answer that is in the journal counts even if the trial was never completed.
 //! * A realization counts as felt once the device has confirmed that it plays,
-//!   whether or not the attempt fails, practice included.
+//!   whether or not the attempt fails, practice included. A trial that was stopped or
+//!   interrupted and is felt again at once is felt once.
 //! * The last event that sets a state determines it.
 //! * An event of an attempt whose start is missing from a damaged journal stands
 //!   for the start: nothing that was measured or answered is lost with one line.
@@ -50,8 +51,10 @@ pub struct History {
     open: Option<u32>,
     /// The trial that counts that was completed last, until it is marked as bad.
     pub last_done: Option<u32>,
-    /// Trials in the order in which they were felt; immediate repeats once.
-    felt: Vec<u32>,
+    /// Trial and attempt of each presentation, in order.
+    felt: Vec<(u32, u32)>,
+    /// Whether the last presentation was stopped or interrupted.
+    goes_on: bool,
     /// Numbers of closed trials after which a break began.
     pub breaks: BTreeSet<u32>,
     /// When the break under way began.
@@ -199,9 +202,7 @@ impl History {
             }
             Event::PlaybackStarted { trial, attempt } => {
                 self.attempt_mut(*trial, *attempt);
-                if self.felt.last() != Some(trial) {
-                    self.felt.push(*trial);
-                }
+                self.presented(*trial, *attempt);
             }
             Event::PlaybackEnded {
                 trial,
@@ -327,6 +328,17 @@ impl History {
         self.trials.get_mut(&self.open?)?.attempts.last_mut()
     }
 
+    /// Adds a presentation, or continues the last one.
+    fn presented(&mut self, trial: u32, attempt: u32) {
+        let goes_on = std::mem::take(&mut self.goes_on);
+        match self.felt.last_mut() {
+            Some(last) if *last == (trial, attempt) || (goes_on && last.0 == trial) => {
+                last.1 = attempt;
+            }
+            _ => self.felt.push((trial, attempt)),
+        }
+    }
+
     fn failed(&mut self, trial: u32, attempt: u32, failure: Failure, queue: &[u32]) {
         if let Some(attempt) = self.attempt_mut(trial, attempt) {
             attempt.void = true;
@@ -336,6 +348,9 @@ impl History {
             self.open = None;
         }
         self.last_done = self.last_done.filter(|t| *t != trial);
+        if self.felt.last() == Some(&(trial, attempt)) {
+            self.goes_on = !failure.counts();
+        }
         let failures = &mut self.trials.entry(trial).or_default().failures;
         *failures += u32::from(failure.counts());
     }

@@ -20,8 +20,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 use study_base::rng::Stream;
 
-/// Approximate bytes above which the states of a design are refused.
-const MEMORY: usize = 64 << 20;
+/// Largest sum of the sizes of all states, about their number of bytes;
+/// docs/schedule.md defines the size.
+const MAX_SIZE: usize = 1 << 26;
 
 /// The number of completions of every reachable state.
 #[derive(Debug)]
@@ -61,7 +62,7 @@ type Key = Vec<u16>;
 
 impl Completions {
     /// Counts for `n` realizations with `repetitions` trials each; `None` if the states
-    /// need too much memory.
+    /// are larger than [`MAX_SIZE`].
     pub(super) fn count(n: usize, repetitions: usize, rule: Rule) -> Option<Self> {
         let trials = n * repetitions;
         // No count is above n^trials.
@@ -70,7 +71,7 @@ impl Completions {
         let mut start = vec![0; held];
         start.extend([small(repetitions), small(n)]);
 
-        let mut used = 0;
+        let mut size = 0;
         let mut nodes = Vec::new();
         let mut edges = Vec::new();
         let mut layer = vec![start];
@@ -82,7 +83,7 @@ impl Completions {
                 each_successor(key, rule, |class, times, next| {
                     let known = found.len();
                     let next = *found.entry(next).or_insert_with_key(|key| {
-                        used += 2 * key.len() + 128 + count_bytes;
+                        size += 2 * key.len() + 128 + count_bytes;
                         first + known
                     });
                     edges.push(Edge { class, times, next });
@@ -91,7 +92,7 @@ impl Completions {
                     completions: BigUint::ZERO,
                     edges: begin..edges.len(),
                 });
-                if used > MEMORY {
+                if size > MAX_SIZE {
                     return None;
                 }
             }
@@ -137,7 +138,7 @@ impl Completions {
     }
 
     /// The order at a place, from 0, in the sorted list of all valid orders.
-    fn at(&self, mut place: BigUint) -> Vec<usize> {
+    pub(super) fn at(&self, mut place: BigUint) -> Vec<usize> {
         let trials = self.n * self.repetitions;
         let mut order: Vec<usize> = Vec::with_capacity(trials);
         let mut left = vec![small(self.repetitions); self.n];
@@ -336,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn what_would_take_too_much_memory_is_refused() {
+    fn designs_with_too_many_states_are_refused() {
         assert!(Completions::count(40, 20, Rule::Distance(4)).is_none());
     }
 }

@@ -4,6 +4,7 @@
 //! `min_distance = d`: positions of the same realization differ by at least d.
 //! Realizations are distinguished by id; a hidden duplicate is another realization.
 
+use std::collections::HashMap;
 use std::fmt;
 use study_base::text::ModelId;
 
@@ -58,53 +59,63 @@ pub fn first_violation(
     max_run: Option<u32>,
     min_distance: Option<u32>,
 ) -> Option<Violation> {
-    let mut run = 0u32;
-    for (i, &model) in models.iter().enumerate() {
-        let violation = |broken| Violation {
+    let mut watch = Watch::new(max_run, min_distance);
+    models.iter().enumerate().find_map(|(i, &model)| {
+        watch.next(model).map(|broken| Violation {
             position: i + 1,
             model: model.clone(),
             broken,
-        };
-        let again = i > 0 && models[i - 1] == model;
-        run = if again { run + 1 } else { 1 };
-        if let Some(limit) = max_run
-            && run > limit
-        {
-            return Some(violation(Broken::MaxRun { limit }));
-        }
-        if let Some(limit) = min_distance
-            && let Some(found) = back(&models[..i], model)
-            && found < limit as usize
-        {
-            return Some(violation(Broken::MinDistance { limit, found }));
-        }
-    }
-    None
+        })
+    })
 }
 
-/// Whether the trial at index `at` satisfies the constraints with respect to the other
-/// trials.
-pub(super) fn keeps(
-    models: &[&ModelId],
-    at: usize,
+/// Follows an order and notices violations.
+#[derive(Debug, Clone)]
+pub(super) struct Watch<'a> {
     max_run: Option<u32>,
     min_distance: Option<u32>,
-) -> bool {
-    let (before, model, after) = (&models[..at], models[at], &models[at + 1..]);
-    let same = |other: &&&ModelId| **other == model;
-    let run =
-        1 + before.iter().rev().take_while(same).count() + after.iter().take_while(same).count();
-    let nearest = back(before, model)
-        .into_iter()
-        .chain(after.iter().position(|m| *m == model).map(|i| i + 1))
-        .min();
-    max_run.is_none_or(|limit| run <= limit as usize)
-        && min_distance.is_none_or(|limit| nearest.is_none_or(|d| d >= limit as usize))
+    /// Trials so far.
+    trials: usize,
+    /// The last position of each realization.
+    last: HashMap<&'a ModelId, usize>,
+    /// Length of the present run.
+    run: u32,
 }
 
-/// Distance from the end of `before` to the last `model`, from 1.
-fn back(before: &[&ModelId], model: &ModelId) -> Option<usize> {
-    before.iter().rev().position(|m| *m == model).map(|i| i + 1)
+impl<'a> Watch<'a> {
+    pub(super) fn new(max_run: Option<u32>, min_distance: Option<u32>) -> Self {
+        Self {
+            max_run,
+            min_distance,
+            trials: 0,
+            last: HashMap::new(),
+            run: 0,
+        }
+    }
+
+    /// Adds a trial; returns the constraint that it violates.
+    pub(super) fn next(&mut self, model: &'a ModelId) -> Option<Broken> {
+        self.trials += 1;
+        let back = self.last.insert(model, self.trials);
+        let back = back.map(|last| self.trials - last);
+        self.run = if back == Some(1) { self.run + 1 } else { 1 };
+        if let Some(limit) = self.max_run
+            && self.run > limit
+        {
+            return Some(Broken::MaxRun { limit });
+        }
+        match (self.min_distance, back) {
+            (Some(limit), Some(found)) if found < limit as usize => {
+                Some(Broken::MinDistance { limit, found })
+            }
+            _ => None,
+        }
+    }
+
+    /// Adds the trials of an order; returns how many of them violate a constraint.
+    pub(super) fn violations(&mut self, models: impl Iterator<Item = &'a ModelId>) -> usize {
+        models.filter(|model| self.next(model).is_some()).count()
+    }
 }
 
 /// The rule that the two constraints reduce to.
@@ -192,11 +203,12 @@ mod tests {
     }
 
     #[test]
-    fn keeping_looks_at_both_sides() {
-        let ids = ids("ABACA");
-        let models: Vec<_> = ids.iter().collect();
-        assert!(keeps(&models, 2, Some(1), Some(2)));
-        assert!(!keeps(&models, 2, None, Some(3)));
-        assert!(keeps(&models, 3, Some(1), Some(9)));
+    fn every_trial_that_violates_a_constraint_counts_once() {
+        let ids = ids("AABBBAB");
+        let count = |run, distance| Watch::new(run, distance).violations(ids.iter());
+        assert_eq!(count(None, None), 0);
+        assert_eq!(count(Some(1), None), 3);
+        assert_eq!(count(Some(2), None), 1);
+        assert_eq!(count(Some(1), Some(3)), 4);
     }
 }

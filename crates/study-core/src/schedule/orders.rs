@@ -18,19 +18,25 @@ use study_base::rng::Stream;
 ///
 /// `distance` is at most `n`, or there is a single block.
 pub(super) fn blocked(stream: &mut Stream, n: usize, blocks: usize, distance: usize) -> Vec<usize> {
-    let mut order = Vec::with_capacity(n * blocks);
-    let mut last: Vec<Option<usize>> = vec![None; n];
-    let mut may_come = Vec::with_capacity(n);
-    for block in 0..blocks {
-        for at in block * n..(block + 1) * n {
-            may_come.clear();
-            may_come.extend((0..n).filter(|&model| {
-                last[model].is_none_or(|before| before < block * n && at - before >= distance)
-            }));
-            let chosen = may_come[below(stream, may_come.len())];
-            last[chosen] = Some(at);
-            order.push(chosen);
+    let mut order: Vec<usize> = Vec::with_capacity(n * blocks);
+    // What may come, by ascending number.
+    let mut free: Vec<usize> = Vec::with_capacity(n);
+    for at in 0..n * blocks {
+        let block = at - at % n;
+        if at == block {
+            let mut too_near = vec![false; n];
+            for &model in &order[(at + 1).saturating_sub(distance).min(at)..] {
+                too_near[model] = true;
+            }
+            free.clear();
+            free.extend((0..n).filter(|&model| !too_near[model]));
+        } else if let Some(back) = at.checked_sub(distance)
+            && back < block
+        {
+            let model = order[back];
+            free.insert(free.partition_point(|&m| m < model), model);
         }
+        order.push(free.remove(below(stream, free.len())));
     }
     order
 }

@@ -1,50 +1,86 @@
 //! Where a failed trial is inserted again.
 
-use super::constraints::keeps;
+use super::constraints::Watch;
 use crate::protocol::{Design, Trial};
+use std::iter::once;
 use study_base::text::ModelId;
+
+/// What a participant has felt so far in a session.
+#[derive(Debug, Clone, Default)]
+pub struct Felt<'a> {
+    /// One for each presentation, in order, practice included.
+    pub trials: Vec<&'a Trial>,
+    /// Whether the last one was stopped or interrupted. If its trial comes next, the
+    /// same presentation goes on; it is not a further one.
+    pub goes_on: bool,
+}
 
 /// The trials that remain after a failed attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Requeued {
     /// The remaining trials in order, the failed one among them.
     pub queue: Vec<Trial>,
-    /// Whether no place satisfied `max_run` and `min_distance`.
+    /// Whether the order violates `max_run` or `min_distance` wherever the failed trial
+    /// is inserted.
     pub constraint_broken: bool,
 }
 
-/// Inserts a failed trial at the end of its block; if that violates a constraint, at
-/// the latest place in the rest of the block that violates none; if there is none, at
-/// the end, flagged.
+/// Inserts a failed trial at the latest place of its block at which the trials to come
+/// violate no constraint. If there is none, it comes at the latest of the places with
+/// the fewest violations, flagged.
 ///
-/// `presented` are the attempts so far in the order of presentation, the failed one
-/// included; `rest` is the queue without it. If its block has no trial left, the
-/// failed trial comes next. Practice is repeated within practice, where no constraint
-/// holds. Only distances to the failed trial can become smaller.
-pub fn requeue(presented: &[&Trial], rest: &[Trial], failed: &Trial, design: &Design) -> Requeued {
+/// `rest` is the queue without the failed trial. If its block has no trial left, the
+/// failed trial comes next. Practice is repeated within practice.
+pub fn requeue(felt: &Felt<'_>, rest: &[Trial], failed: &Trial, design: &Design) -> Requeued {
     let same_block = |t: &Trial| t.practice == failed.practice && t.block == failed.block;
     let end = rest.iter().rposition(same_block).map_or(0, |last| last + 1);
-    let mut models: Vec<&ModelId> = presented
-        .iter()
-        .filter(|t| !t.practice)
-        .map(|t| &t.model)
-        .collect();
-    let so_far = models.len();
-    models.extend(rest.iter().filter(|t| !t.practice).map(|t| &t.model));
-
-    let keeps_at = |place: &usize| {
-        let at = so_far + rest[..*place].iter().filter(|t| !t.practice).count();
-        let mut models = models.clone();
-        models.insert(at, &failed.model);
-        keeps(&models, at, design.max_run, design.min_distance)
-    };
-    let good = (0..=end)
-        .rev()
-        .find(|place| failed.practice || keeps_at(place));
+    let watch = watch(felt, design);
+    let mut best = (usize::MAX, end);
+    for place in (0..=end).rev() {
+        let (before, after) = rest.split_at(place);
+        let to_come = before.iter().chain(once(failed)).chain(after);
+        let violations = violations(watch.clone(), felt, to_come);
+        if violations < best.0 {
+            best = (violations, place);
+        }
+        if violations == 0 {
+            break;
+        }
+    }
+    let (violations, place) = best;
     let mut queue = rest.to_vec();
-    queue.insert(good.unwrap_or(end), failed.clone());
+    queue.insert(place, failed.clone());
     Requeued {
         queue,
-        constraint_broken: good.is_none(),
+        constraint_broken: violations > 0,
     }
+}
+
+/// Whether any of the trials to come violates a constraint.
+pub fn breaks_constraint(felt: &Felt<'_>, to_come: &[Trial], design: &Design) -> bool {
+    violations(watch(felt, design), felt, to_come.iter()) > 0
+}
+
+/// The constraints after what was felt.
+fn watch<'a>(felt: &Felt<'a>, design: &Design) -> Watch<'a> {
+    let mut watch = Watch::new(design.max_run, design.min_distance);
+    watch.violations(counted(felt.trials.iter().copied()));
+    watch
+}
+
+/// Number of trials to come that violate a constraint.
+fn violations<'a>(
+    mut watch: Watch<'a>,
+    felt: &Felt<'_>,
+    to_come: impl Iterator<Item = &'a Trial>,
+) -> usize {
+    let under_way = felt.trials.last().filter(|_| felt.goes_on);
+    let mut to_come = to_come.peekable();
+    to_come.next_if(|next| under_way.is_some_and(|t| t.trial == next.trial));
+    watch.violations(counted(to_come))
+}
+
+/// The realizations of the trials that the constraints concern.
+fn counted<'a>(trials: impl Iterator<Item = &'a Trial>) -> impl Iterator<Item = &'a ModelId> {
+    trials.filter(|t| !t.practice).map(|t| &t.model)
 }

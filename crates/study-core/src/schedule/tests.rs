@@ -221,6 +221,49 @@ fn faults_of_an_orders_file_are_named() {
 }
 
 #[test]
+fn all_given_orders_are_verified_beyond_the_planned_participants() {
+    let mut p = design(3, 2, Order::File("orders.csv".to_owned()));
+    p.design.max_run = Some(1);
+    let verify = |orders: &FileOrders, participants| {
+        let said = Planner::new(&p, Some(orders)).unwrap().verify(participants);
+        said.map_err(|e| e.to_string())
+    };
+    let broken = file(&[(1, "ABCABC"), (2, "ABCABC"), (7, "ABCCBA")]);
+    assert_eq!(
+        verify(&broken, 1).unwrap_err(),
+        "row 7, position 4: `C` occurs 2 times in a row (max_run = 1)"
+    );
+    let short = file(&[(1, "ABCABC"), (2, "CABCAB"), (9, "ABCAB")]);
+    assert!(
+        verify(&short, 1)
+            .unwrap_err()
+            .contains("row 9: 5 positions")
+    );
+    let good = file(&[(1, "ABCABC"), (2, "CABCAB")]);
+    assert_eq!(verify(&good, 2), Ok(()));
+    assert_eq!(
+        verify(&good, 3).unwrap_err(),
+        "the file of orders has no row 3"
+    );
+
+    // Lines 012 120 201 and backwards: only rows 1 and 2 keep the constraint.
+    let mut p = design(3, 2, Order::Williams);
+    p.design.max_run = Some(1);
+    let planner = Planner::new(&p, None).unwrap();
+    assert!((1..=2).all(|row| planner.plan(Seat::Row(row)).is_ok()));
+    let said = planner.verify(2).unwrap_err().to_string();
+    assert!(said.starts_with("row 3, position 4: "), "{said}");
+    for (n, repetitions, order) in [(5, 3, Order::Williams), (4, 3, Order::LatinSquare)] {
+        let mut p = design(n, repetitions, order);
+        p.design.max_run = Some(1);
+        assert_eq!(Planner::new(&p, None).unwrap().verify(1), Ok(()));
+    }
+    let mut p = design(2, 3, Order::Fixed);
+    p.design.min_distance = Some(2);
+    assert_eq!(Planner::new(&p, None).unwrap().verify(1), Ok(()));
+}
+
+#[test]
 fn pilots_take_the_rows_of_a_file_in_turn() {
     let p = design(3, 1, Order::File("orders.csv".to_owned()));
     let orders = file(&[(5, "ABC"), (7, "CBA")]);
@@ -316,6 +359,13 @@ fn trials(text: &str) -> Vec<Trial> {
     out
 }
 
+fn felt(trials: &[Trial]) -> Felt<'_> {
+    Felt {
+        trials: trials.iter().collect(),
+        goes_on: false,
+    }
+}
+
 /// The queue after the `failed`-th trial (from 1) has failed, and the flag.
 fn returned(
     text: &str,
@@ -327,7 +377,7 @@ fn returned(
     design.max_run = max_run;
     design.min_distance = min_distance;
     let all = trials(text);
-    let felt: Vec<&Trial> = all[..failed].iter().collect();
+    let felt = felt(&all[..failed]);
     let got = requeue(&felt, &all[failed..], &all[failed - 1], &design);
     (letters(&got.queue), got.constraint_broken)
 }
@@ -377,6 +427,37 @@ fn the_last_trial_of_a_block_comes_back_right_away_and_is_flagged() {
 }
 
 #[test]
+fn a_trial_that_was_not_felt_comes_right_away_if_its_neighbours_are_alike() {
+    let mut design = protocol(3, 2).design;
+    design.max_run = Some(1);
+    // A was felt, the device refuses B: at any later place A follows A.
+    let all = trials("ABACBC");
+    let got = requeue(&felt(&all[..1]), &all[2..], &all[1], &design);
+    assert_eq!(
+        (letters(&got.queue), got.constraint_broken),
+        ("BACBC".into(), false)
+    );
+    assert!(breaks_constraint(&felt(&all[..1]), &all[2..], &design));
+    assert!(!breaks_constraint(&felt(&all[..2]), &all[2..], &design));
+}
+
+#[test]
+fn a_stopped_presentation_goes_on_if_its_trial_comes_next() {
+    let mut design = protocol(3, 2).design;
+    design.max_run = Some(1);
+    let all = trials("ABC|ABC");
+    let stopped = Felt {
+        goes_on: true,
+        ..felt(&all[..3])
+    };
+    let got = requeue(&stopped, &all[3..], &all[2], &design);
+    assert_eq!(
+        (letters(&got.queue), got.constraint_broken),
+        ("CABC".into(), false)
+    );
+}
+
+#[test]
 fn in_a_session_of_one_block_a_failed_trial_comes_at_the_end() {
     assert_eq!(
         returned("ABCABC", 1, Some(1), None),
@@ -393,12 +474,12 @@ fn practice_comes_back_within_practice_and_violates_nothing() {
     }
     let mut design = protocol(2, 1).design;
     design.max_run = Some(1);
-    let got = requeue(&[&all[0], &all[1]], &all[2..], &all[1], &design);
+    let got = requeue(&felt(&all[..2]), &all[2..], &all[1], &design);
     assert_eq!(
         (letters(&got.queue), got.constraint_broken),
         ("BAB".into(), false)
     );
-    let got = requeue(&[&all[0]], &all[1..], &all[0], &design);
+    let got = requeue(&felt(&all[..1]), &all[1..], &all[0], &design);
     assert_eq!(
         (letters(&got.queue), got.constraint_broken),
         ("BAAB".into(), false)
@@ -413,7 +494,7 @@ fn a_practice_trial_before_does_not_enter_a_constraint() {
     all[0].block = 0;
     let mut design = protocol(2, 1).design;
     design.max_run = Some(1);
-    let got = requeue(&[&all[0], &all[1]], &all[2..], &all[1], &design);
+    let got = requeue(&felt(&all[..2]), &all[2..], &all[1], &design);
     assert_eq!(
         (letters(&got.queue), got.constraint_broken),
         ("BA".into(), false)

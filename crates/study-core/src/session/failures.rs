@@ -4,7 +4,7 @@ use super::phase::{DeviceProblem, LOAD_WITHIN_S, Phase, STOP_WITHIN_S};
 use super::{Effect, Session};
 use crate::outcome::{Event, Failure, Moment};
 use crate::protocol::Trial;
-use crate::schedule;
+use crate::schedule::{self, Felt};
 
 impl Session {
     pub(super) fn device_fault(&mut self, what: &str, at: Moment) {
@@ -151,17 +151,18 @@ impl Session {
         let planned = |n: &u32| self.history.planned(*n).cloned();
         let mut rest: Vec<Trial> = self.history.queue.iter().filter_map(planned).collect();
         rest.retain(|t| t.trial != number);
+        let design = &self.protocol.design;
         let mut constraint_broken = false;
         let mut given_up = false;
         let queue = if !failure.counts() {
             rest.insert(0, trial);
             rest
-        } else if self.history.failures(number) + 1 >= self.protocol.design.max_attempts {
+        } else if self.history.failures(number) + 1 >= design.max_attempts {
             given_up = true;
+            constraint_broken = schedule::breaks_constraint(&self.felt(), &rest, design);
             rest
         } else {
-            let felt: Vec<&Trial> = self.history.felt().collect();
-            let again = schedule::requeue(&felt, &rest, &trial, &self.protocol.design);
+            let again = schedule::requeue(&self.felt(), &rest, &trial, design);
             constraint_broken = again.constraint_broken;
             again.queue
         };
@@ -177,6 +178,14 @@ impl Session {
         if given_up {
             let trial = number;
             self.record(Event::TrialClosed { trial, attempt }, at);
+        }
+    }
+
+    /// What the constraints of the order look back to.
+    pub(super) fn felt(&self) -> Felt<'_> {
+        Felt {
+            trials: self.history.felt().collect(),
+            goes_on: self.history.goes_on(),
         }
     }
 }

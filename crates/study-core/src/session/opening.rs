@@ -147,6 +147,10 @@ impl Session {
         } else {
             self.history.queue.to_vec()
         };
+        let planned = |trial: &u32| self.history.planned(*trial).cloned();
+        let to_come: Vec<_> = queue.iter().filter_map(planned).collect();
+        let constraint_broken =
+            restart && schedule::breaks_constraint(&self.felt(), &to_come, &self.protocol.design);
         let device_id = self.claim.as_ref().map(|c| c.device_id.clone());
         let reopened = Event::Reopened {
             operator: self.operator.clone(),
@@ -155,6 +159,7 @@ impl Session {
             gap_s,
             choice,
             queue,
+            constraint_broken,
         };
         self.record(reopened, at);
         if choice == Some(Choice::DropOut) {

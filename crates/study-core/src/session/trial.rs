@@ -34,9 +34,11 @@ impl Session {
     /// its kind (practice or not) felt so far, each as often as the hand came back
     /// to it from another one. Felt again at once, it keeps its position.
     fn position(&self, trial: &Trial) -> u32 {
-        let same_kind = |t: &&Trial| t.practice == trial.practice;
-        let before = self.history.felt().filter(same_kind).count();
-        let last = self.history.last_felt();
+        let mut felt: Vec<&Trial> = self.history.felt().collect();
+        felt.dedup_by_key(|t| t.trial);
+        let same_kind = |t: &&&Trial| t.practice == trial.practice;
+        let before = felt.iter().filter(same_kind).count();
+        let last = felt.last();
         let again = last.is_some_and(|t| t.trial == trial.trial);
         let before = u32::try_from(before).unwrap_or(u32::MAX);
         before.saturating_add(u32::from(!again))

@@ -82,15 +82,18 @@ pub fn attempt_rows(
                 attempt,
                 failure,
                 detail,
+                queue,
                 constraint_broken,
-                ..
             } => {
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
                 row.failure = Some(*failure);
                 row.text.clone_from(detail);
                 if *constraint_broken {
-                    row.text
-                        .push_str(" [its new place breaks the order's constraint]");
+                    row.text.push_str(if queue.contains(trial) {
+                        " [its new place breaks the order's constraint]"
+                    } else {
+                        " [the order without it breaks its constraint]"
+                    });
                 }
             }
             Event::TrialClosed { trial, attempt } => {
@@ -101,8 +104,17 @@ pub fn attempt_rows(
                 row.by = Some(*by);
                 row.text.clone_from(text);
             }
-            Event::Reopened { gap_s, choice, .. } => {
+            Event::Reopened {
+                gap_s,
+                choice,
+                constraint_broken,
+                ..
+            } => {
                 row.text = resume_text(*gap_s, *choice);
+                if *constraint_broken {
+                    row.text
+                        .push_str(" [the restart breaks the order's constraint]");
+                }
             }
             Event::StateSet { state, reason } => {
                 row.text = format!("{}: {reason}", state.as_str());

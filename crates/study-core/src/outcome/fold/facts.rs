@@ -107,15 +107,21 @@ impl History {
         self.answers.iter().any(rated) || self.all_attempts().any(|(_, a)| a.done.is_some())
     }
 
-    /// The planned trials in the order in which they were felt; a trial felt again
-    /// at once appears once.
+    /// The planned trials in the order in which they were felt, one for each
+    /// presentation.
     pub fn felt(&self) -> impl Iterator<Item = &Trial> {
-        self.felt.iter().filter_map(|t| self.planned(*t))
+        self.felt.iter().filter_map(|(t, _)| self.planned(*t))
+    }
+
+    /// Whether the last presentation was stopped or interrupted. If its trial is felt
+    /// again at once, the same presentation goes on.
+    pub fn goes_on(&self) -> bool {
+        self.goes_on
     }
 
     /// The trial that was felt last.
     pub fn last_felt(&self) -> Option<&Trial> {
-        self.felt.last().and_then(|t| self.planned(*t))
+        self.felt.last().and_then(|(t, _)| self.planned(*t))
     }
 
     /// The current answer to a question.

@@ -106,6 +106,7 @@ fn reopened(choice: Option<Choice>, queue: &[u32]) -> Event {
         gap_s: 90_000.0,
         choice,
         queue: queue.to_vec(),
+        constraint_broken: false,
     }
 }
 
@@ -237,4 +238,68 @@ fn without_the_start_of_an_attempt_only_the_content_of_that_line_is_lost() {
     assert_eq!(damaged[0].response_s, complete[0].response_s);
     assert_eq!(damaged[0].attempt, Some(1));
     assert_eq!(damaged[1].previous_model, complete[1].previous_model);
+}
+
+#[test]
+fn the_log_says_what_breaks_the_constraint_of_the_order() {
+    let failed = |trial, queue: &[u32], constraint_broken| Event::AttemptFailed {
+        trial,
+        attempt: 1,
+        failure: Failure::DeviceFault,
+        detail: "hot".to_owned(),
+        queue: queue.to_vec(),
+        constraint_broken,
+    };
+    let mut restarted = reopened(Some(Choice::RestartBlock), &[1, 3]);
+    if let Event::Reopened {
+        constraint_broken, ..
+    } = &mut restarted
+    {
+        *constraint_broken = true;
+    }
+    let entries = journal(vec![
+        begin(1, 1),
+        failed(1, &[1, 2, 3], true),
+        begin(2, 1),
+        failed(2, &[1, 3], true),
+        restarted,
+        begin(3, 1),
+        failed(3, &[1, 3], false),
+    ]);
+    let history = History::of(&entries);
+    let id = ParticipantId::new("P01").unwrap();
+    let log = attempt_rows(&history, &id, 1, &entries);
+    let texts: Vec<&str> = log.iter().map(|r| r.text.as_str()).collect();
+    let texts: Vec<&str> = texts.into_iter().filter(|t| !t.is_empty()).collect();
+    assert_eq!(
+        texts,
+        [
+            "hot [its new place breaks the order's constraint]",
+            "hot [the order without it breaks its constraint]",
+            "restarted the block after 90000 s [the restart breaks the order's constraint]",
+            "hot",
+        ]
+    );
+}
+
+#[test]
+fn a_stopped_presentation_that_is_resumed_is_one_presentation() {
+    let failed = |attempt, failure| Event::AttemptFailed {
+        trial: 1,
+        attempt,
+        failure,
+        detail: String::new(),
+        queue: vec![1, 2, 3],
+        constraint_broken: false,
+    };
+    let start = |attempt| Event::PlaybackStarted { trial: 1, attempt };
+    let mut events = vec![begin(1, 1), start(1), failed(1, Failure::Stopped)];
+    assert!(History::of(&journal(events.clone())).goes_on());
+    events.extend([begin(1, 2), failed(2, Failure::Interrupted)]);
+    assert!(History::of(&journal(events.clone())).goes_on());
+    events.extend([begin(1, 3), start(3)]);
+    let history = History::of(&journal(events.clone()));
+    assert_eq!((history.felt().count(), history.goes_on()), (1, false));
+    events.extend([failed(3, Failure::DeviceFault), begin(1, 4), start(4)]);
+    assert_eq!(History::of(&journal(events)).felt().count(), 2);
 }
