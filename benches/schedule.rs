@@ -50,9 +50,19 @@ fn one_row_shuffled_10_by_5_max_run(bencher: divan::Bencher<'_, '_>, max_run: u3
     bencher.bench(|| study_core::schedule::plan(&protocol, None, Seat::Row(1)));
 }
 
-/// Near the most that is counted before a design is refused.
+/// Near the most that is counted by states.
 #[divan::bench(sample_count = 3, sample_size = 1)]
 fn one_row_shuffled_20_by_5_max_run_1(bencher: divan::Bencher<'_, '_>) {
     let protocol = constrained(20, 5, Shuffled, Some(1), None);
+    bencher.bench(|| study_core::schedule::plan(&protocol, None, Seat::Row(1)));
+}
+
+/// Too many states: counted by inclusion and exclusion.
+#[divan::bench(sample_count = 3, sample_size = 1, args = [(30, 10), (20, 20)])]
+fn one_row_shuffled_max_run_1(
+    bencher: divan::Bencher<'_, '_>,
+    (models, repetitions): (usize, u32),
+) {
+    let protocol = constrained(models, repetitions, Shuffled, Some(1), None);
     bencher.bench(|| study_core::schedule::plan(&protocol, None, Seat::Row(1)));
 }

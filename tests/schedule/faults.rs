@@ -1,7 +1,7 @@
 //! Sessions with faults: no constraint is violated unflagged.
 
 use crate::designs::{design, model};
-use chrono::{DateTime, TimeDelta};
+use chrono::{DateTime, FixedOffset, TimeDelta};
 use std::sync::Arc;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, ParticipantId};
@@ -19,7 +19,7 @@ fn no_constraint_is_violated_unflagged_in_ten_thousand_sessions_with_faults() {
     let mut tally = Tally::default();
     for number in 1..=SESSIONS {
         let (protocol, mut chance) = constrained_design(number);
-        let journal = Run::new(protocol.clone(), number).to_the_end(&mut chance);
+        let journal = Run::new(protocol.clone(), number).until_the_end(&mut chance);
         check(&journal, &protocol.design, &mut tally);
     }
     // The sessions are worth the check: most failures are mended, some cannot be.
@@ -83,23 +83,33 @@ struct Run {
 
 impl Run {
     fn new(protocol: Arc<Protocol>, row: u32) -> Self {
-        let now = Moment {
-            wall: DateTime::parse_from_rfc3339("2026-03-02T09:00:00+01:00").expect("a date"),
-            mono_ns: 1_000_000_000,
-        };
-        let config = || Config {
+        let wall = DateTime::parse_from_rfc3339("2026-03-02T09:00:00+01:00").expect("a date");
+        Self::from_journal(protocol, row, Vec::new(), wall)
+    }
+
+    fn from_journal(
+        protocol: Arc<Protocol>,
+        row: u32,
+        journal: Vec<Entry>,
+        wall: DateTime<FixedOffset>,
+    ) -> Self {
+        let config = Config {
             participant: "P01".to_owned(),
             auto_identify: true,
             ..Config::default()
         };
-        let (session, effects) = Session::new(protocol.clone(), None, config(), now);
+        let now = Moment {
+            wall,
+            mono_ns: 1_000_000_000,
+        };
+        let (session, effects) = Session::new(protocol.clone(), None, config, now);
         let mut run = Self {
             protocol,
             row,
             session,
             now,
-            journal: Vec::new(),
-            before: 0,
+            before: journal.len(),
+            journal,
             ended: false,
         };
         run.carry_out(effects);
@@ -108,29 +118,9 @@ impl Run {
 
     /// The program ends at once and is started again later.
     fn crash(&mut self, gap_s: i64) {
-        let now = Moment {
-            wall: self.now.wall + TimeDelta::seconds(gap_s),
-            mono_ns: 1_000_000_000,
-        };
-        let again = Self::new(self.protocol.clone(), self.row);
         let journal = std::mem::take(&mut self.journal);
-        let row = self.row;
-        let before = journal.len();
-        let config = Config {
-            participant: "P01".to_owned(),
-            auto_identify: true,
-            ..Config::default()
-        };
-        let (session, effects) = Session::new(again.protocol.clone(), None, config, now);
-        *self = Self {
-            session,
-            now,
-            journal,
-            before,
-            row,
-            ..again
-        };
-        self.carry_out(effects);
+        let wall = self.now.wall + TimeDelta::seconds(gap_s);
+        *self = Self::from_journal(self.protocol.clone(), self.row, journal, wall);
     }
 
     fn send(&mut self, input: Input) {
@@ -186,7 +176,7 @@ impl Run {
         }
     }
 
-    fn to_the_end(mut self, chance: &mut Chance) -> Vec<Entry> {
+    fn until_the_end(mut self, chance: &mut Chance) -> Vec<Entry> {
         for _ in 0..5000 {
             if self.ended {
                 return self.journal;

@@ -171,7 +171,7 @@ impl Design {
         for _ in 0..trials {
             let mut next = std::collections::HashSet::new();
             for (held, others) in &layer {
-                if let (Rule::Run(_), [left, again]) = (self.rule(), held[..])
+                if let (Rule::Run(_), &[left, again]) = (self.rule(), held.as_slice())
                     && again > 0
                 {
                     let again = (again - 1).min(left - 1);
