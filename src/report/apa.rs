@@ -1,6 +1,8 @@
 //! Formats of numbers and names in sentences and tables.
 
-pub(super) use study_base::apa::{bare_p, decimals, interval, number, p, percent, r, share};
+pub(super) use study_base::apa::{
+    bare_p, decimals, interval, number, p, p_beside, percent, r, share,
+};
 use study_base::text::{Untrusted, cut_middle};
 
 /// Names that a list in a sentence shows in full.

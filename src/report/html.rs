@@ -150,7 +150,10 @@ fn head(source: &Source, details: &Details, a: &Analysis, lang: Option<&str>) ->
                         }
                         @if c.participants != c.finished { " " span { (c.participants) " analysed" } }
                     },
-                    None => span { (counted(c.participants, "participant", "participants")) },
+                    None => {
+                        span { (counted(c.participants, "participant", "participants")) }
+                        @if c.with_ratings < c.participants { " " span { (c.with_ratings) " gave ratings" } }
+                    },
                 }
                 " "
                 span { (counted(c.rated, "rating", "ratings")) } " "

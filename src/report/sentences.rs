@@ -1,28 +1,106 @@
-//! Test results and remarks in the wording shared by the terminal page, the report and
-//! its paragraphs. Names in them are untrusted.
+//! Findings, test results and remarks in the wording shared by the terminal page, the
+//! report and its paragraphs. Names in them are untrusted.
 
 use super::apa;
 use study_base::text::counted;
+use study_core::analyze::findings::{Direction, Estimate, Statistic};
 use study_core::analyze::{
-    ALPHA, Analysis, DecidingTest, PreregisteredRule, TestKind, significant,
+    Analysis, Finding, Pair, PreregisteredRule, Test, TestKind, Verdict, Warning,
 };
 
-/// `Yes` or `Not shown`: a test that is not significant shows nothing.
-pub(super) fn verdict(p: f64) -> &'static str {
-    if significant(p) { "Yes" } else { "Not shown" }
+/// `Yes`, `Not shown` or `Cannot be determined`.
+pub(super) fn verdict(verdict: &Verdict) -> &'static str {
+    match verdict {
+        Verdict::Yes => "Yes",
+        Verdict::NotShown => "Not shown",
+        Verdict::Undefined(_) => "Cannot be determined",
+    }
+}
+
+/// The sentence of a finding without a test: `Cannot be determined: …`.
+pub(super) fn undefined(f: &Finding) -> Option<String> {
+    Some(format!("{}: {}.", verdict(&f.verdict), f.reason()?))
 }
 
 /// The name of a test.
 pub(super) fn test_name(kind: TestKind) -> &'static str {
     match kind {
         TestKind::Anova => "repeated-measures analysis of variance",
+        TestKind::AnovaGreenhouseGeisser => {
+            "repeated-measures analysis of variance, Greenhouse–Geisser correction"
+        }
+        TestKind::AnovaHuynhFeldt => {
+            "repeated-measures analysis of variance, Huynh–Feldt correction"
+        }
         TestKind::FriedmanExact => "Friedman's test, exact",
-        TestKind::Friedman => "Friedman's test",
-        TestKind::MixedModel => "linear mixed model, Satterthwaite's degrees of freedom",
-        TestKind::WilcoxonExact => "Wilcoxon's signed-rank test, exact",
+        TestKind::Friedman => "Friedman's test, Iman and Davenport's approximation",
+        TestKind::MixedModel => "linear mixed model",
+        TestKind::MixedContrast => "contrast of the linear mixed model",
         TestKind::PairedT => "paired t test",
-        TestKind::PermutationExact | TestKind::PermutationMonteCarlo => "permutation test",
+        TestKind::PermutationExact => "permutation test, exact",
+        TestKind::PermutationMonteCarlo => "permutation test",
+        TestKind::Interaction => "interaction of participants and realizations",
+        TestKind::SlopesDiffer => "slopes of the participants on VAF",
+        TestKind::SlopeT => "t test",
+        TestKind::Equivalence => "two one-sided t tests",
     }
+}
+
+/// p of a test, with its sign: `p = .023`.
+pub(super) fn p(test: &Test) -> String {
+    format!("p {}", apa::p_beside(test.p, test.level))
+}
+
+/// `F(2.78, 25.00) = 19.16`, `t(9) = 3.20`; χ² with the number of participants.
+fn statistic(s: &Statistic, participants: usize) -> String {
+    let df = |df: &f64| apa::number(*df, if df.fract().abs() < 1e-9 { 0 } else { 2 });
+    let mut df: Vec<String> = s.df.iter().map(df).collect();
+    if s.symbol == "χ²" {
+        df.push(format!("N = {participants}"));
+    }
+    let df = match df.len() {
+        0 => String::new(),
+        _ => format!("({})", df.join(", ")),
+    };
+    format!("{}{df} = {}", s.symbol, apa::two(s.value))
+}
+
+/// The result of the deciding test: `F(2.78, 25.00) = 19.16, p < .001`.
+pub(super) fn result(f: &Finding) -> Option<String> {
+    let test = f.test.as_ref()?;
+    Some(tested(test, f.participants))
+}
+
+/// A test: `t(9) = 3.20, p = .011`.
+pub(super) fn tested(test: &Test, participants: usize) -> String {
+    // A correlation is printed as the estimate.
+    let shown = test.statistic.as_ref().filter(|s| s.symbol != "r");
+    match shown {
+        Some(s) => format!("{}, {}", statistic(s, participants), p(test)),
+        None => p(test),
+    }
+}
+
+/// `paired t test, Holm's correction over 10 pairs`.
+pub(super) fn corrected(test: &Test) -> String {
+    let name = test_name(test.kind);
+    match test.comparisons {
+        0 | 1 => name.to_owned(),
+        n => format!("{name}, Holm's correction over {n} pairs"),
+    }
+}
+
+/// An estimate with its interval: `0.57, 95 % CI [0.12, 1.02]`.
+pub(super) fn estimate(e: &Estimate, format: impl Fn(f64) -> String) -> String {
+    let ci = e.ci95.map_or_else(String::new, |bounds| {
+        format!(", 95 % CI {}", apa::interval(bounds, &format))
+    });
+    format!("{}{ci}", format(e.value))
+}
+
+/// A caveat or warning as a sentence.
+pub(super) fn caveat(w: &Warning) -> String {
+    format!("{}.", apa::capital(&w.text))
 }
 
 /// `, 95 % CI [a, b]`, or nothing if the interval is undefined.
@@ -34,32 +112,33 @@ pub(super) fn ci(a: &Analysis, id: &str, format: impl Fn(f64) -> String) -> Stri
 }
 
 /// `, exact p = .008` or `, permutation p = .008`; nothing if there is no test.
-pub(super) fn permutation_p(test: Option<DecidingTest>) -> String {
-    test.map_or_else(String::new, |test| {
-        let kind = match test.kind {
-            TestKind::PermutationExact => "exact p",
-            _ => "permutation p",
-        };
-        format!(", {kind} {}", apa::p(test.p))
-    })
+pub(super) fn permutation_p(a: &Analysis, correlation: &str) -> String {
+    a.permutation_p(correlation)
+        .map_or_else(String::new, |(p, exact)| {
+            let kind = if exact { "exact p" } else { "permutation p" };
+            format!(", {kind} {}", apa::p_beside(p, a.alpha))
+        })
 }
 
-/// The analysis of variance.
-pub(super) fn anova(a: &Analysis) -> Option<String> {
+/// The effect of the realizations in an analysis of variance, where it was decided by one:
+/// generalised η² and the correction.
+pub(super) fn anova_effect(a: &Analysis, test: &Test) -> String {
     let get = |id: &str| a.values.number(&format!("rmanova/{id}"));
-    let (f, p, e) = (get("F")?, get("p_gg")?, get("eps_gg")?);
-    let (df1, df2) = (get("df1")?, get("df2")?);
     let ges = get("ges").map_or_else(String::new, |g| {
         format!(", generalised η² = {}", apa::share(g, 2))
     });
-    Some(format!(
-        "F({}, {}) = {}, p {}{ges} (Greenhouse–Geisser, ε = {})",
-        apa::two(df1 * e),
-        apa::two(df2 * e),
-        apa::two(f),
-        apa::p(p),
-        apa::share(e, 2)
-    ))
+    let epsilon = match test.kind {
+        TestKind::AnovaGreenhouseGeisser => get("eps_gg"),
+        TestKind::AnovaHuynhFeldt => get("eps_hf_unclipped").map(|e| e.min(1.0)),
+        _ => None,
+    };
+    let epsilon = epsilon.map_or_else(String::new, |e| format!(", ε = {}", apa::share(e, 2)));
+    match test.kind {
+        TestKind::Anova | TestKind::AnovaGreenhouseGeisser | TestKind::AnovaHuynhFeldt => {
+            format!("{ges}{epsilon}")
+        }
+        _ => String::new(),
+    }
 }
 
 /// Friedman's test, exact where possible.
@@ -74,66 +153,57 @@ pub(super) fn friedman(a: &Analysis) -> Option<String> {
     let better = get("iman_davenport_p")
         .filter(|_| kind.is_empty())
         .map_or_else(String::new, |p| {
-            format!(" (by Iman and Davenport's F, p {})", apa::p(p))
+            format!(
+                " (by Iman and Davenport's F, p {})",
+                apa::p_beside(p, a.alpha)
+            )
         });
     let w = get("kendall_W").map_or_else(String::new, |w| {
         format!(", Kendall's W = {}", apa::share(w, 2))
     });
     Some(format!(
-        "Friedman's χ²({df}) = {}, {kind}p {}{better}{w}",
+        "Friedman's χ²({df}, N = {}) = {}, {kind}p {}{better}{w}",
+        a.design.complete,
         apa::two(chi2),
-        apa::p(p)
+        apa::p_beside(p, a.alpha)
     ))
 }
 
-/// The F test of the mixed model, where it decides whether the realizations differ.
-pub(super) fn mixed_model(a: &Analysis) -> Option<String> {
-    let test = a.difference_test()?;
-    let get = |id: &str| a.values.number(&format!("lmm_model/{id}"));
-    let (f, df1, df2) = (
-        get("satterthwaite_F")?,
-        get("lrt_df")?,
-        get("satterthwaite_df2")?,
-    );
-    (test.kind == TestKind::MixedModel).then(|| {
-        format!(
-            "F({}, {}) = {}, p {}",
-            apa::number(df1, 0),
-            apa::number(df2, 1),
-            apa::two(f),
-            apa::p(test.p)
-        )
-    })
-}
-
-/// The slope on VAF of a mixed model: `b = 38.2 per unit of VAF, SE = 5.1, t(3.0) = …`.
+/// The slope on VAF of a mixed model, per .01: `b = 0.38 per .01 of VAF, SE = 0.05, …`.
 pub(super) fn slope_on_vaf(a: &Analysis, model: &str) -> Option<String> {
     let get = |id: &str| a.values.number(&format!("{model}/slope{id}"));
-    let (slope, se) = (get("")?, get("_se")?);
+    let (slope, se) = (get("")? / 100.0, get("_se")? / 100.0);
     let test = get("_t")
         .zip(get("_satterthwaite_df"))
         .zip(get("_satterthwaite_p"))
         .map_or_else(String::new, |((t, df), p)| {
             let df = apa::number(df, 1);
-            format!(", t({df}) = {}, p {}", apa::two(t), apa::p(p))
+            format!(
+                ", t({df}) = {}, p {}",
+                apa::two(t),
+                apa::p_beside(p, a.alpha)
+            )
         });
     let decimals = apa::decimals(se, 2);
     Some(format!(
-        "b = {} per unit of VAF, SE = {}{test}",
+        "b = {} per .01 of VAF, SE = {}{test}",
         apa::number(slope, decimals),
         apa::number(se, decimals)
     ))
 }
 
-/// `three of 8 participants`: those who rated every realization.
-pub(super) fn complete(a: &Analysis) -> String {
-    let get = |id: &str| a.values.number(&format!("design/{id}")).unwrap_or(0.0);
-    let complete = match get("n_subjects_complete") {
-        0.0 => "none".to_owned(),
-        n => n.to_string(),
-    };
-    let all = counted(get("n_subjects") as usize, "participant", "participants");
-    format!("{complete} of {all}")
+/// A pair that differs: `a above b by 0.57, 95 % CI [0.12, 1.02], p = .011`.
+pub(super) fn different_pair(p: &Pair) -> String {
+    let test = p
+        .test
+        .as_ref()
+        .map_or_else(String::new, |t| format!(", {}", self::p(t)));
+    format!(
+        "{} above {} by {}{test}",
+        p.first,
+        p.second,
+        estimate(&p.difference, apa::two)
+    )
 }
 
 /// The realization that alone determines the correlation.
@@ -144,13 +214,15 @@ pub(super) fn sole_influence(a: &Analysis) -> Option<String> {
     ))
 }
 
-/// What ties of VAF and of means do to the permutation p.
+/// What ties of VAF and of means do to an exact permutation p.
 pub(super) fn ties(a: &Analysis) -> Vec<String> {
     let limit = "exchanging them does not change r, which limits how small p can be.";
     let mut found = Vec::new();
-    let exact = a.permutation_test("pearson");
+    if !a.permutation_p("pearson").is_some_and(|(_, exact)| exact) {
+        return found;
+    }
     let vaf = a.tied_vaf();
-    if vaf > 1 && exact.is_some_and(|t| t.kind == TestKind::PermutationExact) {
+    if vaf > 1 {
         let n = apa::capital(&apa::count(vaf));
         found.push(format!(
             "{n} realizations share a VAF with another: {limit}"
@@ -158,24 +230,11 @@ pub(super) fn ties(a: &Analysis) -> Vec<String> {
     }
     let means = a.tied_means();
     if means > 1 {
-        let n = a.values.number("corr/n_models").unwrap_or(0.0);
+        let n = a.values.number("corr_adjusted/n_models").unwrap_or(0.0);
         let tied = apa::capital(&apa::count(means));
         found.push(format!("{tied} of the {n} means are tied: {limit}"));
     }
     found
-}
-
-/// Why a pair of realizations was not tested.
-pub(super) fn pair_not_tested(a: &Analysis, first: &str, second: &str) -> String {
-    let design = |id: &str| a.values.number(&format!("design/{id}"));
-    match (design("n_subjects_complete"), a.pair_reason(first, second)) {
-        (Some(n), Some(why)) if n >= 2.0 => why.to_owned(),
-        _ if design("n_subjects") == Some(1.0) => "there is only one participant".to_owned(),
-        _ => format!(
-            "pairs are compared over the participants who rated every realization, here {}",
-            complete(a)
-        ),
-    }
 }
 
 /// Why equivalence with a reference was not tested; `None` if it was.
@@ -191,50 +250,61 @@ pub(super) fn no_equivalence(a: &Analysis, contrast: &str) -> Option<String> {
     })
 }
 
-/// The question as a noun. Untrusted.
+/// What was rated, as a noun. Untrusted.
 pub(super) fn asked(a: &Analysis) -> String {
-    match a.question.as_str() {
-        "rating" => "the rating".to_owned(),
-        other => other.to_owned(),
+    match (&a.construct, a.question.as_str()) {
+        (Some(construct), _) => construct.clone(),
+        (None, "rating") => "the rating".to_owned(),
+        (None, other) => other.to_owned(),
     }
 }
 
-/// Verdict on the memory from its correlation and the p of the linear and the quadratic
-/// term. With two tests of one question each is held against half of [`ALPHA`].
-pub(super) fn memory_verdict(r: f64, linear: Option<f64>, quadratic: Option<f64>) -> &'static str {
-    let level = if quadratic.is_some() {
-        0.5 * ALPHA
+/// Whether the study is about realism: its question or construct is so called, or it
+/// states from which rating on a realization counts as realistic.
+pub(super) fn is_about_realism(a: &Analysis) -> bool {
+    match &a.construct {
+        Some(construct) => construct == "realism",
+        None => {
+            a.question == "realism"
+                || a.realistic_from.is_some()
+                || a.changed(PreregisteredRule::RealisticFrom)
+        }
+    }
+}
+
+/// The mean on which verdicts rest: `adjusted mean` where cells are missing.
+pub(super) fn mean(a: &Analysis) -> &'static str {
+    if a.design.is_complete() {
+        "mean"
     } else {
-        ALPHA
-    };
-    let shown = |p: Option<f64>| p.is_some_and(|p| p < level);
-    match (shown(linear), shown(quadratic)) {
-        (false, false) if linear.is_none() && r.abs() > 1.0 - 1e-9 => {
-            "No t test is defined, because the mean ratings are an exact linear function of the \
-             memory"
-        }
-        (false, false) if linear.is_none() => "No t test is defined",
-        (true, _) if r > 0.0 => {
-            "Yes: over these realizations, those with a longer memory are rated higher"
-        }
-        (true, _) => "Yes: over these realizations, those with a shorter memory are rated higher",
-        (false, true) => {
-            "Yes: over these realizations the rating is a curved function of the memory"
-        }
-        (false, false) => "Not shown",
+        "adjusted mean"
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Level of significance, without a zero before the decimal point.
+pub(super) fn level(alpha: f64) -> String {
+    let digits = format!("{alpha:.6}");
+    digits.trim_matches('0').to_owned()
+}
 
-    #[test]
-    fn a_correlation_without_a_test_is_not_called_unshown() {
-        assert_eq!(memory_verdict(0.5, Some(0.2), None), "Not shown");
-        assert_eq!(memory_verdict(0.5, Some(0.03), Some(0.4)), "Not shown");
-        assert!(memory_verdict(0.5, Some(0.03), None).starts_with("Yes"));
-        assert!(memory_verdict(-1.0, None, None).contains("exact linear function"));
-        assert_eq!(memory_verdict(0.5, None, None), "No t test is defined");
+/// `12 participants`.
+pub(super) fn participants(n: usize) -> String {
+    counted(n, "participant", "participants")
+}
+
+/// The verdict on the memory.
+pub(super) fn memory_verdict(f: &Finding) -> String {
+    match (&f.verdict, f.direction) {
+        (Verdict::Yes, Some(Direction::Up)) => {
+            "Yes: over these realizations, those with a longer memory are rated higher".to_owned()
+        }
+        (Verdict::Yes, Some(Direction::Down)) => {
+            "Yes: over these realizations, those with a shorter memory are rated higher".to_owned()
+        }
+        (Verdict::Yes, _) => {
+            "Yes: over these realizations the rating is a curved function of the memory".to_owned()
+        }
+        (Verdict::NotShown, _) => "Not shown".to_owned(),
+        (Verdict::Undefined(why), _) => format!("{}: {why}", verdict(&f.verdict)),
     }
 }

@@ -141,6 +141,11 @@ fn head(source: &Source, a: &Analysis, width: usize, paint: Paint) -> String {
                 format!("{finished}, {} analysed", c.participants)
             }
         }
+        None if c.with_ratings < c.participants => format!(
+            "{} of {} gave ratings",
+            c.with_ratings,
+            counted(c.participants, "participant", "participants")
+        ),
         None => counted(c.participants, "participant", "participants"),
     });
     facts.push(counted(c.rated, "rating", "ratings"));

@@ -2,7 +2,7 @@
 //!
 //! `tests/golden/data/NAME/expected.json` holds value, tolerance, class and
 //! source of each identifier; all data sets are freely usable (own simulations, CC0,
-//! and NIST's StRD). Values that are deliberately not compared are listed here.
+//! and NIST's StRD).
 #![allow(clippy::unwrap_used)]
 
 use serde_json::Value as Json;
@@ -11,17 +11,6 @@ use std::io::BufReader;
 use std::path::PathBuf;
 use study_core::analyze::{Rules, Value, Values, analyze};
 use study_core::outcome::ratings::Ratings;
-
-/// Not compared: where F is undefined, the reference has 0 for its corrected p and
-/// its eta squared; this program reports them as undefined.
-const NOT_COMPARED: [(&str, &str); 6] = [
-    ("sim_all_equal", "rmanova2/inter/ges"),
-    ("sim_all_equal", "rmanova2/inter/p_gg"),
-    ("sim_all_equal", "rmanova2/model/ges"),
-    ("sim_all_equal", "rmanova2/model/p_gg"),
-    ("sim_all_equal", "rmanova2/rep/ges"),
-    ("sim_all_equal", "rmanova2/rep/p_gg"),
-];
 
 fn sets() -> Vec<PathBuf> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden/data");
@@ -78,9 +67,6 @@ fn every_statistic_agrees_with_its_reference() {
         let expected: Json = serde_json::from_str(&text).unwrap();
         let values = values(&set);
         for (id, want) in expected["expected"].as_object().unwrap() {
-            if NOT_COMPARED.contains(&(&name, id)) {
-                continue;
-            }
             match values.get(id) {
                 Some(got) if agrees(got, want) => passed += 1,
                 got => wrong.push(format!("{name} {id}: {got:?}, not {}", want["value"])),

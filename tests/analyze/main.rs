@@ -4,6 +4,7 @@ mod command;
 #[path = "../support/designs.rs"]
 mod designs;
 mod docs;
+mod findings;
 mod golden;
 mod mixed;
 mod nist;

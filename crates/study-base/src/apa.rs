@@ -31,20 +31,29 @@ pub fn r(x: f64) -> String {
     share(x, 3)
 }
 
-/// A p with its sign: `= .023`, `< .001`, `> .999`.
-///
-/// Three decimals; what is below .001 or above .999 is printed as a bound, so that no
-/// p but exactly 1 reads as 1, and none as 0.
+/// A p with its sign: `= .023`, `< .001`, `> .999`. [`p_beside`] the level .05.
 pub fn p(x: f64) -> String {
-    if x < 0.001 {
-        "< .001".to_owned()
-    } else if x > 0.999 && x < 1.0 {
-        "> .999".to_owned()
-    } else if x >= 1.0 {
-        "= 1".to_owned()
-    } else {
-        format!("= {}", share(x, 3))
+    p_beside(x, 0.05)
+}
+
+/// A p beside a verdict at a level of significance.
+///
+/// Three decimals; what is below .001 or above .999 is printed as a bound, so that no p
+/// reads as 0 or 1. It has more decimals where three would not show on which side of the
+/// level it lies: .0496 at the level .05, not .050.
+pub fn p_beside(x: f64, level: f64) -> String {
+    if x < 0.001 && (level >= 0.001 || x == 0.0) {
+        return "< .001".to_owned();
     }
+    if x > 0.999 {
+        return "> .999".to_owned();
+    }
+    let on_its_side = |decimals: &usize| {
+        let shown = format!("{x:.decimals$}").parse::<f64>();
+        shown.is_ok_and(|shown| shown > 0.0 && (shown < level) == (x < level))
+    };
+    let decimals = (3..=15).find(on_its_side).unwrap_or(15);
+    format!("= {}", share(x, decimals))
 }
 
 /// A p for a table, without the equals sign: `.023`, `< .001`, `> .999`.
@@ -78,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_p_reads_as_0_or_1_only_if_it_is_exactly_1() {
+    fn no_p_reads_as_0_or_1() {
         for (x, shown) in [
             (0.0, "< .001"),
             (1e-300, "< .001"),
@@ -96,11 +105,22 @@ mod tests {
             (0.999_1, "> .999"),
             (0.999_6, "> .999"),
             (0.999_99, "> .999"),
-            (1.0, "= 1"),
+            (1.0, "> .999"),
+            (0.0496, "= .0496"),
+            (0.049_999_6, "= .0499996"),
+            (0.0504, "= .050"),
         ] {
             assert_eq!(p(x), shown, "{x}");
             assert_eq!(bare_p(x), shown.trim_start_matches("= "), "{x}");
         }
+    }
+
+    #[test]
+    fn a_p_lies_on_its_side_of_the_level() {
+        assert_eq!(p_beside(0.0496, 0.01), "= .050");
+        assert_eq!(p_beside(0.0098, 0.01), "= .0098");
+        assert_eq!(p_beside(0.0004, 0.0005), "= .0004");
+        assert_eq!(p_beside(0.0004, 0.001), "< .001");
     }
 
     #[test]

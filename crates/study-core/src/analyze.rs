@@ -14,6 +14,7 @@ mod cells;
 mod describe;
 mod design;
 mod deviation;
+mod disagreement;
 mod draws;
 mod effects;
 mod exclude;
@@ -32,18 +33,19 @@ mod subjects;
 mod vaf;
 mod values;
 mod verdicts;
+mod warning;
 mod warnings;
 
 pub use crate::protocol::Exclusion;
 pub use design::Design;
 pub use deviation::{Deviation, PreregisteredRule, deviations};
+pub use effects::MAX_PAIRED;
 pub use exclude::Applied;
-pub use findings::{Finding, Pair, Question, Verdict};
+pub use findings::{Finding, Pair, Question, Test, TestKind, Verdict};
 pub use identifiers::{group_id, pair_id};
 pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
-pub use verdicts::{ALPHA, ComparedPairs, DecidingTest, MAX_PAIRED, TestKind, significant};
-pub use warnings::Warning;
+pub use warning::Warning;
 
 use crate::outcome::ratings::{Practice, Ratings};
 use crate::protocol::{Protocol, Role, Unfinished};
@@ -53,6 +55,9 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The level of significance of a study that states none.
+pub const ALPHA: f64 = 0.05;
 
 /// The rules of the analysis, fixed before the data were seen.
 #[derive(Debug, Clone, PartialEq)]
@@ -281,7 +286,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
     }
     let design = Design::of(&cells);
     let (findings, pairs) = findings::findings(&cells, design, rules, &mut values);
-    let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &values);
+    let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &values, &findings);
     Analysis {
         question: ratings.question.clone(),
         realizations: used
@@ -337,7 +342,7 @@ struct Inputs<'a> {
 type Group = fn(&Inputs<'_>, &mut Values);
 
 /// Independent groups of statistics, the slowest ones first.
-const GROUPS: [Group; 12] = [
+const GROUPS: [Group; 13] = [
     |i, values| order::order(i.cells, values),
     |i, values| vaf::against_vaf(i.cells, i.adjusted, i.rules, values),
     |i, values| ordinal::ordinal(i.cells, values),
@@ -350,6 +355,7 @@ const GROUPS: [Group; 12] = [
     |i, values| reference::reference(i.cells, i.rules, values),
     |i, values| adjusted::adjusted(i.cells, i.adjusted, values),
     |i, values| pairs::pairs(i.cells, i.adjusted, values),
+    |i, values| disagreement::disagreement(i.cells, values),
 ];
 
 /// All statistics. Each group runs on one thread, so the number of threads changes

@@ -14,8 +14,8 @@ pub struct Coefficient {
     pub ci95: Option<(Option<f64>, Option<f64>)>,
 }
 
-/// The six intraclass correlations of Shrout & Fleiss (1979). A coefficient is `None` if
-/// there is no variance of error.
+/// The six intraclass correlations of Shrout & Fleiss (1979). Without a variance of error
+/// a coefficient has no interval; it is `None` if the targets do not differ either.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Icc {
     /// Mean square between targets.
@@ -87,6 +87,14 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
     let error = residual / df_e;
     let within = (residual + raters * (kf - 1.0)) / df_w;
     let floor = 1e-24 * size;
+    let differ = targets > floor;
+    // Agreement without error, if there is anything to agree about.
+    let perfect = |mean_square: f64| {
+        (mean_square <= floor && differ).then_some(Coefficient {
+            value: 1.0,
+            ci95: None,
+        })
+    };
     let f_1 = (within > floor).then(|| targets / within).and_then(finite);
     let f_3 = (error > floor).then(|| targets / error).and_then(finite);
     let single = |f: f64| (f - 1.0) / (f + kf - 1.0);
@@ -96,7 +104,8 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
             f * f_quantile(0.975, df, df_t)?,
         ))
     };
-    let icc2 = icc2(targets, raters, error, nf, kf);
+    let error = if error > floor { error } else { 0.0 };
+    let icc2 = icc2(targets, raters, error, nf, kf).filter(|_| differ || error > 0.0);
     // The Spearman–Brown formula has a pole at −1/(k − 1).
     let spearman_brown = |c: f64| finite(kf * c / (1.0 + (kf - 1.0) * c));
     Some(Icc {
@@ -105,11 +114,15 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
         ms_error: error,
         p_1: f_1.and_then(|f| f_upper(f, df_t, df_w)),
         p_3: f_3.and_then(|f| f_upper(f, df_t, df_e)),
-        icc1: f_1.map(|f| Coefficient {
-            value: single(f),
-            ci95: bounds(f, df_w).map(|(l, h)| (finite(single(l)), finite(single(h)))),
-        }),
-        icc1k: f_1.and_then(|f| finite(1.0 - 1.0 / f)),
+        icc1: f_1
+            .map(|f| Coefficient {
+                value: single(f),
+                ci95: bounds(f, df_w).map(|(l, h)| (finite(single(l)), finite(single(h)))),
+            })
+            .or(perfect(within)),
+        icc1k: f_1
+            .and_then(|f| finite(1.0 - 1.0 / f))
+            .or(perfect(within).map(|c| c.value)),
         icc2k: icc2.and_then(|c| {
             Some(Coefficient {
                 value: finite((targets - error) / (targets + (raters - error) / nf))?,
@@ -119,16 +132,21 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
             })
         }),
         icc2,
-        icc3: f_3.map(|f| Coefficient {
-            value: single(f),
-            ci95: bounds(f, df_e).map(|(l, h)| (finite(single(l)), finite(single(h)))),
-        }),
-        icc3k: f_3.and_then(|f| {
-            Some(Coefficient {
-                value: finite(1.0 - 1.0 / f)?,
-                ci95: bounds(f, df_e).map(|(l, h)| (finite(1.0 - 1.0 / l), finite(1.0 - 1.0 / h))),
+        icc3: f_3
+            .map(|f| Coefficient {
+                value: single(f),
+                ci95: bounds(f, df_e).map(|(l, h)| (finite(single(l)), finite(single(h)))),
             })
-        }),
+            .or(perfect(error)),
+        icc3k: f_3
+            .and_then(|f| {
+                let ends = |(l, h): (f64, f64)| (finite(1.0 - 1.0 / l), finite(1.0 - 1.0 / h));
+                Some(Coefficient {
+                    value: finite(1.0 - 1.0 / f)?,
+                    ci95: bounds(f, df_e).map(ends),
+                })
+            })
+            .or(perfect(error)),
         f_1,
         f_3,
     })
@@ -137,10 +155,13 @@ pub fn icc<R: AsRef<[f64]>>(rows: &[R]) -> Option<Icc> {
 /// ICC2, with an interval by Satterthwaite's degrees of freedom.
 fn icc2(t: f64, r: f64, e: f64, n: f64, k: f64) -> Option<Coefficient> {
     let denominator = t + (k - 1.0) * e + k * (r - e) / n;
-    if denominator <= 0.0 || e <= 0.0 {
+    if denominator <= 0.0 {
         return None;
     }
     let value = finite((t - e) / denominator)?;
+    if e <= 0.0 {
+        return Some(Coefficient { value, ci95: None });
+    }
     let f = r / e;
     let a = n * (1.0 + (k - 1.0) * value) - k * value;
     let numerator = (k - 1.0) * (n - 1.0) * (k * value * f + a).powi(2);

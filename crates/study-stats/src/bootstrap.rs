@@ -266,7 +266,8 @@ fn acceleration(rows: &[&[f64]], score: &CorrelationWith) -> Option<f64> {
         cubes += d * d * d;
         squares += d * d;
     }
-    if squares <= 0.0 {
+    // Correlations that differ by rounding errors only have no skewness.
+    if squares <= 1e-24 * without.len() as f64 {
         return None;
     }
     finite(cubes / (6.0 * squares.powf(1.5)))

@@ -112,27 +112,36 @@ pub struct Paired {
     pub rank_biserial: Option<f64>,
 }
 
-/// Compares two columns of the same subjects, a minus b. Differences are rounded to
-/// 10⁻¹⁰, so that rounding errors cancel. `None` for fewer than two subjects or unequal
+/// Compares two columns of the same subjects, a minus b. The ranks are those of the
+/// differences rounded to 10⁻¹⁰ of the columns' size, so that rounding errors cancel; so
+/// are differences that are then all equal. `None` for fewer than two subjects or unequal
 /// lengths.
 pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
     if a.len() != b.len() {
         return None;
     }
-    let d: Vec<f64> = a.iter().zip(b).map(|(x, y)| rounded(x - y)).collect();
-    let test = one_sample(&d)?;
+    let scale = scale(a.iter().chain(b));
+    let exact: Vec<f64> = a.iter().zip(b).map(|(x, y)| (x - y) * scale).collect();
+    let d: Vec<f64> = exact.iter().map(|d| rounded(*d)).collect();
+    let test = one_sample(if is_constant(&d) { &d } else { &exact })?;
+    // A mean of 0 but for rounding is that of the rounded differences.
+    let centre = if test.mean.abs() < 1e-9 {
+        mean(&d)?
+    } else {
+        test.mean
+    };
     let (sa, sb) = (sd(a)?, sd(b)?);
     let average = ((sa * sa + sb * sb) / 2.0).sqrt();
     let w = Wilcoxon::new(&d);
     Some(Paired {
-        mean_diff: test.mean,
+        mean_diff: test.mean / scale,
         t: test.t,
         p_t: test.p,
         dz: test.t.and_then(|_| finite(test.mean / test.sd)),
         d_av: if is_constant(a) && is_constant(b) {
             None
         } else {
-            finite(test.mean / average)
+            finite(centre / scale / average)
         },
         w_plus: w.as_ref().map(|w| w.plus as f64 / 2.0),
         wilcoxon_n: w.as_ref().map_or(0, |w| w.ranks.len()),
@@ -143,6 +152,16 @@ pub fn paired(a: &[f64], b: &[f64]) -> Option<Paired> {
             (2 * w.plus - all) as f64 / all as f64
         }),
     })
+}
+
+/// A power of two that brings small numbers to the size of 1, without rounding.
+fn scale<'a>(x: impl Iterator<Item = &'a f64>) -> f64 {
+    let largest = x.fold(0.0f64, |largest, x| largest.max(x.abs()));
+    if largest > 0.0 && largest < 0.5 {
+        (-largest.log2().floor()).min(1000.0).exp2()
+    } else {
+        1.0
+    }
 }
 
 /// Wilcoxon's signed ranks without zeros, as doubled mid-ranks.
@@ -239,6 +258,21 @@ mod tests {
         let p = paired(&[2.0, 4.0, 6.0, 8.0, 10.0], &[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
         assert_eq!(p.p_exact, Some(2.0 / 32.0));
         assert_eq!((p.w_plus, p.rank_biserial), (Some(15.0), Some(1.0)));
+    }
+
+    /// A change of unit changes neither t nor ranks.
+    #[test]
+    fn small_numbers_are_not_rounded_away() {
+        let (a, b) = ([3.0, 5.0, 4.0, 7.0], [2.0, 3.0, 4.0, 1.0]);
+        let x = paired(&a, &b).unwrap();
+        let y = paired(&a.map(|v| v * 1e-12), &b.map(|v| v * 1e-12)).unwrap();
+        assert!((y.mean_diff / x.mean_diff / 1e-12 - 1.0).abs() < 1e-12);
+        assert!((y.t.unwrap() / x.t.unwrap() - 1.0).abs() < 1e-12);
+        assert_eq!((x.p_exact, x.w_plus), (y.p_exact, y.w_plus));
+        // t is not that of differences of ten decimals.
+        let d = [1e-11, 2e-11, 2.4e-10];
+        let t = paired(&d.map(|d| 1.0 + d), &[1.0; 3]).unwrap().t.unwrap();
+        assert!((t - 0.9 / (1.3 / 3f64.sqrt())).abs() < 1e-3, "{t}");
     }
 
     #[test]

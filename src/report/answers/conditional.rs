@@ -12,7 +12,7 @@ pub(in crate::report) fn conditional(a: &Analysis) -> (Vec<String>, usize) {
         let n = v.number("subject_corr/n_defined").unwrap_or(0.0);
         let ci = sentences::ci(a, "subject_corr/r_ci95", apa::r);
         rows.push(format!(
-            "Mean over {n} subjects of the correlation of their cells with VAF (Fisher's z): r = \
+            "Mean over {n} participants of the correlation of their cells with VAF (Fisher's z): r = \
              {}{ci}.",
             apa::r(r)
         ));
@@ -23,7 +23,7 @@ pub(in crate::report) fn conditional(a: &Analysis) -> (Vec<String>, usize) {
             _ => "",
         };
         rows.push(format!(
-            "Correlation of the means with VAF when subjects are resampled: 95 % of r lie in {} \
+            "Correlation of the means with VAF when participants are resampled: 95 % of r lie in {} \
              ({exact}percentile bootstrap).",
             apa::interval(bounds, apa::r)
         ));
@@ -38,7 +38,7 @@ pub(in crate::report) fn conditional(a: &Analysis) -> (Vec<String>, usize) {
         let ci = sentences::ci(a, "subject_slope/ci95", apa::two);
         let b = apa::two(b);
         rows.push(format!(
-            "Mean slope of a subject's ratings on VAF: {b}{ci}{test}."
+            "Mean slope of a participant's ratings on VAF: {b}{ci}{test}."
         ));
     }
     if let Some((l, p)) = v.number("page/L").zip(v.number("page/p_greater")) {
@@ -48,10 +48,13 @@ pub(in crate::report) fn conditional(a: &Analysis) -> (Vec<String>, usize) {
         ));
     }
     for (id, what) in [
-        ("lmm_vaf", "Mixed model with an intercept for each subject"),
+        (
+            "lmm_vaf",
+            "Mixed model with an intercept for each participant",
+        ),
         (
             "lmm_vaf_slope",
-            "Mixed model with an intercept and a slope for each subject",
+            "Mixed model with an intercept and a slope for each participant",
         ),
     ] {
         rows.extend(sentences::slope_on_vaf(a, id).map(|slope| format!("{what}: {slope}.")));
@@ -60,7 +63,7 @@ pub(in crate::report) fn conditional(a: &Analysis) -> (Vec<String>, usize) {
     if let Some((b, se)) = ordinal {
         let (b, se) = (apa::two(b), apa::two(se));
         rows.push(format!(
-            "Cumulative logit model with an intercept for each subject: log odds ratio {b} per unit \
+            "Cumulative logit model with an intercept for each participant: log odds ratio {b} per unit \
              of VAF, SE = {se}."
         ));
     }

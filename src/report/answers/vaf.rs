@@ -2,7 +2,8 @@
 
 use super::Answer;
 use crate::report::{apa, sentences};
-use study_core::analyze::{Analysis, TestKind, Value, group_id};
+use study_core::analyze::findings::Direction;
+use study_core::analyze::{Analysis, Question, Value, group_id};
 use study_stats::permutation::DRAWS;
 
 /// Covariates in a list.
@@ -11,60 +12,49 @@ const MAX_COVARIATES: usize = 8;
 /// Whether VAF predicts the rating.
 pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     let v = &a.values;
+    let f = a.finding(&Question::Vaf)?;
     let question = format!("Does VAF predict {}?", sentences::asked(a));
-    let Some(r) = v.number("corr/pearson/r") else {
-        let any_vaf = a.realizations.iter().any(|m| m.vaf.is_some());
-        let why = v.reason("corr/pearson/r").filter(|_| any_vaf)?;
-        return Some(Answer::new(
-            &question,
-            format!("Cannot be determined: {why}."),
-        ));
-    };
-    let n = v.number("corr/n_models").unwrap_or(0.0);
-    let test = a.permutation_test("pearson");
-    let verdict = match test {
-        Some(test) if test.is_significant() => format!(
-            "Yes: over these {n} realizations, those with a higher VAF are rated {}",
-            if r > 0.0 { "higher" } else { "lower" }
-        ),
-        Some(_) => format!("Not shown over these {n} realizations"),
-        None => format!("Over {n} realizations"),
-    };
-    let ci = sentences::ci(a, "corr/pearson/ci95", apa::r);
-    let p = sentences::permutation_p(test);
-    let sides = if test.is_some() { " (two-sided)" } else { "" };
-    let mut answer = Answer::new(
-        &question,
-        format!("{verdict}: r = {}{ci}{p}{sides}.", apa::r(r)),
-    );
+    let n = f.realizations;
+    let mut answer = Answer::of(&question, f, |verdict| {
+        let verdict = match f.direction {
+            Some(Direction::Up) => format!(
+                "{verdict}: over these {n} realizations, those with a higher VAF are rated higher"
+            ),
+            Some(_) => format!(
+                "{verdict}: over these {n} realizations, those with a higher VAF are rated lower"
+            ),
+            None => format!("{verdict} over these {n} realizations"),
+        };
+        let r = f
+            .estimate
+            .map_or_else(String::new, |e| sentences::estimate(&e, apa::r));
+        let p = sentences::permutation_p(a, "pearson");
+        format!("{verdict}: r = {r}{p} (two-sided).")
+    });
+    if f.test.is_none() {
+        return Some(answer);
+    }
+    let caveats = std::mem::take(&mut answer.main);
     answer.main.extend(points(a, n));
     answer.main.extend(sentences::ties(a));
-    if let (Some((low, high)), Some(test)) = (v.interval("corr/pearson/ci95"), test)
-        && (low * high > 0.0) != test.is_significant()
-    {
-        answer.more.push(
-            "The confidence interval and p disagree: the interval (Fisher's z) assumes normally \
-             distributed VAF and means, the permutation test does not. Rely on p."
-                .to_owned(),
-        );
-    }
+    answer.main.extend(caveats);
     answer.main.extend(crossed(a));
-    if let Some(rho) = v.number("corr/spearman/rho") {
+    if let Some(rho) = v.number("corr_adjusted/spearman/rho") {
         let tau = v
-            .number("corr/kendall/tau_b")
+            .number("corr_adjusted/kendall/tau_b")
             .map_or_else(String::new, |tau| {
-                let p = sentences::permutation_p(a.permutation_test("kendall"));
+                let p = sentences::permutation_p(a, "kendall");
                 format!("; Kendall's τb = {}{p}", apa::r(tau))
             });
         answer.main.push(format!(
             "Rank correlations: Spearman's ρ = {}{}{tau}.",
             apa::r(rho),
-            sentences::permutation_p(a.permutation_test("spearman"))
+            sentences::permutation_p(a, "spearman")
         ));
     }
     let bounds = v
-        .number("corr/leave_one_out/pearson_min")
-        .zip(v.number("corr/leave_one_out/pearson_max"));
+        .number("corr_adjusted/leave_one_out/pearson_min")
+        .zip(v.number("corr_adjusted/leave_one_out/pearson_max"));
     if let Some((low, high)) = bounds {
         answer.main.push(format!(
             "Leaving out one realization at a time, r ranges from {} to {}.",
@@ -73,10 +63,13 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
         ));
     }
     answer.main.extend(sentences::sole_influence(a));
-    if let Some(share) = v.number("corr/share/r2") {
-        let adjusted = v.number("corr/share/r2_adjusted");
+    if let Some(share) = v.number("corr_adjusted/share/r2") {
+        let adjusted = v.number("corr_adjusted/share/r2_adjusted");
         let adjusted = adjusted.map_or_else(String::new, |x| {
-            format!(" (adjusted for their number: {})", apa::percent(x.max(0.0)))
+            format!(
+                " (corrected for their number: {})",
+                apa::percent(x.max(0.0))
+            )
         });
         answer.more.push(format!(
             "VAF explains {} of the variance between the means of the realizations{adjusted}.",
@@ -87,21 +80,26 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
 }
 
 /// The number of points and the p that it allows.
-fn points(a: &Analysis, n: f64) -> Option<String> {
-    let smallest = a.values.number("corr/pearson/smallest_p_two_sided")?;
-    let smallest = match a.permutation_test("pearson")?.kind {
-        TestKind::PermutationExact => format!(
+fn points(a: &Analysis, n: usize) -> Option<String> {
+    let smallest = a
+        .values
+        .number("corr_adjusted/pearson/smallest_p_two_sided")?;
+    let (_, exact) = a.permutation_p("pearson")?;
+    let smallest = if exact {
+        format!(
             "the smallest p that {n} realizations can give is {}",
-            apa::of_orders(smallest, n)
-        ),
-        _ => format!(
+            apa::of_orders(smallest, n as f64)
+        )
+    } else {
+        format!(
             "p is estimated from {DRAWS} random orders of the realizations and cannot be below 1/{}",
             DRAWS + 1
-        ),
+        )
     };
-    let critical = a.values.number("corr/pearson/critical_r");
+    let critical = a.values.number("corr_adjusted/pearson/critical_r");
+    let level = sentences::level(a.alpha);
     let critical = critical.map_or_else(String::new, |r| {
-        format!("; in a t test, p < .05 requires |r| > {}", apa::r(r))
+        format!("; in a t test, p < {level} requires |r| > {}", apa::r(r))
     });
     Some(format!(
         "VAF varies only between realizations, so the correlation rests on {n} points, whatever the \
@@ -133,7 +131,7 @@ fn crossed(a: &Analysis) -> Option<String> {
         None => "",
     };
     Some(format!(
-        "Mixed model with crossed random effects of subjects and realizations: {slope}.{between}\
+        "Mixed model with crossed random effects of participants and realizations: {slope}.{between}\
          {singular}"
     ))
 }
@@ -143,26 +141,28 @@ pub(super) fn covariates(a: &Analysis) -> Option<Answer> {
     let v = &a.values;
     let get = |id: &str| v.number(&format!("covariate/log10_memory/{id}"));
     let others = others(a);
-    let short = match (get("r"), v.reason("covariate/log10_memory/r")) {
-        (Some(r), _) => {
-            let test = get("t").zip(get("df")).zip(get("p"));
-            let test = test.map_or_else(String::new, |((t, df), p)| {
-                let (df, t, p) = (apa::number(df, 0), apa::two(t), apa::p(p));
-                format!(", t({df}) = {t}, p {p}")
+    let short = match a.finding(&Question::Memory) {
+        Some(f) => {
+            let r = get("r").map_or_else(String::new, |r| {
+                let test = get("t").zip(get("df")).zip(get("p"));
+                let test = test.map_or_else(String::new, |((t, df), p)| {
+                    let (df, t) = (apa::number(df, 0), apa::two(t));
+                    let level = f.test.as_ref().map_or(a.alpha, |t| t.level);
+                    format!(", t({df}) = {t}, p {}", apa::p_beside(p, level))
+                });
+                let unit = match get("in_mm") {
+                    Some(1.0) => "mm",
+                    _ => "samples",
+                };
+                format!(
+                    "; mean rating against log10 of the memory in {unit}: r = {}{test}",
+                    apa::r(r)
+                )
             });
-            let unit = match get("in_mm") {
-                Some(1.0) => "mm",
-                _ => "samples",
-            };
-            format!(
-                "{}; mean rating against log10 of the memory in {unit}: r = {}{test}.",
-                sentences::memory_verdict(r, get("p"), get("quadratic/p")),
-                apa::r(r)
-            )
+            format!("{}{r}.", sentences::memory_verdict(f))
         }
-        (None, Some(why)) => format!("Cannot be determined: {why}."),
-        (None, None) if others.is_empty() => return None,
-        (None, None) => "Correlations of the mean rating with the covariates:".to_owned(),
+        None if others.is_empty() => return None,
+        None => "Correlations of the mean rating with the covariates:".to_owned(),
     };
     let question = if a.has_memory() {
         "Does the forgetting factor matter?"
@@ -210,10 +210,11 @@ fn curvature(a: &Analysis) -> Option<String> {
     });
     Some(format!(
         "Quadratic term: b = {} (a {direction} curve), t({df}) = {}, p {}. The linear and the \
-         quadratic term are two tests of one question, each at the level .025.{both}",
+         quadratic term are two tests of one question, each at the level {}.{both}",
         apa::two(b),
         apa::or_dash(get("t"), apa::two),
-        apa::p(p)
+        apa::p_beside(p, a.alpha / 2.0),
+        sentences::level(a.alpha / 2.0)
     ))
 }
 

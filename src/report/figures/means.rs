@@ -150,7 +150,7 @@ pub(super) fn against_vaf(scene: &Scene<'_>) -> Option<Drawn> {
     }
     let v = &scene.a.values;
     let found = v.number("corr/pearson/r").map_or_else(String::new, |r| {
-        let p = sentences::permutation_p(scene.a.permutation_test("pearson"));
+        let p = sentences::permutation_p(scene.a, "pearson");
         format!(" Over the tested realizations r = {}{p}.", apa::r(r))
     });
     let bars = if dots.iter().any(|d| d.ci95.is_some()) {

@@ -4,7 +4,7 @@
 use super::Details;
 use crate::report::{apa, sentences};
 use study_base::text::counted;
-use study_core::analyze::{Analysis, Exclusion, PreregisteredRule, TestKind, Value};
+use study_core::analyze::{Analysis, Exclusion, PreregisteredRule, Question, TestKind, Value};
 use study_stats::permutation::DRAWS;
 
 /// The paragraph.
@@ -17,14 +17,15 @@ pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {
     if any("sd") {
         let sd = "Standard deviations are over all ratings of a realization (n − 1)";
         let intervals = if any("subject_mean/ci95_lo") {
-            "; confidence intervals of means are t intervals over subjects"
+            "; confidence intervals of means are t intervals over participants"
         } else {
             ""
         };
         text.push(format!("{sd}{intervals}."));
     }
     text.push(format!(
-        "The level of significance is .05, two-sided. The analysis was done with study {}.",
+        "The level of significance is {}, two-sided. The analysis was done with study {}.",
+        sentences::level(a.alpha),
         env!("CARGO_PKG_VERSION")
     ));
     text.join(" ")
@@ -32,18 +33,17 @@ pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {
 
 /// The analyses restricted to participants who rated everything, unless all did.
 fn complete_only(a: &Analysis) -> Option<String> {
-    let v = &a.values;
-    let all = v.number("design/n_subjects")?;
-    let complete = v.number("design/n_subjects_complete")?;
-    let defined = |id: &str| v.number(id).is_some();
+    let (all, complete) = (a.design.participants, a.design.complete);
+    let defined = |id: &str| a.values.number(id).is_some();
+    let compared = a.design.uses_complete();
     let done: Vec<String> = [
-        (defined("rmanova/F"), "the analysis of variance"),
+        (defined("rmanova/F") && compared, "the analysis of variance"),
         (defined("friedman/chi2"), "Friedman's test"),
+        (!a.pairs.is_empty() && compared, "the comparison of pairs"),
         (
-            !a.compared_pairs().pairs.is_empty(),
-            "the comparison of pairs",
+            defined("variance/share/model") && compared,
+            "the variance components",
         ),
-        (defined("variance/share/model"), "the variance components"),
     ]
     .into_iter()
     .filter(|(done, _)| *done)
@@ -123,7 +123,7 @@ fn design(d: &Details, a: &Analysis) -> Vec<String> {
 /// How many participants rated how many realizations how often.
 fn ratings(d: &Details, a: &Analysis) -> String {
     let c = &a.counts;
-    let all = |one, many| counted(c.participants, one, many);
+    let all = |one, many| counted(c.with_ratings, one, many);
     let pilots = counted(c.pilots, "pilot", "pilots");
     let (participants, others) = match (c.pilots, c.simulated) {
         (_, s) if s > 0 && s == c.participants => (
@@ -156,18 +156,22 @@ fn ratings(d: &Details, a: &Analysis) -> String {
     let tested = a.tested().count();
     let has_ratings = |id: &str| a.described(id, "n").is_some_and(|n| n > 0.0);
     let rated = a.tested().filter(|m| has_ratings(&m.id)).count();
+    let without = match c.participants - c.with_ratings {
+        0 => String::new(),
+        n => format!(" {n} more took part but gave no rating."),
+    };
     let realizations = counted(tested, "realization", "realizations");
     if c.rated == 0 {
         "No rating is included: there is nothing to analyse.".to_owned()
     } else if tested == 0 {
         let ratings = counted(c.rated, "rating", "ratings");
-        format!("{participants}{others} gave {ratings}.")
+        format!("{participants}{others} gave {ratings}.{without}")
     } else if rated < tested {
         format!(
-            "{participants}{others} rated {rated} of {realizations}{times}; nobody rated the others."
+            "{participants}{others} rated {rated} of {realizations}{times}; nobody rated the others.{without}"
         )
     } else {
-        format!("{participants}{others} rated {realizations}{times}.")
+        format!("{participants}{others} rated {realizations}{times}.{without}")
     }
 }
 
@@ -236,6 +240,52 @@ fn exclusions(a: &Analysis) -> Vec<String> {
     text
 }
 
+/// How differences between realizations were tested.
+fn differences(a: &Analysis) -> Option<String> {
+    let test = a.finding(&Question::Differ)?.test.as_ref()?;
+    let correction = |name: &str| format!(" with the {name} correction");
+    let anova = "a repeated-measures analysis of variance on the cell means";
+    let friedman = "Friedman's test with mid-ranks";
+    let by = match test.kind {
+        TestKind::Anova => anova.to_owned(),
+        TestKind::AnovaGreenhouseGeisser => anova.to_owned() + &correction("Greenhouse–Geisser"),
+        TestKind::AnovaHuynhFeldt => {
+            anova.to_owned()
+                + &correction("Huynh–Feldt")
+                + ", because there are not more participants than realizations"
+        }
+        TestKind::MixedModel => format!(
+            "a linear mixed model of all cell means with random intercepts of participants and \
+             Satterthwaite's degrees of freedom, because only {} of {} rated every realization",
+            a.design.complete,
+            counted(a.design.participants, "participant", "participants")
+        ),
+        _ => friedman.to_owned(),
+    };
+    let besides = match test.kind {
+        TestKind::Friedman | TestKind::FriedmanExact => String::new(),
+        _ if a.values.number("friedman/chi2").is_some() => format!("; {friedman} is given besides"),
+        _ => String::new(),
+    };
+    Some(format!(
+        "Differences between realizations were tested by {by}{besides}."
+    ))
+}
+
+/// How disagreement was tested.
+fn disagreement(a: &Analysis) -> Option<String> {
+    let test = a.finding(&Question::Disagreement)?.test.as_ref()?;
+    let by = match test.kind {
+        TestKind::Interaction => {
+            "the interaction of participants and realizations against the variance within cells"
+        }
+        _ => "the differences between their slopes on VAF against the rest of the interaction",
+    };
+    Some(format!(
+        "Whether participants disagree about the realizations was tested by F of {by}."
+    ))
+}
+
 /// The tests whose results are defined.
 fn tests(a: &Analysis) -> Vec<String> {
     let v = &a.values;
@@ -245,51 +295,46 @@ fn tests(a: &Analysis) -> Vec<String> {
             id.starts_with(start) && id.ends_with(end) && matches!(value, Value::Number(_))
         })
     };
+    let finding = |question: &Question| a.finding(question);
     let mut text = Vec::new();
-    if defined("corr/pearson/r") {
-        let p = match a.permutation_test("pearson").map(|t| t.kind) {
-            None => String::new(),
-            Some(TestKind::PermutationExact) => {
-                "; p is from all permutations of the realizations".to_owned()
-            }
-            Some(_) => format!("; p is from {DRAWS} random permutations of the realizations"),
+    if let Some(test) = finding(&Question::Vaf).and_then(|f| f.test.as_ref()) {
+        let p = match test.kind {
+            TestKind::PermutationExact => "all permutations".to_owned(),
+            _ => format!("{DRAWS} random permutations"),
+        };
+        let means = if a.design.is_complete() {
+            "means of the realizations (averages of the participants' cell means)"
+        } else {
+            "adjusted means of the realizations (marginal means of a linear mixed model of the \
+             cell means)"
         };
         text.push(format!(
             "Whether the variance accounted for (VAF) predicts the rating was tested by Pearson's \
-             correlation over the means of the realizations (averages of the subjects' cell \
-             means){p}."
+             correlation over the {means}; p is from {p} of the realizations."
         ));
     }
-    let anova = "a repeated-measures analysis of variance on the cell means with the \
-                 Greenhouse–Geisser correction";
-    let friedman = "Friedman's test with mid-ranks";
-    let complete = sentences::complete(a);
-    let differences = match (defined("rmanova/F"), defined("friedman/chi2")) {
-        (true, true) => Some(format!("{anova} and by {friedman}")),
-        (true, false) => Some(anova.to_owned()),
-        (false, true) => Some(friedman.to_owned()),
-        (false, false) => sentences::mixed_model(a).map(|_| {
-            format!(
-                "a linear mixed model of all ratings with an intercept for each subject and \
-                 Satterthwaite's degrees of freedom, because {complete} rated every realization"
-            )
-        }),
-    };
-    text.extend(
-        differences.map(|d| format!("Differences between realizations were tested by {d}.")),
-    );
-    let pair_test = if any("posthoc/", "/p_wilcoxon_exact") {
-        "by Wilcoxon's signed-rank test (exact, conditional on ties) and by paired t tests"
-    } else {
-        "by paired t tests"
-    };
-    match a.compared_pairs().pairs.len() {
-        0 => {}
-        1 => text.push(format!("The pair was compared {pair_test}.")),
-        n => text.push(format!(
-            "The {n} pairs were compared {pair_test}, each with Holm's correction over all pairs."
-        )),
+    text.extend(differences(a));
+    let wilcoxon = any("posthoc/", "/p_wilcoxon_exact");
+    let test = finding(&Question::Best).and_then(|f| f.test.as_ref());
+    let test = test.or_else(|| finding(&Question::Pairs)?.test.as_ref());
+    if let Some(test) = test {
+        let how = match test.kind {
+            TestKind::MixedContrast => "contrasts of the same model",
+            _ => "paired t tests",
+        };
+        let wilcoxon = if wilcoxon {
+            "; p of Wilcoxon's signed-rank test (exact, conditional on ties) is given besides"
+        } else {
+            ""
+        };
+        text.push(match test.comparisons {
+            0 | 1 => format!("The pair was compared by {how}{wilcoxon}."),
+            n => format!(
+                "Pairs were compared by {how} with Holm's correction over all {n} pairs{wilcoxon}."
+            ),
+        });
     }
+    text.extend(disagreement(a));
     if defined("lmm_vaf_crossed/slope") {
         let effects = if defined("lmm_vaf_crossed/var_subject_model") {
             ", realizations and their combinations"
@@ -297,12 +342,12 @@ fn tests(a: &Analysis) -> Vec<String> {
             " and realizations"
         };
         text.push(format!(
-            "A linear mixed model of the ratings on VAF with random intercepts of subjects{effects} \
+            "A linear mixed model of the ratings on VAF with random intercepts of participants{effects} \
              was fitted by restricted maximum likelihood, with Satterthwaite's degrees of freedom."
         ));
     }
     let between = defined("icc_subjects/ICC2")
-        .then(|| "Agreement between subjects is ICC(2,1) over cell means".to_owned());
+        .then(|| "Agreement between participants is ICC(2,1) over cell means".to_owned());
     let within = defined("icc_repetitions/ICC1")
         .then(|| "consistency over repetitions is ICC(1,1)".to_owned());
     let iccs: Vec<String> = [between, within].into_iter().flatten().collect();

@@ -1,9 +1,10 @@
 //! The main tables.
 
 use super::safe;
-use crate::report::{answers, apa};
+use crate::report::{answers, apa, sentences};
 use maud::{Markup, html};
-use study_core::analyze::{Analysis, RealizationSummary, group_id, significant};
+use study_base::text::counted;
+use study_core::analyze::{Analysis, RealizationSummary, group_id, pair_id};
 use study_core::outcome::Role;
 
 /// Largest number of rows of a table; the CSV has all.
@@ -78,7 +79,7 @@ pub(super) fn section(a: &Analysis) -> Markup {
                 p.note {
                     "n: number of ratings. Mean, SD (standard deviation, n − 1) and median are over all \
                      ratings of a realization"
-                    @if any_interval { "; the interval is a 95 % t interval of the mean over subjects" }
+                    @if any_interval { "; the interval is a 95 % t interval of the mean over participants" }
                     "."
                     @if a.realizations.iter().any(|m| !m.tested) {
                         " Realizations in italics are not included in the tests."
@@ -118,11 +119,11 @@ fn glossary(a: &Analysis) -> Markup {
         ),
         (
             any(&["friedman/kendall_W"]),
-            "W: concordance of the subjects' rankings, from 0 to 1.",
+            "W: concordance of the participants' rankings, from 0 to 1.",
         ),
         (any(&alpha), "α: agreement beyond chance, at most 1."),
         (
-            !a.compared_pairs().pairs.is_empty(),
+            a.pairs.iter().any(|p| p.dz.is_some()),
             "dz: mean difference divided by the standard deviation of the differences.",
         ),
     ]
@@ -190,41 +191,51 @@ fn realizations(a: &Analysis) -> HtmlTable {
 }
 
 fn pairs(a: &Analysis) -> Markup {
-    let head = [
+    let wilcoxon = |first: &str, second: &str| {
+        let id = pair_id("posthoc", first, second);
+        a.values.number(&format!("{id}/p_wilcoxon_exact_holm"))
+    };
+    let any = (a.pairs.iter()).any(|p| wilcoxon(&p.first, &p.second).is_some());
+    let mut head = vec![
         "pair (a − b)",
         "difference",
+        "95 % CI",
         "dz",
         "t",
-        "p (t, Holm)",
-        "p (Wilcoxon, Holm)",
+        "p (Holm)",
     ];
+    head.extend(any.then_some("p (Wilcoxon, Holm)"));
     let mut table = HtmlTable::new("Pairs of realizations", &head);
-    let compared = a.compared_pairs();
-    for (first, second) in &compared.pairs {
-        let get = |what: &str| a.paired(first, second, what);
+    for pair in &a.pairs {
         // Cancelling thirds leave a rounding error.
-        let shown = |what: &str, decimals: usize| {
-            let x = get(what).map(|x| if x.abs() < 1e-9 { 0.0 } else { x });
-            show(x, decimals)
-        };
-        table.row(vec![
-            format!("{} − {}", apa::name(first), apa::name(second)),
-            shown("mean_diff", 3),
-            shown("dz", 2),
-            shown("t", 2),
-            show_p(get("p_t_holm")),
-            show_p(get("p_wilcoxon_exact_holm")),
-        ]);
+        let whole = |x: f64| if x.abs() < 1e-9 { 0.0 } else { x };
+        let test = pair.test.as_ref();
+        let t = test.and_then(|t| Some(whole(t.statistic.as_ref()?.value)));
+        let mut row = vec![
+            format!("{} − {}", apa::name(&pair.first), apa::name(&pair.second)),
+            apa::number(whole(pair.difference.value), 3),
+            apa::interval_or_dash(pair.difference.ci95, apa::two),
+            show(pair.dz.map(whole), 2),
+            show(t, 2),
+            test.map_or_else(
+                || "–".to_owned(),
+                |t| {
+                    apa::p_beside(t.p, t.level)
+                        .trim_start_matches("= ")
+                        .to_owned()
+                },
+            ),
+        ];
+        row.extend(any.then(|| show_p(wilcoxon(&pair.first, &pair.second))));
+        table.row(row);
     }
     html! {
         (table.render())
-        @if !compared.pairs.is_empty() {
+        @if let Some(test) = a.pairs.iter().find_map(|p| p.test.as_ref()) {
             p.note {
-                "Differences of cell means over subjects; p of the paired t test and of Wilcoxon's \
-                 signed-rank test (exact), with Holm's correction over all pairs."
-                @if let Some(p) = compared.smallest_p.filter(|p| !significant(*p)) {
-                    " " (answers::too_few_for_pairs(compared.pairs.len(), p))
-                }
+                "Differences of " (if a.design.uses_complete() { "cell means over participants" } else { "adjusted means" })
+                "; the intervals are not corrected for the number of pairs, p (" (sentences::test_name(test.kind))
+                ") has Holm's correction over " (counted(test.comparisons, "pair", "pairs")) "."
             }
         }
     }
@@ -279,7 +290,7 @@ fn repeats(a: &Analysis) -> HtmlTable {
         "mean |difference|",
     ];
     let mut table = HtmlTable::new(
-        "Hidden duplicates minus their originals, over subjects",
+        "Hidden duplicates minus their originals, over participants",
         &head,
     );
     for m in &a.realizations {
@@ -319,12 +330,15 @@ fn agreement(a: &Analysis) -> HtmlTable {
     let mut table = HtmlTable::new("Agreement", &["coefficient", "value", "95 % CI"]);
     let v = &a.values;
     for (id, what) in [
-        ("icc_subjects/ICC2", "between subjects, single: ICC(2,1)"),
-        ("icc_subjects/ICC2k", "between subjects, mean: ICC(2,k)"),
+        (
+            "icc_subjects/ICC2",
+            "between participants, single: ICC(2,1)",
+        ),
+        ("icc_subjects/ICC2k", "between participants, mean: ICC(2,k)"),
         ("icc_repetitions/ICC1", "over repetitions, single: ICC(1,1)"),
         (
             "krippendorff_subjects/ordinal",
-            "between subjects: Krippendorff's α, ordinal",
+            "between participants: Krippendorff's α, ordinal",
         ),
         (
             "krippendorff_repetitions/ordinal",

@@ -133,11 +133,13 @@ fn anova_with_repetitions(cells: &Cells<'_>, table: &CompleteTable, values: &mut
         g.maybe("F", *f);
         g.maybe("p", *p);
         g.maybe("eps_gg", *eps_gg);
-        // Without an F there is no p to correct and no effect to size.
-        if f.is_some() {
-            g.maybe("p_gg", *p_gg);
-            g.maybe("ges", *ges);
-        }
+        g.maybe("p_gg", p_gg.filter(|_| f.is_some()));
+        // Without an error η² is defined unless the effect, too, is 0 but for rounding.
+        g.put_or(
+            "ges",
+            ges.filter(|ges| f.is_some() || *ges > 1e-9),
+            "neither effect nor error has a variance",
+        );
     }
 }
 

@@ -15,7 +15,7 @@ use super::cells::Cells;
 use super::design::Design;
 use super::identifiers::group_id;
 use super::values::Values;
-use super::warnings::Warning;
+use super::warning::Warning;
 
 pub use pairs::Pair;
 
@@ -32,6 +32,8 @@ pub enum Question {
     Differ,
     /// Which pairs of realizations differ?
     Pairs,
+    /// Do participants differ in how they rate the realizations?
+    Disagreement,
     /// Do ratings drift over the session?
     Order,
     /// Does the realization with the highest mean differ from this reference?
@@ -51,6 +53,7 @@ impl Question {
             Self::Best => "best".to_owned(),
             Self::Differ => "differ".to_owned(),
             Self::Pairs => "pairs".to_owned(),
+            Self::Disagreement => "disagreement".to_owned(),
             Self::Order => "order".to_owned(),
             Self::Reference(name) => group_id("reference", &[name]),
             Self::Equivalence(name) => group_id("equivalence", &[name]),
@@ -130,6 +133,12 @@ pub enum TestKind {
     PermutationExact,
     /// Permutation test over random orders of the realizations.
     PermutationMonteCarlo,
+    /// F of the interaction of participants and realizations, against the variance within
+    /// cells.
+    Interaction,
+    /// F of the differences between the participants' slopes on VAF, against the rest of
+    /// the interaction.
+    SlopesDiffer,
     /// t test of a regression slope.
     SlopeT,
     /// Two one-sided t tests.
@@ -150,6 +159,8 @@ impl TestKind {
             Self::MixedContrast => "mixed-contrast",
             Self::PermutationExact => "permutation-exact",
             Self::PermutationMonteCarlo => "permutation-monte-carlo",
+            Self::Interaction => "interaction",
+            Self::SlopesDiffer => "slopes-differ",
             Self::SlopeT => "slope-t",
             Self::Equivalence => "equivalence",
         }
@@ -350,7 +361,9 @@ pub(super) fn findings(
     found.extend(pairs::best(&facts));
     found.extend(differ::differ(&facts));
     found.extend(pairs::which(&facts));
+    found.extend(others::disagreement(&facts));
     found.extend(others::order(&facts));
+    others::disagreement_as_caveat(&mut found);
     found.extend(others::repeats(&facts));
     let pairs = facts.pairs;
     for finding in &found {

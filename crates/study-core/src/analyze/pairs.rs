@@ -36,19 +36,21 @@ pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, values: &mut Values)
         };
         (of_complete(cells, &adjusted.models), why.to_owned())
     } else {
-        match adjusted.pairs() {
-            Ok(pairs) => (
-                (pairs.iter())
-                    .map(|&(first, second, t)| Difference {
+        match &adjusted.fit {
+            Ok(fit) => {
+                let places = (0..k).flat_map(|a| (a + 1..k).map(move |b| (a, b)));
+                let found = places
+                    .zip(&fit.pairs)
+                    .map(|((first, second), t)| Difference {
                         first,
                         second,
                         n: adjusted.design.participants,
-                        t,
+                        t: *t,
                         dz: None,
-                    })
-                    .collect(),
-                "the likelihood is too flat for degrees of freedom".to_owned(),
-            ),
+                    });
+                let why = "the likelihood is too flat for degrees of freedom";
+                (found.collect(), why.to_owned())
+            }
             Err(error) => (Vec::new(), error.to_string()),
         }
     };

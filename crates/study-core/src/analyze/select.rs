@@ -124,6 +124,8 @@ pub struct Counts {
     pub excluded: BTreeMap<String, usize>,
     /// Participants with rows that count.
     pub participants: usize,
+    /// Of these, those with at least one rating.
+    pub with_ratings: usize,
     /// Real participants whose session is finished or of unknown state, including
     /// those excluded by a rule. Only these count towards the planned ones.
     pub finished: usize,
@@ -174,6 +176,10 @@ impl Counts {
         for (&s, &o) in used.subject.iter().zip(&used.origin) {
             origin[s as usize] = origin[s as usize].max(o);
         }
+        let mut rated_by = vec![false; used.subjects.len()];
+        for (&s, rating) in used.subject.iter().zip(&used.rating) {
+            rated_by[s as usize] |= rating.is_some();
+        }
         let finished = |state: Option<State>| matches!(state, None | Some(State::Done));
         Self {
             rows: all.len(),
@@ -187,6 +193,7 @@ impl Counts {
             practice: all.practice.len(),
             excluded,
             participants: used.subjects.len(),
+            with_ratings: rated_by.iter().filter(|r| **r).count(),
             finished: (all.subjects.iter().zip(&took_part))
                 .filter(|(s, part)| **part && finished(s.state))
                 .count(),

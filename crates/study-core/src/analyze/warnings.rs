@@ -2,25 +2,22 @@
 
 use super::Rules;
 use super::cells::Cells;
+use super::design::Design;
 use super::deviation::PreregisteredRule;
 use super::exclude::Applied;
+use super::findings::{Finding, Question, Verdict};
 use super::identifiers::group_id;
 use super::select::Counts;
 use super::subjects::MAX_LISTED;
 use super::values::Values;
-use super::verdicts::{has_memory, significant};
+use super::verdicts::has_memory;
+use super::warning::Warning;
 use study_base::apa;
 use study_base::text::counted;
 use study_stats::permutation::{DRAWS, MAX_EXACT};
 
-/// A warning.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Warning {
-    /// A stable identifier for programs.
-    pub code: &'static str,
-    /// A sentence without capital and full stop. May contain names from the data: untrusted.
-    pub text: String,
-}
+/// A weaker correlation is not driven by anything.
+const DRIVEN: f64 = 0.5;
 
 /// With fewer realizations a test of "VAF predicts the rating" has little power.
 const ENOUGH_REALIZATIONS: f64 = 8.0;
@@ -31,6 +28,7 @@ pub(super) fn warnings(
     rules: &Rules,
     exclusions: &[Applied],
     values: &Values,
+    findings: &[Finding],
 ) -> Vec<Warning> {
     let mut found = Vec::new();
     let mut warn = |code, text: String| found.push(Warning { code, text });
@@ -76,7 +74,7 @@ pub(super) fn warnings(
     let changed =
         (rules.deviations.iter()).any(|d| d.affects.contains(&PreregisteredRule::Exclusions));
     excluded(&mut warn, exclusions, changed, values);
-    headline(&mut warn, values);
+    headline(&mut warn, values, findings);
     design(&mut warn, cells, values);
     raters(&mut warn, cells, values);
     found
@@ -139,11 +137,19 @@ fn excluded(
     }
 }
 
-fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
-    let Some(r) = values.number("corr/pearson/r") else {
+fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values, findings: &[Finding]) {
+    let is = |question: &Question, verdict: &Verdict| {
+        (findings.iter()).any(|f| f.question == *question && f.verdict == *verdict)
+    };
+    for caveat in findings.iter().flat_map(|f| &f.caveats) {
+        if caveat.code == "raw-and-adjusted" {
+            warn(caveat.code, caveat.text.clone());
+        }
+    }
+    let Some(r) = values.number("corr_adjusted/pearson/r") else {
         return;
     };
-    let n = values.number("corr/n_models").unwrap_or(0.0);
+    let n = values.number("corr_adjusted/n_models").unwrap_or(0.0);
     if n < ENOUGH_REALIZATIONS {
         warn(
             "few-realizations",
@@ -162,10 +168,11 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
         );
     }
     let ends = [
-        "corr/leave_one_out/pearson_min",
-        "corr/leave_one_out/pearson_max",
+        "corr_adjusted/leave_one_out/pearson_min",
+        "corr_adjusted/leave_one_out/pearson_max",
     ];
     if let (Some(low), Some(high)) = (values.number(ends[0]), values.number(ends[1]))
+        && r.abs() >= DRIVEN
         && (low * high <= 0.0 || high - low > 0.5)
     {
         warn(
@@ -178,7 +185,7 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
             ),
         );
     }
-    if let Some(rho) = values.number("corr/spearman/rho")
+    if let Some(rho) = values.number("corr_adjusted/spearman/rho")
         && (r - rho).abs() > 0.3
     {
         warn(
@@ -190,11 +197,7 @@ fn headline(warn: &mut impl FnMut(&'static str, String), values: &Values) {
             ),
         );
     }
-    let f = values.number("rmanova/p_gg").is_some_and(significant);
-    let flat = values
-        .number("corr/pearson/p_t")
-        .is_some_and(|p| !significant(p));
-    if f && flat {
+    if is(&Question::Differ, &Verdict::Yes) && is(&Question::Vaf, &Verdict::NotShown) {
         warn(
             "differ-without-trend",
             "the realizations differ, but a linear relation with VAF is not shown: look at the \
@@ -219,10 +222,16 @@ fn design(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
         warn(
             "incomplete",
             format!(
-                "{} did not rate every test realization and {} excluded from the analyses that \
-                 need complete data",
+                "{} did not rate every test realization{}",
                 people(incomplete as usize),
-                if incomplete == 1.0 { "is" } else { "are" }
+                match (Design::of(cells).uses_complete(), incomplete == 1.0) {
+                    (true, true) => " and is excluded from the comparisons of realizations",
+                    (true, false) => " and are excluded from the comparisons of realizations",
+                    (false, _) => {
+                        ": the comparisons use adjusted means, and what needs complete data (analysis of \
+                         variance, Friedman's test) leaves them out"
+                    }
+                }
             ),
         );
     }

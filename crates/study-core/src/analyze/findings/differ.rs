@@ -67,6 +67,13 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
                 counted(d.participants, "participant", "participants")
             ),
         );
+        if facts.number("lmm_cells/connected") == Some(0.0) {
+            found.caveat(
+                "not-connected",
+                "no participants link all realizations: some are compared only between different \
+                 participants",
+            );
+        }
     } else if d.complete < d.participants {
         found.caveat(
             "complete-only",

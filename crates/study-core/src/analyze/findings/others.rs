@@ -1,6 +1,6 @@
 //! Memory, order, references, hidden duplicates; and the ranking.
 
-use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind};
+use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind, Verdict};
 use crate::analyze::cells::Cells;
 use crate::analyze::exclude;
 use crate::analyze::identifiers::group_id;
@@ -56,6 +56,75 @@ pub(super) fn memory(facts: &Facts<'_>) -> Option<Finding> {
     found.direction = direction;
     found.estimate = r.and_then(|r| Estimate::of("r", r));
     Some(found)
+}
+
+/// Whether participants differ in how they rate the realizations: by the interaction if
+/// cells repeat, else by their slopes on VAF.
+pub(super) fn disagreement(facts: &Facts<'_>) -> Option<Finding> {
+    let d = facts.design;
+    if d.participants < 2 || d.realizations < 2 {
+        return None;
+    }
+    let (name, kind) = if d.repeated {
+        ("interaction", TestKind::Interaction)
+    } else {
+        ("slopes", TestKind::SlopesDiffer)
+    };
+    let id = |what: &str| format!("disagreement/{name}/{what}");
+    let get = |what: &str| facts.number(&id(what));
+    let Some(p) = get("p") else {
+        let why = facts.values.reason(&id("p")).unwrap_or("there is no test");
+        let no_vaf = facts.cells.vaf.iter().all(Option::is_none);
+        let why = match (d.repeated, no_vaf) {
+            (true, _) => why.to_owned(),
+            (false, true) => "no cell has two ratings".to_owned(),
+            (false, false) => format!("no cell has two ratings, and {why}"),
+        };
+        return Some(Finding::undefined(Question::Disagreement, why, d));
+    };
+    let test = Test::single(kind, p, facts.rules.alpha);
+    let test = test.with("F", get("F"), &[get("df1"), get("df2")]);
+    let mut found = Finding::decided(Question::Disagreement, test, d);
+    if !d.repeated {
+        found.participants = get("df1").map_or(0, |df| df as usize + 1);
+    }
+    let share = [
+        "variance/share/interaction",
+        "lmm_variance/share_subject_model",
+    ]
+    .iter()
+    .find_map(|id| facts.number(id))
+    .filter(|_| d.repeated);
+    found.effect = share.and_then(|x| Estimate::of("share of the variance", x));
+    let n = |what: &str| facts.number(&format!("disagreement/{what}")).unwrap_or(0.0);
+    let (rising, falling) = (n("n_rising"), n("n_falling"));
+    if found.is_yes() && rising > 0.0 && falling > 0.0 {
+        found.caveat(
+            "opposed",
+            format!(
+                "realizations with a higher VAF are rated higher by {rising} and lower by {falling} \
+                 of the participants who rated them all"
+            ),
+        );
+    }
+    Some(found)
+}
+
+/// Where participants disagree, a question about means that shows nothing says so.
+pub(super) fn disagreement_as_caveat(found: &mut [Finding]) {
+    let disagree = |f: &Finding| f.question == Question::Disagreement && f.is_yes();
+    if !found.iter().any(disagree) {
+        return;
+    }
+    let about_means = [Question::Vaf, Question::Differ];
+    for finding in found.iter_mut() {
+        if about_means.contains(&finding.question) && finding.verdict == Verdict::NotShown {
+            finding.caveat(
+                "disagreement",
+                "participants disagree about the realizations, and means hide opposed opinions",
+            );
+        }
+    }
 }
 
 /// Whether ratings drift over the session.

@@ -1,0 +1,634 @@
+//! Findings: the right verdict in every design, and the same one wherever it is printed.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::report_support::{analysis_of, part, source, words};
+use rayon::prelude::*;
+use serde_json::Value as Json;
+use std::fmt::Write as _;
+use study::report::html::{Details, document};
+use study::report::json;
+use study::report::text::{Page, page};
+use study_base::rng::Stream;
+use study_core::analyze::findings::Direction;
+use study_core::analyze::{Analysis, Finding, Question, Rules, TestKind, Verdict, analyze};
+use study_core::outcome::ratings::Ratings;
+
+/// Random numbers of a design.
+struct Numbers(Stream);
+
+impl Numbers {
+    fn new(seed: u64) -> Self {
+        Self(Stream::new(seed, &["findings"]))
+    }
+
+    fn below(&mut self, n: u64) -> usize {
+        self.0.below(n) as usize
+    }
+
+    fn normal(&mut self) -> f64 {
+        self.0.normal()
+    }
+}
+
+/// Everything that is printed about an analysis, with single spaces.
+struct Printed {
+    terminal: String,
+    html: String,
+    json: Json,
+}
+
+impl Printed {
+    fn of(a: &Analysis) -> Self {
+        let wide = Page {
+            width: 100,
+            colour: false,
+        };
+        let terminal = page(&source(), a, wide);
+        Self {
+            terminal: terminal.split_whitespace().collect::<Vec<_>>().join(" "),
+            html: words(&document(&source(), &Details::default(), a, &[])),
+            json: serde_json::from_str(&json::document(&source(), a)).unwrap(),
+        }
+    }
+
+    /// The answers and the results paragraph of the report.
+    fn sections(&self) -> (&str, &str) {
+        let answers = part(&self.html, "Answers", "For the paper");
+        let paper = part(&self.html, "For the paper", "Included and excluded");
+        (
+            answers,
+            part(paper, " Results ", "For these realizations only"),
+        )
+    }
+}
+
+fn rating_table(rows: &[(usize, usize, usize, f64)], vaf: impl Fn(usize) -> Option<f64>) -> String {
+    let mut csv = "subject,model,repetition,rating,vaf\n".to_owned();
+    for (s, m, k, rating) in rows {
+        let vaf = vaf(*m).map_or_else(String::new, |v| v.to_string());
+        let _ = writeln!(csv, "S{s:02},m{m:02},{k},{rating},{vaf}");
+    }
+    csv
+}
+
+fn finding(a: &Analysis, question: Question) -> &Finding {
+    a.finding(&question).unwrap()
+}
+
+fn kind(a: &Analysis, question: Question) -> TestKind {
+    finding(a, question).test.as_ref().unwrap().kind
+}
+
+/// Eight lenient participants rate m0 to m4 and eight severe ones m2 to m6; each
+/// realization is better than the one before.
+fn lenient_and_severe() -> Analysis {
+    let mut random = Numbers::new(1);
+    let mut rows = Vec::new();
+    for s in 0..16 {
+        let (first, level) = if s < 8 { (0, 7.0) } else { (2, 2.0) };
+        for m in first..first + 5 {
+            for k in 1..=2 {
+                let rating = level + 0.5 * m as f64 + 0.4 * random.normal();
+                rows.push((s, m, k, (rating * 100.0).round() / 100.0));
+            }
+        }
+    }
+    analysis_of(&rating_table(&rows, |m| Some(0.7 + 0.03 * m as f64)))
+}
+
+#[test]
+fn who_rated_which_realization_does_not_turn_the_result_round() {
+    let a = lenient_and_severe();
+    assert!(a.values.number("corr/pearson/r").unwrap() < -0.7);
+    let f = finding(&a, Question::Vaf);
+    assert_eq!(
+        (&f.verdict, f.direction),
+        (&Verdict::Yes, Some(Direction::Up))
+    );
+    assert_eq!((f.participants, f.realizations), (16, 7));
+    assert_eq!(a.ranked()[0].1, "m06");
+    assert!(a.warnings.iter().any(|w| w.code == "raw-and-adjusted"));
+    let printed = Printed::of(&a);
+    let (answers, results) = printed.sections();
+    for text in [printed.terminal.as_str(), answers] {
+        assert!(text.contains("higher VAF are rated higher"), "{text}");
+        assert!(
+            text.contains("The best-rated realization is m06, adjusted mean"),
+            "{text}"
+        );
+        assert!(
+            text.contains("Participants did not all rate the same realizations"),
+            "{text}"
+        );
+    }
+    assert!(
+        results.contains("Realizations with a higher VAF were rated higher"),
+        "{results}"
+    );
+    for text in [&printed.terminal, &printed.html] {
+        assert!(
+            !text.contains("are rated lower") && !text.contains("were rated lower"),
+            "{text}"
+        );
+    }
+    assert_eq!(printed.json["values"]["finding/vaf/verdict"], 1.0);
+}
+
+/// Two participants rank four realizations alike: no variance of error, so no F; Friedman's
+/// exact test has p = 1/4! and decides, while its χ² approximation would not reject.
+#[test]
+fn two_participants_and_four_realizations_have_one_verdict() {
+    let rows: Vec<_> = (0..2)
+        .flat_map(|s| (0..4).map(move |m| (s, m, 1, m as f64 + 1.0)))
+        .collect();
+    let a = analysis_of(&rating_table(&rows, |m| Some(0.7 + 0.05 * m as f64)));
+    assert!(a.values.number("friedman/p").unwrap() > 0.05);
+    let f = finding(&a, Question::Differ);
+    assert_eq!(f.verdict, Verdict::Yes);
+    let test = f.test.as_ref().unwrap();
+    assert_eq!(test.kind, TestKind::FriedmanExact);
+    assert!((test.p - 1.0 / 24.0).abs() < 1e-12);
+    let printed = Printed::of(&a);
+    let (answers, results) = printed.sections();
+    let sentence = "Yes, χ²(3, N = 2) = 6.00, p = .042 (Friedman's test, exact, 2 participants).";
+    for text in [printed.terminal.as_str(), answers] {
+        assert!(
+            text.contains(&format!("Do the realizations differ? {sentence}")),
+            "{text}"
+        );
+    }
+    assert!(
+        results.contains("The realizations differed, χ²(3, N = 2) = 6.00, p = .042"),
+        "{results}"
+    );
+}
+
+/// Nobody rates everything, participants disagree, and nothing differs on average: a model
+/// without the interaction rejects in a quarter of such studies.
+#[test]
+fn with_nobody_complete_the_verdict_keeps_its_level() {
+    let studies = 300;
+    let yes: usize = (0..studies)
+        .into_par_iter()
+        .map(|seed| {
+            let mut random = Numbers::new(seed);
+            let mut rows = Vec::new();
+            for s in 0..12 {
+                let level = random.normal();
+                for m in (0..5).filter(|m| s % 5 != *m) {
+                    let cell = level + 0.8 * random.normal();
+                    for k in 1..=3 {
+                        rows.push((s, m, k, cell + 0.6 * random.normal()));
+                    }
+                }
+            }
+            let a = analysis_of(&rating_table(&rows, |_| None));
+            assert_eq!(kind(&a, Question::Differ), TestKind::MixedModel);
+            usize::from(finding(&a, Question::Differ).is_yes())
+        })
+        .sum();
+    // Binomial: 15 ± 3 · 3.8 of 300 at the level .05.
+    assert!((4..=26).contains(&yes), "{yes} of {studies}");
+}
+
+#[test]
+fn names_with_separators_do_not_share_a_statistic() {
+    let mut csv = "subject,model,rating\n".to_owned();
+    for s in 0..6 {
+        for (m, name) in ["a", "a/subject_mean", "a|b", "b|c", "c"]
+            .iter()
+            .enumerate()
+        {
+            let _ = writeln!(csv, "S{s},{name},{}", 1 + m + (s * (m + 1)) % 3);
+        }
+    }
+    let a = analysis_of(&csv);
+    let all: Vec<&str> = a.values.iter().map(|(id, _)| id).collect();
+    let pairs = all
+        .iter()
+        .filter(|id| id.starts_with("posthoc/") && id.ends_with("/mean_diff"));
+    assert_eq!(pairs.count(), 10);
+    assert_eq!(a.pairs.len(), 10);
+    for m in &a.realizations {
+        let mean = a.described(&m.id, "subject_mean/mean").unwrap();
+        let low = a.described(&m.id, "subject_mean/ci95_lo").unwrap();
+        let high = a.described(&m.id, "subject_mean/ci95_hi").unwrap();
+        assert!(low <= mean && mean <= high, "{}: {low} {mean} {high}", m.id);
+        assert!((mean - a.described(&m.id, "mean").unwrap()).abs() < 1e-9);
+    }
+    let page = Printed::of(&a).html;
+    assert!(page.contains("a|b − b|c"), "{page}");
+}
+
+/// Twelve participants, of whom eight lack one cell each: four are complete.
+#[test]
+fn the_verdict_rests_on_everybody_who_rated() {
+    let mut random = Numbers::new(3);
+    let mut rows = Vec::new();
+    for s in 0..12 {
+        let level = random.normal();
+        for m in (0..4).filter(|m| s >= 8 || s % 4 != *m) {
+            rows.push((
+                s,
+                m,
+                1,
+                4.0 + level + 0.8 * m as f64 + 0.7 * random.normal(),
+            ));
+        }
+    }
+    let a = analysis_of(&rating_table(&rows, |_| None));
+    assert_eq!(a.design.complete, 4);
+    let f = finding(&a, Question::Differ);
+    assert_eq!((f.participants, &f.verdict), (12, &Verdict::Yes));
+    assert_eq!(kind(&a, Question::Best), TestKind::MixedContrast);
+    assert!(
+        a.pairs
+            .iter()
+            .all(|p| p.participants == 12 && p.difference.ci95.is_some())
+    );
+    let text = Printed::of(&a).terminal;
+    assert!(
+        text.contains("(linear mixed model, 12 participants)"),
+        "{text}"
+    );
+    assert!(
+        text.contains("4 of 12 participants rated every realization"),
+        "{text}"
+    );
+}
+
+/// ε̂ of Greenhouse and Geisser is at most (S − 1)/(k − 1), so that it could not say yes.
+#[test]
+fn few_participants_can_show_that_many_realizations_differ() {
+    let mut random = Numbers::new(5);
+    let mut rows = Vec::new();
+    for s in 0..5 {
+        let level = random.normal();
+        for m in 0..20 {
+            let rating = 4.0 + level + 0.08 * m as f64 + 0.7 * random.normal();
+            rows.push((s, m, 1, rating));
+        }
+    }
+    let a = analysis_of(&rating_table(&rows, |_| None));
+    assert!(a.values.number("rmanova/p_gg").unwrap() > 0.05);
+    assert_eq!(kind(&a, Question::Differ), TestKind::AnovaHuynhFeldt);
+    assert!(finding(&a, Question::Differ).is_yes());
+    // Above eight realizations the best is compared with each other one, at the price of all.
+    assert_eq!(a.pairs.len(), 19);
+    assert_eq!(
+        finding(&a, Question::Best)
+            .test
+            .as_ref()
+            .unwrap()
+            .comparisons,
+        190
+    );
+}
+
+/// Eight of 16 participants like what the others dislike.
+fn camps(repetitions: usize) -> Analysis {
+    let mut random = Numbers::new(7);
+    let mut rows = Vec::new();
+    for s in 0..16 {
+        let slope = if s % 2 == 0 { 0.8 } else { -0.8 };
+        for m in 0..6 {
+            for k in 1..=repetitions {
+                let rating = 4.0 + slope * (m as f64 - 2.5) + 0.6 * random.normal();
+                rows.push((s, m, k, rating));
+            }
+        }
+    }
+    analysis_of(&rating_table(&rows, |m| Some(0.7 + 0.03 * m as f64)))
+}
+
+#[test]
+fn two_opposed_camps_are_named() {
+    for (repetitions, test) in [(3, TestKind::Interaction), (1, TestKind::SlopesDiffer)] {
+        let a = camps(repetitions);
+        assert_eq!(finding(&a, Question::Differ).verdict, Verdict::NotShown);
+        assert_eq!(kind(&a, Question::Disagreement), test);
+        let printed = Printed::of(&a);
+        let (answers, results) = printed.sections();
+        for text in [printed.terminal.as_str(), answers] {
+            assert!(
+                text.contains("Do participants disagree about the realizations? Yes, F("),
+                "{text}"
+            );
+            assert!(
+                text.contains("rated higher by 8 and lower by 8 of the participants"),
+                "{text}"
+            );
+            assert!(
+                text.contains("Participants disagree about the realizations, and means"),
+                "{text}"
+            );
+        }
+        assert!(
+            results.contains("Participants disagreed about the realizations, F("),
+            "{results}"
+        );
+    }
+}
+
+#[test]
+fn the_level_of_significance_is_that_of_the_protocol() {
+    let mut rows = Vec::new();
+    let mut random = Numbers::new(11);
+    for s in 0..10 {
+        for m in 0..2 {
+            rows.push((s, m, 1, 4.0 + 0.75 * m as f64 + 0.7 * random.normal()));
+        }
+    }
+    let csv = rating_table(&rows, |_| None);
+    let ratings = Ratings::read_csv("data.csv", csv.as_bytes(), None).unwrap();
+    let at = |alpha: f64| {
+        let rules = Rules {
+            alpha,
+            ..Rules::default()
+        };
+        analyze(&ratings, &rules)
+    };
+    let p = finding(&at(0.05), Question::Differ)
+        .test
+        .as_ref()
+        .unwrap()
+        .p;
+    assert!((0.0001..0.045).contains(&p), "{p}");
+    // Between three and four decimals of p, so that the printed p has to show the side.
+    for alpha in [p * 0.9999, p * 1.0001] {
+        let a = at(alpha);
+        let verdict = if p < alpha {
+            Verdict::Yes
+        } else {
+            Verdict::NotShown
+        };
+        assert_eq!(finding(&a, Question::Differ).verdict, verdict);
+        let printed = Printed::of(&a);
+        let shown = p_of(&sentence(&printed.terminal, "Do the realizations differ? ").unwrap());
+        assert_eq!(shown.unwrap() < alpha, p < alpha, "{}", printed.terminal);
+    }
+    let page = Printed::of(&at(0.01)).html;
+    assert!(
+        page.contains("The level of significance is .01, two-sided"),
+        "{page}"
+    );
+    assert!(!page.contains("The level of significance is .05"), "{page}");
+    // Two realizations: ε is 1 by definition.
+    assert!(!page.contains("ε = "), "{page}");
+}
+
+#[test]
+fn those_who_gave_no_rating_did_not_rate() {
+    let mut csv = "subject,model,rating\n".to_owned();
+    for s in 0..10 {
+        for (m, name) in ["a", "b", "c"].iter().enumerate() {
+            let rating = if s < 7 {
+                (1 + (s + 2 * m) % 5).to_string()
+            } else {
+                String::new()
+            };
+            let _ = writeln!(csv, "S{s},{name},{rating}");
+        }
+    }
+    let a = analysis_of(&csv);
+    assert_eq!(finding(&a, Question::Differ).participants, 7);
+    let printed = Printed::of(&a);
+    assert!(
+        printed.html.contains("7 participants rated 3 realizations"),
+        "{}",
+        printed.html
+    );
+    assert!(!printed.html.contains("10 participants rated"));
+    assert!(
+        printed
+            .terminal
+            .contains("7 of 10 participants gave ratings"),
+        "{}",
+        printed.terminal
+    );
+}
+
+#[test]
+fn perfect_agreement_is_1_and_not_undefined() {
+    let rows: Vec<_> = (0..4)
+        .flat_map(|s| (0..3).flat_map(move |m| (1..=2).map(move |k| (s, m, k, 2.0 + m as f64))))
+        .collect();
+    let a = analysis_of(&rating_table(&rows, |_| None));
+    for id in [
+        "icc_subjects/ICC2",
+        "icc_subjects/ICC3",
+        "icc_subjects/ICC1k",
+        "rmanova/pes",
+        "rmanova2/model/ges",
+    ] {
+        assert_eq!(a.values.number(id), Some(1.0), "{id}");
+    }
+    for id in [
+        "rmanova/F",
+        "icc_subjects/F_3",
+        "rmanova2/model/F",
+        "rmanova2/inter/ges",
+        "icc_subjects/ICC2/lo",
+    ] {
+        assert!(a.values.reason(id).is_some(), "{id}");
+    }
+}
+
+/// The sentence after a question.
+fn sentence(text: &str, question: &str) -> Option<String> {
+    let (_, rest) = text.split_once(question)?;
+    Some(rest.split(". ").next()?.to_owned())
+}
+
+/// The first p of a sentence; the bound of `p < .001`.
+fn p_of(sentence: &str) -> Option<f64> {
+    let (_, rest) = sentence
+        .split_once("p = ")
+        .or_else(|| sentence.split_once("p < "))?;
+    let digits = rest
+        .split(|c: char| !c.is_ascii_digit() && c != '.')
+        .next()?;
+    digits.trim_end_matches('.').parse().ok()
+}
+
+fn verdict_of(sentence: &str) -> &'static str {
+    let words = [
+        ("Yes", "yes"),
+        ("Not shown", "not shown"),
+        ("Cannot be determined", "undefined"),
+    ];
+    let found = words.iter().find(|(word, _)| sentence.starts_with(word));
+    found.unwrap_or_else(|| panic!("no verdict: {sentence}")).1
+}
+
+/// Question, its heading, and its words in the results paragraph: yes, not shown,
+/// undefined.
+const PRINTED: [(&str, &str, [&str; 3]); 6] = [
+    (
+        "vaf",
+        "Does VAF predict the rating? ",
+        [
+            "with a higher VAF were rated",
+            "A relation with VAF was not shown",
+            "Whether VAF predicts the rating cannot be determined",
+        ],
+    ),
+    (
+        "best",
+        "Does the best-rated realization differ from the second best? ",
+        [
+            " differed from the second best",
+            "not shown",
+            "Whether the best-rated realization differs from the second best cannot be determined",
+        ],
+    ),
+    (
+        "differ",
+        "Do the realizations differ? ",
+        [
+            "The realizations differed",
+            "A difference between the realizations was not shown",
+            "Whether the realizations differ cannot be determined",
+        ],
+    ),
+    (
+        "pairs",
+        "Which pairs of realizations differ? ",
+        [
+            "These pairs of realizations differed",
+            "No pair of realizations was shown to differ",
+            "Which pairs of realizations differ cannot be determined",
+        ],
+    ),
+    (
+        "disagreement",
+        "Do participants disagree about the realizations? ",
+        [
+            "Participants disagreed about the realizations",
+            "A disagreement of participants about the realizations was not shown",
+            "Whether participants disagree about the realizations cannot be determined",
+        ],
+    ),
+    (
+        "order",
+        "Do order and learning matter? ",
+        [
+            "Ratings changed over the session",
+            "A change of the ratings over the session was not shown",
+            "Whether ratings change over the session cannot be determined",
+        ],
+    ),
+];
+
+/// A design: complete or not, tiny or not, tied or not, with two realizations or thirty.
+fn random_design(seed: u64) -> String {
+    let mut random = Numbers::new(1000 + seed);
+    let participants = 1 + random.below(10);
+    let realizations = match random.below(12) {
+        0 => 1,
+        1..=3 => 2,
+        4 => 9 + random.below(3),
+        5 if seed % 10 == 0 => 30,
+        _ => 3 + random.below(4),
+    };
+    let repetitions = 1 + random.below(3);
+    let missing = [0, 0, 10, 40][random.below(4)];
+    let steps = [0, 1, 2, 7][random.below(4)];
+    let effect = [0.0, 0.3, 1.5][random.below(3)];
+    let noise = [0.0, 0.7, 0.7][random.below(3)];
+    let vaf = random.below(4);
+    let camps = random.below(4) == 0;
+    let mut csv = "subject,model,repetition,rating,vaf,trial_index\n".to_owned();
+    for s in 0..participants {
+        let level = random.normal();
+        let mut trial = 0;
+        for k in 1..=repetitions {
+            for m in 0..realizations {
+                trial += 1;
+                if random.below(100) < missing {
+                    continue;
+                }
+                let turn = if camps && s % 2 == 1 { -1.0 } else { 1.0 };
+                let raw = 4.0 + level + turn * effect * m as f64 + noise * random.normal();
+                let rating = match steps {
+                    0 => raw,
+                    steps => raw.round().clamp(1.0, f64::from(steps)),
+                };
+                let vaf = match vaf {
+                    0 => String::new(),
+                    1 => (m % 2).to_string(),
+                    _ => format!("0.{}", 70 + 10 * m % 29),
+                };
+                let _ = writeln!(
+                    csv,
+                    "S{s:02},m{m:02},{k},{rating},{vaf},{}",
+                    1 + (trial * 7) % 101
+                );
+            }
+        }
+    }
+    csv
+}
+
+fn check_design(seed: u64) {
+    let csv = random_design(seed);
+    if csv.lines().count() < 2 {
+        return;
+    }
+    let a = analysis_of(&csv);
+    let printed = Printed::of(&a);
+    let (answers, results) = printed.sections();
+    let findings = printed.json["findings"].as_array().unwrap();
+    for (id, heading, [yes, not_shown, undefined]) in PRINTED {
+        let found = findings.iter().find(|f| f["question"] == id);
+        let said = [printed.terminal.as_str(), answers].map(|text| sentence(text, heading));
+        let Some(found) = found else {
+            assert_eq!(said, [None, None], "design {seed}: {id} is answered");
+            continue;
+        };
+        let verdict = found["verdict"].as_str().unwrap();
+        for sentence in said {
+            let sentence =
+                sentence.unwrap_or_else(|| panic!("design {seed}: {id} is not answered"));
+            assert_eq!(
+                verdict_of(&sentence),
+                verdict,
+                "design {seed}: {id}: {sentence}"
+            );
+            if let (Some(p), true) = (p_of(&sentence), verdict != "undefined") {
+                assert_eq!(
+                    p < 0.05,
+                    verdict == "yes",
+                    "design {seed}: {id}: {sentence}"
+                );
+            }
+        }
+        let value = &printed.json["values"][format!("finding/{id}/verdict")];
+        let expected = match verdict {
+            "yes" => Json::from(1.0),
+            "not shown" => Json::from(0.0),
+            _ => Json::Null,
+        };
+        assert_eq!(*value, expected, "design {seed}: {id}");
+        let words = match verdict {
+            "yes" => yes,
+            "not shown" => not_shown,
+            _ => undefined,
+        };
+        assert!(
+            results.contains(words),
+            "design {seed}: {id}: {verdict}: {results}"
+        );
+        for other in [yes, undefined].into_iter().filter(|w| *w != words) {
+            assert!(
+                !results.contains(other),
+                "design {seed}: {id}: {verdict}: {results}"
+            );
+        }
+    }
+}
+
+#[test]
+fn all_renderers_give_the_same_verdicts_in_a_thousand_designs() {
+    (0..1000u64).into_par_iter().for_each(check_design);
+}
