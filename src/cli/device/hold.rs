@@ -67,7 +67,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
             }
         },
     )
-    .map_err(|e| Failure::device(e))?;
+    .map_err(Failure::device)?;
     console.out(format!(
         "{:.1} s, {} samples, {} lost, {} strokes, least energy {:.4} J, {:.1} switches/s, {} clamps\n{}",
         playback.exploration_s,

@@ -319,4 +319,15 @@ mod tests {
             ]
         );
     }
+
+    #[test]
+    fn a_remark_is_neither_blank_nor_longer_than_the_limit() {
+        assert!(matches!(check_free_text(" \n"), Err(InputRefused::NoText)));
+        assert!(check_free_text(&"x".repeat(MAX_TEXT_BYTES)).is_ok());
+        let long = "x".repeat(MAX_TEXT_BYTES + 1);
+        assert!(matches!(
+            check_free_text(&long),
+            Err(InputRefused::TextTooLong)
+        ));
+    }
 }
