@@ -190,3 +190,30 @@ impl Session {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chrono::DateTime;
+
+    #[test]
+    fn a_trial_is_saved_with_its_last_event_and_not_before() {
+        let at = Moment {
+            wall: DateTime::UNIX_EPOCH.fixed_offset(),
+            mono_ns: 0,
+        };
+        let mut saves = SaveState::default();
+        saves.send(Event::ClockStepped { by_s: 1.0 }, at);
+        let done = Event::TrialDone {
+            trial: 1,
+            attempt: 1,
+            response_s: 1.0,
+        };
+        saves.send(done, at);
+        for (saved, shown) in [(0, false), (1, false), (2, true)] {
+            saves.saved = saved;
+            assert_eq!(saves.has_trial(1), shown, "{saved} of 2 events on disk");
+        }
+        assert!(saves.has_trial(7), "from the journal");
+    }
+}
