@@ -242,6 +242,18 @@ mod tests {
         assert_eq!(decode(&bytes).unwrap().record, hostile);
     }
 
+    #[test]
+    fn a_line_of_the_next_version_is_newer_whatever_its_form() {
+        let line = |rest: &str| {
+            let counted = format!("\"v\":{},{rest}}}", VERSION + 1);
+            let sum = CRC.checksum(counted.as_bytes());
+            format!("{{\"crc\":\"{sum:08x}\",{counted}").into_bytes()
+        };
+        for rest in ["\"seq\":1", "\"seq\":\"one\"", "\"event\":[]"] {
+            assert_eq!(decode(&line(rest)), Err(LineError::Newer(VERSION + 1)));
+        }
+    }
+
     /// 0xcbf43926 is the check value of CRC-32/ISO-HDLC for "123456789".
     #[test]
     fn the_checksum_is_that_of_zlib() {
