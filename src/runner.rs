@@ -30,15 +30,12 @@ use study_haptics::model::Realization;
 
 /// Longest wait for an input while nothing else is expected: clocks on the screen move.
 const IDLE: Duration = Duration::from_millis(100);
-/// Longest wait during playback: the live strip and the stroke count move.
+/// Longest wait during playback.
 const PLAYING: Duration = Duration::from_millis(20);
 /// Longest wait while an event is being saved.
 const SAVING: Duration = Duration::from_millis(2);
 /// A playback is lost if a device with telemetry reports nothing for this time.
 const SILENCE: Duration = Duration::from_secs(1);
-/// Telemetry samples in the live strip.
-const STRIP_SAMPLES: usize = 3000;
-
 /// Operates a session: sees the view and gives inputs.
 pub trait Operator {
     /// Shows `view` and waits at most `timeout` for inputs (possibly none).
@@ -46,29 +43,13 @@ pub trait Operator {
     /// # Errors
     /// [`OperatorError`] if the operator can no longer see or type; the session then
     /// ends as after a quit.
-    fn next(
-        &mut self,
-        view: &View,
-        strip: Option<&Strip>,
-        timeout: Duration,
-    ) -> Result<Vec<Input>, OperatorError>;
+    fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError>;
 }
 
 /// The reason why the operator is gone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct OperatorError(pub String);
-
-/// The live strip: force over position, shown only on request.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Strip {
-    /// Position in mm and commanded force in N, oldest first.
-    pub samples: Vec<(f64, f64)>,
-    /// Largest force, N: the upper edge of the strip.
-    pub force_limit_n: f64,
-    /// Position range of the realizations, mm.
-    pub x_range_mm: [f64; 2],
-}
 
 /// Everything that a session needs.
 pub struct Setup {
@@ -94,8 +75,6 @@ pub struct Setup {
     pub device_check: Option<String>,
     /// The clock.
     pub clock: Box<dyn Clock>,
-    /// Whether telemetry is kept for the live strip.
-    pub live: bool,
     /// Whether a thread saves. Without it every event is on disk before the next input,
     /// as a rehearsal on a virtual clock requires.
     pub threaded: bool,
@@ -113,15 +92,24 @@ pub struct Ended {
     pub receipt: Option<Receipt>,
 }
 
+/// Loads of tables of different sizes take a multiple of this time, so that their
+/// duration tells nothing about the realization.
+const LOAD_SLOT: Duration = Duration::from_millis(500);
+
 /// A running session with its device and its folder.
 pub struct Runner {
     setup: Setup,
     session: Session,
     saver: Option<Saver>,
     saved: u64,
-    strip: Option<Strip>,
     ended: Option<Ending>,
     receipt: Option<Receipt>,
+    /// Whether the time of a load depends on the realization.
+    uneven_loads: bool,
+    /// When the load under way was requested.
+    load_began: Duration,
+    /// When the session is told that the table is loaded.
+    loaded_due: Option<Duration>,
     /// When the device last reported about the current playback.
     last_report: Option<Duration>,
     /// The code on the physical sample of each realization.
@@ -136,20 +124,18 @@ impl Runner {
         let at = setup.clock.now();
         let (session, effects) =
             Session::new(setup.protocol.clone(), setup.orders.clone(), config, at);
-        let strip = setup.live.then(|| Strip {
-            samples: Vec::new(),
-            force_limit_n: setup.protocol.device.limits.force_n.get(),
-            x_range_mm: x_range(&setup.models),
-        });
+        let uneven_loads = uneven_loads(&setup.protocol, &setup.models);
         let codes = sample_codes(&setup.protocol);
         let mut runner = Self {
             setup,
             session,
             saver: None,
             saved: 0,
-            strip,
             ended: None,
             receipt: None,
+            uneven_loads,
+            load_began: Duration::ZERO,
+            loaded_due: None,
             last_report: None,
             codes,
             has_telemetry: false,
@@ -171,7 +157,7 @@ impl Runner {
                 IDLE
             };
             let inputs = operator
-                .next(&view, self.strip.as_ref(), timeout)
+                .next(&view, timeout)
                 .unwrap_or_else(|gone| vec![Input::Abort(gone.0)]);
             if let Some(ended) = self.step(inputs) {
                 return ended;
@@ -340,10 +326,8 @@ impl Runner {
             by_hand,
             allow_uncertified: protocol.device.uncertified.as_ref().is_some_and(|u| u.play),
         };
-        if let Some(strip) = &mut self.strip {
-            strip.samples.clear();
-        }
         let at = self.device_time();
+        self.load_began = at;
         match self.setup.device.load(&stimulus, limits, at) {
             Ok(()) => {
                 self.send(Job::TelemetryBegin { trial, attempt });
@@ -365,26 +349,27 @@ impl Runner {
                 self.send(Job::TelemetryEnd);
             }
             let input = match report {
+                Report::Loaded if self.uneven_loads => {
+                    self.loaded_due = Some(end_of_slot(self.load_began, at));
+                    continue;
+                }
                 Report::Loaded => Input::DeviceLoaded,
                 Report::Mount(code) => Input::DeviceMount(code),
                 Report::Started => Input::DeviceStarted,
                 Report::Telemetry(samples) => {
-                    if let Some(strip) = &mut self.strip {
-                        let new = samples.iter().map(|s| (s.x_mm, s.force_command_n));
-                        strip.samples.extend(new);
-                        let excess = strip.samples.len().saturating_sub(STRIP_SAMPLES);
-                        strip.samples.drain(..excess);
-                    }
                     self.send(Job::Telemetry(samples));
-                    continue;
+                    Input::DeviceSampled
                 }
-                Report::Progress { strokes, clamps } => Input::DeviceProgress { strokes, clamps },
+                Report::Progress { strokes, .. } => Input::DeviceProgress { strokes },
                 Report::Stopped(playback) => Input::DeviceStopped(playback),
                 Report::Fault(what) => Input::DeviceFault(what),
                 Report::Lost(what) => Input::DeviceLost(what),
                 Report::Ready => Input::DeviceReady,
             };
             self.feed(input);
+        }
+        if self.loaded_due.take_if(|due| *due <= at).is_some() {
+            self.feed(Input::DeviceLoaded);
         }
         if self
             .last_report
@@ -446,6 +431,7 @@ impl Runner {
 
     fn device_limp(&mut self) {
         self.last_report = None;
+        self.loaded_due = None;
         let at = self.device_time();
         self.setup.device.limp(at);
     }
@@ -478,13 +464,19 @@ pub fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limi
     limits
 }
 
-/// The position range of all realizations together, mm.
-fn x_range(models: &BTreeMap<ModelId, Realization>) -> [f64; 2] {
-    let ends = models
-        .values()
-        .filter_map(|m| Some((*m.x_mm.first()?, *m.x_mm.last()?)));
-    let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (x, y)| {
-        (a.min(x), b.max(y))
-    });
-    if low < high { [low, high] } else { [0.0, 35.0] }
+/// Whether the tables of a study differ in size, or are not known.
+fn uneven_loads(protocol: &Protocol, models: &BTreeMap<ModelId, Realization>) -> bool {
+    let nodes = |entry: &ModelEntry| models.get(&entry.id).map(|table| table.x_mm.len());
+    let mut sizes = protocol.models.iter().map(nodes);
+    let first = sizes.next().flatten();
+    first.is_none() || sizes.any(|size| size != first)
+}
+
+/// The first multiple of [`LOAD_SLOT`] after `began` that is not before `now`.
+fn end_of_slot(began: Duration, now: Duration) -> Duration {
+    let slots = now
+        .saturating_sub(began)
+        .as_nanos()
+        .div_ceil(LOAD_SLOT.as_nanos());
+    began + LOAD_SLOT * u32::try_from(slots.max(1)).unwrap_or(u32::MAX)
 }

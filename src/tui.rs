@@ -24,7 +24,7 @@ pub mod wrap;
 pub use surface::Surface;
 pub use theme::Colour;
 
-use crate::runner::{Operator, OperatorError, Strip};
+use crate::runner::{Operator, OperatorError};
 use crossterm::event::{Event, MouseEventKind};
 use std::time::{Duration, Instant};
 use study_core::session::{Input, Screen, View};
@@ -36,7 +36,7 @@ pub(crate) use terminal::survive_file_size_limit;
 pub struct Options {
     /// Whether the mouse can choose. Selecting text in the terminal then needs Shift.
     pub mouse: bool,
-    /// Whether the live strip is drawn.
+    /// Whether the page shows that telemetry arrives.
     pub live: bool,
     /// The colours to use.
     pub colour: Colour,
@@ -95,8 +95,7 @@ const SUSPEND_WAIT: Duration = Duration::from_secs(2);
 pub struct Tui {
     terminal: Terminal,
     surface: Surface,
-    live: bool,
-    drawn: Option<(View, Option<Strip>)>,
+    drawn: Option<View>,
     suspend_since: Option<Instant>,
 }
 
@@ -108,16 +107,15 @@ impl Tui {
     pub fn open(options: Options) -> Result<Self, TuiError> {
         Ok(Self {
             terminal: Terminal::open(options.mouse)?,
-            surface: Surface::new(options.colour),
-            live: options.live,
+            surface: Surface::new(options.colour).with_live(options.live),
             drawn: None,
             suspend_since: None,
         })
     }
 
     /// Draws the view if anything visible has changed.
-    fn draw(&mut self, view: &View, strip: Option<&Strip>) -> Result<(), OperatorError> {
-        let now = (as_shown(view), strip.cloned());
+    fn draw(&mut self, view: &View) -> Result<(), OperatorError> {
+        let now = as_shown(view);
         if self.drawn.as_ref() == Some(&now) {
             return Ok(());
         }
@@ -125,7 +123,7 @@ impl Tui {
         let drawn = self.terminal.draw(|frame| {
             let area = frame.area();
             surface.follow(view, area);
-            if let Some(at) = surface.draw(view, strip, area, frame.buffer_mut()) {
+            if let Some(at) = surface.draw(view, area, frame.buffer_mut()) {
                 frame.set_cursor_position(at);
             }
         });
@@ -153,13 +151,7 @@ impl Tui {
 }
 
 impl Operator for Tui {
-    fn next(
-        &mut self,
-        view: &View,
-        strip: Option<&Strip>,
-        timeout: Duration,
-    ) -> Result<Vec<Input>, OperatorError> {
-        let strip = strip.filter(|_| self.live);
+    fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
         let until = Instant::now() + timeout;
         self.suspend_if_asked(view)?;
         loop {
@@ -169,7 +161,7 @@ impl Operator for Tui {
             if self.terminal.check()? {
                 self.drawn = None;
             }
-            self.draw(view, strip)?;
+            self.draw(view)?;
             let left = until.saturating_duration_since(Instant::now());
             match self.terminal.event(left.min(SLICE))? {
                 Some(Event::Mouse(mouse)) if mouse.kind == MouseEventKind::Moved => {}

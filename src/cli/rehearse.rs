@@ -115,7 +115,6 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             },
             device_check: None,
             clock: Box::new(clock.clone()),
-            live: false,
             threaded: false,
         };
         let mut rater = Rater::new(seed, number, effect);

@@ -37,7 +37,7 @@ pub(super) struct Args {
     /// Folder for the results of all studies
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
-    /// Show a live strip of force over position
+    /// Show whether telemetry arrives
     #[arg(long)]
     live: bool,
     /// Do not use the mouse
@@ -117,7 +117,6 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         device_check: device_selection::commissioned(&device.identity().id, console),
         device,
         clock: Box::new(clock),
-        live: args.live,
         threaded: true,
     };
     let config = Config {

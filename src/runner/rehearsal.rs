@@ -159,9 +159,7 @@ impl Plan {
                 pass(wait_s + GLANCE_S);
                 vec![Input::Advance]
             }
-            Screen::Playing {
-                strokes_missing, ..
-            } => {
+            Screen::Playing { keep_exploring, .. } => {
                 // In small steps, so that telemetry arrives as in a real session.
                 const PIECE_S: f64 = 0.25;
                 let left = self
@@ -169,7 +167,7 @@ impl Plan {
                     .get_or_insert_with(|| rater.exploration_s());
                 pass(PIECE_S.min(left.max(0.02)));
                 *left -= PIECE_S;
-                if *left <= 0.0 && *strokes_missing == 0 {
+                if *left <= 0.0 && !keep_exploring {
                     vec![Input::Advance]
                 } else {
                     Vec::new()

@@ -6,7 +6,6 @@
 use super::theme::{Colour, Theme};
 use super::ui_state::UiState;
 use super::views::Page;
-use crate::runner::Strip;
 use crossterm::event::{Event, MouseButton, MouseEventKind};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
@@ -20,6 +19,7 @@ pub struct Surface {
     theme: Theme,
     area: Rect,
     screen: Option<Screen>,
+    live: bool,
 }
 
 impl Surface {
@@ -30,7 +30,15 @@ impl Surface {
             theme: Theme::new(colour),
             area: Rect::ZERO,
             screen: None,
+            live: false,
         }
+    }
+
+    /// The same, which shows whether telemetry arrives.
+    #[must_use]
+    pub fn with_live(mut self, live: bool) -> Self {
+        self.live = live;
+        self
     }
 
     /// The state of the interface.
@@ -53,17 +61,17 @@ impl Surface {
         self.measure(view);
     }
 
-    fn page<'a>(&'a self, view: &'a View, strip: Option<&'a Strip>) -> Page<'a> {
+    fn page<'a>(&'a self, view: &'a View) -> Page<'a> {
         Page {
             view,
             state: &self.state,
-            strip,
+            live: self.live,
             theme: self.theme,
         }
     }
 
     fn measure(&mut self, view: &View) {
-        let room = self.page(view, None).room(self.area);
+        let room = self.page(view).room(self.area);
         self.state.set_room(room.most, room.page);
         if let Some(columns) = room.columns {
             self.state.set_columns(columns);
@@ -84,7 +92,7 @@ impl Surface {
         match mouse.kind {
             MouseEventKind::Down(MouseButton::Left) => {
                 let place = Position::new(mouse.column, mouse.row);
-                let hit = self.page(view, None).hit(self.area, place);
+                let hit = self.page(view).hit(self.area, place);
                 if let Some(target) = hit {
                     self.state.pick(target, view);
                 }
@@ -98,14 +106,8 @@ impl Surface {
     }
 
     /// Draws everything; returns the position of the terminal's cursor.
-    pub fn draw(
-        &self,
-        view: &View,
-        strip: Option<&Strip>,
-        area: Rect,
-        buf: &mut Buffer,
-    ) -> Option<Position> {
-        let page = self.page(view, strip);
+    pub fn draw(&self, view: &View, area: Rect, buf: &mut Buffer) -> Option<Position> {
+        let page = self.page(view);
         page.render(area, buf);
         let cursor = page.cursor(area.intersection(buf.area));
         cursor.filter(|at| buf.area.contains(*at))

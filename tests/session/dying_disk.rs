@@ -192,7 +192,6 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
         device: Box::new(Manual::default()),
         device_check: None,
         clock: Box::new(clock.clone()),
-        live: false,
         threaded: false,
     };
     let config = Config {

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod blinding;
 mod by_keys;
 #[path = "../support/designs.rs"]
 mod designs;

@@ -120,10 +120,8 @@ proptest! {
         let at = which % all.len();
         let (name, mut view) = all.swap_remove(at);
         poison(&mut view, &text, number);
-        let mut strip = strip();
-        strip.samples.push((number, number));
         let mut surface = Surface::new(Colour::Full);
-        drawn(&mut surface, &view, Some(&strip), w, h);
+        drawn(&mut surface, &view, w, h);
         for n in keys {
             surface.event(&key(n), &view);
         }
@@ -132,7 +130,7 @@ proptest! {
         let modifiers = KeyModifiers::NONE;
         surface.event(&Event::Mouse(MouseEvent { kind, column: x, row: y, modifiers }), &view);
         for (w, h) in [(w, h), (w2, h2), (80, 24)] {
-            let buf = drawn(&mut surface, &view, Some(&strip), w, h);
+            let buf = drawn(&mut surface, &view, w, h);
             for cell in &buf.content {
                 prop_assert!(!cell.symbol().contains(is_unsafe), "{name}: {:?}", cell.symbol());
             }
@@ -167,7 +165,7 @@ fn extreme_scales_are_drawn() {
         };
         let view = view(form(vec![slider]));
         let mut surface = Surface::new(Colour::None);
-        drawn(&mut surface, &view, None, 80, 24);
+        drawn(&mut surface, &view, 80, 24);
         for n in 0..24 {
             surface.event(&key(n), &view);
         }

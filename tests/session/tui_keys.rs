@@ -11,7 +11,7 @@ use study::tui::{Colour, Surface};
 use study_core::outcome::{Author, Choice, FormId};
 use study_core::protocol::question::MAX_TEXT_BYTES;
 use study_core::protocol::{Answer, Entry, QuestionKind};
-use study_core::session::view::{Counts, DeviceState, View};
+use study_core::session::view::{DeviceState, Telemetry, View};
 use study_core::session::{Input, Screen};
 
 struct Desk {
@@ -39,7 +39,7 @@ impl Desk {
     }
 
     fn look(&mut self) -> String {
-        picture(&drawn(&mut self.surface, &self.view, None, 80, 24))
+        picture(&drawn(&mut self.surface, &self.view, 80, 24))
     }
 
     fn press(&mut self, code: KeyCode) -> Vec<Input> {
@@ -87,7 +87,7 @@ impl Desk {
 fn playing() -> Screen {
     Screen::Playing {
         since_s: 3.0,
-        strokes_missing: 0,
+        keep_exploring: false,
     }
 }
 
@@ -152,7 +152,7 @@ fn esc_stops_the_device_on_every_screen_and_in_every_dialog() {
 #[test]
 fn esc_works_where_the_terminal_is_too_small_to_draw() {
     let mut desk = Desk::with(playing());
-    drawn(&mut desk.surface, &desk.view, None, 12, 3);
+    drawn(&mut desk.surface, &desk.view, 12, 3);
     assert_eq!(desk.press(KeyCode::Esc), [Input::Stop]);
     assert_eq!(desk.types(" "), [Input::Stop]);
     // No answer and no quitting unseen; Space is not taken for text.
@@ -161,7 +161,7 @@ fn esc_works_where_the_terminal_is_too_small_to_draw() {
     assert_eq!(desk.types("x "), [Input::Stop]);
     assert_eq!(desk.types("y"), []);
     desk.control('c');
-    let small = picture(&drawn(&mut desk.surface, &desk.view, None, 60, 20));
+    let small = picture(&drawn(&mut desk.surface, &desk.view, 60, 20));
     assert!(small.contains("y: yes"), "{small}");
     assert_eq!(desk.types("y"), [Input::Quit]);
 }
@@ -383,7 +383,7 @@ fn a_stopped_trial_is_played_again_or_rated() {
 fn enter_advances_only_when_the_session_allows_it() {
     let mut desk = Desk::with(Screen::Playing {
         since_s: 1.0,
-        strokes_missing: 1,
+        keep_exploring: true,
     });
     assert_eq!(desk.enter(), []);
     let mut desk = Desk::with(Screen::SaveTrouble {
@@ -524,12 +524,9 @@ fn several_questions_are_answered_page_by_page() {
 fn the_screen_shows_nothing_but_the_view_during_playback() {
     // Every word on the screen is fixed or comes from the view.
     let mut desk = Desk::with(playing());
-    desk.view.line.device = DeviceState::Running(Some(Counts {
-        strokes: 4,
-        clamps: 1,
-    }));
+    desk.view.line.device = DeviceState::Running(Telemetry::Arrives);
     let known = "trial 7 of 15 Feel the device. ● playing 0:03 Enter: rate · Esc: stop \
-                 S03 · lw running · 4 strokes · 1 clamp · 12:41 · saved ✓ 6 of 6 ? help";
+                 S03 · lw running · 12:41 · saved ✓ 6 of 6 ? help";
     let known: Vec<&str> = known.split_whitespace().collect();
     for word in desk.look().split_whitespace() {
         assert!(known.contains(&word), "{word}");

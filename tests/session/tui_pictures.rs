@@ -7,13 +7,13 @@ use crate::views::*;
 use crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
 use study::tui::{Colour, Surface};
 use study_core::session::Screen;
-use study_core::session::view::View;
+use study_core::session::view::{DeviceState, Telemetry, View};
 
 /// The screen after some keys: function keys as `F2`, characters as they are,
 /// `\n` Enter, `\t` Tab.
 fn after(view: &View, keys: &[&str], w: u16, h: u16) -> String {
     let mut surface = Surface::new(Colour::None);
-    drawn(&mut surface, view, None, w, h);
+    drawn(&mut surface, view, w, h);
     for key in keys {
         let function = key.strip_prefix('F').and_then(|n| n.parse().ok());
         let codes: Vec<KeyCode> = match function {
@@ -33,7 +33,7 @@ fn after(view: &View, keys: &[&str], w: u16, h: u16) -> String {
             surface.event(&Event::Key(KeyEvent::new(code, KeyModifiers::NONE)), view);
         }
     }
-    picture(&drawn(&mut surface, view, None, w, h))
+    picture(&drawn(&mut surface, view, w, h))
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn a_larger_terminal_is_used() {
 fn a_smaller_terminal_says_what_is_needed() {
     let playing = view(Screen::Playing {
         since_s: 1.0,
-        strokes_missing: 0,
+        keep_exploring: false,
     });
     insta::assert_snapshot!("small_40x10", fresh(&playing, 40, 10));
     assert!(
@@ -108,26 +108,28 @@ fn every_dialog() {
 }
 
 #[test]
-fn the_strip_is_drawn_on_request() {
-    let playing = view(Screen::Playing {
+fn the_arrival_of_telemetry_is_shown_on_request() {
+    let mut playing = view(Screen::Playing {
         since_s: 14.0,
-        strokes_missing: 0,
+        keep_exploring: false,
     });
-    let mut surface = Surface::new(Colour::None);
-    let strip = strip();
-    let buf = drawn(&mut surface, &playing, Some(&strip), 80, 24);
-    insta::assert_snapshot!("playing_strip_80x24", picture(&buf));
-    // a sample that was mounted by hand has no force
-    let mut felt = playing;
-    felt.device = study_core::protocol::DeviceKind::Manual;
-    let buf = drawn(&mut surface, &felt, Some(&strip), 80, 24);
-    assert!(!picture(&buf).contains('┤'), "{}", picture(&buf));
+    for (telemetry, words) in [
+        (Telemetry::Arrives, "running · telemetry arrives"),
+        (Telemetry::Silent, "running · NO TELEMETRY"),
+        (Telemetry::None, "running · 12:41"),
+    ] {
+        playing.line.device = DeviceState::Running(telemetry);
+        let mut surface = Surface::new(Colour::None).with_live(true);
+        let shown = picture(&drawn(&mut surface, &playing, 80, 24));
+        assert!(shown.contains(words), "{shown}");
+        assert!(fresh(&playing, 80, 24).contains("running · 12:41"));
+    }
 }
 
 #[test]
 fn no_information_depends_on_colour() {
     for (name, view) in screens() {
-        let of = |colour| drawn(&mut Surface::new(colour), &view, Some(&strip()), 80, 24);
+        let of = |colour| drawn(&mut Surface::new(colour), &view, 80, 24);
         let none = of(Colour::None);
         for colour in [Colour::Full, Colour::Sixteen] {
             assert_eq!(picture(&of(colour)), picture(&none), "{name}");

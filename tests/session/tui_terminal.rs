@@ -40,14 +40,14 @@ fn child_operates_a_terminal() {
             } else {
                 Screen::Playing {
                     since_s: 1.0,
-                    strokes_missing: 0,
+                    keep_exploring: false,
                 }
             });
             if fails {
                 std::thread::spawn(|| panic!("planted"));
             }
             loop {
-                match tui.next(&view, None, Duration::from_millis(100)) {
+                match tui.next(&view, Duration::from_millis(100)) {
                     Ok(inputs) => match &inputs[..] {
                         [Input::Quit] => break "quit".to_owned(),
                         [Input::Answer(answers)] => break format!("{answers:?}"),

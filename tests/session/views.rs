@@ -5,13 +5,12 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use std::collections::BTreeMap;
-use study::runner::Strip;
 use study::tui::{Colour, Surface};
 use study_base::text::QuestionId;
 use study_core::outcome::FormId;
 use study_core::protocol::{Answer, DeviceKind, Entry, Question, QuestionKind};
 use study_core::session::view::{
-    Banner, Correctable, Counts, DeviceState, MessageKind, Progress, Screen, StatusLine, View,
+    Banner, Correctable, DeviceState, MessageKind, Progress, Screen, StatusLine, Telemetry, View,
 };
 
 pub(crate) fn question(id: &str, prompt: &str, kind: QuestionKind) -> Question {
@@ -117,10 +116,7 @@ pub(crate) fn view(screen: Screen) -> View {
         Screen::Playing { .. } | Screen::Loading | Screen::Mount { .. }
     );
     let device = match screen {
-        Screen::Playing { .. } => DeviceState::Running(Some(Counts {
-            strokes: 4,
-            clamps: 0,
-        })),
+        Screen::Playing { .. } => DeviceState::Running(Telemetry::Arrives),
         Screen::Loading => DeviceState::Loading,
         Screen::Stopping => DeviceState::Stopping,
         Screen::DeviceTrouble { .. } => DeviceState::Fault,
@@ -130,9 +126,7 @@ pub(crate) fn view(screen: Screen) -> View {
     let before = !matches!(screen, Screen::Who { .. } | Screen::Consent { .. });
     let can_advance = match &screen {
         Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => *wait_s <= 0.0,
-        Screen::Playing {
-            strokes_missing, ..
-        } => *strokes_missing == 0,
+        Screen::Playing { keep_exploring, .. } => !keep_exploring,
         Screen::Message { .. } | Screen::Paused { .. } | Screen::End { .. } => true,
         Screen::Mount { .. } => true,
         Screen::DeviceTrouble { can_go_on, .. } => *can_go_on,
@@ -222,19 +216,6 @@ pub(crate) fn asked(screen: Screen) -> View {
     }
 }
 
-pub(crate) fn strip() -> Strip {
-    Strip {
-        samples: (0..300)
-            .map(|i| {
-                let x = 15.0 - 14.0 * (f64::from(i) / 48.0).cos();
-                (x, 6.0 * (x / 2.5).sin() + 0.1 * x)
-            })
-            .collect(),
-        force_limit_n: 12.0,
-        x_range_mm: [0.0, 30.0],
-    }
-}
-
 /// One view of every screen, with its name.
 pub(crate) fn screens() -> Vec<(&'static str, View)> {
     let text = |s: &str| s.to_owned();
@@ -306,14 +287,14 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             "playing",
             view(Screen::Playing {
                 since_s: 14.3,
-                strokes_missing: 0,
+                keep_exploring: false,
             }),
         ),
         (
             "playing_strokes",
             pilot(Screen::Playing {
                 since_s: 3.0,
-                strokes_missing: 2,
+                keep_exploring: true,
             }),
         ),
         (
@@ -321,7 +302,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             by_hand(
                 Screen::Playing {
                     since_s: 14.3,
-                    strokes_missing: 0,
+                    keep_exploring: false,
                 },
                 DeviceState::Felt,
             ),
@@ -474,17 +455,11 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
 }
 
 /// Draws a view into a buffer.
-pub(crate) fn drawn(
-    surface: &mut Surface,
-    view: &View,
-    strip: Option<&Strip>,
-    w: u16,
-    h: u16,
-) -> Buffer {
+pub(crate) fn drawn(surface: &mut Surface, view: &View, w: u16, h: u16) -> Buffer {
     let area = Rect::new(0, 0, w, h);
     let mut buf = Buffer::empty(area);
     surface.follow(view, area);
-    surface.draw(view, strip, area, &mut buf);
+    surface.draw(view, area, &mut buf);
     buf
 }
 
@@ -509,5 +484,5 @@ pub(crate) fn picture(buf: &Buffer) -> String {
 
 /// The text of a view without any input.
 pub(crate) fn fresh(view: &View, w: u16, h: u16) -> String {
-    picture(&drawn(&mut Surface::new(Colour::None), view, None, w, h))
+    picture(&drawn(&mut Surface::new(Colour::None), view, w, h))
 }

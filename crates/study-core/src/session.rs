@@ -164,7 +164,8 @@ impl Session {
             Input::DeviceLoaded => self.device_loaded(at),
             Input::DeviceMount(code) => self.device_mount(code),
             Input::DeviceStarted => self.device_started(at),
-            Input::DeviceProgress { strokes, clamps } => self.device_progress(strokes, clamps),
+            Input::DeviceSampled => self.device_sampled(at),
+            Input::DeviceProgress { strokes } => self.device_progress(strokes),
             Input::DeviceStopped(playback) => self.device_stopped(playback, at),
             Input::DeviceFault(what) => self.device_fault(&what, at),
             Input::DeviceLost(what) => self.device_gone(&what, at),
@@ -226,6 +227,7 @@ fn is_deliberate(input: &Input) -> bool {
             | Input::DeviceLoaded
             | Input::DeviceMount(_)
             | Input::DeviceStarted
+            | Input::DeviceSampled
             | Input::DeviceProgress { .. }
             | Input::DeviceStopped(_)
             | Input::DeviceReady

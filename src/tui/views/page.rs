@@ -9,7 +9,6 @@ use super::prose::{ProseView, prose};
 use super::status::{Status, Top};
 use super::trouble::Trouble;
 use super::who::WhoView;
-use crate::runner::Strip;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::dialog::{Confirm, Dialog};
 use crate::tui::ui_state::{Target, UiState};
@@ -34,8 +33,8 @@ pub struct Page<'a> {
     pub view: &'a View,
     /// What has been entered.
     pub state: &'a UiState,
-    /// The live strip, if requested.
-    pub strip: Option<&'a Strip>,
+    /// Whether it shows that telemetry arrives.
+    pub live: bool,
     /// The styles.
     pub theme: Theme,
 }
@@ -163,14 +162,13 @@ impl<'a> Page<'a> {
             trouble.render(area, buf);
         } else if let Screen::Playing {
             since_s,
-            strokes_missing,
+            keep_exploring,
         } = &self.view.screen
         {
             let playing = Playing {
                 view: self.view,
                 since_s: *since_s,
-                strokes_missing: *strokes_missing,
-                strip: self.strip,
+                keep_exploring: *keep_exploring,
                 theme: self.theme,
             };
             playing.render(area, buf);
@@ -296,6 +294,7 @@ impl Widget for &Page<'_> {
         let status = Status {
             line: &self.view.line,
             text: self.state.is_text(),
+            live: self.live,
             unsaved: matches!(self.view.screen, Screen::SaveTrouble { .. }),
             theme: self.theme,
         };

@@ -7,7 +7,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
-use study_core::session::view::{Banner, Counts, DeviceState, StatusLine};
+use study_core::session::view::{Banner, DeviceState, StatusLine, Telemetry};
 use study_core::session::{Screen, View};
 
 /// The status line, in the last row.
@@ -15,6 +15,8 @@ use study_core::session::{Screen, View};
 pub struct Status<'a> {
     /// Its content.
     pub line: &'a StatusLine,
+    /// Whether it shows that telemetry arrives.
+    pub live: bool,
     /// Whether `?` is text at the moment.
     pub text: bool,
     /// Whether saving has failed.
@@ -23,23 +25,20 @@ pub struct Status<'a> {
     pub theme: Theme,
 }
 
-fn device(state: DeviceState) -> String {
+fn device(state: DeviceState, live: bool) -> &'static str {
     match state {
-        DeviceState::Unknown => "no session yet".to_owned(),
-        DeviceState::Limp => "device limp".to_owned(),
-        DeviceState::Loading => "device loading".to_owned(),
-        DeviceState::Ready => "device ready".to_owned(),
-        DeviceState::Running(None) => "running".to_owned(),
-        DeviceState::Running(Some(Counts { strokes, clamps })) => {
-            let stroke = if strokes == 1 { "stroke" } else { "strokes" };
-            let clamp = if clamps == 1 { "clamp" } else { "clamps" };
-            format!("running · {strokes} {stroke} · {clamps} {clamp}")
-        }
-        DeviceState::Stopping => "device stopping".to_owned(),
-        DeviceState::Fault => "DEVICE FAULT".to_owned(),
-        DeviceState::Lost => "DEVICE LOST".to_owned(),
-        DeviceState::ByHand => "samples by hand".to_owned(),
-        DeviceState::Felt => "sample felt".to_owned(),
+        DeviceState::Unknown => "no session yet",
+        DeviceState::Limp => "device limp",
+        DeviceState::Loading => "device loading",
+        DeviceState::Ready => "device ready",
+        DeviceState::Running(Telemetry::Arrives) if live => "running · telemetry arrives",
+        DeviceState::Running(Telemetry::Silent) if live => "running · NO TELEMETRY",
+        DeviceState::Running(_) => "running",
+        DeviceState::Stopping => "device stopping",
+        DeviceState::Fault => "DEVICE FAULT",
+        DeviceState::Lost => "DEVICE LOST",
+        DeviceState::ByHand => "samples by hand",
+        DeviceState::Felt => "sample felt",
     }
 }
 
@@ -58,7 +57,7 @@ impl Widget for &Status<'_> {
 
         let bad = matches!(line.device, DeviceState::Fault | DeviceState::Lost);
         let mut spans = vec![Span::styled(
-            device(line.device),
+            device(line.device, self.live),
             if bad {
                 self.theme.trouble_frame()
             } else {

@@ -70,7 +70,7 @@ fn input() -> impl Strategy<Value = Input> {
         Just(Input::DeviceLoaded),
         Just(Input::DeviceStarted),
         Just(Input::DeviceReady),
-        (0..9u32).prop_map(|strokes| Input::DeviceProgress { strokes, clamps: 0 }),
+        (0..9u32).prop_map(|strokes| Input::DeviceProgress { strokes }),
         words().prop_map(Input::DeviceFault),
         words().prop_map(Input::DeviceLost),
         words().prop_map(Input::SaveFailed),

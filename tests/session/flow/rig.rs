@@ -198,7 +198,6 @@ impl Rig {
                         answers.push(Input::DeviceStarted);
                         answers.push(Input::DeviceProgress {
                             strokes: self.playback.strokes,
-                            clamps: 0,
                         });
                     }
                 }
@@ -388,10 +387,7 @@ impl Rig {
             Screen::Mount { .. } => self.send(Input::Advance).send(Input::DeviceStarted),
             Screen::Loading => self.send(Input::DeviceLoaded).send(Input::DeviceStarted),
             Screen::Playing { .. } => self
-                .send(Input::DeviceProgress {
-                    strokes: 9,
-                    clamps: 0,
-                })
+                .send(Input::DeviceProgress { strokes: 9 })
                 .send(Input::Advance),
             Screen::Stopping => {
                 let playback = self.playback;

@@ -4,7 +4,7 @@ use super::rig::{Rig, start};
 use super::studies::{MODELS, plain, rating, rich};
 use study_core::outcome::{Author, Event, FormId, State};
 use study_core::protocol::{Breaks, Entry, Seat};
-use study_core::session::view::{Banner, Counts, DeviceState, MessageKind};
+use study_core::session::view::{Banner, DeviceState, MessageKind, Telemetry};
 use study_core::session::{Config, Effect, Ending, Input, Screen};
 
 #[test]
@@ -346,10 +346,7 @@ fn the_status_line_follows_the_device_and_the_clock() {
     rig.step();
     assert_eq!(
         rig.view().line.device,
-        DeviceState::Running(Some(Counts {
-            strokes: 5,
-            clamps: 0
-        }))
+        DeviceState::Running(Telemetry::Arrives)
     );
     assert!(rig.view().armed);
     let before = rig.view().line.elapsed_s;

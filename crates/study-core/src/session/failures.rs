@@ -45,16 +45,21 @@ impl Session {
 
     /// Fails the attempt under way because of the device.
     pub(super) fn lose_attempt(&mut self, failure: Failure, what: &str, at: Moment) {
+        let preparing = matches!(
+            self.phase,
+            Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. }
+        );
+        let refused = failure == Failure::DeviceFault && preparing;
         self.fail(failure, what, at);
         self.proceed(at);
-        self.set_problem(what, failure);
+        self.set_problem(if refused { REFUSED } else { what }, failure);
     }
 
     fn set_problem(&mut self, what: &str, failure: Failure) {
-        self.device_problem = Some(DeviceProblem {
-            what: self.sanitized(what),
-            fault: failure == Failure::DeviceFault,
-        });
+        let fault = failure == Failure::DeviceFault;
+        let what = self.sanitized(what);
+        let what = if fault { without_numbers(&what) } else { what };
+        self.device_problem = Some(DeviceProblem { what, fault });
     }
 
     pub(super) fn show_device_lost(&mut self) {
@@ -188,6 +193,23 @@ impl Session {
             goes_on: self.history.goes_on(),
         }
     }
+}
+
+/// What the screen shows instead of a device's reason for not playing a realization.
+const REFUSED: &str = "the device does not play this trial; the journal has its reason";
+
+/// The text with "…" for each number: a position or speed may depend on the realization.
+fn without_numbers(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(from) = rest.find(|c: char| c.is_ascii_digit()) {
+        let (before, number) = rest.split_at(from);
+        out.push_str(before);
+        out.push('…');
+        let in_number = |c: char| c.is_ascii_digit() || c == '.';
+        rest = number.trim_start_matches(in_number);
+    }
+    out + rest
 }
 
 /// "trial 7", "practice 1". `number` is that on the screen, not the planned one.

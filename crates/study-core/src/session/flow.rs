@@ -203,9 +203,7 @@ impl Session {
                 }
             }
             Phase::Mounting { .. } => self.mounted(at),
-            Phase::Playing { counts, .. } => {
-                self.finish_playing(counts.unwrap_or_default().strokes, at);
-            }
+            &Phase::Playing { strokes, .. } => self.finish_playing(strokes, at),
             Phase::Stopped => self.notify("choose: play it again or rate it"),
             Phase::Break { since, rested_s } => {
                 let rested_s = rested_s + at.seconds_since(since);

@@ -75,12 +75,12 @@ pub enum Input {
     DeviceMount(String),
     /// The device confirms that it plays.
     DeviceStarted,
-    /// Strokes and clamps so far, from telemetry.
+    /// Samples have arrived.
+    DeviceSampled,
+    /// Progress of the playback.
     DeviceProgress {
         /// Full strokes so far.
         strokes: u32,
-        /// Clamps so far.
-        clamps: u64,
     },
     /// The device confirms that it has stopped.
     DeviceStopped(Playback),

@@ -1,7 +1,7 @@
 //! The current phase of a session: what its events do not determine.
 
 use super::Ending;
-use super::view::{Counts, MessageKind};
+use super::view::MessageKind;
 use crate::outcome::{FormId, Moment};
 use crate::protocol::Question;
 
@@ -11,6 +11,8 @@ pub(super) const STOP_WITHIN_S: f64 = 2.0;
 pub(super) const LOAD_WITHIN_S: f64 = 5.0;
 /// How long a forced exit waits for the last event to be on disk, s.
 pub(super) const LEAVE_WITHIN_S: f64 = 5.0;
+/// Time without telemetry after which the screen says so, s.
+pub(super) const TELEMETRY_WITHIN_S: f64 = 0.5;
 /// Smallest step of the wall clock that is recorded, s.
 pub(super) const CLOCK_STEP_S: f64 = 2.0;
 
@@ -46,8 +48,10 @@ pub(super) enum Phase {
     },
     Playing {
         since: Moment,
-        /// Strokes and clamps so far, if the device reports them.
-        counts: Option<Counts>,
+        /// Full strokes so far.
+        strokes: u32,
+        /// When telemetry last arrived, or the start; `None` if the device reports none.
+        telemetry: Option<Moment>,
     },
     /// The stop was requested.
     Stopping {

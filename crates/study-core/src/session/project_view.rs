@@ -2,8 +2,10 @@
 
 use super::failures::title;
 use super::flow::Overlay;
-use super::phase::{Form, Phase};
-use super::view::{Banner, Correctable, DeviceState, Progress, Screen, StatusLine, View};
+use super::phase::{Form, Phase, TELEMETRY_WITHIN_S};
+use super::view::{
+    Banner, Correctable, DeviceState, Progress, Screen, StatusLine, Telemetry, View,
+};
 use super::{Ending, Session};
 use crate::outcome::{FormId, Moment};
 use crate::protocol::{DeviceKind, Seat};
@@ -97,11 +99,9 @@ impl Session {
             },
             Phase::Loading { .. } | Phase::Ready { .. } => Screen::Loading,
             Phase::Mounting { code } => Screen::Mount { code: code.clone() },
-            Phase::Playing { since, counts } => Screen::Playing {
+            Phase::Playing { since, strokes, .. } => Screen::Playing {
                 since_s: at.seconds_since(since),
-                strokes_missing: self
-                    .strokes_needed()
-                    .saturating_sub(counts.unwrap_or_default().strokes),
+                keep_exploring: *strokes < self.strokes_needed(),
             },
             Phase::Stopping { .. } => Screen::Stopping,
             Phase::Stopped => Screen::Stopped {
@@ -153,7 +153,7 @@ impl Session {
         StatusLine {
             participant: self.participant.clone(),
             operator: self.operator.clone(),
-            device: self.device_state(),
+            device: self.device_state(at),
             elapsed_s: self.opened.map_or(0.0, |opened| at.seconds_since(&opened)),
             trials_saved: count(
                 self.history
@@ -165,7 +165,7 @@ impl Session {
         }
     }
 
-    fn device_state(&self) -> DeviceState {
+    fn device_state(&self, at: Moment) -> DeviceState {
         if self.claim.is_none() {
             return DeviceState::Unknown;
         }
@@ -184,7 +184,11 @@ impl Session {
             _ if self.current_device() == DeviceKind::Manual => DeviceState::Limp,
             Phase::Loading { .. } => DeviceState::Loading,
             Phase::Ready { .. } => DeviceState::Ready,
-            Phase::Playing { counts, .. } => DeviceState::Running(counts),
+            Phase::Playing { telemetry, .. } => DeviceState::Running(match telemetry {
+                None => Telemetry::None,
+                Some(last) if at.seconds_since(&last) > TELEMETRY_WITHIN_S => Telemetry::Silent,
+                Some(_) => Telemetry::Arrives,
+            }),
             Phase::Stopping { .. } => DeviceState::Stopping,
             _ => DeviceState::Limp,
         }
@@ -311,9 +315,7 @@ fn can_advance(screen: &Screen) -> bool {
         Screen::Message { .. } | Screen::SaveTrouble { .. } | Screen::Paused { .. } => true,
         Screen::End { .. } | Screen::Mount { .. } => true,
         Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => *wait_s <= 0.0,
-        Screen::Playing {
-            strokes_missing, ..
-        } => *strokes_missing == 0,
+        Screen::Playing { keep_exploring, .. } => !keep_exploring,
         Screen::DeviceTrouble { can_go_on, .. } => *can_go_on,
         _ => false,
     }

@@ -1,7 +1,6 @@
 //! One attempt at a trial: load, play, stop, rate.
 
 use super::phase::Phase;
-use super::view::Counts;
 use super::{Effect, Session};
 use crate::outcome::{Event, Failure, Moment, Playback};
 use crate::protocol::{DeviceKind, Trial};
@@ -69,13 +68,17 @@ impl Session {
     pub(super) fn device_started(&mut self, at: Moment) {
         match (&mut self.phase, self.history.open()) {
             (Phase::Ready { .. }, Some(open)) => {
-                let counts = self.counted(open.trial).then(Counts::default);
+                let telemetry = self.counted(open.trial).then_some(at);
                 let started = Event::PlaybackStarted {
                     trial: open.trial.trial,
                     attempt: open.attempt.number,
                 };
                 self.record(started, at);
-                self.phase = Phase::Playing { since: at, counts };
+                self.phase = Phase::Playing {
+                    since: at,
+                    strokes: 0,
+                    telemetry,
+                };
             }
             (Phase::Playing { .. }, _) => {}
             (Phase::Loading { .. } | Phase::Mounting { .. }, _) => {
@@ -90,9 +93,15 @@ impl Session {
         }
     }
 
-    pub(super) fn device_progress(&mut self, strokes: u32, clamps: u64) {
-        if let Phase::Playing { counts, .. } = &mut self.phase {
-            *counts = Some(Counts { strokes, clamps });
+    pub(super) fn device_sampled(&mut self, at: Moment) {
+        if let Phase::Playing { telemetry, .. } = &mut self.phase {
+            *telemetry = Some(at);
+        }
+    }
+
+    pub(super) fn device_progress(&mut self, so_far: u32) {
+        if let Phase::Playing { strokes, .. } = &mut self.phase {
+            *strokes = so_far;
         }
     }
 
@@ -162,7 +171,7 @@ impl Session {
         }
     }
 
-    /// Whether the device reports strokes and clamps for this trial.
+    /// Whether the device reports strokes for this trial.
     fn counted(&self, trial: &Trial) -> bool {
         self.claim.as_ref().is_some_and(|c| c.device_telemetry) && !self.by_hand(trial)
     }
@@ -201,9 +210,8 @@ impl Session {
         let Some(open) = self.history.open() else {
             return;
         };
-        let missing = self.minimum_strokes(open.trial).saturating_sub(strokes);
-        if missing > 0 {
-            return self.notify(format!("{missing} more full strokes are needed"));
+        if strokes < self.minimum_strokes(open.trial) {
+            return self.notify("keep exploring");
         }
         self.request_stop(false, false, at);
     }

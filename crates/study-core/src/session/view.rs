@@ -85,8 +85,8 @@ pub enum DeviceState {
     Loading,
     /// Loaded and about to start.
     Ready,
-    /// Playing; with strokes and clamps so far if the device reports them.
-    Running(Option<Counts>),
+    /// Playing.
+    Running(Telemetry),
     /// A stop is requested and not confirmed.
     Stopping,
     /// It reported a fault.
@@ -99,13 +99,16 @@ pub enum DeviceState {
     Felt,
 }
 
-/// Counts of a playback.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counts {
-    /// Full strokes.
-    pub strokes: u32,
-    /// Clamps.
-    pub clamps: u64,
+/// Whether telemetry of a playback arrives. Its content is never shown: strokes, clamps
+/// and forces depend on the realization.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Telemetry {
+    /// The device reports none.
+    None,
+    /// It arrives.
+    Arrives,
+    /// Nothing has arrived for a while.
+    Silent,
 }
 
 /// The main content of the screen.
@@ -174,8 +177,8 @@ pub enum Screen {
     Playing {
         /// Time since the confirmed start, s.
         since_s: f64,
-        /// Full strokes still required before Enter works.
-        strokes_missing: u32,
+        /// Whether more exploration is required before Enter works.
+        keep_exploring: bool,
     },
     /// A stop is requested and not yet confirmed.
     Stopping,

@@ -1,0 +1,214 @@
+//! Every realization of both protocols, anchors included, is played in the same place with
+//! the same hand: no page, notice or duration of a page tells them apart, for participant
+//! and experimenter.
+
+use crate::memory::MemoryDisk;
+use crate::support::repository;
+use crate::views::{drawn, picture};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+use study::cli::load::load;
+use study::device::faults::{FaultPlan, InjectedFault};
+use study::device::virtual_device::{Options, VirtualDevice};
+use study::runner::clock::VirtualClock;
+use study::runner::rehearsal::first_day;
+use study::runner::{Runner, Setup};
+use study::tui::{Colour, Surface};
+use study_base::text::ModelId;
+use study_core::protocol::{Answer, Entry, Order, Protocol, QuestionKind, Role};
+use study_core::session::{Config, Input, Screen, View};
+use study_core::store::{Frozen, SeatKind, StudyFolder};
+
+/// Time between two looks at the screen.
+const LOOK: Duration = Duration::from_millis(20);
+/// How long the hand explores, s.
+const EXPLORES_S: f64 = 3.0;
+
+fn inputs(view: &View) -> Vec<Input> {
+    match &view.screen {
+        Screen::Consent { .. } => vec![Input::Consent(true)],
+        Screen::Message { .. } => vec![Input::Advance],
+        Screen::Reference { wait_s, .. } if *wait_s <= 0.0 => vec![Input::Advance],
+        Screen::Playing { since_s, .. } if *since_s > EXPLORES_S && view.can_advance => {
+            vec![Input::Advance]
+        }
+        Screen::DeviceTrouble {
+            can_go_on: true, ..
+        } if view.line.elapsed_s > 8.0 => vec![Input::Advance],
+        Screen::Form { questions, .. } => {
+            let answer = |kind: &QuestionKind| match kind {
+                QuestionKind::Rating { from, .. } => Answer::Rating(*from),
+                QuestionKind::Slider { from, .. } => Answer::Number(*from),
+                QuestionKind::Number { min, .. } => Answer::Number(min.unwrap_or(1.0)),
+                QuestionKind::Choice { options, .. } => Answer::Choice(vec![options[0].clone()]),
+                QuestionKind::Text => Answer::Text("something".to_owned()),
+            };
+            let given = questions.iter().map(|q| (q.id.clone(), answer(&q.kind)));
+            vec![Input::Answer(given.collect())]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The pages of a session, one for each look, up to the trial after `first`.
+fn pages(
+    name: &str,
+    first: &ModelId,
+    entry: Entry,
+    change: fn(&mut Protocol),
+    fault: Option<InjectedFault>,
+) -> Vec<String> {
+    let mut loaded = load(Path::new(&repository(name))).unwrap();
+    let protocol = &mut loaded.protocol;
+    protocol.session.entry = entry;
+    protocol.design.practice.clear();
+    for model in &mut protocol.models {
+        if model.role == Role::Practice {
+            model.role = Role::Test;
+        }
+    }
+    protocol.design.repetitions = 1;
+    protocol.design.order = Order::File("orders.csv".to_owned());
+    change(protocol);
+    let mut order: Vec<ModelId> = protocol.models.iter().map(|m| m.id.clone()).collect();
+    order.retain(|id| id != first);
+    order.insert(0, first.clone());
+    let orders = BTreeMap::from([(1, order)]);
+    let clock = VirtualClock::starting_at(first_day());
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let disk = Arc::new(MemoryDisk::new());
+    let now = study::runner::clock::Clock::now(&clock);
+    let study = StudyFolder::open_or_create_on(disk, Path::new("results"), &frozen, now).unwrap();
+    let options = Options {
+        telemetry_hz: 50.0,
+        servo_hz: 2000.0,
+        faults: match fault {
+            Some(fault) => FaultPlan::none().with(1, fault),
+            None => FaultPlan::none(),
+        },
+        ..Options::default()
+    };
+    let setup = Setup {
+        protocol: Arc::new(loaded.protocol),
+        orders: Some(Arc::new(orders)),
+        models: loaded.models,
+        fingerprints: loaded.fingerprints,
+        study,
+        kind: SeatKind::Real,
+        rows: None,
+        device_kind: study_core::protocol::DeviceKind::Simulated,
+        device: Box::new(VirtualDevice::new(options)),
+        device_check: None,
+        clock: Box::new(clock.clone()),
+        threaded: false,
+    };
+    let config = Config {
+        participant: "P01".to_owned(),
+        operator: "lw".to_owned(),
+        auto_identify: true,
+    };
+    let mut runner = Runner::new(setup, config);
+    let mut surface = Surface::new(Colour::None).with_live(true);
+    let mut pages = Vec::new();
+    let mut played = false;
+    for _ in 0..20_000 {
+        let view = runner.view();
+        pages.push(picture(&drawn(&mut surface, &view, 80, 24)));
+        match &view.screen {
+            Screen::Playing { .. } => {
+                assert_eq!(runner.felt(), Some(first));
+                played = true;
+            }
+            Screen::DeviceTrouble { .. } => played = true,
+            Screen::Reference { .. } if played => return pages,
+            _ => {}
+        }
+        if runner.step(inputs(&view)).is_some() {
+            return pages;
+        }
+        clock.advance(LOOK);
+    }
+    panic!("no second trial:\n{}", pages.last().unwrap())
+}
+
+const PROTOCOLS: [&str; 2] = ["protocols/turn-signal", "protocols/turn-signal-extended"];
+
+fn realizations(name: &str) -> Vec<ModelId> {
+    let loaded = load(Path::new(&repository(name))).unwrap();
+    loaded.protocol.models.into_iter().map(|m| m.id).collect()
+}
+
+/// Compares the pages of all realizations of a protocol with those of its first.
+fn compare(
+    entry: Entry,
+    change: fn(&mut Protocol),
+    fault: Option<InjectedFault>,
+    reduce: fn(Vec<String>) -> Vec<String>,
+) {
+    for name in PROTOCOLS {
+        let all = realizations(name);
+        let of = |id: &ModelId| reduce(pages(name, id, entry, change, fault));
+        let expected = of(&all[0]);
+        let seen = match fault {
+            Some(_) => "DEVICE TROUBLE",
+            None => "Feel the device",
+        };
+        assert!(expected.iter().any(|page| page.contains(seen)), "{name}");
+        for id in &all[1..] {
+            let shown = of(id);
+            for (n, (one, other)) in expected.iter().zip(&shown).enumerate() {
+                assert_eq!(one, other, "{name}: {id} differs at look {n}");
+            }
+            assert_eq!(expected.len(), shown.len(), "{name}: {id}");
+        }
+    }
+}
+
+fn without_strokes(protocol: &mut Protocol) {
+    protocol.trial.minimum_strokes = 0;
+}
+
+#[test]
+fn pages_and_their_durations_do_not_tell_realizations_apart() {
+    for entry in [Entry::Participant, Entry::Experimenter] {
+        compare(entry, without_strokes, None, |pages| pages);
+    }
+}
+
+/// Where strokes are required, only how long the hand must keep exploring may depend on
+/// what it feels.
+#[test]
+fn required_strokes_show_no_count() {
+    let strokes = |protocol: &mut Protocol| protocol.trial.minimum_strokes = 3;
+    compare(Entry::Participant, strokes, None, |pages| {
+        let is_number = |c: char| c.is_ascii_digit();
+        let mut pages: Vec<String> = pages
+            .iter()
+            .map(|page| page.replace(is_number, "0"))
+            .collect();
+        pages.dedup();
+        assert!(pages.iter().any(|page| page.contains("Keep exploring")));
+        pages
+    });
+}
+
+/// The same fault of the device has the same words.
+#[test]
+fn a_fault_does_not_tell_realizations_apart() {
+    for fault in [
+        InjectedFault::RefuseLoad,
+        InjectedFault::Trip,
+        InjectedFault::LosePlayback,
+        InjectedFault::Unplug,
+    ] {
+        compare(Entry::Experimenter, without_strokes, Some(fault), |pages| {
+            pages
+        });
+    }
+}
