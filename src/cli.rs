@@ -103,13 +103,20 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
 }
 
 /// Prints a message of the argument parser, such as help or a usage error. Returns the
-/// exit code: 0 for help and version, 2 for wrong usage.
-pub fn usage(message: &clap::Error) -> ExitCode {
-    // A closed pipe needs no message.
-    let _ = message.print();
+/// exit code: 0 for help and version, 2 for wrong usage, 1 if help cannot be written.
+pub fn usage(message: &clap::Error, console: &mut Console) -> ExitCode {
+    let printed = message
+        .print()
+        .and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
     if message.use_stderr() {
-        ExitCode::from(Kind::Usage as u8)
-    } else {
-        ExitCode::SUCCESS
+        return ExitCode::from(Kind::Usage as u8);
+    }
+    match printed.map_err(|e| console::unwritten(&e)) {
+        Err(Some(failure)) => {
+            console.failure(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+        // A closed pipe needs no message.
+        Ok(()) | Err(None) => ExitCode::SUCCESS,
     }
 }

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use study::cli::{Cli, Console, Failure, guard};
 
 fn main() -> ExitCode {
+    let mut console = Console::of_process();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return study::cli::usage(&error),
+        Err(error) => return study::cli::usage(&error, &mut console),
     };
-    let mut console = Console::of_process();
     match guard(|| study::cli::run(cli, &mut console)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -12,12 +12,13 @@ use crate::report::text::{Page, comments, page};
 use crate::report::{Source, csv, json};
 use rayon::prelude::*;
 use std::fs::{self, File};
-use std::io::BufReader;
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use study_base::text::{QuestionId, Untrusted};
 use study_core::analyze::{self, Analysis, Deviation, Include, Rules, Warning};
 use study_core::outcome::ratings::Ratings;
 use study_core::protocol::Protocol;
+use study_core::store::disk::{Disk as _, RealDisk};
 use study_core::store::{Derived, SessionData, StudyFolder};
 
 /// Arguments of `study analyze`.
@@ -136,7 +137,7 @@ fn show(
         other => other,
     };
     if args.json {
-        return console.out(json::document(source, analysis));
+        return console.document(json::document(source, analysis));
     }
     let terminal = Page {
         width: console.width,
@@ -329,8 +330,38 @@ fn deviations(study: &StudyFolder) -> Result<Vec<Deviation>, Failure> {
     Ok(found)
 }
 
+/// Creates a folder and its parents; only the owner can enter the new ones.
+fn private_folder(path: &Path) -> io::Result<()> {
+    for folder in path.ancestors().collect::<Vec<_>>().into_iter().rev() {
+        if !folder.as_os_str().is_empty() && !folder.exists() {
+            match RealDisk.create_folder(folder) {
+                Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e),
+                _ => {}
+            }
+        }
+    }
+    match path.is_dir() {
+        true => Ok(()),
+        false => Err(io::ErrorKind::NotADirectory.into()),
+    }
+}
+
+/// Whether only the owner can read a file, as far as the system knows.
+fn is_private(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        fs::metadata(path).is_ok_and(|known| known.permissions().mode() & 0o077 == 0)
+    }
+    #[cfg(not(unix))]
+    {
+        path.exists()
+    }
+}
+
 /// Writes each file atomically, unless it already has this content. Nothing is synced,
-/// because all files can be regenerated.
+/// because all files can be regenerated. Only the owner can read them: they contain
+/// single ratings and comments.
 fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
     let figures = dir.join("figures");
     // A link may lead to a folder that is not ours.
@@ -342,16 +373,21 @@ fn write_files(dir: &Path, files: &[report::Output]) -> Result<(), Failure> {
         .hint("remove the link, or choose another folder with --out"));
     }
     for item in [dir.to_owned(), figures] {
-        fs::create_dir_all(&item).map_err(|e| Failure::file(&item, &e))?;
+        private_folder(&item).map_err(|e| Failure::file(&item, &e))?;
     }
     files.par_iter().try_for_each(|output| {
         let path = dir.join(&output.name);
-        if fs::read(&path).is_ok_and(|old| old == output.content) {
+        if is_private(&path) && fs::read(&path).is_ok_and(|old| old == output.content) {
             return Ok(());
         }
         // A unique temporary name for each file and process.
         let part = dir.join(format!("{}.{}.part", output.name, std::process::id()));
-        let written = fs::write(&part, &output.content).and_then(|()| fs::rename(&part, &path));
+        // Left by a process of the same number that died.
+        let _ = fs::remove_file(&part);
+        let written = RealDisk
+            .create(&part)
+            .and_then(|mut file| file.write_all(&output.content))
+            .and_then(|()| fs::rename(&part, &path));
         written.map_err(|e| {
             // The first error is the one to report.
             let _ = fs::remove_file(&part);

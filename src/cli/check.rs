@@ -86,7 +86,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         };
         let document = serde_json::to_string_pretty(&report)
             .map_err(|e| Failure::new(super::Kind::Bug, format!("the report: {e}")))?;
-        console.out(document + "\n")?;
+        console.document(document + "\n")?;
         // standard output holds the whole report
         return match loaded {
             Some(_) => Ok(()),

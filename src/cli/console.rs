@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use std::io::{self, IsTerminal as _, Write};
 use study_base::diagnostic::{Findings, Severity};
-use study_base::text::Untrusted;
+use study_base::text::{Untrusted, escaped_json};
 
 /// Where a command prints: results with [`Console::out`], messages for the user with
 /// [`Console::say`].
@@ -57,6 +57,13 @@ fn quoted(word: &str) -> String {
     }
 }
 
+/// The failure to write standard output; none for a closed pipe, whose reader has ended.
+pub(super) fn unwritten(error: &io::Error) -> Option<Failure> {
+    let closed = error.kind() == io::ErrorKind::BrokenPipe;
+    let why = study_core::store::plain(error);
+    (!closed).then(|| Failure::input(format!("standard output: {why}")))
+}
+
 impl Console {
     /// The console of the process.
     pub fn of_process() -> Self {
@@ -100,10 +107,8 @@ impl Console {
             .out
             .write_all(text.as_ref().as_bytes())
             .and_then(|()| self.out.flush());
-        match written {
-            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-                Err(Failure::input(format!("standard output: {e}")))
-            }
+        match written.map_err(|e| unwritten(&e)) {
+            Err(Some(failure)) => Err(failure),
             _ => Ok(()),
         }
     }
@@ -113,7 +118,15 @@ impl Console {
     /// # Errors
     /// As [`Console::out`].
     pub fn json(&mut self, document: &serde_json::Value) -> Result<(), Failure> {
-        self.out(format!("{document:#}\n"))
+        self.document(format!("{document:#}\n"))
+    }
+
+    /// Prints the text of a JSON document to standard output, unsafe characters escaped.
+    ///
+    /// # Errors
+    /// As [`Console::out`].
+    pub fn document(&mut self, text: impl AsRef<str>) -> Result<(), Failure> {
+        self.out(escaped_json(text.as_ref()))
     }
 
     /// Prints a message of one line to standard error.

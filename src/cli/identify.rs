@@ -122,7 +122,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         results.files.extend(figures);
     }
     if args.json {
-        console.out(output::json(&results))?;
+        console.document(output::json(&results))?;
     } else {
         console.out(output::table(&results))?;
     }

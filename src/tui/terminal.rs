@@ -1,7 +1,7 @@
 //! The terminal: raw mode and alternate screen on opening, restored on every way out.
 //!
-//! It is restored when [`Terminal`] is dropped, by a hook when any thread panics, and
-//! around Ctrl-Z. Terminating signals only set a flag, so that the session can stop
+//! It is restored when [`Terminal`] is dropped, by a hook when any thread panics, by a
+//! handler when the program aborts, and around Ctrl-Z. Terminating signals only set a flag, so that the session can stop
 //! the device and close its journal first. A thread of its own reads the events:
 //! reading never returns once a terminal is gone, and the device must not wait for
 //! that.
@@ -130,6 +130,7 @@ impl Terminal {
         PANICKED.store(false, Ordering::SeqCst);
         MOUSE.store(mouse, Ordering::SeqCst);
         let signals = Signals::register().map_err(TuiError::Terminal)?;
+        platform::restore_on_failure(&TAKEN).map_err(TuiError::Terminal)?;
         take().map_err(TuiError::Terminal)?;
         let failed = |error| {
             restore();

@@ -219,3 +219,94 @@ fn a_hostile_comment_is_stored_as_typed_and_shown_escaped() {
     assert!(out.contains("=1+1"), "{out}");
     assert!(!out.contains(['\u{1b}', '\u{202e}']), "{out:?}");
 }
+
+#[test]
+fn a_json_document_has_no_character_that_controls_a_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = "x\u{9b}31m\u{202e}\u{7f}\u{e0041}.csv";
+    let text = "subject,model,rating\nP1,a,1\nP1,b,2\nP2,a,3\nP2,b,5\n";
+    fs::write(folder.path().join(name), text).unwrap();
+    let (code, out, err) = study(&["analyze", name, "--json"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let bad = |c: char| c != '\n' && study_base::text::is_unsafe(c);
+    assert!(!out.contains(bad), "{out:?}");
+    let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["study"]["path"], name);
+    // the same for the faults of a protocol
+    let path = protocol(folder.path(), "reference = ", "\"\u{9b}\u{202e}\" = ");
+    let arguments = ["check", path.to_str().unwrap(), "--json"];
+    let (code, out, _) = study(&arguments, folder.path());
+    assert_eq!(code, 1);
+    assert!(!out.contains(bad), "{out:?}");
+    assert!(
+        out.contains("\\u009b\\u202e") || out.contains("u{9b}"),
+        "{out}"
+    );
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn help_that_cannot_be_written_is_an_error() {
+    for arguments in [&["--help"][..], &["--version"], &["run", "--help"]] {
+        let full = fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .unwrap();
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_study"))
+            .args(arguments)
+            .stdout(full)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            err.contains("error: standard output: the disk is full"),
+            "{err}"
+        );
+    }
+}
+
+/// Comments and single ratings are for the owner of the folder only, whatever the umask.
+#[cfg(unix)]
+#[test]
+fn only_the_owner_can_read_an_analysis() {
+    use std::os::unix::fs::PermissionsExt as _;
+    fn check(path: &Path, seen: &mut usize) {
+        let mode = fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        let private = if path.is_dir() { 0o700 } else { 0o600 };
+        assert_eq!(mode, private, "{}", path.display());
+        *seen += 1;
+        if path.is_dir() {
+            for item in fs::read_dir(path).unwrap() {
+                check(&item.unwrap().path(), seen);
+            }
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = repository("protocols/turn-signal");
+    let binary = env!("CARGO_BIN_EXE_study");
+    let script = format!(
+        "umask 0; set -e; '{binary}' rehearse '{protocol}' --participants 2 --telemetry 10 --out r >/dev/null; \
+         '{binary}' analyze r >/dev/null; '{binary}' analyze r --out a/b/c >/dev/null"
+    );
+    let shell = std::process::Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(
+        shell.status.success(),
+        "{}",
+        String::from_utf8_lossy(&shell.stderr)
+    );
+    let mut seen = 0;
+    check(&folder.path().join("r"), &mut seen);
+    check(&folder.path().join("a"), &mut seen);
+    assert!(seen > 40, "{seen}");
+    // one of an earlier version is made private, too
+    let report = folder.path().join("r/turn-signal/analysis/report.html");
+    fs::set_permissions(&report, fs::Permissions::from_mode(0o644)).unwrap();
+    let (code, _, err) = study(&["analyze", "r"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    check(&report, &mut seen);
+}

@@ -1,13 +1,12 @@
 //! A disk that fails at every call from some call on: what the session says is saved is
 //! saved, and its end names the rest.
 
-use crate::memory::{Crash, MemoryDisk};
+use crate::memory::{Crash, Fault, MemoryDisk};
 use crate::world::{Kept, at};
 use std::collections::BTreeMap;
-use std::io;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 use study::device::manual::Manual;
 use study::runner::clock::VirtualClock;
@@ -15,102 +14,7 @@ use study::runner::{Ended, Runner, Setup};
 use study_core::outcome::Event;
 use study_core::protocol::{Answer, DeviceKind};
 use study_core::session::{Config, Ending, Input, Screen, View};
-use study_core::store::disk::{Appender, Disk, Item, Lock};
 use study_core::store::{SeatKind, StudyFolder};
-
-/// A disk whose calls all fail with EIO from one call on.
-#[derive(Debug, Clone)]
-struct Dying {
-    disk: MemoryDisk,
-    calls: Arc<AtomicUsize>,
-    from: usize,
-}
-
-struct DyingFile(Box<dyn Appender>, Dying);
-
-impl Dying {
-    fn call(&self) -> io::Result<()> {
-        if self.calls.fetch_add(1, Ordering::SeqCst) < self.from {
-            return Ok(());
-        }
-        // EIO has the same number on all Unix systems.
-        Err(io::Error::from_raw_os_error(5))
-    }
-}
-
-impl Appender for DyingFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.1.call()?;
-        self.0.write(bytes)
-    }
-
-    fn sync(&mut self) -> io::Result<()> {
-        self.1.call()?;
-        self.0.sync()
-    }
-}
-
-impl Disk for Dying {
-    fn create_folder(&self, path: &Path) -> io::Result<()> {
-        self.call()?;
-        self.disk.create_folder(path)
-    }
-
-    fn sync_folder(&self, path: &Path) -> io::Result<()> {
-        self.call()?;
-        self.disk.sync_folder(path)
-    }
-
-    fn create(&self, path: &Path) -> io::Result<Box<dyn Appender>> {
-        self.call()?;
-        Ok(Box::new(DyingFile(self.disk.create(path)?, self.clone())))
-    }
-
-    fn open(&self, path: &Path) -> io::Result<Box<dyn Appender>> {
-        self.call()?;
-        Ok(Box::new(DyingFile(self.disk.open(path)?, self.clone())))
-    }
-
-    fn truncate(&self, path: &Path, bytes: u64) -> io::Result<()> {
-        self.call()?;
-        self.disk.truncate(path, bytes)
-    }
-
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.call()?;
-        self.disk.rename(from, to)
-    }
-
-    fn remove_file(&self, path: &Path) -> io::Result<()> {
-        self.call()?;
-        self.disk.remove_file(path)
-    }
-
-    fn remove_folder(&self, path: &Path) -> io::Result<()> {
-        self.call()?;
-        self.disk.remove_folder(path)
-    }
-
-    fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
-        self.call()?;
-        self.disk.read(path)
-    }
-
-    fn list(&self, path: &Path) -> io::Result<Vec<Item>> {
-        self.call()?;
-        self.disk.list(path)
-    }
-
-    fn lock(&self, path: &Path) -> io::Result<Option<Lock>> {
-        self.call()?;
-        self.disk.lock(path)
-    }
-
-    fn free_bytes(&self, path: &Path) -> io::Result<Option<u64>> {
-        self.call()?;
-        self.disk.free_bytes(path)
-    }
-}
 
 /// What an operator does who plays until something is not saved, tries once more to save
 /// it, and then leaves.
@@ -169,15 +73,11 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
     let mut kept = Kept::new();
     kept.protocol.device.kind = DeviceKind::Manual;
     let disk = MemoryDisk::new();
-    let dying = Dying {
-        disk: disk.clone(),
-        calls: Arc::default(),
-        from,
-    };
+    disk.plan(from, Fault::From(ErrorKind::Other));
     let results = Path::new("results");
     let frozen = kept.frozen();
     let study =
-        StudyFolder::open_or_create_on(Arc::new(dying.clone()), results, &frozen, at(0)).ok()?;
+        StudyFolder::open_or_create_on(Arc::new(disk.clone()), results, &frozen, at(0)).ok()?;
     let path = study.path().to_owned();
     let clock = VirtualClock::starting_at(at(0).wall);
     let setup = Setup {
@@ -225,7 +125,7 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
                 last,
                 saved,
                 on_disk: entries.map(|e| e.event).collect(),
-                calls: dying.calls.load(Ordering::SeqCst),
+                calls: disk.calls(),
             });
         }
     }

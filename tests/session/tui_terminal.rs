@@ -27,6 +27,7 @@ fn child_operates_a_terminal() {
         return;
     };
     let fails = std::env::var("TUI_CHILD_PANICS").is_ok();
+    let aborts = std::env::var("TUI_CHILD_ABORTS").is_ok();
     let options = Options {
         mouse: true,
         live: true,
@@ -48,6 +49,8 @@ fn child_operates_a_terminal() {
             }
             loop {
                 match tui.next(&view, Duration::from_millis(100)) {
+                    // Not in a thread of its own: the page must be complete.
+                    Ok(_) if aborts => std::process::abort(),
                     Ok(inputs) => match &inputs[..] {
                         [Input::Quit] => break "quit".to_owned(),
                         [Input::Answer(answers)] => break format!("{answers:?}"),
@@ -184,6 +187,15 @@ impl Desk {
         std::fs::read_to_string(&self.report).unwrap()
     }
 
+    /// Waits for the end of the child.
+    fn ends(&mut self) {
+        let start = Instant::now();
+        while self.child.try_wait().unwrap().is_none() {
+            assert!(start.elapsed() < PATIENCE, "the signal was swallowed");
+            self.listen();
+        }
+    }
+
     fn is_restored(&mut self) {
         self.until("restored", |desk| {
             let screen = desk.screen.screen();
@@ -218,12 +230,42 @@ fn signals_end_the_session_in_order() {
         (Signal::HUP, "SIGHUP"),
         (Signal::INT, "SIGINT"),
         (Signal::QUIT, "SIGQUIT"),
+        (Signal::USR1, "SIGUSR1"),
+        (Signal::USR2, "SIGUSR2"),
+        (Signal::ALARM, "SIGALRM"),
+        (Signal::VTALARM, "SIGVTALRM"),
+        (Signal::PROF, "SIGPROF"),
     ] {
         let mut desk = Desk::start(None, &[]);
         desk.shows("Feel the device.");
         desk.signal(signal);
         assert_eq!(desk.report(), format!("abort: the program received {name}"));
         desk.is_restored();
+    }
+}
+
+/// There is no time to end the session in order, but the terminal is given back.
+#[test]
+fn a_failure_restores_the_terminal_and_ends_the_program() {
+    for (signal, variables) in [
+        (Some(Signal::ABORT), &[][..]),
+        (Some(Signal::BUS), &[]),
+        (Some(Signal::TRAP), &[]),
+        (Some(Signal::SYS), &[]),
+        (Some(Signal::XCPU), &[]),
+        (None, &[("TUI_CHILD_ABORTS", "1")]),
+    ] {
+        let mut desk = Desk::start(None, variables);
+        desk.until("on the alternate screen", |desk| {
+            desk.seen.contains("\u{1b}[?1049h")
+        });
+        if let Some(signal) = signal {
+            desk.shows("Feel the device.");
+            desk.signal(signal);
+        }
+        desk.ends();
+        desk.is_restored();
+        assert!(!desk.report.exists(), "{signal:?}: it ended in order");
     }
 }
 
@@ -235,11 +277,7 @@ fn after_the_session_a_signal_has_its_default_effect() {
     assert_eq!(desk.report(), "quit");
     desk.is_restored();
     desk.signal(Signal::TERM);
-    let start = Instant::now();
-    while desk.child.try_wait().unwrap().is_none() {
-        assert!(start.elapsed() < PATIENCE, "the signal was swallowed");
-        desk.listen();
-    }
+    desk.ends();
 }
 
 #[test]

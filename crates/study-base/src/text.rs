@@ -80,6 +80,23 @@ pub fn cut_middle(text: &str, columns: usize) -> String {
     format!("{}…{}", start.concat(), end.concat())
 }
 
+/// A JSON document with every unsafe character of its strings as an escape: terminals
+/// show a document, too. It stays the same document.
+pub fn escaped_json(document: &str) -> String {
+    let mut out = String::with_capacity(document.len());
+    for c in document.chars() {
+        // Line feeds are between the strings, where they are written as escapes.
+        if c == '\n' || !is_unsafe(c) {
+            out.push(c);
+            continue;
+        }
+        for unit in c.encode_utf16(&mut [0; 2]) {
+            out.push_str(&format!("\\u{unit:04x}"));
+        }
+    }
+    out
+}
+
 /// Whether a character can control a terminal or disguise the text around it: C0,
 /// DEL, C1, line and paragraph separators, bidirectional controls, interlinear
 /// annotations, tags and invisible characters. The zero-width joiner and non-joiner

@@ -8,6 +8,9 @@ use study_core::schedule::balance::{Balance, Balances, Spread, balances};
 
 /// Ids up to this length are used in the tables.
 const SHORT: usize = 3;
+/// Largest table of counts that is shown, in cells: a larger one fills thousands of
+/// lines, and nobody reads it.
+const MAX_CELLS: usize = 40_000;
 
 /// Counts are shown for up to so many realizations; of more, nobody reads them.
 const MAX_COUNTED: usize = 100;
@@ -207,6 +210,15 @@ fn numbers(table: &[Vec<u32>]) -> Vec<String> {
 
 /// A table of counts, split into parts if it is too wide.
 fn counts(out: &mut String, codes: &Codes, heads: &[String], table: &[Vec<u32>], width: usize) {
+    if heads.len() * table.len() > MAX_CELLS {
+        let _ = writeln!(
+            out,
+            "  {} × {} counts, too many to be shown; `--csv` prints the orders",
+            table.len(),
+            heads.len()
+        );
+        return;
+    }
     let largest = table.iter().flatten().map(|c| c.to_string().len()).max();
     let head = heads.iter().map(String::len).max().unwrap_or(1);
     let cell = largest.unwrap_or(1).max(head) + 1;

@@ -2,6 +2,7 @@
 //! device when its terminal closes.
 
 use std::io;
+use std::sync::atomic::AtomicBool;
 
 /// Whether this platform can guarantee that a session ends in order.
 pub(super) const SUPPORTED: bool = false;
@@ -20,6 +21,10 @@ impl Signals {
     pub(super) fn take_continued(&self) -> bool {
         false
     }
+}
+
+pub(super) fn restore_on_failure(_taken: &'static AtomicBool) -> io::Result<()> {
+    Ok(())
 }
 
 pub(super) fn suspend() -> io::Result<()> {

@@ -1,16 +1,39 @@
 //! Signals and hang-up detection on Unix.
+//!
+//! A signal from outside that would end the program only sets a flag, so that the session
+//! can end in order. A signal of a failure in the program itself, such as SIGABRT, leaves
+//! no time for that: its handler restores the terminal and lets the signal end the program.
 
 use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::process::{Signal, getpid, kill_process};
+use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
 use signal_hook::SigId;
-use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM};
-use signal_hook::low_level::signal_name;
+use signal_hook::consts::{
+    SIGABRT, SIGALRM, SIGBUS, SIGCONT, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGSYS, SIGTERM, SIGTRAP,
+    SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
+};
+use signal_hook::low_level::{emulate_default_handler, signal_name};
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Whether this platform can guarantee that a session ends in order.
 pub(super) const SUPPORTED: bool = true;
+
+/// Signals that end a session in order.
+const ENDING: [i32; 9] = [
+    SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF,
+];
+/// Signals of a failure in the program, or of the end of its time.
+const FAILING: [i32; 5] = [SIGABRT, SIGBUS, SIGTRAP, SIGSYS, SIGXCPU];
+
+/// What restores the screen: end of an update, mouse and paste off, colours reset, main
+/// screen, cursor shown.
+const RESTORED: &[u8] =
+    b"\x1b[?2026l\x1b[?1006l\x1b[?1015l\x1b[?1003l\x1b[?1002l\x1b[?1000l\x1b[?2004l\x1b[0m\x1b[?1049l\x1b[?25h";
+
+/// The settings of the terminal before it was taken.
+static BEFORE: OnceLock<Termios> = OnceLock::new();
 
 /// True while no terminal is open: the terminating signals then have their default
 /// effect. Their handlers stay registered until the process ends.
@@ -34,7 +57,7 @@ impl Signals {
         let first = IDLE.get().is_none();
         let idle = IDLE.get_or_init(Arc::default);
         idle.store(false, Ordering::SeqCst);
-        for number in [SIGHUP, SIGINT, SIGQUIT, SIGTERM] {
+        for number in ENDING {
             if first {
                 signal_hook::flag::register_conditional_default(number, Arc::clone(idle))?;
             }
@@ -68,6 +91,50 @@ impl Drop for Signals {
         if let Some(idle) = IDLE.get() {
             idle.store(true, Ordering::SeqCst);
         }
+    }
+}
+
+/// Remembers the settings of the terminal, and restores them when the program fails.
+/// `taken` tells whether the terminal is in use.
+pub(super) fn restore_on_failure(taken: &'static AtomicBool) -> io::Result<()> {
+    if BEFORE.get().is_some() {
+        return Ok(());
+    }
+    let before = tcgetattr(rustix::stdio::stdin())?;
+    if BEFORE.set(before).is_ok() {
+        for signal in FAILING {
+            on_failure(signal, taken)?;
+        }
+    }
+    Ok(())
+}
+
+#[allow(unsafe_code, reason = "a signal handler")]
+fn on_failure(signal: i32, taken: &'static AtomicBool) -> io::Result<()> {
+    let handler = move || {
+        if taken.swap(false, Ordering::SeqCst) {
+            restore_now();
+        }
+        // The signal has its default effect: it ends the program.
+        let _ = emulate_default_handler(signal);
+    };
+    // SAFETY: the handler only uses atomics and system calls that are safe in a handler
+    // (tcsetattr, poll, write, sigaction, raise); it neither allocates nor locks.
+    unsafe { signal_hook::low_level::register(signal, handler) }?;
+    Ok(())
+}
+
+/// Restores the terminal by system calls alone. A terminal that does not read is left as
+/// it is: a write to it would wait.
+fn restore_now() {
+    if let Some(before) = BEFORE.get() {
+        let _ = tcsetattr(rustix::stdio::stdin(), OptionalActions::Now, before);
+    }
+    let out = rustix::stdio::stdout();
+    let mut ends = [PollFd::new(&out, PollFlags::OUT)];
+    let polled = rustix::event::poll(&mut ends, Some(&Timespec::default()));
+    if polled.is_ok() && ends[0].revents().contains(PollFlags::OUT) {
+        let _ = rustix::io::write(out, RESTORED);
     }
 }
 
