@@ -169,7 +169,6 @@ fn session(falls_silent: bool) -> (Vec<Load>, Vec<serde_json::Value>) {
         device: Box::new(device),
         device_check: None,
         clock: Box::new(clock.clone()),
-        live: false,
         threaded: false,
     };
     let mut rater = Rater::new(1, 1, Effect::None);
