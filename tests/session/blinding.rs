@@ -85,15 +85,12 @@ fn pages(
     let disk = Arc::new(MemoryDisk::new());
     let now = study::runner::clock::Clock::now(&clock);
     let study = StudyFolder::open_or_create_on(disk, Path::new("results"), &frozen, now).unwrap();
-    let options = Options {
-        telemetry_hz: 50.0,
-        servo_hz: 2000.0,
-        faults: match fault {
-            Some(fault) => FaultPlan::none().with(1, fault),
-            None => FaultPlan::none(),
-        },
-        ..Options::default()
-    };
+    let mut options = Options::default();
+    options.device.telemetry_hz = 50.0;
+    options.device.servo_hz = 2000.0;
+    if let Some(fault) = fault {
+        options.faults = FaultPlan::default().with(1, fault);
+    }
     let setup = Setup {
         protocol: Arc::new(loaded.protocol),
         orders: Some(Arc::new(orders)),
