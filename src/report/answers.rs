@@ -55,6 +55,7 @@ pub(super) fn answers(a: &Analysis) -> Vec<Answer> {
         disagreement(a),
         variance(a),
         order(a),
+        carry_over(a),
     ];
     let mut answers: Vec<Answer> = all.into_iter().flatten().collect();
     answers.extend(target::repeats(a));
@@ -160,14 +161,23 @@ fn order(a: &Analysis) -> Option<Answer> {
     });
     (answer.more)
         .push("The change per trial is adjusted for participants and realizations.".to_owned());
-    if let Some(slope) = get("order_previous_rating/slope") {
-        let se = get("order_previous_rating/se").unwrap_or(0.0);
-        answer.more.push(format!(
-            "Carry-over, the change per point of the preceding rating: b = {}. It is not tested, \
-             because it is biased below 0: the participants' means are estimated from the same \
-             ratings.",
-            apa::number(slope, apa::decimals(se, 3))
-        ));
-    }
+    Some(answer)
+}
+
+/// Whether a rating depends on the one before it.
+fn carry_over(a: &Analysis) -> Option<Answer> {
+    let f = a.finding(&Question::CarryOver)?;
+    let mut answer = Answer::of("Does a rating depend on the one before it?", f, |verdict| {
+        let size = f
+            .estimate
+            .map_or_else(String::new, |e| sentences::estimate(&e, apa::two));
+        let result = sentences::result(f).unwrap_or_default();
+        format!("{verdict}: {size} points per point of the preceding rating, {result} (t test).")
+    });
+    answer.more.push(
+        "Neighbouring ratings are compared with all orders of the trials of a block, over \
+         participants."
+            .to_owned(),
+    );
     Some(answer)
 }

@@ -463,7 +463,7 @@ fn verdict_of(sentence: &str) -> &'static str {
 
 /// Question, its heading, and its words in the results paragraph: yes, not shown,
 /// undefined.
-const PRINTED: [(&str, &str, [&str; 3]); 6] = [
+const PRINTED: [(&str, &str, [&str; 3]); 7] = [
     (
         "vaf",
         "Does VAF predict the rating? ",
@@ -516,6 +516,15 @@ const PRINTED: [(&str, &str, [&str; 3]); 6] = [
             "Ratings changed over the session",
             "A change of the ratings over the session was not shown",
             "Whether ratings change over the session cannot be determined",
+        ],
+    ),
+    (
+        "carry-over",
+        "Does a rating depend on the one before it? ",
+        [
+            "Ratings depended on the ones before them",
+            "A dependence of ratings on the ones before them was not shown",
+            "Whether ratings depend on the ones before them cannot be determined",
         ],
     ),
 ];

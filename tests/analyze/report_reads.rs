@@ -64,9 +64,8 @@ fn methods_and_results_hold_no_number_that_the_analysis_does_not() {
         }
         for (id, value) in a.values.iter() {
             // Slopes are given per .01 of VAF.
-            if let (true, Value::Number(x)) =
-                (id.starts_with("lmm_vaf") && id.contains("slope"), value)
-            {
+            let slope = id.starts_with("lmm_vaf") && id.contains("slope");
+            if let (true, Value::Number(x)) = (slope || id == "clmm_vaf_crossed/beta/vaf", value) {
                 known.push(x / 100.0);
             }
         }

@@ -81,6 +81,57 @@ pub fn disagreement(cells: &[CellSummary]) -> Option<Disagreement> {
     })
 }
 
+/// Whether the slopes of subjects on a covariate of the realizations differ, in a complete
+/// table of subjects × realizations, against the rest of the interaction (Mandel 1961,
+/// with a known covariate). With dᵢⱼ the doubly centred table, x centred and
+/// cᵢ = Σⱼ dᵢⱼxⱼ/Σxⱼ²: SS = Σ cᵢ² Σxⱼ² on S − 1 degrees of freedom, the error has
+/// (S − 1)(k − 2).
+///
+/// `None` for fewer than two subjects or three realizations, or if the covariate or the
+/// error does not vary.
+pub fn slopes_differ<R: AsRef<[f64]>>(rows: &[R], x: &[f64]) -> Option<Disagreement> {
+    let rows = super::rectangular(rows)?;
+    let (s, k) = (rows.len(), x.len());
+    if s < 2 || k < 3 || rows[0].len() != k {
+        return None;
+    }
+    let mean = |values: &mut dyn Iterator<Item = f64>, n: usize| values.sum::<f64>() / n as f64;
+    let centre = mean(&mut x.iter().copied(), k);
+    let x: Vec<f64> = x.iter().map(|x| x - centre).collect();
+    let xx: f64 = x.iter().map(|x| x * x).sum();
+    if !(xx > 1e-24 * centre * centre) {
+        return None;
+    }
+    let columns: Vec<f64> = (0..k)
+        .map(|j| mean(&mut rows.iter().map(|r| r[j]), s))
+        .collect();
+    let grand = mean(&mut columns.iter().copied(), k);
+    let (mut slopes, mut all, mut size) = (0.0, 0.0, 0.0);
+    for row in &rows {
+        let own = mean(&mut row.iter().copied(), k);
+        let rest: Vec<f64> = (row.iter().zip(&columns))
+            .map(|(y, column)| y - own - column + grand)
+            .collect();
+        let slope = rest.iter().zip(&x).map(|(d, x)| d * x).sum::<f64>() / xx;
+        slopes += slope * slope * xx;
+        all += rest.iter().map(|d| d * d).sum::<f64>();
+        size += row.iter().map(|y| (y - grand).powi(2)).sum::<f64>();
+    }
+    let df = (s - 1) as f64;
+    let error = all - slopes;
+    if error <= 1e-20 * size {
+        return None;
+    }
+    let df2 = df * (k - 2) as f64;
+    let f = finite((slopes / df) / (error / df2))?;
+    Some(Disagreement {
+        f,
+        df1: df,
+        df2,
+        p: f_upper(f, df, df2),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,5 +173,31 @@ mod tests {
             .collect();
         assert_eq!(disagreement(&single), None);
         assert_eq!(disagreement(&[]), None);
+    }
+
+    /// R 4.2: anova(lm(y ~ s + m), lm(y ~ s + m + s:x)).
+    #[test]
+    fn slopes_of_opposed_subjects() {
+        let rows = [
+            [2.0, 4.0, 5.0, 7.0],
+            [6.0, 5.0, 3.0, 1.0],
+            [3.0, 4.0, 6.0, 6.0],
+            [5.0, 5.0, 4.0, 2.0],
+            [1.0, 3.0, 3.0, 6.0],
+        ];
+        let found = slopes_differ(&rows, &[0.7, 0.75, 0.85, 0.95]).unwrap();
+        assert_eq!((found.df1, found.df2), (4.0, 8.0));
+        assert!((found.f / 34.54803 - 1.0).abs() < 1e-6, "{found:?}");
+        assert!(
+            (found.p.unwrap() / 4.2874e-5 - 1.0).abs() < 1e-4,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn without_an_error_slopes_have_no_test() {
+        let rows = [[1.0, 2.0, 3.0], [3.0, 4.0, 5.0]];
+        assert_eq!(slopes_differ(&rows, &[0.7, 0.8, 0.9]), None);
+        assert_eq!(slopes_differ(&rows, &[0.8; 3]), None);
     }
 }

@@ -35,7 +35,6 @@
 //! repository collects them, and says what every result was compared with.
 //! `examples/ratings.rs` is a short analysis.
 
-pub mod additivity;
 pub mod agreement;
 pub mod anova;
 pub mod bayes;

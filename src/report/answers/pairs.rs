@@ -83,6 +83,13 @@ pub(super) fn which(a: &Analysis) -> Option<Answer> {
             .main
             .push(format!("{more} more are in the table of pairs."));
     }
+    if let Some(dz) = a.values.number("sensitivity/difference") {
+        answer.more.push(format!(
+            "A single difference of {} standard deviations (of the differences) is found with a power \
+             of 80 % in this design; of a pair among several it has to be larger.",
+            apa::two(dz)
+        ));
+    }
     if a.design.realizations > MAX_PAIRED && !a.pairs.is_empty() {
         answer.more.push(format!(
             "Above {MAX_PAIRED} realizations only the one with the highest {} is compared with each \

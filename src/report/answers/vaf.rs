@@ -37,8 +37,17 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     let caveats = std::mem::take(&mut answer.main);
     answer.main.extend(points(a, n));
     answer.main.extend(sentences::ties(a));
+    answer
+        .main
+        .extend(v.number("sensitivity/correlation").map(|r| {
+            format!(
+                "A true correlation of {} is found with a power of 80 % in this design.",
+                apa::r(r)
+            )
+        }));
     answer.main.extend(caveats);
     answer.main.extend(crossed(a));
+    answer.more.extend(ordinal(a));
     if let Some(rho) = v.number("corr_adjusted/spearman/rho") {
         let tau = v
             .number("corr_adjusted/kendall/tau_b")
@@ -133,6 +142,34 @@ fn crossed(a: &Analysis) -> Option<String> {
     Some(format!(
         "Mixed model with crossed random effects of participants and realizations: {slope}.{between}\
          {singular}"
+    ))
+}
+
+/// The ordinal model with crossed random effects, and whether its odds are proportional.
+fn ordinal(a: &Analysis) -> Option<String> {
+    let get = |id: &str| a.values.number(&format!("clmm_vaf_crossed/{id}"));
+    let beta = get("beta/vaf")? / 100.0;
+    let (t, p) = (get("t")?, get("p")?);
+    let n = a.values.number("corr_adjusted/n_models").unwrap_or(0.0);
+    let odds = |id: &str| a.values.number(&format!("clm_vaf/proportional_odds/{id}"));
+    let odds = (odds("chi2").zip(odds("df")).zip(odds("p"))).map_or_else(
+        String::new,
+        |((chi2, df), p)| {
+            format!(
+                " Are the odds proportional? χ²({df}, N = {}) = {}, p {} (ratings taken as independent).",
+                a.counts.with_ratings,
+                apa::two(chi2),
+                apa::p_beside(p, a.alpha)
+            )
+        },
+    );
+    Some(format!(
+        "Cumulative logit model with crossed random effects: log odds ratio {} per .01 of VAF, \
+         t({}) = {} from the likelihood ratio, p {}.{odds}",
+        apa::two(beta),
+        n - 2.0,
+        apa::two(t),
+        apa::p_beside(p, a.alpha)
     ))
 }
 

@@ -187,6 +187,14 @@ fn sentence(a: &Analysis, f: &Finding) -> Option<String> {
                 .map_or_else(String::new, |e| apa::number(e.value, decimals));
             format!("{what}, b = {b} per trial, {result}.")
         }
+        Question::CarryOver => {
+            let what = if yes {
+                "Ratings depended on the ones before them"
+            } else {
+                "A dependence of ratings on the ones before them was not shown"
+            };
+            format!("{what}, b = {size} points per point, {result}.")
+        }
         Question::Reference(reference) => {
             let best = f.names.first()?;
             let role = a.realizations.iter().find(|m| m.id == *reference)?.role;
@@ -240,6 +248,7 @@ fn subject(a: &Analysis, f: &Finding) -> Option<String> {
         Question::Pairs => "Which pairs of realizations differ".to_owned(),
         Question::Disagreement => "Whether participants disagree about the realizations".to_owned(),
         Question::Order => "Whether ratings change over the session".to_owned(),
+        Question::CarryOver => "Whether ratings depend on the ones before them".to_owned(),
         Question::Reference(name) => format!("Whether {} differs from {name}", f.names.first()?),
         Question::Equivalence(name) => {
             format!("Whether {} is equivalent to {name}", f.names.first()?)

@@ -36,6 +36,8 @@ pub enum Question {
     Disagreement,
     /// Do ratings drift over the session?
     Order,
+    /// Does a rating depend on the one before it?
+    CarryOver,
     /// Does the realization with the highest mean differ from this reference?
     Reference(String),
     /// Is it equivalent to this reference, within the stated margin?
@@ -55,6 +57,7 @@ impl Question {
             Self::Pairs => "pairs".to_owned(),
             Self::Disagreement => "disagreement".to_owned(),
             Self::Order => "order".to_owned(),
+            Self::CarryOver => "carry-over".to_owned(),
             Self::Reference(name) => group_id("reference", &[name]),
             Self::Equivalence(name) => group_id("equivalence", &[name]),
             Self::Repeat(name) => group_id("repeat", &[name]),
@@ -363,6 +366,7 @@ pub(super) fn findings(
     found.extend(pairs::which(&facts));
     found.extend(others::disagreement(&facts));
     found.extend(others::order(&facts));
+    found.extend(others::carry_over(&facts));
     others::disagreement_as_caveat(&mut found);
     found.extend(others::repeats(&facts));
     let pairs = facts.pairs;

@@ -4,10 +4,12 @@
 
 use super::Rules;
 use super::cells::{Cells, within};
+use super::design::Design;
 use super::identifiers::group_id;
 use super::values::Values;
 use study_stats::anova::one_way;
 use study_stats::distribution::t_quantile;
+use study_stats::power::{detectable_correlation, detectable_difference};
 use study_stats::proportion::share;
 
 pub(super) fn headline(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
@@ -18,7 +20,21 @@ pub(super) fn headline(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
         explained(group, rules.alpha, values);
     }
     components(cells, values);
+    sensitivity(Design::of(cells), rules.alpha, values);
 }
+
+/// The smallest effects that the design finds with a power of 80 %.
+fn sensitivity(design: Design, alpha: f64, values: &mut Values) {
+    let n = values.number("corr_adjusted/n_models").unwrap_or(0.0) as usize;
+    let r = detectable_correlation(n, POWER, alpha);
+    let mut g = values.group("sensitivity", "fewer than three realizations with a VAF");
+    g.maybe("correlation", r);
+    let difference = detectable_difference(design.analyzed(), POWER, alpha);
+    g.put_or("difference", difference, "fewer than two participants");
+}
+
+/// The power for which the smallest effects are given.
+const POWER: f64 = 0.8;
 
 /// Shares of ratings at or above a threshold, with subjects as clusters.
 fn realistic(cells: &Cells<'_>, from: f64, values: &mut Values) {

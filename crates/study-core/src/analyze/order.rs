@@ -4,6 +4,7 @@
 use super::cells::Cells;
 use super::values::Values;
 use std::collections::BTreeMap;
+use study_stats::carry_over::{OrderedRating, carry_over};
 use study_stats::describe::Sum;
 use study_stats::two_way_slope::{TwoWaySlope, two_way_slope};
 
@@ -41,6 +42,7 @@ pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
     );
     put("order_trial", by_trial, values);
     put("order_previous_rating", by_previous, values);
+    carry_over_of(cells, values);
     let mut by_repetition: BTreeMap<u32, (Sum, f64)> = BTreeMap::new();
     for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
         let (sum, n) = by_repetition.entry(r.repetition[i]).or_default();
@@ -55,6 +57,52 @@ pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
             .group(format!("order_repetition/{repetition}"), "no ratings")
             .put("mean", sum.get() / n + cells.offset);
     }
+}
+
+/// The dependence of a rating on the one before it, by comparison with all orders of a
+/// block. A block is a repetition if each participant's repetitions follow each other.
+fn carry_over_of(cells: &Cells<'_>, values: &mut Values) {
+    let r = cells.ratings;
+    let mut rows = Vec::with_capacity(cells.order.len());
+    for own in cells.order.chunk_by(|&a, &b| r.subject[a] == r.subject[b]) {
+        let mut trials: Vec<(u32, usize)> = (own.iter())
+            .filter_map(|&i| Some((r.trial_index[i]?, i)))
+            .collect();
+        trials.sort_unstable();
+        let known = trials.len() == own.len();
+        if !known || trials.windows(2).any(|w| w[0].0 == w[1].0) {
+            rows.clear();
+            break;
+        }
+        rows.extend(trials.into_iter().map(|(_, i)| i));
+    }
+    let same = |w: &[usize]| r.subject[w[0]] == r.subject[w[1]];
+    let blocked = rows
+        .windows(2)
+        .all(|w| !same(w) || r.repetition[w[0]] <= r.repetition[w[1]]);
+    let ordered: Vec<OrderedRating> = (rows.iter())
+        .filter_map(|&i| {
+            Some(OrderedRating {
+                subject: r.subject[i],
+                realization: r.model[i]?,
+                block: if blocked { r.repetition[i] } else { 0 },
+                rating: cells.centred[i]?,
+            })
+        })
+        .collect();
+    let found = carry_over(&ordered);
+    let why = if rows.is_empty() {
+        "the order of the trials is not known"
+    } else {
+        "fewer than two participants, or no variance"
+    };
+    let mut g = values.group("carry_over", why);
+    g.maybe("slope", found.map(|f| f.slope));
+    g.maybe("se", found.map(|f| f.se));
+    g.maybe("t", found.map(|f| f.t));
+    g.maybe("df", found.map(|f| f.df));
+    g.maybe("p", found.map(|f| f.p));
+    g.interval("ci95", found.map(|f| f.ci95));
 }
 
 /// Largest number of repetitions whose means are listed.

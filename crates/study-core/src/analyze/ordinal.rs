@@ -10,8 +10,11 @@ use super::cells::Cells;
 use super::identifiers::group_id;
 use super::values::{self, Values};
 use rayon::prelude::*;
-use study_stats::clm::{CategoryCount, CategoryCounts, ClmError, ClmFit, Predictor, clm};
-use study_stats::clmm::{ClmmFit, clmm};
+use study_stats::clm::{
+    CategoryCount, CategoryCounts, ClmError, ClmFit, Predictor, ProportionalOdds, clm,
+    proportional_odds,
+};
+use study_stats::clmm::{ClmmFit, clmm, clmm_crossed};
 use thiserror::Error;
 
 /// Largest number of categories; more come from a slider, not from a rating scale.
@@ -59,7 +62,7 @@ pub(super) fn ordinal(cells: &Cells<'_>, values: &mut Values) {
     }
     let of_test = |i: &usize| cells.ratings.model[*i].is_some_and(|m| test[m as usize]);
     let rows: Vec<usize> = cells.order.iter().copied().filter(of_test).collect();
-    let both: [Group; 2] = [by_model, by_vaf];
+    let both: [Group; 3] = [crossed, by_model, by_vaf];
     let parts = both.par_iter().map(|group| {
         let mut values = Values::default();
         group(cells, &rows, &mut values);
@@ -271,7 +274,12 @@ fn put_all(
         .collect();
     let fixed = clm(&table);
     match &fixed {
-        Ok(fit) => put(fit, &labels, scale, &mut values.group(&ids[0], "")),
+        Ok(fit) => {
+            put(fit, &labels, scale, &mut values.group(&ids[0], ""));
+            if what == "vaf" {
+                proportional(proportional_odds(&table, fit).as_ref(), values);
+            }
+        }
         Err(cause) => none(&mut values.group(&ids[0], cause.to_string()), what),
     }
     let mixed: [Result<ClmmFit, NotFitted>; 2] = if many {
@@ -295,6 +303,76 @@ fn put_all(
             }
         }
     }
+}
+
+/// Whether one slope for all thresholds is enough.
+fn proportional(found: Option<&ProportionalOdds>, values: &mut Values) {
+    let why =
+        "fewer than three categories, or the model with a slope for each threshold has no fit";
+    let mut g = values.group("clm_vaf/proportional_odds", why);
+    g.maybe("chi2", found.map(|f| f.chi2));
+    g.maybe("df", found.map(|f| f.df));
+    g.maybe("p", found.and_then(|f| f.p));
+}
+
+/// The slope on VAF beside random effects of subjects and of realizations, tested by the
+/// likelihood ratio: `clmm_vaf_crossed/*`.
+fn crossed(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
+    let model = |i: usize| cells.ratings.model[i].map(|m| m as usize);
+    let vaf = |i: usize| model(i).and_then(|m| cells.vaf[m]);
+    let rows: Vec<usize> = (rows.iter().copied())
+        .filter(|&i| vaf(i).is_some())
+        .collect();
+    let mut present: Vec<usize> = rows.iter().filter_map(|&i| model(i)).collect();
+    present.sort_unstable();
+    present.dedup();
+    let all: Vec<f64> = present.iter().filter_map(|&m| cells.vaf[m]).collect();
+    let low = all.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (origin, unit) = (0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low);
+    let found = (|| {
+        if rows.is_empty() {
+            return Err(NotFitted::NoVaf);
+        } else if !(unit > 0.0) {
+            return Err(NotFitted::EqualVaf);
+        } else if present.len() > MAX_MODELS {
+            return Err(NotFitted::TooManyRealizations);
+        } else if many(cells, &rows) {
+            return Err(NotFitted::TooManySubjects);
+        }
+        let ratings = categories(cells, &rows)?;
+        let predictors = all.iter().map(|v| Predictor {
+            column: 0,
+            x: (v - origin) / unit,
+        });
+        let index = |i: usize| {
+            let at = model(i).and_then(|m| present.binary_search(&m).ok());
+            at.unwrap_or(0) as u32
+        };
+        let counts = counts(cells, &rows, &ratings, present.len(), index);
+        let table = CategoryCounts::new(predictors.collect(), 1, ratings.len(), &counts);
+        Ok(clmm_crossed(&table)?)
+    })();
+    let why = found
+        .as_ref()
+        .err()
+        .map_or_else(String::new, ToString::to_string);
+    let found = found.ok();
+    let mut g = values.group("clmm_vaf_crossed", why);
+    let scaled = |of: fn(&ClmFit) -> &Vec<f64>| {
+        let first = found.as_ref().and_then(|f| of(&f.fit).first());
+        first.map(|x| x / unit)
+    };
+    g.maybe("beta/vaf", scaled(|f| &f.beta));
+    g.maybe("se/vaf", scaled(|f| &f.se));
+    g.maybe("loglik", found.as_ref().map(|f| f.fit.loglik));
+    g.maybe("null_loglik", found.as_ref().map(|f| f.null_loglik));
+    g.maybe("sd_subject", found.as_ref().map(|f| f.sd_subject));
+    g.maybe("sd_model", found.as_ref().map(|f| f.sd_realization));
+    g.maybe("lrt_chi2", found.as_ref().map(|f| f.chi2));
+    g.maybe("lrt_p", found.as_ref().and_then(|f| f.p_chi2));
+    g.maybe("t", found.as_ref().map(|f| f.t));
+    g.maybe("p", found.as_ref().and_then(|f| f.p));
 }
 
 fn none(g: &mut values::Group<'_>, what: &str) {

@@ -141,6 +141,23 @@ pub(super) fn order(facts: &Facts<'_>) -> Option<Finding> {
     })
 }
 
+/// Whether a rating depends on the one before it.
+pub(super) fn carry_over(facts: &Facts<'_>) -> Option<Finding> {
+    let get = |what: &str| facts.number(&format!("carry_over/{what}"));
+    let (slope, p) = (get("slope")?, get("p")?);
+    let test = Test::single(TestKind::SlopeT, p, facts.rules.alpha);
+    let test = test.with("t", get("t"), &[get("df")]);
+    Some(Finding {
+        direction: Some(Direction::of(slope)).filter(|_| test.is_significant()),
+        estimate: Some(Estimate {
+            name: "slope",
+            value: slope,
+            ci95: facts.values.interval("carry_over/ci95"),
+        }),
+        ..Finding::decided(Question::CarryOver, test, facts.design)
+    })
+}
+
 /// The realization with the highest mean against each reference, anchor and physical
 /// sample: a difference, and equivalence within the stated margin.
 pub(super) fn against_references(facts: &Facts<'_>) -> Vec<Finding> {
