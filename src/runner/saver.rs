@@ -151,10 +151,7 @@ impl Saver {
     /// Queues a job.
     pub fn send(&mut self, job: Job) {
         match &mut self.mode {
-            Mode::Inline { worker, events } => {
-                events.extend(worker.work(job));
-                events.extend(worker.save());
-            }
+            Mode::Inline { worker, events } => events.extend(worker.work(job)),
             Mode::Thread { jobs, .. } => {
                 // The thread ends early only by a panic; then no event comes back, and
                 // nothing is shown as saved.
@@ -166,7 +163,10 @@ impl Saver {
     /// Returns the events since the last call.
     pub fn drain(&mut self) -> Vec<SaveEvent> {
         match &mut self.mode {
-            Mode::Inline { events, .. } => std::mem::take(events),
+            Mode::Inline { worker, events } => {
+                events.extend(worker.save());
+                std::mem::take(events)
+            }
             Mode::Thread {
                 events,
                 handle,
@@ -340,6 +340,7 @@ impl Worker {
     /// Finishes what is under way, and writes the receipt if it can be written.
     fn finish(mut self) -> Vec<SaveEvent> {
         let mut events = self.end_telemetry();
+        events.extend(self.save());
         let receipt = self.journal.receipt();
         events.extend(receipt.ok().flatten().map(SaveEvent::Left));
         events

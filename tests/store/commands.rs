@@ -10,7 +10,7 @@ use study_core::outcome::Event;
 use study_core::store::{Frozen, StudyFolder};
 
 /// A study of the repository's protocol with a finished and an unfinished session.
-fn turn_signal(results: &Path) -> PathBuf {
+pub(crate) fn turn_signal(results: &Path) -> PathBuf {
     let loaded = study::cli::load::load(Path::new("protocols/turn-signal")).unwrap();
     let frozen = Frozen {
         protocol: &loaded.protocol,
@@ -35,7 +35,7 @@ fn turn_signal(results: &Path) -> PathBuf {
     folder.path().to_owned()
 }
 
-fn study_command() -> Command {
+pub(crate) fn study_command() -> Command {
     Command::cargo_bin("study").unwrap()
 }
 

@@ -87,7 +87,7 @@ fn recovery_can_be_killed_at_each_step_and_run_again() {
                 second.plan(call, fault);
                 let mut told = told.clone();
                 let _ = process(&second, &mut told);
-                for crash in CRASHES {
+                for crash in [Crash::OnlySynced, Crash::Half, Crash::Strict(call as u64)] {
                     let why = format!("{first:?}, {fault:?} at {call}, {crash:?}");
                     comes_back(&second.after(crash), &told, &why);
                 }

@@ -178,13 +178,13 @@ fn a_tail_cut_at_any_byte_leaves_every_line_before_it() {
     }
 }
 
-fn small() -> &'static Path {
+pub(crate) fn small() -> &'static Path {
     Path::new("results/small")
 }
 
 /// A disk with an unfinished session of so many events, the last of which was not
 /// acknowledged: `head.json` names the one before.
-fn interrupted(events: usize) -> MemoryDisk {
+pub(crate) fn interrupted(events: usize) -> MemoryDisk {
     let head = Path::new("results/small/sessions/P01/1/head.json");
     let before = unfinished(events - 1).read(head).unwrap();
     let disk = unfinished(events);
@@ -194,7 +194,7 @@ fn interrupted(events: usize) -> MemoryDisk {
 }
 
 /// A disk with an unfinished session of so many events.
-fn unfinished(events: usize) -> MemoryDisk {
+pub(crate) fn unfinished(events: usize) -> MemoryDisk {
     let disk = MemoryDisk::new();
     let kept = Kept::new();
     let study = StudyFolder::open_or_create_on(
@@ -212,7 +212,7 @@ fn unfinished(events: usize) -> MemoryDisk {
     disk.after(Crash::Process)
 }
 
-fn journal_path() -> std::path::PathBuf {
+pub(crate) fn journal_path() -> std::path::PathBuf {
     small().join("sessions/P01/1/journal.jsonl")
 }
 

@@ -8,12 +8,15 @@ mod designs;
 mod dictionary;
 mod example_study;
 mod folder;
+mod heads;
 mod journal;
 mod memory;
 mod mirrors;
 mod process;
 mod processes;
+mod saver;
 #[path = "../support/mod.rs"]
 mod support;
 #[path = "../support/world.rs"]
 mod world;
+mod wrong_kinds;

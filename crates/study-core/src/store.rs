@@ -63,6 +63,7 @@ use error::At as _;
 use mirror::catch_up::catch_up;
 use mirror::{MirrorDisk, Side};
 use participant::remove_all;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -291,7 +292,7 @@ fn make_folders(disk: &dyn Disk, path: &Path) -> Result<(), StoreError> {
     let folders = path.ancestors().filter(|a| !a.as_os_str().is_empty());
     for folder in folders.collect::<Vec<_>>().into_iter().rev() {
         let known = disk.list(folder);
-        if known.is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound) {
+        if known.is_err_and(|e| e.kind() == ErrorKind::NotFound) {
             atomic::folder(disk, folder)?;
         }
     }
@@ -307,7 +308,8 @@ fn settle_names(disk: &dyn Disk, study: &Path) -> Result<(), StoreError> {
             false => folder,
         };
         match disk.sync_folder(folder) {
-            // Beyond the folder around the results nothing may be ours.
+            // The folders around the results may not be ours.
+            Err(e) if level == 2 && e.kind() == ErrorKind::PermissionDenied => {}
             Err(e) if level <= 2 => return Err(e).at(folder),
             _ => {}
         }

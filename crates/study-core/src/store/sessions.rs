@@ -163,8 +163,9 @@ impl StudyFolder {
         number: u32,
     ) -> Result<SessionData, StoreError> {
         let path = layout::session(&self.path, id, number);
-        let segments = journal::segments(self.disk.as_ref(), &path)?;
+        // The head first: a session under way may write on between the two.
         let head = Head::read(self.disk.as_ref(), &path)?;
+        let segments = journal::segments(self.disk.as_ref(), &path)?;
         let replay = replay(&segments, &head);
         Ok(SessionData {
             participant: id.clone(),

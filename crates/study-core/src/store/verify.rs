@@ -221,7 +221,7 @@ impl StudyFolder {
             found.push(Finding::problem(&place, whose));
         }
         self.verify_start(session, &place, found);
-        self.verify_receipt(session, &place, found);
+        self.verify_receipt(session, &place, found)?;
         for item in self.disk.list(&session.path).at(&session.path)? {
             let known = layout::segment_number(&item.name).is_some()
                 || layout::OF_SESSION.contains(&item.name.as_str());
@@ -239,21 +239,31 @@ impl StudyFolder {
     }
 
     /// Compares the receipt with the record that it names.
-    fn verify_receipt(&self, session: &SessionData, place: &str, found: &mut Vec<Finding>) {
-        let place = format!("{place}/{}", layout::RECEIPT);
+    fn verify_receipt(
+        &self,
+        session: &SessionData,
+        place: &str,
+        found: &mut Vec<Finding>,
+    ) -> Result<(), StoreError> {
         let what = match Receipt::read(self.disk.as_ref(), &session.path) {
-            Ok(None) => return,
+            Ok(None) => return Ok(()),
             Ok(Some(receipt)) => {
-                let seq = receipt.seq;
-                if session.hashes.contains(&(seq, receipt.hash)) {
-                    return;
+                let record = (receipt.seq, receipt.hash);
+                // It may have been written after the journal was read.
+                let has = |session: &SessionData| session.hashes.contains(&record);
+                if has(session) || has(&self.session(&session.participant, session.session)?) {
+                    return Ok(());
                 }
-                format!("record {seq} is missing or changed")
+                format!("record {} is missing or changed", record.0)
             }
             Err(StoreError::Damaged { what, .. }) => what,
             Err(e) => e.to_string(),
         };
-        found.push(Finding::problem(place, what));
+        found.push(Finding::problem(
+            format!("{place}/{}", layout::RECEIPT),
+            what,
+        ));
+        Ok(())
     }
 
     fn verify_start(&self, session: &SessionData, place: &str, found: &mut Vec<Finding>) {

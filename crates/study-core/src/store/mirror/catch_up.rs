@@ -11,7 +11,7 @@ use crate::store::head::Head;
 use crate::store::journal_record::sha256;
 use crate::store::manifest::Manifest;
 use crate::store::replay::{Replay, replay};
-use crate::store::{atomic, journal, layout, lock_study, remove_all};
+use crate::store::{atomic, journal, layout, lock_study, make_folders, remove_all};
 use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -90,14 +90,10 @@ impl Pair<'_> {
         Ok(&self.names_of(0)? | &self.names_of(1)?)
     }
 
-    /// Creates this folder on both sides.
+    /// Creates this folder where it does not exist.
     fn make(&self) -> Result<(), StoreError> {
-        for side in self.sides {
-            let mut path = side.root.clone();
-            for part in self.path.components() {
-                path.push(part);
-                atomic::folder(side.disk.as_ref(), &path)?;
-            }
+        for side in [0, 1] {
+            make_folders(self.disk(side), &self.at(side))?;
         }
         Ok(())
     }
@@ -250,8 +246,8 @@ impl Pair<'_> {
 
     fn replay(&self, side: usize) -> Result<Replay, StoreError> {
         let path = self.at(side);
-        let segments = journal::segments(self.disk(side), &path)?;
-        Ok(replay(&segments, &Head::read(self.disk(side), &path)?))
+        let head = Head::read(self.disk(side), &path)?;
+        Ok(replay(&journal::segments(self.disk(side), &path)?, &head))
     }
 }
 

@@ -1,0 +1,120 @@
+//! The saver: what becomes of telemetry, and events that wait together.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::memory::MemoryDisk;
+use crate::process::open;
+use crate::world::{at, begun, ended, real, started};
+use std::path::Path;
+use study::runner::saver::{Job, SaveEvent, Saver};
+use study_core::outcome::{Event, Sample};
+use study_core::store::StudyFolder;
+use study_core::store::disk::Disk as _;
+
+const SAMPLE: Sample = Sample {
+    t_s: 0.001,
+    x_mm: 1.0,
+    v_mm_s: 0.0,
+    force_command_n: 0.5,
+    force_measured_n: None,
+};
+
+fn telemetry() -> &'static Path {
+    Path::new("results/small/sessions/P01/1/telemetry")
+}
+
+/// Saves one playback; `before` changes the disk before its telemetry begins.
+fn playback(disk: &MemoryDisk, before: impl Fn(&MemoryDisk)) -> (StudyFolder, Vec<SaveEvent>) {
+    let study = open(disk).unwrap();
+    let mut claimed = study.claim(&real("P01")).unwrap();
+    let start = started("P01", 1, claimed.seat);
+    let journal = claimed.folder.journal().unwrap();
+    let mut saver = Saver::new(claimed.folder, journal, false);
+    before(disk);
+    saver.send(Job::Append(at(0), start));
+    saver.send(Job::Append(at(1), begun(1, 1, 1, "B")));
+    saver.send(Job::TelemetryBegin {
+        trial: 1,
+        attempt: 1,
+    });
+    saver.send(Job::Telemetry(vec![SAMPLE; 3250]));
+    saver.send(Job::TelemetryEnd);
+    saver.send(Job::Append(at(2), ended(1, 1)));
+    let mut events = saver.drain();
+    events.extend(saver.finish());
+    (study, events)
+}
+
+fn findings(study: &StudyFolder) -> Vec<(bool, String)> {
+    let found = study.verify(None).unwrap().into_iter();
+    found
+        .map(|f| (f.is_problem, format!("{}: {}", f.place, f.what)))
+        .collect()
+}
+
+#[test]
+fn the_journal_has_the_hash_of_the_telemetry() {
+    let disk = MemoryDisk::new();
+    let (study, events) = playback(&disk, |_| {});
+    assert_eq!(
+        events[..3],
+        [SaveEvent::Saved, SaveEvent::Saved, SaveEvent::Saved]
+    );
+    assert!(
+        matches!(&events[3..], [SaveEvent::Left(receipt)] if receipt.seq == 3),
+        "{events:?}"
+    );
+    assert_eq!(findings(&study), []);
+    let file = telemetry().join("001-a1.csv");
+    let mut bytes = disk.read(&file).unwrap();
+    let last = bytes.len() - 3;
+    bytes[last - 1] ^= 1;
+    disk.truncate(&file, 0).unwrap();
+    disk.open(&file).unwrap().write_all(&bytes).unwrap();
+    let [(true, changed)] = &findings(&study)[..] else {
+        panic!("{:?}", findings(&study));
+    };
+    assert!(
+        changed.contains("001-a1.csv: not the file that was recorded"),
+        "{changed}"
+    );
+    disk.remove_file(&file).unwrap();
+    let [(true, missing)] = &findings(&study)[..] else {
+        panic!("{:?}", findings(&study));
+    };
+    assert!(missing.contains("001-a1.csv: missing"), "{missing}");
+}
+
+#[test]
+fn lost_telemetry_is_in_the_journal_and_no_problem_for_ever() {
+    let disk = MemoryDisk::new();
+    // A file has the name of the folder.
+    let (study, events) = playback(&disk, |disk| drop(disk.create(telemetry()).unwrap()));
+    let is_lost = |e: &SaveEvent| matches!(e, SaveEvent::TelemetryLost(_));
+    assert!(events.iter().any(is_lost), "{events:?}");
+    let saved = events.iter().filter(|e| **e == SaveEvent::Saved).count();
+    assert_eq!(
+        saved, 3,
+        "the session waits for three events and knows of no fourth"
+    );
+    let session = study.sessions().unwrap().remove(0);
+    let lost = |e: &Event| {
+        matches!(
+            e,
+            Event::TelemetryLost {
+                trial: 1,
+                attempt: 1,
+                ..
+            }
+        )
+    };
+    assert!(session.entries.iter().any(|e| lost(&e.event)));
+    disk.remove_file(telemetry()).unwrap();
+    let [(false, note)] = &findings(&study)[..] else {
+        panic!("{:?}", findings(&study));
+    };
+    assert!(
+        note.contains("001-a1.csv: not saved, or only in part"),
+        "{note}"
+    );
+}

@@ -1,0 +1,83 @@
+//! Links and files in the place of folders: every command names them.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::commands::{study_command, turn_signal};
+use crate::world::{Kept, at, real};
+use predicates::prelude::*;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use study_core::store::{StoreError, StudyFolder};
+
+/// Moves a file or folder elsewhere and leaves a link.
+fn link(path: &Path, elsewhere: &Path) {
+    std::fs::rename(path, elsewhere).unwrap();
+    symlink(elsewhere, path).unwrap();
+}
+
+/// The commands that read the study and one that changes it.
+fn each_names(results: &Path, place: &str, what: &str) {
+    let state = ["P01", "--state", "excluded", "--reason", "x"];
+    for (command, more) in [
+        ("status", &[][..]),
+        ("analyze", &[]),
+        ("verify", &[]),
+        ("participant", &state),
+    ] {
+        study_command()
+            .arg(command)
+            .arg(results)
+            .args(more)
+            .assert()
+            .code(4)
+            .stderr(predicate::str::contains(place))
+            .stderr(predicate::str::contains(what));
+    }
+}
+
+#[test]
+fn a_link_in_the_place_of_a_folder_or_journal_is_named_by_every_command() {
+    for place in [
+        "sessions",
+        "sessions/P01",
+        "sessions/P01/1",
+        "sessions/P01/1/journal.jsonl",
+        "sessions/P01/1/head.json",
+        "protocol",
+    ] {
+        let results = tempfile::tempdir().unwrap();
+        let elsewhere = tempfile::tempdir().unwrap();
+        let folder = turn_signal(results.path());
+        link(&folder.join(place), &elsewhere.path().join("x"));
+        each_names(results.path(), place, "a symbolic link");
+    }
+}
+
+#[test]
+fn a_file_in_the_place_of_a_folder_is_named_by_every_command() {
+    for place in ["sessions/P03", "sessions/P01/2"] {
+        let results = tempfile::tempdir().unwrap();
+        let folder = turn_signal(results.path());
+        std::fs::write(folder.join(place), "x").unwrap();
+        each_names(results.path(), place, "a file in the place of a folder");
+    }
+}
+
+#[test]
+fn telemetry_is_not_written_through_a_link() {
+    let results = tempfile::tempdir().unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let study = StudyFolder::open_or_create(results.path(), &Kept::new().frozen(), at(0)).unwrap();
+    let claimed = study.claim(&real("P01")).unwrap();
+    symlink(elsewhere.path(), claimed.folder.path().join("telemetry")).unwrap();
+    let refused = claimed.folder.telemetry(1, 1);
+    assert!(
+        matches!(refused, Err(StoreError::WrongKind { .. })),
+        "{refused:?}"
+    );
+    assert_eq!(std::fs::read_dir(elsewhere.path()).unwrap().count(), 0);
+    let found = study.verify(None).unwrap();
+    let named = found.iter().find(|f| f.is_problem).unwrap();
+    assert_eq!(named.place, "sessions/P01/1/telemetry");
+    assert!(named.what.contains("a symbolic link"), "{named:?}");
+}
