@@ -14,6 +14,9 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use study_base::text::ParticipantId;
+use study_core::outcome::{Event, Moment};
+use study_core::store::{ClaimRequest, Frozen, SeatKind, StudyFolder};
 use support::player::{Did, play};
 use support::{Terminal, repository, study};
 
@@ -78,8 +81,16 @@ fn session(folder: &Path) {
             std::thread::sleep(Duration::from_millis(1));
         }
     }
-    show("key to `saved ✓`: three events, each synced", saved);
+    show("key to `saved ✓`: three events written together", saved);
     show("append and sync of the disk, three times", disk(folder));
+    show(
+        "the journal's part: three events, head.json",
+        journal(folder, None),
+    );
+    let mirror = folder.join("mirror");
+    fs::create_dir(&mirror).unwrap();
+    let mirrored = journal(folder, Some(&mirror));
+    show("the same with a mirror on the same disk", mirrored);
     println!("{:<48} {memory_kib} KiB", "resident memory of the session");
 }
 
@@ -92,6 +103,42 @@ fn disk(folder: &Path) -> Vec<Duration> {
             file.write_all(&line).unwrap();
             file.sync_data().unwrap();
         }
+        began.elapsed()
+    });
+    times.collect()
+}
+
+/// The events of an answer in the journal, until they are acknowledged.
+fn journal(folder: &Path, mirror: Option<&Path>) -> Vec<Duration> {
+    let loaded = ::study::cli::load::load(Path::new(&repository("protocols/turn-signal"))).unwrap();
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let at = Moment {
+        wall: chrono::Local::now().fixed_offset(),
+        mono_ns: 0,
+    };
+    let results = folder.join(if mirror.is_some() { "both" } else { "one" });
+    let opened = match mirror {
+        None => StudyFolder::open_or_create(&results, &frozen, at),
+        Some(mirror) => StudyFolder::open_or_create_mirrored(&results, mirror, &frozen, at)
+            .map(|(study, _)| study),
+    };
+    let request = ClaimRequest {
+        participant: ParticipantId::new("P01").unwrap(),
+        kind: SeatKind::Real,
+        rows: None,
+    };
+    let mut claimed = opened.unwrap().claim(&request).unwrap();
+    let mut journal = claimed.folder.journal().unwrap();
+    let event = Event::Interrupted {
+        reason: "x".repeat(150),
+    };
+    let times = (0..STARTS).map(|_| {
+        let began = Instant::now();
+        journal.append_all(&[(at, &event); 3]).unwrap();
         began.elapsed()
     });
     times.collect()

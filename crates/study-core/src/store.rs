@@ -5,10 +5,11 @@
 //! journals and the protocol matter: the tables can be derived again from them.
 //! `docs/results.md` describes each file.
 //!
-//! Invariants: [`Journal::append`] returns only when the event is on the medium.
-//! A journal is only appended to; an incomplete last line is copied before it is cut
-//! off, and a damaged line stays where it is. A session's folder is locked by one
-//! process at a time, and a row belongs to one participant.
+//! Invariants: [`Journal::append`] returns only when the event is on the medium and
+//! `head.json` says so. A journal is only appended to; an incomplete end is copied before
+//! it is cut off, and a damaged line stays where it is. What another process left behind
+//! is synced before it is used. A session's folder is locked by one process at a time,
+//! and a row belongs to one participant.
 //!
 //! Every change goes through [`disk::Disk`], so that tests can make each call fail.
 
