@@ -7,7 +7,13 @@
 //! not on the medium when the power goes may be there or not, each name and each file
 //! by itself ([`Crash::Strict`]); a journaling file system keeps the order of names and
 //! writes them with every sync ([`Crash::Ext4`]).
-#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
+#![allow(
+    dead_code,
+    unused_imports,
+    missing_docs,
+    unreachable_pub,
+    clippy::unwrap_used
+)]
 
 #[path = "memory/power.rs"]
 mod power;
