@@ -14,12 +14,13 @@
 mod axis;
 mod draw;
 mod frame;
+mod labels;
 mod look;
 
 pub use super::picture::{Anchor, Colour, text_width};
 pub use axis::{Axis, Ticks};
 pub(in crate::report) use draw::share;
-pub(in crate::report) use frame::for_names;
+pub(in crate::report) use frame::{MAX_LABEL, for_names, widest};
 pub use look::{Dash, Look, PALETTE, Shape, ramp};
 
 use super::picture::Picture;
@@ -64,8 +65,12 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Text in the panel.
     pub notes: Vec<Note>,
+    /// Names of points, placed so that they do not overlap.
+    pub labels: Vec<Label>,
     /// Legend of a heat map.
     pub colour_bar: Option<ColourBar>,
+    /// Width relative to other columns; a column takes the largest of its panels.
+    pub breadth: f64,
     /// Height relative to other rows; a row takes the largest of its panels.
     pub share: f64,
 }
@@ -94,6 +99,8 @@ pub enum Mark {
     ErrorBars(Vec<Whisker>),
     /// Horizontal error bars with caps: `at` is y, the ends are x.
     ErrorBarsAcross(Vec<Whisker>),
+    /// A filled area, such as a confidence band: x, its lower and its upper edge.
+    Area(Vec<(f64, f64, f64)>),
     /// Filled boxes, such as those of a histogram.
     Bars(Vec<Span>),
     /// Boxes coloured by a value between `low` and `high`, by [`ramp`].
@@ -144,6 +151,15 @@ pub struct Note {
     pub rim: bool,
 }
 
+/// The name of a point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Label {
+    /// The point, in units of the axes.
+    pub at: (f64, f64),
+    /// Untrusted.
+    pub text: String,
+}
+
 /// Legend of a heat map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourBar {
@@ -176,6 +192,12 @@ impl Figure {
         self
     }
 
+    /// Whether all labels have a place where they overlap nothing.
+    pub fn labels_fit(&self) -> bool {
+        (self.panels.iter().zip(frame::frames(self)))
+            .all(|(panel, frame)| labels::places(panel, &frame).iter().all(|p| p.is_free))
+    }
+
     /// The picture.
     pub fn picture(&self) -> Picture {
         let mut out = Picture::new(&self.id, &self.title, self.width, self.height);
@@ -203,7 +225,9 @@ impl Panel {
             y,
             series: Vec::new(),
             notes: Vec::new(),
+            labels: Vec::new(),
             colour_bar: None,
+            breadth: 1.0,
             share: 1.0,
         }
     }

@@ -1,29 +1,36 @@
 //! The figures of an analysis, each with the data it shows.
 //!
-//! Means of subject × realization cells and of repetitions are computed here from the
-//! included rows; all other statistics are looked up in the analysis. Figures that the
+//! Means of subject × realization cells and of repetitions, and the line through drawn
+//! points, are computed here; all other statistics are looked up in the analysis. Figures that the
 //! data do not allow are left out. Each figure has two widths, those of two
 //! columns and of one column of a journal.
 
 mod counts;
 mod means;
+mod pairs;
+mod strips;
 mod subjects;
 mod traces;
+mod vaf;
 
-use super::chart::{Axis, Figure};
+use super::chart::{Axis, Figure, Look, Mark, Panel, for_names};
 use super::picture::POINTS;
 use std::collections::BTreeMap;
 use study_core::analyze::{Analysis, RealizationSummary};
 use study_core::outcome::Role;
+use study_stats::describe::mean;
 
 /// Largest number of realizations, and of subjects, that are drawn individually.
 pub const MAX_DRAWN: usize = 60;
 
 /// File names of all figures, without extension.
-pub const NAMES: [&str; 8] = [
+pub const NAMES: [&str; 10] = [
     "fig10-means",
+    // Of earlier versions: now below fig10-means.
     "fig11-rating-and-vaf",
     "rating-against-vaf",
+    "pairs",
+    "strips",
     "subjects-and-realizations",
     "histograms",
     "subject-lines",
@@ -100,10 +107,10 @@ pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
     let note = note(a);
     let all = [
         means::fig10(&scene),
-        means::fig11(&scene),
-        means::against_vaf(&scene),
+        vaf::against_vaf(&scene),
+        pairs::forest(&scene),
         subjects::cells(&scene),
-        counts::histograms(&scene),
+        counts::histograms(&scene).or_else(|| strips::strips(&scene)),
         subjects::lines(&scene),
         subjects::order(&scene),
         traces::traces(&scene, traces),
@@ -135,8 +142,10 @@ fn note(a: &Analysis) -> Option<String> {
 /// Data that several figures use.
 struct Scene<'a> {
     a: &'a Analysis,
-    /// The tested realizations, then the others.
+    /// The tested realizations, then the others, both in ascending order of VAF or, if
+    /// a tested one has no VAF, of the mean.
     models: Vec<&'a RealizationSummary>,
+    by_vaf: bool,
     /// The question as a noun, without article.
     asked: String,
     /// Ratings by subject and realization.
@@ -146,8 +155,6 @@ struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     fn of(a: &'a Analysis) -> Self {
-        let mut models: Vec<&RealizationSummary> = a.realizations.iter().collect();
-        models.sort_by_key(|m| !m.tested);
         let mut cells: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
         // Larger numbers of subjects are not drawn.
         let few = a.counts.participants <= MAX_DRAWN;
@@ -162,13 +169,40 @@ impl<'a> Scene<'a> {
         let asked = super::sentences::asked(a);
         let mut subjects: Vec<&str> = cells.keys().map(|(s, _)| *s).collect();
         subjects.dedup();
-        Self {
+        let mut scene = Self {
             a,
-            models,
+            models: a.realizations.iter().collect(),
+            by_vaf: a.realizations.iter().all(|m| m.vaf.is_some() || !m.tested),
             asked: asked.trim_start_matches("the ").to_owned(),
             cells,
             subjects,
-        }
+        };
+        let key = |m: &RealizationSummary| {
+            let along = if scene.by_vaf {
+                m.vaf
+            } else {
+                scene.mean(&m.id)
+            };
+            (!m.tested, along.unwrap_or(f64::INFINITY))
+        };
+        let mut models = scene.models.clone();
+        models.sort_by(|a, b| {
+            let (a, b) = (key(a), key(b));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        });
+        scene.models = models;
+        scene
+    }
+
+    /// Label of the axis of the realizations, with their order.
+    fn realizations(&self) -> String {
+        let from = if self.by_vaf { "VAF" } else { "mean" };
+        format!("realization, from low to high {from}")
+    }
+
+    /// What the realizations are in the order of.
+    fn order(&self) -> &'static str {
+        if self.by_vaf { "VAF" } else { "the means" }
     }
 
     /// Whether the realizations can be drawn individually.
@@ -189,6 +223,32 @@ impl<'a> Scene<'a> {
         self.a.described(model, what)
     }
 
+    /// The mean of a realization over participants, adjusted if cells are missing.
+    fn mean(&self, model: &str) -> Option<f64> {
+        (self.a.about("adjusted", &[model], "mean"))
+            .or_else(|| self.number(model, "subject_mean/mean"))
+    }
+
+    /// "adjusted " if means are adjusted for missing cells.
+    fn adjusted(&self) -> &'static str {
+        if self.a.design.is_complete() {
+            ""
+        } else {
+            "adjusted "
+        }
+    }
+
+    /// The mean of the ratings of a cell.
+    fn cell(&self, subject: &str, model: &str) -> Option<f64> {
+        self.cells.get(&(subject, model)).and_then(|x| mean(x))
+    }
+
+    /// Whether the names of the realizations are too long or too many to stand side by
+    /// side below an axis of this figure. Then they stand at the left.
+    fn across(&self, c: Canvas) -> bool {
+        for_names(&self.names(), c.width - 60.0) > 0.0
+    }
+
     /// An axis with the rating scale and the values beyond it.
     fn ratings(&self, label: &str, beyond: &[f64]) -> Axis {
         let finite = || beyond.iter().copied().filter(|v| v.is_finite());
@@ -199,9 +259,72 @@ impl<'a> Scene<'a> {
                 let room = (to - from) * 0.04;
                 Axis::new(label, low.min(from) - room, high.max(to) + room)
             }
-            None => Axis::around(label, [low, high]),
+            None => {
+                // All ratings, so that all figures have the same axis.
+                let ends = |what, end: fn(f64, f64) -> f64| {
+                    let all = self.models.iter().filter_map(|m| self.number(&m.id, what));
+                    all.reduce(end)
+                };
+                let least = ends("min", f64::min).map_or(low, |v| v.min(low));
+                let most = ends("max", f64::max).map_or(high, |v| v.max(high));
+                let room = (most - least) * 0.04;
+                Axis::new(label, least - room, most + room)
+            }
         }
     }
+}
+
+/// A panel with realizations along one axis and values along the other.
+struct Along {
+    across: bool,
+    panel: Panel,
+}
+
+impl Along {
+    /// Realizations stand at the left, the first at the top, or below the axes.
+    fn new(across: bool, realizations: Axis, values: Axis) -> Self {
+        let panel = if across {
+            // Names explain themselves, and their height may be small.
+            let mut names = realizations.reversed();
+            names.label.clear();
+            Panel::new(values, names)
+        } else {
+            Panel::new(realizations, values)
+        };
+        Self { across, panel }
+    }
+
+    /// Adds marks at (realization, value), with a legend entry if they have a name.
+    fn with(mut self, name: Option<&str>, look: Look, mark: Mark) -> Self {
+        let turn = |points: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
+            points.into_iter().map(|(x, y)| (y, x)).collect()
+        };
+        let mark = match mark {
+            mark if !self.across => mark,
+            Mark::Line(points) => Mark::Line(turn(points)),
+            Mark::Dots(points) => Mark::Dots(turn(points)),
+            Mark::Points(points) => Mark::Points(turn(points)),
+            Mark::ErrorBars(bars) => Mark::ErrorBarsAcross(bars),
+            other => other,
+        };
+        self.panel = match name {
+            Some(name) => self.panel.named(name, look, mark),
+            None => self.panel.with(look, mark),
+        };
+        self
+    }
+}
+
+/// Height for realizations that stand at the left, px.
+fn rows_height(n: usize) -> f64 {
+    17.0 * n.max(4) as f64
+}
+
+/// An offset between −0.5 and 0.5 that spreads marks of the same value: equal for equal
+/// numbers, and different for neighbours.
+fn jitter(n: usize) -> f64 {
+    // The golden ratio spreads any number of them evenly.
+    (n as f64 * 0.618_033_988_749_895 + 0.5).fract() - 0.5
 }
 
 fn name(m: &RealizationSummary) -> String {

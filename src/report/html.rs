@@ -207,7 +207,7 @@ fn conditional_section(a: &Analysis) -> Markup {
 fn figures_section(figures: &[Drawn]) -> Markup {
     html! {
         @if !figures.is_empty() {
-            section {
+            section.figures {
                 h2 { "Figures" }
                 @for (i, f) in figures.iter().enumerate() {
                     figure {
@@ -215,7 +215,7 @@ fn figures_section(figures: &[Drawn]) -> Markup {
                         div.narrow { (PreEscaped(f.narrow.to_svg())) }
                         figcaption {
                             b { "Figure " (i + 1) ". " } (typeset(&f.caption))
-                            span.file { " figures/" (f.name) ".svg, .png, .csv" }
+                            span.file { " figures/" (f.name) ".pdf, .svg, .png, .csv" }
                         }
                     }
                 }

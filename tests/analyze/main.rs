@@ -12,6 +12,7 @@ mod odd;
 mod possible;
 mod properties;
 mod report_answers;
+mod report_figures;
 mod report_html;
 mod report_reads;
 mod report_support;

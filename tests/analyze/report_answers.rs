@@ -344,7 +344,7 @@ fn a_foreign_table_has_no_words_about_the_paper_or_lambda() {
     }
     let text = words(&html(&own));
     for expected in [
-        "as in Fig. 10 of Colton &amp; Hollerbach (World Haptics 2007)",
+        "as in Fig. 10 and 11 of Colton &amp; Hollerbach (World Haptics 2007)",
         "validation recording",
         "adjacent lambda",
     ] {

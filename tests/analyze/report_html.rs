@@ -128,8 +128,8 @@ fn the_answers_hold_the_numbers_of_the_analysis() {
     )));
     for name in [
         "fig10-means",
-        "fig11-rating-and-vaf",
         "rating-against-vaf",
+        "pairs",
         "histograms",
         "order",
     ] {

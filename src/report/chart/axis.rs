@@ -26,6 +26,8 @@ pub struct Axis {
     pub ticks: Ticks,
     /// Whether grid lines are drawn at the ticks.
     pub grid: bool,
+    /// Largest width of a tick label, in columns.
+    pub columns: usize,
 }
 
 impl Axis {
@@ -47,6 +49,7 @@ impl Axis {
             high,
             ticks: Ticks::Round,
             grid: true,
+            columns: super::frame::MAX_LABEL,
         }
     }
 
@@ -74,6 +77,13 @@ impl Axis {
             grid: false,
             ..Self::new(label, -0.5, names.len().max(1) as f64 - 0.5)
         }
+    }
+
+    /// Exchanges the ends, so that the first category is at the top of a y axis.
+    #[must_use]
+    pub fn reversed(mut self) -> Self {
+        (self.low, self.high) = (self.high, self.low);
+        self
     }
 
     /// Sets the ticks.

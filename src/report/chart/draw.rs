@@ -1,17 +1,15 @@
 //! Drawing of a panel: axes, marks, notes, legend.
 
 use super::frame::{Frame, MAX_LABEL, SAMPLE, TITLE_BASE};
+use super::labels;
 use super::look::{Look, Shape, ramp};
 use super::{Anchor, Colour, ColourBar, Mark, NORMAL, Note, Panel, SMALL, fitted, shortened};
-use super::{Span, Whisker};
+use super::{Span, Whisker, text_width};
 use crate::report::picture::{Path, Pen, Picture, Point, Text};
 use std::collections::BTreeSet;
 
 /// Half the width of an error bar's cap, px.
 const CAP: f64 = 4.0;
-
-/// A note with a larger vertical offset has a leader line, px.
-const LEADER: f64 = 10.0;
 
 /// Largest width of a note, in columns.
 const MAX_NOTE: usize = 80;
@@ -34,6 +32,7 @@ pub(super) fn panel(out: &mut Picture, panel: &Panel, frame: &Frame) {
     for n in &panel.notes {
         note(out, panel, frame, n);
     }
+    labels::draw(out, panel, frame);
     for (i, at) in &frame.legend {
         let series = &panel.series[*i];
         sample(out, &series.mark, series.look, *at);
@@ -65,6 +64,8 @@ fn fits(panel: &Panel, mark: &Mark) -> bool {
         Mark::ErrorBarsAcross(bars) => {
             (bars.iter()).all(|b| within(y, b.at) && within(x, b.low) && within(x, b.high))
         }
+        Mark::Area(edges) => (edges.iter())
+            .all(|(at, low, high)| within(x, *at) && within(y, *low) && within(y, *high)),
         Mark::Bars(all) => all.iter().all(spans),
         Mark::Heat { cells, .. } => cells.iter().all(|c| spans(&c.0)),
     }
@@ -93,10 +94,10 @@ fn axes(out: &mut Picture, panel: &Panel, f: &Frame) {
             continue;
         };
         lines.segment((x, f.bottom), (x, f.bottom + 4.0));
-        out.text(if f.slant > 0 {
+        out.text(if f.turned {
             Text {
-                angle: f.slant,
-                ..Text::new((x + 4.0, f.bottom + 15.0), label, SMALL, Anchor::End)
+                angle: 90,
+                ..Text::new((x + 4.0, f.bottom + 7.0), label, SMALL, Anchor::End)
             }
         } else {
             Text::new((x, f.bottom + 18.0), label, SMALL, Anchor::Middle)
@@ -116,13 +117,15 @@ fn axes(out: &mut Picture, panel: &Panel, f: &Frame) {
     }
     out.path(lines);
     if !panel.x.label.is_empty() {
-        let at = ((f.left + f.right) / 2.0, f.outer_bottom - 8.0);
-        let text = fitted(&panel.x.label, NORMAL, f.right - f.outer_left);
+        let text = fitted(&panel.x.label, NORMAL, f.outer_right - f.outer_left - 4.0);
+        let x = middle((f.left, f.right), (f.outer_left, f.outer_right), &text);
+        let at = (x, f.outer_bottom - 8.0);
         out.text(Text::new(at, &text, NORMAL, Anchor::Middle));
     }
     if !panel.y.label.is_empty() {
-        let at = (f.outer_left + 16.0, (f.top + f.bottom) / 2.0);
-        let text = fitted(&panel.y.label, NORMAL, f.outer_bottom - f.outer_top);
+        let text = fitted(&panel.y.label, NORMAL, f.outer_bottom - f.outer_top - 4.0);
+        let y = middle((f.top, f.bottom), (f.outer_top, f.outer_bottom), &text);
+        let at = (f.outer_left + 16.0, y);
         out.text(Text {
             angle: 90,
             ..Text::new(at, &text, NORMAL, Anchor::Middle)
@@ -136,6 +139,13 @@ fn axes(out: &mut Picture, panel: &Panel, f: &Frame) {
             ..Text::new(at, &text, NORMAL, Anchor::Start)
         });
     }
+}
+
+/// The middle of an axis, or as near to it as a label stays within the panel.
+fn middle(axis: (f64, f64), outer: (f64, f64), label: &str) -> f64 {
+    let half = text_width(label, NORMAL) / 2.0 + 2.0;
+    let middle = (axis.0 + axis.1) / 2.0;
+    middle.min(outer.1 - half).max(outer.0 + half)
 }
 
 fn mark(out: &mut Picture, panel: &Panel, f: &Frame, mark: &Mark, look: Look) {
@@ -170,6 +180,14 @@ fn mark(out: &mut Picture, panel: &Panel, f: &Frame, mark: &Mark, look: Look) {
                 Some((place(&(*low, *at))?, place(&(*high, *at))?))
             });
             whiskers(out, ends, (0.0, CAP), look);
+        }
+        Mark::Area(edges) => {
+            let above = edges.iter().map(|(at, _, high)| (*at, *high));
+            let below = edges.iter().rev().map(|(at, low, _)| (*at, *low));
+            let corners: Vec<Point> = above.chain(below).filter_map(|p| place(&p)).collect();
+            let mut area = Path::filled(look.colour);
+            area.polygon(&corners);
+            out.path(area.opacity(look.opacity));
         }
         Mark::Bars(spans) => {
             let mut boxes = Path::filled(look.colour);
@@ -282,17 +300,6 @@ fn note(out: &mut Picture, panel: &Panel, f: &Frame, n: &Note) {
     let (Some(x), Some(y)) = (f.x(&panel.x, n.at.0), f.y(&panel.y, n.at.1)) else {
         return;
     };
-    if n.by.1.abs() > LEADER {
-        // From the middle of the text to the edge of the marker.
-        let (dx, dy) = (n.by.0, n.by.1);
-        let length = dx.hypot(dy);
-        let mut leader = Path::drawn(Pen::new(Colour::GREY, 1.0));
-        leader.segment(
-            (x + dx * 6.0 / length, y + dy * 6.0 / length),
-            (x + dx, y + dy),
-        );
-        out.path(leader);
-    }
     let at = (x + n.by.0, y + n.by.1 + 4.0);
     out.text(Text {
         colour: n.colour,
@@ -320,7 +327,7 @@ fn sample(out: &mut Picture, mark: &Mark, look: Look, at: Point) {
             let ends = ((left, at.1), (right, at.1));
             whiskers(out, [ends].into_iter(), (0.0, CAP), look);
         }
-        Mark::Bars(_) | Mark::Heat { .. } => {
+        Mark::Area(_) | Mark::Bars(_) | Mark::Heat { .. } => {
             let mut sample = Path::filled(look.colour);
             sample.rectangle((left + 2.0, at.1 - 5.0), (left + 18.0, at.1 + 5.0));
             out.path(sample.opacity(look.opacity));

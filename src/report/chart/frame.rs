@@ -1,46 +1,39 @@
 //! Layout of panels, margins and legends.
 
 use super::axis::{Axis, Ticks};
-use super::{Figure, NORMAL, Panel, SMALL, fitted, text_width};
+use super::{Figure, NORMAL, Panel, SMALL, text_width};
 
 /// Smallest gap between two tick labels, px.
 const APART: f64 = 8.0;
 
-/// Largest width of a slanted label, px.
-const MAX_SLANTED: f64 = 140.0;
+/// Smallest distance of turned labels, px.
+const LINE: f64 = 13.0;
 
-/// An angle: degrees, cosine, sine.
-type Angle = (u8, f64, f64);
+/// Whether the labels of an x axis of `room` px fit side by side.
+fn fit(widest: f64, labels: usize, room: f64) -> bool {
+    (widest + APART) * labels as f64 <= room
+}
 
-/// Angles of slanted labels; the flatter one is used if it fits.
-const FLAT: Angle = (35, 0.819, 0.574);
-const STEEP: Angle = (60, 0.5, 0.866);
+/// Width of the widest name as a tick label, px.
+pub(in crate::report) fn widest(names: &[String], columns: usize) -> f64 {
+    (names.iter())
+        .map(|n| text_width(&super::shortened(n, columns), SMALL))
+        .fold(0.0, f64::max)
+}
 
-/// Smallest distance of the base lines of slanted labels, px.
-const LINE: f64 = 12.0;
-
-/// The angle of the labels of an x axis of `room` px; `None` if they fit horizontally.
-fn slant(widest: f64, labels: usize, room: f64) -> Option<Angle> {
-    if (widest + APART) * labels as f64 <= room {
-        None
-    } else if room / labels as f64 * FLAT.2 >= LINE {
-        Some(FLAT)
+/// Additional height for names below an x axis about `room` px wide, px: 0 if they fit
+/// side by side.
+pub(in crate::report) fn for_names(names: &[String], room: f64) -> f64 {
+    let widest = widest(names, MAX_LABEL);
+    if fit(widest, names.len(), room) {
+        0.0
     } else {
-        Some(STEEP)
+        widest
     }
 }
 
-/// Additional height for slanted labels of an x axis about `room` px wide, px.
-pub(in crate::report) fn for_names(names: &[String], room: f64) -> f64 {
-    let widths = names
-        .iter()
-        .map(|n| text_width(&super::shortened(n, MAX_LABEL), SMALL));
-    let widest = widths.fold(0.0, f64::max);
-    slant(widest, names.len(), room).map_or(0.0, |(_, _, sine)| sine * widest.min(MAX_SLANTED))
-}
-
-/// Largest width of a tick label, in columns.
-pub(super) const MAX_LABEL: usize = 24;
+/// Largest width of a label, in columns: the same everywhere.
+pub(in crate::report) const MAX_LABEL: usize = 36;
 
 /// Positions of the parts of a panel, px.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,8 +43,9 @@ pub(super) struct Frame {
     pub(super) top: f64,
     pub(super) right: f64,
     pub(super) bottom: f64,
-    /// Left edge of the panel.
+    /// Left and right edge of the panel.
     pub(super) outer_left: f64,
+    pub(super) outer_right: f64,
     /// Upper edge of the panel.
     pub(super) outer_top: f64,
     /// Lower edge of the panel.
@@ -59,8 +53,8 @@ pub(super) struct Frame {
     /// Ticks of x and y: value, label.
     pub(super) x_ticks: Vec<(f64, String)>,
     pub(super) y_ticks: Vec<(f64, String)>,
-    /// Slant of the labels of x, degrees.
-    pub(super) slant: u8,
+    /// Whether the labels of x are turned.
+    pub(super) turned: bool,
     /// Legend: index of the series, position of its sample.
     pub(super) legend: Vec<(usize, (f64, f64))>,
 }
@@ -79,15 +73,21 @@ impl Frame {
 pub(super) const SAMPLE: f64 = 26.0;
 const LEGEND_LINE: f64 = 18.0;
 
-/// The frames of all panels. All have the same left margin, and those of a row the same
-/// lower margin, so that axes are aligned.
+/// The frames of all panels. Those of a column have the same margins, so that axes are
+/// aligned; widths between the margins are proportional to [`Panel::breadth`].
 pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
-    let columns = figure.columns.max(1);
-    let cell_width = figure.width / columns as f64;
+    let columns = figure.columns.clamp(1, figure.panels.len().max(1));
+    let column = |j: usize| figure.panels.iter().skip(j).step_by(columns);
+    let most = |j: usize, of: fn(&Panel) -> f64| column(j).map(of).fold(0.0, f64::max);
+    let margins: Vec<(f64, f64)> = (0..columns)
+        .map(|j| (most(j, left_margin), most(j, right_margin)))
+        .collect();
+    let breadths: Vec<f64> = (0..columns).map(|j| most(j, |p| p.breadth)).collect();
+    let outside: f64 = margins.iter().map(|m| m.0 + m.1).sum();
+    let unit = (figure.width - outside).max(10.0) / breadths.iter().sum::<f64>().max(0.1);
     let rows: Vec<&[Panel]> = figure.panels.chunks(columns).collect();
     let share = |row: &[Panel]| row.iter().map(|p| p.share).fold(0.1, f64::max);
     let whole: f64 = rows.iter().map(|r| share(r)).sum();
-    let margin = figure.panels.iter().map(left_margin).fold(0.0, f64::max);
     // Panels in a grid have equal heights.
     let labelled = |row: &[Panel]| row.iter().any(|p| !p.x.label.is_empty());
     let anywhere = columns > 1 && labelled(&figure.panels);
@@ -95,14 +95,13 @@ pub(super) fn frames(figure: &Figure) -> Vec<Frame> {
     let mut top = 0.0;
     for row in rows {
         let height = figure.height * share(row) / whole;
+        let mut left = 0.0;
         for (j, panel) in row.iter().enumerate() {
-            let left = cell_width * j as f64;
+            let right = left + margins[j].0 + unit * breadths[j] + margins[j].1;
             let label = anywhere || labelled(row);
-            frames.push(frame(
-                panel,
-                (left, top, left + cell_width, top + height),
-                (margin, label),
-            ));
+            let outer = (left, top, right, top + height);
+            frames.push(frame(panel, outer, margins[j], label));
+            left = right;
         }
         top += height;
     }
@@ -115,90 +114,94 @@ fn left_margin(panel: &Panel) -> f64 {
     let widest = [2, 4, 6, 8, 10]
         .into_iter()
         .flat_map(|most| panel.y.marks(most))
-        .map(|(_, l)| text_width(&super::shortened(&l, MAX_LABEL), SMALL))
+        .map(|(_, l)| text_width(&super::shortened(&l, panel.y.columns), SMALL))
         .fold(0.0, f64::max);
     label + widest + 8.0
 }
 
-fn frame(panel: &Panel, outer: (f64, f64, f64, f64), (margin, label): (f64, bool)) -> Frame {
+fn right_margin(panel: &Panel) -> f64 {
+    match &panel.colour_bar {
+        Some(_) => 76.0,
+        None => 14.0,
+    }
+}
+
+fn frame(panel: &Panel, outer: (f64, f64, f64, f64), margins: (f64, f64), label: bool) -> Frame {
     let (outer_left, outer_top, outer_right, outer_bottom) = outer;
-    let left = outer_left + margin;
-    let right = outer_right
-        - match &panel.colour_bar {
-            Some(_) => 76.0,
-            None => 14.0,
-        };
+    let (left, right) = (outer_left + margins.0, outer_right - margins.1);
     let mut top = outer_top + if panel.title.is_empty() { 8.0 } else { 26.0 };
-    let legend = legend(panel, left, right, &mut top);
+    let legend = legend(panel, outer_left, (left, right), &mut top);
     let room = right - left;
-    let (x_ticks, angle) = x_ticks(&panel.x, room, left - outer_left);
-    let below = match (x_ticks.is_empty(), angle) {
+    let (x_ticks, turned) = x_ticks(&panel.x, room);
+    let below = match (x_ticks.is_empty(), turned) {
         (true, _) => 6.0,
-        (false, None) => 22.0,
-        (false, Some((_, _, sine))) => {
-            let widest = x_ticks
-                .iter()
-                .map(|(_, l)| text_width(l, SMALL))
-                .fold(0.0, f64::max);
-            // Plus the height of the letters.
-            widest * sine + 18.0
+        (false, false) => 22.0,
+        (false, true) => {
+            let widths = x_ticks.iter().map(|(_, l)| text_width(l, SMALL));
+            widths.fold(0.0, f64::max) + 12.0
         }
     };
     let label = if label { 22.0 } else { 4.0 };
     let bottom = (outer_bottom - below - label).max(top + 10.0);
     // At least 22 px from tick to tick.
     let most = ((bottom - top) / 22.0).floor().clamp(2.0, 10.0) as usize;
-    let shorten = |t: (f64, String)| (t.0, super::shortened(&t.1, MAX_LABEL));
+    let shorten = |t: (f64, String)| (t.0, super::shortened(&t.1, panel.y.columns));
     Frame {
         left,
         top,
         right: right.max(left + 10.0),
         bottom,
         outer_left,
+        outer_right,
         outer_top,
         outer_bottom,
         x_ticks,
         y_ticks: panel.y.marks(most).into_iter().map(shorten).collect(),
-        slant: angle.map_or(0, |a| a.0),
+        turned,
         legend,
     }
 }
 
-/// As many ticks as fit. Names that do not fit are slanted, and if they still do not fit
-/// only every n-th is shown. A slanted label extends at most `margin` px to the left
-/// of the axis.
-fn x_ticks(axis: &Axis, room: f64, margin: f64) -> (Vec<(f64, String)>, Option<Angle>) {
+/// As many ticks as fit, and whether their labels are turned. Names that do not fit side
+/// by side are turned, and if they still do not fit only every n-th is shown.
+fn x_ticks(axis: &Axis, room: f64) -> (Vec<(f64, String)>, bool) {
     let widest = |ticks: &[(f64, String)]| {
         let all = ticks.iter().map(|(_, l)| text_width(l, SMALL));
         all.fold(0.0, f64::max)
     };
     if let Ticks::At(given) = &axis.ticks {
-        let mut ticks: Vec<(f64, String)> = given
-            .iter()
-            .map(|(at, l)| (*at, super::shortened(l, MAX_LABEL)))
+        let ticks = given.iter();
+        let ticks: Vec<(f64, String)> = ticks
+            .map(|(at, l)| (*at, super::shortened(l, axis.columns)))
             .collect();
-        let angle = slant(widest(&ticks), ticks.len(), room);
-        if let Some((_, cosine, sine)) = angle {
-            let fit = (room * sine / LINE).floor().max(1.0) as usize;
-            let every = ticks.len().div_ceil(fit);
-            let short = |(at, label): (f64, String)| {
-                let before = margin + axis.share(at).unwrap_or(0.0) * room;
-                let most = MAX_SLANTED.min(before / cosine);
-                (at, fitted(&label, SMALL, most))
-            };
-            ticks = ticks.into_iter().step_by(every).map(short).collect();
+        if fit(widest(&ticks), ticks.len(), room) {
+            return (ticks, false);
         }
-        return (ticks, angle);
+        let every = ticks
+            .len()
+            .div_ceil((room / LINE).floor().max(1.0) as usize);
+        return (ticks.into_iter().step_by(every).collect(), true);
     }
     let ticks = (2..=10)
         .rev()
         .map(|most| axis.marks(most))
-        .find(|ticks| (widest(ticks) + APART) * ticks.len() as f64 <= room);
-    (ticks.unwrap_or_default(), None)
+        .find(|ticks| fit(widest(ticks), ticks.len(), room));
+    (ticks.unwrap_or_default(), false)
 }
 
-fn legend(panel: &Panel, left: f64, right: f64, top: &mut f64) -> Vec<(usize, (f64, f64))> {
+fn legend(
+    panel: &Panel,
+    outer_left: f64,
+    (left, right): (f64, f64),
+    top: &mut f64,
+) -> Vec<(usize, (f64, f64))> {
     let mut entries = Vec::new();
+    // Beside long names there is little room above the axes alone.
+    let left = if right - left < 240.0 {
+        left.min(outer_left + 8.0)
+    } else {
+        left
+    };
     let (mut x, mut y) = (left, *top + 10.0);
     for (i, series) in panel.series.iter().enumerate() {
         let Some(name) = &series.name else { continue };

@@ -2,6 +2,7 @@
 
 use super::{Canvas, Drawn, Scene, drawn, head, name};
 use crate::report::chart::{Axis, Look, Mark, PALETTE, Panel, Span};
+use crate::report::chart::{MAX_LABEL, widest};
 use crate::report::csv::digits;
 use study_core::analyze::group_id;
 
@@ -51,12 +52,20 @@ pub(super) fn histograms(scene: &Scene<'_>) -> Option<Drawn> {
         "rating" => String::new(),
         asked => format!(" of {asked}"),
     };
-    let caption = format!("Number of ratings{of} by realization. All panels have the same axes.");
+    let caption = format!(
+        "Number of ratings{of} by realization, in the order of {}. All panels have the same axes.",
+        scene.order()
+    );
     let title = format!("Counts of {} by realization", scene.asked);
     Some(drawn("histograms", caption, data, |c: Canvas| {
-        let columns = c.pick(3, 2).min(scene.models.len());
-        let rows = scene.models.len().div_ceil(columns);
-        let mut figure = c.figure("histograms", &title, 168.0 * rows as f64);
+        // As many columns as leave room for all titles.
+        let title_width = widest(&scene.names(), MAX_LABEL) * 1.1;
+        let columns = (1..=c.pick(4, 2))
+            .rev()
+            .find(|n| title_width <= c.width / f64::from(*n) - 50.0);
+        let rows = scene.models.len().div_ceil(columns.unwrap_or(1) as usize);
+        let columns = scene.models.len().div_ceil(rows);
+        let mut figure = c.figure("histograms", &title, c.pick(140.0, 120.0) * rows as f64);
         figure.columns = columns;
         for (j, (m, counts)) in scene.models.iter().zip(&counts).enumerate() {
             let under = j + columns >= scene.models.len();

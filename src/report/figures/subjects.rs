@@ -1,18 +1,13 @@
 //! Ratings by subject: a heat map, a line for each subject, repetitions.
 
-use super::{Canvas, Drawn, Scene, cell, drawn, head, name};
+use super::{Along, Canvas, Drawn, Scene, cell, drawn, head, name, rows_height};
 use crate::report::apa;
 use crate::report::chart::{
-    Axis, Colour, ColourBar, Look, Mark, Note, PALETTE, Panel, SMALL, Span, for_names, ramp, share,
-    shortened, text_width,
+    Axis, Colour, ColourBar, Look, MAX_LABEL, Mark, Note, PALETTE, Panel, SMALL, Span, for_names,
+    ramp, share, text_width, widest,
 };
 use std::collections::BTreeMap;
-use study_core::analyze::RealizationSummary;
 use study_stats::describe::mean;
-
-fn mean_of(scene: &Scene<'_>, subject: &str, model: &str) -> Option<f64> {
-    scene.cells.get(&(subject, model)).and_then(|x| mean(x))
-}
 
 /// The means of all cells, as CSV rows.
 fn table(scene: &Scene<'_>) -> Vec<Vec<String>> {
@@ -35,7 +30,7 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
     let mut found = Vec::new();
     for (j, m) in scene.models.iter().enumerate() {
         for (i, s) in scene.subjects.iter().enumerate() {
-            if let Some(mean) = mean_of(scene, s, &m.id) {
+            if let Some(mean) = scene.cell(s, &m.id) {
                 found.push(((j as f64, i as f64), mean));
             }
         }
@@ -46,127 +41,128 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
         (low, all().fold(f64::NEG_INFINITY, f64::max))
     });
     let caption = format!(
-        "Mean {} of each participant for each realization, over the repetitions. Darker is higher.",
-        scene.asked
+        "Mean {} of each participant for each realization, over the repetitions; realizations in \
+         the order of {}. Darker is higher.",
+        scene.asked,
+        scene.order()
     );
-    let title = format!("{} by subject and realization", scene.asked);
-    let rows = scene.subjects.len();
-    Some(drawn(
-        "subjects-and-realizations",
-        caption,
-        table(scene),
-        |c: Canvas| {
-            let boxes = found.iter().map(|((x, y), mean)| {
-                let span = Span {
-                    x: (x - 0.5, x + 0.5),
-                    y: (y - 0.5, y + 0.5),
-                };
-                (span, *mean)
-            });
-            let mut subjects = Axis::of_names("subject", &scene.subjects);
-            // The first one is at the top.
-            (subjects.low, subjects.high) = (subjects.high, subjects.low);
-            let heat = Mark::Heat {
-                cells: boxes.collect(),
-                low,
-                high,
-            };
-            let mut panel = Panel::new(Axis::of_names("realization", &scene.names()), subjects)
-                .with(Look::plain(PALETTE[0]), heat);
-            panel.colour_bar = Some(ColourBar {
-                label: scene.asked.clone(),
-                low,
-                high,
-            });
-            let widest = (scene.subjects.iter())
-                .map(|s| text_width(&shortened(s, 24), SMALL))
-                .fold(0.0, f64::max);
-            // Width without labels and legend; a cell below 26 px is too narrow for a number.
-            let room = c.width - widest - 110.0;
-            let wide = room / scene.models.len() as f64 >= 26.0;
-            if wide && high.abs() < 1000.0 && low.abs() < 1000.0 {
-                panel.notes = found
-                    .iter()
-                    .map(|(at, mean)| {
-                        let paper = ramp(share(*mean, low, high));
-                        Note::new(*at, &apa::number(*mean, 1)).on(paper)
-                    })
-                    .collect();
+    let title = format!("{} by participant and realization", scene.asked);
+    let subjects: Vec<String> = scene.subjects.iter().map(|s| (*s).to_owned()).collect();
+    let drawn = |c: Canvas| {
+        // Realizations stand at the left if they would not fit side by side.
+        let across = scene.across(c);
+        let (rows, columns) = if across {
+            (scene.names(), subjects.clone())
+        } else {
+            (subjects.clone(), scene.names())
+        };
+        let place = |(model, subject): (f64, f64)| {
+            if across {
+                (subject, model)
+            } else {
+                (model, subject)
             }
-            // Room for slanted names below the cells.
-            let below = for_names(&scene.names(), room);
-            let height = 70.0 + c.pick(22.0, 20.0) * rows.max(4) as f64 + below;
-            c.figure("subjects-and-realizations", &title, height)
-                .with(panel)
-        },
-    ))
-}
-
-/// The realizations, ordered by VAF if all have one.
-fn ordered<'s>(scene: &'s Scene<'_>) -> (Vec<&'s RealizationSummary>, bool) {
-    let mut models = scene.models.clone();
-    let by_vaf = models.iter().all(|m| m.vaf.is_some());
-    if by_vaf {
-        models.sort_by(|a, b| a.vaf.unwrap_or(0.0).total_cmp(&b.vaf.unwrap_or(0.0)));
-    }
-    (models, by_vaf)
+        };
+        let (x, y) = if across {
+            ("participant".to_owned(), "")
+        } else {
+            (scene.realizations(), "participant")
+        };
+        let boxes = found.iter().map(|(at, mean)| {
+            let (x, y) = place(*at);
+            let span = Span {
+                x: (x - 0.5, x + 0.5),
+                y: (y - 0.5, y + 0.5),
+            };
+            (span, *mean)
+        });
+        let heat = Mark::Heat {
+            cells: boxes.collect(),
+            low,
+            high,
+        };
+        // The first row is at the top.
+        let y = Axis::of_names(y, &rows).reversed();
+        let mut panel =
+            Panel::new(Axis::of_names(&x, &columns), y).with(Look::plain(PALETTE[0]), heat);
+        panel.colour_bar = Some(ColourBar {
+            label: scene.asked.clone(),
+            low,
+            high,
+        });
+        // Width without labels and legend; a cell below 26 px is too narrow for a number.
+        let room = c.width - widest(&rows, MAX_LABEL) - 110.0;
+        if room / columns.len() as f64 >= 26.0 && high.abs() < 1000.0 && low.abs() < 1000.0 {
+            panel.notes = found
+                .iter()
+                .map(|(at, mean)| {
+                    let paper = ramp(share(*mean, low, high));
+                    Note::new(place(*at), &apa::number(*mean, 1)).on(paper)
+                })
+                .collect();
+        }
+        let below = for_names(&columns, room);
+        let height = 56.0 + 18.0 * rows.len().max(4) as f64 + below;
+        c.figure("subjects-and-realizations", &title, height)
+            .with(panel)
+    };
+    let name = "subjects-and-realizations";
+    Some(super::drawn(name, caption, table(scene), drawn))
 }
 
 pub(super) fn lines(scene: &Scene<'_>) -> Option<Drawn> {
     if !scene.with_subjects() || scene.models.len() < 2 || scene.subjects.len() < 2 {
         return None;
     }
-    let (models, by_vaf) = ordered(scene);
-    let order = if by_vaf { " ordered by VAF" } else { "" };
     let caption = format!(
-        "Mean {} of each realization{order}, with a grey line for each participant. The thick line is \
-         the mean over participants.",
-        scene.asked
+        "Mean {} of each realization in the order of {}, with a grey line for each participant. \
+         The thick line is the {}mean over participants.",
+        scene.asked,
+        scene.order(),
+        scene.adjusted(),
     );
     let title = format!("{} by participant", scene.asked);
-    let names: Vec<String> = models.iter().map(|m| name(m)).collect();
+    let along = |get: &dyn Fn(&str) -> Option<f64>| -> Vec<(f64, f64)> {
+        let each = scene.models.iter().enumerate();
+        each.map(|(j, m)| (j as f64, get(&m.id).unwrap_or(f64::NAN)))
+            .collect()
+    };
     Some(drawn(
         "subject-lines",
         caption,
         table(scene),
         |c: Canvas| {
-            let label = if by_vaf {
-                "realization, from low to high VAF"
-            } else {
-                "realization"
-            };
-            let along = |get: &dyn Fn(&str) -> Option<f64>| -> Vec<(f64, f64)> {
-                let each = models.iter().enumerate();
-                each.map(|(j, m)| (j as f64, get(&m.id).unwrap_or(f64::NAN)))
-                    .collect()
-            };
-            let y = scene.ratings(&format!("{}, mean", scene.asked), &[]);
-            let y = if scene.a.scale.is_some() {
-                y
-            } else {
-                let all: Vec<f64> = scene.cells.values().filter_map(|x| mean(x)).collect();
-                scene.ratings(&y.label, &all)
-            };
-            let mut panel = Panel::new(Axis::of_names(label, &names), y);
-            let mut thin = Look::plain(Colour::GREY).stroke(1.2).size(4.0);
-            thin.opacity = 0.55;
+            let all: Vec<f64> = scene.cells.values().filter_map(|x| mean(x)).collect();
+            let values = scene.ratings(&format!("{}, mean", scene.asked), &all);
+            let names = Axis::of_names(&scene.realizations(), &scene.names());
+            let across = scene.across(c);
+            let mut panel = Along::new(across, names, values);
+            let mut thin = Look::plain(Colour::GREY).stroke(1.0);
+            thin.opacity = 0.5;
             for (i, s) in scene.subjects.iter().enumerate() {
-                let line = along(&|m| mean_of(scene, s, m));
-                let mark = Mark::Line(line.clone());
-                panel = if i == 0 {
-                    panel.named("one participant", thin, mark)
-                } else {
-                    panel.with(thin, mark)
-                };
-                panel = panel.with(thin, Mark::Points(line));
+                let line = along(&|m| scene.cell(s, m));
+                let name = (i == 0).then_some("one participant");
+                // A dot where both neighbours are missing, too.
+                let dots = Mark::Dots(line.clone());
+                panel = panel
+                    .with(name, thin, Mark::Line(line))
+                    .with(None, thin.stroke(3.5), dots);
             }
-            let over = along(&|m| scene.number(m, "subject_mean/mean"));
-            let thick = Look::plain(PALETTE[0]).stroke(3.0).size(9.0);
-            panel = panel
-                .named("mean over participants", thick, Mark::Line(over.clone()))
-                .with(thick, Mark::Points(over));
-            let height = c.pick(320.0, 290.0) + for_names(&names, c.width - 60.0);
-            c.figure("subject-lines", &title, height).with(panel)
+            let over = along(&|m| scene.mean(m));
+            let thick = Look::plain(PALETTE[0]).stroke(2.5).size(8.0);
+            let panel = panel
+                .with(
+                    Some("mean over participants"),
+                    thick,
+                    Mark::Line(over.clone()),
+                )
+                .with(None, thick, Mark::Points(over));
+            let height = if across {
+                rows_height(scene.models.len()) + 72.0
+            } else {
+                c.pick(290.0, 270.0)
+            };
+            c.figure("subject-lines", &title, height).with(panel.panel)
         },
     ))
 }
@@ -203,7 +199,7 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
     let digits = apa::decimals(v.number("order_trial/se").unwrap_or(0.0), 3);
     let slope = slope.map_or_else(String::new, |(b, p)| {
         format!(
-            " Adjusted for subjects and realizations, the rating changes by {} per trial, t test p {}.",
+            " Adjusted for participants and realizations, the rating changes by {} per trial, t test p {}.",
             apa::number(b, digits),
             apa::p(p)
         )
@@ -243,7 +239,7 @@ pub(super) fn order(scene: &Scene<'_>) -> Option<Drawn> {
             .iter()
             .map(|m| text_width(&name(m), SMALL) + 40.0);
         let lines = (names.sum::<f64>() / (c.width - 80.0)).ceil();
-        let height = c.pick(320.0, 340.0) + 18.0 * (lines - 1.0).max(0.0);
+        let height = c.pick(280.0, 230.0) + 18.0 * (lines - 1.0).max(0.0);
         c.figure("order", &title, height).with(panel)
     }))
 }

@@ -162,7 +162,7 @@ pub(super) fn exclusions(a: &Analysis, of_study: bool) -> Markup {
 pub(super) fn comments(a: &Analysis, lang: Option<&str>) -> Markup {
     html! {
         @if !a.comments.is_empty() {
-            section {
+            section.comments {
                 h2 { "Comments" }
                 p.note { "As typed. Control characters and characters that change the direction of text are shown as codes." }
                 @for group in a.comments.chunk_by(|x, y| x.model == y.model) {

@@ -1,6 +1,6 @@
 //! The style sheet. It refers to no other file.
 
-/// Dark on white; figures in two widths; wide tables scroll.
+/// Dark on white; figures in two widths, on paper two side by side; wide tables scroll.
 pub(super) const CSS: &str = "
 :root { color-scheme: only light; }
 * { box-sizing: border-box; }
@@ -51,12 +51,29 @@ footer { margin-top: 3rem; font-size: .85rem; border-top: 1px solid #bbb; paddin
   dd { margin-bottom: .4rem; }
 }
 @media print {
-  @page { size: A4; margin: 18mm 16mm; }
-  body { max-width: none; padding: 0; font-size: 10pt; }
-  .wide { display: block; }
-  .narrow { display: none; }
-  .scroll { overflow: visible; }
-  .apart { background: #fff; }
+  @page { size: A4; margin: 12mm 14mm; }
+  html { font-size: 8.5pt; }
+  body { max-width: none; padding: 0; font-size: 1rem; line-height: 1.3; }
+  h1 { font-size: 15pt; }
+  h2 { font-size: 11pt; margin: 4mm 0 1.2mm; }
+  h3 { font-size: 9pt; margin: 2mm 0 .3mm; }
+  p { margin: .6mm 0; }
+  table, dl, .note, .comments, footer { font-size: 7.5pt; }
+  th, td { padding: .2mm 2mm .2mm 0; }
+  figcaption { font-size: 8pt; margin-top: 0; }
+  dl { grid-template-columns: max-content 1fr max-content 1fr; gap: .3mm 3mm; margin: 1mm 0; }
+  details { padding: .8mm 2mm; margin: 1.5mm 0; }
+  blockquote { margin: .3mm 0; padding-left: 1.5mm; border-left-width: 1px; }
+  .comments { columns: 3; column-gap: 4mm; }
+  .comments h2, .comments > .note { column-span: all; }
+  .banner, .warning { padding: 1.5mm 3mm; margin: 2mm 0; }
+  .scroll { overflow: visible; margin: 2.5mm 0; }
+  .apart { background: #fff; margin-top: 5mm; }
+  .figures { columns: 2; column-gap: 5mm; }
+  .wide { display: none; }
+  .narrow { display: block; }
+  figure { margin: 0 0 2.5mm; }
+  footer { margin-top: 5mm; }
   h2, h3, caption, summary { break-after: avoid; }
   figure, .banner, .warning, blockquote, tr, .whole { break-inside: avoid; }
 }

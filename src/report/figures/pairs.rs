@@ -1,0 +1,145 @@
+//! Differences between realizations with their intervals.
+
+use super::{Canvas, Drawn, Scene, cell, drawn, head};
+use crate::report::chart::{Anchor, MAX_LABEL, Note, shortened, widest};
+use crate::report::chart::{Axis, Colour, Look, Mark, PALETTE, Panel, Shape, Whisker};
+use crate::report::csv::digits;
+use study_core::analyze::pair_id;
+
+/// A pair, the higher mean first.
+struct Pair<'a> {
+    higher: &'a str,
+    lower: &'a str,
+    difference: f64,
+    /// None where all differences are equal.
+    ci95: Option<(f64, f64)>,
+    /// Corrected for the number of pairs.
+    p: Option<f64>,
+}
+
+fn pairs<'a>(scene: &'a Scene<'_>) -> Vec<Pair<'a>> {
+    let v = &scene.a.values;
+    let tested: Vec<&str> = (scene.models.iter())
+        .filter(|m| m.tested)
+        .map(|m| m.id.as_str())
+        .collect();
+    let mut found = Vec::new();
+    for (i, a) in tested.iter().enumerate() {
+        for b in &tested[i + 1..] {
+            let id = pair_id("pair", a, b);
+            let number = |what: &str| v.number(&format!("{id}/{what}"));
+            let Some(difference) = number("difference") else {
+                continue;
+            };
+            let ci95 = v.interval(&format!("{id}/ci95"));
+            // The difference is that of the name that sorts first.
+            let (first, second) = (*a.min(b), *a.max(b));
+            let p = number("p_holm");
+            found.push(if difference < 0.0 {
+                Pair {
+                    higher: second,
+                    lower: first,
+                    difference: -difference,
+                    ci95: ci95.map(|(low, high)| (-high, -low)),
+                    p,
+                }
+            } else {
+                Pair {
+                    higher: first,
+                    lower: second,
+                    difference,
+                    ci95,
+                    p,
+                }
+            });
+        }
+    }
+    found.sort_by(|a, b| b.difference.total_cmp(&a.difference));
+    found
+}
+
+pub(super) fn forest(scene: &Scene<'_>) -> Option<Drawn> {
+    let pairs = pairs(scene);
+    if pairs.is_empty() || !scene.drawable() {
+        return None;
+    }
+    let mut data = vec![head([
+        "higher",
+        "lower",
+        "difference",
+        "ci95_lo",
+        "ci95_hi",
+        "p_holm",
+    ])];
+    for p in &pairs {
+        data.push(vec![
+            p.higher.to_owned(),
+            p.lower.to_owned(),
+            digits(p.difference),
+            cell(p.ci95.map(|e| e.0)),
+            cell(p.ci95.map(|e| e.1)),
+            cell(p.p),
+        ]);
+    }
+    let alpha = scene.a.alpha;
+    let significant = |p: &Pair<'_>| p.p.is_some_and(|p| p < alpha);
+    let tested = scene.models.iter().filter(|m| m.tested).count();
+    let which = if pairs.len() == tested * (tested - 1) / 2 {
+        "all pairs of realizations"
+    } else {
+        "the realization with the highest mean and each other one"
+    };
+    let caption = format!(
+        "Differences of mean {} between {which}, with 95 % intervals that are not corrected for \
+         the number of pairs. Filled: significant at {} after Holm's correction.",
+        scene.asked,
+        alpha.to_string().trim_start_matches('0'),
+    );
+    let title = format!("Differences of {} between realizations", scene.asked);
+    Some(drawn("pairs", caption, data, |c: Canvas| {
+        let columns = 2 * MAX_LABEL + 3;
+        let short = |name: &str| shortened(name, MAX_LABEL);
+        let names: Vec<String> = pairs
+            .iter()
+            .map(|p| format!("{} − {}", short(p.higher), short(p.lower)))
+            .collect();
+        // Names that would take most of the width stand above their bars.
+        let above = widest(&names, columns) > 0.5 * c.width;
+        let ends = pairs.iter().flat_map(|p| {
+            let (low, high) = p.ci95.unwrap_or((p.difference, p.difference));
+            [low, high, 0.0]
+        });
+        let mut rows = Axis::of_names("", &names).reversed();
+        rows.columns = columns;
+        let values = Axis::around(&format!("difference of mean {}", scene.asked), ends);
+        let (low, high) = (rows.low, rows.high);
+        let mut panel = Panel::new(values, rows);
+        if above {
+            panel.y = panel.y.bare();
+            let left = panel.x.low;
+            let notes = names.iter().enumerate().map(|(i, name)| {
+                let note = Note::new((left, i as f64), name).moved(4.0, -12.0);
+                note.anchored(Anchor::Start)
+            });
+            panel.notes = notes.collect();
+        }
+        let zero = Mark::Line(vec![(0.0, low), (0.0, high)]);
+        panel = panel.with(Look::plain(Colour::INK).stroke(1.0), zero);
+        let look = Look::plain(PALETTE[0]).stroke(1.5).size(8.0);
+        let bars = pairs.iter().enumerate().filter_map(|(i, p)| {
+            let ((low, high), at) = (p.ci95?, i as f64);
+            Some(Whisker { at, low, high })
+        });
+        panel = panel.with(look, Mark::ErrorBarsAcross(bars.collect()));
+        for filled in [true, false] {
+            let shown = pairs.iter().enumerate();
+            let shown = shown.filter(|(_, p)| significant(p) == filled);
+            let shape = if filled { Shape::Disc } else { Shape::Ring };
+            let points = shown.map(|(i, p)| (p.difference, i as f64)).collect();
+            panel = panel.with(Look { shape, ..look }, Mark::Points(points));
+        }
+        let row = if above { 28.0 } else { 17.0 };
+        let height = row * pairs.len().max(3) as f64 + 52.0;
+        c.figure("pairs", &title, height).with(panel)
+    }))
+}
