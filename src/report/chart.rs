@@ -18,9 +18,10 @@ mod labels;
 mod look;
 
 pub use super::picture::{Anchor, Colour, text_width};
+pub(in crate::report) use axis::MAX_LABEL;
 pub use axis::{Axis, Ticks};
 pub(in crate::report) use draw::share;
-pub(in crate::report) use frame::{MAX_LABEL, for_names, widest};
+pub(in crate::report) use frame::{for_names, widest};
 pub use look::{Dash, Look, PALETTE, Shape, ramp};
 
 use super::picture::Picture;

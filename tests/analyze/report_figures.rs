@@ -1,5 +1,7 @@
 //! The figures of a report: what they show, and in which order.
 
+#![allow(clippy::unwrap_used)]
+
 use super::report_support::{FIVE, analysis_of, ratings};
 use std::collections::BTreeSet;
 use study::report::figures::{self, Drawn};

@@ -2,6 +2,9 @@
 
 use crate::report::plot::step;
 
+/// Largest width of a label, in columns: the same everywhere.
+pub(in crate::report) const MAX_LABEL: usize = 36;
+
 /// The ticks of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ticks {
@@ -49,7 +52,7 @@ impl Axis {
             high,
             ticks: Ticks::Round,
             grid: true,
-            columns: super::frame::MAX_LABEL,
+            columns: MAX_LABEL,
         }
     }
 

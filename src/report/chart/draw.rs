@@ -1,6 +1,7 @@
 //! Drawing of a panel: axes, marks, notes, legend.
 
-use super::frame::{Frame, MAX_LABEL, SAMPLE, TITLE_BASE};
+use super::MAX_LABEL;
+use super::frame::{Frame, SAMPLE, TITLE_BASE};
 use super::labels;
 use super::look::{Look, Shape, ramp};
 use super::{Anchor, Colour, ColourBar, Mark, NORMAL, Note, Panel, SMALL, fitted, shortened};

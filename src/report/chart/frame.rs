@@ -1,6 +1,6 @@
 //! Layout of panels, margins and legends.
 
-use super::axis::{Axis, Ticks};
+use super::axis::{Axis, MAX_LABEL, Ticks};
 use super::{Figure, NORMAL, Panel, SMALL, text_width};
 
 /// Smallest gap between two tick labels, px.
@@ -31,9 +31,6 @@ pub(in crate::report) fn for_names(names: &[String], room: f64) -> f64 {
         widest
     }
 }
-
-/// Largest width of a label, in columns: the same everywhere.
-pub(in crate::report) const MAX_LABEL: usize = 36;
 
 /// Positions of the parts of a panel, px.
 #[derive(Debug, Clone, PartialEq)]

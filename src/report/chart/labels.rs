@@ -1,7 +1,7 @@
 //! Names of points, each beside its point or at the end of a line to it.
 
-use super::frame::{Frame, MAX_LABEL};
-use super::{Anchor, Colour, Mark, Panel, SMALL, shortened, text_width};
+use super::frame::Frame;
+use super::{Anchor, Colour, MAX_LABEL, Mark, Panel, SMALL, shortened, text_width};
 use crate::report::picture::{Path, Pen, Picture, Point, Text};
 
 /// Distances of a name from its point that are tried, px.
