@@ -179,14 +179,14 @@ fn kept_of(csv: &str, keep: impl Fn(&str) -> bool) -> String {
 fn a_single_participant_has_no_intervals() {
     let a = analysis_of(&ratings(1, &FIVE, |_, m, k| 1.0 + ((m * k) % 5) as f64));
     let text = words(&html(&a));
-    assert!(!text.contains("t intervals over subjects"), "{text}");
+    assert!(!text.contains("t intervals over participants"), "{text}");
     assert!(!text.contains("95 % t interval of the mean"), "{text}");
     for text in [text, terminal(&a)] {
         assert!(text.contains("nly one participant is analysed"), "{text}");
         assert!(text.contains("there is only one participant"), "{text}");
     }
     let two = analysis_of(&ratings(2, &FIVE, |s, m, k| 1.0 + ((m * k + s) % 5) as f64));
-    assert!(words(&html(&two)).contains("t intervals over subjects"));
+    assert!(words(&html(&two)).contains("t intervals over participants"));
     assert!(!terminal(&two).contains("nly one participant"));
 }
 

@@ -93,7 +93,7 @@ pub(super) fn forest(scene: &Scene<'_>) -> Option<Drawn> {
         "Differences of mean {} between {which}, with 95 % intervals that are not corrected for \
          the number of pairs. Filled: significant at {} after Holm's correction.",
         scene.asked,
-        alpha.to_string().trim_start_matches('0'),
+        crate::report::sentences::level(alpha),
     );
     let title = format!("Differences of {} between realizations", scene.asked);
     Some(drawn("pairs", caption, data, |c: Canvas| {
