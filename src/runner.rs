@@ -25,7 +25,7 @@ use study_core::outcome::Event;
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol};
 use study_core::session::{Effect, Ending, Input, Session, Unsaved, View, input::Claim};
-use study_core::store::{ClaimRequest, Receipt, SeatKind, StudyFolder};
+use study_core::store::{ClaimRequest, Copies, Receipt, SeatKind, StudyFolder};
 use study_haptics::model::Realization;
 
 /// Longest wait for an input while nothing else is expected: clocks on the screen move.
@@ -104,6 +104,8 @@ pub struct Runner {
     saved: u64,
     ended: Option<Ending>,
     receipt: Option<Receipt>,
+    /// What the session knows of results folder and mirror.
+    copies: Option<Copies>,
     /// Whether the time of a load depends on the realization.
     uneven_loads: bool,
     /// When the load under way was requested.
@@ -133,6 +135,7 @@ impl Runner {
             saved: 0,
             ended: None,
             receipt: None,
+            copies: None,
             uneven_loads,
             load_began: Duration::ZERO,
             loaded_due: None,
@@ -173,6 +176,7 @@ impl Runner {
         }
         self.poll_device();
         self.poll_saver();
+        self.poll_mirror();
         self.feed(Input::Tick);
         let ending = self.ended.clone()?;
         self.close();
@@ -387,6 +391,16 @@ impl Runner {
         for event in events {
             if let Some(input) = self.save_input(event) {
                 self.feed(input);
+            }
+        }
+    }
+
+    fn poll_mirror(&mut self) {
+        let copies = self.setup.study.copies();
+        if copies != self.copies {
+            self.copies.clone_from(&copies);
+            if let Some(Copies { results, mirror }) = copies {
+                self.feed(Input::Mirrored { results, mirror });
             }
         }
     }

@@ -89,6 +89,15 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             || study_folder::warnings(study, &sessions, Some(&loaded)),
         );
         let (mut input, damage) = (input?, damage?);
+        let counts = &input.analysis.counts;
+        if counts.real_rows == 0 && counts.pilots > 0 && !args.include.contains(&Who::Pilot) {
+            let path = study.path().display();
+            return Err(
+                Failure::input(format!("{path}: holds only pilots so far")).hint(format!(
+                    "`study analyze {path} --include pilot` analyzes them"
+                )),
+            );
+        }
         // The page contains these warnings; if it is not shown on a terminal, they are
         // also printed to standard error.
         if !console.terminal || args.json || args.comments {

@@ -16,6 +16,9 @@ pub(super) struct Args {
     /// Print one JSON document
     #[arg(long)]
     json: bool,
+    /// Show the margins of each certificate and the damping that the tables need
+    #[arg(long, conflicts_with = "json")]
+    verbose: bool,
 }
 
 /// The JSON document of `--json`.
@@ -106,14 +109,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return Err(failure);
     };
     console.findings(&findings);
+    console.out(certificates(&loaded, args.verbose))?;
     console.out(format!(
         "{}: ok, {}, {}, about {minutes:.0} minutes, {}\n",
         loaded.protocol.study.id,
         counted(loaded.protocol.models.len(), "model", "models"),
         counted(trials, "trial", "trials"),
         counted(warnings, "warning", "warnings"),
-    ))?;
-    console.out(certificates(&loaded))
+    ))
 }
 
 /// The tables that a device plays. A sample mounted by hand has none, even if the
@@ -151,17 +154,22 @@ fn certified(loaded: &load::Loaded) -> Vec<Certified<'_>> {
         .collect()
 }
 
-/// A line for each table that is played, with its certificate; notes about tables
-/// that fail theirs and about samples mounted by hand.
-fn certificates(loaded: &load::Loaded) -> String {
+/// A line for each table that is played, with its certificate and, if `verbose`, its
+/// margins; notes about tables that fail theirs and about samples mounted by hand.
+fn certificates(loaded: &load::Loaded, verbose: bool) -> String {
     let mut out = String::new();
     let (mut failing, mut tables) = (0, 0);
     for (id, realization) in played(loaded) {
         tables += 1;
         let certificate = realization.certificate();
         failing += usize::from(!certificate.passes());
-        out += &format!("{id}: {certificate}\n");
-        out += &format!("    {}\n", super::identify::required_damping(&certificate));
+        if verbose {
+            let damping = super::identify::required_damping(&certificate);
+            out += &format!("{id}: {certificate}\n    {damping}\n");
+        } else {
+            let verdict = if certificate.passes() { "PASS" } else { "FAIL" };
+            out += &format!("{id}: {verdict}\n");
+        }
     }
     if let (1.., Some(permission)) = (failing, &loaded.protocol.device.uncertified) {
         out += &format!(

@@ -10,7 +10,7 @@ use crate::device::virtual_device::{Options, VirtualDevice};
 use crate::device::{Device, DeviceError};
 use crate::tui;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use study_base::text::Untrusted;
 use study_core::protocol::{DeviceKind, Protocol};
@@ -79,6 +79,8 @@ struct DeviceConfig {
     serial: SerialConfig,
     #[serde(default)]
     process: ProcessConfig,
+    /// Folder on a second disk for `study run`.
+    mirror: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -106,9 +108,14 @@ impl DeviceConfig {
             let before = e.span().and_then(|span| text.get(..span.start));
             let line = before.map_or(1, |before| before.matches('\n').count() + 1);
             Failure::input(format!("{}:{line}: {}", path.display(), e.message()))
-                .hint("allowed are [serial] with port, baud, usb_serial and [process] with command")
+                .hint("allowed are mirror, [serial] with port, baud, usb_serial and [process] with command")
         })
     }
+}
+
+/// The mirror that `device.toml` names.
+pub(super) fn mirror() -> Result<Option<PathBuf>, Failure> {
+    Ok(DeviceConfig::read(Path::new(CONFIG_FILE))?.mirror)
 }
 
 impl DeviceAddress {

@@ -2,10 +2,11 @@
 
 use super::{Console, Failure, study_folder};
 use clap::ValueEnum;
-use std::path::PathBuf;
+use std::io::{self, IsTerminal as _};
+use std::path::{Path, PathBuf};
 use study_base::text::{ParticipantId, counted};
 use study_core::outcome::State;
-use study_core::store::{StateChange, StateRequest};
+use study_core::store::{StateChange, StateRequest, layout};
 
 /// Arguments of `study participant`.
 #[derive(Debug, clap::Args)]
@@ -24,6 +25,9 @@ pub(super) struct Args {
     /// part remains. Also deletes analysis/, which contains ratings and comments
     #[arg(long)]
     erase: bool,
+    /// Erase without asking
+    #[arg(long, requires = "erase")]
+    yes: bool,
 }
 
 /// The states that this command can set.
@@ -39,6 +43,8 @@ enum Settable {
     Excluded,
     /// Withdrew consent
     Withdrawn,
+    /// Takes back an exclusion or a drop-out
+    Reinstated,
 }
 
 impl From<Settable> for State {
@@ -49,6 +55,7 @@ impl From<Settable> for State {
             Settable::DroppedOut => Self::DroppedOut,
             Settable::Excluded => Self::Excluded,
             Settable::Withdrawn => Self::Withdrawn,
+            Settable::Reinstated => Self::Unfinished,
         }
     }
 }
@@ -69,12 +76,67 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         erase: args.erase,
     };
     let study = study_folder::one_study(&args.results)?;
+    if args.erase && !args.yes && !confirmed(study.path(), &request.participant, console)? {
+        return console.out("Nothing is erased.\n");
+    }
     let change = study.set_state(&request, study_folder::now())?;
     for notice in &change.notices {
         console.say(notice);
     }
     console.out(summary(&request, &change))?;
     study_folder::refresh(&study, console)
+}
+
+/// Lists what is erased and asks for the participant's id. True without a question if
+/// there is nothing to list: the store then says why.
+fn confirmed(
+    study: &Path,
+    participant: &ParticipantId,
+    console: &mut Console,
+) -> Result<bool, Failure> {
+    let mut listed = Vec::new();
+    list(&layout::participant(study, participant), &mut listed);
+    if listed.is_empty() {
+        return Ok(true);
+    }
+    list(&study.join(layout::ANALYSIS), &mut listed);
+    let names = listed
+        .iter()
+        .filter_map(|path| path.strip_prefix(study).ok());
+    let names: Vec<String> = names
+        .map(|name| format!("  {}\n", name.display()))
+        .collect();
+    console.out(format!(
+        "These files are erased and cannot be restored:\n{}",
+        names.concat()
+    ))?;
+    if !io::stdin().is_terminal() {
+        return Err(Failure::input(
+            "--erase asks for confirmation, and standard input is no terminal",
+        )
+        .hint("add --yes to erase without asking"));
+    }
+    console.out(format!("Type {participant} to erase them: "))?;
+    let mut typed = String::new();
+    let read = io::stdin().read_line(&mut typed);
+    read.map_err(|e| Failure::input(format!("standard input: {e}")))?;
+    Ok(typed.trim() == participant.as_str())
+}
+
+/// The files in a folder, in order; none if it cannot be read.
+fn list(folder: &Path, files: &mut Vec<PathBuf>) {
+    let Ok(items) = std::fs::read_dir(folder) else {
+        return;
+    };
+    let mut paths: Vec<PathBuf> = items.flatten().map(|item| item.path()).collect();
+    paths.sort();
+    for path in paths {
+        if path.is_dir() && !path.is_symlink() {
+            list(&path, files);
+        } else {
+            files.push(path);
+        }
+    }
 }
 
 /// What happened to the participant, their data and their row.
@@ -96,7 +158,7 @@ fn summary(request: &StateRequest, change: &StateChange) -> String {
             "The data of {id} were already erased on {when}; nothing else is changed. {left}{analysis}\n"
         );
     }
-    let state = request.state.as_str();
+    let state = change.after.as_str();
     let mut text = match change.before {
         Some(before) => format!("{id} was {} and is now {state}.", before.as_str()),
         None => format!("{id} is recorded as {state}."),

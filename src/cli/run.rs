@@ -13,7 +13,7 @@ use std::sync::Arc;
 use study_base::text::ParticipantId;
 use study_core::protocol::DeviceKind;
 use study_core::session::{Config, Ending, MAX_OPERATOR};
-use study_core::store::{Frozen, SeatKind, StoreError, StudyFolder, layout};
+use study_core::store::{Copies, Frozen, SeatKind, StoreError, StudyFolder, layout};
 
 /// Arguments of `study run`.
 #[derive(Debug, clap::Args)]
@@ -37,6 +37,10 @@ pub(super) struct Args {
     /// Folder for the results of all studies
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
+    /// Existing folder, on a second disk, for a copy of everything that is written
+    /// (default: mirror in device.toml)
+    #[arg(long, value_name = "DIR")]
+    mirror: Option<PathBuf>,
     /// Show whether telemetry arrives
     #[arg(long)]
     live: bool,
@@ -67,9 +71,22 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return Err(Failure::input(format!("{shown} is a file, not a folder"))
             .hint("--results names the folder for the results of all studies"));
     }
+    let mirror = match &args.mirror {
+        Some(mirror) => Some(mirror.clone()),
+        None => device_selection::mirror()?,
+    };
+    let open = || match &mirror {
+        Some(mirror) => StudyFolder::open_or_create_mirrored(&args.results, mirror, &frozen, at),
+        None => StudyFolder::open_or_create(&args.results, &frozen, at).map(|s| (s, Vec::new())),
+    };
     let begun = args.results.join(loaded.protocol.study.id.as_str());
+    let mut notices = Vec::new();
     let begun = match begun.join(layout::MANIFEST).exists() {
-        true => Some(StudyFolder::open_or_create(&args.results, &frozen, at)?),
+        true => {
+            let (study, caught_up) = open()?;
+            notices = caught_up;
+            Some(study)
+        }
         false => None,
     };
     if let (Some(study), Some(participant)) = (&begun, &participant) {
@@ -99,7 +116,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut tui = Tui::open(options).map_err(unusable)?;
     let study = match begun {
         Some(study) => study,
-        None => StudyFolder::open_or_create(&args.results, &frozen, at)?,
+        None => {
+            let (study, caught_up) = open()?;
+            notices = caught_up;
+            study
+        }
     };
     let folder = study.path().to_owned();
     // After a kill the tables may be older than the journals: update them first.
@@ -124,6 +145,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         operator: args.operator.clone().unwrap_or_default(),
         auto_identify: false,
     };
+    let study = setup.study.clone();
     let mut runner = Runner::new(setup, config);
     let ended = runner.run(&mut tui);
     let participant = runner.view().line.participant;
@@ -135,9 +157,36 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         unsaved::failure(&unsaved, &kept, &folder, &resume)
     });
     drop(tui);
-    match failure {
-        Some(failure) => Err(failure),
-        None => finish(console, &folder, &protocol, &ended.ending, &resume),
+    for notice in notices {
+        console.say(notice);
+    }
+    say_behind(&study, console);
+    if let Some(failure) = failure {
+        return Err(failure);
+    }
+    if let Some(receipt) = &ended.receipt {
+        console.out(format!(
+            "Receipt: {} records, {}\n",
+            receipt.seq, receipt.hash
+        ))?;
+    }
+    finish(console, &study, &protocol, &ended.ending, &resume)
+}
+
+/// Says which of results folder and mirror was left behind.
+fn say_behind(study: &StudyFolder, console: &mut Console) {
+    let Some(Copies { results, mirror }) = study.copies() else {
+        return;
+    };
+    for (folder, other, why) in [
+        ("results folder", "mirror", results),
+        ("mirror", "results folder", mirror),
+    ] {
+        if let Some(why) = why {
+            console.say(format!(
+                "warning: the {folder} was left behind: {why}; the {other} has everything that was saved, and the next `study run` brings the {folder} up to date"
+            ));
+        }
     }
 }
 
@@ -220,6 +269,7 @@ fn resume_command(args: &Args, participant: &str) -> String {
             .as_ref()
             .map(|r| format!("{}-{}", r.start(), r.end())),
     );
+    option("mirror", args.mirror.as_deref().map(path));
     option("operator", args.operator.clone());
     option(
         "participant",
@@ -241,15 +291,16 @@ fn resume_command(args: &Args, participant: &str) -> String {
 /// the next step, even if the tables cannot be written.
 fn finish(
     console: &mut Console,
-    folder: &std::path::Path,
+    study: &StudyFolder,
     protocol: &study_core::protocol::Protocol,
     ending: &Ending,
     resume: &str,
 ) -> Result<(), Failure> {
     let written = match ending {
         Ending::Nothing => Ok(()),
-        _ => StudyFolder::open(folder).and_then(|study| study.refresh(protocol).map(drop)),
+        _ => study.refresh(protocol).map(drop),
     };
+    let folder = study.path();
     let shown = folder.display();
     match ending {
         Ending::Finished => console.out(format!(
@@ -319,7 +370,7 @@ mod tests {
         let ending = Ending::Interrupted;
         let failure = finish(
             &mut console,
-            study.path(),
+            &study,
             &loaded.protocol,
             &ending,
             "study run X",

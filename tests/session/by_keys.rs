@@ -83,7 +83,14 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     let (code, out, err) = study(&["status", "results"], folder.path());
     assert_eq!(code, 0, "{out}{err}");
     assert!(out.contains("done"), "{out}");
-    let (code, out, err) = study(&["analyze", "results"], folder.path());
+    let (code, _, err) = study(&["analyze", "results"], folder.path());
+    assert_eq!(code, 1, "{err}");
+    assert!(
+        err.contains("only pilots") && err.contains("--include pilot"),
+        "{err}"
+    );
+    let analyze = ["analyze", "results", "--include", "pilot"];
+    let (code, out, err) = study(&analyze, folder.path());
     assert_eq!(code, 0, "{err}");
     assert!(out.contains("pilot"), "{out}");
 
@@ -149,4 +156,46 @@ fn shortened(folder: &Path) -> PathBuf {
 fn the_extended_study_with_the_same_and_its_consent_forms_practice_and_breaks() {
     let folder = tempfile::tempdir().unwrap();
     eventful(&shortened(folder.path()), "turn-signal-extended", 10);
+}
+
+#[test]
+fn an_erasure_lists_what_goes_and_asks_for_the_id() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = folder.path().join("paper");
+    changed_protocol("turn-signal", &protocol, &[PATIENT]);
+    let mut terminal = start(folder.path(), &protocol);
+    play_until(&mut terminal, "trial 2 of");
+    terminal.keys(F10);
+    terminal.wait_for("Are you sure?");
+    terminal.keys("y");
+    assert_eq!(terminal.exit_code(), 0);
+    let erase = [
+        "participant",
+        "results",
+        "P01",
+        "--state",
+        "withdrawn",
+        "--reason",
+        "asked",
+        "--erase",
+    ];
+    let journal = folder
+        .path()
+        .join("results/turn-signal/sessions/P01/1/journal.jsonl");
+    // without a terminal it is refused
+    let (code, out, err) = study(&erase, folder.path());
+    assert_eq!(code, 1, "{out}");
+    assert!(out.contains("sessions/P01/1/journal.jsonl"), "{out}");
+    assert!(err.contains("--yes"), "{err}");
+    for (typed, goes) in [("P02", false), ("", false), ("P01", true)] {
+        assert!(journal.exists());
+        let mut terminal = Terminal::start(&erase, folder.path(), 40, 80);
+        terminal.wait_for("Type P01 to erase them:");
+        assert!(terminal.screen().contains("sessions/P01/1/journal.jsonl"));
+        terminal.keys(&format!("{typed}\r"));
+        assert_eq!(terminal.exit_code(), 0);
+        let screen = terminal.screen();
+        assert_eq!(screen.contains("Nothing is erased."), !goes, "{screen}");
+        assert_eq!(journal.exists(), !goes);
+    }
 }

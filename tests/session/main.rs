@@ -12,6 +12,7 @@ mod flow;
 mod kill;
 #[path = "../store/memory.rs"]
 mod memory;
+mod mirror;
 mod rehearsed;
 #[path = "../support/mod.rs"]
 mod support;

@@ -155,6 +155,7 @@ pub(crate) fn view(screen: Screen) -> View {
             elapsed_s: 761.0,
             trials_saved: 6,
             trials_answered: 6,
+            mirror: None,
             all_saved: !matches!(screen, Screen::Saving | Screen::SaveTrouble { .. }),
         },
         banner: None,

@@ -259,7 +259,7 @@ fn participant_sets_a_state_and_refuses_what_is_no_id() {
             "Row 2 is assigned to the next participant",
         ));
     set("P01", "withdrawn")
-        .arg("--erase")
+        .args(["--erase", "--yes"])
         .assert()
         .success()
         .stdout(predicate::str::contains("erased"));
@@ -292,7 +292,7 @@ fn erasing_leaves_nothing_in_the_analysis_and_says_so_twice() {
     let erase = |state: &str| {
         let mut command = study_command();
         command.arg("participant").arg(results.path()).arg("P01");
-        command.args(["--state", state, "--reason", "asked", "--erase"]);
+        command.args(["--state", state, "--reason", "asked", "--erase", "--yes"]);
         command.assert()
     };
     erase("excluded")
@@ -485,4 +485,70 @@ fn a_folder_that_is_none_or_of_a_newer_version_is_refused() {
             .code(4)
             .stderr(predicate::str::contains("newer version of study"));
     }
+}
+
+/// An exclusion and a drop-out are taken back by another record; nothing is rewritten.
+#[test]
+fn a_participant_is_reinstated() {
+    let results = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let set = |id: &str, state: &str, code: i32| {
+        let mut command = study_command();
+        command.arg("participant").arg(&folder).arg(id);
+        command.args(["--state", state, "--reason", "a slip"]);
+        let done = command.assert().code(code);
+        let output = done.get_output().clone();
+        String::from_utf8([output.stdout, output.stderr].concat()).unwrap()
+    };
+    let ratings = || -> usize {
+        let mut command = study_command();
+        let done = command.args(["analyze", "--json"]).arg(&folder).assert();
+        let json: serde_json::Value =
+            serde_json::from_slice(&done.success().get_output().stdout).unwrap();
+        json["counts"]["rated"].as_u64().unwrap() as usize
+    };
+    let before = ratings();
+    let journal = |id: &str| {
+        let session = folder.join("sessions").join(id).join("1");
+        let mut text = String::new();
+        for name in ["journal.jsonl", "journal-2.jsonl", "journal-3.jsonl"] {
+            text += &std::fs::read_to_string(session.join(name)).unwrap_or_default();
+        }
+        text
+    };
+    // nothing to take back
+    let said = set("P01", "reinstated", 1);
+    assert!(said.contains("only an exclusion or a drop-out"), "{said}");
+    for (id, away, state) in [
+        ("P01", "excluded", "done"),
+        ("P02", "dropped-out", "unfinished"),
+    ] {
+        set(id, away, 0);
+        let old = journal(id);
+        let said = set(id, "reinstated", 0);
+        assert!(
+            said.contains(&format!("{id} was {away} and is now {state}.")),
+            "{said}"
+        );
+        assert!(journal(id).starts_with(&old) && journal(id).len() > old.len());
+    }
+    assert_eq!(ratings(), before);
+    study_command()
+        .arg("verify")
+        .arg(&folder)
+        .assert()
+        .success();
+    // the row went to somebody else in the meantime
+    set("P02", "dropped-out", 0);
+    let study = StudyFolder::open(&folder).unwrap();
+    assert_eq!(study.claim(&real("P03")).unwrap().seat.row(), Some(2));
+    let said = set("P02", "reinstated", 0);
+    assert!(
+        said.contains("row 2 was assigned to P03 in the meantime"),
+        "{said}"
+    );
+    // whoever withdrew stays away
+    set("P02", "withdrawn", 0);
+    let said = set("P02", "reinstated", 1);
+    assert!(said.contains("only an exclusion or a drop-out"), "{said}");
 }

@@ -80,6 +80,7 @@ pub struct Session {
     /// Forms and messages completed in this process, in addition to the history.
     passed: BTreeSet<flow::Step>,
     notice: Option<String>,
+    mirror: Option<view::Mirror>,
     /// When the session's folder was claimed.
     opened: Option<Moment>,
     /// Both clocks at the last comparison that showed no step.
@@ -120,6 +121,7 @@ impl Session {
             saves: SaveState::default(),
             passed: BTreeSet::new(),
             notice: None,
+            mirror: None,
             opened: None,
             clock: at,
             overlaid_since: None,
@@ -181,6 +183,7 @@ impl Session {
             }
             Input::Claimed(claim) => self.claimed(*claim, at),
             Input::ClaimRefused(why) => self.claim_refused(&why),
+            Input::Mirrored { results, mirror } => self.mirrored(results, mirror),
             Input::Notice(what) => self.notify(what),
             Input::RetrySave => self.retry_save(),
             Input::Advance => self.advance_or_dismiss(at),
@@ -222,6 +225,7 @@ fn is_deliberate(input: &Input) -> bool {
         input,
         Input::Tick
             | Input::Notice(_)
+            | Input::Mirrored { .. }
             | Input::Saved { .. }
             | Input::Claimed(_)
             | Input::DeviceLoaded

@@ -7,7 +7,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
-use study_core::session::view::{Banner, DeviceState, StatusLine, Telemetry};
+use study_core::session::view::{Banner, DeviceState, Mirror, StatusLine, Telemetry};
 use study_core::session::{Screen, View};
 
 /// The status line, in the last row.
@@ -77,10 +77,20 @@ impl Widget for &Status<'_> {
                 ));
             } else if answered > 0 {
                 spans.push(Span::styled(" · saved ", quiet));
-                spans.push(Span::styled("✓", self.theme.saved()));
+                let mark = match line.mirror {
+                    Some(Mirror::InStep) => "✓✓",
+                    _ => "✓",
+                };
+                spans.push(Span::styled(mark, self.theme.saved()));
                 spans.push(Span::styled(format!(" {saved} of {answered}"), quiet));
             }
         }
+        let behind = match line.mirror {
+            Some(Mirror::OnlyResults) => " · NO MIRROR",
+            Some(Mirror::OnlyMirror) => " · ONLY IN MIRROR",
+            Some(Mirror::InStep) | None => "",
+        };
+        spans.push(Span::styled(behind, self.theme.trouble_frame()));
         centre(buf, inside, &Line::from(spans));
 
         let help = vec![

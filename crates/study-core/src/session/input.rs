@@ -100,6 +100,13 @@ pub enum Input {
     },
     /// Saving failed; no later event is acknowledged.
     SaveFailed(String),
+    /// Results folder and mirror are both up to date, or why one is not.
+    Mirrored {
+        /// Why the results folder is not.
+        results: Option<String>,
+        /// Why the mirror is not.
+        mirror: Option<String>,
+    },
     /// A message to the operator without other effect, such as telemetry that could
     /// not be written.
     Notice(String),

@@ -162,6 +162,15 @@ impl Session {
             constraint_broken,
         };
         self.record(reopened, at);
+        let total = self.history.planned_total(false);
+        let greeting = format!(
+            "welcome back: {} of {total} trials are saved",
+            self.history.completed().count()
+        );
+        self.notice = Some(match self.notice.take() {
+            Some(notice) => format!("{notice} · {greeting}"),
+            None => greeting,
+        });
         if choice == Some(Choice::DropOut) {
             self.drop_out("did not come back", at);
         }

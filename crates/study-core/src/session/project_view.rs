@@ -162,6 +162,7 @@ impl Session {
             ),
             trials_answered: count(self.history.completed()),
             all_saved: self.saves.all_saved(),
+            mirror: self.mirror,
         }
     }
 

@@ -1,6 +1,7 @@
 //! Saving and leaving: the session ends only after its events are on disk.
 
 use super::phase::{CLOCK_STEP_S, LEAVE_WITHIN_S, Phase};
+use super::view::Mirror;
 use super::{Effect, Ending, Session};
 use crate::outcome::{Event, Failure, Moment};
 use std::collections::{BTreeMap, VecDeque};
@@ -54,6 +55,19 @@ impl Session {
             self.saves.retrying = false;
         }
         self.proceed_if_saved(at);
+    }
+
+    pub(super) fn mirrored(&mut self, results: Option<String>, mirror: Option<String>) {
+        let (state, folder, why) = match (results, mirror) {
+            (None, None) => return self.mirror = Some(Mirror::InStep),
+            (None, Some(why)) => (Mirror::OnlyResults, "the mirror", why),
+            (Some(why), _) => (Mirror::OnlyMirror, "the results folder", why),
+        };
+        self.mirror = Some(state);
+        let why = self.sanitized(&why);
+        self.notify(format!(
+            "{folder} is not written any more ({why}); answers are saved in the other one"
+        ));
     }
 
     /// Leaves [`Phase::Saving`] and [`Phase::Leaving`] once everything is on disk.

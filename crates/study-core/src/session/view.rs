@@ -72,6 +72,19 @@ pub struct StatusLine {
     pub trials_answered: u32,
     /// Whether every event is on disk.
     pub all_saved: bool,
+    /// The state of the mirror; `None` without one.
+    pub mirror: Option<Mirror>,
+}
+
+/// Which of results folder and mirror are up to date.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mirror {
+    /// Both.
+    InStep,
+    /// Only the results folder.
+    OnlyResults,
+    /// Only the mirror.
+    OnlyMirror,
 }
 
 /// The state of the device as far as the session knows it.

@@ -10,6 +10,7 @@ use super::sessions::SessionData;
 use super::tombstone::{ErasedSession, Tombstone};
 use super::{StudyFolder, layout};
 use crate::outcome::{Event, Moment, State};
+use crate::protocol::Seat;
 use chrono::{DateTime, FixedOffset};
 use std::path::Path;
 use study_base::text::ParticipantId;
@@ -19,7 +20,8 @@ use study_base::text::ParticipantId;
 pub struct StateRequest {
     /// Participant.
     pub participant: ParticipantId,
-    /// New state.
+    /// New state. [`State::Unfinished`] takes back an exclusion or a drop-out: the
+    /// participant then has the state that the session determines.
     pub state: State,
     /// Reason.
     pub reason: String,
@@ -32,6 +34,8 @@ pub struct StateRequest {
 pub struct StateChange {
     /// State before; `None` for a participant without a session.
     pub before: Option<State>,
+    /// State from now on.
+    pub after: State,
     /// The row that the next participant gets, if one became free.
     pub freed_row: Option<u32>,
     /// Number of sessions whose data were erased.
@@ -68,6 +72,7 @@ impl StudyFolder {
             self.disk.sync_folder(&folder).at(&folder)?;
             return Ok(StateChange {
                 before: Some(stone.state),
+                after: stone.state,
                 freed_row: None,
                 erased: self.remove_sessions(id)?,
                 erased_before: Some(stone.erased_at),
@@ -80,17 +85,26 @@ impl StudyFolder {
         let before = last.map(|s| s.standing().state);
         let freed_row = last.and_then(SessionData::held_row);
         let mut notices = Vec::new();
+        let after = match (request.state, last) {
+            (State::Unfinished, Some(last)) => self.reinstated(last, &mut notices)?,
+            (state, _) => state,
+        };
         let (mut erased, mut analysis_removed) = (0, false);
         if request.erase {
             erased = self.erase(request, &own, at)?;
             analysis_removed = self.remove_analysis()?;
         } else {
             let number = last.map_or(1, |s| s.session);
-            self.append_state(request, last.is_none(), number, at, &mut notices)?;
+            let event = Event::StateSet {
+                state: after,
+                reason: request.reason.clone(),
+            };
+            self.append_state(id, last.is_none(), number, at, &event, &mut notices)?;
         }
         Ok(StateChange {
             before,
-            freed_row,
+            after,
+            freed_row: freed_row.filter(|_| !after.keeps_row()),
             erased,
             erased_before: None,
             analysis_removed,
@@ -121,7 +135,16 @@ impl StudyFolder {
         };
         let started = last.history.start().is_some();
         match request.state {
-            State::Unfinished | State::Done => refused("only a session sets this state"),
+            State::Done => refused("only a session sets this state"),
+            State::Unfinished => {
+                let consent = last.history.consent.as_ref();
+                match last.standing().state {
+                    _ if request.erase => refused("nothing is erased of who is reinstated"),
+                    _ if consent.is_some_and(|c| !c.accepted) => refused("consent was refused"),
+                    State::Excluded | State::DroppedOut => Ok(()),
+                    _ => refused("only an exclusion or a drop-out can be taken back"),
+                }
+            }
             State::Void if last.history.has_rating() => {
                 refused("a trial has been rated; use dropped-out or excluded")
             }
@@ -131,6 +154,30 @@ impl StudyFolder {
             }
             _ => Ok(()),
         }
+    }
+
+    /// The state that a session determines by itself; says who has its row now.
+    fn reinstated(
+        &self,
+        session: &SessionData,
+        notices: &mut Vec<String>,
+    ) -> Result<State, StoreError> {
+        let row = session.seat.and_then(Seat::row);
+        for other in self.sessions()? {
+            if row.is_some() && other.held_row() == row {
+                notices.push(format!(
+                    "row {} was assigned to {} in the meantime: both have its order",
+                    row.unwrap_or_default(),
+                    other.participant
+                ));
+            }
+        }
+        let finished = session.entries.iter().any(|e| e.event == Event::Finished);
+        Ok(if finished {
+            State::Done
+        } else {
+            State::Unfinished
+        })
     }
 
     fn near(&self, id: &ParticipantId) -> Result<Option<ParticipantId>, StoreError> {
@@ -144,29 +191,26 @@ impl StudyFolder {
     /// gets a folder without a seat.
     fn append_state(
         &self,
-        request: &StateRequest,
+        participant: &ParticipantId,
         new: bool,
         number: u32,
         at: Moment,
+        event: &Event,
         notices: &mut Vec<String>,
     ) -> Result<(), StoreError> {
         if new {
-            let folder = layout::session(&self.path, &request.participant, number);
-            self.make_session(&request.participant, &folder)?;
+            let folder = layout::session(&self.path, participant, number);
+            self.make_session(participant, &folder)?;
         }
-        let lock = self.lock_session(&request.participant, number)?;
+        let lock = self.lock_session(participant, number)?;
         let mut recovered = journal::recover(&lock)?;
         notices.append(&mut recovered.notices);
         let is_new = recovered.replay.records == 0;
         let mut journal = Journal::open(lock, recovered)?;
         if is_new {
-            journal.records(&[self.claim_record(&request.participant, number, None)])?;
+            journal.records(&[self.claim_record(participant, number, None)])?;
         }
-        let event = Event::StateSet {
-            state: request.state,
-            reason: request.reason.clone(),
-        };
-        journal.append(at, &event)?;
+        journal.append(at, event)?;
         Ok(())
     }
 
