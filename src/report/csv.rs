@@ -1,5 +1,7 @@
 //! The CSV tables of `analysis/` (RFC 4180). Text is stored as typed.
 
+mod test_table;
+
 use super::Source;
 use study_core::analyze::{Analysis, MAX_PAIRED, Value, group_id, pair_id};
 
@@ -16,6 +18,7 @@ pub struct TableFile {
 pub fn tables(source: &Source, analysis: &Analysis) -> Vec<TableFile> {
     vec![
         table("descriptives.csv", descriptives(analysis)),
+        table("tests.csv", test_table::rows(analysis)),
         table("correlation.csv", identified(analysis, &CORRELATION)),
         table("pairs.csv", pairs(analysis)),
         table("variance.csv", identified(analysis, &VARIANCE)),

@@ -57,7 +57,7 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
     }
     out += &all_answers(a, width, paint);
     // The head and the answers contain these.
-    let shown = ["no-participants", "few-realizations"];
+    let shown = ["no-participants", "few-realizations", "raw-and-adjusted"];
     let warnings = a.warnings.iter().filter(|w| !shown.contains(&w.code));
     for w in warnings.clone() {
         let text = wrap(&Untrusted(&w.text).to_string(), width, "! ", "  ");

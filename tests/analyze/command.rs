@@ -98,6 +98,7 @@ fn tables_go_where_out_says() {
         "ratings_used.csv",
         "report.html",
         "subjects.csv",
+        "tests.csv",
         "values.json",
         "variance.csv",
         "with_and_without.csv",

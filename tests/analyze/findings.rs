@@ -10,7 +10,9 @@ use study::report::json;
 use study::report::text::{Page, page};
 use study_base::rng::Stream;
 use study_core::analyze::findings::Direction;
-use study_core::analyze::{Analysis, Finding, Question, Rules, TestKind, Verdict, analyze};
+use study_core::analyze::{
+    Analysis, Finding, Include, Question, Rules, TestKind, Verdict, analyze,
+};
 use study_core::outcome::ratings::Ratings;
 
 /// Random numbers of a design.
@@ -375,6 +377,73 @@ fn the_level_of_significance_is_that_of_the_protocol() {
     assert!(!page.contains("The level of significance is .05"), "{page}");
     // Two realizations: ε is 1 by definition.
     assert!(!page.contains("ε = "), "{page}");
+}
+
+#[test]
+fn level_and_construct_come_from_the_protocol() {
+    let mut protocol = crate::designs::design(3, 1, study_core::protocol::Order::Blocked);
+    let rules = |p: &study_core::protocol::Protocol| Rules::of(p, "realism", Include::default());
+    assert_eq!(
+        (rules(&protocol).alpha, rules(&protocol).construct),
+        (0.05, None)
+    );
+    protocol.analysis.alpha = Some(0.01);
+    protocol.analysis.construct = Some("pleasantness".to_owned());
+    let rules = rules(&protocol);
+    assert_eq!(rules.alpha, 0.01);
+    let rows: Vec<_> = (0..6)
+        .flat_map(|s| (0..3).map(move |m| (s, m, 1, (m + s % 2) as f64)))
+        .collect();
+    let csv = rating_table(&rows, |m| Some(0.7 + 0.1 * m as f64));
+    let ratings = Ratings::read_csv("data.csv", csv.as_bytes(), None).unwrap();
+    let a = analyze(
+        &ratings,
+        &Rules {
+            planned: None,
+            ..rules
+        },
+    );
+    let printed = Printed::of(&a);
+    for text in [&printed.terminal, &printed.html] {
+        assert!(
+            text.contains("Which realization is rated highest in pleasantness?"),
+            "{text}"
+        );
+        assert!(text.contains("Does VAF predict pleasantness?"), "{text}");
+        assert!(!text.contains("feel like the target"), "{text}");
+    }
+    assert_eq!(printed.json["alpha"], 0.01);
+}
+
+/// Every finding and every pair, with the p on which it rests.
+#[test]
+fn the_table_of_tests_has_all_findings() {
+    let a = lenient_and_severe();
+    let tables = study::report::csv::tables(&source(), &a);
+    let table = tables.iter().find(|t| t.name == "tests.csv").unwrap();
+    let mut reader = csv_lines(&table.content);
+    let head = reader.remove(0);
+    let column = |name: &str| head.iter().position(|h| h == name).unwrap();
+    for f in &a.findings {
+        let row = reader.iter().find(|r| r[0] == f.question.id()).unwrap();
+        assert_eq!(row[column("verdict")], f.verdict.as_str());
+        let p = row[column("p")].parse::<f64>().ok();
+        assert_eq!(p, f.test.as_ref().map(|t| t.p));
+    }
+    let pairs = reader.iter().filter(|r| r[0] == "pairs").count();
+    assert_eq!(pairs, 1 + a.pairs.len());
+    let crossed = reader
+        .iter()
+        .find(|r| r[1] == "mixed-model-crossed")
+        .unwrap();
+    let slope = a.values.number("lmm_vaf_crossed/slope").unwrap();
+    assert_eq!(crossed[column("estimate")].parse::<f64>().unwrap(), slope);
+    assert_eq!(crossed[column("deciding")], "false");
+}
+
+fn csv_lines(text: &str) -> Vec<Vec<String>> {
+    let fields = |line: &str| line.split(',').map(str::to_owned).collect();
+    text.lines().map(fields).collect()
 }
 
 #[test]

@@ -162,6 +162,8 @@ fn realizations(a: &Analysis) -> HtmlTable {
         "median",
         "95 % CI",
     ];
+    let adjusted = !a.design.is_complete();
+    head.extend(adjusted.then_some("adjusted mean"));
     head.extend(share.as_deref());
     let mut table = HtmlTable::new("Ratings by realization", &head);
     let mut listed: Vec<&RealizationSummary> = a.realizations.iter().collect();
@@ -181,6 +183,9 @@ fn realizations(a: &Analysis) -> HtmlTable {
             show(get("median"), 1),
             apa::interval_or_dash(ci, apa::two),
         ];
+        if adjusted {
+            row.push(show(a.about("adjusted", &[&m.id], "mean"), 3));
+        }
         if share.is_some() {
             let s = a.about("realistic", &[&m.id], "share");
             row.push(apa::or_dash(s, apa::percent));
