@@ -40,7 +40,7 @@ fn table(people: &[(&str, [u8; 6], &str)]) -> Ratings {
 fn people() -> Ratings {
     table(&[
         //       A  B  C  R  L  D
-        ("P1", [2, 4, 6, 7, 1, 2], "9"),
+        ("P1", [2, 4, 6, 7, 1, 2], "2"),
         ("P2", [3, 4, 6, 7, 1, 3], "1"),
         ("P3", [3, 5, 7, 6, 2, 4], ""),
         ("P4", [4, 4, 4, 4, 4, 4], "9"),
@@ -75,6 +75,7 @@ fn each_rule_excludes_exactly_the_participants_it_describes() {
     assert_eq!(of(Exclusion::HiddenReferenceBelow(4.0)), all("P5"));
     // D and A are 5 apart for P5, 1 for P3, 0 for the others.
     assert_eq!(of(Exclusion::Inconsistent(1.0)), all("P5"));
+    // P1 has exactly 2 strokes.
     assert_eq!(of(Exclusion::StrokesBelow(2.0)), (vec!["P2".to_owned()], 1));
     assert_eq!(of(Exclusion::HiddenReferenceBelow(2.0)), (vec![], 0));
 }

@@ -274,4 +274,17 @@ mod tests {
         };
         assert_eq!(what.chars().count(), MAX_TEXT + 1);
     }
+
+    #[test]
+    fn a_line_has_at_most_so_many_samples() {
+        let line = |n: usize| {
+            let rows = vec!["[0,1,2,3,null]"; n].join(",");
+            format!(r#"{{"say":"samples","load":1,"samples":[{rows}]}}"#)
+        };
+        assert!(read(line(MAX_SAMPLES).as_bytes()).is_ok());
+        assert!(matches!(
+            read(line(MAX_SAMPLES + 1).as_bytes()),
+            Err(MessageError::TooManySamples)
+        ));
+    }
 }

@@ -356,4 +356,21 @@ mod tests {
         protocol.models[1].role = Role::Practice;
         assert!(messages(&protocol).contains(&"`B` is never played".to_owned()));
     }
+
+    #[test]
+    fn a_break_that_never_occurs_gives_a_warning() {
+        let mut protocol = example::protocol(8, 2);
+        for (every, warned) in [(15, false), (16, true), (17, true)] {
+            protocol.design.breaks = Some(Breaks {
+                every,
+                at_least_s: 60.0,
+            });
+            let found = messages(&protocol);
+            assert_eq!(
+                found.iter().any(|m| m.starts_with("no break occurs")),
+                warned,
+                "{every}: {found:?}"
+            );
+        }
+    }
 }
