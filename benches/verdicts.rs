@@ -1,0 +1,429 @@
+//! How often the verdicts of `analyze`, and the tests behind them, say yes.
+//!
+//! `cargo bench --bench verdicts -- --studies 10000 --power 1000` simulates this many
+//! studies without an effect in each design, and so many with one. Ratings are whole
+//! numbers from 1 to 7. The seed is fixed: the same numbers of studies print the same
+//! tables for any number of threads. docs/calibration.md has the results.
+#![allow(clippy::print_stdout)]
+
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use study_base::rng::Stream;
+use study_core::analyze::{Rules, analyze};
+use study_core::outcome::ratings::Ratings;
+use study_stats::carry_over::{OrderedRating, carry_over};
+use study_stats::clm::{CategoryCount, CategoryCounts, Predictor};
+use study_stats::clmm::clmm_crossed;
+use study_stats::disagreement::disagreement;
+use study_stats::lmm::{CellSummary, FixedEffects, LmmData, slope_variance};
+
+/// Which cells are missing.
+#[derive(Clone, Copy)]
+enum Missing {
+    /// None.
+    None,
+    /// Each with probability 0.2.
+    Random,
+    /// Two of five: each participant rates another triple.
+    Blocks,
+}
+
+/// A design, and how its participants differ.
+#[derive(Clone, Copy)]
+struct World {
+    name: &'static str,
+    participants: u32,
+    realizations: usize,
+    repetitions: u32,
+    missing: Missing,
+    /// Standard deviation of participants' preferences.
+    taste: f64,
+    /// Half of the participants rate higher with VAF, half lower: by this per standard
+    /// deviation of VAF.
+    camps: f64,
+}
+
+const COMPLETE: World = World {
+    name: "complete",
+    participants: 10,
+    realizations: 5,
+    repetitions: 3,
+    missing: Missing::None,
+    taste: 0.5,
+    camps: 0.0,
+};
+const RANDOM: World = World {
+    name: "random",
+    missing: Missing::Random,
+    ..COMPLETE
+};
+const BLOCKS: World = World {
+    name: "blocks",
+    missing: Missing::Blocks,
+    ..COMPLETE
+};
+const FEW: World = World {
+    name: "few",
+    participants: 5,
+    realizations: 12,
+    repetitions: 1,
+    ..COMPLETE
+};
+const CAMPS: World = World {
+    name: "camps",
+    camps: 0.7,
+    ..COMPLETE
+};
+const CAMPS_RANDOM: World = World {
+    name: "camps, random",
+    missing: Missing::Random,
+    ..CAMPS
+};
+const EIGHT: World = World {
+    name: "eight",
+    realizations: 8,
+    ..COMPLETE
+};
+const ALIKE: World = World {
+    name: "alike",
+    taste: 0.0,
+    ..COMPLETE
+};
+
+/// What the realizations have in common for all participants.
+#[derive(Clone, Copy, PartialEq)]
+enum Truth {
+    /// No realization is better.
+    Equal,
+    /// They differ at random, standard deviation 0.5, unrelated to VAF.
+    Unrelated,
+    /// 0.5 per standard deviation of VAF, and at random, standard deviation 0.3.
+    Vaf,
+    /// No realization is better, but 0.3 of a rating is carried over to the next.
+    Carried,
+}
+
+/// A trial: participant, realization, repetition, impression.
+type Trial = (u32, usize, u32, f64);
+
+/// VAF of the realizations, unevenly spaced.
+fn vafs(k: usize) -> Vec<f64> {
+    (0..k)
+        .map(|i| 0.7 + 0.25 * ((i as f64 + 0.5) / k as f64).powf(1.3))
+        .collect()
+}
+
+/// The same with mean 0 and standard deviation 1.
+fn standardized(x: &[f64]) -> Vec<f64> {
+    let n = x.len() as f64;
+    let mean = x.iter().sum::<f64>() / n;
+    let sd = (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
+    x.iter().map(|x| (x - mean) / sd).collect()
+}
+
+/// The trials of one study in the order of presentation.
+fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
+    let key = [world.name, &format!("{}", truth as u8), &number.to_string()];
+    let mut noise = Stream::new(2007, &["verdicts", key[0], key[1], key[2]]);
+    let k = world.realizations;
+    let x = standardized(&vafs(k));
+    let (slope, spread) = match truth {
+        Truth::Equal | Truth::Carried => (0.0, 0.0),
+        Truth::Unrelated => (0.0, 0.5),
+        Truth::Vaf => (0.5, 0.3),
+    };
+    let means: Vec<f64> = x
+        .iter()
+        .map(|x| slope * x + spread * noise.normal())
+        .collect();
+    let mut trials = Vec::new();
+    for p in 0..world.participants {
+        let level = 4.0 + 0.7 * noise.normal();
+        let camp = if p % 2 == 0 {
+            world.camps
+        } else {
+            -world.camps
+        };
+        let own: Vec<f64> = (0..k)
+            .map(|m| level + means[m] + camp * x[m] + world.taste * noise.normal())
+            .collect();
+        let rated: Vec<bool> = (0..k)
+            .map(|m| match world.missing {
+                Missing::None => true,
+                Missing::Random => noise.below(5) > 0,
+                // The ten pairs of five that are missing.
+                Missing::Blocks => {
+                    let (a, step) = ((p % 5) as usize, 1 + (p as usize / 5) % 2);
+                    m != a && m != (a + step) % 5
+                }
+            })
+            .collect();
+        let mut before = 0.0;
+        for r in 0..world.repetitions {
+            let mut order: Vec<usize> = (0..k).filter(|&m| rated[m]).collect();
+            noise.shuffle(&mut order);
+            for m in order {
+                let carried = if truth == Truth::Carried {
+                    0.3 * before
+                } else {
+                    0.0
+                };
+                let rating = (own[m] + carried + 0.8 * noise.normal())
+                    .round()
+                    .clamp(1.0, 7.0);
+                before = rating - level;
+                trials.push((p, m, r, rating));
+            }
+        }
+    }
+    trials
+}
+
+/// Whether each test says yes; `None` if it is undefined.
+type Results = BTreeMap<String, Option<bool>>;
+
+/// Statistics of the analysis that are compared with 5 %.
+const TESTS: [&str; 12] = [
+    "rmanova/p_gg",
+    "rmanova/p_hf",
+    "rmanova/p",
+    "friedman/iman_davenport_p",
+    "lmm_cells/p",
+    "lmm_model/satterthwaite_p",
+    "corr/pearson/p_exact_two_sided",
+    "corr_adjusted/pearson/p_exact_two_sided",
+    "corr_adjusted/pearson/p_monte_carlo_two_sided",
+    "corr_adjusted/pearson/p_t",
+    "lmm_vaf_crossed/slope_satterthwaite_p",
+    "order_previous_rating/p",
+];
+
+/// The findings of `analyze` and the tests behind them.
+fn verdicts(world: &World, trials: &[Trial]) -> Results {
+    let x = vafs(world.realizations);
+    let mut csv = String::from("subject,model,repetition,rating,vaf,trial_index\n");
+    let (mut index, mut of) = (0, 0);
+    for &(p, m, r, rating) in trials {
+        index = if p == of { index + 1 } else { 1 };
+        of = p;
+        csv += &format!("S{p:02},m{m:02},{},{rating},{},{index}\n", r + 1, x[m]);
+    }
+    let ratings = Ratings::read_csv("verdicts", csv.as_bytes(), None).expect("the table is valid");
+    let analysis = analyze(&ratings, &Rules::default());
+    let mut results = Results::new();
+    for finding in &analysis.findings {
+        let id = format!("verdict: {}", finding.question.id());
+        results.insert(id, finding.reason().is_none().then(|| finding.is_yes()));
+    }
+    for id in TESTS {
+        results.insert(id.to_owned(), analysis.values.number(id).map(|p| p <= 0.05));
+    }
+    results
+}
+
+/// Tests of `study-stats` that need no analysis.
+fn functions(world: &World, trials: &[Trial]) -> Results {
+    let x = vafs(world.realizations);
+    let mut cells: BTreeMap<(u32, usize), Vec<f64>> = BTreeMap::new();
+    for &(p, m, _, rating) in trials {
+        cells.entry((p, m)).or_default().push(rating);
+    }
+    let cells: Vec<CellSummary> = cells
+        .iter()
+        .map(|(&(p, m), ratings)| {
+            let mean = ratings.iter().sum::<f64>() / ratings.len() as f64;
+            CellSummary {
+                subject: p as usize,
+                realization: m,
+                x: x[m],
+                n: ratings.len(),
+                mean,
+                within: ratings.iter().map(|r| (r - mean).powi(2)).sum(),
+            }
+        })
+        .collect();
+    let centre = x.iter().sum::<f64>() / x.len() as f64;
+    let slopes = LmmData::new(&cells, FixedEffects::Covariate { centre })
+        .and_then(|table| slope_variance(&table));
+    let orders: Vec<OrderedRating> = trials
+        .iter()
+        .map(|&(subject, m, block, rating)| OrderedRating {
+            subject,
+            realization: m as u32,
+            block,
+            rating,
+        })
+        .collect();
+    let ordinal = clmm_crossed(&counts(&x, trials));
+    let below = |p: Option<f64>| p.map(|p| p <= 0.05);
+    let ordinal = ordinal.as_ref();
+    let wald = ordinal.map(|f| (f.fit.beta[0] / f.fit.se[0]).abs() >= 1.959_963_984_540_054);
+    let list = [
+        ("slope variance", below(slopes.ok().and_then(|s| s.p))),
+        (
+            "disagreement",
+            below(disagreement(&cells).and_then(|d| d.p)),
+        ),
+        ("carry-over", below(carry_over(&orders).map(|c| c.p))),
+        ("crossed ordinal, Wald", wald.ok()),
+        (
+            "crossed ordinal, χ²",
+            ordinal.ok().and_then(|f| below(f.p_chi2)),
+        ),
+        ("crossed ordinal, t", ordinal.ok().and_then(|f| below(f.p))),
+    ];
+    list.map(|(name, yes)| (name.to_owned(), yes))
+        .into_iter()
+        .collect()
+}
+
+/// Counts for an ordinal model, with VAF from −1 to 1.
+fn counts(x: &[f64], trials: &[Trial]) -> CategoryCounts {
+    let mut used: Vec<u32> = trials.iter().map(|t| t.3 as u32).collect();
+    used.sort_unstable();
+    used.dedup();
+    let (low, high) = (x[0], x[x.len() - 1]);
+    let scaled = |v: f64| (2.0 * v - low - high) / (high - low);
+    let predictors = x.iter().map(|&v| Predictor {
+        column: 0,
+        x: scaled(v),
+    });
+    let counts: Vec<CategoryCount> = trials
+        .iter()
+        .map(|&(subject, m, _, rating)| CategoryCount {
+            subject,
+            predictor: m as u32,
+            category: used.partition_point(|u| f64::from(*u) < rating) as u32,
+            n: 1,
+        })
+        .collect();
+    CategoryCounts::new(predictors.collect(), 1, used.len(), &counts)
+}
+
+/// Studies that say yes, and studies in which the test is defined.
+type Rates = BTreeMap<String, (u32, u32)>;
+
+fn rates(studies: u32, of: impl Fn(u32) -> Results + Sync) -> Rates {
+    let one = |number: u32| -> Rates {
+        let results = of(number).into_iter();
+        results
+            .map(|(id, yes)| (id, (u32::from(yes == Some(true)), u32::from(yes.is_some()))))
+            .collect()
+    };
+    let add = |mut all: Rates, one: Rates| {
+        for (id, (yes, defined)) in one {
+            let sum = all.entry(id).or_default();
+            *sum = (sum.0 + yes, sum.1 + defined);
+        }
+        all
+    };
+    (0..studies)
+        .into_par_iter()
+        .map(one)
+        .reduce(Rates::new, add)
+}
+
+/// Prints a table with a column for each world. A star: further from 5 % than three
+/// binomial standard deviations. In brackets, if any: the share in which it is undefined.
+fn table(
+    title: &str,
+    studies: u32,
+    level: bool,
+    worlds: &[(&World, Truth)],
+    of: fn(&World, &[Trial]) -> Results,
+) {
+    println!("\n**{title}** ({studies} studies each)\n");
+    let columns: Vec<Rates> = worlds
+        .iter()
+        .map(|(world, truth)| rates(studies, |number| of(world, &study(world, *truth, number))))
+        .collect();
+    let names: Vec<&str> = worlds.iter().map(|(world, _)| world.name).collect();
+    println!("| test | {} |", names.join(" | "));
+    println!("|---|{}", "---|".repeat(names.len()));
+    let mut ids: Vec<&String> = columns.iter().flat_map(BTreeMap::keys).collect();
+    ids.sort();
+    ids.dedup();
+    let n = f64::from(studies);
+    let three = 3.0 * (0.05 * 0.95 / n).sqrt();
+    for id in ids {
+        let cell = |rates: &Rates| match rates.get(id) {
+            Some(&(yes, defined)) if defined > 0 => {
+                let rate = f64::from(yes) / n;
+                let star = if level && (rate - 0.05).abs() > three {
+                    "*"
+                } else {
+                    ""
+                };
+                let undefined = f64::from(studies - defined) / n;
+                let note = if undefined > 0.0 {
+                    format!(" ({undefined:.3})")
+                } else {
+                    String::new()
+                };
+                format!("{rate:.4}{star}{note}")
+            }
+            _ => String::new(),
+        };
+        let cells: Vec<String> = columns.iter().map(cell).collect();
+        if cells.iter().any(|c| !c.is_empty()) {
+            println!("| {id} | {} |", cells.join(" | "));
+        }
+    }
+}
+
+fn main() {
+    let args: Vec<String> = std::env::args().collect();
+    let number = |name: &str, default: u32| -> u32 {
+        let at = args.iter().position(|a| a == name);
+        at.and_then(|at| args.get(at + 1)?.parse().ok())
+            .unwrap_or(default)
+    };
+    let (null, power) = (number("--studies", 10_000), number("--power", 1000));
+    let all = [&COMPLETE, &RANDOM, &BLOCKS, &FEW, &CAMPS, &CAMPS_RANDOM];
+    let with = |truth: Truth| all.map(|world| (world, truth));
+    table(
+        "No realization is better",
+        null,
+        true,
+        &with(Truth::Equal),
+        verdicts,
+    );
+    table(
+        "They differ, unrelated to VAF",
+        null,
+        true,
+        &with(Truth::Unrelated),
+        verdicts,
+    );
+    table(
+        "Power: 0.5 per standard deviation of VAF",
+        power,
+        false,
+        &with(Truth::Vaf),
+        verdicts,
+    );
+    let worlds = |truth: Truth| {
+        [&ALIKE, &COMPLETE, &EIGHT, &RANDOM, &FEW, &CAMPS].map(|world| (world, truth))
+    };
+    table(
+        "Functions, unrelated to VAF",
+        null,
+        true,
+        &worlds(Truth::Unrelated),
+        functions,
+    );
+    table(
+        "Functions, power: VAF",
+        power,
+        false,
+        &worlds(Truth::Vaf),
+        functions,
+    );
+    table(
+        "Functions, power: carry-over",
+        power,
+        false,
+        &worlds(Truth::Carried),
+        functions,
+    );
+}
