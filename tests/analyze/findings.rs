@@ -606,7 +606,7 @@ fn random_design(seed: u64) -> String {
         0 => 1,
         1..=3 => 2,
         4 => 9 + random.below(3),
-        5 if seed % 10 == 0 => 30,
+        5 if seed.is_multiple_of(10) => 30,
         _ => 3 + random.below(4),
     };
     let repetitions = 1 + random.below(3);

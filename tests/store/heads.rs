@@ -76,7 +76,7 @@ fn a_resumed_journal_repeats_what_was_not_acknowledged() {
     let last = lines(&disk, "journal.jsonl").pop().unwrap();
     let claimed = open(&disk).claim(&real("P01")).unwrap();
     assert_eq!(claimed.entries.len(), 12);
-    assert_eq!(lines(&disk, "journal-2.jsonl"), [last.clone()]);
+    assert_eq!(lines(&disk, "journal-2.jsonl"), std::slice::from_ref(&last));
     assert_eq!(head(&disk), (12, hash(&last), 2));
     drop(claimed);
     let session = open(&disk).sessions().unwrap().remove(0);

@@ -99,7 +99,7 @@ pub fn slopes_differ<R: AsRef<[f64]>>(rows: &[R], x: &[f64]) -> Option<Disagreem
     let centre = mean(&mut x.iter().copied(), k);
     let x: Vec<f64> = x.iter().map(|x| x - centre).collect();
     let xx: f64 = x.iter().map(|x| x * x).sum();
-    if !(xx > 1e-24 * centre * centre) {
+    if xx.is_nan() || xx <= 1e-24 * centre * centre {
         return None;
     }
     let columns: Vec<f64> = (0..k)

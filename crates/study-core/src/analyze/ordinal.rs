@@ -333,7 +333,7 @@ fn crossed(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
     let found = (|| {
         if rows.is_empty() {
             return Err(NotFitted::NoVaf);
-        } else if !(unit > 0.0) {
+        } else if unit.is_nan() || unit <= 0.0 {
             return Err(NotFitted::EqualVaf);
         } else if present.len() > MAX_MODELS {
             return Err(NotFitted::TooManyRealizations);
