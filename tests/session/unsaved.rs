@@ -139,8 +139,9 @@ fn quitting_names_what_is_not_saved_and_writes_it_elsewhere() {
     let mut desk = Desk::at_a_rating();
     desk.fail();
     desk.rate("6\tlate\r");
-    // A second attempt changes nothing.
+    // A second attempt, in a new segment, fails as well.
     desk.terminal.keys("\r");
+    desk.terminal.wait_for("journal-2");
     desk.terminal.keys(F10);
     desk.terminal.wait_for("This is in memory only");
     let screen = desk.terminal.screen();
