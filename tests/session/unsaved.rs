@@ -32,6 +32,9 @@ impl Desk {
             folder,
         };
         play_until(&mut desk.terminal, "P01", "1–7: choose");
+        // The end of the playback is on the disk, too.
+        desk.terminal
+            .wait_until("the playback to be saved", |s| !s.contains("saving …"));
         desk
     }
 
