@@ -16,6 +16,7 @@ pub mod picture;
 pub mod plot;
 mod sentences;
 pub mod text;
+pub mod wide;
 
 /// What was analysed, for the head of a report.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use super::{Console, Failure, study_folder};
 use crate::report::figures::Trace;
 use crate::report::html::Details;
 use crate::report::text::{Page, comments, page};
-use crate::report::{Source, csv, json};
+use crate::report::{Source, csv, json, wide};
 use rayon::prelude::*;
 use std::fs::{self, File};
 use std::io::{self, BufReader};
@@ -24,7 +24,7 @@ use study_core::store::{Derived, SessionData, StudyFolder};
 /// Arguments of `study analyze`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A results folder, one study in it, or a CSV: subject,model,rating[,repetition][,vaf][,trial_index]
+    /// A results folder, one study in it, or a CSV: subject,model,rating[,repetition][,vaf][,trial_index][,role]
     #[arg(required_unless_present = "possible")]
     results: Option<PathBuf>,
     /// Check a published mean and SD (GRIM/GRIMMER): mean=4.800 sd=0.997 n=30 scale=1..7 [each=3]
@@ -32,7 +32,7 @@ pub(super) struct Args {
         long,
         num_args = 1..,
         value_name = "KEY=VALUE",
-        conflicts_with_all = ["results", "out", "question", "include", "comments"]
+        conflicts_with_all = ["results", "out", "question", "scale", "include", "comments"]
     )]
     possible: Vec<String>,
     /// Print the results as one JSON document with unrounded numbers
@@ -44,6 +44,9 @@ pub(super) struct Args {
     /// Analyse this question instead of the protocol's primary one
     #[arg(long, value_name = "ID")]
     question: Option<String>,
+    /// The scale of the ratings in a CSV, such as 1..7; ratings outside it are reported
+    #[arg(long, value_name = "LOW..HIGH", value_parser = parse_scale, allow_hyphen_values = true)]
+    scale: Option<(f64, f64)>,
     /// Also include these sessions
     #[arg(long, value_name = "WHO", value_delimiter = ',')]
     include: Vec<Who>,
@@ -58,6 +61,20 @@ enum Who {
     Simulated,
 }
 
+/// A text that is no scale.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("give two numbers, lowest first, such as 1..7")]
+struct ScaleError;
+
+/// Reads `1..7`.
+fn parse_scale(given: &str) -> Result<(f64, f64), ScaleError> {
+    let number = |text: &str| text.trim().parse().ok().filter(|x: &f64| x.is_finite());
+    let ends = given
+        .split_once("..")
+        .and_then(|(low, high)| number(low).zip(number(high)));
+    ends.filter(|(low, high)| low < high).ok_or(ScaleError)
+}
+
 /// Runs `study analyze`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let Some(results) = &args.results else {
@@ -66,6 +83,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if results.is_file() {
         let input = of_csv(results, args)?;
         return show(args, &input, args.out.as_deref(), console);
+    }
+    if args.scale.is_some() {
+        return Err(Failure::input(
+            "--scale is for a CSV: a protocol states its scale",
+        ));
     }
     let studies = study_folder::studies(results)?;
     if args.json && studies.len() > 1 {
@@ -175,7 +197,7 @@ fn write_all(dir: &Path, analysed: &Analysed) -> Result<(), Failure> {
         traces,
         analysis,
     } = analysed;
-    let tables = csv::tables(source, analysis).into_iter();
+    let tables = (csv::tables(source, analysis).into_iter()).chain([wide::file(analysis)]);
     let mut files: Vec<report::Output> = tables
         .map(|t| report::Output {
             name: t.name.to_owned(),
@@ -205,6 +227,7 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
         Ratings::read_csv(&name, input, args.question.as_deref()).map_err(Failure::input)?;
     let rules = Rules {
         include: include(args),
+        scale: args.scale,
         ..Rules::default()
     };
     let title = path.file_name().unwrap_or_default().to_string_lossy();

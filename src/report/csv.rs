@@ -39,7 +39,7 @@ pub fn tables(source: &Source, analysis: &Analysis) -> Vec<TableFile> {
     ]
 }
 
-fn table(name: &'static str, rows: Vec<Vec<String>>) -> TableFile {
+pub(super) fn table(name: &'static str, rows: Vec<Vec<String>>) -> TableFile {
     TableFile {
         name,
         content: text(&rows),
@@ -84,7 +84,7 @@ fn cells<const N: usize>(texts: [&str; N]) -> Vec<String> {
     texts.iter().map(|t| (*t).to_owned()).collect()
 }
 
-fn number(x: Option<f64>) -> String {
+pub(super) fn number(x: Option<f64>) -> String {
     x.map_or_else(String::new, digits)
 }
 

@@ -101,6 +101,7 @@ fn tables_go_where_out_says() {
         "tests.csv",
         "values.json",
         "variance.csv",
+        "wide.csv",
         "with_and_without.csv",
     ];
     assert_eq!(names(&target), expected);
@@ -119,6 +120,45 @@ fn tables_go_where_out_says() {
     let pairs = fs::read_to_string(target.join("pairs.csv")).unwrap();
     assert!(pairs.starts_with("pair,mean_diff,t,p_t,p_t_holm,"));
     assert!(!pairs.contains(",,"), "all of it is defined: {pairs}");
+}
+
+#[test]
+fn numbers_that_cannot_be_and_columns_that_are_not_read_are_reported() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("r.csv");
+    let table =
+        "subject,model,rating,vaf,Repetition\nS1,a,8,95,1\nS1,b,3,97,1\nS2,a,0,95,1\nS2,b,4,97,1\n";
+    fs::write(&path, table).unwrap();
+    let codes = |scale: &[&str]| {
+        let text = out(study().args(["analyze", "--json"]).args(scale).arg(&path));
+        let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let warnings = document["warnings"].as_array().unwrap().clone();
+        let text = |w: &serde_json::Value| w["text"].as_str().unwrap().to_owned();
+        warnings.iter().map(text).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        codes(&["--scale", "1..7"])[..3],
+        [
+            "column Repetition is not read: did you mean repetition?",
+            "2 ratings outside the scale 1 to 7, such as 8",
+            "VAF above 1, such as 95: is it in per cent?",
+        ]
+    );
+    assert!(
+        !codes(&["--scale=0..8"])
+            .iter()
+            .any(|w| w.contains("outside"))
+    );
+    assert!(!codes(&[]).iter().any(|w| w.contains("outside")));
+    for bad in ["7..1", "1..x", "7"] {
+        let mut command = study();
+        command.args(["analyze", "--scale", bad]).arg(&path);
+        command.assert().code(2);
+    }
+    let mut command = study();
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/results/turn-signal-example");
+    command.args(["analyze", "--scale", "1..7", example]);
+    command.assert().code(1);
 }
 
 #[test]

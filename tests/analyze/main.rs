@@ -18,6 +18,7 @@ mod report_reads;
 mod report_support;
 mod rows;
 mod rules;
+mod schema;
 mod study;
 #[path = "../support/world.rs"]
 mod world;

@@ -27,6 +27,7 @@ mod order;
 mod ordinal;
 mod overflow;
 mod pairs;
+mod range;
 mod reference;
 mod select;
 mod subjects;
@@ -287,6 +288,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
     let design = Design::of(&cells);
     let (findings, pairs) = findings::findings(&cells, design, rules, &mut values);
     let warnings = warnings::warnings(&cells, &counts, rules, &exclusions, &values, &findings);
+    let warnings = range::before(warnings, &used, rules);
     Analysis {
         question: ratings.question.clone(),
         realizations: used

@@ -120,6 +120,9 @@ pub struct Ratings {
     pub comments: Vec<Comment>,
     /// Practice rows, which are not in the columns.
     pub practice: Arc<Practice>,
+    /// Columns of a foreign table that were not read although their names differ from
+    /// optional ones only in case, and these. The first is untrusted.
+    pub near_misses: Vec<(String, &'static str)>,
 }
 
 /// Practice rows, with their own list of names: a participant who only practiced is
@@ -298,6 +301,7 @@ impl Ratings {
                 })
                 .collect(),
             practice: Arc::clone(&self.practice),
+            near_misses: self.near_misses.clone(),
             subjects,
             models,
         }

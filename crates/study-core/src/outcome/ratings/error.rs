@@ -21,10 +21,14 @@ pub enum RatingsError {
     )]
     Separator { name: String, separator: char },
     /// The header lacks a column.
-    #[error("{name}: no column `{}`; a table of ratings has the columns {expected}", Untrusted(.column))]
+    #[error(
+        "{name}: no column `{}`{}; a table of ratings has the columns {expected}",
+        Untrusted(.column), renamed(.near.as_deref())
+    )]
     NoColumn {
         name: String,
         column: String,
+        near: Option<String>,
         expected: &'static str,
     },
     /// A table with the columns of a study's has no answers.
@@ -67,6 +71,13 @@ pub enum RatingsError {
     /// There is no row.
     #[error("{name}: no ratings, only a header")]
     Empty { name: String },
+}
+
+/// What to do about a column whose name differs only in case.
+fn renamed(near: Option<&str>) -> String {
+    near.map_or_else(String::new, |near| {
+        format!(" (rename `{}`)", Untrusted(near))
+    })
 }
 
 impl RatingsError {

@@ -10,12 +10,12 @@ use serde::de::{DeserializeOwned, IntoDeserializer as _};
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
-const FOREIGN: &str = "subject,model,rating[,repetition][,vaf][,trial_index]";
+const FOREIGN: &str = "subject,model,rating[,repetition][,vaf][,trial_index][,role]";
 
 impl Ratings {
     /// Reads a CSV with the columns `subject`, `model`, `rating` and optionally
-    /// `repetition`, `vaf` and `trial_index`, in any order, or one with the columns of
-    /// a study's `ratings.csv`. Fields of model, rating and VAF may be empty, `NA` or
+    /// `repetition`, `vaf`, `trial_index` and `role`, in any order, or one with the
+    /// columns of a study's `ratings.csv`. An empty role is `test`. Fields of model, rating and VAF may be empty, `NA` or
     /// `NaN`. A repetition that is empty or has no column is numbered from 1; a written
     /// one is kept, 0 too. A byte order mark is skipped. `question` names the column
     /// with the ratings; default: `rating`, and in a study's table the first question.
@@ -52,7 +52,8 @@ impl Ratings {
         };
         let read = table.read(name, &header, &columns, &mut reader);
         let lines = table.lines;
-        let ratings = table.builder.finish();
+        let mut ratings = table.builder.finish();
+        ratings.near_misses = columns.near_misses;
         // A repeated row above a line that cannot be read is the first error.
         if let Some((first, second)) = repeated(&ratings) {
             let model = ratings.model[second].map(|m| &ratings.models[m as usize]);
@@ -176,6 +177,7 @@ struct Positions {
     /// Remarks, and the questions that are not read.
     texts: Vec<usize>,
     covariates: Vec<usize>,
+    near_misses: Vec<(String, &'static str)>,
 }
 
 impl Positions {
@@ -194,13 +196,23 @@ impl Positions {
             find(column).ok_or_else(|| RatingsError::NoColumn {
                 name: name.to_owned(),
                 column: column.to_owned(),
+                near: near_miss(column, header).map(str::to_owned),
                 expected: FOREIGN,
             })
         };
         let own = |column: C| find(column.name());
         let (Some(subject), Some(_)) = (own(C::Participant), own(C::PlannedPosition)) else {
             let question = question.unwrap_or(Foreign::Rating.name());
+            let optional = [
+                Foreign::Repetition.name(),
+                Foreign::Vaf.name(),
+                Foreign::TrialIndex.name(),
+                C::Role.name(),
+            ];
+            let missed = optional.into_iter().filter(|column| find(column).is_none());
+            let near = missed.filter_map(|c| Some((near_miss(c, header)?.to_owned(), c)));
             return Ok(Self {
+                near_misses: near.collect(),
                 question: question.to_owned(),
                 subject: need(Foreign::Subject.name())?,
                 model: need(Foreign::Model.name())?,
@@ -208,7 +220,7 @@ impl Positions {
                 repetition: find(Foreign::Repetition.name()),
                 vaf: find(Foreign::Vaf.name()),
                 trial_index: find(Foreign::TrialIndex.name()),
-                role: None,
+                role: own(C::Role),
                 practice: None,
                 pilot: None,
                 simulated: None,
@@ -240,6 +252,7 @@ impl Positions {
         };
         let texts = questions.filter(|&i| i != rating);
         Ok(Self {
+            near_misses: Vec::new(),
             question: header[rating].clone(),
             subject,
             model: need(C::Model.name())?,
@@ -287,7 +300,16 @@ impl Positions {
             row.status = line.level(at, C::Status)?;
         }
         let model = line.text(self.model);
-        if line.flag(self.practice)? {
+        let practice = line.flag(self.practice)?;
+        let role = match self
+            .role
+            .filter(|&at| !practice && !line.text(at).is_empty())
+        {
+            Some(at) => line.level(at, C::Role)?,
+            None => Role::Test,
+        };
+        // A foreign table has no column that says so.
+        if practice || (self.practice.is_none() && role == Role::Practice) {
             builder.practice(subject, model, row);
             return Ok(());
         }
@@ -303,10 +325,6 @@ impl Positions {
             }
         }
         row.subject = builder.subject(subject);
-        let role = match self.role {
-            Some(at) => line.level(at, C::Role)?,
-            None => Role::Test,
-        };
         if !model.is_empty() {
             let model = builder.model(model, role, || self.covariates(line));
             row.model = Some(model);
@@ -325,6 +343,12 @@ impl Positions {
             .filter_map(|&i| Some((line.header[i].clone(), number(i)?)))
             .collect()
     }
+}
+
+/// A column whose name differs from `wanted` only in case.
+fn near_miss<'h>(wanted: &str, header: &'h [String]) -> Option<&'h str> {
+    let near = |h: &&String| h.eq_ignore_ascii_case(wanted);
+    header.iter().find(near).map(String::as_str)
 }
 
 /// Columns of a foreign table that give the memory of a realization.
@@ -414,6 +438,36 @@ mod tests {
     }
 
     const HEAD: &str = "subject,model,repetition,rating,vaf\n";
+
+    #[test]
+    fn names_that_differ_only_in_case_are_noticed() {
+        assert_eq!(
+            message("Subject,model,rating\nS1,A,4\n"),
+            "r.csv: no column `subject` (rename `Subject`); a table of ratings has the columns \
+             subject,model,rating[,repetition][,vaf][,trial_index][,role]"
+        );
+        let r = read("subject,model,rating,VAF,Role\nS1,A,4,0.5,test\n").unwrap();
+        let near: Vec<_> = r
+            .near_misses
+            .iter()
+            .map(|(c, k)| (c.as_str(), *k))
+            .collect();
+        assert_eq!(near, [("VAF", "vaf"), ("Role", "role")]);
+        assert_eq!(
+            read(&format!("{HEAD}S1,A,1,4,0.5\n")).unwrap().near_misses,
+            []
+        );
+    }
+
+    #[test]
+    fn a_foreign_table_can_have_roles() {
+        let csv = "subject,model,rating,role\nS1,A,4,\nS1,B,5,hidden-reference\nS1,C,2,practice\n";
+        let r = read(csv).unwrap();
+        let roles: Vec<Role> = r.models.iter().map(|m| m.role).collect();
+        assert_eq!(roles, [Role::Test, Role::HiddenReference]);
+        assert_eq!(r.practice.len(), 1);
+        assert!(message("subject,model,rating,role\nS1,A,4,best\n").contains("one of test, "));
+    }
 
     #[test]
     fn a_byte_order_mark_and_empty_fields_are_allowed() {
