@@ -202,3 +202,19 @@ fn the_share_of_vaf_is_undefined_without_variance_between_realizations() {
         "no variance between realizations",
     );
 }
+
+/// The crossed ordinal model takes milliseconds for each participant.
+#[test]
+fn the_crossed_ordinal_model_has_at_most_a_hundred_participants() {
+    let study = |participants| {
+        table(
+            [participants, 4, 1],
+            |s, m, _| f64::from(1 + (s * 7 + m * (s % 3 + 1)) % 5),
+            |_, m, _| format!("0.{}", 6 + m),
+        )
+    };
+    let id = "clmm_vaf_crossed/beta/vaf";
+    let fitted = study(100);
+    assert!(fitted.number(id).is_some(), "{:?}", fitted.reason(id));
+    assert_eq!(study(101).reason(id), Some("more than 100 subjects"));
+}

@@ -29,6 +29,10 @@ const MAX_LEVELS: usize = 10_000;
 /// Largest number of subjects of a mixed model, whose cost is proportional to it.
 const MAX_SUBJECTS: usize = 10_000;
 
+/// Largest number of subjects of the model with two random effects, which takes some
+/// milliseconds for each.
+const MAX_CROSSED_SUBJECTS: usize = 100;
+
 /// Not every larger whole number is a double.
 const WHOLE: f64 = 9_007_199_254_740_992.0;
 
@@ -51,6 +55,8 @@ enum NotFitted {
     TooManyVaf,
     #[error("more than {MAX_SUBJECTS} subjects")]
     TooManySubjects,
+    #[error("more than {MAX_CROSSED_SUBJECTS} subjects")]
+    TooManyCrossedSubjects,
     #[error(transparent)]
     Estimation(#[from] ClmError),
 }
@@ -76,12 +82,17 @@ pub(super) fn ordinal(cells: &Cells<'_>, values: &mut Values) {
 /// Fits the models of one predictor.
 type Group = fn(&Cells<'_>, &[usize], &mut Values);
 
+/// Whether rows, sorted by subject, have more than `most` subjects.
+fn more_subjects(cells: &Cells<'_>, rows: &[usize], most: usize) -> bool {
+    let subject = |i: usize| cells.ratings.subject[i];
+    let next = rows.windows(2).filter(|w| subject(w[0]) != subject(w[1]));
+    next.count() >= most
+}
+
 /// Whether there are too many subjects for a mixed model. The counts are then pooled
 /// over subjects.
 fn many(cells: &Cells<'_>, rows: &[usize]) -> bool {
-    let subject = |i: usize| cells.ratings.subject[i];
-    let same = rows.windows(2).filter(|w| subject(w[0]) != subject(w[1]));
-    same.count() >= MAX_SUBJECTS
+    more_subjects(cells, rows, MAX_SUBJECTS)
 }
 
 fn by_model(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
@@ -337,8 +348,8 @@ fn crossed(cells: &Cells<'_>, rows: &[usize], values: &mut Values) {
             return Err(NotFitted::EqualVaf);
         } else if present.len() > MAX_MODELS {
             return Err(NotFitted::TooManyRealizations);
-        } else if many(cells, &rows) {
-            return Err(NotFitted::TooManySubjects);
+        } else if more_subjects(cells, &rows, MAX_CROSSED_SUBJECTS) {
+            return Err(NotFitted::TooManyCrossedSubjects);
         }
         let ratings = categories(cells, &rows)?;
         let predictors = all.iter().map(|v| Predictor {
