@@ -3,7 +3,7 @@
 //! Nothing is repaired here. A line that cannot be read affects no other line: every
 //! valid line is used, wherever it is. All damage is listed as [`Damage`]. Unreadable
 //! lines at the end of a segment are what a crash leaves of records that were not
-//! acknowledged, unless the head ([`super::head`]) says that they were.
+//! acknowledged, unless `head.json` says that they were.
 
 use super::head::HeadFile;
 use super::journal_record::{self, Claim, Line, LineError, PREFIX, Record};
