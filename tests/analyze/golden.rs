@@ -2,7 +2,8 @@
 //!
 //! `tests/golden/data/NAME/expected.json` holds value, tolerance, class and
 //! source of each identifier; all data sets are freely usable (own simulations, CC0,
-//! and NIST's StRD).
+//! and NIST's StRD). Only `value`, `undefined`, `tol_rel` and `tol_abs` are read. A
+//! statistic without an entry is not compared.
 #![allow(clippy::unwrap_used)]
 
 use serde_json::Value as Json;

@@ -6,6 +6,9 @@ use std::collections::BTreeSet;
 use study_core::protocol::{Answer, Question, QuestionKind};
 
 /// The answer to one question, as entered so far.
+///
+/// `answer`, `key`, `set_number` and `toggle` match field and kind together and ignore
+/// what does not fit: for a new kind the compiler does not list them.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Field {
     /// A rating.

@@ -87,6 +87,8 @@ impl Judgement {
     }
 }
 
+/// What one rule excludes of the rows in `counts`: participants ([`Judgement::of`]) or
+/// single rows (a field of [`Judgement`]).
 fn judge(ratings: &Ratings, rules: &Rules, rule: Exclusion, counts: &[bool]) -> Judgement {
     if !matches!(rule, Exclusion::StrokesBelow(_)) && !rules.primary {
         return Judgement::none("it applies to the primary question, which this is not");

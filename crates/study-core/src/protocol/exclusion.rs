@@ -4,7 +4,8 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// One of `[[analysis.exclude]]`: a rule with its parameter.
+/// One of `[[analysis.exclude]]`: a rule with its parameter. CONTRIBUTING.md has the
+/// recipe of a new one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Exclusion {
     /// Participants with two or more primary ratings that are all equal.
@@ -21,7 +22,7 @@ pub enum Exclusion {
 
 impl Exclusion {
     /// The rule's name in a protocol file, and the name and value of its
-    /// parameter.
+    /// parameter. The names are part of the analysis fingerprint and never change.
     pub fn parts(self) -> (&'static str, Option<(&'static str, f64)>) {
         match self {
             Self::ConstantRater => ("constant-rater", None),

@@ -68,6 +68,10 @@ pub enum QuestionKind {
 }
 
 /// An answer to a question.
+///
+/// Journals have the names of the variants, which therefore never change. A program
+/// that does not know a variant skips its record, reports it, and does not continue
+/// that session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {

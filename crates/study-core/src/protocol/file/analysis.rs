@@ -38,8 +38,8 @@ static EXCLUDE: Variants = Variants {
 
 static SHAPES: [Shape; RULES.len()] = shapes(&RULES);
 
-/// The exclusion rules. A new one is declared here, in [`Exclusion`], and judged
-/// in `analyze/exclude.rs`.
+/// The exclusion rules. A new one is declared here and in [`Exclusion`], and judged
+/// in `analyze/exclude.rs`; CONTRIBUTING.md lists the other places.
 const RULES: [Variant<Exclusion>; 4] = [
     Variant::new(
         "constant-rater",

@@ -27,7 +27,8 @@ pub(super) static QUESTIONS: Variants = Variants {
 
 static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
 
-/// The kinds of question. A new one is declared here and in [`QuestionKind`].
+/// The kinds of question. A new one is declared here and in [`QuestionKind`];
+/// CONTRIBUTING.md lists the other places, some of which the compiler does not find.
 const KINDS: [Variant<QuestionKind>; 5] = [
     Variant::new(
         "rating",
