@@ -4,57 +4,21 @@ use super::{Canvas, Drawn, Scene, cell, drawn, head};
 use crate::report::chart::{Anchor, MAX_LABEL, Note, shortened, widest};
 use crate::report::chart::{Axis, Colour, Look, Mark, PALETTE, Panel, Shape, Whisker};
 use crate::report::csv::digits;
-use study_core::analyze::pair_id;
+use study_core::analyze::{Pair, Verdict};
 
-/// A pair, the higher mean first.
-struct Pair<'a> {
-    higher: &'a str,
-    lower: &'a str,
-    difference: f64,
-    /// None where all differences are equal.
-    ci95: Option<(f64, f64)>,
-    /// Corrected for the number of pairs.
-    p: Option<f64>,
-}
-
-fn pairs<'a>(scene: &'a Scene<'_>) -> Vec<Pair<'a>> {
-    let v = &scene.a.values;
-    let tested: Vec<&str> = (scene.models.iter())
-        .filter(|m| m.tested)
-        .map(|m| m.id.as_str())
-        .collect();
-    let mut found = Vec::new();
-    for (i, a) in tested.iter().enumerate() {
-        for b in &tested[i + 1..] {
-            let id = pair_id("pair", a, b);
-            let number = |what: &str| v.number(&format!("{id}/{what}"));
-            let Some(difference) = number("difference") else {
-                continue;
-            };
-            let ci95 = v.interval(&format!("{id}/ci95"));
-            // The difference is that of the name that sorts first.
-            let (first, second) = (*a.min(b), *a.max(b));
-            let p = number("p_holm");
-            found.push(if difference < 0.0 {
-                Pair {
-                    higher: second,
-                    lower: first,
-                    difference: -difference,
-                    ci95: ci95.map(|(low, high)| (-high, -low)),
-                    p,
-                }
+/// The compared pairs, the higher mean first, the largest difference first.
+fn pairs(scene: &Scene<'_>) -> Vec<Pair> {
+    let mut found: Vec<Pair> = (scene.a.pairs.iter())
+        .map(|p| {
+            let higher = if p.difference.value < 0.0 {
+                &p.second
             } else {
-                Pair {
-                    higher: first,
-                    lower: second,
-                    difference,
-                    ci95,
-                    p,
-                }
-            });
-        }
-    }
-    found.sort_by(|a, b| b.difference.total_cmp(&a.difference));
+                &p.first
+            };
+            p.seen_from(higher)
+        })
+        .collect();
+    found.sort_by(|a, b| b.difference.value.total_cmp(&a.difference.value));
     found
 }
 
@@ -73,16 +37,14 @@ pub(super) fn forest(scene: &Scene<'_>) -> Option<Drawn> {
     ])];
     for p in &pairs {
         data.push(vec![
-            p.higher.to_owned(),
-            p.lower.to_owned(),
-            digits(p.difference),
-            cell(p.ci95.map(|e| e.0)),
-            cell(p.ci95.map(|e| e.1)),
-            cell(p.p),
+            p.first.clone(),
+            p.second.clone(),
+            digits(p.difference.value),
+            cell(p.difference.ci95.map(|e| e.0)),
+            cell(p.difference.ci95.map(|e| e.1)),
+            cell(p.test.as_ref().map(|t| t.p)),
         ]);
     }
-    let alpha = scene.a.alpha;
-    let significant = |p: &Pair<'_>| p.p.is_some_and(|p| p < alpha);
     let tested = scene.models.iter().filter(|m| m.tested).count();
     let which = if pairs.len() == tested * (tested - 1) / 2 {
         "all pairs of realizations"
@@ -93,7 +55,7 @@ pub(super) fn forest(scene: &Scene<'_>) -> Option<Drawn> {
         "Differences of mean {} between {which}, with 95 % intervals that are not corrected for \
          the number of pairs. Filled: significant at {} after Holm's correction.",
         scene.asked,
-        crate::report::sentences::level(alpha),
+        crate::report::sentences::level(scene.a.alpha),
     );
     let title = format!("Differences of {} between realizations", scene.asked);
     Some(drawn("pairs", caption, data, |c: Canvas| {
@@ -101,12 +63,13 @@ pub(super) fn forest(scene: &Scene<'_>) -> Option<Drawn> {
         let short = |name: &str| shortened(name, MAX_LABEL);
         let names: Vec<String> = pairs
             .iter()
-            .map(|p| format!("{} − {}", short(p.higher), short(p.lower)))
+            .map(|p| format!("{} − {}", short(&p.first), short(&p.second)))
             .collect();
         // Names that would take most of the width stand above their bars.
         let above = widest(&names, columns) > 0.5 * c.width;
         let ends = pairs.iter().flat_map(|p| {
-            let (low, high) = p.ci95.unwrap_or((p.difference, p.difference));
+            let (low, high) =
+                (p.difference.ci95).unwrap_or((p.difference.value, p.difference.value));
             [low, high, 0.0]
         });
         let mut rows = Axis::of_names("", &names).reversed();
@@ -127,15 +90,15 @@ pub(super) fn forest(scene: &Scene<'_>) -> Option<Drawn> {
         panel = panel.with(Look::plain(Colour::INK).stroke(1.0), zero);
         let look = Look::plain(PALETTE[0]).stroke(1.5).size(8.0);
         let bars = pairs.iter().enumerate().filter_map(|(i, p)| {
-            let ((low, high), at) = (p.ci95?, i as f64);
+            let ((low, high), at) = (p.difference.ci95?, i as f64);
             Some(Whisker { at, low, high })
         });
         panel = panel.with(look, Mark::ErrorBarsAcross(bars.collect()));
         for filled in [true, false] {
             let shown = pairs.iter().enumerate();
-            let shown = shown.filter(|(_, p)| significant(p) == filled);
+            let shown = shown.filter(|(_, p)| (p.verdict == Verdict::Yes) == filled);
             let shape = if filled { Shape::Disc } else { Shape::Ring };
-            let points = shown.map(|(i, p)| (p.difference, i as f64)).collect();
+            let points = shown.map(|(i, p)| (p.difference.value, i as f64)).collect();
             panel = panel.with(Look { shape, ..look }, Mark::Points(points));
         }
         let row = if above { 28.0 } else { 17.0 };

@@ -5,14 +5,12 @@
 //! same participants had rated all of them. In designs without a missing cell they are
 //! the means over participants.
 
-use super::cells::Cells;
+use super::cells::{Cell, Cells};
 use super::design::Design;
 use super::identifiers::group_id;
 use super::values::Values;
 use study_stats::describe::mean;
-use study_stats::lmm::{
-    AdjustedMeans, CellSummary, ContrastT, FixedEffects, LmmData, LmmError, adjusted_means,
-};
+use study_stats::lmm::{AdjustedMeans, ContrastT, FixedEffects, LmmData, LmmError, adjusted_means};
 
 /// Most realizations that are compared pair by pair.
 pub(super) const MAX_COMPARED: usize = 60;
@@ -54,15 +52,8 @@ impl Adjusted {
 
 fn fitted(cells: &Cells<'_>, models: &[usize]) -> Result<AdjustedMeans, LmmError> {
     let own = (cells.cells.iter())
-        .filter(|c| models.binary_search(&c.model).is_ok() && c.squares.is_finite())
-        .map(|c| CellSummary {
-            subject: c.subject,
-            realization: c.model,
-            x: 0.0,
-            n: c.rows.len(),
-            mean: c.mean,
-            within: c.squares,
-        });
+        .filter(|c| models.binary_search(&c.model).is_ok())
+        .filter_map(Cell::summary);
     let table = LmmData::new(&own.collect::<Vec<_>>(), FixedEffects::Intercept)?;
     let found = adjusted_means(&table)?;
     if found.realizations == models {

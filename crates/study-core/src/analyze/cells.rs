@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 use study_stats::describe::{mean, mean_of, squares_about};
+use study_stats::lmm::CellSummary;
 
 /// One subject's ratings of one realization, with the sufficient statistics of a
 /// Gaussian model without trial-level terms.
@@ -21,6 +22,21 @@ pub(super) struct Cell {
     pub(super) mean: f64,
     /// Sum of squares about the mean, not finite if it overflows.
     pub(super) squares: f64,
+}
+
+impl Cell {
+    /// What a mixed model needs of it, without a covariate; `None` if its sum of squares
+    /// overflows.
+    pub(super) fn summary(&self) -> Option<CellSummary> {
+        self.squares.is_finite().then(|| CellSummary {
+            subject: self.subject,
+            realization: self.model,
+            x: 0.0,
+            n: self.rows.len(),
+            mean: self.mean,
+            within: self.squares,
+        })
+    }
 }
 
 /// The included ratings, sorted into cells.

@@ -1,6 +1,6 @@
 //! Whether participants differ in how they rate the realizations: `disagreement/*`.
 
-use super::cells::Cells;
+use super::cells::{Cell, Cells};
 use super::values::Values;
 use study_stats::disagreement::{Disagreement, disagreement as interaction, slopes_differ};
 use study_stats::lmm::CellSummary;
@@ -9,15 +9,8 @@ use study_stats::regression::slope;
 pub(super) fn disagreement(cells: &Cells<'_>, values: &mut Values) {
     let models = cells.tested();
     let own: Vec<CellSummary> = (cells.cells.iter())
-        .filter(|c| c.squares.is_finite() && models.binary_search(&c.model).is_ok())
-        .map(|c| CellSummary {
-            subject: c.subject,
-            realization: c.model,
-            x: 0.0,
-            n: c.rows.len(),
-            mean: c.mean,
-            within: c.squares,
-        })
+        .filter(|c| models.binary_search(&c.model).is_ok())
+        .filter_map(Cell::summary)
         .collect();
     let why = if own.iter().all(|c| c.n < 2) {
         "no cell has two ratings"

@@ -80,18 +80,7 @@ impl Data {
                 within: sum_of_squares(rows)?,
             })
         };
-        let all: Vec<CellSummary> = own
-            .iter()
-            .filter(|c| c.squares.is_finite())
-            .map(|c| CellSummary {
-                subject: c.subject,
-                realization: c.model,
-                x: 0.0,
-                n: c.rows.len(),
-                mean: c.mean,
-                within: c.squares,
-            })
-            .collect();
+        let all: Vec<CellSummary> = own.iter().filter_map(|c| c.summary()).collect();
         let vafs: Vec<f64> = models.iter().filter_map(|&m| cells.vaf[m]).collect();
         let by_row = vafs.is_empty();
         let mut with_vaf: Vec<CellSummary> = Vec::new();
