@@ -158,7 +158,7 @@ impl Playing {
         let branch =
             |b: &Branch, i: usize| [b.m_kg[i], b.b_n_s_per_mm[i], b.k_n_per_mm[i], b.f0_n[i]];
         let mut crc = UploadCrc::of_table(&begin);
-        playing.say(Request::Hello(Hello { nonce: 1 }));
+        playing.say(Request::Hello(Hello { nonce: 1, minor: 1 }));
         playing.say(Request::TableBegin(begin));
         for i in 0..table.x_mm.len() {
             let node = Node {

@@ -19,7 +19,7 @@ use std::time::Duration;
 use study_base::limits::Limits;
 use study_haptics::plant::{HandParameters, Parameters};
 use study_wire::handler::{Bounds, Drive, Handler, Measured, Out, Profile};
-use study_wire::message::{DeviceState, Fault, Flags, Loaded, Name};
+use study_wire::message::{DeviceState, Fault, Features, Flags, Loaded, Name};
 use study_wire::servo::ServoSettings;
 
 /// Largest number of nodes of a table.
@@ -332,6 +332,7 @@ fn profile(options: &Options) -> Profile {
             telemetry: options.telemetry_hz > 0.0,
             probe: true,
         },
+        features: Features::default(),
         watchdog_ms: match options.flaw {
             Some(Flaw::LateWatchdog) => flaw::LATE_MS,
             _ => options.watchdog_ms,

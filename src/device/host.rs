@@ -351,7 +351,12 @@ impl Host {
         self.sequence = self.sequence.wrapping_add(1);
         let limp = Request::Limp.frame(self.sequence);
         self.out.extend_from_slice(limp.as_bytes());
-        self.send(Request::Hello(Hello { nonce: self.nonce }), at);
+        self.say_hello(message::MINOR, at);
+    }
+
+    fn say_hello(&mut self, minor: u8, at: Duration) {
+        let nonce = self.nonce;
+        self.send(Request::Hello(Hello { nonce, minor }), at);
     }
 
     fn send(&mut self, request: Request, at: Duration) {

@@ -245,7 +245,13 @@ fn a_repeated_request_is_executed_once() {
 #[test]
 fn sequence_numbers_and_the_clock_wrap() {
     let mut host = Host::opened(Options::default());
-    host.ask_as(9, Request::Hello(Hello { nonce: 99 }));
+    host.ask_as(
+        9,
+        Request::Hello(Hello {
+            nonce: 99,
+            minor: 0,
+        }),
+    );
     for sequence in [30_000, 60_000, 65_535, 0, 1] {
         assert!(
             host.ask_as(sequence, Request::Rearm).is_some(),
@@ -298,7 +304,7 @@ fn the_longest_duration_ends_a_playback() {
 #[test]
 fn another_host_makes_the_device_limp_and_discards_the_table() {
     let mut host = Host::playing(Options::default(), ms(500));
-    let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1 })) else {
+    let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1, minor: 0 })) else {
         panic!();
     };
     assert_eq!(
@@ -306,7 +312,7 @@ fn another_host_makes_the_device_limp_and_discards_the_table() {
         DeviceState::Run,
         "the same one changes nothing"
     );
-    let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 2 })) else {
+    let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 2, minor: 0 })) else {
         panic!();
     };
     assert_eq!(identity.state, DeviceState::Limp);

@@ -78,7 +78,7 @@ fn every_flaw_is_visible() {
     assert!(matches!(host.send(&damaged), Some(Reply::Outcome(_))));
 
     let mut host = Host::new(flawed(Flaw::OtherVersion));
-    let ack = host.ack(Request::Hello(Hello { nonce: 1 }));
+    let ack = host.ack(Request::Hello(Hello { nonce: 1, minor: 0 }));
     assert_eq!((ack.refusal, ack.detail), (Refusal::Version, 2));
 
     let mut host = playing(Flaw::DeafToLimp);
@@ -103,7 +103,7 @@ fn every_flaw_is_visible() {
     host.beat();
     host.wait(ms(250));
     assert_eq!(host.device.state(), DeviceState::Run);
-    let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1 })) else {
+    let Reply::Identity(identity) = host.ask(Request::Hello(Hello { nonce: 1, minor: 0 })) else {
         panic!();
     };
     assert_eq!(identity.watchdog_ms, 30);
@@ -140,7 +140,7 @@ fn every_flaw_is_visible() {
     assert!(gaps.count() > 20);
 
     let mut host = Host::new(flawed(Flaw::SlowReplies));
-    let hello = Request::Hello(Hello { nonce: 1 });
+    let hello = Request::Hello(Hello { nonce: 1, minor: 0 });
     assert!(host.send(hello.frame(1).as_bytes()).is_none());
     host.wait(ms(49));
     assert_eq!(host.heard, []);
@@ -254,7 +254,7 @@ fn every_request_in_every_state_has_the_specified_result() {
         every: NonZeroU16::new(4),
     });
     let stop = Request::Stop(Stop { playback: 7 });
-    let hello = Request::Hello(Hello { nonce: 2 });
+    let hello = Request::Hello(Hello { nonce: 2, minor: 0 });
     let record = Request::Record(Record { playback: 7, crc });
     let states = [Boot, Idle, Loaded, Ramp, Run, Limp, Fault];
     let stay = |refusal| {

@@ -96,6 +96,7 @@ impl Fuzz {
         match self.below(20) {
             0 => Request::Hello(Hello {
                 nonce: self.nonce + self.below(2) as u32,
+                minor: self.below(3) as u8,
             }),
             1 => Request::TableBegin(TableBegin {
                 nodes: small,
@@ -201,7 +202,10 @@ impl Fuzz {
         self.say(Request::Limp);
         self.at += Duration::from_millis(500);
         self.nonce += 2;
-        self.say(Request::Hello(Hello { nonce: self.nonce }));
+        self.say(Request::Hello(Hello {
+            nonce: self.nonce,
+            minor: 1,
+        }));
         self.at += Duration::from_millis(100);
         self.say(Request::Rearm);
     }

@@ -4,5 +4,6 @@ mod firmware;
 mod firmware_probe;
 mod firmware_states;
 mod fuzz;
+mod minor;
 mod support;
 mod v1;

@@ -55,7 +55,7 @@ impl Host {
 
     pub(crate) fn open(&mut self, nonce: u32) {
         self.ask(Request::Limp);
-        self.ask(Request::Hello(Hello { nonce }));
+        self.ask(Request::Hello(Hello { nonce, minor: 1 }));
         assert_eq!(self.ack(Request::Rearm).refusal, Refusal::None);
     }
 

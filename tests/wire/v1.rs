@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod frames;
 mod replies;
 mod requests;
 
@@ -15,10 +16,10 @@ use std::num::NonZeroU16;
 use study_wire::frame::{Decoder, crc32};
 use study_wire::handler::{Bounds, Handler, Measured, Profile};
 use study_wire::message::{
-    Ack, Commit, DeviceState, Event, EventKind, Fault, FixedVec, Flags, Heartbeat, Hello, Identity,
-    Loaded, Name, Node, Outcome, PathBegin, PathChunk, Play, Pulse, Record, Recorded,
-    RecordedPoint, Refusal, Reply, Request, Stop, TableBegin, TableChunk, Telemetry,
-    TelemetrySample, UploadCrc, WireError, fixed, kind,
+    Ack, Commit, Constants, DeviceState, Event, EventKind, Fault, Features, FixedVec, Flags,
+    Heartbeat, Hello, Identity, Loaded, Name, Node, Outcome, PathBegin, PathChunk, Play, Pulse,
+    Record, Recorded, RecordedPoint, Refusal, Reply, Request, Stop, TableBegin, TableChunk,
+    Telemetry, TelemetrySample, UploadCrc, WireError, fixed, kind,
 };
 use study_wire::predict::{Direction, Lookup, Motion};
 use study_wire::servo::ServoSettings;
@@ -100,6 +101,30 @@ fn identity() -> Identity {
         stroke_mm: [-5.0, 40.0],
         firmware: Name::new("example 1.0"),
         serial: Name::new("A-0001"),
+        constants: None,
+    }
+}
+
+/// The same device to a host of minor version 1.
+fn identity_1() -> Identity {
+    Identity {
+        constants: Some(Constants {
+            minor: 1,
+            features: Features {
+                acceleration_from_speed: true,
+            },
+            commit_ms: 135,
+            acceleration_hz: 20.0,
+            least_mass_kg: -0.05,
+            damping_n_s_per_mm: 0.002,
+            wall_n_per_mm: 10.0,
+            wall_n_s_per_mm: 0.01,
+            overtravel_mm: 2.5,
+            jump_mm: 1.0,
+            slew_n_s: 2000.0,
+            ramp_s: 0.4,
+        }),
+        ..identity()
     }
 }
 
@@ -243,14 +268,24 @@ fn the_crc_of_an_upload_is_that_of_its_consecutive_fields() {
 
 #[test]
 fn a_message_of_any_other_length_is_refused() {
+    // Of these two, all that minor version 1 added is absent in minor version 0.
+    let hello = Hello {
+        nonce: 0xC0FF_EE01,
+        minor: 0,
+    };
+    let shorter = |body: &[u8]| match (body[1], body.len()) {
+        (kind::HELLO, 8) => Some(Request::decode(body).unwrap().1 == Request::Hello(hello)),
+        (kind::IDENTITY, 157) => {
+            Some(Reply::decode(body).unwrap().1 == Reply::Identity(identity()))
+        }
+        _ => None,
+    };
     for golden in requests() {
         let body = joined(&golden);
         for cut in 4..body.len() {
-            assert!(
-                Request::decode(&body[..cut]).is_err(),
-                "{} {cut}",
-                golden.name
-            );
+            let decoded = Request::decode(&body[..cut]);
+            let good = shorter(&body[..cut]).unwrap_or(decoded.is_err());
+            assert!(good, "{} {cut}", golden.name);
         }
         let longer = [&body[..], &[0]].concat();
         assert_eq!(Request::decode(&longer).unwrap_err(), WireError::Length);
@@ -258,11 +293,9 @@ fn a_message_of_any_other_length_is_refused() {
     for golden in replies() {
         let body = joined(&golden);
         for cut in 4..body.len() {
-            assert!(
-                Reply::decode(&body[..cut]).is_err(),
-                "{} {cut}",
-                golden.name
-            );
+            let decoded = Reply::decode(&body[..cut]);
+            let good = shorter(&body[..cut]).unwrap_or(decoded.is_err());
+            assert!(good, "{} {cut}", golden.name);
         }
         let longer = [&body[..], &[0]].concat();
         assert_eq!(Reply::decode(&longer).unwrap_err(), WireError::Length);
@@ -283,6 +316,23 @@ fn invalid_replies_are_rejected() {
         let spoilt = spoiled(Reply::Identity(identity()), at, bytes);
         assert_eq!(spoilt, Err(WireError::Field), "{at}");
     }
+    // minor version, acceleration filter, mass, damping, slew
+    let positive = 0.1f64.to_le_bytes();
+    let constants: [(usize, &[u8]); 6] = [
+        (157, &[0]),
+        (164, &zero),
+        (172, &positive),
+        (172, &nan),
+        (180, &nan),
+        (220, &zero),
+    ];
+    for (at, bytes) in constants {
+        let spoilt = spoiled(Reply::Identity(identity_1()), at, bytes);
+        assert_eq!(spoilt, Err(WireError::Field), "{at}");
+    }
+    // Features that this version does not know are ignored.
+    let later = spoiled(Reply::Identity(identity_1()), 158, &[0xff; 4]);
+    assert_eq!(later.unwrap().1, Reply::Identity(identity_1()));
     // energy
     let spoilt = spoiled(Reply::Outcome(outcome()), 47, &nan);
     assert_eq!(spoilt, Err(WireError::Field));
@@ -315,6 +365,7 @@ fn documented() -> Box<Handler<8, 0>> {
         firmware: identity.firmware,
         serial: identity.serial,
         flags: identity.flags,
+        features: Features::default(),
         watchdog_ms: identity.watchdog_ms,
         longest_ms: identity.longest_ms,
         telemetry_hz: identity.telemetry_hz,
@@ -336,7 +387,14 @@ fn conversation() -> Vec<(u32, u16, Request)> {
     let beat = |count, deadline_ms| Request::Heartbeat(Heartbeat { count, deadline_ms });
     vec![
         (100, 1, Request::Limp),
-        (102, 2, Request::Hello(Hello { nonce: 0xC0FF_EE01 })),
+        (
+            102,
+            2,
+            Request::Hello(Hello {
+                nonce: 0xC0FF_EE01,
+                minor: 0,
+            }),
+        ),
         (104, 3, Request::Rearm),
         (106, 4, Request::TableBegin(begin())),
         (112, 5, chunk(0, 3)),

@@ -28,7 +28,7 @@ mod table;
 
 use super::frame::{Decoder, Frame, MAX_BODY};
 use super::message::{
-    Ack, DeviceState, Event, EventKind, Fault, Flags, Loaded, Name, Refusal, Reply,
+    Ack, DeviceState, Event, EventKind, Fault, Features, Flags, Loaded, Name, Refusal, Reply,
 };
 use super::servo::{Rendering, Servo, ServoSettings, ServoState, Trip};
 use crate::predict::Motion;
@@ -49,6 +49,8 @@ pub struct Profile {
     pub serial: Name,
     /// Optional features. [`Flags::probe`] needs `POINTS` > 0.
     pub flags: Flags,
+    /// Features of minor version 1.
+    pub features: Features,
     /// Time without a fresh heartbeat after which the device goes limp, ms.
     pub watchdog_ms: u16,
     /// Longest playback, ms.

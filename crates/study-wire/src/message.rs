@@ -23,12 +23,15 @@ use core::num::NonZeroU16;
 
 pub use code::{DeviceState, EventKind, Fault, Loaded, Refusal};
 pub use probe::{PathBegin, PathChunk};
-pub use reply::{Ack, Flags, Identity, Name, Outcome, Pulse};
+pub use reply::{Ack, Constants, Features, Flags, Identity, Name, Outcome, Pulse};
 pub use stream::{Event, Recorded, RecordedPoint, Telemetry, TelemetrySample};
 pub use table::{Node, TableBegin, TableChunk, UploadCrc};
 
 /// The version of the wire format that this module implements.
 pub const VERSION: u8 = 1;
+/// The newest minor version that this module implements. Minor versions only add: host
+/// and device use the lower one of both, see [`Hello`] and [`Constants`].
+pub const MINOR: u8 = 1;
 
 /// Why a body is no message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -144,12 +147,35 @@ impl<T: Copy + Default + PartialEq, const N: usize> PartialEq for FixedVec<T, N>
     }
 }
 
-fields! {
-    /// Opens a connection.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-    Hello {
-        /// Different for each connection; the device returns it.
-        nonce: u32;
+/// Opens a connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hello {
+    /// Different for each connection; the device returns it.
+    pub nonce: u32,
+    /// Newest minor version that the host supports. It is sent unless it is 0, so that a
+    /// HELLO of minor version 0 has the bytes that it always had.
+    pub minor: u8,
+}
+
+impl Field for Hello {
+    const MAX_LEN: usize = u32::MAX_LEN + u8::MAX_LEN;
+
+    fn write(&self, out: &mut Writer) {
+        self.nonce.write(out);
+        if self.minor > 0 {
+            self.minor.write(out);
+        }
+    }
+
+    fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
+        let nonce = u32::read(from)?;
+        if from.left() == 0 {
+            return Ok(Self { nonce, minor: 0 });
+        }
+        match u8::read(from)? {
+            0 => Err(WireError::Length),
+            minor => Ok(Self { nonce, minor }),
+        }
     }
 }
 
@@ -424,6 +450,7 @@ mod tests {
             stroke_mm: [-20.0, 20.0],
             firmware: Name::new("f"),
             serial: Name::new("s"),
+            constants: None,
         };
         let good = body(&Reply::Identity(identity).frame(1));
         assert!(Reply::decode(&good).is_ok());

@@ -263,7 +263,10 @@ impl<'w> Exchange<'w> {
     pub(crate) fn hello(&mut self) -> Result<Identity, CheckFailure> {
         self.nonce = self.nonce.wrapping_add(1);
         let sent = self.now();
-        let request = Request::Hello(Hello { nonce: self.nonce });
+        let request = Request::Hello(Hello {
+            nonce: self.nonce,
+            minor: 0,
+        });
         let received = self.ask(request)?;
         if let Reply::Ack(ack) = received.reply
             && ack.refusal == Refusal::Version

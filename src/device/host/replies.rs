@@ -9,6 +9,11 @@ use study_wire::message::{
     self, DeviceState, EventKind, Fault, Outcome, Pulse, Refusal, Reply, Request, Telemetry,
 };
 
+/// Whether this is a HELLO with a minor version.
+fn says_minor(request: &Request) -> bool {
+    matches!(request, Request::Hello(hello) if hello.minor > 0)
+}
+
 impl Host {
     pub(super) fn take(&mut self, sequence: u16, reply: Reply, at: Duration) {
         self.silent_since = None;
@@ -20,6 +25,16 @@ impl Host {
                 // The answer to HELLO of a device with another version.
                 let version = u8::try_from(ack.detail).unwrap_or(u8::MAX);
                 self.other_version(version, at);
+            }
+            // A device of minor version 0 does not know a HELLO with a minor version.
+            Reply::Ack(ack)
+                if self.stage == Stage::Connecting
+                    && ack.refusal == Refusal::Malformed
+                    && self.pending.is_some_and(|pending| {
+                        pending.sequence == sequence && says_minor(&pending.request)
+                    }) =>
+            {
+                self.say_hello(0, at);
             }
             _ if !self.stage.known() => {}
             Reply::Ack(ack) => {

@@ -7,7 +7,10 @@ pub(super) fn requests() -> Vec<Golden<Request>> {
         Golden {
             name: "HELLO",
             sequence: 0,
-            message: Request::Hello(Hello { nonce: 0xC0FF_EE01 }),
+            message: Request::Hello(Hello {
+                nonce: 0xC0FF_EE01,
+                minor: 0,
+            }),
             body: &[
                 ("01", "version"),
                 ("01", "type HELLO"),
@@ -16,6 +19,23 @@ pub(super) fn requests() -> Vec<Golden<Request>> {
             ],
             crc: "4e717f1c",
             frame: "00030101010901eeffc04e717f1c00",
+        },
+        Golden {
+            name: "HELLO of minor version 1",
+            sequence: 2,
+            message: Request::Hello(Hello {
+                nonce: 0xC0FF_EE01,
+                minor: 1,
+            }),
+            body: &[
+                ("01", "version"),
+                ("01", "type HELLO"),
+                ("0200", "sequence number 2"),
+                ("01eeffc0", "nonce"),
+                ("01", "minor version 1"),
+            ],
+            crc: "d4dde2a3",
+            frame: "00040101020a01eeffc001d4dde2a300",
         },
         Golden {
             name: "TABLE_BEGIN",

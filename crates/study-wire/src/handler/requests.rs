@@ -5,14 +5,16 @@ use super::table::{Refused, require};
 use super::{Alive, Handler, LastRequest, Out};
 use crate::frame::crc32;
 use crate::message::{
-    DeviceState, EventKind, Fault, Header, Heartbeat, Hello, Identity, Loaded, Outcome, Play,
-    Pulse, Record, Refusal, Reply, Request, Stop, VERSION, WireError, kind,
+    Constants, DeviceState, EventKind, Fault, Header, Heartbeat, Hello, Identity, Loaded, MINOR,
+    Outcome, Play, Pulse, Record, Refusal, Reply, Request, Stop, VERSION, WireError, kind,
 };
 use crate::servo::{Servo, ServoSettings};
 use core::num::NonZeroU32;
 
 /// A heartbeat with a deadline further ahead than this is not fresh, ms.
 const MAX_DEADLINE_MS: u32 = 1000;
+/// Longest time from COMMIT to its reply, ms.
+const COMMIT_MS: u16 = 50;
 
 /// Success, or a refusal and its detail.
 type Answer = Result<(), Refused>;
@@ -301,7 +303,26 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             stroke_mm: profile.bounds.stroke_mm,
             firmware: profile.firmware,
             serial: profile.serial,
+            constants: (hello.minor > 0).then(|| self.constants(hello.minor.min(MINOR))),
         })
+    }
+
+    fn constants(&self, minor: u8) -> Constants {
+        let servo = &self.profile.servo;
+        Constants {
+            minor,
+            features: self.profile.features,
+            commit_ms: COMMIT_MS,
+            acceleration_hz: servo.acceleration_hz,
+            least_mass_kg: servo.least_mass_kg,
+            damping_n_s_per_mm: servo.damping_n_s_per_mm,
+            wall_n_per_mm: servo.wall_n_per_mm,
+            wall_n_s_per_mm: servo.wall_n_s_per_mm,
+            overtravel_mm: servo.overtravel_mm,
+            jump_mm: servo.jump_mm,
+            slew_n_s: servo.slew_n_s,
+            ramp_s: servo.ramp_s,
+        }
     }
 
     fn heartbeat(&mut self, beat: Heartbeat, now_ms: u32) -> Reply {

@@ -98,6 +98,11 @@ impl<'a> Reader<'a> {
         Ok(*first)
     }
 
+    /// Number of bytes left.
+    pub(super) fn left(&self) -> usize {
+        self.0.len()
+    }
+
     /// Checks that nothing is left.
     pub(super) fn done(self) -> Result<(), WireError> {
         if self.0.is_empty() {

@@ -36,6 +36,15 @@ pub struct Flags {
     pub probe: bool,
 }
 
+/// What a device does beyond minor version 0. A host ignores features that it does not
+/// know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Features {
+    /// The acceleration is the difference of the speeds of two servo periods, and not
+    /// that of a sensor, so that a host can compute it from TELEMETRY.
+    pub acceleration_from_speed: bool,
+}
+
 /// Text of a device: UTF-8, padded with zeros. It is untrusted input.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 pub struct Name([u8; Name::LEN]);
@@ -82,6 +91,41 @@ fields! {
         firmware: Name;
         /// Serial number, the same on every port.
         serial: Name;
+        /// What the device adds to a table; `None` from a device of minor version 0, or
+        /// to a host of minor version 0.
+        constants: Option<Constants>;
+    }
+}
+
+fields! {
+    /// What a device adds to a table and how long a COMMIT takes, from minor version 1
+    /// on. A host predicts the force with these values.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    Constants {
+        /// Minor version of the connection, the lower one of host and device, not 0.
+        minor: u8, if not_zero;
+        /// What the device does beyond minor version 0.
+        features: Features;
+        /// Longest time from COMMIT to its reply, ms.
+        commit_ms: u16;
+        /// Corner of the acceleration's low-pass, Hz.
+        acceleration_hz: f64, if positive;
+        /// Smallest mass that is rendered, kg, zero or negative; may be −∞.
+        least_mass_kg: f64, if not_positive;
+        /// Damping added to the table's, N·s/mm.
+        damping_n_s_per_mm: f64, if finite;
+        /// Stiffness of the wall beyond the range, N/mm.
+        wall_n_per_mm: f64, if finite;
+        /// Damping of the wall, N·s/mm.
+        wall_n_s_per_mm: f64, if finite;
+        /// How far beyond the range the device trips, mm.
+        overtravel_mm: f64, if finite;
+        /// Larger position changes in one servo period trip, mm.
+        jump_mm: f64, if finite;
+        /// Fastest change of force, N/s.
+        slew_n_s: f64, if positive;
+        /// Time from zero to full force, s.
+        ramp_s: f64, if finite;
     }
 }
 
@@ -178,6 +222,41 @@ impl Field for Flags {
     }
 }
 
+/// Unknown bits are ignored, so that later minor versions can use them.
+impl Field for Features {
+    const MAX_LEN: usize = u32::MAX_LEN;
+
+    fn write(&self, out: &mut Writer) {
+        u32::from(self.acceleration_from_speed).write(out);
+    }
+
+    fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
+        let bits = u32::read(from)?;
+        Ok(Self {
+            acceleration_from_speed: bits & 1 != 0,
+        })
+    }
+}
+
+/// The end of a message: absent in minor version 0.
+impl Field for Option<Constants> {
+    const MAX_LEN: usize = Constants::MAX_LEN;
+
+    fn write(&self, out: &mut Writer) {
+        if let Some(constants) = self {
+            constants.write(out);
+        }
+    }
+
+    fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
+        match from.left() {
+            0 => Ok(None),
+            1..Constants::MAX_LEN => Err(WireError::Length),
+            _ => Constants::read(from).map(Some),
+        }
+    }
+}
+
 impl Field for Name {
     const MAX_LEN: usize = Self::LEN;
 
@@ -220,6 +299,14 @@ impl core::fmt::Debug for Name {
 
 fn finite(value: f64) -> bool {
     value.is_finite()
+}
+
+fn not_positive(value: f64) -> bool {
+    value <= 0.0
+}
+
+fn not_zero(value: u8) -> bool {
+    value != 0
 }
 
 fn positive(value: f64) -> bool {
