@@ -1,5 +1,7 @@
 //! The minor version: hosts and devices of minor versions 0 and 1 work together.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use super::support::{Host, ms};
 use std::time::Duration;
 use study::device::Report;
