@@ -12,7 +12,7 @@
 //! | What is the slope on a covariate? | [`regression`], [`two_way_slope`] (beside two fixed factors), [`lmm`] (random effects) |
 //! | Do the raters agree? | [`agreement`], [`disagreement`] (interaction of subject and realization) |
 //! | Does a rating depend on the one before? | [`carry_over`] |
-//! | How large an effect would be found? | [`power`] |
+//! | How large an effect would be found? How many subjects and realizations does it take? | [`power`] |
 //! | How large is a share of trials? | [`proportion`] |
 //! | Can a printed mean and standard deviation be right? | [`grim`] |
 //! | Tail probabilities, quantiles, ranks | [`distribution`], [`rank`] |

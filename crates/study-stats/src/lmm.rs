@@ -9,7 +9,8 @@
 //! dense Cholesky factor. A variance on the boundary is exactly 0.
 //!
 //! Usage: [`LmmData::new`], then [`fit`], then the tests of [`LmmFit`] or
-//! [`kenward_roger`]; or [`adjusted_means`].
+//! [`kenward_roger`]; or [`adjusted_means`]. [`balanced_slope`] is the closed form of the
+//! crossed model on complete, balanced data.
 //!
 //! `docs/statistics-mixed.md` derives the formulas. Sources: Bates, Mächler,
 //! Bolker & Walker (2015) for the profiled criterion; Satterthwaite (1946) and
@@ -20,6 +21,7 @@
 //! slopes, weights.
 
 mod adjusted;
+mod balanced;
 mod data;
 mod differences;
 mod fit;
@@ -33,6 +35,7 @@ mod start;
 mod tests;
 
 pub use adjusted::{AdjustedMeans, adjusted_means};
+pub use balanced::{BalancedSlope, balanced_slope};
 pub use data::{CellSummary, FixedEffects, LmmData};
 pub use fit::{Criterion, LmmFit, VarianceComponents, fit};
 pub use kenward_roger::kenward_roger;

@@ -4,6 +4,10 @@
 //! the observed one included, whose statistic is at least as extreme, where values
 //! within 10⁻⁹ count as equal (Pitman 1937). No distribution of either column is assumed.
 
+mod decision;
+
+pub use decision::Decision;
+
 use super::correlation::{kendall, pearson, spearman};
 use super::describe::{mean, sum_of_squares};
 use super::rank::{doubled_ranks, mid_ranks};
@@ -92,6 +96,15 @@ pub fn test(
         smallest: 1.0 / all,
         exact: false,
     })
+}
+
+/// The smallest two-sided p of the exact permutation test of Pearson's r that any y can
+/// have with these x: with few or evenly spaced x no result is significant. `None` for
+/// fewer than three x or if they do not vary.
+pub fn floor(x: &[f64]) -> Option<f64> {
+    let all: f64 = (1..=x.len()).map(|i| i as f64).product();
+    (x.len() > 2 && sum_of_squares(x)? > 0.0 && all.is_finite())
+        .then(|| smallest(Statistic::Pearson, x, all))
 }
 
 /// The smallest attainable two-sided p of `all` pairings: for ranks that of a perfect
@@ -272,6 +285,18 @@ mod tests {
         let one = test(Statistic::Pearson, &x, &y, &mut seeded(7)).unwrap();
         assert_eq!(Some(one), test(Statistic::Pearson, &x, &y, &mut seeded(7)));
         assert!(!one.exact && one.greater > 0.0 && one.greater < 0.001);
+    }
+
+    /// Counted over all orders.
+    #[test]
+    fn the_floor_depends_on_the_spacing() {
+        let paper = [0.7672, 0.7851, 0.7904, 0.7798, 0.7425];
+        assert_eq!(floor(&paper), Some(1.0 / 120.0));
+        assert_eq!(floor(&[0.6, 0.7, 0.8, 0.9]), Some(2.0 / 24.0));
+        assert_eq!(floor(&[0.6, 0.69, 0.753, 0.7971]), Some(1.0 / 24.0));
+        assert_eq!(floor(&[0.6, 0.75, 0.9]), Some(2.0 / 6.0));
+        assert_eq!(floor(&[0.7, 0.7, 0.8, 0.85, 0.9]), Some(2.0 / 120.0));
+        assert_eq!(floor(&[0.7; 5]), None);
     }
 
     #[test]

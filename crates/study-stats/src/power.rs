@@ -5,6 +5,12 @@
 //! slope: with the covariate standardised over q realizations (Σx² = q) and the scatter
 //! V of their observed means about the line, δ = slope·√(q/V) and ν = q − 2. For a
 //! mean difference over n subjects, δ = d√n and ν = n − 1.
+//!
+//! [`covariate`] has the design of subjects × realizations × repetitions, [`two_conditions`]
+//! the designs of Westfall, Kenny and Judd.
+
+pub mod covariate;
+pub mod two_conditions;
 
 use super::distribution::{normal_upper, t_quantile};
 use statrs::function::gamma::ln_gamma;
@@ -32,15 +38,18 @@ const PANELS: usize = 60;
 
 /// ∫ f(u) P(|Z + δ| > cu) du over the density f of u = √(χ²(ν)/ν).
 fn rejected(ncp: f64, df: f64, critical: f64) -> f64 {
-    // f(u) is below 10⁻¹⁶ outside.
+    let at = |u: f64| normal_upper(critical * u - ncp) + normal_upper(critical * u + ncp);
+    average(df, at).clamp(0.0, 1.0)
+}
+
+/// The mean of `g(u)` over u = √(χ²(ν)/ν).
+fn average(df: f64, g: impl Fn(f64) -> f64) -> f64 {
+    // The density is below 10⁻¹⁶ outside.
     let reach = 9.0 / (2.0 * df).sqrt();
     let (low, high) = ((1.0 - reach).max(0.0), 1.0 + 1.3 * reach);
     let half = (high - low) / (2 * PANELS) as f64;
     let ln_scale = 2f64.ln() + df / 2.0 * (df / 2.0).ln() - ln_gamma(df / 2.0);
-    let at = |u: f64| {
-        let density = (ln_scale + (df - 1.0) * u.ln() - df * u * u / 2.0).exp();
-        density * (normal_upper(critical * u - ncp) + normal_upper(critical * u + ncp))
-    };
+    let at = |u: f64| g(u) * (ln_scale + (df - 1.0) * u.ln() - df * u * u / 2.0).exp();
     let panel = |i: usize| {
         let middle = low + half * (2 * i + 1) as f64;
         let pair = |&(x, w): &(f64, f64)| {
@@ -49,7 +58,7 @@ fn rejected(ncp: f64, df: f64, critical: f64) -> f64 {
         };
         half * RULE.iter().map(pair).sum::<f64>()
     };
-    (0..PANELS).map(panel).sum::<f64>().clamp(0.0, 1.0)
+    (0..PANELS).map(panel).sum()
 }
 
 /// The smallest noncentrality with this power. `None` unless `alpha` < `target` < 1.

@@ -381,3 +381,48 @@ fn random_small_tables_give_numbers_or_reasons() {
     }
     assert!(fits > 120, "only {fits} fits");
 }
+
+/// Every combination of variances on the boundary occurs.
+#[test]
+fn the_closed_form_of_balanced_data_is_the_fit() {
+    let mut singular = 0;
+    for seed in 0..120 {
+        let n = [3, 1][seed as usize % 2];
+        let spread = [
+            [0.6, 0.3, 0.4, 0.8],
+            [0.0, 0.0, 0.0, 1.0],
+            [0.5, 0.0, 0.3, 1.0],
+            [0.0, 0.5, 0.3, 0.6],
+            [0.2, 0.2, 0.1, 1.0],
+        ][seed as usize % 5];
+        let cells = balanced(seed, 10, &X, n, spread);
+        let table = table(&cells);
+        let random = RandomEffects {
+            cell: n > 1,
+            ..CROSSED
+        };
+        let fit = fit(&table, random, Criterion::Reml).unwrap();
+        let general = fit.t_tests(&[vec![0.0, 1.0]])[0];
+        let means: Vec<f64> = cells.iter().map(|c| c.mean).collect();
+        let within = cells.iter().map(|c| c.within).sum();
+        let closed = balanced_slope(&means, &X, n, within).unwrap();
+        close(closed.estimate, general.estimate, 1e-9);
+        close(closed.se, general.se, 1e-6);
+        close(closed.df, general.df.unwrap(), 2e-6);
+        let p = crate::distribution::t_two_sided(closed.estimate / closed.se, closed.df);
+        assert!((p.unwrap() - general.p.unwrap()).abs() < 1e-6, "{seed}");
+        assert_eq!(closed.singular, fit.singular, "{seed}");
+        singular += u32::from(closed.singular);
+    }
+    assert!((30..100).contains(&singular), "{singular}");
+}
+
+#[test]
+fn a_balanced_table_without_error_or_realizations_has_no_closed_form() {
+    let means = [1.0, 2.0, 4.0, 2.0, 3.0, 5.0];
+    let x = [0.0, 1.0, 2.0];
+    assert_eq!(balanced_slope(&means, &x, 2, 0.0), None);
+    assert_eq!(balanced_slope(&means[..3], &x, 2, 1.0), None);
+    assert_eq!(balanced_slope(&means, &[1.0; 3], 2, 1.0), None);
+    assert!(balanced_slope(&means, &x, 2, 1.0).is_some());
+}
