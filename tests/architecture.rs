@@ -39,8 +39,9 @@ const CRATES: [(&str, &[&str], &[&str]); 7] = [
 
 /// Module → the modules that it may import. `study-base` is open to all who depend
 /// on it; `study-stats` and `study-wire` count as one module each.
-const IMPORTS: [(&str, &[&str]); 22] = [
+const IMPORTS: [(&str, &[&str]); 23] = [
     ("diagnostic", &["text"]),
+    ("procedure", &["stats"]),
     ("schedule", &["protocol"]),
     ("outcome", &["protocol"]),
     ("session", &["protocol", "schedule", "outcome"]),
