@@ -42,7 +42,7 @@ pub trait Board {
 pub fn period(device: &mut Device, board: &mut dyn Board) {
     let now_ms = board.clock_ms();
     if board.overrun() {
-        device.trip(Fault::Overrun, now_ms, &mut |bytes| board.send(bytes));
+        device.overrun(now_ms, &mut |bytes| board.send(bytes));
     }
     if board.guard_open() {
         device.trip(Fault::External, now_ms, &mut |bytes| board.send(bytes));

@@ -288,11 +288,7 @@ impl Firmware {
             return false;
         }
         self.stall = None;
-        if self.handler.state().applies_force() {
-            self.with_handler(at, |handler, now_ms, out| {
-                handler.trip(Fault::Overrun, now_ms, out)
-            });
-        }
+        self.with_handler(at, |handler, now_ms, out| handler.overrun(now_ms, out));
         let unread = std::mem::take(&mut self.unread);
         self.handle(&unread, at);
         true

@@ -28,6 +28,10 @@ use study_wire::message::{self, Heartbeat, Hello, Play, Reply, Request, Stop, Wi
 
 /// Time after which an unanswered request is sent again.
 pub const RETRY_INTERVAL: Duration = Duration::from_millis(100);
+/// Longest time for a COMMIT, wire.md 11.2, ms.
+const MAX_COMMIT_MS: u16 = 1000;
+/// Time on the way that COMMIT has in addition to the device's own.
+const COMMIT_SLACK: Duration = Duration::from_millis(50);
 /// Number of times a request is sent before the device counts as lost.
 pub const MAX_TRIES: u32 = 5;
 /// Time between heartbeats while the device's watchdog is active.
@@ -334,7 +338,7 @@ impl Host {
             _ => self.next_heartbeat,
         };
         let request = match (&self.pending, self.rearm_retry) {
-            (Some(pending), _) => Some(pending.sent + RETRY_INTERVAL),
+            (Some(pending), _) => Some(pending.sent + self.retry_interval(&pending.request)),
             (None, rearm) => rearm.map(|rearm| rearm.next),
         };
         heartbeat.into_iter().chain(request).min()
@@ -371,16 +375,31 @@ impl Host {
         });
     }
 
+    /// Time after which an unanswered request is sent again: longer for COMMIT, which a
+    /// device may take longer to judge.
+    fn retry_interval(&self, request: &Request) -> Duration {
+        let constants = self.identity.and_then(|device| device.constants);
+        match (request, constants) {
+            (Request::TableCommit(_) | Request::PathCommit(_), Some(constants)) => RETRY_INTERVAL
+                .max(
+                    Duration::from_millis(u64::from(constants.commit_ms.min(MAX_COMMIT_MS)))
+                        + COMMIT_SLACK,
+                ),
+            _ => RETRY_INTERVAL,
+        }
+    }
+
     fn repeat(&mut self, at: Duration) {
-        let Some(pending) = &mut self.pending else {
+        let Some(mut pending) = self.pending else {
             return;
         };
-        if at.saturating_sub(pending.sent) < RETRY_INTERVAL {
+        if at.saturating_sub(pending.sent) < self.retry_interval(&pending.request) {
             return;
         }
         if pending.tries < MAX_TRIES {
             pending.tries += 1;
             pending.sent = at;
+            self.pending = Some(pending);
             self.health.repeats += 1;
             let frame = pending.request.frame(pending.sequence);
             self.out.extend_from_slice(frame.as_bytes());

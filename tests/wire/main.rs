@@ -1,5 +1,6 @@
 //! The wire format, and the device that implements it.
 
+mod commit;
 mod firmware;
 mod firmware_probe;
 mod firmware_states;

@@ -77,7 +77,7 @@ pub struct Margin {
 
 impl Margin {
     /// No value so far.
-    fn at(at_mm: f64) -> Self {
+    const fn at(at_mm: f64) -> Self {
         Self {
             value: f64::INFINITY,
             at_mm,
@@ -129,22 +129,67 @@ pub struct Range {
 
 /// Computes the certificate of a valid table.
 pub fn certify(table: &TableView<'_>, direction: Direction, range: Range) -> Certificate {
-    let mut c = Certificate {
-        mass: Margin::at(table.x_mm[0]),
-        damping: Margin::at(table.x_mm[0]),
-        hysteresis: Margin::at(table.x_mm[0]),
-        negative_mass: 0.0,
-        negative_damping: 0.0,
-        stiffness_n_per_mm: 0.0,
-        damping_n_s_per_mm: 0.0,
-        mass_kg: 0.0,
-    };
-    let nodes = table.x_mm.len();
-    let delta_mm = direction.delta_mm();
-    for (branch, sign) in [(&table.positive, 1.0), (&table.negative, -1.0)] {
-        for i in 0..nodes {
+    let mut certifier = Certifier::new();
+    for _ in table.x_mm {
+        certifier.step(table, table.x_mm.len(), direction, range);
+    }
+    certifier.finish(table, range)
+}
+
+/// A certificate in progress, one node at a time, so that a device can judge a table
+/// between servo periods while it arrives.
+#[derive(Debug, Clone, Copy)]
+pub struct Certifier {
+    so_far: Certificate,
+    /// Margins of mass and damping for v > 0 and v < 0.
+    branches: [[Margin; 2]; 2],
+    judged: usize,
+}
+
+impl Certifier {
+    /// Before the first node.
+    pub const fn new() -> Self {
+        let margin = Margin::at(0.0);
+        Self {
+            so_far: Certificate {
+                mass: margin,
+                damping: margin,
+                hysteresis: margin,
+                negative_mass: 0.0,
+                negative_damping: 0.0,
+                stiffness_n_per_mm: 0.0,
+                damping_n_s_per_mm: 0.0,
+                mass_kg: 0.0,
+            },
+            branches: [[margin; 2]; 2],
+            judged: 0,
+        }
+    }
+
+    /// Nodes judged so far.
+    pub fn judged(&self) -> usize {
+        self.judged
+    }
+
+    /// Judges the next node of a table of `nodes`. The table has to contain the node after
+    /// it as well, unless it is the last.
+    pub fn step(
+        &mut self,
+        table: &TableView<'_>,
+        nodes: usize,
+        direction: Direction,
+        range: Range,
+    ) {
+        let (i, c) = (self.judged, &mut self.so_far);
+        let (x_mm, delta_mm) = (table.x_mm[i], direction.delta_mm());
+        if i == 0 {
+            self.branches = [[Margin::at(x_mm); 2]; 2];
+            c.hysteresis = Margin::at(x_mm);
+        }
+        let directions = [(&table.positive, 1.0), (&table.negative, -1.0)];
+        for ((branch, sign), [mass, damping]) in directions.into_iter().zip(&mut self.branches) {
             let (m, b) = (branch.m_kg[i], branch.b_n_s_per_mm[i]);
-            c.mass.include(m, table.x_mm[i]);
+            mass.include(m, x_mm);
             c.negative_mass += node_fraction(m < 0.0, nodes);
             c.negative_damping += node_fraction(b < 0.0, nodes);
             c.mass_kg = c.mass_kg.max(libm::fabs(m));
@@ -156,29 +201,45 @@ pub fn certify(table: &TableView<'_>, direction: Direction, range: Range) -> Cer
             } else {
                 0.0
             };
-            c.damping.include(b - required, table.x_mm[i]);
+            damping.include(b - required, x_mm);
         }
+        if i > 0 {
+            between(table, i - 1, c);
+        }
+        self.judged += 1;
     }
-    for i in 0..nodes - 1 {
-        between(table, i, &mut c);
-    }
-    let ends = [(0, range.x_mm[0]), (nodes - 1, range.x_mm[1])];
-    for (i, x) in ends {
-        let outside = if i == 0 {
-            x < table.x_mm[0]
-        } else {
-            x > table.x_mm[i]
-        };
-        let gap = |x: f64| spring(&table.positive, i, x) - spring(&table.negative, i, x);
-        c.hysteresis.include(gap(table.x_mm[i]), table.x_mm[i]);
-        if outside {
-            c.hysteresis.include(gap(x), x);
-            for branch in [&table.positive, &table.negative] {
-                c.include_stiffness(libm::fabs(branch.k_n_per_mm[i]));
+
+    /// The certificate, after the last node.
+    pub fn finish(&self, table: &TableView<'_>, range: Range) -> Certificate {
+        let mut c = self.so_far;
+        let [positive, negative] = self.branches;
+        [c.mass, c.damping] = positive;
+        c.mass.include(negative[0].value, negative[0].at_mm);
+        c.damping.include(negative[1].value, negative[1].at_mm);
+        let last = table.x_mm.len() - 1;
+        for (i, x) in [(0, range.x_mm[0]), (last, range.x_mm[1])] {
+            let outside = if i == 0 {
+                x < table.x_mm[0]
+            } else {
+                x > table.x_mm[i]
+            };
+            let gap = |x: f64| spring(&table.positive, i, x) - spring(&table.negative, i, x);
+            c.hysteresis.include(gap(table.x_mm[i]), table.x_mm[i]);
+            if outside {
+                c.hysteresis.include(gap(x), x);
+                for branch in [&table.positive, &table.negative] {
+                    c.include_stiffness(libm::fabs(branch.k_n_per_mm[i]));
+                }
             }
         }
+        c
     }
-    c
+}
+
+impl Default for Certifier {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 fn node_fraction(counts: bool, nodes: usize) -> f64 {

@@ -209,6 +209,13 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         self.limit_n
     }
 
+    /// Received nodes that have not been judged so far. [`Handler::servo`] judges one a
+    /// period while there is no force, and COMMIT the rest. A link of up to 32 bytes a
+    /// period leaves at most those of one chunk.
+    pub fn unjudged(&self) -> usize {
+        self.table.unjudged()
+    }
+
     /// Processes bytes that the link has received.
     pub fn receive(&mut self, bytes: &[u8], now_ms: u32, out: Out<'_>) {
         self.supervise(now_ms, out);
@@ -255,6 +262,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         };
         self.supervise(now_ms, out);
         if !self.state.applies_force() {
+            self.table.judge();
             return Drive::Force(0.0);
         }
         match self.loaded {
@@ -264,8 +272,15 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         }
     }
 
+    /// The firmware missed a servo period. This is a fault only while there is force.
+    pub fn overrun(&mut self, now_ms: u32, out: Out<'_>) {
+        if self.state.applies_force() {
+            self.trip(Fault::Overrun, now_ms, out);
+        }
+    }
+
     /// Switches the force off and latches this state. The firmware reports faults of
-    /// the hardware this way, such as [`Fault::Overrun`] or [`Fault::External`].
+    /// the hardware this way, such as [`Fault::External`].
     pub fn trip(&mut self, fault: Fault, now_ms: u32, out: Out<'_>) {
         self.latch(DeviceState::Fault, fault, now_ms);
         self.send_event(out);

@@ -21,6 +21,8 @@ pub(super) struct PathBuffer<const N: usize> {
     len: usize,
     begin: Option<PathBegin>,
     crc: UploadCrc,
+    /// Why the first bad point cannot be followed.
+    bad: Option<Refused>,
     /// Position of the handle at the start of the approach.
     from_mm: Option<f64>,
     /// Duration of the approach, servo periods.
@@ -36,6 +38,7 @@ impl<const N: usize> PathBuffer<N> {
             len: 0,
             begin: None,
             crc: UploadCrc::default(),
+            bad: None,
             from_mm: None,
             approach: 0,
             ticks: 0,
@@ -45,6 +48,7 @@ impl<const N: usize> PathBuffer<N> {
     pub(super) fn clear(&mut self) {
         self.begin = None;
         self.len = 0;
+        self.bad = None;
     }
 
     pub(super) fn begin(&mut self, begin: &PathBegin) -> Result<(), Refused> {
@@ -56,8 +60,8 @@ impl<const N: usize> PathBuffer<N> {
         Ok(())
     }
 
-    pub(super) fn chunk(&mut self, chunk: &PathChunk) -> Result<(), Refused> {
-        let Some(begin) = &self.begin else {
+    pub(super) fn chunk(&mut self, chunk: &PathChunk, bounds: &Bounds) -> Result<(), Refused> {
+        let Some(begin) = self.begin else {
             return Err((Refusal::WrongState, 0));
         };
         let points = chunk.x_nm.as_slice();
@@ -68,9 +72,20 @@ impl<const N: usize> PathBuffer<N> {
         for point in points {
             self.x_nm[self.len] = *point;
             self.crc.point(*point);
+            self.bad = self.bad.or(self.check(self.len, &begin, bounds).err());
             self.len += 1;
         }
         Ok(())
+    }
+
+    /// Checks that a point is inside the stroke and can be reached from the one before.
+    fn check(&self, point: usize, begin: &PathBegin, bounds: &Bounds) -> Result<(), Refused> {
+        let [low, high] = bounds.stroke_mm;
+        let x_mm = fixed::from_nm(self.x_nm[point]);
+        let before_mm = fixed::from_nm(self.x_nm[point.saturating_sub(1)]);
+        require((low..=high).contains(&x_mm), Refusal::Limit, 3)?;
+        let slow = libm::fabs(x_mm - before_mm) * begin.rate_hz <= begin.velocity_mm_s;
+        require(slow, Refusal::BadTable, point as u32)
     }
 
     /// Checks that the path is complete and within the bounds; its force limit, N.
@@ -92,15 +107,7 @@ impl<const N: usize> PathBuffer<N> {
         require(within(begin.force_n, bounds.force_n), Refusal::Limit, 1)?;
         let velocity = within(begin.velocity_mm_s, bounds.velocity_mm_s);
         require(velocity, Refusal::Limit, 2)?;
-        let [low, high] = bounds.stroke_mm;
-        for (i, x_nm) in self.x_nm[..self.len].iter().enumerate() {
-            let x_mm = fixed::from_nm(*x_nm);
-            let before_mm = fixed::from_nm(self.x_nm[i.saturating_sub(1)]);
-            require((low..=high).contains(&x_mm), Refusal::Limit, 3)?;
-            let slow = libm::fabs(x_mm - before_mm) * begin.rate_hz <= begin.velocity_mm_s;
-            require(slow, Refusal::BadTable, i as u32)?;
-        }
-        Ok(begin.force_n)
+        self.bad.map_or(Ok(begin.force_n), Err)
     }
 
     pub(super) fn velocity_mm_s(&self) -> f64 {

@@ -121,7 +121,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             Request::PathChunk(chunk) => {
                 self.may_probe()?;
                 self.may_continue()?;
-                self.path.chunk(chunk)
+                self.path.chunk(chunk, &self.profile.bounds)
             }
             Request::PathCommit(commit) => {
                 self.may_probe()?;

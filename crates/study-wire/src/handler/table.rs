@@ -1,6 +1,6 @@
 //! The uploaded table and the checks before it may be played.
 
-use crate::certificate::{self, Certificate};
+use crate::certificate::{Certificate, Certifier, Range};
 use crate::message::{Node, Refusal, TableBegin, TableChunk, UploadCrc};
 use crate::predict::{BranchView, Lookup, TableView};
 
@@ -29,6 +29,9 @@ pub(super) struct TableBuffer<const N: usize> {
     len: usize,
     pub(super) begin: Option<TableBegin>,
     crc: UploadCrc,
+    /// The first node that is not finite or does not ascend.
+    bad: Option<usize>,
+    certifier: Certifier,
 }
 
 /// A refusal and its detail, see [`Refusal`].
@@ -43,6 +46,8 @@ impl<const N: usize> TableBuffer<N> {
             len: 0,
             begin: None,
             crc: UploadCrc::default(),
+            bad: None,
+            certifier: Certifier::new(),
         }
     }
 
@@ -59,6 +64,8 @@ impl<const N: usize> TableBuffer<N> {
     pub(super) fn clear(&mut self) {
         self.begin = None;
         self.len = 0;
+        self.bad = None;
+        self.certifier = Certifier::new();
     }
 
     pub(super) fn chunk(&mut self, chunk: &TableChunk) -> Result<(), Refused> {
@@ -78,6 +85,11 @@ impl<const N: usize> TableBuffer<N> {
 
     fn add(&mut self, node: &Node) {
         let at = self.len;
+        let ascends = at == 0 || self.x_mm[at - 1] < node.x_mm;
+        let mut parameters = node.positive.iter().chain(&node.negative);
+        if !(ascends && node.x_mm.is_finite() && parameters.all(|value| value.is_finite())) {
+            self.bad = self.bad.or(Some(at));
+        }
         self.x_mm[at] = node.x_mm;
         for parameter in 0..4 {
             self.positive[parameter][at] = node.positive[parameter];
@@ -101,21 +113,45 @@ impl<const N: usize> TableBuffer<N> {
         }
     }
 
+    /// Received nodes whose certificate has not been computed.
+    pub(super) fn unjudged(&self) -> usize {
+        match self.bad {
+            None => self.len - self.certifier.judged(),
+            Some(_) => 0,
+        }
+    }
+
+    /// Computes the certificate of the next node; false if it needs the one after it, or
+    /// if there is none. A device does so while it waits for the next chunk, so that
+    /// little is left for COMMIT.
+    pub(super) fn judge(&mut self) -> bool {
+        let Some(begin) = self.begin else {
+            return false;
+        };
+        let nodes = usize::from(begin.nodes);
+        let at = self.certifier.judged();
+        let known = at + 1 < self.len || (at < self.len && self.len == nodes);
+        if !known || self.bad.is_some() {
+            return false;
+        }
+        let mut certifier = self.certifier;
+        certifier.step(&self.view(), nodes, begin.direction, range(&begin));
+        self.certifier = certifier;
+        true
+    }
+
     /// Checks that the table is complete and may be played; its force limit, N.
-    pub(super) fn validate(&self, crc: u32, bounds: &Bounds) -> Result<f64, Refused> {
-        let Some(begin) = &self.begin else {
+    pub(super) fn validate(&mut self, crc: u32, bounds: &Bounds) -> Result<f64, Refused> {
+        let Some(begin) = self.begin else {
             return Err((Refusal::WrongState, 0));
         };
         let complete = self.len == usize::from(begin.nodes);
         require(complete, Refusal::Incomplete, self.len as u32)?;
         require(self.crc() == crc, Refusal::Checksum, self.crc())?;
-        self.check_evaluable(begin)?;
-        check_limits(begin, bounds)?;
-        let range = certificate::Range {
-            x_mm: begin.range_mm,
-            v_mm_s: begin.trained_mm_s,
-        };
-        let certificate = certificate::certify(&self.view(), begin.direction, range);
+        self.check_evaluable(&begin)?;
+        check_limits(&begin, bounds)?;
+        while self.judge() {}
+        let certificate = self.certifier.finish(&self.view(), range(&begin));
         match (check_physics(&certificate, bounds), begin.uncertified_n) {
             (Ok(()), _) => Ok(begin.force_n),
             (Err(_), Some(cap_n)) => Ok(cap_n.min(begin.force_n)),
@@ -129,14 +165,8 @@ impl<const N: usize> TableBuffer<N> {
         if self.len < 2 {
             return bad(self.len);
         }
-        for node in 0..self.len {
-            let ascends = node == 0 || self.x_mm[node - 1] < self.x_mm[node];
-            let mut parameters = self.positive.iter().chain(&self.negative);
-            let finite =
-                self.x_mm[node].is_finite() && parameters.all(|values| values[node].is_finite());
-            if !(ascends && finite) {
-                return bad(node);
-            }
+        if let Some(node) = self.bad {
+            return bad(node);
         }
         let [low, high] = begin.range_mm;
         let ordered = low.is_finite() && high.is_finite() && low < high;
@@ -146,6 +176,13 @@ impl<const N: usize> TableBuffer<N> {
         } else {
             bad(self.len)
         }
+    }
+}
+
+fn range(begin: &TableBegin) -> Range {
+    Range {
+        x_mm: begin.range_mm,
+        v_mm_s: begin.trained_mm_s,
     }
 }
 
@@ -198,4 +235,59 @@ pub(super) fn require(satisfied: bool, refusal: Refusal, detail: u32) -> Result<
 
 fn positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::FixedVec;
+    use crate::predict::Direction;
+    use proptest::prelude::*;
+
+    const NODES: usize = 11;
+
+    proptest! {
+        /// A table that is judged while it arrives has the certificate of the whole table.
+        #[test]
+        fn judging_node_by_node_gives_the_same_certificate(
+            values in proptest::array::uniform11(proptest::array::uniform8(-1.0..3.0)),
+            steps in proptest::array::uniform11(0.1..2.0),
+            judged in proptest::array::uniform4(0..6),
+            lookup in 0..3_usize,
+            delta_mm in prop::option::of(0.1..1.0),
+        ) {
+            let mut x_mm = 1.0;
+            let mut nodes = [Node::default(); NODES];
+            for ((node, values), step) in nodes.iter_mut().zip(values).zip(steps) {
+                x_mm += step;
+                let [m, b, k, f0, ..] = values;
+                let [.., m2, b2, k2, f2] = values;
+                *node = Node { x_mm, positive: [m, b, k, f0], negative: [m2, b2, k2, f2] };
+            }
+            let begin = TableBegin {
+                nodes: NODES as u16,
+                lookup: Lookup::NAMES[lookup].1,
+                direction: delta_mm.map_or(Direction::Sign, |delta_mm| Direction::Play { delta_mm }),
+                range_mm: [0.0, 40.0],
+                trained_mm_s: 100.0,
+                force_n: 1.0,
+                velocity_mm_s: 100.0,
+                uncertified_n: None,
+            };
+            let mut table = TableBuffer::<16>::new();
+            table.begin(&begin).unwrap();
+            for (at, (some, judged)) in nodes.chunks(3).zip(judged).enumerate() {
+                let first = (3 * at) as u16;
+                table.chunk(&TableChunk { first, nodes: FixedVec::of(some) }).unwrap();
+                for _ in 0..judged {
+                    table.judge();
+                }
+            }
+            while table.judge() {}
+            prop_assert_eq!(table.unjudged(), 0);
+            let view = table.view();
+            let whole = crate::certificate::certify(&view, begin.direction, range(&begin));
+            prop_assert_eq!(table.certifier.finish(&view, range(&begin)), whole);
+        }
+    }
 }

@@ -106,7 +106,7 @@ fields! {
         minor: u8, if not_zero;
         /// What the device does beyond minor version 0.
         features: Features;
-        /// Longest time from COMMIT to its reply, ms.
+        /// Longest time from COMMIT to its reply, at most 1000 ms.
         commit_ms: u16;
         /// Corner of the acceleration's low-pass, Hz.
         acceleration_hz: f64, if positive;
