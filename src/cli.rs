@@ -11,6 +11,7 @@ mod check;
 mod completions;
 mod device;
 mod device_selection;
+mod help;
 mod identify;
 mod new;
 mod participant;
@@ -24,10 +25,11 @@ mod study_folder;
 mod trajectory;
 mod verify;
 
+pub use completions::answer_shell;
 pub use console::Console;
 pub use failure::{Failure, Kind, guard};
 
-use clap::{Parser, Subcommand};
+use clap::{FromArgMatches as _, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Haptic experiments: identify realizations, play them back, collect ratings, analyze
@@ -74,6 +76,14 @@ enum Command {
     Completions(completions::Args),
     /// Write manual pages
     Man(completions::ManArgs),
+}
+
+/// Parses the arguments of the process.
+///
+/// # Errors
+/// The help that was asked for, or what is wrong.
+pub fn parse() -> Result<Cli, clap::Error> {
+    Cli::from_arg_matches(&help::command().try_get_matches()?)
 }
 
 /// Runs a command.

@@ -17,10 +17,10 @@
 //! | 2 | `study-core`: schedule, outcome |
 //! | 3 | `study-core`: session, store, analyze; [`device`], [`rater`] |
 //! | 4 | [`runner`], [`report`] |
-//! | 5 | [`tui`] |
+//! | 5 | [`tui`], [`plain`] |
 //! | 6 | [`cli`] |
 //!
-//! Input and output happen only in `store`, `tui`, `runner` (the clock),
+//! Input and output happen only in `store`, `tui`, `plain`, `runner` (the clock),
 //! `device::{link, process}` and `cli`. Everywhere else time, randomness and identity
 //! are arguments.
 //!
@@ -47,6 +47,7 @@
 
 pub mod cli;
 pub mod device;
+pub mod plain;
 pub mod rater;
 pub mod report;
 pub mod runner;

@@ -1,12 +1,12 @@
 //! The command line of `study`.
 
-use clap::Parser as _;
 use std::process::ExitCode;
-use study::cli::{Cli, Console, Failure, guard};
+use study::cli::{Console, Failure, guard};
 
 fn main() -> ExitCode {
+    study::cli::answer_shell();
     let mut console = Console::of_process();
-    let cli = match Cli::try_parse() {
+    let cli = match study::cli::parse() {
         Ok(cli) => cli,
         Err(error) => return study::cli::usage(&error, &mut console),
     };

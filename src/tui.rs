@@ -29,7 +29,7 @@ use crossterm::event::{Event, MouseEventKind};
 use std::time::{Duration, Instant};
 use study_core::session::{Input, Screen, View};
 use terminal::Terminal;
-pub(crate) use terminal::survive_file_size_limit;
+pub(crate) use terminal::{Signals, survive_file_size_limit};
 
 /// Options of the terminal interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,11 +66,12 @@ impl TuiError {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::NoTerminal => {
-                "start it in a terminal window, without pipes; `study rehearse` needs no terminal"
+                "start it in a terminal window, or use --plain to read and write lines; \
+                 `study rehearse` needs no terminal"
             }
             Self::DumbTerminal(_) => {
-                "use a terminal such as xterm, or set TERM to its actual type; \
-                 `study rehearse` needs no terminal"
+                "use a terminal such as xterm, or set TERM to its actual type, or use \
+                 --plain; `study rehearse` needs no terminal"
             }
             Self::Platform => "run it on Linux or macOS, or in the Windows Subsystem for Linux",
             Self::Terminal(_) => "try another terminal window",

@@ -72,6 +72,10 @@ const IMPORTS: [(&str, &[&str]); 23] = [
     ),
     ("tui", &["runner", "session", "outcome", "protocol"]),
     (
+        "plain",
+        &["runner", "session", "outcome", "protocol", "tui"],
+    ),
+    (
         "cli",
         &[
             "analyze",
@@ -79,6 +83,7 @@ const IMPORTS: [(&str, &[&str]); 23] = [
             "identify",
             "model",
             "outcome",
+            "plain",
             "plant",
             "protocol",
             "rater",
@@ -107,9 +112,10 @@ const IMPORTS: [(&str, &[&str]); 23] = [
 ];
 
 /// Modules that may touch files, clocks, terminals, processes or the network.
-const WITH_IO: [&str; 6] = [
+const WITH_IO: [&str; 7] = [
     "store",
     "tui",
+    "plain",
     "runner",
     "cli",
     "device/link",

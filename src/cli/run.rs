@@ -5,8 +5,9 @@ mod unsaved;
 use super::console::shell_command;
 use super::device_selection::{self, DeviceArgs, WaitDisplay};
 use super::{Console, Failure, Kind, load};
+use crate::plain::Plain;
 use crate::runner::clock::{Clock as _, RealClock};
-use crate::runner::{Runner, Setup};
+use crate::runner::{Operator, Runner, Setup};
 use crate::tui::{self, Tui};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,10 +19,10 @@ use study_core::store::{Copies, Frozen, SeatKind, StoreError, StudyFolder, layou
 /// Arguments of `study run`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A protocol.toml or the folder that contains it
-    protocol: PathBuf,
+    /// A protocol.toml or the folder that contains it [default: the working folder]
+    protocol: Option<PathBuf>,
     /// Pseudonym of the participant; asked on the first screen if omitted
-    #[arg(long, value_name = "ID")]
+    #[arg(long, value_name = "ID", add = super::completions::participants())]
     participant: Option<String>,
     /// Initials or code of the operator; asked on the first screen if omitted
     #[arg(long, value_name = "NAME")]
@@ -44,6 +45,9 @@ pub(super) struct Args {
     /// Show whether telemetry arrives
     #[arg(long)]
     live: bool,
+    /// Lines only, for screen readers; also with STUDY_PLAIN=1 and in a dumb terminal
+    #[arg(long)]
+    plain: bool,
     /// Do not use the mouse
     #[arg(long)]
     no_mouse: bool,
@@ -52,8 +56,12 @@ pub(super) struct Args {
 /// Runs the command.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     tui::check_platform().map_err(unusable)?;
-    let loaded = load::load_for(&args.protocol, &args.results)?;
-    console.warnings_in_short(&loaded.findings, &args.protocol);
+    let protocol = match &args.protocol {
+        Some(given) => given.clone(),
+        None => protocol_here()?,
+    };
+    let loaded = load::load_for(&protocol, &args.results)?;
+    console.warnings_in_short(&loaded.findings, &protocol);
     let kind = args.device.kind.unwrap_or(loaded.protocol.device.kind);
     // Checks come before the device, and the device before the terminal, so that an
     // error message stays on the screen.
@@ -98,7 +106,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         colour: tui::Colour::detect(|name| std::env::var(name).ok()),
     };
     let address = &args.device.address;
-    let mut waiting = WaitDisplay::on_screen(options);
+    let plain = args.plain || wants_plain(|name| std::env::var(name).ok());
+    let mut waiting = match plain {
+        true => WaitDisplay::in_a_line(console),
+        false => WaitDisplay::on_screen(options),
+    };
     let opened = device_selection::open(address, kind, &loaded.protocol, &mut waiting);
     drop(waiting);
     let Some(device) = opened? else {
@@ -113,7 +125,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     tui::survive_file_size_limit();
     // The terminal comes before the folder: without a terminal nothing is created.
-    let mut tui = Tui::open(options).map_err(unusable)?;
+    let mut operator: Box<dyn Operator> = match plain {
+        true => Box::new(Plain::open(args.live).map_err(unusable)?),
+        false => Box::new(Tui::open(options).map_err(unusable)?),
+    };
     let study = match begun {
         Some(study) => study,
         None => {
@@ -147,7 +162,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let study = setup.study.clone();
     let mut runner = Runner::new(setup, config);
-    let ended = runner.run(&mut tui);
+    let ended = runner.run(&mut *operator);
     let participant = runner.view().line.participant;
     drop(runner);
     let resume = resume_command(args, &participant);
@@ -156,7 +171,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let kept = unsaved::keep(&unsaved, &participant, &folder, &unsaved::places());
         unsaved::failure(&unsaved, &kept, &folder, &resume)
     });
-    drop(tui);
+    drop(operator);
     for notice in notices {
         console.say(notice);
     }
@@ -171,6 +186,20 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         ))?;
     }
     finish(console, &study, &protocol, &ended.ending, &resume)
+}
+
+/// The protocol of the working folder.
+fn protocol_here() -> Result<PathBuf, Failure> {
+    let file = PathBuf::from("protocol.toml");
+    if file.is_file() {
+        return Ok(file);
+    }
+    Err(
+        Failure::usage("no protocol is given, and the working folder has no protocol.toml").hint(
+            "study run PROTOCOL, with a protocol.toml or the folder that contains it; \
+             `study new my-study` writes one",
+        ),
+    )
 }
 
 /// Says which of results folder and mirror was left behind.
@@ -188,6 +217,13 @@ fn say_behind(study: &StudyFolder, console: &mut Console) {
             ));
         }
     }
+}
+
+/// Whether the environment asks for lines: `STUDY_PLAIN`, or a terminal that cannot
+/// position text.
+fn wants_plain(var: impl Fn(&str) -> Option<String>) -> bool {
+    let asked = var("STUDY_PLAIN").is_some_and(|value| !value.is_empty() && value != "0");
+    asked || var("TERM").is_some_and(|term| term == "dumb")
 }
 
 fn unusable(error: tui::TuiError) -> Failure {
@@ -248,7 +284,7 @@ pub(super) fn refuse_unplayable(kind: DeviceKind, loaded: &load::Loaded) -> Resu
 fn resume_command(args: &Args, participant: &str) -> String {
     let mut command = vec!["study".to_owned(), "run".to_owned()];
     let path = |path: &std::path::Path| path.display().to_string();
-    command.push(path(&args.protocol));
+    command.extend(args.protocol.as_deref().map(path));
     let mut option = |name: &str, value: Option<String>| {
         if let Some(value) = value {
             command.extend([format!("--{name}"), value]);
@@ -278,6 +314,7 @@ fn resume_command(args: &Args, participant: &str) -> String {
     for (flag, given) in [
         ("--pilot", args.pilot),
         ("--live", args.live),
+        ("--plain", args.plain),
         ("--no-mouse", args.no_mouse),
     ] {
         if given {

@@ -16,7 +16,7 @@ use other as platform;
 #[cfg(unix)]
 use unix as platform;
 
-pub(crate) use platform::survive_file_size_limit;
+pub(crate) use platform::{Signals, survive_file_size_limit};
 
 use super::TuiError;
 use crate::runner::OperatorError;
@@ -28,7 +28,7 @@ use crossterm::terminal::{
     disable_raw_mode, enable_raw_mode,
 };
 use crossterm::{cursor, execute, queue, style};
-use platform::{Signals, hung_up};
+use platform::hung_up;
 use ratatui::Frame;
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;

@@ -13,6 +13,7 @@ mod kill;
 #[path = "../store/memory.rs"]
 mod memory;
 mod mirror;
+mod plain;
 mod rehearsed;
 #[path = "../support/mod.rs"]
 mod support;

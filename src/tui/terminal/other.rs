@@ -7,18 +7,18 @@ use std::sync::atomic::AtomicBool;
 /// Whether this platform can guarantee that a session ends in order.
 pub(super) const SUPPORTED: bool = false;
 
-pub(super) struct Signals;
+pub(crate) struct Signals;
 
 impl Signals {
-    pub(super) fn register() -> io::Result<Self> {
+    pub(crate) fn register() -> io::Result<Self> {
         Err(io::ErrorKind::Unsupported.into())
     }
 
-    pub(super) fn take(&self) -> Option<&'static str> {
+    pub(crate) fn take(&self) -> Option<&'static str> {
         None
     }
 
-    pub(super) fn take_continued(&self) -> bool {
+    pub(crate) fn take_continued(&self) -> bool {
         false
     }
 }

@@ -41,14 +41,14 @@ static IDLE: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
 /// Signals while a terminal is open: the terminating ones only set a flag, so that
 /// the session can stop the device and close its journal first.
-pub(super) struct Signals {
+pub(crate) struct Signals {
     terminating: Arc<AtomicUsize>,
     continued: Arc<AtomicBool>,
     registered: Vec<SigId>,
 }
 
 impl Signals {
-    pub(super) fn register() -> io::Result<Self> {
+    pub(crate) fn register() -> io::Result<Self> {
         let mut signals = Self {
             terminating: Arc::default(),
             continued: Arc::default(),
@@ -72,13 +72,13 @@ impl Signals {
     }
 
     /// The name of a terminating signal that has arrived, once.
-    pub(super) fn take(&self) -> Option<&'static str> {
+    pub(crate) fn take(&self) -> Option<&'static str> {
         let number = i32::try_from(self.terminating.swap(0, Ordering::SeqCst));
         signal_name(number.ok()?)
     }
 
     /// Whether the program was stopped and continued since the last call.
-    pub(super) fn take_continued(&self) -> bool {
+    pub(crate) fn take_continued(&self) -> bool {
         self.continued.swap(false, Ordering::SeqCst)
     }
 }

@@ -63,6 +63,11 @@ impl<'a> Trouble<'a> {
             theme,
         })
     }
+
+    /// Title, message, and what to do.
+    pub fn words(&self) -> (&str, &str, &str) {
+        (self.title, self.what, &self.then)
+    }
 }
 
 impl Widget for &Trouble<'_> {

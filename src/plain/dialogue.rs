@@ -1,0 +1,478 @@
+//! What is said when, and what a typed line means. No terminal, no clock.
+
+use super::answers;
+use super::pages::{self, Page};
+use study_base::text::{QuestionId, Untrusted};
+use study_core::outcome::{Author, Choice};
+use study_core::protocol::Answer;
+use study_core::session::view::{Correctable, DeviceState, Mirror, Telemetry};
+use study_core::session::{Input, Screen, View};
+
+/// What the lines that begin with a slash do, in the order of the help.
+const COMMANDS: [(&str, &str); 9] = [
+    ("/stop", "stops the device at once"),
+    ("/remark TEXT", "keeps a remark of the experimenter"),
+    ("/says TEXT", "keeps a remark of the participant"),
+    ("/correct", "changes an earlier answer, with a reason"),
+    ("/decline REASON", "declines the question"),
+    ("/bad REASON", "marks the trial as bad; it is repeated"),
+    ("/pause", "pauses"),
+    ("/again", "says the page again"),
+    ("/quit", "leaves; the session can be resumed"),
+];
+
+/// Inputs, or what to say instead.
+type Reply = Result<Vec<Input>, Vec<String>>;
+
+/// Something that is asked before the page goes on.
+#[derive(Debug, Clone, PartialEq)]
+enum Asking {
+    /// Whether to do what the inputs say.
+    Sure(Vec<Input>),
+    /// Which of the earlier answers to correct.
+    Which(Vec<Correctable>),
+    /// The new answer.
+    NewAnswer(Box<Correctable>),
+    /// Why; `None`: declined, with the same reason.
+    Why(Box<Correctable>, Option<Answer>),
+}
+
+/// What to say.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Said {
+    /// The lines.
+    pub lines: Vec<String>,
+    /// Whether a new page begins with them.
+    pub new_page: bool,
+}
+
+/// The state of a session in lines.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Dialogue {
+    keys: bool,
+    live: bool,
+    page: Option<Page>,
+    /// Whether the page is said again.
+    repeated: bool,
+    /// Where in the session the last page was.
+    top: Vec<String>,
+    /// Answers to the first questions of the form on the page.
+    entered: Vec<(QuestionId, Answer)>,
+    /// Number of the form's question that is asked.
+    at: usize,
+    /// The participant's id, typed on the first page.
+    participant: Option<String>,
+    asking: Option<Asking>,
+    notice: Option<String>,
+    begun: bool,
+    banner: bool,
+    saved: u32,
+    mirror: Option<Mirror>,
+    silent: bool,
+}
+
+impl Dialogue {
+    /// A dialogue that has said nothing. `keys` says whether single keys can be read,
+    /// `live` whether arriving telemetry is mentioned.
+    pub fn new(keys: bool, live: bool) -> Self {
+        Self {
+            keys,
+            live,
+            ..Self::default()
+        }
+    }
+
+    /// Says the page again.
+    pub fn repeat(&mut self) {
+        self.page = None;
+        self.top.clear();
+        self.repeated = true;
+    }
+
+    /// What has changed since the last call, in words.
+    pub fn follow(&mut self, view: &View) -> Said {
+        let mut lines = self.news(view);
+        if view.screen == Screen::Saving {
+            // Too short to be a page; what is saved is news.
+            return Said {
+                lines,
+                new_page: false,
+            };
+        }
+        let mut page = pages::page(view, self.at, self.keys);
+        let other = self.page.as_ref().is_none_or(|old| !old.is_like(&page));
+        if other && self.at > 0 && !self.is_next_question(view) {
+            self.restart();
+            page = pages::page(view, 0, self.keys);
+        }
+        if let Screen::Who {
+            participant,
+            operator,
+            claiming,
+        } = &view.screen
+        {
+            self.who(&mut page, participant, operator, *claiming);
+        }
+        let old = self.page.as_ref();
+        let new_page = old.is_none_or(|old| !old.is_like(&page));
+        if new_page {
+            self.asking = None;
+            if self.top != page.top {
+                self.top.clone_from(&page.top);
+                lines.extend(page.top.iter().cloned());
+            }
+            lines.extend(page.lines.iter().cloned());
+            lines.extend(page.wait.clone());
+        }
+        if new_page || old.is_none_or(|old| old.prompt != page.prompt) {
+            lines.extend(Some(page.prompt.clone()).filter(|p| !p.is_empty()));
+        }
+        page.wait = None;
+        self.page = Some(page);
+        let repeated = std::mem::take(&mut self.repeated);
+        Said {
+            lines,
+            new_page: new_page && !repeated,
+        }
+    }
+
+    /// Whether the form on the screen is still the one whose first questions are answered.
+    fn is_next_question(&self, view: &View) -> bool {
+        let Screen::Form { questions, .. } = &view.screen else {
+            return false;
+        };
+        let asked = questions.iter().take(self.at).map(|q| &q.id);
+        self.entered
+            .iter()
+            .all(|(id, _)| asked.clone().any(|q| q == id))
+            && self.at < questions.len()
+    }
+
+    fn restart(&mut self) {
+        self.at = 0;
+        self.entered.clear();
+    }
+
+    fn who(&mut self, page: &mut Page, participant: &str, operator: &str, claiming: bool) {
+        if claiming {
+            page.lines = vec!["One moment.".to_owned()];
+            return;
+        }
+        page.lines = vec!["Who takes part?".to_owned()];
+        let known = |preset: &str, word: &str| match preset {
+            "" => format!("Type {word}, then press Enter."),
+            preset => format!(
+                "Type {word}, then press Enter. Enter alone: {}.",
+                Untrusted(preset)
+            ),
+        };
+        page.prompt = match &self.participant {
+            None => known(participant, "the participant's pseudonym, such as P01"),
+            Some(_) => known(operator, "the operator's initials or a code"),
+        };
+    }
+
+    /// What changed beside the page.
+    fn news(&mut self, view: &View) -> Vec<String> {
+        let mut lines = Vec::new();
+        if !self.begun {
+            self.begun = true;
+            lines.push("Type /help at any time for the list of commands.".to_owned());
+        }
+        if !self.banner
+            && let Some(banner) = pages::banner(view)
+        {
+            self.banner = true;
+            lines.push(banner.to_owned());
+        }
+        if self.notice != view.notice {
+            self.notice.clone_from(&view.notice);
+            lines.extend(
+                view.notice
+                    .as_ref()
+                    .map(|n| format!("Note: {}", Untrusted(n))),
+            );
+            // A refused id is typed again.
+            self.participant = None;
+        }
+        let line = &view.line;
+        if line.all_saved && line.trials_saved > self.saved {
+            self.saved = line.trials_saved;
+            let both = match line.mirror {
+                Some(Mirror::InStep) => " in both places",
+                _ => "",
+            };
+            let plural = if self.saved == 1 { "" } else { "s" };
+            lines.push(format!("Saved{both}: {} trial{plural}.", self.saved));
+        }
+        if self.mirror != line.mirror {
+            self.mirror = line.mirror;
+            lines.extend(match line.mirror {
+                Some(Mirror::OnlyResults) => {
+                    Some("NO MIRROR: answers are saved once only.".to_owned())
+                }
+                Some(Mirror::OnlyMirror) => {
+                    Some("ONLY IN THE MIRROR: the results folder is behind.".to_owned())
+                }
+                Some(Mirror::InStep) | None => None,
+            });
+        }
+        let silent = line.device == DeviceState::Running(Telemetry::Silent);
+        if self.live && silent && !self.silent {
+            lines.push("NO TELEMETRY arrives.".to_owned());
+        }
+        self.silent = silent;
+        lines
+    }
+
+    /// The inputs that a typed line causes, and what to say to it at once.
+    pub fn line(&mut self, line: &str, view: &View) -> (Vec<Input>, Vec<String>) {
+        let done = match line.trim().split_once(char::is_whitespace) {
+            _ if line.starts_with("//") => self.answer(&line[1..], view),
+            Some((command, rest)) if command.starts_with('/') => {
+                self.command(command, rest.trim(), view)
+            }
+            None if line.trim().starts_with('/') => self.command(line.trim(), "", view),
+            _ => self.answer(line, view),
+        };
+        match done {
+            Ok(inputs) => (inputs, Vec::new()),
+            Err(words) => (Vec::new(), words),
+        }
+    }
+
+    fn command(&mut self, command: &str, rest: &str, view: &View) -> Reply {
+        let begun = !matches!(view.screen, Screen::Who { .. });
+        let needs = |what: &str| match (begun, rest.is_empty()) {
+            (false, _) => say("That is possible once the session has begun."),
+            (true, true) => say(&format!("Type {command} and {what} in one line.")),
+            (true, false) => Ok(rest.to_owned()),
+        };
+        let remark = |by| {
+            let text = needs("the remark")?;
+            Ok(vec![Input::Remark { by, text }])
+        };
+        match command {
+            "/stop" => Ok(vec![Input::Stop]),
+            "/remark" => remark(Author::Experimenter),
+            "/says" => remark(Author::Participant),
+            "/correct" if view.correctable.is_empty() => {
+                say("There is no earlier answer to correct.")
+            }
+            "/correct" => {
+                let items = view.correctable.clone();
+                let mut lines: Vec<String> =
+                    (1..).zip(&items).map(|(n, item)| listed(n, item)).collect();
+                lines.push(
+                    "Type the number of the answer to correct. Enter alone: none.".to_owned(),
+                );
+                self.asking = Some(Asking::Which(items));
+                Err(lines)
+            }
+            "/decline" => match (self.asking.take(), &view.screen) {
+                (Some(Asking::NewAnswer(item)), _) => {
+                    self.asking = Some(Asking::Why(item, None));
+                    say("Type the reason, then press Enter.")
+                }
+                (_, Screen::Form { questions, .. }) => {
+                    let reason = needs("the reason")?;
+                    let answer = Answer::Declined { reason };
+                    let Some(question) = questions.get(self.at) else {
+                        return Ok(Vec::new());
+                    };
+                    self.entered.push((question.id.clone(), answer));
+                    self.next_question(view)
+                }
+                _ => say("There is no question to decline."),
+            },
+            "/bad" if view.can_mark_bad.is_none() => say("There is no trial to mark as bad."),
+            "/bad" => {
+                let reason = needs("the reason")?;
+                Ok(vec![Input::MarkBad { reason }])
+            }
+            "/pause" => Ok(vec![Input::Pause]),
+            "/again" => {
+                self.repeat();
+                Ok(Vec::new())
+            }
+            "/quit" => self.sure(
+                "Leave the session? It can be resumed later.",
+                vec![Input::Quit],
+            ),
+            "/help" => Err(COMMANDS
+                .iter()
+                .map(|(c, what)| format!("{c}: {what}."))
+                .collect()),
+            other => say(&format!(
+                "{} is no command. Type /help for a list. An answer that begins with a slash needs two.",
+                Untrusted(other)
+            )),
+        }
+    }
+
+    fn sure(&mut self, question: &str, inputs: Vec<Input>) -> Reply {
+        self.asking = Some(Asking::Sure(inputs));
+        say(&format!("{question} Type y or n."))
+    }
+
+    fn answer(&mut self, line: &str, view: &View) -> Reply {
+        if let Some(asking) = self.asking.take() {
+            return self.asked(asking, line);
+        }
+        let key = line.trim().to_lowercase();
+        match &view.screen {
+            Screen::Who {
+                participant,
+                operator,
+                claiming: false,
+            } => self.identify(line.trim(), participant, operator),
+            Screen::ResumeChoice { .. } => match key.as_str() {
+                "b" => Ok(vec![Input::Resume(Choice::RestartBlock)]),
+                "c" => Ok(vec![Input::Resume(Choice::Continue)]),
+                "d" => self.sure(
+                    "Does the participant drop out?",
+                    vec![Input::Resume(Choice::DropOut)],
+                ),
+                _ => say("Type b, c or d."),
+            },
+            Screen::Consent { .. } => match key.as_str() {
+                "y" | "yes" => Ok(vec![Input::Consent(true)]),
+                "n" | "no" => self.sure(
+                    "Not take part? The session then ends.",
+                    vec![Input::Consent(false)],
+                ),
+                _ => say("Type y or n."),
+            },
+            Screen::Stopped { can_rate } => match key.as_str() {
+                "" => Ok(vec![Input::PlayAgain]),
+                "r" if *can_rate => Ok(vec![Input::RateStopped]),
+                _ => say("Press Enter to feel it again."),
+            },
+            Screen::SaveTrouble { .. } => Ok(vec![Input::RetrySave]),
+            Screen::Form { questions, .. } => {
+                let Some(question) = questions.get(self.at) else {
+                    return Ok(Vec::new());
+                };
+                let answer = answers::read(question, line).map_err(|what| vec![what])?;
+                self.entered
+                    .extend(answer.map(|answer| (question.id.clone(), answer)));
+                self.next_question(view)
+            }
+            _ if !key.is_empty() => say("Nothing is asked here. Type /help for what can be typed."),
+            _ if view.can_advance => Ok(vec![Input::Advance]),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// Asks the next question of the form, or sends the answers.
+    fn next_question(&mut self, view: &View) -> Reply {
+        let Screen::Form { questions, .. } = &view.screen else {
+            return Ok(Vec::new());
+        };
+        self.at += 1;
+        if self.at < questions.len() {
+            return Ok(Vec::new());
+        }
+        self.at = 0;
+        Ok(vec![Input::Answer(std::mem::take(&mut self.entered))])
+    }
+
+    fn identify(&mut self, line: &str, participant: &str, operator: &str) -> Reply {
+        let or = |preset: &str| match line {
+            "" => preset.to_owned(),
+            typed => typed.to_owned(),
+        };
+        match self.participant.take() {
+            None if or(participant).is_empty() => say("Type the participant's pseudonym first."),
+            None => {
+                self.participant = Some(or(participant));
+                Ok(Vec::new())
+            }
+            Some(participant) => Ok(vec![Input::Identify {
+                participant,
+                operator: or(operator),
+            }]),
+        }
+    }
+
+    fn asked(&mut self, asking: Asking, line: &str) -> Reply {
+        let typed = line.trim();
+        match asking {
+            Asking::Sure(inputs) => match typed.to_lowercase().as_str() {
+                "y" | "yes" => Ok(inputs),
+                "n" | "no" => {
+                    self.repeat();
+                    Ok(Vec::new())
+                }
+                _ => {
+                    self.asking = Some(Asking::Sure(inputs));
+                    say("Type y or n.")
+                }
+            },
+            _ if typed.is_empty() => {
+                self.repeat();
+                say("Nothing is corrected.")
+            }
+            Asking::Which(mut items) => {
+                let number = typed.parse::<usize>().ok().and_then(|n| n.checked_sub(1));
+                match number.filter(|n| *n < items.len()) {
+                    Some(n) => {
+                        let item = Box::new(items.swap_remove(n));
+                        let (mut lines, prompt) = answers::ask(&item.question);
+                        lines.insert(0, listed(n + 1, &item));
+                        lines.push(format!("{prompt} Type /decline to decline it."));
+                        self.asking = Some(Asking::NewAnswer(item));
+                        Err(lines)
+                    }
+                    None => {
+                        self.asking = Some(Asking::Which(items));
+                        say("Type a number of the list.")
+                    }
+                }
+            }
+            Asking::NewAnswer(item) => match answers::read(&item.question, line) {
+                Ok(Some(answer)) if answer == item.answer => {
+                    self.repeat();
+                    say("That is already the answer.")
+                }
+                Ok(answer) => {
+                    let empty = || Answer::Text(String::new());
+                    self.asking = Some(Asking::Why(item, Some(answer.unwrap_or_else(empty))));
+                    say("Type the reason for the correction, then press Enter.")
+                }
+                Err(what) => {
+                    self.asking = Some(Asking::NewAnswer(item));
+                    say(&what)
+                }
+            },
+            Asking::Why(item, answer) => {
+                let reason = typed.to_owned();
+                let declined = Answer::Declined {
+                    reason: reason.clone(),
+                };
+                self.repeat();
+                Ok(vec![Input::Correct {
+                    form: item.form,
+                    question: item.question.id.clone(),
+                    answer: answer.unwrap_or(declined),
+                    reason,
+                    by: Author::Experimenter,
+                }])
+            }
+        }
+    }
+}
+
+fn say<T>(words: &str) -> Result<T, Vec<String>> {
+    Err(vec![words.to_owned()])
+}
+
+fn listed(number: usize, item: &Correctable) -> String {
+    let prompt = item.question.prompt.lines().next().unwrap_or_default();
+    format!(
+        "{number}: {}, {}: {}",
+        Untrusted(&item.title),
+        Untrusted(prompt),
+        answers::in_words(&item.answer)
+    )
+}

@@ -1,0 +1,172 @@
+//! The words of a page.
+
+use super::answers;
+use crate::tui::theme::{Colour, Theme};
+use crate::tui::views::prose::prose;
+use crate::tui::views::trouble::Trouble;
+use study_core::protocol::{DeviceKind, Entry, Question};
+use study_core::session::view::{Banner, MessageKind};
+use study_core::session::{Screen, View};
+
+/// A page in words.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Page {
+    /// Where in the session it is.
+    pub top: Vec<String>,
+    /// Its lines.
+    pub lines: Vec<String>,
+    /// What has to be waited for, with the time left; not part of the comparison of two
+    /// pages.
+    pub wait: Option<String>,
+    /// What can be done now; empty while nothing can.
+    pub prompt: String,
+}
+
+/// The words of a view, with its form at question number `at`. `keys` says whether single
+/// keys can be read.
+pub fn page(view: &View, at: usize, keys: bool) -> Page {
+    let mut page = Page {
+        top: top(view),
+        ..Page::default()
+    };
+    match &view.screen {
+        Screen::Who { .. } => {}
+        Screen::Form {
+            questions,
+            to_experimenter,
+            ..
+        } => page.form(view, questions, at, *to_experimenter),
+        Screen::Playing { keep_exploring, .. } => {
+            page.lines.push(
+                match view.device {
+                    DeviceKind::Manual => "Feel the sample.",
+                    _ => "The device plays. Feel the device.",
+                }
+                .to_owned(),
+            );
+            page.prompt = match (keep_exploring, keys) {
+                (true, true) => "Keep exploring, from end to end. Esc or Space stops.",
+                (true, false) => "Keep exploring, from end to end. Type /stop to stop.",
+                (false, true) => "Press Enter to go on. Esc or Space stops.",
+                (false, false) => "Press Enter to go on. Type /stop to stop.",
+            }
+            .to_owned();
+        }
+        Screen::DeviceTrouble { .. } | Screen::SaveTrouble { .. } => page.trouble(view),
+        _ => page.prose(view),
+    }
+    page
+}
+
+/// Progress of the participant, and the page of the form.
+fn top(view: &View) -> Vec<String> {
+    let mut parts = Vec::new();
+    if let Some(progress) = view.progress {
+        let what = match progress.practice {
+            true => "Practice",
+            false => "Trial",
+        };
+        parts.push(format!(
+            "{what} {} of {}.",
+            progress.current, progress.total
+        ));
+    }
+    if let Screen::Form { page, pages, .. } = &view.screen
+        && *pages > 1
+    {
+        parts.push(format!("Page {page} of {pages}."));
+    }
+    match parts.is_empty() {
+        true => Vec::new(),
+        false => vec![parts.join(" ")],
+    }
+}
+
+/// Whose data these are, if not those of a real participant.
+pub fn banner(view: &View) -> Option<&'static str> {
+    view.banner.map(|banner| match banner {
+        Banner::Pilot => "PILOT: not analyzed with real data.",
+        Banner::Simulated => "SIMULATED: not analyzed with real data.",
+    })
+}
+
+impl Page {
+    /// Whether the pages differ at most in what is waited for and can be done.
+    pub fn is_like(&self, other: &Self) -> bool {
+        (&self.top, &self.lines) == (&other.top, &other.lines)
+    }
+
+    fn form(&mut self, view: &View, questions: &[Question], at: usize, to_experimenter: bool) {
+        let Some(question) = questions.get(at) else {
+            return;
+        };
+        if to_experimenter {
+            self.lines.push("For the experimenter:".to_owned());
+        } else if view.entry == Entry::Experimenter {
+            self.lines.push("Ask the participant:".to_owned());
+        }
+        let (lines, prompt) = answers::ask(question);
+        self.lines.extend(lines);
+        self.prompt = prompt;
+    }
+
+    fn trouble(&mut self, view: &View) {
+        let Some(trouble) = Trouble::new(view, Theme::new(Colour::None)) else {
+            return;
+        };
+        let (title, what, then) = trouble.words();
+        self.lines.push(format!("{title}:"));
+        self.lines.extend(answers::text(what));
+        self.prompt = then.to_owned();
+    }
+
+    fn prose(&mut self, view: &View) {
+        let Some(words) = prose(view) else {
+            return;
+        };
+        let waits = matches!(&view.screen, Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } if *wait_s > 0.0);
+        let (title, body) = match &view.screen {
+            // These two show the time left in the body or the title.
+            Screen::Reference { .. } if waits => (words.title, String::new()),
+            Screen::Break { .. } => (String::new(), words.body),
+            Screen::Paused { .. } => (words.title, String::new()),
+            _ => (words.title, words.body),
+        };
+        if waits
+            && let Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } = view.screen
+        {
+            self.wait = Some(format!("You can continue in {} seconds.", wait_s.ceil()));
+        }
+        for part in [&words.above, &title, &body] {
+            // The full screen marks some titles with a symbol.
+            self.lines
+                .extend(answers::text(part.trim_start_matches(['■', ' '])));
+        }
+        self.prompt = match &view.screen {
+            Screen::ResumeChoice { .. } | Screen::Consent { .. } | Screen::Stopped { .. } => {
+                let choices = words.choices.iter().map(|(key, what, more)| match *more {
+                    "" => format!("{}: {what}.", typed(key)),
+                    more => format!("{}: {what}, {more}.", typed(key)),
+                });
+                choices.collect::<Vec<_>>().join(" ")
+            }
+            Screen::Message { kind, .. } => match kind {
+                MessageKind::PracticeOver => "Press Enter to begin.".to_owned(),
+                _ => "Press Enter to continue.".to_owned(),
+            },
+            Screen::Paused { .. } => "Press Enter to continue, or type /quit.".to_owned(),
+            Screen::End { .. } => "Press Enter to close.".to_owned(),
+            Screen::Reference { .. } | Screen::Break { .. } if view.can_advance => {
+                "Press Enter when ready.".to_owned()
+            }
+            _ => String::new(),
+        };
+    }
+}
+
+fn typed(key: &str) -> String {
+    match key {
+        "Enter" => "Enter alone".to_owned(),
+        key => format!("Type {key}"),
+    }
+}
