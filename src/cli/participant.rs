@@ -14,6 +14,7 @@ pub(super) struct Args {
     /// Results folder of one study
     results: PathBuf,
     /// Participant
+    #[arg(add = super::completions::participants())]
     id: String,
     /// New state
     #[arg(long, value_enum)]
