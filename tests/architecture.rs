@@ -22,7 +22,11 @@ const CRATES: [(&str, &[&str], &[&str]); 7] = [
     ("study-wire", &[], &[]),
     ("study-stats", &[], &[]),
     ("study-haptics", &["study-base", "study-wire"], &[]),
-    ("study-core", &["study-base", "study-stats"], &[]),
+    (
+        "study-core",
+        &["study-base", "study-stats", "study-wire"],
+        &[],
+    ),
     (
         "study",
         &[
@@ -46,6 +50,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("outcome", &["protocol"]),
     ("session", &["protocol", "schedule", "outcome"]),
     ("store", &["protocol", "outcome"]),
+    ("rendering", &["protocol", "outcome", "wire"]),
     ("analyze", &["protocol", "outcome", "stats"]),
     ("model", &["wire"]),
     ("trajectory", &["wire"]),

@@ -44,6 +44,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
                 velocity_mm_s: limit(1000.0),
             },
             uncertified: None,
+            rendering: None,
         },
         trial: TrialRules {
             reference: None,

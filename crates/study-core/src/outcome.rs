@@ -8,6 +8,7 @@
 
 pub mod cell;
 pub mod event;
+pub mod fidelity;
 pub mod fold;
 pub mod ratings;
 pub mod rows;
@@ -15,6 +16,7 @@ pub mod rows;
 pub use event::{
     Author, Choice, Entry, Event, Failure, FormId, Moment, Playback, Start, State, TelemetryFile,
 };
+pub use fidelity::{Defect, Fidelity, Verdict};
 pub use rows::{AttemptEvent, AttemptRow, ParticipantRow, RatingRow, Status};
 
 /// A row says what its realization is; readers of rows need no protocol for it.

@@ -190,6 +190,54 @@ pub struct DeviceRules {
     pub limits: Limits,
     /// Permission to play tables that fail their passivity certificate.
     pub uncertified: Option<Uncertified>,
+    /// What a playback has to keep to, if the file says it.
+    #[serde(skip)]
+    pub rendering: Option<RenderingRules>,
+}
+
+/// `[device.rendering]`: when a playback is right.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RenderingRules {
+    /// Least share of the variance of the table's force that the device commands.
+    pub min_vaf: f64,
+    /// Least and largest slope of the commanded on the table's force, and of the measured
+    /// on the commanded force.
+    pub gain: [f64; 2],
+    /// Largest mean difference of commanded and table's force, N.
+    pub max_bias_n: f64,
+    /// Largest delay of the commanded force, ms.
+    pub max_delay_ms: f64,
+    /// Largest difference of commanded and table's force that lasts 20 ms, N.
+    pub max_error_n: f64,
+    /// Largest mean size of measured minus commanded force, N.
+    pub max_measured_error_n: f64,
+    /// What a wrong playback is; `None`: a fault if the force passed its limit, was that
+    /// of another table or had the wrong sign, else a flag.
+    pub on_fault: Option<OnFault>,
+}
+
+impl Default for RenderingRules {
+    fn default() -> Self {
+        Self {
+            min_vaf: 0.98,
+            gain: [0.93, 1.07],
+            max_bias_n: 0.2,
+            max_delay_ms: 5.0,
+            max_error_n: 0.5,
+            max_measured_error_n: 0.5,
+            on_fault: None,
+        }
+    }
+}
+
+words! {
+    /// What a wrong playback is.
+    OnFault {
+        /// A failed attempt, which comes again.
+        Fail = "fail",
+        /// A mark in the results.
+        Flag = "flag",
+    }
 }
 
 words! {

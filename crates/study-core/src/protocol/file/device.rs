@@ -62,6 +62,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
             None => return None,
         },
         uncertified,
+        rendering: None,
     })
 }
 

@@ -1,0 +1,158 @@
+//! How faithful a playback was, as it is stored: the verdict and its quantities.
+//!
+//! [`rendering`](crate::rendering) computes it from the telemetry and the table that was
+//! sent.
+
+use serde::{Deserialize, Serialize};
+use study_base::named;
+use study_base::text::ModelId;
+
+named! {
+    /// Whether the force was that of the table that was sent. From good to bad.
+    #[derive(Default, PartialOrd, Ord, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    Verdict {
+        /// The commanded force, and the measured one where there is a sensor, were right.
+        Ok = "ok",
+        /// The device reports no samples, or plays no table.
+        #[default]
+        Unverified = "unverified",
+        /// Too little was felt, or reported, to judge it.
+        TooLittle = "too-little",
+        /// It was wrong in a way that the protocol marks.
+        Flag = "flag",
+        /// It was wrong in a way that fails the attempt.
+        Fault = "fault",
+    }
+}
+
+named! {
+    /// What was wrong with a playback.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    Defect {
+        /// The force passed the limit of the session.
+        OverLimit = "over-limit",
+        /// Another table of the study explains the force.
+        OtherTable = "other-table",
+        /// The force had the wrong sign.
+        Sign = "sign",
+        /// The force varied otherwise than that of the table.
+        Shape = "shape",
+        /// The force was too large or too small.
+        Gain = "gain",
+        /// A constant force was added.
+        Bias = "bias",
+        /// The force came too late, or before the motion.
+        Delay = "delay",
+        /// For a moment the force was another one.
+        Error = "error",
+        /// The measured force was not the commanded one.
+        Measured = "measured",
+        /// The reported speed was not the change of the reported position.
+        Speed = "speed",
+        /// The time of the samples was not that of the host.
+        Clock = "clock",
+        /// Samples that are not finite, or not in the order of time.
+        Samples = "samples",
+    }
+}
+
+impl Defect {
+    /// Whether it fails an attempt unless the protocol says otherwise.
+    pub fn is_grave(self) -> bool {
+        matches!(self, Self::OverLimit | Self::OtherTable | Self::Sign)
+    }
+}
+
+/// What was found about one playback. `None`: not known, or not defined.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Fidelity {
+    /// Verdict.
+    pub verdict: Verdict,
+    /// What was wrong, in the order of [`Defect`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub defects: Vec<Defect>,
+    /// Why a defect is a flag only, or why there is no verdict.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub because: Option<String>,
+    /// Share of the variance of the table's force that the commanded force has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rendered_vaf: Option<f64>,
+    /// Slope of the commanded force on that of the table.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rendered_gain: Option<f64>,
+    /// Mean of the commanded force minus that of the table, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rendered_bias_n: Option<f64>,
+    /// How much later than that of the table the commanded force was, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rendered_delay_ms: Option<f64>,
+    /// Largest difference of the two forces that lasted 20 ms, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rendered_error_n: Option<f64>,
+    /// Largest commanded or measured force, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_force_n: Option<f64>,
+    /// By how much the commanded force passed the limit of the session, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub over_limit_n: Option<f64>,
+    /// Share of the variance of the commanded force that the measured force has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_vaf: Option<f64>,
+    /// Slope of the measured force on the commanded one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_gain: Option<f64>,
+    /// Mean of the measured minus the commanded force, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_bias_n: Option<f64>,
+    /// Mean size of the measured minus the commanded force, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_error_n: Option<f64>,
+    /// The realization of the study that explains the commanded force best. Never on a
+    /// screen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nearest_model: Option<ModelId>,
+    /// Share of the samples that was lost.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_share: Option<f64>,
+    /// Time of the samples over time of the host.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_ratio: Option<f64>,
+    /// Slope of the reported speed on the change of the reported position.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_gain: Option<f64>,
+    /// Distance over which the handle was moved, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub travel_mm: Option<f64>,
+    /// Share of the identified range that was visited.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_share: Option<f64>,
+    /// Largest speed, mm/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub top_speed_mm_s: Option<f64>,
+    /// Share of the time in which the handle moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion_share: Option<f64>,
+}
+
+impl Fidelity {
+    /// A playback that cannot be judged, and why.
+    pub fn unverified(because: &str) -> Self {
+        Self {
+            because: Some(because.to_owned()),
+            ..Self::default()
+        }
+    }
+
+    /// Makes a fault a flag, and says why.
+    pub fn only_flag(&mut self, because: &str) {
+        if self.verdict == Verdict::Fault {
+            self.verdict = Verdict::Flag;
+        }
+        if self.verdict == Verdict::Flag {
+            self.because = Some(because.to_owned());
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The force that the table gives for the reported motion, by the device's own servo.
+
+use crate::outcome::Sample;
+use study_wire::predict::Motion;
+use study_wire::servo::{Rendering, Servo, ServoSettings};
+
+/// After a longer pause between two samples the filters have to settle again, s.
+const GAP_S: f64 = 0.004;
+/// Time in which filter and slew limit forget a gap, s.
+const SETTLING_S: f64 = 0.06;
+/// Only this much of a longer gap is calculated, in addition to the ramp, s.
+const LONGEST_GAP_S: f64 = 0.25;
+
+/// The force at one sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Predicted {
+    /// Force that a right device commands, N.
+    pub force_n: f64,
+    /// Whether it is known well: the samples before it are complete.
+    pub settled: bool,
+}
+
+/// The force at each sample. The samples are finite and in the order of time.
+///
+/// Between two samples the motion is interpolated, so that the servo runs at its own
+/// rate. The acceleration is the difference of the speed.
+pub(super) fn predicted(
+    what: &Rendering<'_>,
+    settings: ServoSettings,
+    samples: &[Sample],
+) -> Vec<Predicted> {
+    // The device trips by its own measurements; here every sample has a force.
+    let mut servo = Servo::new(ServoSettings {
+        velocity_mm_s: f64::MAX,
+        overtravel_mm: f64::MAX,
+        jump_mm: f64::MAX,
+        ..settings
+    });
+    servo.start();
+    let hz = settings.servo_hz;
+    let most = ((LONGEST_GAP_S + settings.ramp_s) * hz).ceil();
+    let mut all = Vec::with_capacity(samples.len());
+    let mut before: Option<(f64, Motion)> = None;
+    let mut settled_from_s = 0.0;
+    for (i, sample) in samples.iter().enumerate() {
+        let here = Motion {
+            x_mm: sample.x_mm,
+            v_mm_s: sample.v_mm_s,
+            a_m_s2: acceleration(samples, i),
+        };
+        // A playback begins at its servo period 0 with the first motion that is known.
+        let (from_s, from) = before.unwrap_or((-1.0 / hz, here));
+        let apart_s = sample.t_s - from_s;
+        if before.is_some() && apart_s > GAP_S {
+            settled_from_s = sample.t_s + SETTLING_S;
+        }
+        let steps = (apart_s * hz).round().clamp(1.0, most) as u32;
+        let mut force_n = 0.0;
+        for step in 1..=steps {
+            let part = f64::from(step) / f64::from(steps);
+            let between = |a: f64, b: f64| a + part * (b - a);
+            force_n = servo.step(
+                what,
+                Motion {
+                    x_mm: between(from.x_mm, here.x_mm),
+                    v_mm_s: between(from.v_mm_s, here.v_mm_s),
+                    a_m_s2: between(from.a_m_s2, here.a_m_s2),
+                },
+            );
+        }
+        all.push(Predicted {
+            force_n,
+            settled: sample.t_s >= settled_from_s,
+        });
+        before = Some((sample.t_s, here));
+    }
+    all
+}
+
+/// Difference of the speed around a sample, m/s².
+pub(super) fn acceleration(samples: &[Sample], i: usize) -> f64 {
+    let before = &samples[i.saturating_sub(1)];
+    let after = &samples[(i + 1).min(samples.len() - 1)];
+    let dt_s = after.t_s - before.t_s;
+    if dt_s > 0.0 {
+        1e-3 * (after.v_mm_s - before.v_mm_s) / dt_s
+    } else {
+        0.0
+    }
+}
