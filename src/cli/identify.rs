@@ -26,7 +26,7 @@ use study_wire::certificate::{Certificate, SERVO_RATES_HZ};
 /// The results of an identification, for [`output`] and [`files`].
 struct Results<'a> {
     args: &'a Args,
-    training: &'a Recording,
+    training: &'a [(&'a NamedPath, Recording)],
     /// The --validate recordings, then the --test recordings.
     recordings: Vec<(&'a NamedPath, &'a Recording)>,
     cells: Vec<Cell>,
@@ -55,7 +55,10 @@ impl Results<'_> {
 /// Identifies a grid of realizations, prints it and writes the files.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let plan = args.plan()?;
-    let mut training = read(&args.training, args, console)?;
+    let mut training = Vec::new();
+    for named in &args.training {
+        training.push((named, read(named, args, console)?));
+    }
     let mut recordings = Vec::new();
     for named in args.validate.iter().chain(&args.test) {
         recordings.push((named, read(named, args, console)?));
@@ -64,33 +67,35 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for named in &args.repeat {
         repeats.push((named, read(named, args, console)?));
     }
-    check_distinct(&args.training, &training, &recordings, &repeats)?;
-    if args.thin {
-        let (thinned, removed) = signal::thin(&training);
-        console.say(format!(
-            "{removed} samples of dwells removed from the training recording"
-        ));
-        training = thinned;
-    }
-    if let Some(warning) = Excitation::of(&training).warning() {
-        console.say(format!(
-            "warning: {}: {warning}",
-            args.training.path.display()
-        ));
+    check_distinct(training.iter().chain(&recordings).chain(&repeats))?;
+    for (named, training) in &mut training {
+        if args.thin {
+            let (thinned, removed) = signal::thin(training);
+            console.say(format!(
+                "{removed} samples of dwells removed from {}",
+                named.path.display()
+            ));
+            *training = thinned;
+        }
+        if let Some(warning) = Excitation::of(training).warning() {
+            console.say(format!("warning: {}: {warning}", named.path.display()));
+        }
     }
     let recordings: Vec<(&NamedPath, &Recording)> =
         recordings.iter().map(|(n, r)| (*n, r)).collect();
     let ceilings = ceilings(&recordings, &repeats)?;
 
     let mut cells = identify(args, &plan, &training, &recordings)
-        .map_err(|e| Failure::input(format!("{}: {e}", args.training.path.display())))?;
-    warn_about_filters(&training, &recordings, console);
-    let filter = filter_description(args, &training);
+        .map_err(|e| Failure::input(format!("{}: {e}", args.training[0].path.display())))?;
+    let (_, first) = &training[0];
+    let others = (training.iter().skip(1).map(|(n, r)| (*n, r))).chain(recordings.iter().copied());
+    warn_about_filters(first, others, console);
+    let filter = filter_description(args, first);
     for cell in &mut cells {
         cell.realization.provenance.filter = Some(filter.clone());
     }
     let best = grid::best(&cells, args.validate.len());
-    let detents = validation::detents(&training);
+    let detents = validation::detents(first);
     let validations = recordings
         .iter()
         .map(|(_, recording)| {
@@ -144,8 +149,12 @@ pub(super) fn required_damping(certificate: &Certificate) -> String {
             hz / 1000.0
         )
     };
+    let state = match certificate.state_n_per_mm {
+        Some(n_per_mm) => format!(" and {n_per_mm:.2} over the direction state"),
+        None => String::new(),
+    };
     format!(
-        "K up to {:.2} N/mm, |b| up to {:.1} N·s/m; required device damping in N·s/m: {}",
+        "K up to {:.2} N/mm{state}, |b| up to {:.1} N·s/m; required device damping in N·s/m: {}",
         certificate.stiffness_n_per_mm,
         1000.0 * certificate.damping_n_s_per_mm,
         SERVO_RATES_HZ.map(at).join(", ")
@@ -195,9 +204,9 @@ fn filter_description(args: &Args, training: &Recording) -> String {
 
 /// Warns if a recording was filtered differently from the training recording, which
 /// distorts its VAF.
-fn warn_about_filters(
+fn warn_about_filters<'a>(
     training: &Recording,
-    recordings: &[(&NamedPath, &Recording)],
+    recordings: impl Iterator<Item = (&'a NamedPath, &'a Recording)>,
     console: &mut Console,
 ) {
     let filter = |r: &Recording| Untrusted(r.filter().unwrap_or("unknown")).to_string();
@@ -227,15 +236,10 @@ fn read(named: &NamedPath, args: &Args, console: &mut Console) -> Result<Recordi
 
 /// Rejects recordings with the same bytes, which are not independent, and recordings
 /// with the same name, which would be one entry of a model file.
-fn check_distinct(
-    training_name: &NamedPath,
-    training: &Recording,
-    recordings: &[(&NamedPath, Recording)],
-    repeats: &[(&NamedPath, Recording)],
+fn check_distinct<'a>(
+    all: impl Iterator<Item = &'a (&'a NamedPath, Recording)>,
 ) -> Result<(), Failure> {
-    let all: Vec<(&NamedPath, &Recording)> = std::iter::once((training_name, training))
-        .chain(recordings.iter().chain(repeats).map(|(n, r)| (*n, r)))
-        .collect();
+    let all: Vec<&(&NamedPath, Recording)> = all.collect();
     for (i, (named, recording)) in all.iter().enumerate() {
         for (before, other) in &all[..i] {
             if recording.sha256 == other.sha256 {
@@ -263,10 +267,11 @@ fn check_distinct(
 fn identify(
     args: &Args,
     plan: &Plan,
-    training: &Recording,
+    training: &[(&NamedPath, Recording)],
     recordings: &[(&NamedPath, &Recording)],
 ) -> Result<Vec<Cell>, IdentifyError> {
-    let training = Training::new(training)?;
+    let training: Vec<&Recording> = training.iter().map(|(_, r)| r).collect();
+    let training = Training::of(&training)?;
     let recordings: Vec<&Recording> = recordings.iter().map(|(_, r)| *r).collect();
     let (began, done, bar) = (Instant::now(), AtomicU64::new(0), OnceLock::new());
     let cells = grid::run(&training, plan, args.lookup, &recordings, || {

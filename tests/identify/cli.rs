@@ -61,7 +61,7 @@ fn json_has_a_cell_for_every_lambda_and_dx_with_unrounded_vaf() {
         [(0.999, 0.5), (0.999, 1.0), (0.9995, 0.5), (0.9995, 1.0)]
     );
     // golden numbers as in tests/identify/golden.rs
-    let vaf = cells[1]["vaf"]["validation_a.csv"].as_f64().unwrap();
+    let vaf = cells[1]["vaf"]["validation_a"].as_f64().unwrap();
     assert!((vaf - 0.949471).abs() < 0.51e-6, "{vaf}");
     assert_eq!(cells[0]["method"], "ewls");
     assert_eq!(cells[0]["resample"], "bin");
@@ -88,6 +88,74 @@ fn the_table_marks_the_best_cell_and_names_the_recording_used_for_selection() {
         "highest VAF: 0.949471 on validation_a, selected on this recording",
     ))
     .stdout(predicate::str::contains("\u{1b}").not());
+}
+
+/// Without a method and options of the recursion: the passive table, whose chosen δ is in
+/// the table and the document.
+#[test]
+fn the_default_passes_its_certificate_and_says_its_delta() {
+    let out = identify(&[TRAINING, "--validate", VALIDATION, "--dx", "0.5", "--json"])
+        .assert()
+        .success();
+    let document: Value = serde_json::from_slice(&out.get_output().stdout).unwrap();
+    let cell = &document["cells"][0];
+    assert_eq!(cell["method"], "passive");
+    assert_eq!(cell["certificate"]["pass"], true);
+    assert_eq!(cell["direction"], "play");
+    let delta = cell["delta_mm"].as_f64().unwrap();
+    assert!(delta > 0.2 && delta < 1.0, "{delta}");
+    assert!(cell["vaf"]["validation_a"].as_f64().unwrap() >= 0.996);
+    identify(&[TRAINING, "--validate", VALIDATION, "--dx", "0.5"])
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("delta mm"))
+        .stdout(predicate::str::contains(delta.to_string()));
+    refused(
+        &[
+            TRAINING,
+            "--validate",
+            VALIDATION,
+            "--method",
+            "static",
+            "--start",
+            "warm",
+        ],
+        2,
+        "--start warm does not apply to this method",
+    );
+}
+
+/// A recording cut in two gives nearly the table of the whole: the direction state starts
+/// anew in the second half.
+#[test]
+fn several_training_recordings_count_like_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(TRAINING).unwrap();
+    let rows = text.lines().position(|l| l.starts_with("t_s")).unwrap() + 1;
+    let lines: Vec<&str> = text.lines().collect();
+    let half = rows + (lines.len() - rows) / 2;
+    let part = |name: &str, from: usize, to: usize| {
+        let path = dir.path().join(name);
+        let all = [&lines[..rows], &lines[from..to]].concat();
+        fs::write(&path, all.join("\n")).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let (first, second) = (part("1.csv", rows, half), part("2.csv", half, lines.len()));
+    let vaf = |training: &[&str]| {
+        let mut args = training.to_vec();
+        args.extend(["--validate", VALIDATION, "--dx", "0.5", "--json"]);
+        let out = identify(&args).assert().success();
+        let document: Value = serde_json::from_slice(&out.get_output().stdout).unwrap();
+        let recordings = document["recordings"].as_array().unwrap().len();
+        let vaf = document["cells"][0]["vaf"]["validation_a"]
+            .as_f64()
+            .unwrap();
+        (vaf, recordings)
+    };
+    let ((whole, _), (parts, recordings)) = (vaf(&[TRAINING]), vaf(&[&first, &second]));
+    assert_eq!(recordings, 2);
+    assert!((whole - parts).abs() < 1e-4, "{whole} {parts}");
+    assert!((vaf(&[&first]).0 - parts).abs() > 1e-6);
 }
 
 #[test]
@@ -200,7 +268,7 @@ fn bad_arguments_and_bad_recordings_give_one_clear_error_each() {
         "--method",
         "magic",
         2,
-        "possible values: ewls, constrained, two-sided, hat, static, segments, spring",
+        "possible values: ewls, constrained, two-sided, hat, passive, static, segments, spring",
     );
     refused(&[TRAINING], 2, "--validate");
     refused(&[TRAINING, "--validate", "absent.csv"], 1, "absent.csv: ");

@@ -6,7 +6,9 @@
 use std::fs::File;
 use std::io::BufReader;
 use study_base::rng::Stream;
-use study_haptics::identify::method::{Delta, Ewls, Hat, Segments, State, TwoSided, Width, Window};
+use study_haptics::identify::method::{
+    Delta, Ewls, Hat, Passive, Segments, State, TwoSided, Width, Window,
+};
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{Method, Training, vaf};
 use study_haptics::recording::{self, Recording};
@@ -70,26 +72,46 @@ fn on_switch_a_each_method_reaches_its_known_vaf() {
     assert!(left > 10.0 * best, "{left} {best}");
 }
 
+/// The passive table costs little, and every one passes its certificate.
+#[test]
+fn passive_tables_pass_by_construction() {
+    let (train, validation) = (recording("training_a"), recording("validation_a"));
+    let training = Training::new(&train).unwrap();
+    assert!(vaf_of(&training, &validation, Method::Passive(Passive::default())) >= 0.996);
+    let mut log_ratio = 0.0;
+    for switch in 0..10 {
+        let [train, validation] = recordings(switch, [20.0, 4.0]);
+        let training = Training::new(&train).unwrap();
+        let method = Method::Passive(Passive::default());
+        let found = training.identify(method, 0.5, Lookup::Linear).unwrap();
+        let certificate = found.realization.certificate();
+        assert!(certificate.passes(), "switch {switch}: {certificate}");
+        assert!(certificate.rendered_n_per_mm().is_finite());
+        let passive = vaf::score(&found.realization, &validation).vaf;
+        let hat = vaf_of(&training, &validation, Method::Hat(Hat::default()));
+        log_ratio += ((1.0 - hat) / (1.0 - passive)).ln() / 10.0;
+    }
+    // residual of the hat table over this
+    let ratio = log_ratio.exp();
+    assert!(ratio >= 0.9, "{ratio}");
+}
+
+/// Training and validation on a random switch.
+fn recordings(switch: u64, [long, short]: [f64; 2]) -> [Recording; 2] {
+    let parameters = crate::switches::random_switch(switch);
+    let mut noise = Stream::new(switch + 2, &["bench"]);
+    let mut record =
+        |name, motion, s| crate::switches::record(name, &parameters, motion, s, &mut noise);
+    [
+        record("t", crate::switches::training as fn(f64) -> _, long),
+        record("v", crate::switches::validation, short),
+    ]
+}
+
 /// The ratio of the unexplained variance of the paper's cell to that of the hat table
 /// with a direction state, on a random switch.
 fn factor(switch: u64, seconds: [f64; 2], lambda: f64) -> f64 {
-    let parameters = crate::switches::random_switch(switch);
-    let mut noise = Stream::new(switch + 2, &["bench"]);
-    let [long, short] = seconds;
-    let train = crate::switches::record(
-        "t",
-        &parameters,
-        crate::switches::training,
-        long,
-        &mut noise,
-    );
-    let validation = crate::switches::record(
-        "v",
-        &parameters,
-        crate::switches::validation,
-        short,
-        &mut noise,
-    );
+    let [train, validation] = recordings(switch, seconds);
     let training = Training::new(&train).unwrap();
     let left = |method| 1.0 - vaf_of(&training, &validation, method);
     left(paper(lambda)) / left(hat(State::Play(Delta::Scan), true))

@@ -33,6 +33,7 @@ mod hat;
 mod hat_table;
 pub mod lanes;
 pub mod method;
+mod passive;
 mod problem;
 pub mod resample;
 pub mod samples;
@@ -52,10 +53,10 @@ use problem::START_UP_SAMPLES;
 use resample::{Resample, Resampled};
 use study_wire::predict::{Direction, Lookup};
 
-/// A recording prepared for identification.
+/// One or more recordings of a target, prepared for identification.
 #[derive(Debug)]
 pub struct Training<'r> {
-    recording: &'r Recording,
+    recordings: Vec<&'r Recording>,
     positive: Samples,
     negative: Samples,
     /// Where both directions have samples, mm.
@@ -66,17 +67,28 @@ pub struct Training<'r> {
 }
 
 impl<'r> Training<'r> {
-    /// Groups the samples by the sign of v and sorts each group by x.
+    /// One recording: see [`Self::of`].
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn new(recording: &'r Recording) -> Result<Self, IdentifyError> {
+        Self::of(&[recording])
+    }
+
+    /// Groups the samples of all recordings by the sign of v and sorts each group by x.
+    /// A direction state starts anew in each recording.
     ///
     /// # Errors
     /// [`IdentifyError`] if a direction has no samples or the directions do not
     /// overlap in x.
-    pub fn new(recording: &'r Recording) -> Result<Self, IdentifyError> {
-        let positive = Samples::of(recording, |v| v > 0.0);
-        let negative = Samples::of(recording, |v| v < 0.0);
+    pub fn of(recordings: &[&'r Recording]) -> Result<Self, IdentifyError> {
+        let positive = Samples::of(recordings, |v| v > 0.0);
+        let negative = Samples::of(recordings, |v| v < 0.0);
+        let names: Vec<&str> = recordings.iter().map(|r| r.name.as_str()).collect();
+        let names = names.join(", ");
         let range_of = |samples: &Samples, positive| {
             (samples.range_mm()).ok_or_else(|| IdentifyError::OneDirection {
-                recording: recording.name.clone(),
+                recording: names.clone(),
                 positive,
             })
         };
@@ -84,16 +96,24 @@ impl<'r> Training<'r> {
         let low = plus[0].max(minus[0]);
         let high = plus[1].min(minus[1]);
         if low >= high {
-            return Err(IdentifyError::NoOverlap(recording.name.clone()));
+            return Err(IdentifyError::NoOverlap(names));
         }
+        let forces = recordings.iter().map(|r| range(&r.f_n));
         Ok(Self {
-            recording,
+            recordings: recordings.to_vec(),
             positive,
             negative,
             range_mm: [low, high],
-            force_range_n: range(&recording.f_n),
-            top_speed_mm_s: recording.top_speed_mm_s(),
+            force_range_n: forces.fold([f64::INFINITY, f64::NEG_INFINITY], |all, one| {
+                [all[0].min(one[0]), all[1].max(one[1])]
+            }),
+            top_speed_mm_s: (recordings.iter().map(|r| r.top_speed_mm_s())).fold(0.0, f64::max),
         })
+    }
+
+    /// The recordings.
+    pub fn recordings(&self) -> &[&'r Recording] {
+        &self.recordings
     }
 
     /// The samples with v > 0 and those with v < 0.
@@ -130,6 +150,7 @@ impl<'r> Training<'r> {
             }
             Method::TwoSided(options) => self.two_sided(options, dx_mm, lookup),
             Method::Hat(options) => self.hat(options, dx_mm, lookup),
+            Method::Passive(options) => self.passive(options, dx_mm, lookup),
             Method::Static => self.static_profile(dx_mm, lookup),
             Method::Segments(options) => self.segments(options, lookup),
             Method::Spring => Ok(self.spring(lookup)),
@@ -247,7 +268,7 @@ impl<'r> Training<'r> {
 
     /// Baseline: one straight line, as a table of two nodes at the ends of the range.
     pub fn spring(&self, lookup: Lookup) -> Identified {
-        let theta = baseline::spring(self.recording);
+        let theta = baseline::spring(&self.recordings);
         let branch = Resampled {
             theta: vec![theta; 2],
             filled: 0,
@@ -326,13 +347,15 @@ impl<'r> Training<'r> {
     fn provenance(&self, method: Method) -> Provenance {
         Provenance {
             method: method.to_string(),
-            filter: Some(match self.recording.filter() {
+            filter: Some(match self.recordings[0].filter() {
                 Some(description) => format!("as recorded: {description}"),
                 None => "as recorded".into(),
             }),
-            recordings: [(self.recording.name.clone(), self.recording.sha256.clone())].into(),
+            recordings: (self.recordings.iter())
+                .map(|r| (r.name.clone(), r.sha256.clone()))
+                .collect(),
             // `study record` writes there what was recorded and whether it is simulated
-            note: self.recording.header.first().cloned(),
+            note: self.recordings[0].header.first().cloned(),
             ..Provenance::default()
         }
     }

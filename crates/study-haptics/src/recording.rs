@@ -78,6 +78,25 @@ impl Recording {
         range(&self.x_mm)
     }
 
+    /// The count of the encoder, mm, if at least half of the differences of x are whole
+    /// multiples of one of them: a filtered position has none.
+    pub fn resolution_mm(&self) -> Option<f64> {
+        let steps = || (self.x_mm.windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 0.0);
+        // differences of numbers near the largest position are no more exact than this
+        let rounding = 1e-12 * self.x_mm.iter().fold(1.0, |most: f64, x| x.abs().max(most));
+        let count = steps()
+            .filter(|d| *d > rounding)
+            .fold(f64::INFINITY, f64::min);
+        let whole = |d: &f64| {
+            let ratio = d / count;
+            (ratio - ratio.round()).abs() < 0.01 && ratio < 1000.0
+        };
+        let [low, high] = self.range_mm();
+        // ten decimals of a filtered position are not counts either
+        let plausible = count.is_finite() && count > 1e-6 * (high - low);
+        (plausible && 2 * steps().filter(whole).count() >= steps().count()).then_some(count)
+    }
+
     /// The filter of its signals according to the header: the text of the line
     /// `filter: …` up to a semicolon. `None` if unknown.
     pub fn filter(&self) -> Option<&str> {

@@ -18,6 +18,9 @@
 //! separately: its minimum is at a node or at the vertex, which is computed, as is the
 //! largest |dS/dx|, K.
 //!
+//! While a direction state changes from one branch to the other, the force changes by
+//! S⁺ − S⁻ over δ: a device renders this stiffness in addition to K.
+//!
 //! A sampled device needs additional damping: b_device > K T/2 + |B| (Colgate &
 //! Schenkel 1997), with n periods of delay K T (½ + n) + |B|, and 2 m/T for a mass
 //! unless the acceleration is low-pass filtered.
@@ -112,6 +115,9 @@ pub struct Certificate {
     pub negative_damping: f64,
     /// K = max |dS/dx|, N/mm; infinite where S jumps.
     pub stiffness_n_per_mm: f64,
+    /// max |S⁺ − S⁻|/δ, N/mm, by which a direction state changes the force in addition to
+    /// K. `None` without a state: the force then jumps with the sign of v.
+    pub state_n_per_mm: Option<f64>,
     /// B = max |b|, N·s/mm.
     pub damping_n_s_per_mm: f64,
     /// max |m|, kg.
@@ -143,6 +149,7 @@ pub struct Certifier {
     so_far: Certificate,
     /// Margins of mass and damping for v > 0 and v < 0.
     branches: [[Margin; 2]; 2],
+    delta_mm: Option<f64>,
     judged: usize,
 }
 
@@ -158,10 +165,12 @@ impl Certifier {
                 negative_mass: 0.0,
                 negative_damping: 0.0,
                 stiffness_n_per_mm: 0.0,
+                state_n_per_mm: None,
                 damping_n_s_per_mm: 0.0,
                 mass_kg: 0.0,
             },
             branches: [[margin; 2]; 2],
+            delta_mm: None,
             judged: 0,
         }
     }
@@ -185,6 +194,8 @@ impl Certifier {
         if i == 0 {
             self.branches = [[Margin::at(x_mm); 2]; 2];
             c.hysteresis = Margin::at(x_mm);
+            c.state_n_per_mm = delta_mm.map(|_| 0.0);
+            self.delta_mm = delta_mm;
         }
         let directions = [(&table.positive, 1.0), (&table.negative, -1.0)];
         for ((branch, sign), [mass, damping]) in directions.into_iter().zip(&mut self.branches) {
@@ -204,7 +215,7 @@ impl Certifier {
             damping.include(b - required, x_mm);
         }
         if i > 0 {
-            between(table, i - 1, c);
+            between(table, i - 1, delta_mm, c);
         }
         self.judged += 1;
     }
@@ -224,9 +235,9 @@ impl Certifier {
                 x > table.x_mm[i]
             };
             let gap = |x: f64| spring(&table.positive, i, x) - spring(&table.negative, i, x);
-            c.hysteresis.include(gap(table.x_mm[i]), table.x_mm[i]);
+            c.include_gap(gap(table.x_mm[i]), table.x_mm[i], self.delta_mm);
             if outside {
-                c.hysteresis.include(gap(x), x);
+                c.include_gap(gap(x), x, self.delta_mm);
                 for branch in [&table.positive, &table.negative] {
                     c.include_stiffness(libm::fabs(branch.k_n_per_mm[i]));
                 }
@@ -284,14 +295,14 @@ fn growth(
 }
 
 /// Includes S⁺ − S⁻ and |dS/dx| between node `i` and the next.
-fn between(table: &TableView<'_>, i: usize, c: &mut Certificate) {
+fn between(table: &TableView<'_>, i: usize, delta_mm: Option<f64>, c: &mut Certificate) {
     let (x, h) = (table.x_mm[i], table.x_mm[i + 1] - table.x_mm[i]);
     if table.lookup != Lookup::Linear {
         // S is linear between jumps; each node's line is evaluated at both ends.
         let reach = |x: f64, c: &mut Certificate| {
             for node in [i, i + 1] {
                 let gap = spring(&table.positive, node, x) - spring(&table.negative, node, x);
-                c.hysteresis.include(gap, x);
+                c.include_gap(gap, x, delta_mm);
             }
         };
         reach(x, c);
@@ -319,15 +330,33 @@ fn between(table: &TableView<'_>, i: usize, c: &mut Certificate) {
     }
     let [s, p, q] = [plus[0] - minus[0], plus[1] - minus[1], plus[2] - minus[2]];
     let gap = |t: f64| s + (p + q * t) * t;
-    c.hysteresis.include(gap(0.0), x);
-    c.hysteresis.include(gap(1.0), x + h);
+    c.include_gap(gap(0.0), x, delta_mm);
+    c.include_gap(gap(1.0), x + h, delta_mm);
     let vertex = -p / (2.0 * q);
-    if q > 0.0 && vertex > 0.0 && vertex < 1.0 {
-        c.hysteresis.include(gap(vertex), x + vertex * h);
+    // false for NaN, the vertex of a constant
+    if vertex > 0.0 && vertex < 1.0 {
+        c.include_gap(gap(vertex), x + vertex * h, delta_mm);
     }
 }
 
 impl Certificate {
+    /// Includes S⁺ − S⁻ at a position. From z = −1 to 1 the force changes by it, over δ.
+    fn include_gap(&mut self, gap_n: f64, at_mm: f64, delta_mm: Option<f64>) {
+        self.hysteresis.include(gap_n, at_mm);
+        if let (Some(most), Some(delta_mm)) = (&mut self.state_n_per_mm, delta_mm) {
+            let n_per_mm = libm::fabs(gap_n) / delta_mm;
+            if n_per_mm > *most || n_per_mm.is_nan() {
+                *most = n_per_mm;
+            }
+        }
+    }
+
+    /// The stiffness that a device has to render, N/mm: K and the change of the force
+    /// over the direction state.
+    pub fn rendered_n_per_mm(&self) -> f64 {
+        self.stiffness_n_per_mm + self.state_n_per_mm.unwrap_or(0.0)
+    }
+
     fn include_stiffness(&mut self, n_per_mm: f64) {
         if n_per_mm > self.stiffness_n_per_mm || n_per_mm.is_nan() {
             self.stiffness_n_per_mm = n_per_mm;
@@ -351,7 +380,7 @@ impl Certificate {
     /// Damping that the device itself needs to render the springs and dampers of this
     /// table at `rate_hz` with `delay` periods of delay, N·s/m.
     pub fn device_damping_n_s_per_m(&self, rate_hz: f64, delay: f64) -> f64 {
-        spring_damping_n_s_per_m(self.stiffness_n_per_mm, rate_hz, delay)
+        spring_damping_n_s_per_m(self.rendered_n_per_mm(), rate_hz, delay)
             + 1000.0 * self.damping_n_s_per_mm
     }
 }

@@ -8,7 +8,7 @@ use study_base::text::Untrusted;
 use study_haptics::identify::Method;
 use study_haptics::identify::grid::Plan;
 use study_haptics::identify::method::{
-    Delta, Ewls, Hat, Segments, Sort, Start, State, TwoSided, Width, Window,
+    Delta, Ewls, Hat, Passive, Segments, Sort, Start, State, TwoSided, Width, Window,
 };
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::signal::{Acceleration, Settings};
@@ -98,9 +98,9 @@ fn switch(on: bool) -> &'static str {
 /// Arguments of `study identify`.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Args {
-    /// The training recording: a CSV file with t_s, x_mm, f_n (and v_mm_s, a_m_s2)
-    #[arg(value_name = "TRAINING")]
-    pub(super) training: NamedPath,
+    /// The training recordings: CSV files with t_s, x_mm, f_n (and v_mm_s, a_m_s2)
+    #[arg(value_name = "TRAINING", required = true)]
+    pub(super) training: Vec<NamedPath>,
 
     /// Recordings on which lambda and dx are selected; NAME=PATH sets the name in model files
     #[arg(long, value_name = "REC", num_args = 1.., required = true)]
@@ -126,11 +126,11 @@ pub(in crate::cli) struct Args {
     #[arg(long)]
     pub(super) thin: bool,
 
-    /// Estimator
-    #[arg(long, value_enum, default_value_t = MethodName::Ewls)]
-    pub(super) method: MethodName,
+    /// Estimator [default: passive; ewls if an option of its recursion is given]
+    #[arg(long, value_enum)]
+    method: Option<MethodName>,
 
-    /// Forgetting factors, above 0 and at most 1: a list, or FROM:TO:STEP [default: 0.999:0.9999:0.0001]
+    /// Forgetting factors, above 0 and at most 1: a list, or FROM:TO:STEP [default: 0.999:0.9999:0.0001]; without --method they mean ewls
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = lambdas)]
     pub(super) lambda: Vec<Numbers>,
 
@@ -162,15 +162,15 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "MM", value_parser = positive, conflicts_with = "lambda")]
     pub(super) width: Option<f64>,
 
-    /// Direction state of a hat table [default: play]
+    /// Direction state of a hat or passive table [default: play]
     #[arg(long, value_enum)]
     pub(super) direction: Option<DirectionRule>,
 
-    /// Length over which a hat table changes direction, in mm [default: the shortest that suits the training recording]
+    /// Length over which a hat or passive table changes direction, in mm [default: the shortest that suits the training recording]
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) delta: Option<f64>,
 
-    /// Ridges of a hat table: on the curvature of F, on the slopes of m and b [default: 0.003,0.05]
+    /// Ridges of a hat table: on the curvature of F, on the slopes of m and b [default: 0.003,0.05]; of a passive table: on F, on b [default: 0.003,0.06]
     #[arg(long, value_name = "F,DYNAMICS", value_delimiter = ',', value_parser = ridge, num_args = 2)]
     pub(super) ridge: Vec<f64>,
 
@@ -213,6 +213,8 @@ pub(super) enum MethodName {
     TwoSided,
     /// All nodes at once, with a direction state
     Hat,
+    /// A hat table with one mass and bounds: passes its certificate by construction
+    Passive,
     /// Baseline: mean force by position and direction
     Static,
     /// Baseline: piecewise linear force by direction
@@ -262,14 +264,6 @@ impl std::str::FromStr for NamedPath {
                 })
             }
         }
-    }
-}
-
-impl NamedPath {
-    /// The file name, for `--json`.
-    pub(super) fn file_name(&self) -> String {
-        let name = self.path.file_name().unwrap_or(self.path.as_os_str());
-        name.to_string_lossy().into_owned()
     }
 }
 
@@ -377,6 +371,18 @@ fn distinct(lists: &[Numbers]) -> Vec<f64> {
 }
 
 impl Args {
+    /// The estimator. The options of the paper's recursion mean this recursion.
+    pub(super) fn method(&self) -> MethodName {
+        let recursion = !self.lambda.is_empty()
+            || self.resample.is_some()
+            || self.start.is_some()
+            || self.sort.is_some();
+        self.method.unwrap_or(match recursion {
+            true => MethodName::Ewls,
+            false => MethodName::Passive,
+        })
+    }
+
     /// How signals are prepared.
     pub(super) fn signals(&self) -> Settings {
         Settings {
@@ -398,7 +404,7 @@ impl Args {
             given => given,
         };
         let each = |of: &dyn Fn(f64) -> Method| lambdas.iter().map(|l| of(*l)).collect();
-        let methods: Vec<Method> = match self.method {
+        let methods: Vec<Method> = match self.method() {
             MethodName::Ewls => each(&|lambda| self.ewls(lambda, false)),
             MethodName::Constrained => each(&|lambda| self.ewls(lambda, true)),
             MethodName::TwoSided => {
@@ -415,6 +421,7 @@ impl Args {
                 }
             }
             MethodName::Hat => vec![self.hat()],
+            MethodName::Passive => vec![self.passive()],
             MethodName::Static => vec![Method::Static],
             MethodName::Segments => vec![Method::Segments(
                 self.segments
@@ -435,15 +442,29 @@ impl Args {
         })
     }
 
+    fn state(&self) -> State {
+        let delta = self.delta.map_or(Delta::Scan, Delta::Mm);
+        match self.direction {
+            Some(DirectionRule::Sign) => State::Sign,
+            Some(DirectionRule::Play) | None => State::Play(delta),
+            Some(DirectionRule::Dahl) => State::Dahl(delta),
+        }
+    }
+
+    fn passive(&self) -> Method {
+        let default = Passive::default();
+        Method::Passive(Passive {
+            state: self.state(),
+            ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
+            ridge_damping: self.ridge.get(1).copied().unwrap_or(default.ridge_damping),
+            ..default
+        })
+    }
+
     fn hat(&self) -> Method {
         let default = Hat::default();
-        let delta = self.delta.map_or(Delta::Scan, Delta::Mm);
         Method::Hat(Hat {
-            state: match self.direction {
-                Some(DirectionRule::Sign) => State::Sign,
-                Some(DirectionRule::Play) | None => State::Play(delta),
-                Some(DirectionRule::Dahl) => State::Dahl(delta),
-            },
+            state: self.state(),
             ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
             ridge_dynamics: self.ridge.get(1).copied().unwrap_or(default.ridge_dynamics),
             bounded: self.bounds.unwrap_or(default.bounded),
@@ -451,23 +472,32 @@ impl Args {
     }
 
     /// Rejects options that the method does not have. Those of the paper's recursion are
-    /// accepted, so that one script can identify baselines as well.
+    /// accepted at their defaults, so that one script can identify baselines as well.
     fn check_options_apply(&self) -> Result<(), Failure> {
-        use MethodName::{Constrained, Ewls, Hat, Segments, Static, TwoSided};
+        use MethodName::{Constrained, Ewls, Hat, Passive, Segments, Static, TwoSided};
         let (lambda, dx) = (!self.lambda.is_empty(), !self.dx.is_empty());
-        let given: [(&str, bool, &[MethodName]); 9] = [
+        let given: [(&str, bool, &[MethodName]); 10] = [
             ("--lambda", lambda, &[Ewls, Constrained, TwoSided]),
-            ("--dx", dx, &[Ewls, Constrained, TwoSided, Hat, Static]),
+            (
+                "--dx",
+                dx,
+                &[Ewls, Constrained, TwoSided, Hat, Passive, Static],
+            ),
+            (
+                "--start warm",
+                self.start == Some(Start::Warm),
+                &[Ewls, Constrained],
+            ),
             ("--window", self.window.is_some(), &[TwoSided]),
             ("--width", self.width.is_some(), &[TwoSided]),
-            ("--direction", self.direction.is_some(), &[Hat]),
-            ("--delta", self.delta.is_some(), &[Hat]),
-            ("--ridge", !self.ridge.is_empty(), &[Hat]),
+            ("--direction", self.direction.is_some(), &[Hat, Passive]),
+            ("--delta", self.delta.is_some(), &[Hat, Passive]),
+            ("--ridge", !self.ridge.is_empty(), &[Hat, Passive]),
             ("--bounds", self.bounds.is_some(), &[TwoSided, Hat]),
             ("--segments", self.segments.is_some(), &[Segments]),
         ];
         let useless = |(_, given, methods): &&(_, bool, &[MethodName])| {
-            *given && !methods.contains(&self.method)
+            *given && !methods.contains(&self.method())
         };
         match given.iter().find(useless) {
             Some((flag, _, _)) => Err(Failure::usage(format!(

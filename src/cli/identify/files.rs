@@ -20,12 +20,13 @@ pub(super) fn models(
     args: &Args,
     dir: &Path,
 ) -> Result<Vec<OutputFile>, Failure> {
-    let template = args.id.as_deref().unwrap_or(match args.method {
+    let template = args.id.as_deref().unwrap_or(match args.method() {
         MethodName::Ewls => "lambda-{lambda}-dx-{dx}",
         MethodName::Constrained => "constrained-lambda-{lambda}-dx-{dx}",
         MethodName::TwoSided if args.width.is_some() => "two-sided-dx-{dx}",
         MethodName::TwoSided => "two-sided-{lambda}-dx-{dx}",
         MethodName::Hat => "hat-dx-{dx}",
+        MethodName::Passive => "passive-dx-{dx}",
         MethodName::Static => "static-dx-{dx}",
         MethodName::Segments => "segments",
         MethodName::Spring => "spring",

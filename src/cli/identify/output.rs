@@ -25,7 +25,7 @@ pub(super) fn json(results: &Results<'_>) -> String {
             let provenance = &cell.realization.provenance;
             let by_file = |of: fn(&Score) -> f64| -> Map<String, Value> {
                 (results.recordings.iter().zip(&cell.scores))
-                    .map(|((named, _), score)| (key(results, named), of(score).into()))
+                    .map(|((named, _), score)| (named.name.clone(), of(score).into()))
                     .collect()
             };
             let warnings: Vec<String> = cell.warnings.iter().map(ToString::to_string).collect();
@@ -37,6 +37,8 @@ pub(super) fn json(results: &Results<'_>) -> String {
                 "dx_mm": provenance.dx_mm,
                 "resample": provenance.resample,
                 "lookup": cell.realization.lookup.as_str(),
+                "direction": cell.realization.direction.as_str(),
+                "delta_mm": cell.realization.direction.delta_mm(),
                 "start": start,
                 "sort": sort,
                 "estimator": provenance.method,
@@ -55,21 +57,24 @@ pub(super) fn json(results: &Results<'_>) -> String {
     let recording = |named: &NamedPath, recording: &Recording, role: &str| {
         let warnings: Vec<String> = recording.warnings.iter().map(ToString::to_string).collect();
         json!({
-            "file": key(results, named),
+            "file": named.path.file_name().map(|name| name.to_string_lossy()),
             "name": named.name,
             "sha256": recording.sha256,
             "role": role,
             "warnings": warnings,
         })
     };
-    let recordings: Vec<Value> = results
+    let further = (results.training.iter().skip(1)).map(|(named, r)| (*named, r, "training"));
+    let others = results
         .recordings
         .iter()
         .enumerate()
         .map(|(i, (named, r))| {
             let validates = i < results.args.validate.len();
-            recording(named, r, if validates { "validate" } else { "test" })
-        })
+            (*named, *r, if validates { "validate" } else { "test" })
+        });
+    let recordings: Vec<Value> = (further.chain(others))
+        .map(|(named, r, role)| recording(named, r, role))
         .collect();
     let validation: Map<String, Value> = results
         .recordings
@@ -91,13 +96,13 @@ pub(super) fn json(results: &Results<'_>) -> String {
                     "vaf": c.vaf, "noise_n": c.noise_n, "apart_mm": c.apart_mm,
                 })),
             });
-            Some((key(results, named), document))
+            Some((named.name.clone(), document))
         })
         .collect();
     let document = json!({
         "format": "study-identify/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
-        "training": recording(&results.args.training, results.training, "training"),
+        "training": results.training.first().map(|(named, r)| recording(named, r, "training")),
         "recordings": recordings,
         "best": results.best,
         "validation": validation,
@@ -132,6 +137,7 @@ fn certificate(certificate: &Certificate) -> Value {
         "pass": certificate.passes(),
         "margins": margins,
         "stiffness_n_per_mm": certificate.stiffness_n_per_mm,
+        "state_n_per_mm": certificate.state_n_per_mm,
         "damping_n_s_per_mm": certificate.damping_n_s_per_mm,
         "mass_kg": certificate.mass_kg,
     })
@@ -145,34 +151,21 @@ fn start_and_sort(method: Method) -> [Option<&'static str>; 2] {
     }
 }
 
-/// The file name of a recording; its path if two recordings have the same file name.
-fn key(results: &Results<'_>, named: &NamedPath) -> String {
-    let name = named.file_name();
-    let same = results
-        .recordings
-        .iter()
-        .filter(|(other, _)| other.file_name() == name)
-        .count();
-    if same > 1 {
-        named.path.display().to_string()
-    } else {
-        name
-    }
-}
-
 /// The results as text for a terminal.
 pub(super) fn table(results: &Results<'_>) -> String {
     let mut out = String::new();
-    let _ = writeln!(
-        out,
-        "{}: {} samples, {:.1} s, x {:.2} to {:.2} mm, |v| up to {:.0} mm/s",
-        Untrusted(&results.training.name),
-        results.training.len(),
-        results.training.duration_s(),
-        results.training.range_mm()[0],
-        results.training.range_mm()[1],
-        results.training.top_speed_mm_s(),
-    );
+    for (_, training) in results.training {
+        let _ = writeln!(
+            out,
+            "{}: {} samples, {:.1} s, x {:.2} to {:.2} mm, |v| up to {:.0} mm/s",
+            Untrusted(&training.name),
+            training.len(),
+            training.duration_s(),
+            training.range_mm()[0],
+            training.range_mm()[1],
+            training.top_speed_mm_s(),
+        );
+    }
     if let Some(cell) = results.cells.first() {
         let _ = writeln!(out, "{}", settings(cell));
     }
@@ -186,7 +179,7 @@ pub(super) fn table(results: &Results<'_>) -> String {
         None => {
             let mut rows = vec![heads(results)];
             let cells = results.cells.iter().enumerate();
-            rows.extend(cells.map(|(i, cell)| row(cell, results.best == Some(i))));
+            rows.extend(cells.map(|(i, cell)| row(results, cell, results.best == Some(i))));
             out.push_str(&align(&rows));
         }
     }
@@ -318,6 +311,9 @@ fn settings(cell: &Cell) -> String {
 
 fn heads(results: &Results<'_>) -> Vec<String> {
     let mut heads: Vec<String> = ["", "lambda", "L mm", "dx mm"].map(String::from).to_vec();
+    if has_delta(results) {
+        heads.push("delta mm".into());
+    }
     for (named, _) in &results.recordings {
         heads.push(format!("VAF {}", short_name(named)));
         heads.extend(["bias N", "residual N"].map(String::from));
@@ -326,7 +322,13 @@ fn heads(results: &Results<'_>) -> Vec<String> {
     heads
 }
 
-fn row(cell: &Cell, best: bool) -> Vec<String> {
+/// Whether a cell has a direction state.
+fn has_delta(results: &Results<'_>) -> bool {
+    let delta = |cell: &Cell| cell.realization.direction.delta_mm();
+    results.cells.iter().any(|cell| delta(cell).is_some())
+}
+
+fn row(results: &Results<'_>, cell: &Cell, best: bool) -> Vec<String> {
     let provenance = &cell.realization.provenance;
     let number = |n: Option<f64>| n.map_or("-".to_owned(), |n| n.to_string());
     let memory = match (provenance.lambda, provenance.memory_mm) {
@@ -340,6 +342,9 @@ fn row(cell: &Cell, best: bool) -> Vec<String> {
         memory,
         number(provenance.dx_mm),
     ];
+    if has_delta(results) {
+        row.push(number(cell.realization.direction.delta_mm()));
+    }
     for score in &cell.scores {
         row.push(format!("{:.6}", score.vaf));
         row.push(format!("{:+.4}", score.bias_n));

@@ -1,18 +1,23 @@
 //! Symmetric banded systems, with bounds on the unknowns.
 //!
 //! [`Banded::solve`] is a Cholesky factorization within the band: n·h² operations
-//! for n unknowns and half-bandwidth h. [`Banded::solve_bounded`] minimizes
+//! for n unknowns and half-bandwidth h. The last unknowns may be coupled with all others
+//! ([`Banded::bordered`]), which the factorization preserves as well. [`Banded::solve_bounded`] minimizes
 //! ½xᵀAx − rᵀx with some x ≥ 0 by block principal pivoting (Portugal, Júdice &
 //! Vicente 1994, Math. Comp. 63:625): all unknowns that violate a condition are
 //! exchanged at once, and one at a time where that does not help, which terminates
 //! for every positive definite A.
 
-/// A symmetric matrix with `half` diagonals on either side of the main one.
+/// A symmetric matrix with `half` diagonals on either side of the main one, and full
+/// rows for the last unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct Banded {
     n: usize,
-    half: usize,
-    /// Row by row, the diagonal element last: (i, j) at i·(half + 1) + half − (i − j).
+    /// The first column of each row.
+    first: Vec<usize>,
+    /// Where each row begins in `lower`; one more than there are rows.
+    start: Vec<usize>,
+    /// Row by row, from its first column to the diagonal.
     lower: Vec<f64>,
 }
 
@@ -34,18 +39,32 @@ const SINGULAR: f64 = 1e-13;
 
 impl Banded {
     pub(super) fn zero(n: usize, half: usize) -> Self {
+        Self::bordered(n, half, 0)
+    }
+
+    /// With `full` more unknowns at the end, which may be coupled with all others.
+    pub(super) fn bordered(n: usize, half: usize, full: usize) -> Self {
+        let first: Vec<usize> = (0..n)
+            .map(|i| i.saturating_sub(half))
+            .chain(std::iter::repeat_n(0, full))
+            .collect();
+        let mut start = vec![0];
+        for (i, first) in first.iter().enumerate() {
+            start.push(start[i] + i + 1 - first);
+        }
         Self {
-            n,
-            half,
-            lower: vec![0.0; n * (half + 1)],
+            n: n + full,
+            lower: vec![0.0; start[n + full]],
+            first,
+            start,
         }
     }
 
     fn at(&self, i: usize, j: usize) -> usize {
-        i * (self.half + 1) + self.half + j - i
+        self.start[i] + j - self.first[i]
     }
 
-    /// Adds `value` to (i, j) and (j, i); j ≤ i ≤ j + half.
+    /// Adds `value` to (i, j) and (j, i); j ≤ i, within the band or the border.
     pub(super) fn add(&mut self, i: usize, j: usize, value: f64) {
         let at = self.at(i, j);
         self.lower[at] += value;
@@ -55,7 +74,7 @@ impl Banded {
     pub(super) fn times(&self, x: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; self.n];
         for i in 0..self.n {
-            for j in i.saturating_sub(self.half)..=i {
+            for j in self.first[i]..=i {
                 let value = self.lower[self.at(i, j)];
                 product[i] += value * x[j];
                 if j < i {
@@ -71,14 +90,14 @@ impl Banded {
     pub(super) fn solve(&self, right: &[f64], free: &[bool]) -> Option<Vec<f64>> {
         let mut factor = self.lower.clone();
         for i in 0..self.n {
-            let first = i.saturating_sub(self.half);
+            let first = self.first[i];
             for j in first..=i {
                 let at = self.at(i, j);
                 if !(free[i] && free[j]) {
                     factor[at] = if i == j { 1.0 } else { 0.0 };
                     continue;
                 }
-                let start = first.max(j.saturating_sub(self.half));
+                let start = first.max(self.first[j]);
                 let (row_i, row_j) = (self.at(i, start), self.at(j, start));
                 let done: f64 = factor[row_i..row_i + j - start]
                     .iter()
@@ -104,14 +123,14 @@ impl Banded {
             .map(|(r, free)| if *free { *r } else { 0.0 })
             .collect();
         for i in 0..self.n {
-            for j in i.saturating_sub(self.half)..i {
+            for j in self.first[i]..i {
                 x[i] -= factor[self.at(i, j)] * x[j];
             }
             x[i] /= factor[self.at(i, i)];
         }
         for i in (0..self.n).rev() {
             x[i] /= factor[self.at(i, i)];
-            for j in i.saturating_sub(self.half)..i {
+            for j in self.first[i]..i {
                 x[j] -= factor[self.at(i, j)] * x[i];
             }
         }
@@ -200,6 +219,26 @@ mod tests {
             for (p, r) in a.times(&x).iter().zip(&right) {
                 assert!((p - r).abs() < 1e-8, "{p} {r}");
             }
+        }
+    }
+
+    #[test]
+    fn an_unknown_that_is_coupled_with_all_others_is_solved_with_them() {
+        let mut noise = Stream::new(3, &["banded"]);
+        let n = 30;
+        let (band, mut right) = system(&mut noise, n);
+        let mut a = Banded::bordered(n, 3, 1);
+        for i in 0..n {
+            for j in band.first[i]..=i {
+                a.add(i, j, band.lower[band.at(i, j)]);
+            }
+            a.add(n, i, 0.01 * noise.normal());
+        }
+        a.add(n, n, 2.0);
+        right.push(1.0);
+        let x = a.solve(&right, &vec![true; n + 1]).unwrap();
+        for (p, r) in a.times(&x).iter().zip(&right) {
+            assert!((p - r).abs() < 1e-8, "{p} {r}");
         }
     }
 

@@ -17,12 +17,13 @@ pub fn static_profile(samples: &Samples, nodes: &[f64], dx_mm: f64) -> Resampled
 }
 
 /// The least-squares line through all samples, as [0, 0, k, F0].
-pub fn spring(recording: &Recording) -> Theta {
-    let n = recording.len() as f64;
-    let mean_x = recording.x_mm.iter().sum::<f64>() / n;
-    let mean_f = recording.f_n.iter().sum::<f64>() / n;
+pub fn spring(recordings: &[&Recording]) -> Theta {
+    let all = || recordings.iter().flat_map(|r| r.x_mm.iter().zip(&r.f_n));
+    let n = all().count() as f64;
+    let mean_x = all().map(|(x, _)| x).sum::<f64>() / n;
+    let mean_f = all().map(|(_, f)| f).sum::<f64>() / n;
     let (mut xx, mut xf) = (0.0, 0.0);
-    for (x, f) in recording.x_mm.iter().zip(&recording.f_n) {
+    for (x, f) in all() {
         xx += (x - mean_x) * (x - mean_x);
         xf += (x - mean_x) * (f - mean_f);
     }

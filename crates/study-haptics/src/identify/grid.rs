@@ -178,7 +178,7 @@ fn one_method(
         }
         Method::Segments(options) => Ok(vec![training.segments(options, lookup)?]),
         Method::Spring => Ok(vec![training.spring(lookup)]),
-        Method::TwoSided(_) | Method::Hat(_) | Method::Static => tables
+        Method::TwoSided(_) | Method::Hat(_) | Method::Passive(_) | Method::Static => tables
             .par_iter()
             .map(|nodes| training.identify(method, nodes.dx_mm, lookup))
             .collect::<Vec<_>>()

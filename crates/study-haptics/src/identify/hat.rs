@@ -46,7 +46,7 @@ pub(super) struct HatTable {
 
 /// The table of least cost; `None` if recording and ridges leave it undetermined.
 pub(super) fn table(
-    recording: &Recording,
+    recordings: &[&Recording],
     nodes: &[f64],
     lookup: Lookup,
     rule: Direction,
@@ -57,7 +57,13 @@ pub(super) fn table(
     let mut right = vec![0.0; n];
     let mut weight = vec![[0.0; 2]; nodes.len()];
     let mut state = DirectionState::default();
-    for i in 0..recording.len() {
+    let samples = (recordings.iter().enumerate())
+        .flat_map(|(r, recording)| (0..recording.len()).map(move |i| (r, i)));
+    for (r, i) in samples {
+        let recording = recordings[r];
+        if i == 0 {
+            state = DirectionState::default();
+        }
         let motion = motion(recording, i);
         let z = state.step(rule, motion);
         let sides = [0.5 * (1.0 + z), 0.5 * (1.0 - z)];
@@ -88,7 +94,8 @@ pub(super) fn table(
             }
         }
     }
-    let information = recording.len() as f64 / nodes.len() as f64;
+    let samples: usize = recordings.iter().map(|r| r.len()).sum();
+    let information = samples as f64 / nodes.len() as f64;
     add_ridges(&mut normal, nodes.len(), information, penalty);
     let of_node = [penalty.dynamics, penalty.dynamics, Bound::Free];
     let bounds = of_node.repeat(n / 3);

@@ -1,16 +1,23 @@
-//! Methods of [`Training`] that identify hat tables: with a direction state, and the
+//! Methods of [`Training`] that identify hat tables: with a direction state, passive, and the
 //! segmented baseline, a hat table of forces alone.
 
 use super::banded::Bound;
 use super::hat::{self, HatTable, Penalty};
-use super::method::{Delta, Hat, Method, Segments, State};
+use super::method::{Delta, Hat, Method, Passive, Segments, State};
+use super::passive::{self, PassiveTable};
 use super::resample::Resampled;
-use super::{Cause, Identified, IdentifyError, Training, Warning, two_sided, vaf};
+use super::{Cause, Identified, IdentifyError, Theta, Training, Warning, two_sided, vaf};
 use crate::model::Provenance;
 use study_wire::predict::{Direction, Lookup};
 
-/// First and last δ of the scan, in twentieths of a mm: 0.3 to 1 mm.
-const SCAN: [u32; 2] = [6, 20];
+/// Least and greatest δ of the scan, as shares of the travel.
+const SCAN: [f64; 2] = [0.01, 0.25];
+/// Ratio of one δ of the scan to the one before.
+const STEP: f64 = std::f64::consts::SQRT_2;
+/// Golden sections of the neighbourhood of the best, to 1 % of it.
+const GOLDEN_STEPS: usize = 10;
+/// A direction state that changes over fewer encoder counts follows their noise.
+const LEAST_COUNTS: f64 = 20.0;
 
 /// The rms error of the chosen δ over the least one is at most this. Chosen, together
 /// with the ridge on m and b, on simulated switches: see `docs/estimators.md`.
@@ -34,16 +41,9 @@ impl Training<'_> {
                 Bound::Free
             },
         };
-        let with = |rule| self.hat_with(nodes.clone(), lookup, rule, penalty);
-        let mut identified = match options.state {
-            State::Sign => with(Direction::Sign)?,
-            State::Play(Delta::Mm(mm)) | State::Dahl(Delta::Mm(mm)) => {
-                with(options.state.with(mm))?
-            }
-            State::Play(Delta::Scan) | State::Dahl(Delta::Scan) => {
-                self.scan(|delta_mm| with(options.state.with(delta_mm)))?
-            }
-        };
+        let mut identified = self.with_state(options.state, |rule| {
+            self.hat_with(nodes.clone(), lookup, rule, penalty)
+        })?;
         identified.realization.provenance = Provenance {
             dx_mm: Some(dx_mm),
             ..self.provenance(Method::Hat(options))
@@ -51,9 +51,53 @@ impl Training<'_> {
         Ok(identified)
     }
 
-    /// The table with the shortest δ whose rms error on this recording is within
-    /// [`TOLERANCE`] of the least. Tried are every second value of [`SCAN`] and then the
-    /// neighbours of the best.
+    /// The passive table.
+    pub(super) fn passive(
+        &self,
+        options: Passive,
+        dx_mm: f64,
+        lookup: Lookup,
+    ) -> Result<Identified, IdentifyError> {
+        let nodes = self.nodes(dx_mm)?;
+        let penalty = passive::Penalty {
+            ridge_force: options.ridge_force,
+            ridge_damping: options.ridge_damping,
+            terms: options.terms,
+        };
+        let mut identified = self.with_state(options.state, |rule| {
+            let PassiveTable {
+                positive,
+                negative,
+                weight,
+            } = passive::table(&self.recordings, &nodes, lookup, rule, penalty, None)
+                .ok_or(IdentifyError::Undetermined)?;
+            Ok(self.hats(nodes.clone(), [positive, negative], &weight, rule, lookup))
+        })?;
+        identified.realization.provenance = Provenance {
+            dx_mm: Some(dx_mm),
+            ..self.provenance(Method::Passive(options))
+        };
+        Ok(identified)
+    }
+
+    /// The table with the given direction state, or with the δ that the scan finds.
+    fn with_state(
+        &self,
+        state: State,
+        table: impl Fn(Direction) -> Result<Identified, IdentifyError>,
+    ) -> Result<Identified, IdentifyError> {
+        match state {
+            State::Sign => table(Direction::Sign),
+            State::Play(Delta::Mm(mm)) | State::Dahl(Delta::Mm(mm)) => table(state.with(mm)),
+            State::Play(Delta::Scan) | State::Dahl(Delta::Scan) => {
+                self.scan(|delta_mm| table(state.with(delta_mm)))
+            }
+        }
+    }
+
+    /// The table with the shortest δ whose rms error on the recordings is within
+    /// [`TOLERANCE`] of the least. Tried are lengths in a geometric series from 1/100 to
+    /// 1/4 of the travel, then golden sections around the best.
     ///
     /// The error is flat in δ, and a longer δ also fits the slow reversals of this
     /// motion, which are not hysteresis; on other motions the shorter δ predicts better.
@@ -61,37 +105,72 @@ impl Training<'_> {
         &self,
         table: impl Fn(f64) -> Result<Identified, IdentifyError>,
     ) -> Result<Identified, IdentifyError> {
-        let [first, last] = SCAN;
-        let attempt = |twentieths: u32| -> Result<(u32, f64, Identified), IdentifyError> {
-            let identified = table(f64::from(twentieths) / 20.0)?;
-            let score = vaf::score(&identified.realization, self.recording);
-            let rms_n = score.residual_n.hypot(score.bias_n);
-            Ok((twentieths, rms_n, identified))
+        let travel_mm = self.range_mm[1] - self.range_mm[0];
+        let counts = (self.recordings.iter())
+            .filter_map(|r| r.resolution_mm())
+            .fold(0.0, f64::max);
+        let least_mm = (SCAN[0] * travel_mm)
+            .max(LEAST_COUNTS * counts)
+            .min(0.5 * SCAN[1] * travel_mm);
+        let most_mm = SCAN[1] * travel_mm;
+        let attempt = |delta_mm: f64| -> Result<(f64, f64, Identified), IdentifyError> {
+            let identified = table(delta_mm)?;
+            let (mut square, mut samples) = (0.0, 0.0);
+            for recording in &self.recordings {
+                let score = vaf::score(&identified.realization, recording);
+                let n = recording.len() as f64;
+                square += n * (score.residual_n.powi(2) + score.bias_n.powi(2));
+                samples += n;
+            }
+            Ok((delta_mm, (square / samples).sqrt(), identified))
         };
-        let best = |tried: &[(u32, f64, Identified)]| {
-            let (at, rms_n, _) = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-            Some((*at, *rms_n))
-        };
-        let mut tried = (first..=last)
-            .step_by(2)
-            .map(attempt)
+        let steps = ((most_mm / least_mm).ln() / STEP.ln()).round() as i32;
+        let series = |i: i32| rounded(least_mm * STEP.powi(i));
+        let mut tried = (0..=steps)
+            .map(|i| attempt(series(i)))
             .collect::<Result<Vec<_>, _>>()?;
-        let (at, _) = best(&tried).ok_or(IdentifyError::Undetermined)?;
-        for neighbour in [at - 1, at + 1] {
-            if (first..=last).contains(&neighbour) {
-                tried.push(attempt(neighbour)?);
+        let rms_n = |tried: &[(f64, f64, Identified)], i: usize| tried.get(i).map(|t| t.1);
+        let least = |tried: &[(f64, f64, Identified)]| {
+            (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1))
+        };
+        let best = least(&tried).ok_or(IdentifyError::Undetermined)?;
+        let at_end = best == 0 || best == tried.len() - 1;
+        // the golden section of the neighbourhood of the best, in log δ
+        let [mut low, mut high] =
+            [best.saturating_sub(1), (best + 1).min(tried.len() - 1)].map(|i| tried[i].0.ln());
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        for _ in 0..GOLDEN_STEPS {
+            let [left, right] = [high - golden * (high - low), low + golden * (high - low)];
+            let mut of = [0.0; 2];
+            for (of, at) in of.iter_mut().zip([left, right]) {
+                let delta_mm = rounded(at.exp());
+                let known = tried.iter().position(|t| t.0 == delta_mm);
+                let i = match known {
+                    Some(i) => i,
+                    None => {
+                        tried.push(attempt(delta_mm)?);
+                        tried.len() - 1
+                    }
+                };
+                *of = rms_n(&tried, i).unwrap_or(f64::INFINITY);
+            }
+            if of[0] <= of[1] {
+                high = right;
+            } else {
+                low = left;
             }
         }
-        tried.sort_by_key(|(twentieths, ..)| *twentieths);
-        let (at, least_n) = best(&tried).ok_or(IdentifyError::Undetermined)?;
+        let best = least(&tried).ok_or(IdentifyError::Undetermined)?;
+        let (best_mm, least_n) = (tried[best].0, tried[best].1);
         let (_, _, mut identified) = tried
             .into_iter()
-            .find(|(_, rms_n, _)| *rms_n <= TOLERANCE * least_n)
+            .filter(|(_, rms_n, _)| *rms_n <= TOLERANCE * least_n)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
             .ok_or(IdentifyError::Undetermined)?;
-        if SCAN.contains(&at) {
-            identified.warnings.push(Warning::DeltaAtEnd {
-                delta_mm: f64::from(at) / 20.0,
-            });
+        if at_end {
+            identified
+                .warnings
+                .push(Warning::DeltaAtEnd { delta_mm: best_mm });
         }
         Ok(identified)
     }
@@ -108,7 +187,7 @@ impl Training<'_> {
             .map(|i| low + (high - low) * i as f64 / options.count as f64)
             .collect();
         if nodes.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(IdentifyError::NoOverlap(self.recording.name.clone()));
+            return Err(IdentifyError::NoOverlap(self.recordings[0].name.clone()));
         }
         let penalty = Penalty {
             // only interpolates over segments without samples
@@ -132,8 +211,21 @@ impl Training<'_> {
             positive,
             negative,
             weight,
-        } = hat::table(self.recording, &nodes, lookup, rule, penalty)
+        } = hat::table(&self.recordings, &nodes, lookup, rule, penalty)
             .ok_or(IdentifyError::Undetermined)?;
+        Ok(self.hats(nodes, [positive, negative], &weight, rule, lookup))
+    }
+
+    /// A table with a direction state from the parameters at its nodes and the weight of
+    /// the samples behind each.
+    fn hats(
+        &self,
+        nodes: Vec<f64>,
+        [positive, negative]: [Vec<Theta>; 2],
+        weight: &[[f64; 2]],
+        rule: Direction,
+        lookup: Lookup,
+    ) -> Identified {
         let branch = |theta, side: usize| {
             let sparse = |w: &&[f64; 2]| w[side] < two_sided::MIN_WEIGHT;
             Resampled {
@@ -144,6 +236,11 @@ impl Training<'_> {
         let (positive, negative) = (branch(positive, 0), branch(negative, 1));
         let mut identified = self.table(nodes, positive, negative, Cause::FewSamples, lookup);
         identified.realization.direction = rule;
-        Ok(identified)
+        identified
     }
+}
+
+/// A length with two significant digits, as a person would write it.
+fn rounded(mm: f64) -> f64 {
+    format!("{mm:.1e}").parse().unwrap_or(mm)
 }

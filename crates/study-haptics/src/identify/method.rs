@@ -20,6 +20,8 @@ pub enum Method {
     TwoSided(TwoSided),
     /// All nodes at once, by penalized least squares, with a direction state.
     Hat(Hat),
+    /// The hat table with one mass and bounds that make it passive.
+    Passive(Passive),
     /// Baseline: mean force by position and direction.
     Static,
     /// Baseline: force by direction, piecewise linear between few nodes.
@@ -36,6 +38,7 @@ impl Method {
             Self::Ewls(_) => "constrained",
             Self::TwoSided(_) => "two-sided",
             Self::Hat(_) => "hat",
+            Self::Passive(_) => "passive",
             Self::Static => "static",
             Self::Segments(_) => "segments",
             Self::Spring => "spring",
@@ -78,11 +81,14 @@ impl Method {
                 Width::Lambda(_) => Ok(()),
             },
             Self::Hat(options) => {
-                if let State::Play(Delta::Mm(mm)) | State::Dahl(Delta::Mm(mm)) = options.state {
-                    positive("delta", mm)?;
-                }
+                options.state.check()?;
                 not_negative("the ridge on F", options.ridge_force)?;
                 not_negative("the ridge on m and b", options.ridge_dynamics)
+            }
+            Self::Passive(options) => {
+                options.state.check()?;
+                not_negative("the ridge on F", options.ridge_force)?;
+                not_negative("the ridge on b", options.ridge_damping)
             }
             Self::Segments(options) => {
                 if (1..super::resample::MAX_NODES).contains(&options.count) {
@@ -215,6 +221,47 @@ impl Default for Hat {
     }
 }
 
+/// Options of the passive table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Passive {
+    /// The direction state, in identification and in prediction.
+    pub state: State,
+    /// Weight of the squared second differences of F⁺ and F⁻ along the nodes.
+    pub ridge_force: f64,
+    /// Weight of the squared first differences of b times the rms speed.
+    pub ridge_damping: f64,
+    /// Which of m and b the table has.
+    pub terms: Terms,
+}
+
+impl Default for Passive {
+    /// Play, with δ found on the training recordings.
+    fn default() -> Self {
+        Self {
+            state: State::Play(Delta::Scan),
+            ridge_force: 3e-3,
+            ridge_damping: 6e-2,
+            terms: Terms::default(),
+        }
+    }
+}
+
+/// Which of the dynamic terms are identified; the others are 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Terms {
+    /// The mass.
+    pub m: bool,
+    /// The damping.
+    pub b: bool,
+}
+
+impl Default for Terms {
+    /// Both.
+    fn default() -> Self {
+        Self { m: true, b: true }
+    }
+}
+
 /// The direction state of a hat table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum State {
@@ -227,6 +274,13 @@ pub enum State {
 }
 
 impl State {
+    fn check(self) -> Result<(), IdentifyError> {
+        match self {
+            Self::Play(Delta::Mm(mm)) | Self::Dahl(Delta::Mm(mm)) => positive("delta", mm),
+            _ => Ok(()),
+        }
+    }
+
     /// The direction rule with a given δ, mm.
     pub(super) fn with(self, delta_mm: f64) -> Direction {
         match self {
@@ -242,8 +296,8 @@ impl State {
 pub enum Delta {
     /// A length, mm.
     Mm(f64),
-    /// The shortest in 0.3 to 1 mm whose rms error on the training recording exceeds the
-    /// least one by at most a tenth.
+    /// The shortest whose rms error on the training recordings exceeds the least one by
+    /// at most a tenth, between 1/100 and 1/4 of the travel.
     Scan,
 }
 
@@ -287,15 +341,34 @@ impl fmt::Display for Method {
                     " ridge={},{}",
                     options.ridge_force, options.ridge_dynamics
                 )?;
-                if let State::Play(Delta::Scan) | State::Dahl(Delta::Scan) = options.state {
-                    f.write_str(" delta=scan")?;
-                }
+                scanned(f, options.state)?;
                 bounds(f, options.bounded)
+            }
+            Self::Passive(options) => {
+                write!(
+                    f,
+                    " ridge={},{}",
+                    options.ridge_force, options.ridge_damping
+                )?;
+                scanned(f, options.state)?;
+                match options.terms {
+                    Terms { m: true, b: true } => Ok(()),
+                    Terms { m: true, b: false } => f.write_str(" terms=m"),
+                    Terms { m: false, b: true } => f.write_str(" terms=b"),
+                    Terms { m: false, b: false } => f.write_str(" terms=f0"),
+                }
             }
             Self::Segments(options) => write!(f, " count={}", options.count),
             Self::Static | Self::Spring => Ok(()),
         }
     }
+}
+
+fn scanned(f: &mut fmt::Formatter<'_>, state: State) -> fmt::Result {
+    f.write_str(match state {
+        State::Play(Delta::Scan) | State::Dahl(Delta::Scan) => " delta=scan",
+        _ => "",
+    })
 }
 
 fn bounds(f: &mut fmt::Formatter<'_>, bounded: bool) -> fmt::Result {

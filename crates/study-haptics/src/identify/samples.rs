@@ -24,15 +24,21 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// The samples of `recording` whose velocity satisfies `belongs`.
-    pub(super) fn of(recording: &Recording, belongs: impl Fn(f64) -> bool) -> Self {
-        let mut order: Vec<usize> = (0..recording.len())
-            .filter(|i| belongs(recording.v_mm_s[*i]))
-            .collect();
+    /// The samples of `recordings` whose velocity satisfies `belongs`.
+    pub(super) fn of(recordings: &[&Recording], belongs: impl Fn(f64) -> bool) -> Self {
+        let mut all = Self::default();
+        for r in recordings {
+            for i in (0..r.len()).filter(|i| belongs(r.v_mm_s[*i])) {
+                all.x_mm.push(r.x_mm[i]);
+                all.v_mm_s.push(r.v_mm_s[i]);
+                all.a_m_s2.push(r.a_m_s2[i]);
+                all.f_n.push(r.f_n[i]);
+            }
+        }
+        let mut order: Vec<usize> = (0..all.len()).collect();
         // stable: ties keep their order in time
-        order.sort_by(|a, b| recording.x_mm[*a].total_cmp(&recording.x_mm[*b]));
-        let r = recording;
-        Self::pick([&r.x_mm, &r.v_mm_s, &r.a_m_s2, &r.f_n], &order)
+        order.sort_by(|a, b| all.x_mm[*a].total_cmp(&all.x_mm[*b]));
+        all.reordered(&order)
     }
 
     fn pick(columns: [&[f64]; 4], order: &[usize]) -> Self {

@@ -235,3 +235,24 @@ fn a_sampled_spring_needs_the_damping_of_colgate_and_schenkel() {
     // one period of delay triples it
     assert!((spring_damping_n_s_per_m(5.0, 1000.0, 1.0) - 7.5).abs() < 1e-12);
 }
+
+/// F⁺ − F⁻ = 2 N over δ = 0.5 mm is 4 N/mm to the device, whatever K is.
+#[test]
+fn the_change_over_the_direction_state_is_a_stiffness() {
+    for rule in [
+        Direction::Play { delta_mm: 0.5 },
+        Direction::Dahl { delta_mm: 0.5 },
+    ] {
+        let c = plain().certify(Lookup::Linear, rule);
+        assert_eq!(c.state_n_per_mm, Some(4.0));
+        assert_eq!(c.rendered_n_per_mm(), 4.0);
+        // K T/2 + |B| at 1 kHz: 2 + 10 N·s/m
+        assert!((c.device_damping_n_s_per_m(1000.0, 0.0) - 12.0).abs() < 1e-9);
+    }
+    assert_eq!(plain().linear().state_n_per_mm, None);
+    // k x: the gap is widest between the nodes, 2 + 2·0.25 N at 0.5 mm
+    let mut t = plain();
+    t.0[0][2] = [1.0, 0.0, 0.0];
+    let c = t.certify(Lookup::Linear, Direction::Play { delta_mm: 0.5 });
+    assert!((c.state_n_per_mm.unwrap() - 4.5).abs() < 1e-9, "{c:?}");
+}
