@@ -1,7 +1,8 @@
 //! All colours and text styles of the terminal.
 //!
 //! No information depends on colour: a page has the same characters in the same cells
-//! with every [`Colour`]. The terminal's own background is kept.
+//! with every [`Colour`]. The terminal's own background is kept, dark or light: each of
+//! the 256 colours in use has a contrast of at least 4.5 : 1 to black and to white.
 
 use ratatui::style::{Color, Modifier, Style};
 
@@ -68,19 +69,20 @@ impl Theme {
     /// Secondary text: the experimenter's status line, explanations.
     pub fn quiet(self) -> Style {
         match self.colour {
-            Colour::Full => Style::new().fg(Color::Indexed(244)),
-            Colour::Sixteen | Colour::None => Style::new().add_modifier(Modifier::DIM),
+            Colour::Full => Style::new().fg(Color::Indexed(243)),
+            // Dim text is too faint on many terminals.
+            Colour::Sixteen | Colour::None => Style::new(),
         }
     }
 
     /// The name of a key.
     pub fn key(self) -> Style {
-        self.tint(73, Color::Cyan).add_modifier(Modifier::BOLD)
+        self.tint(63, Color::Cyan).add_modifier(Modifier::BOLD)
     }
 
     /// A chosen answer.
     pub fn chosen(self) -> Style {
-        self.tint(73, Color::Cyan).add_modifier(Modifier::BOLD)
+        self.tint(63, Color::Cyan).add_modifier(Modifier::BOLD)
     }
 
     /// The outline of an answer that can be chosen.
@@ -90,45 +92,45 @@ impl Theme {
 
     /// The bar of the field with the focus.
     pub fn focus(self) -> Style {
-        self.tint(73, Color::Cyan)
+        self.tint(63, Color::Cyan)
     }
 
     /// The playback indicator.
     pub fn playing(self) -> Style {
-        self.tint(71, Color::Green).add_modifier(Modifier::BOLD)
+        self.tint(29, Color::Green).add_modifier(Modifier::BOLD)
     }
 
     /// The check mark of saved answers.
     pub fn saved(self) -> Style {
-        self.tint(71, Color::Green)
+        self.tint(29, Color::Green)
     }
 
     /// A notice.
     pub fn notice(self) -> Style {
-        self.tint(172, Color::Yellow)
+        self.tint(131, Color::Yellow)
     }
 
     /// The title of a fault.
     pub fn trouble(self) -> Style {
-        self.tint(167, Color::Red)
+        self.tint(163, Color::Red)
             .add_modifier(Modifier::BOLD | Modifier::REVERSED)
     }
 
     /// The frame around a fault.
     pub fn trouble_frame(self) -> Style {
-        self.tint(167, Color::Red).add_modifier(Modifier::BOLD)
+        self.tint(163, Color::Red).add_modifier(Modifier::BOLD)
     }
 
     /// The banner of pilots and simulations.
     pub fn banner(self) -> Style {
-        self.tint(172, Color::Yellow)
+        self.tint(131, Color::Yellow)
             .add_modifier(Modifier::REVERSED)
     }
 
     /// The force trace.
     pub fn trace(self) -> Color {
         match self.colour {
-            Colour::Full => Color::Indexed(73),
+            Colour::Full => Color::Indexed(63),
             Colour::Sixteen => Color::Cyan,
             Colour::None => Color::Reset,
         }
@@ -138,6 +140,24 @@ impl Theme {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn styles(theme: Theme) -> [Style; 13] {
+        [
+            theme.text(),
+            theme.strong(),
+            theme.quiet(),
+            theme.key(),
+            theme.chosen(),
+            theme.outline(),
+            theme.focus(),
+            theme.playing(),
+            theme.saved(),
+            theme.notice(),
+            theme.trouble(),
+            theme.trouble_frame(),
+            theme.banner(),
+        ]
+    }
 
     fn detect(vars: &[(&str, &str)]) -> Colour {
         Colour::detect(|name| {
@@ -168,24 +188,49 @@ mod tests {
         );
     }
 
+    /// Relative luminance of one of the 256 colours above the first 16, after WCAG 2.2.
+    fn luminance(index: u8) -> f64 {
+        let level = |n: u8| if n == 0 { 0 } else { 55 + 40 * n };
+        let (r, g, b) = match index {
+            232.. => {
+                let grey = 8 + 10 * (index - 232);
+                (grey, grey, grey)
+            }
+            _ => {
+                let n = index - 16;
+                (level(n / 36), level(n / 6 % 6), level(n % 6))
+            }
+        };
+        let linear = |c: u8| match f64::from(c) / 255.0 {
+            c if c <= 0.04045 => c / 12.92,
+            c => ((c + 0.055) / 1.055).powf(2.4),
+        };
+        0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b)
+    }
+
+    #[test]
+    fn every_colour_is_legible_on_black_and_on_white() {
+        let theme = Theme::new(Colour::Full);
+        let trace = Style::new().fg(theme.trace());
+        for style in styles(theme).into_iter().chain([trace]) {
+            let Some(Color::Indexed(index)) = style.fg else {
+                assert_eq!(style.fg, None);
+                continue;
+            };
+            let bright = luminance(index);
+            let (on_black, on_white) = ((bright + 0.05) / 0.05, 1.05 / (bright + 0.05));
+            let contrast = on_black.min(on_white);
+            assert!(contrast >= 4.5, "colour {index}: {contrast:.2}");
+        }
+        for style in styles(Theme::new(Colour::Sixteen)) {
+            assert!(!style.add_modifier.contains(Modifier::DIM));
+        }
+    }
+
     #[test]
     fn without_colour_no_style_has_one() {
         let theme = Theme::new(Colour::None);
-        for style in [
-            theme.text(),
-            theme.strong(),
-            theme.quiet(),
-            theme.key(),
-            theme.chosen(),
-            theme.outline(),
-            theme.focus(),
-            theme.playing(),
-            theme.saved(),
-            theme.notice(),
-            theme.trouble(),
-            theme.trouble_frame(),
-            theme.banner(),
-        ] {
+        for style in styles(theme) {
             assert_eq!((style.fg, style.bg), (None, None));
         }
         assert_eq!(theme.trace(), Color::Reset);

@@ -50,17 +50,21 @@ pub fn left(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
     }
 }
 
+/// The cells that a line takes. Some letters that a font joins, such as those of لا, are
+/// counted as one column by [`Line::width`], and are two cells.
+pub fn cells(line: &Line<'_>) -> u16 {
+    let wide = line.spans.iter().map(|span| wrap::width(&span.content));
+    u16::try_from(wide.sum::<usize>()).unwrap_or(u16::MAX)
+}
+
 /// Draws a centred line.
 pub fn centre(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
-    let width = u16::try_from(line.width()).unwrap_or(u16::MAX);
-    left(buf, middle(area, width, area.height), line);
+    left(buf, middle(area, cells(line), area.height), line);
 }
 
 /// Draws a right-aligned line.
 pub fn right(buf: &mut Buffer, area: Rect, line: &Line<'_>) {
-    let width = u16::try_from(line.width())
-        .unwrap_or(u16::MAX)
-        .min(area.width);
+    let width = cells(line).min(area.width);
     let x = area.right() - width;
     left(buf, Rect { x, width, ..area }, line);
 }
@@ -210,6 +214,18 @@ mod tests {
         assert_eq!(clock(3600.0), "1:00:00");
         assert_eq!(clock(f64::NAN), "0:00");
         assert_eq!(clock(-1.0), "0:00");
+    }
+
+    #[test]
+    fn arabic_with_ligatures_is_drawn_whole() {
+        let question = "هل لا لا لا لا نهاية؟";
+        for draw in [centre, right] {
+            let mut buf = Buffer::empty(Rect::new(0, 0, 40, 1));
+            let area = buf.area;
+            draw(&mut buf, area, &styled(question, Style::new()));
+            let drawn: String = buf.content().iter().map(|cell| cell.symbol()).collect();
+            assert_eq!(drawn.trim(), question);
+        }
     }
 
     #[test]

@@ -72,6 +72,11 @@ pub fn wrap(text: &str, columns: usize) -> Vec<Line> {
         let cell = shown(grapheme);
         let cells = width(&cell);
         let space = grapheme.chars().all(char::is_whitespace);
+        let wide = cells > 1 && width(grapheme) == cells;
+        let parts = (wide || line.wide) && !line.opens && !begins_no_line(grapheme);
+        if parts && !space && line.cells > 0 {
+            line.break_after = Some((at, line.shown.len(), line.cells));
+        }
         if line.cells + cells > columns && line.cells > 0 {
             if space {
                 // Spaces at the edge belong to the line they end.
@@ -89,18 +94,35 @@ pub fn wrap(text: &str, columns: usize) -> Vec<Line> {
             lines.push(cut);
             line = next;
         }
-        let wide = cells > 1 && width(grapheme) == cells;
-        if wide && line.cells > 0 {
-            line.break_after = Some((at, line.shown.len(), line.cells));
-        }
         line.shown.push_str(&cell);
         line.cells += cells;
-        if space || wide || matches!(grapheme, "-" | "–" | "—" | "/") {
+        line.wide = wide;
+        line.opens = ends_no_line(grapheme);
+        if space || matches!(grapheme, "-" | "–" | "—" | "/") {
             line.break_after = Some((end, line.shown.len(), line.cells));
         }
     }
     lines.push(line.close(text.len()));
     lines
+}
+
+/// Whether no line of Japanese or Chinese text begins with a character: closing
+/// punctuation and marks of repetition (`line-break: normal` of CSS).
+fn begins_no_line(grapheme: &str) -> bool {
+    const NOT_FIRST: &str = "、。，．・：；？！!?,.:;)]}）］｝〕〉》」』】’”…‥〜～々ゝゞヽヾ％℃";
+    grapheme
+        .chars()
+        .next()
+        .is_some_and(|c| NOT_FIRST.contains(c))
+}
+
+/// Whether no line ends with a character: opening brackets.
+fn ends_no_line(grapheme: &str) -> bool {
+    const NOT_LAST: &str = "([{（［｛〔〈《「『【‘“￥";
+    grapheme
+        .chars()
+        .next()
+        .is_some_and(|c| NOT_LAST.contains(c))
 }
 
 /// A line that is being filled.
@@ -109,6 +131,10 @@ struct Open {
     shown: String,
     cells: usize,
     hangs: bool,
+    /// Whether its last character is wide.
+    wide: bool,
+    /// Whether no line ends with its last character.
+    opens: bool,
     /// Source byte, shown byte and cell after which it may be broken.
     break_after: Option<(usize, usize, usize)>,
 }
@@ -120,6 +146,8 @@ impl Open {
             shown: String::new(),
             cells: 0,
             hangs: false,
+            wide: false,
+            opens: false,
             break_after: None,
         }
     }
@@ -144,18 +172,22 @@ impl Open {
     }
 }
 
-/// A text of the author's as paragraphs: a single line break flows on, a blank line
-/// parts paragraphs, and a line that starts with a list mark or a space stays a line.
-/// Between wide characters, which part words without spaces, nothing is put.
+/// Source lines of at least this width were broken to fit a file, not for the reader.
+const FULL: usize = 60;
+
+/// A text of the author's as paragraphs: a line break after a full line flows on, every
+/// other one is kept, and so are blank lines and lines that start with a list mark or a
+/// space. Between wide characters, which part words without spaces, nothing is put.
 pub fn flow(text: &str) -> String {
     let mut out: Vec<String> = Vec::new();
+    let mut full = false;
     for line in text.trim_end().lines() {
         let line = line.trim_end();
         let own = line.is_empty()
             || line.starts_with([' ', '\t', '-', '*', '•', '–'])
             || line.starts_with(|c: char| c.is_ascii_digit());
         match out.last_mut() {
-            Some(last) if !own && !last.is_empty() => {
+            Some(last) if full && !own => {
                 let wide = |g: Option<&str>| g.is_some_and(|g| width(g) > 1);
                 let unspaced =
                     wide(last.graphemes(true).next_back()) && wide(line.graphemes(true).next());
@@ -166,6 +198,7 @@ pub fn flow(text: &str) -> String {
             }
             _ => out.push(line.to_owned()),
         }
+        full = width(line) >= FULL;
     }
     out.join("\n")
 }
@@ -209,15 +242,24 @@ mod tests {
     }
 
     #[test]
-    fn single_line_breaks_flow_and_blank_lines_part_paragraphs() {
-        assert_eq!(
-            flow("You will feel\nsome switches."),
-            "You will feel some switches."
-        );
-        assert_eq!(flow("one\n\ntwo\nthree\n"), "one\n\ntwo three");
-        assert_eq!(flow("do:\n- this\n- that"), "do:\n- this\n- that");
-        assert_eq!(flow("これは\n長い"), "これは長い");
+    fn a_full_line_flows_on_and_the_authors_breaks_stay() {
+        let full = "You will feel a number of imitations of a turn-signal switch and say";
+        let flows = format!("{full}\nhow real they are.");
+        assert_eq!(flow(&flows), format!("{full} how real they are."));
+        assert_eq!(flow("first\nsecond\n"), "first\nsecond");
+        assert_eq!(flow(&format!("{full}\n\ntwo")), format!("{full}\n\ntwo"));
+        assert_eq!(flow(&format!("{full}\n- this")), format!("{full}\n- this"));
+        let wide = "これは".repeat(11);
+        assert_eq!(flow(&format!("{wide}\n長い")), format!("{wide}長い"));
         assert_eq!(flow(""), "");
+    }
+
+    #[test]
+    fn no_line_of_japanese_begins_with_a_full_stop_or_ends_with_a_bracket() {
+        assert_eq!(lines("よかった。", 8), ["よかっ", "た。"]);
+        assert_eq!(lines("がくせい", 6), ["がくせ", "い"]);
+        assert_eq!(lines("まって", 4), ["まっ", "て"]);
+        assert_eq!(lines("あ「いい」", 4), ["あ", "「い", "い」"]);
     }
 
     #[test]

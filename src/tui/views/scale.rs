@@ -1,7 +1,7 @@
 //! Scales: numbers in boxes, or a line with a marker.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{centre, frame, left, right, row, rows, styled};
+use crate::tui::widgets::{cells, centre, frame, left, right, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -279,7 +279,7 @@ impl Widget for &Track<'_> {
                 &mark,
             );
             let text = styled(value.to_string().replace('-', "−"), self.theme.chosen());
-            let wide = u16::try_from(text.width()).unwrap_or(u16::MAX);
+            let wide = cells(&text);
             let start = x
                 .saturating_sub(wide / 2)
                 .clamp(area.x, area.right().saturating_sub(wide).max(area.x));
