@@ -2,48 +2,49 @@
 
 use crate::tui::ui_state::field;
 use study_base::text::Untrusted;
+use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::question::cut_to_fit;
 use study_core::protocol::{Answer, Question, QuestionKind};
 
 /// The lines that ask a question, and the last of them, which says what to type.
-pub fn ask(question: &Question) -> (Vec<String>, String) {
+pub fn ask(question: &Question, words: &Words) -> (Vec<String>, String) {
     let mut lines = text(&question.prompt);
     let what = match &question.kind {
         QuestionKind::Rating { from, to, labels } => {
-            lines.extend(labels.iter().map(|(n, label)| labelled(n, label)));
-            format!("Type a number from {from} to {to}, then press Enter.")
+            lines.extend(labels.iter().map(|(n, label)| labelled(n, label, words)));
+            words.fill(Phrase::PlainRange, &[("from", from), ("to", to)])
         }
         QuestionKind::Slider {
             from, to, labels, ..
         } => {
-            lines.extend(labels.iter().map(|(n, label)| labelled(n, label)));
-            format!("Type a number from {from} to {to}, then press Enter.")
+            lines.extend(labels.iter().map(|(n, label)| labelled(n, label, words)));
+            words.fill(Phrase::PlainRange, &[("from", from), ("to", to)])
         }
         QuestionKind::Choice { options, multiple } => {
             let options = options.iter().enumerate();
             lines.extend(options.map(|(i, option)| format!("{}: {}", i + 1, Untrusted(option))));
-            match multiple {
-                true => "Type the numbers of all that apply, such as 1 2, then press Enter.",
-                false => "Type the number of one of them, then press Enter.",
-            }
-            .to_owned()
+            let phrase = match multiple {
+                true => Phrase::PlainOptions,
+                false => Phrase::PlainOption,
+            };
+            words.get(phrase).to_owned()
         }
         QuestionKind::Number { unit, min, max } => {
-            let unit = unit.as_ref().map(|u| format!(", in {}", Untrusted(u)));
-            let range = match (min, max) {
-                (Some(min), Some(max)) => format!(" from {min} to {max}"),
-                (Some(min), None) => format!(" from {min} up"),
-                (None, Some(max)) => format!(" up to {max}"),
-                (None, None) => String::new(),
-            };
-            let unit = unit.unwrap_or_default();
-            format!("Type a number{range}{unit}, then press Enter.")
+            lines.extend(unit.as_ref().map(|unit| Untrusted(unit).to_string()));
+            match (min, max) {
+                (Some(min), Some(max)) => {
+                    words.fill(Phrase::PlainRange, &[("from", min), ("to", max)])
+                }
+                (Some(min), None) => words.fill(Phrase::RangeFrom, &[("from", min)]),
+                (None, Some(max)) => words.fill(Phrase::RangeTo, &[("to", max)]),
+                (None, None) => words.get(Phrase::PlainNumber).to_owned(),
+            }
         }
-        QuestionKind::Text => "Type your answer, then press Enter.".to_owned(),
+        QuestionKind::Text => words.get(Phrase::PlainText).to_owned(),
     };
     let what = match question.required {
         true => what,
-        false => format!("{what} Enter alone leaves it empty."),
+        false => format!("{what} {}", words.get(Phrase::PlainOptional)),
     };
     (lines, what)
 }
@@ -54,8 +55,11 @@ pub fn text(text: &str) -> Vec<String> {
     lines.map(|line| Untrusted(line).to_string()).collect()
 }
 
-fn labelled(value: &impl std::fmt::Display, label: &str) -> String {
-    format!("{value} means: {}", Untrusted(label))
+fn labelled(value: &dyn std::fmt::Display, label: &str, words: &Words) -> String {
+    words.fill(
+        Phrase::PlainLabel,
+        &[("value", value), ("label", &Untrusted(label))],
+    )
 }
 
 /// An answer in words.
@@ -73,15 +77,25 @@ pub fn in_words(answer: &Answer) -> String {
 ///
 /// # Errors
 /// What to type instead.
-pub fn read(question: &Question, line: &str) -> Result<Option<Answer>, String> {
+pub fn read(question: &Question, line: &str, words: &Words) -> Result<Option<Answer>, String> {
     let typed = line.trim();
     if typed.is_empty() {
         return match question.required {
-            true => Err(format!("An answer is needed. {}", ask(question).1)),
+            true => Err(format!(
+                "{} {}",
+                words.get(Phrase::PlainNeeded),
+                ask(question, words).1
+            )),
             false => Ok(None),
         };
     }
-    let instead = || format!("That is not an answer here. {}", ask(question).1);
+    let instead = || {
+        format!(
+            "{} {}",
+            words.get(Phrase::PlainNoAnswer),
+            ask(question, words).1
+        )
+    };
     let answer = match &question.kind {
         QuestionKind::Rating { .. } => Answer::Rating(typed.parse().map_err(|_| instead())?),
         QuestionKind::Slider { .. } | QuestionKind::Number { .. } => {

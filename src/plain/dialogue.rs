@@ -5,6 +5,7 @@ use super::pages::{self, Page};
 use study_base::text::{QuestionId, Untrusted};
 use study_core::outcome::{Author, Choice};
 use study_core::protocol::Answer;
+use study_core::protocol::phrases::Phrase;
 use study_core::session::view::{Correctable, DeviceState, Mirror, Telemetry};
 use study_core::session::{Input, Screen, View};
 
@@ -29,6 +30,8 @@ type Reply = Result<Vec<Input>, Vec<String>>;
 enum Asking {
     /// Whether to do what the inputs say.
     Sure(Vec<Input>),
+    /// Whether the participant does not agree: n again.
+    Refuse,
     /// Which of the earlier answers to correct.
     Which(Vec<Correctable>),
     /// The new answer.
@@ -317,7 +320,7 @@ impl Dialogue {
 
     fn answer(&mut self, line: &str, view: &View) -> Reply {
         if let Some(asking) = self.asking.take() {
-            return self.asked(asking, line);
+            return self.asked(asking, line, view);
         }
         let key = line.trim().to_lowercase();
         match &view.screen {
@@ -337,11 +340,17 @@ impl Dialogue {
             },
             Screen::Consent { .. } => match key.as_str() {
                 "y" | "yes" => Ok(vec![Input::Consent(true)]),
-                "n" | "no" => self.sure(
-                    "Not take part? The session then ends.",
-                    vec![Input::Consent(false)],
-                ),
-                _ => say("Type y or n."),
+                "n" | "no" => {
+                    self.asking = Some(Asking::Refuse);
+                    let (words, n) = (&view.words, &"n");
+                    let again = words.fill(Phrase::PlainType, &[("key", n)]);
+                    let refuse = words.get(Phrase::RefuseConfirm);
+                    say(&format!(
+                        "{} {again}: {refuse}.",
+                        words.get(Phrase::RefuseSure)
+                    ))
+                }
+                _ => say(view.words.get(Phrase::ChooseYesOrNo)),
             },
             Screen::Stopped { can_rate } => match key.as_str() {
                 "" => Ok(vec![Input::PlayAgain]),
@@ -353,7 +362,8 @@ impl Dialogue {
                 let Some(question) = questions.get(self.at) else {
                     return Ok(Vec::new());
                 };
-                let answer = answers::read(question, line).map_err(|what| vec![what])?;
+                let answer =
+                    answers::read(question, line, &view.words).map_err(|what| vec![what])?;
                 self.entered
                     .extend(answer.map(|answer| (question.id.clone(), answer)));
                 self.next_question(view)
@@ -395,9 +405,16 @@ impl Dialogue {
         }
     }
 
-    fn asked(&mut self, asking: Asking, line: &str) -> Reply {
+    fn asked(&mut self, asking: Asking, line: &str, view: &View) -> Reply {
         let typed = line.trim();
         match asking {
+            Asking::Refuse => match typed.to_lowercase().as_str() {
+                "n" | "no" => Ok(vec![Input::Consent(false)]),
+                _ => {
+                    self.repeat();
+                    Ok(Vec::new())
+                }
+            },
             Asking::Sure(inputs) => match typed.to_lowercase().as_str() {
                 "y" | "yes" => Ok(inputs),
                 "n" | "no" => {
@@ -418,7 +435,7 @@ impl Dialogue {
                 match number.filter(|n| *n < items.len()) {
                     Some(n) => {
                         let item = Box::new(items.swap_remove(n));
-                        let (mut lines, prompt) = answers::ask(&item.question);
+                        let (mut lines, prompt) = answers::ask(&item.question, &view.words);
                         lines.insert(0, listed(n + 1, &item));
                         lines.push(format!("{prompt} Type /decline to decline it."));
                         self.asking = Some(Asking::NewAnswer(item));
@@ -430,7 +447,7 @@ impl Dialogue {
                     }
                 }
             }
-            Asking::NewAnswer(item) => match answers::read(&item.question, line) {
+            Asking::NewAnswer(item) => match answers::read(&item.question, line, &view.words) {
                 Ok(Some(answer)) if answer == item.answer => {
                     self.repeat();
                     say("That is already the answer.")

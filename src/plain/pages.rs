@@ -4,8 +4,10 @@ use super::answers;
 use crate::tui::theme::{Colour, Theme};
 use crate::tui::views::prose::prose;
 use crate::tui::views::trouble::Trouble;
+use std::fmt::Display;
+use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{DeviceKind, Entry, Question};
-use study_core::session::view::{Banner, MessageKind};
+use study_core::session::view::Banner;
 use study_core::session::{Screen, View};
 
 /// A page in words.
@@ -25,6 +27,7 @@ pub struct Page {
 /// The words of a view, with its form at question number `at`. `keys` says whether single
 /// keys can be read.
 pub fn page(view: &View, at: usize, keys: bool) -> Page {
+    let words = &view.words;
     let mut page = Page {
         top: top(view),
         ..Page::default()
@@ -39,16 +42,15 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
         Screen::Playing { keep_exploring, .. } => {
             page.lines.push(
                 match view.device {
-                    DeviceKind::Manual => "Feel the sample.",
-                    _ => "The device plays. Feel the device.",
+                    DeviceKind::Manual => words.get(Phrase::FeelSample),
+                    _ => words.get(Phrase::PlainPlays),
                 }
                 .to_owned(),
             );
             page.prompt = match (keep_exploring, keys) {
-                (true, true) => "Keep exploring, from end to end. Esc or Space stops.",
-                (true, false) => "Keep exploring, from end to end. Type /stop to stop.",
-                (false, true) => "Press Enter to go on. Esc or Space stops.",
-                (false, false) => "Press Enter to go on. Type /stop to stop.",
+                (true, _) => words.get(Phrase::KeepExploring),
+                (false, true) => words.get(Phrase::PlainRate),
+                (false, false) => words.get(Phrase::PlainContinue),
             }
             .to_owned();
         }
@@ -62,19 +64,21 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
 fn top(view: &View) -> Vec<String> {
     let mut parts = Vec::new();
     if let Some(progress) = view.progress {
-        let what = match progress.practice {
-            true => "Practice",
-            false => "Trial",
+        let phrase = match progress.practice {
+            true => Phrase::PracticeOf,
+            false => Phrase::TrialOf,
         };
-        parts.push(format!(
-            "{what} {} of {}.",
-            progress.current, progress.total
-        ));
+        let values = [
+            ("n", &progress.current as &dyn Display),
+            ("total", &progress.total),
+        ];
+        parts.push(capital(&view.words.fill(phrase, &values)));
     }
     if let Screen::Form { page, pages, .. } = &view.screen
         && *pages > 1
     {
-        parts.push(format!("Page {page} of {pages}."));
+        let values = [("n", page as &dyn Display), ("total", pages)];
+        parts.push(capital(&view.words.fill(Phrase::PageOf, &values)));
     }
     match parts.is_empty() {
         true => Vec::new(),
@@ -105,7 +109,7 @@ impl Page {
         } else if view.entry == Entry::Experimenter {
             self.lines.push("Ask the participant:".to_owned());
         }
-        let (lines, prompt) = answers::ask(question);
+        let (lines, prompt) = answers::ask(question, &view.words);
         self.lines.extend(lines);
         self.prompt = prompt;
     }
@@ -135,7 +139,7 @@ impl Page {
         if waits
             && let Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } = view.screen
         {
-            self.wait = Some(format!("You can continue in {} seconds.", wait_s.ceil()));
+            self.wait = Some(view.words.wait(wait_s));
         }
         for part in [&words.above, &title, &body] {
             // The full screen marks some titles with a symbol.
@@ -145,28 +149,32 @@ impl Page {
         self.prompt = match &view.screen {
             Screen::ResumeChoice { .. } | Screen::Consent { .. } | Screen::Stopped { .. } => {
                 let choices = words.choices.iter().map(|(key, what, more)| match *more {
-                    "" => format!("{}: {what}.", typed(key)),
-                    more => format!("{}: {what}, {more}.", typed(key)),
+                    "" => format!("{}: {what}.", typed(key, &view.words)),
+                    more => format!("{}: {what}, {more}.", typed(key, &view.words)),
                 });
                 choices.collect::<Vec<_>>().join(" ")
             }
-            Screen::Message { kind, .. } => match kind {
-                MessageKind::PracticeOver => "Press Enter to begin.".to_owned(),
-                _ => "Press Enter to continue.".to_owned(),
-            },
+            Screen::Message { .. } => view.words.get(Phrase::PlainContinue).to_owned(),
             Screen::Paused { .. } => "Press Enter to continue, or type /quit.".to_owned(),
-            Screen::End { .. } => "Press Enter to close.".to_owned(),
+            Screen::End { .. } => view.words.get(Phrase::PlainClose).to_owned(),
             Screen::Reference { .. } | Screen::Break { .. } if view.can_advance => {
-                "Press Enter when ready.".to_owned()
+                view.words.get(Phrase::PlainReady).to_owned()
             }
             _ => String::new(),
         };
     }
 }
 
-fn typed(key: &str) -> String {
+fn typed(key: &str, words: &Words) -> String {
     match key {
-        "Enter" => "Enter alone".to_owned(),
-        key => format!("Type {key}"),
+        "Enter" => words.get(Phrase::PlainEnterAlone).to_owned(),
+        key => words.fill(Phrase::PlainType, &[("key", &key)]),
     }
+}
+
+/// As a sentence of its own.
+fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }

@@ -442,3 +442,44 @@ fn a_replication_takes_the_newest_frozen_protocol_with_a_seed_of_its_own() {
     assert_eq!(code, 4, "{err}");
     assert!(!dir.path().join("other").exists());
 }
+
+#[test]
+fn a_language_that_is_not_shipped_lacks_sentences_and_a_study_can_replace_them() {
+    let dir = turn_signal();
+    let first = "[design]";
+    let text = "[text]\nlang = \"nl\"\nwords = { rate = \"verder\" }\n\n[design]";
+    edit(dir.path(), "protocol.toml", first, text);
+    let (code, errors, warnings) = report(dir.path());
+    assert_eq!((code, errors), (0, Vec::<String>::new()));
+    let lacks = |w: &String| w.contains("would be in English: `nl` is not one of en, de");
+    assert_eq!(
+        warnings.iter().filter(|w| lacks(w)).count(),
+        1,
+        "{warnings:?}"
+    );
+
+    edit(dir.path(), "protocol.toml", "\"nl\"", "\"de-AT\"");
+    let (_, _, warnings) = report(dir.path());
+    assert!(!warnings.iter().any(lacks), "{warnings:?}");
+
+    edit(
+        dir.path(),
+        "protocol.toml",
+        "rate = \"verder\"",
+        "rat = \"x\", trial-of = \"nr {n}\"",
+    );
+    let (code, errors, _) = report(dir.path());
+    assert_eq!(code, 1);
+    assert!(
+        errors
+            .iter()
+            .any(|e| e.contains("`rat` is no fixed sentence")),
+        "{errors:?}"
+    );
+    assert!(
+        errors
+            .iter()
+            .any(|e| e.contains("`trial-of` needs the words in braces")),
+        "{errors:?}"
+    );
+}

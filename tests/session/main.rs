@@ -10,6 +10,7 @@ mod devices;
 mod dying_disk;
 mod flow;
 mod kill;
+mod languages;
 #[path = "../store/memory.rs"]
 mod memory;
 mod mirror;

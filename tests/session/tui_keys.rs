@@ -355,7 +355,8 @@ fn consent_and_drop_out_are_confirmed() {
     assert_eq!(desk.enter(), []);
     assert_eq!(desk.types("n"), []);
     assert_eq!(desk.types("n"), []);
-    assert_eq!(desk.types("ny"), [Input::Consent(false)]);
+    assert_eq!(desk.enter(), [Input::Consent(false)]);
+    assert_eq!(desk.types("ny"), [], "y is not the answer to a refusal");
     assert_eq!(desk.types("y"), [Input::Consent(true)]);
 
     let old = Screen::ResumeChoice {

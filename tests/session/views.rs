@@ -158,6 +158,7 @@ pub(crate) fn view(screen: Screen) -> View {
             mirror: None,
             all_saved: !matches!(screen, Screen::Saving | Screen::SaveTrouble { .. }),
         },
+        words: Default::default(),
         banner: None,
         notice: None,
         entry: Entry::Participant,

@@ -14,6 +14,7 @@ mod exclusion;
 pub mod file;
 pub mod fingerprint;
 pub mod keys;
+pub mod phrases;
 pub mod plan;
 pub mod question;
 pub mod schema;
@@ -100,6 +101,17 @@ pub struct Text {
     pub end: Option<String>,
     /// BCP 47 tag of the texts' language.
     pub lang: Option<String>,
+    /// The study's own fixed sentences, by the key of a
+    /// [`Phrase`](phrases::Phrase); `words` in the file.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub words: BTreeMap<String, String>,
+}
+
+impl Text {
+    /// The fixed sentences of the study.
+    pub fn phrases(&self) -> phrases::Words {
+        phrases::Words::new(self.lang.as_deref(), &self.words)
+    }
 }
 
 /// `[consent]`: the document that the participant agrees to. No name is stored.

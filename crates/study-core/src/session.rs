@@ -42,6 +42,7 @@ pub use view::{Screen, View};
 
 use crate::outcome::fold::History;
 use crate::outcome::{Event, Moment};
+use crate::protocol::phrases::Words;
 use crate::protocol::{DeviceKind, FileOrders, Protocol, Seat};
 use phase::{DeviceProblem, Phase};
 use saving::SaveState;
@@ -64,6 +65,8 @@ pub struct Config {
 pub struct Session {
     protocol: Arc<Protocol>,
     orders: Option<Arc<FileOrders>>,
+    /// What participants read besides the texts of the protocol.
+    words: Arc<Words>,
     /// As typed on the first screen.
     participant: String,
     operator: String,
@@ -108,6 +111,7 @@ impl Session {
         at: Moment,
     ) -> (Self, Vec<Effect>) {
         let mut session = Self {
+            words: Arc::new(protocol.text.phrases()),
             protocol,
             orders,
             participant: config.participant.clone(),

@@ -6,6 +6,7 @@ use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
 use study_core::outcome::{Author, Choice};
 use study_core::protocol::Answer;
+use study_core::protocol::phrases::Words;
 use study_core::session::view::{Correctable, View};
 use study_core::session::{Input, Screen};
 
@@ -151,7 +152,7 @@ impl Dialog {
     }
 
     /// Handles a key. Esc is handled by the caller.
-    pub fn key(&mut self, key: Key, screen: &Screen) -> DialogResult {
+    pub fn key(&mut self, key: Key, view: &View) -> DialogResult {
         if self.own_key() == Some(key) {
             return match self.editor() {
                 Some(editor) if !editor.is_blank() => {
@@ -186,21 +187,30 @@ impl Dialog {
                 Key::Enter => DialogResult::Declined(reason.text().to_owned()),
                 key => DialogResult::Open(reason.key(key)),
             },
-            Self::Confirm(confirm) => confirm.key(key, screen),
-            Self::Correct(correct) => correct.key(key),
+            Self::Confirm(confirm) => confirm.key(key, &view.screen),
+            Self::Correct(correct) => correct.key(key, &view.words),
         }
     }
 }
 
 impl Confirm {
     fn key(self, key: Key, screen: &Screen) -> DialogResult {
+        // The keys of the page keep their meaning: y is not the answer to a refusal.
+        if self == Self::Refuse {
+            return match (key, screen) {
+                (Key::Enter, Screen::Consent { .. }) => {
+                    DialogResult::Done(vec![Input::Consent(false)])
+                }
+                (Key::Enter | Key::Char('y' | 'Y'), _) => DialogResult::Closed,
+                _ => missing("Press Enter, or y to go back."),
+            };
+        }
         match key {
             Key::Char('y' | 'Y') => DialogResult::Done(match (self, screen) {
                 (Self::Quit, _) => vec![Input::Quit],
                 (Self::DropOut, Screen::ResumeChoice { .. }) => {
                     vec![Input::Resume(Choice::DropOut)]
                 }
-                (Self::Refuse, Screen::Consent { .. }) => vec![Input::Consent(false)],
                 // The screen has changed in the meantime.
                 _ => Vec::new(),
             }),
@@ -216,7 +226,7 @@ impl Correct {
         self.items.get(self.cursor)
     }
 
-    fn key(&mut self, key: Key) -> DialogResult {
+    fn key(&mut self, key: Key, words: &Words) -> DialogResult {
         let last = self.items.len().saturating_sub(1);
         let Some(item) = self.items.get(self.cursor) else {
             return DialogResult::Closed;
@@ -240,7 +250,7 @@ impl Correct {
                 DialogResult::Open(Handled::Yes)
             }
             Step::Answer(field) => match key {
-                Key::Enter => match field.answer(&item.question) {
+                Key::Enter => match field.answer(&item.question, words) {
                     Ok(Some(answer)) if answer == item.answer => {
                         missing("That is already the answer.")
                     }
@@ -256,7 +266,7 @@ impl Correct {
                     self.step = Step::List;
                     DialogResult::Open(Handled::Yes)
                 }
-                key => DialogResult::Open(field.key(&item.question, key)),
+                key => DialogResult::Open(field.key(&item.question, key, words)),
             },
             Step::Reason { answer, by, reason } => match key {
                 Key::Enter if reason.is_blank() => missing("Type a reason first, or press Esc."),

@@ -3,7 +3,8 @@
 use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
 use std::collections::BTreeSet;
-use study_core::protocol::{Answer, Question, QuestionKind};
+use study_core::protocol::phrases::{Phrase, Words};
+use study_core::protocol::{Answer, AnswerError, Question, QuestionKind};
 
 /// The answer to one question, as entered so far.
 ///
@@ -84,7 +85,7 @@ impl Field {
     ///
     /// # Errors
     /// What to do, if the entry is not a valid answer.
-    pub fn answer(&self, question: &Question) -> Result<Option<Answer>, String> {
+    pub fn answer(&self, question: &Question, words: &Words) -> Result<Option<Answer>, String> {
         let answer = match (self, &question.kind) {
             (Self::Rating { chosen, .. }, _) => chosen.map(Answer::Rating),
             (Self::Slider { value, .. }, _) => value.map(Answer::Number),
@@ -95,7 +96,7 @@ impl Field {
                 Some(Answer::Choice(chosen.collect()))
             }
             (Self::Number(editor), _) if !editor.is_blank() => {
-                let number = parse(editor.text()).ok_or("Type a number, such as 12.5.")?;
+                let number = parse(editor.text()).ok_or(words.get(Phrase::NumberLike))?;
                 Some(Answer::Number(number))
             }
             (Self::Text(editor), _) if !editor.is_blank() => {
@@ -106,33 +107,21 @@ impl Field {
         match &answer {
             Some(answer) => question
                 .accepts(answer)
-                .map_err(|why| sentence(&why.to_string()))?,
-            None if question.required => return Err(self.ask_for(question)),
+                .map_err(|why| in_words(why, words))?,
+            None if question.required => return Err(ask_for(question, words)),
             None => {}
         }
         Ok(answer)
     }
 
-    fn ask_for(&self, question: &Question) -> String {
-        match &question.kind {
-            QuestionKind::Rating { from, to, .. } => {
-                format!("Choose a number from {from} to {to} first.")
-            }
-            QuestionKind::Slider { .. } => "Set the slider first, with ← and →.".to_owned(),
-            QuestionKind::Choice { .. } => "Choose from the list first.".to_owned(),
-            QuestionKind::Number { .. } => "Type a number first.".to_owned(),
-            QuestionKind::Text => "Type an answer first.".to_owned(),
-        }
-    }
-
     /// Handles a key.
-    pub fn key(&mut self, question: &Question, key: Key) -> Handled {
+    pub fn key(&mut self, question: &Question, key: Key, words: &Words) -> Handled {
         match (self, &question.kind) {
             (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
-                rating(chosen, typed, *from, *to, key)
+                rating(chosen, typed, (*from, *to), key, words)
             }
             (Self::Slider { value, typed }, QuestionKind::Slider { from, to, step, .. }) => {
-                slider(value, typed, (*from, *to, *step), key)
+                slider(value, typed, (*from, *to, *step), key, words)
             }
             (Self::Choice { cursor, marked }, QuestionKind::Choice { options, multiple }) => {
                 choice(cursor, marked, options.len(), *multiple, key)
@@ -182,13 +171,51 @@ pub fn parse(text: &str) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
+/// What is missing, as a request.
+fn ask_for(question: &Question, words: &Words) -> String {
+    let phrase = match &question.kind {
+        QuestionKind::Rating { from, to, .. } => {
+            return words.fill(Phrase::NumberFirst, &[("from", from), ("to", to)]);
+        }
+        QuestionKind::Slider { .. } => Phrase::SliderFirst,
+        QuestionKind::Choice { .. } => Phrase::OptionFirst,
+        QuestionKind::Number { .. } => Phrase::TypeNumberFirst,
+        QuestionKind::Text => Phrase::TypeAnswerFirst,
+    };
+    words.get(phrase).to_owned()
+}
+
+/// Why an answer is not accepted, as a request.
+fn in_words(why: AnswerError, words: &Words) -> String {
+    let number = |min: Option<f64>, max: Option<f64>| match (min, max) {
+        (Some(min), Some(max)) => {
+            Some(words.fill(Phrase::OffScale, &[("from", &min), ("to", &max)]))
+        }
+        (Some(min), None) => Some(words.fill(Phrase::RangeFrom, &[("from", &min)])),
+        (None, Some(max)) => Some(words.fill(Phrase::RangeTo, &[("to", &max)])),
+        (None, None) => None,
+    };
+    let words = match why {
+        AnswerError::OffScale(from, to) => number(Some(from), Some(to)),
+        AnswerError::OutOfRange { min, max } => number(min, max),
+        _ => None,
+    };
+    words.unwrap_or_else(|| sentence(&why.to_string()))
+}
+
 fn sentence(why: &str) -> String {
     let mut letters = why.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string());
     format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }
 
-fn rating(chosen: &mut Option<i64>, typed: &mut String, from: i64, to: i64, key: Key) -> Handled {
+fn rating(
+    chosen: &mut Option<i64>,
+    typed: &mut String,
+    (from, to): (i64, i64),
+    key: Key,
+    words: &Words,
+) -> Handled {
     if let Key::Char(c @ ('0'..='9' | '-')) = key {
         for start in [format!("{typed}{c}"), c.to_string()] {
             let number = start.parse().ok().filter(|n| (from..=to).contains(n));
@@ -202,7 +229,7 @@ fn rating(chosen: &mut Option<i64>, typed: &mut String, from: i64, to: i64, key:
             }
         }
         typed.clear();
-        return Handled::Notice(format!("The scale goes from {from} to {to}."));
+        return Handled::Notice(words.fill(Phrase::OffScale, &[("from", &from), ("to", &to)]));
     }
     let big = (to.saturating_sub(from) / 10).max(1);
     let next = match key {
@@ -254,6 +281,7 @@ fn slider(
     typed: &mut String,
     (from, to, step): (f64, f64, f64),
     key: Key,
+    words: &Words,
 ) -> Handled {
     if let Key::Char(c @ ('0'..='9' | '.' | ',' | '-')) = key {
         for start in [format!("{typed}{c}"), c.to_string()] {
@@ -267,7 +295,7 @@ fn slider(
             }
         }
         typed.clear();
-        return Handled::Notice(format!("The scale goes from {from} to {to}."));
+        return Handled::Notice(words.fill(Phrase::OffScale, &[("from", &from), ("to", &to)]));
     }
     // The first key sets the marker to the middle, which favours neither end.
     let moved = |steps: f64| value.map_or((from + to) / 2.0, |v| v + steps * step);
@@ -382,9 +410,9 @@ mod tests {
     fn after(question: &Question, keys: &[Key]) -> Option<f64> {
         let mut field = Field::new(question);
         for key in keys {
-            field.key(question, *key);
+            field.key(question, *key, &Words::default());
         }
-        let answer = field.answer(question).ok().flatten();
+        let answer = field.answer(question, &Words::default()).ok().flatten();
         answer.and_then(|a| a.number())
     }
 
@@ -468,10 +496,13 @@ mod tests {
             });
             let mut field = Field::new(&question);
             for key in keys {
-                field.key(&question, key);
+                field.key(&question, key, &Words::default());
             }
             let want = want.into_iter().map(str::to_owned).collect();
-            assert_eq!(field.answer(&question), Ok(Some(Answer::Choice(want))));
+            assert_eq!(
+                field.answer(&question, &Words::default()),
+                Ok(Some(Answer::Choice(want)))
+            );
         }
     }
 
@@ -485,14 +516,17 @@ mod tests {
         assert_eq!(after(&number, &digits("12,5")), Some(12.5));
         let mut field = Field::new(&number);
         for key in digits("121") {
-            field.key(&number, key);
+            field.key(&number, key, &Words::default());
         }
         assert_eq!(
-            field.answer(&number),
+            field.answer(&number, &Words::default()),
             Err("A number from 0 to 120.".to_owned())
         );
         // Letters are no part of a number: "nan" and "inf" cannot be typed.
-        assert_eq!(field.key(&number, Key::Char('n')), Handled::No);
+        assert_eq!(
+            field.key(&number, Key::Char('n'), &Words::default()),
+            Handled::No
+        );
     }
 
     #[test]
@@ -500,7 +534,7 @@ mod tests {
         let mut text = question(QuestionKind::Text);
         text.required = false;
         let mut field = Field::new(&text);
-        field.key(&text, Key::Char(' '));
-        assert_eq!(field.answer(&text), Ok(None));
+        field.key(&text, Key::Char(' '), &Words::default());
+        assert_eq!(field.answer(&text, &Words::default()), Ok(None));
     }
 }

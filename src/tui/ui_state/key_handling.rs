@@ -8,6 +8,7 @@ use crate::tui::keys::{self, Key};
 use crossterm::event::Event;
 use study_base::text::QuestionId;
 use study_core::outcome::Choice;
+use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Answer, Question};
 use study_core::session::{Input, Screen, View};
 
@@ -112,7 +113,7 @@ impl UiState {
         let Some(dialog) = self.dialogs.last_mut() else {
             return Vec::new();
         };
-        match dialog.key(key, &view.screen) {
+        match dialog.key(key, view) {
             DialogResult::Open(handled) => {
                 self.show_notice(handled);
                 Vec::new()
@@ -128,7 +129,9 @@ impl UiState {
             DialogResult::Declined(reason) => {
                 self.dialogs.pop();
                 match &view.screen {
-                    Screen::Form { questions, .. } => self.submit(questions, Some(reason)),
+                    Screen::Form { questions, .. } => {
+                        self.submit(questions, Some(reason), &view.words)
+                    }
                     _ => Vec::new(),
                 }
             }
@@ -148,10 +151,10 @@ impl UiState {
             Screen::Consent { .. } => match key {
                 Key::Char('y' | 'Y') => vec![Input::Consent(true)],
                 Key::Char('n' | 'N') => self.confirm(Confirm::Refuse),
-                Key::Enter => self.notify("Choose y or n."),
+                Key::Enter => self.notify(view.words.get(Phrase::ChooseYesOrNo)),
                 _ => Vec::new(),
             },
-            Screen::Form { questions, .. } => self.press_form(key, questions),
+            Screen::Form { questions, .. } => self.press_form(key, questions, &view.words),
             Screen::Message { .. } | Screen::End { .. } | Screen::Break { .. } => {
                 self.press_reading(key, view)
             }
@@ -203,13 +206,13 @@ impl UiState {
         Vec::new()
     }
 
-    fn press_form(&mut self, key: Key, questions: &[Question]) -> Vec<Input> {
+    fn press_form(&mut self, key: Key, questions: &[Question], words: &Words) -> Vec<Input> {
         let Some((_, form)) = &mut self.form else {
             return Vec::new();
         };
         let count = form.fields.len().max(1);
         match key {
-            Key::Enter => return self.submit(questions, None),
+            Key::Enter => return self.submit(questions, None, words),
             Key::Tab => form.focus = (form.focus + 1) % count,
             Key::BackTab => form.focus = (form.focus + count - 1) % count,
             key => {
@@ -218,7 +221,7 @@ impl UiState {
                 else {
                     return Vec::new();
                 };
-                match field.key(question, key) {
+                match field.key(question, key, words) {
                     Handled::No if key == Key::Down => form.focus = (at + 1).min(count - 1),
                     Handled::No if key == Key::Up => form.focus = at.saturating_sub(1),
                     handled => self.show_notice(handled),
@@ -230,7 +233,12 @@ impl UiState {
 
     /// Sends the form, or shows what is missing. With a reason, the first question is
     /// declined and the other answers are sent with it.
-    fn submit(&mut self, questions: &[Question], declined: Option<String>) -> Vec<Input> {
+    fn submit(
+        &mut self,
+        questions: &[Question],
+        declined: Option<String>,
+        words: &Words,
+    ) -> Vec<Input> {
         let Some((_, form)) = &mut self.form else {
             return Vec::new();
         };
@@ -240,7 +248,7 @@ impl UiState {
                 Some(reason) if at == 0 => Ok(Some(Answer::Declined {
                     reason: reason.clone(),
                 })),
-                _ => field.answer(question),
+                _ => field.answer(question, words),
             };
             match answer {
                 Ok(Some(answer)) => answers.push((question.id.clone(), answer)),

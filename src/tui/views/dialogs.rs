@@ -11,6 +11,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use study_core::outcome::Author;
 use study_core::protocol::Answer;
+use study_core::protocol::phrases::{Phrase, Words};
 
 /// A dialog above a page.
 #[derive(Debug)]
@@ -21,6 +22,8 @@ pub struct DialogView<'a> {
     pub armed: bool,
     /// What is in memory only because saving has failed.
     pub unsaved: &'a [String],
+    /// The fixed sentences that a participant reads.
+    pub words: &'a Words,
     /// The styles.
     pub theme: Theme,
 }
@@ -71,7 +74,7 @@ pub fn unsaved_lines(names: &[String], most: usize, columns: usize) -> Vec<Strin
 
 impl DialogView<'_> {
     /// The title and the area of the dialog.
-    fn place(&self, area: Rect) -> (&'static str, Rect) {
+    fn place(&self, area: Rect) -> (&str, Rect) {
         let (title, width, height) = match self.dialog {
             Dialog::Help => ("Keys", 72, 19),
             Dialog::Remark { .. } => ("Remark", 68, 11),
@@ -81,8 +84,9 @@ impl DialogView<'_> {
                 Step::Reason { .. } => ("Correct an answer", 68, 12),
             },
             Dialog::MarkBad { .. } => ("Mark as bad", 68, 10),
-            Dialog::Decline { .. } => ("Decline this question", 68, 10),
+            Dialog::Decline { .. } => (self.words.get(Phrase::DeclineTitle), 68, 10),
             Dialog::Confirm(Confirm::Quit) if !self.unsaved.is_empty() => ("NOT SAVED", 72, 15),
+            Dialog::Confirm(Confirm::Refuse) => (self.words.get(Phrase::Sure), 60, 8),
             Dialog::Confirm(_) => ("Are you sure?", 60, 8),
         };
         (title, middle(area, width, height.min(area.height)))
@@ -304,8 +308,9 @@ impl Widget for &DialogView<'_> {
                 self.ask(buf, inside, &words, &[("Enter", "mark as bad")]);
             }
             Dialog::Decline { .. } => {
-                let words = "Why is the question declined? The reason is stored.";
-                self.ask(buf, inside, words, &[("Enter", "decline")]);
+                let words = self.words.get(Phrase::DeclineWhy);
+                let keys = [("Enter", self.words.get(Phrase::Decline))];
+                self.ask(buf, inside, words, &keys);
             }
             Dialog::Confirm(Confirm::Quit) if !self.unsaved.is_empty() => {
                 self.leave_unsaved(buf, inside);
@@ -317,10 +322,12 @@ impl Widget for &DialogView<'_> {
                         "Does the participant drop out? This ends their part in the study.",
                         "drop out",
                     ),
-                    Confirm::Refuse => (
-                        "You do not agree to take part? The session then ends, and nothing more is asked.",
-                        "I do not agree",
-                    ),
+                    Confirm::Refuse => {
+                        let refuse = self.words.get(Phrase::RefuseConfirm);
+                        let keys = [("Enter", refuse), ("y", self.words.get(Phrase::Back))];
+                        self.ask(buf, inside, self.words.get(Phrase::RefuseSure), &keys);
+                        return;
+                    }
                 };
                 self.ask(buf, inside, words, &[("y", yes), ("n", "back")]);
             }

@@ -12,6 +12,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_core::protocol::phrases::Phrase;
 use study_core::protocol::{Entry, Question, QuestionKind};
 use study_core::session::View;
 
@@ -173,37 +174,41 @@ impl FormView<'_> {
     }
 
     /// The keys of this page and their actions.
-    pub fn hints(&self) -> Vec<(String, &'static str)> {
+    pub fn hints(&self) -> Vec<(String, Phrase)> {
         let mut keys = Vec::new();
         let at = self.form.focus;
         match self.questions.get(at).map(|q| &q.kind) {
             Some(QuestionKind::Rating { from, to, .. }) => {
-                keys.push((format!("{from}–{to}").replace('-', "−"), "choose"));
+                keys.push((format!("{from}–{to}").replace('-', "−"), Phrase::Choose));
             }
-            Some(QuestionKind::Slider { .. }) => keys.push(("← →".to_owned(), "move")),
+            Some(QuestionKind::Slider { .. }) => keys.push(("← →".to_owned(), Phrase::Move)),
             Some(QuestionKind::Choice { multiple: true, .. }) => {
-                keys.push(("↑ ↓".to_owned(), "move"));
-                keys.push(("Space".to_owned(), "mark"));
+                keys.push(("↑ ↓".to_owned(), Phrase::Move));
+                keys.push(("Space".to_owned(), Phrase::Mark));
             }
-            Some(QuestionKind::Choice { .. }) => keys.push(("↑ ↓".to_owned(), "choose")),
-            Some(QuestionKind::Text) => keys.push(("Alt-Enter".to_owned(), "new line")),
+            Some(QuestionKind::Choice { .. }) => keys.push(("↑ ↓".to_owned(), Phrase::Choose)),
+            Some(QuestionKind::Text) => keys.push(("Alt-Enter".to_owned(), Phrase::NewLine)),
             Some(QuestionKind::Number { .. }) | None => {}
         }
         if self.questions.len() > 1 {
-            let other = if at == 0 { "comment" } else { "back" };
+            let other = if at == 0 {
+                Phrase::Comment
+            } else {
+                Phrase::Back
+            };
             let is_comment = self
                 .questions
                 .iter()
                 .skip(1)
                 .any(|q| q.id.as_str() == "comment");
             let other = if at == 0 && !is_comment {
-                "next"
+                Phrase::Next
             } else {
                 other
             };
             keys.push(("Tab".to_owned(), other));
         }
-        keys.push(("Enter".to_owned(), "save"));
+        keys.push(("Enter".to_owned(), Phrase::Save));
         keys
     }
 
@@ -264,7 +269,8 @@ impl Widget for &FormView<'_> {
                 );
                 let mut spans = vec![Span::styled(words, self.theme.text())];
                 if !question.required {
-                    spans.push(Span::styled(" (optional)", self.theme.quiet()));
+                    let optional = format!(" ({})", self.view.words.get(Phrase::Optional));
+                    spans.push(Span::styled(optional, self.theme.quiet()));
                 }
                 let title = if self.compact() {
                     *title

@@ -18,6 +18,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::{Clear, Widget};
 use study_core::protocol::Entry;
+use study_core::protocol::phrases::Phrase;
 use study_core::session::view::DeviceState;
 use study_core::session::{Screen, View};
 
@@ -95,6 +96,7 @@ impl<'a> Page<'a> {
         Some(DialogView {
             dialog: self.state.dialog()?,
             armed: self.view.armed,
+            words: &self.view.words,
             unsaved: &self.view.unsaved,
             theme: self.theme,
         })
@@ -178,8 +180,8 @@ impl<'a> Page<'a> {
     }
 
     /// The keys at the foot of the screen.
-    fn keys(&self) -> Vec<(String, &'static str)> {
-        let own = |keys: &[(&str, &'static str)]| {
+    fn keys(&self) -> Vec<(String, Phrase)> {
+        let own = |keys: &[(&str, Phrase)]| {
             let own = keys.iter().map(|(key, what)| ((*key).to_owned(), *what));
             own.collect::<Vec<_>>()
         };
@@ -189,21 +191,21 @@ impl<'a> Page<'a> {
         match &self.view.screen {
             Screen::Who {
                 claiming: false, ..
-            } => own(&[("Tab", "other field"), ("Enter", "begin")]),
+            } => own(&[("Tab", Phrase::OtherField), ("Enter", Phrase::Begin)]),
             Screen::Playing { .. } if self.view.can_advance => {
-                own(&[("Enter", "rate"), ("Esc", "stop")])
+                own(&[("Enter", Phrase::Rate), ("Esc", Phrase::Stop)])
             }
-            Screen::Playing { .. } | Screen::Loading => own(&[("Esc", "stop")]),
+            Screen::Playing { .. } | Screen::Loading => own(&[("Esc", Phrase::Stop)]),
             Screen::DeviceTrouble {
                 can_go_on: true, ..
-            } => own(&[("Enter", "continue"), ("F10", "quit")]),
-            Screen::DeviceTrouble { .. } => own(&[("F10", "quit")]),
-            Screen::SaveTrouble { .. } => own(&[("Enter", "try again")]),
+            } => own(&[("Enter", Phrase::Continue), ("F10", Phrase::Quit)]),
+            Screen::DeviceTrouble { .. } => own(&[("F10", Phrase::Quit)]),
+            Screen::SaveTrouble { .. } => own(&[("Enter", Phrase::TryAgain)]),
             _ => {
                 let reading = self.state.reading();
                 match prose(self.view) {
                     Some(_) if reading.scrolled < reading.most => {
-                        own(&[("Enter", "read on"), ("↑ ↓", "scroll")])
+                        own(&[("Enter", Phrase::ReadOn), ("↑ ↓", Phrase::Scroll)])
                     }
                     Some(prose) => own(&prose.keys),
                     None => Vec::new(),
@@ -266,7 +268,11 @@ impl Widget for &Page<'_> {
         let body = Page::body(area);
         self.screen(body, buf);
         let keys = self.keys();
-        let keys: Vec<(&str, &str)> = keys.iter().map(|(k, w)| (k.as_str(), *w)).collect();
+        let words = &self.view.words;
+        let keys: Vec<(&str, &str)> = keys
+            .iter()
+            .map(|(key, what)| (key.as_str(), words.get(*what)))
+            .collect();
         if self.state.dialog().is_none() {
             let line = hints(self.theme, &keys);
             centre(buf, row(area, area.height - 3), &line);
@@ -296,6 +302,7 @@ impl Widget for &Page<'_> {
             text: self.state.is_text(),
             live: self.live,
             unsaved: matches!(self.view.screen, Screen::SaveTrouble { .. }),
+            words: &self.view.words,
             theme: self.theme,
         };
         status.render(row(area, area.height - 1), buf);

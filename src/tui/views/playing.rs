@@ -7,6 +7,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use study_core::protocol::DeviceKind;
+use study_core::protocol::phrases::Phrase;
 use study_core::session::View;
 
 /// The screen while the device plays.
@@ -24,22 +25,23 @@ pub struct Playing<'a> {
 
 impl Widget for &Playing<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
+        let words = &self.view.words;
         let by_hand = self.view.device == DeviceKind::Manual;
         let y = area.height.saturating_sub(5) / 2;
         let (what, now) = if by_hand {
-            ("Feel the sample.", "●  exploring")
+            (Phrase::FeelSample, Phrase::Exploring)
         } else {
-            ("Feel the device.", "●  playing")
+            (Phrase::FeelDevice, Phrase::Playing)
         };
-        let title = Span::styled(what, self.theme.strong());
+        let title = Span::styled(words.get(what), self.theme.strong());
         centre(buf, row(area, y), &Line::from(title));
         let playing = Line::from(vec![
-            Span::styled(now, self.theme.playing()),
+            Span::styled(format!("●  {}", words.get(now)), self.theme.playing()),
             Span::styled(format!("   {}", clock(self.since_s)), self.theme.text()),
         ]);
         centre(buf, row(area, y + 2), &playing);
         if self.keep_exploring {
-            let more = styled("Keep exploring, from end to end.", self.theme.text());
+            let more = styled(words.get(Phrase::KeepExploring), self.theme.text());
             centre(buf, row(area, y + 4), &more);
         }
     }

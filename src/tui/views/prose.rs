@@ -8,6 +8,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_core::protocol::phrases::Phrase;
 use study_core::protocol::{DeviceKind, Entry};
 use study_core::session::view::MessageKind;
 use study_core::session::{Screen, View};
@@ -27,9 +28,9 @@ pub struct Prose {
     /// Whether the body is a long text: left-aligned and scrollable.
     pub long: bool,
     /// Keys in a column: the key, its action, an explanation.
-    pub choices: Vec<(&'static str, &'static str, &'static str)>,
+    pub choices: Vec<(&'static str, String, &'static str)>,
     /// The keys at the foot of the page and their actions.
-    pub keys: Vec<(&'static str, &'static str)>,
+    pub keys: Vec<(&'static str, Phrase)>,
 }
 
 /// The text of a screen; `None` for screens that show more than text.
@@ -42,27 +43,17 @@ pub fn prose(view: &View) -> Option<Prose> {
             String::new()
         }
     };
+    let words = &view.words;
     let by_hand = view.device == DeviceKind::Manual;
     let again = if by_hand {
-        "feel it again"
+        words.get(Phrase::FeelAgain)
     } else {
-        "play it again"
+        words.get(Phrase::PlayAgain)
     };
     let ready: &[_] = if view.can_advance {
-        &[("Enter", "when ready")]
+        &[("Enter", Phrase::Ready)]
     } else {
         &[]
-    };
-    let wait = |seconds: f64| {
-        if seconds > 0.0 && seconds.is_finite() {
-            match seconds.ceil() {
-                1.0 => "in 1 second".to_owned(),
-                whole if whole < 100.0 => format!("in {whole} seconds"),
-                whole => format!("in {}", clock(whole)),
-            }
-        } else {
-            String::new()
-        }
     };
     Some(match &view.screen {
         Screen::ResumeChoice { gap_h, done, total } => Prose {
@@ -74,97 +65,113 @@ pub fn prose(view: &View) -> Option<Prose> {
             choices: vec![
                 (
                     "b",
-                    "restart the block",
+                    "restart the block".to_owned(),
                     "the trials of the block are repeated",
                 ),
-                ("c", "continue where it stopped", "later trials are flagged"),
-                ("d", "drop out", "the participant does not return"),
+                (
+                    "c",
+                    "continue where it stopped".to_owned(),
+                    "later trials are flagged",
+                ),
+                (
+                    "d",
+                    "drop out".to_owned(),
+                    "the participant does not return",
+                ),
             ],
             ..Prose::default()
         },
         Screen::Consent { document, version } => Prose {
             above: read_out("Ask the participant"),
-            title: "Do you agree to take part?".to_owned(),
+            title: words.get(Phrase::AgreeQuestion).to_owned(),
             body: if version.is_empty() {
                 document.clone()
             } else {
-                format!("{document}, version {version}")
+                words.fill(
+                    Phrase::Version,
+                    &[("document", document), ("version", version)],
+                )
             },
-            choices: vec![("y", "yes, I agree", ""), ("n", "no", "")],
+            choices: vec![
+                ("y", words.get(Phrase::Agree).to_owned(), ""),
+                ("n", words.get(Phrase::Refuse).to_owned(), ""),
+            ],
             ..Prose::default()
         },
         Screen::Message { kind, text } => Prose {
             above: match kind {
                 MessageKind::Welcome | MessageKind::Instructions => read_out("Read out"),
-                MessageKind::Practice => "Practice".to_owned(),
+                MessageKind::Practice => words.get(Phrase::Practice).to_owned(),
                 MessageKind::PracticeOver => String::new(),
             },
             body: wrap::flow(text),
             long: true,
-            keys: vec![("Enter", "continue")],
+            keys: vec![("Enter", Phrase::Continue)],
             ..Prose::default()
         },
         Screen::Reference { prompt, wait_s } => Prose {
             above: read_out("Tell the participant"),
             title: prompt.clone(),
             body: if *wait_s > 0.0 {
-                format!("You can continue {}.", wait(*wait_s))
+                words.wait(*wait_s)
             } else {
-                "Take as long as you like.".to_owned()
+                words.get(Phrase::AtLeisure).to_owned()
             },
             keys: ready.to_vec(),
             ..Prose::default()
         },
         Screen::Loading => Prose {
-            title: "One moment.".to_owned(),
-            body: "Preparing the device.".to_owned(),
+            title: words.get(Phrase::OneMoment).to_owned(),
+            body: words.get(Phrase::Preparing).to_owned(),
             ..Prose::default()
         },
         Screen::Mount { code } => Prose {
             above: "For the experimenter".to_owned(),
             title: format!("Mount sample {code}."),
             body: "Press Enter when the sample is mounted.".to_owned(),
-            keys: vec![("Enter", "mounted"), ("Esc", "stop")],
+            keys: vec![("Enter", Phrase::Mounted), ("Esc", Phrase::Stop)],
             ..Prose::default()
         },
         Screen::Stopping => Prose {
-            title: "Stopping.".to_owned(),
+            title: words.get(Phrase::Stopping).to_owned(),
             ..Prose::default()
         },
         Screen::Stopped { can_rate } => Prose {
-            title: if by_hand {
-                "■  Stopped."
-            } else {
-                "■  The device is stopped."
-            }
-            .to_owned(),
-            body: if by_hand {
-                "Let go of the sample. This trial is not lost."
-            } else {
-                "It produces no force. This trial is not lost."
-            }
-            .to_owned(),
+            title: format!(
+                "■  {}",
+                words.get(if by_hand {
+                    Phrase::StoppedSample
+                } else {
+                    Phrase::StoppedDevice
+                })
+            ),
+            body: words
+                .get(if by_hand {
+                    Phrase::LetGo
+                } else {
+                    Phrase::NoForce
+                })
+                .to_owned(),
             choices: if *can_rate {
-                vec![("Enter", again, ""), ("r", "rate what you felt", "")]
+                vec![
+                    ("Enter", again.to_owned(), ""),
+                    ("r", words.get(Phrase::RateFelt).to_owned(), ""),
+                ]
             } else {
-                vec![("Enter", again, "")]
+                vec![("Enter", again.to_owned(), "")]
             },
             ..Prose::default()
         },
         Screen::Saving => Prose {
-            title: "Saving …".to_owned(),
+            title: words.get(Phrase::Saving).to_owned(),
             ..Prose::default()
         },
         Screen::Break { text, wait_s } => Prose {
-            above: "Break".to_owned(),
-            body: if text.trim().is_empty() {
-                "Take a break. Let go of the device and look away from the screen.".to_owned()
-            } else {
-                wrap::flow(text)
-            },
+            above: words.get(Phrase::Break).to_owned(),
+            body: wrap::flow(text),
             long: true,
             title: if *wait_s > 0.0 {
-                format!("You can continue {}.", wait(*wait_s))
+                words.wait(*wait_s)
             } else {
                 String::new()
             },
@@ -172,23 +179,22 @@ pub fn prose(view: &View) -> Option<Prose> {
             ..Prose::default()
         },
         Screen::Paused { since_s } => Prose {
-            title: "Paused".to_owned(),
-            body: if by_hand {
-                format!("for {}.", clock(*since_s))
-            } else {
-                format!("for {}. The device produces no force.", clock(*since_s))
-            },
-            keys: vec![("Enter", "continue"), ("F10", "quit")],
+            title: words.get(Phrase::Paused).to_owned(),
+            body: words.fill(
+                if by_hand {
+                    Phrase::PausedFor
+                } else {
+                    Phrase::PausedNoForce
+                },
+                &[("time", &clock(*since_s))],
+            ),
+            keys: vec![("Enter", Phrase::Continue), ("F10", Phrase::Quit)],
             ..Prose::default()
         },
         Screen::End { text } => Prose {
-            body: if text.trim().is_empty() {
-                "The session is complete. Thank you!".to_owned()
-            } else {
-                wrap::flow(text)
-            },
+            body: wrap::flow(text),
             long: true,
-            keys: vec![("Enter", "close")],
+            keys: vec![("Enter", Phrase::Close)],
             ..Prose::default()
         },
         Screen::Who { .. }
@@ -329,7 +335,7 @@ impl Widget for &ProseView<'_> {
         y += len(&title) + 1;
         centre_all(buf, rows(area, y, len(&body)), &body, self.theme.text());
         y += len(&body) + 2;
-        let widest = |(key, what, more): &(&str, &str, &str)| {
+        let widest = |(key, what, more): &(&str, String, &str)| {
             let more = if more.is_empty() {
                 0
             } else {

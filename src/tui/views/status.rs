@@ -7,6 +7,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use std::fmt::Display;
+use study_core::protocol::phrases::{Phrase, Words};
 use study_core::session::view::{Banner, DeviceState, Mirror, StatusLine, Telemetry};
 use study_core::session::{Screen, View};
 
@@ -21,6 +23,8 @@ pub struct Status<'a> {
     pub text: bool,
     /// Whether saving has failed.
     pub unsaved: bool,
+    /// The fixed sentences that a participant reads.
+    pub words: &'a Words,
     /// The styles.
     pub theme: Theme,
 }
@@ -95,7 +99,7 @@ impl Widget for &Status<'_> {
 
         let help = vec![
             Span::styled(if self.text { "F1" } else { "?" }, self.theme.key()),
-            Span::styled(" help", quiet),
+            Span::styled(format!(" {}", self.words.get(Phrase::Help)), quiet),
         ];
         right(buf, inside, &Line::from(help));
     }
@@ -124,15 +128,20 @@ impl Widget for &Top<'_> {
         if let Screen::Form { page, pages, .. } = &self.view.screen
             && *pages > 1
         {
-            words.push(format!("page {page} of {pages}"));
+            let page = [("n", page as &dyn Display), ("total", pages)];
+            words.push(self.view.words.fill(Phrase::PageOf, &page));
         }
         if let Some(progress) = self.view.progress {
-            let what = if progress.practice {
-                "practice"
+            let phrase = if progress.practice {
+                Phrase::PracticeOf
             } else {
-                "trial"
+                Phrase::TrialOf
             };
-            words.push(format!("{what} {} of {}", progress.current, progress.total));
+            let values = [
+                ("n", &progress.current as &dyn Display),
+                ("total", &progress.total),
+            ];
+            words.push(self.view.words.fill(phrase, &values));
         }
         if !words.is_empty() {
             let words = Span::styled(words.join(" · "), self.theme.quiet());

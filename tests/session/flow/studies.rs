@@ -66,6 +66,7 @@ pub(crate) fn rich() -> Protocol {
         rest: some("Rest."),
         end: some("Goodbye."),
         lang: some("en"),
+        words: Default::default(),
     };
     protocol.consent = Some(Consent {
         document: "Information sheet".to_owned(),

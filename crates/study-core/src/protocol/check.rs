@@ -3,11 +3,12 @@
 //! No finding here prevents a study from running. Warnings that need the models'
 //! tables or the orders are given where these are loaded.
 
+use super::phrases::{self, Phrase};
 use super::{Design, DeviceKind, Exclusion, ModelEntry, Protocol, Question, QuestionKind, Role};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use study_base::diagnostic::Fault;
-use study_base::text::{ModelId, counted};
+use study_base::text::{ModelId, Untrusted, counted};
 
 /// Number of test realizations from which a correlation over them is informative.
 const ENOUGH_REALIZATIONS: usize = 8;
@@ -33,12 +34,43 @@ pub type Spans = BTreeMap<String, Range<usize>>;
 /// `unread` could not be, which is reported as an error elsewhere.
 pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<Fault> {
     let mut faults = Vec::new();
+    language(protocol, spans, &mut faults);
     realizations(protocol, spans, &mut faults);
     vaf(protocol, spans, unread, &mut faults);
     practice(protocol, spans, &mut faults);
     duration(protocol, spans, &mut faults);
     roles(protocol, spans, &mut faults);
     faults
+}
+
+/// Fixed sentences that the language of the study lacks.
+fn language(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let Some(lang) = &protocol.text.lang else {
+        return;
+    };
+    if phrases::is_shipped(lang) {
+        return;
+    }
+    let own = &protocol.text.words;
+    let all = Phrase::ALL.iter().map(|phrase| phrase.key());
+    let missing: Vec<&str> = all.filter(|key| !own.contains_key(*key)).collect();
+    let Some(first) = missing.first() else {
+        return;
+    };
+    let count = counted(missing.len(), "fixed sentence", "fixed sentences");
+    let shipped: Vec<&str> = phrases::languages().collect();
+    faults.push(
+        Fault::warning(format!(
+            "{count} that participants read would be in English: `{}` is not one of {}",
+            Untrusted(lang),
+            shipped.join(", ")
+        ))
+        .at(spans.get("text.lang").cloned())
+        .hint(format!(
+            "write them in [text.words], beginning with `{first}`: {}",
+            missing.join(", ")
+        )),
+    );
 }
 
 /// Trials of a session, practice included, unless an orders file has fewer.

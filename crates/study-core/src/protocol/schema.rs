@@ -71,6 +71,10 @@ fn of(kind: Kind) -> Value {
             super::keys::Id::Question.pattern(),
             json!({ "type": "number" }),
         ),
+        Kind::Sentences => {
+            let keys = super::phrases::Phrase::ALL.iter().map(|p| p.key());
+            map(&format!("^({})$", keys.collect::<Vec<_>>().join("|")), text)
+        }
         Kind::Table(keys) => object(keys),
         Kind::Tables(keys) => json!({ "type": "array", "items": object(keys) }),
         Kind::Variants(variants) => array_of(variants),

@@ -8,14 +8,9 @@ use super::view::{
 };
 use super::{Ending, Session};
 use crate::outcome::{FormId, Moment};
+use crate::protocol::phrases::Phrase;
 use crate::protocol::{DeviceKind, Seat};
 use study_base::text::Untrusted;
-
-/// Texts for which the protocol has none.
-const REFERENCE: &str = "Ready for the next one?";
-const REST: &str = "Time for a break.";
-const THANKS: &str = "That was all. Thank you.";
-const NO_MORE: &str = "Nothing more is asked. Thank you.";
 
 impl Session {
     /// What the screen shows at this moment.
@@ -39,6 +34,7 @@ impl Session {
                 None => Vec::new(),
             },
             can_advance: can_advance(&screen),
+            words: self.words.clone(),
             screen,
         }
     }
@@ -94,7 +90,7 @@ impl Session {
                     .trial
                     .reference
                     .clone()
-                    .unwrap_or(REFERENCE.into()),
+                    .unwrap_or_else(|| self.words.get(Phrase::ReferenceText).to_owned()),
                 wait_s: self.reference_wait_s(at),
             },
             Phase::Loading { .. } | Phase::Ready { .. } => Screen::Loading,
@@ -108,7 +104,8 @@ impl Session {
                 can_rate: self.can_rate(),
             },
             Phase::Break { .. } => Screen::Break {
-                text: self.protocol.text.rest.clone().unwrap_or(REST.into()),
+                text: (self.protocol.text.rest.clone())
+                    .unwrap_or_else(|| self.words.get(Phrase::BreakText).to_owned()),
                 wait_s: self.break_wait_s(at),
             },
             Phase::Saving | Phase::Leaving { .. } => Screen::Saving,
@@ -122,7 +119,14 @@ impl Session {
         let finished =
             self.history.finished() && !matches!(self.phase, Phase::Over(Ending::Nothing));
         let own = self.protocol.text.end.clone().filter(|_| finished);
-        own.unwrap_or_else(|| if finished { THANKS } else { NO_MORE }.to_owned())
+        own.unwrap_or_else(|| {
+            let phrase = if finished {
+                Phrase::Complete
+            } else {
+                Phrase::NoMore
+            };
+            self.words.get(phrase).to_owned()
+        })
     }
 
     fn strokes_needed(&self) -> u32 {

@@ -1,7 +1,9 @@
 //! What a session shows. Nothing here identifies a realization.
 
 use crate::outcome::FormId;
+use crate::protocol::phrases::Words;
 use crate::protocol::{Answer, DeviceKind, Entry, Question};
+use std::sync::Arc;
 use study_base::text::QuestionId;
 
 /// The content of the screen.
@@ -33,6 +35,8 @@ pub struct View {
     pub unsaved: Vec<String>,
     /// Whether Enter has an effect now.
     pub can_advance: bool,
+    /// The fixed sentences that a participant reads.
+    pub words: Arc<Words>,
 }
 
 /// The participant's progress.

@@ -2,7 +2,11 @@
 
 use super::section::Section;
 use crate::protocol::keys::{Id, Key, Kind, Words as _, keys};
+use crate::protocol::phrases::{Phrase, placeholders};
 use crate::protocol::{Consent, Entry, SessionRules, Study, Text, TrialRules};
+use std::collections::BTreeMap;
+use study_base::diagnostic::{Fault, did_you_mean};
+use study_base::text::Untrusted;
 
 pub(super) const STUDY: &[Key] = keys! {
     /// The name of the study and of its results folder.
@@ -37,9 +41,13 @@ pub(super) const TEXT: &[Key] = keys! {
     "break": Kind::Text, r#""Please rest your hand.""#;
     /// The last screen of the participant.
     "end": Kind::Text, r#""That was all. Thank you!""#;
-    /// The language of the study's texts, as a BCP 47 tag. Reports mark quoted texts with
-    /// it.
+    /// The language of the study's texts, as a BCP 47 tag. What a participant reads besides
+    /// them, such as "Choose from the list first.", is shown in this language if it is one of
+    /// en, de, fr, es, ja, zh-Hans and ar, else in English. Reports mark quoted texts with it.
     "lang": Kind::Text, r#""en""#;
+    /// Single sentences instead of the fixed ones, by key. The JSON Schema lists the keys;
+    /// words in braces, such as `{n}`, are replaced by numbers and have to stay.
+    "words": Kind::Sentences, r#"{ rate = "go on", trial-of = "switch {n} of {total}" }"#;
 };
 
 pub(super) const CONSENT: &[Key] = keys! {
@@ -103,7 +111,36 @@ pub(super) fn text(mut section: Section<'_, '_>) -> Text {
         rest: section.text("break"),
         end: section.text("end"),
         lang: section.text("lang"),
+        words: words(&mut section),
     }
+}
+
+fn words(section: &mut Section<'_, '_>) -> BTreeMap<String, String> {
+    let mut words = BTreeMap::new();
+    for (key, value) in section.entries("words") {
+        let Some(phrase) = Phrase::ALL.iter().find(|p| p.key() == key) else {
+            let keys = Phrase::ALL.iter().map(|phrase| phrase.key());
+            let hint = match did_you_mean(&key, keys) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => "`study schema` lists the keys".to_owned(),
+            };
+            let what = format!("`{}` is no fixed sentence", Untrusted(&key));
+            value.fault(Fault::error(what).hint(hint));
+            continue;
+        };
+        let Some(text) = super::section::text(&value) else {
+            continue;
+        };
+        let needed = placeholders(phrase.english());
+        if placeholders(&text) != needed {
+            value.fault(
+                Fault::error(format!("`{key}` needs the words in braces of the sentence"))
+                    .hint(format!("in English: \"{}\"", phrase.english())),
+            );
+        }
+        words.insert(key, text);
+    }
+    words
 }
 
 pub(super) fn consent(mut section: Section<'_, '_>) -> Option<Consent> {

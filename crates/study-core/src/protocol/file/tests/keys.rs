@@ -339,6 +339,12 @@ fn bad_values(kind: Kind) -> Vec<Value> {
         Kind::WholeLabels => parsed(&["1", "{ x = \"a\" }", "{ 1 = \"\" }", "{ 1 = 2 }"]),
         Kind::NumberLabels => parsed(&["1", "{ x = \"a\" }", "{ 0 = \"\" }", "{ 50 = \"a\" }"]),
         Kind::Numbers => parsed(&["1", "{ a = \"1\" }", "{ a = nan }", "{ \"a b\" = 1 }"]),
+        Kind::Sentences => parsed(&[
+            "1",
+            "{ zz = \"a\" }",
+            "{ rate = \"\" }",
+            "{ trial-of = \"x\" }",
+        ]),
         Kind::Table(_) => parsed(&["1", "\"x\"", "[1]", "{ zzzzzzzz = 1 }"]),
         Kind::Tables(_) | Kind::Variants(_) => parsed(&["1", "[1]", "[{ zzzzzzzz = 1 }]"]),
     }
