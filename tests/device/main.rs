@@ -6,6 +6,7 @@ mod check;
 #[path = "../support/designs.rs"]
 mod designs;
 mod playback;
+mod precision;
 mod process;
 mod safety;
 mod shipped;

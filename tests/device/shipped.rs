@@ -14,7 +14,7 @@ use study_haptics::model::{Realization, file};
 /// Force limit of the protocols for uncertified tables.
 const UNCERTIFIED_N: f64 = 9.0;
 
-fn shipped() -> BTreeMap<String, Realization> {
+pub(crate) fn shipped() -> BTreeMap<String, Realization> {
     ["turn-signal", "turn-signal-extended"]
         .iter()
         .flat_map(|protocol| fs::read_dir(format!("protocols/{protocol}/models")).unwrap())

@@ -136,10 +136,11 @@ pub struct Range {
 /// Computes the certificate of a valid table.
 pub fn certify(table: &TableView<'_>, direction: Direction, range: Range) -> Certificate {
     let mut certifier = Certifier::new();
-    for _ in table.x_mm {
-        certifier.step(table, table.x_mm.len(), direction, range);
+    let nodes = table.x_mm.len();
+    for at in 0..nodes {
+        certifier.step(table, at, nodes, direction, range);
     }
-    certifier.finish(table, range)
+    certifier.finish()
 }
 
 /// A certificate in progress, one node at a time, so that a device can judge a table
@@ -149,7 +150,6 @@ pub struct Certifier {
     so_far: Certificate,
     /// Margins of mass and damping for v > 0 and v < 0.
     branches: [[Margin; 2]; 2],
-    delta_mm: Option<f64>,
     judged: usize,
 }
 
@@ -170,7 +170,6 @@ impl Certifier {
                 mass_kg: 0.0,
             },
             branches: [[margin; 2]; 2],
-            delta_mm: None,
             judged: 0,
         }
     }
@@ -180,22 +179,24 @@ impl Certifier {
         self.judged
     }
 
-    /// Judges the next node of a table of `nodes`. The table has to contain the node after
-    /// it as well, unless it is the last.
+    /// Judges the next node of a table of `nodes`. `table` is a part of the table with this
+    /// node at index `at` and the nodes before and after it.
     pub fn step(
         &mut self,
         table: &TableView<'_>,
+        at: usize,
         nodes: usize,
         direction: Direction,
         range: Range,
     ) {
-        let (i, c) = (self.judged, &mut self.so_far);
+        let (i, c) = (at, &mut self.so_far);
+        let (first, last) = (self.judged == 0, self.judged + 1 == nodes);
         let (x_mm, delta_mm) = (table.x_mm[i], direction.delta_mm());
-        if i == 0 {
+        if first {
             self.branches = [[Margin::at(x_mm); 2]; 2];
             c.hysteresis = Margin::at(x_mm);
             c.state_n_per_mm = delta_mm.map(|_| 0.0);
-            self.delta_mm = delta_mm;
+            edge(table, i, range.x_mm[0].min(x_mm), delta_mm, c);
         }
         let directions = [(&table.positive, 1.0), (&table.negative, -1.0)];
         for ((branch, sign), [mass, damping]) in directions.into_iter().zip(&mut self.branches) {
@@ -214,35 +215,22 @@ impl Certifier {
             };
             damping.include(b - required, x_mm);
         }
-        if i > 0 {
+        if !first {
             between(table, i - 1, delta_mm, c);
+        }
+        if last {
+            edge(table, i, range.x_mm[1].max(x_mm), delta_mm, c);
         }
         self.judged += 1;
     }
 
     /// The certificate, after the last node.
-    pub fn finish(&self, table: &TableView<'_>, range: Range) -> Certificate {
+    pub fn finish(&self) -> Certificate {
         let mut c = self.so_far;
         let [positive, negative] = self.branches;
         [c.mass, c.damping] = positive;
         c.mass.include(negative[0].value, negative[0].at_mm);
         c.damping.include(negative[1].value, negative[1].at_mm);
-        let last = table.x_mm.len() - 1;
-        for (i, x) in [(0, range.x_mm[0]), (last, range.x_mm[1])] {
-            let outside = if i == 0 {
-                x < table.x_mm[0]
-            } else {
-                x > table.x_mm[i]
-            };
-            let gap = |x: f64| spring(&table.positive, i, x) - spring(&table.negative, i, x);
-            c.include_gap(gap(table.x_mm[i]), table.x_mm[i], self.delta_mm);
-            if outside {
-                c.include_gap(gap(x), x, self.delta_mm);
-                for branch in [&table.positive, &table.negative] {
-                    c.include_stiffness(libm::fabs(branch.k_n_per_mm[i]));
-                }
-            }
-        }
         c
     }
 }
@@ -250,6 +238,18 @@ impl Certifier {
 impl Default for Certifier {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// Includes the range beyond the first or last node, up to `end`.
+fn edge(table: &TableView<'_>, i: usize, end: f64, delta_mm: Option<f64>, c: &mut Certificate) {
+    let gap = |x: f64| spring(&table.positive, i, x) - spring(&table.negative, i, x);
+    c.include_gap(gap(table.x_mm[i]), table.x_mm[i], delta_mm);
+    if end != table.x_mm[i] {
+        c.include_gap(gap(end), end, delta_mm);
+        for branch in [&table.positive, &table.negative] {
+            c.include_stiffness(libm::fabs(branch.k_n_per_mm[i]));
+        }
     }
 }
 

@@ -63,7 +63,7 @@ static SHARED: Crc<u32> = CRC;
 
 impl RunningCrc {
     /// The CRC of no bytes.
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Self(SHARED.digest())
     }
 
@@ -164,7 +164,7 @@ impl Default for Decoder {
 
 impl Decoder {
     /// A decoder without content.
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Self {
             buffer: [0; MAX_ENCODED],
             len: 0,

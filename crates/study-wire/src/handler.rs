@@ -11,8 +11,8 @@
 //! The simulated device does the same. `docs/wire.md` is the specification.
 //!
 //! It has no clock and does not panic, whatever bytes it receives. `NODES` is the capacity
-//! for the nodes of a table, 72 bytes each; `POINTS` is the capacity for the points of a
-//! path, 4 bytes each. All calls must come from one context or exclude each other.
+//! for the nodes of a table, 72 bytes each, or 36 in single precision; `POINTS` is the
+//! capacity for the points of a path, 4 bytes each; the rest takes less than 2.5 KiB. All calls must come from one context or exclude each other.
 //!
 //! Invariants:
 //!
@@ -32,6 +32,7 @@ use super::message::{
 };
 use super::servo::{Rendering, Servo, ServoSettings, ServoState, Trip};
 use crate::predict::Motion;
+use crate::real::Real;
 use path::PathBuffer;
 use run::Run;
 pub use table::Bounds;
@@ -69,26 +70,26 @@ pub struct Profile {
 
 /// Sensor values at the beginning of a servo period.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measured {
+pub struct Measured<R = f64> {
     /// Motion of the handle.
-    pub motion: Motion,
+    pub motion: Motion<R>,
     /// Measured force, N; `None` without a force sensor.
-    pub force_n: Option<f64>,
+    pub force_n: Option<R>,
 }
 
 /// Command for the motor until the next servo period.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Drive {
+pub enum Drive<R = f64> {
     /// Render this force, N, with the sign of the force that the hand applies.
-    Force(f64),
+    Force(R),
     /// Control the position: a probe follows its path.
     Position {
         /// Target position, mm.
-        x_mm: f64,
+        x_mm: R,
         /// Target speed, mm/s.
-        v_mm_s: f64,
+        v_mm_s: R,
         /// Largest force, N.
-        force_n: f64,
+        force_n: R,
     },
 }
 
@@ -107,9 +108,10 @@ struct LastRequest {
     request: Option<(u32, Frame)>,
 }
 
-/// A device without its hardware.
+/// A device without its hardware. The servo calculates with `R`, which is `f32` on a
+/// processor without a double-precision unit.
 #[derive(Debug, Clone)]
-pub struct Handler<const NODES: usize, const POINTS: usize> {
+pub struct Handler<const NODES: usize, const POINTS: usize, R = f64> {
     profile: Profile,
     decoder: Decoder,
     state: DeviceState,
@@ -120,14 +122,14 @@ pub struct Handler<const NODES: usize, const POINTS: usize> {
     /// Count of the newest heartbeat.
     heartbeat: Option<u32>,
     alive: Option<Alive>,
-    table: TableBuffer<NODES>,
+    table: TableBuffer<NODES, R>,
     path: PathBuffer<POINTS>,
     loaded: Loaded,
     /// CRC of what is loaded.
     crc: u32,
     /// Largest force of what is loaded, N.
     limit_n: f64,
-    servo: Servo,
+    servo: Servo<R>,
     run: Run,
     /// Accepted uploads since power-up.
     uploads: u32,
@@ -141,11 +143,12 @@ pub struct Handler<const NODES: usize, const POINTS: usize> {
     stale_beats: u32,
 }
 
-impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
-    /// A device that has just been powered up.
-    pub fn new(profile: Profile) -> Self {
+impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R> {
+    /// A device that has just been powered up. As a constant it can be the value of a
+    /// `static`.
+    pub const fn new(profile: Profile) -> Self {
         Self {
-            servo: Servo::new(profile.servo),
+            servo: Servo::limp_with(profile.servo),
             profile,
             decoder: Decoder::new(),
             state: DeviceState::Boot,
@@ -159,7 +162,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             loaded: Loaded::Nothing,
             crc: 0,
             limit_n: 0.0,
-            run: Run::default(),
+            run: Run::new(),
             uploads: 0,
             unsolicited: 0,
             event: None,
@@ -196,11 +199,11 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 
     /// The commanded force, N.
-    pub fn held_n(&self) -> f64 {
+    pub fn held_n(&self) -> R {
         if self.state.applies_force() {
             self.servo.held_n()
         } else {
-            0.0
+            R::ZERO
         }
     }
 
@@ -252,9 +255,9 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
     }
 
     /// Runs one servo period and returns the command for the motor.
-    pub fn servo(&mut self, measured: Measured, now_ms: u32, out: Out<'_>) -> Drive {
+    pub fn servo(&mut self, measured: Measured<R>, now_ms: u32, out: Out<'_>) -> Drive<R> {
         let motion = measured.motion;
-        let still = libm::fabs(motion.v_mm_s) <= self.profile.rest_mm_s;
+        let still = motion.v_mm_s.abs() <= R::of(self.profile.rest_mm_s);
         self.rest_periods = if still {
             self.rest_periods.saturating_add(1)
         } else {
@@ -263,12 +266,12 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         self.supervise(now_ms, out);
         if !self.state.applies_force() {
             self.table.judge();
-            return Drive::Force(0.0);
+            return Drive::Force(R::ZERO);
         }
         match self.loaded {
             Loaded::Table => self.play(measured, now_ms, out),
             Loaded::Path => self.follow(measured, now_ms, out),
-            Loaded::Nothing => Drive::Force(0.0),
+            Loaded::Nothing => Drive::Force(R::ZERO),
         }
     }
 
@@ -286,9 +289,9 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         self.send_event(out);
     }
 
-    fn play(&mut self, measured: Measured, now_ms: u32, out: Out<'_>) -> Drive {
+    fn play(&mut self, measured: Measured<R>, now_ms: u32, out: Out<'_>) -> Drive<R> {
         let Some(begin) = &self.table.begin else {
-            return Drive::Force(0.0);
+            return Drive::Force(R::ZERO);
         };
         let what = Rendering {
             table: self.table.view(),
@@ -300,14 +303,16 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         if let ServoState::Tripped(trip) = self.servo.state() {
             self.latch(DeviceState::Fault, fault_of(trip), now_ms);
             self.send_event(out);
-            return Drive::Force(0.0);
+            return Drive::Force(R::ZERO);
         }
         if self.run.add_period(measured, force_n, now_ms) {
             self.flush(out);
         }
-        let full = self.profile.servo.ramp_s * self.profile.servo.servo_hz;
-        if self.state == DeviceState::Ramp && f64::from(self.run.ticks) >= full {
-            self.state = DeviceState::Run;
+        if self.state == DeviceState::Ramp {
+            let full = self.profile.servo.ramp_s * self.profile.servo.servo_hz;
+            if f64::from(self.run.ticks) >= full {
+                self.state = DeviceState::Run;
+            }
         }
         Drive::Force(force_n)
     }
@@ -400,5 +405,60 @@ fn fault_of(trip: Trip) -> Fault {
         Trip::Stroke => Fault::Stroke,
         Trip::NotANumber => Fault::NotANumber,
         Trip::Encoder => Fault::Encoder,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PROFILE: Profile = Profile {
+        firmware: Name::new("test 1"),
+        serial: Name::new("1"),
+        flags: Flags {
+            force_sensor: false,
+            simulated: false,
+            telemetry: true,
+            probe: false,
+        },
+        features: Features {
+            acceleration_from_speed: true,
+        },
+        watchdog_ms: 30,
+        longest_ms: 600_000,
+        telemetry_hz: 1000.0,
+        bounds: Bounds {
+            force_n: 10.0,
+            velocity_mm_s: 1000.0,
+            stiffness_n_per_mm: 10.0,
+            damping_n_s_per_mm: 0.1,
+            stroke_mm: [0.0, 35.0],
+        },
+        servo: ServoSettings::new(),
+        rest_mm_s: 5.0,
+        rest_s: 0.05,
+    };
+
+    /// As a firmware holds it: without code at the start, and not on a stack.
+    static DOUBLE: Handler<512, 0> = Handler::new(PROFILE);
+    static SINGLE: Handler<512, 0, f32> = Handler::new(PROFILE);
+
+    #[test]
+    fn a_handler_is_a_constant_of_the_documented_size() {
+        assert_eq!(DOUBLE.state(), DeviceState::Boot);
+        assert_eq!(SINGLE.held_n(), 0.0);
+        // 72 or 36 bytes a node, and the rest
+        let rest = [
+            size_of_val(&DOUBLE) - 72 * 512,
+            size_of_val(&SINGLE) - 36 * 512,
+        ];
+        assert!(rest.iter().all(|rest| *rest < 2560), "{rest:?}");
+        let probe = size_of::<Handler<2, 1000>>() - size_of::<Handler<2, 0>>();
+        assert_eq!(probe, 4000);
+    }
+
+    #[test]
+    fn the_default_servo_renders_no_negative_mass() {
+        assert_eq!(ServoSettings::default().least_mass_kg, 0.0);
     }
 }

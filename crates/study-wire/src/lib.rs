@@ -2,7 +2,8 @@
 //! and passivity certificate, shared by a motor's firmware and the host.
 //!
 //! The crate is `no_std`, does not allocate and calculates in `f64`, so that a device
-//! validates and renders a table with exactly the same results as the host.
+//! validates and renders a table with exactly the same results as the host. A processor
+//! without a double-precision unit renders with `f32`, within 1 mN ([`real`]).
 //!
 //! # For firmware authors
 //!
@@ -11,12 +12,14 @@
 //!
 //! 1. Describe the device with a [`handler::Profile`]: its limits, its servo rate and
 //!    the settings of the [`servo`].
-//! 2. Put a `Handler<NODES, POINTS>` into a `static`; a table node takes 72 bytes, a
+//! 2. Put a `Handler<NODES, POINTS>`, or `Handler<NODES, POINTS, f32>`, into a `static`:
+//!    [`handler::Handler::new`] is `const`. A table node takes 72 bytes, or 36 in `f32`, a
 //!    point of a probe's path 4 bytes. `POINTS` is 0 without probe mode.
 //! 3. In the servo's timer interrupt call [`handler::Handler::servo`] with the measured
 //!    motion, apply the returned [`handler::Drive`] to the motor, and pass received
 //!    bytes to [`handler::Handler::receive`].
-//! 4. Report faults of the hardware with [`handler::Handler::trip`].
+//! 4. Report missed periods with [`handler::Handler::overrun`] and faults of the hardware
+//!    with [`handler::Handler::trip`].
 //!
 //! The crate `study-firmware` of the same repository is this loop, and
 //! `docs/wire.md` specifies the bytes, states and time limits. `study device check`
@@ -27,6 +30,7 @@
 //! - [`predict`]: the force of a table at a given motion. Start here; `examples/servo.rs`
 //!   plays a small table.
 //! - [`certificate`]: whether a table is passive.
+//! - [`estimate`]: speed and acceleration from an encoder, and rotary devices.
 //! - [`servo`]: one servo period, with trips, slew limit, ramp and clamp.
 //! - [`frame`] and [`message`]: the wire format.
 //! - [`handler`]: the device's state machine, watchdog and uploads.
@@ -41,8 +45,10 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod certificate;
+pub mod estimate;
 pub mod frame;
 pub mod handler;
 pub mod message;
 pub mod predict;
+pub mod real;
 pub mod servo;

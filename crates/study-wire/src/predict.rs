@@ -7,30 +7,32 @@
 //! F = (1+z)/2 · F⁺ + (1−z)/2 · F⁻. With [`Direction::Sign`] z is the sign of v, as
 //! in Colton & Hollerbach (2007).
 
+use crate::real::Real;
+
 /// A table as borrowed slices.
 #[derive(Debug, Clone, Copy)]
-pub struct TableView<'a> {
+pub struct TableView<'a, R = f64> {
     /// Positions of the nodes, mm, strictly ascending.
-    pub x_mm: &'a [f64],
+    pub x_mm: &'a [R],
     /// Parameters for v > 0.
-    pub positive: BranchView<'a>,
+    pub positive: BranchView<'a, R>,
     /// Parameters for v < 0.
-    pub negative: BranchView<'a>,
+    pub negative: BranchView<'a, R>,
     /// Interpolation between nodes.
     pub lookup: Lookup,
 }
 
 /// The parameters of one direction as borrowed slices.
 #[derive(Debug, Clone, Copy)]
-pub struct BranchView<'a> {
+pub struct BranchView<'a, R = f64> {
     /// Mass, kg.
-    pub m_kg: &'a [f64],
+    pub m_kg: &'a [R],
     /// Damping, N·s/mm.
-    pub b_n_s_per_mm: &'a [f64],
+    pub b_n_s_per_mm: &'a [R],
     /// Stiffness, N/mm.
-    pub k_n_per_mm: &'a [f64],
+    pub k_n_per_mm: &'a [R],
     /// Offset force, N.
-    pub f0_n: &'a [f64],
+    pub f0_n: &'a [R],
 }
 
 /// Interpolation of parameters between nodes.
@@ -48,11 +50,11 @@ impl Lookup {
     /// The node to use, and the weight of the next one, for a position between `left`
     /// and the next node; `weight` is the fraction of the way, in [0, 1).
     #[inline]
-    pub fn between(self, left: usize, weight: f64) -> (usize, f64) {
+    pub fn between<R: Real>(self, left: usize, weight: R) -> (usize, R) {
         match self {
             Self::Linear => (left, weight),
-            Self::Floor => (left, 0.0),
-            Self::Nearest => (left + usize::from(weight > 0.5), 0.0),
+            Self::Floor => (left, R::ZERO),
+            Self::Nearest => (left + usize::from(weight > R::HALF), R::ZERO),
         }
     }
 
@@ -107,22 +109,31 @@ impl Direction {
 
 /// Position, velocity and acceleration at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
+pub struct Motion<R = f64> {
     /// Position, mm.
-    pub x_mm: f64,
+    pub x_mm: R,
     /// Velocity, mm/s.
-    pub v_mm_s: f64,
+    pub v_mm_s: R,
     /// Acceleration, m/s².
-    pub a_m_s2: f64,
+    pub a_m_s2: R,
 }
 
-impl Motion {
+impl<R: Real> Motion<R> {
     /// At rest at a position, mm.
-    pub fn at_rest(x_mm: f64) -> Self {
+    pub fn at_rest(x_mm: R) -> Self {
         Self {
             x_mm,
-            v_mm_s: 0.0,
-            a_m_s2: 0.0,
+            v_mm_s: R::ZERO,
+            a_m_s2: R::ZERO,
+        }
+    }
+
+    /// In double precision.
+    pub fn f64(&self) -> Motion {
+        Motion {
+            x_mm: self.x_mm.f64(),
+            v_mm_s: self.v_mm_s.f64(),
+            a_m_s2: self.a_m_s2.f64(),
         }
     }
 
@@ -134,77 +145,122 @@ impl Motion {
 
 /// The direction state z with its memory of the last position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DirectionState {
-    z: f64,
-    last_x_mm: Option<f64>,
+pub struct DirectionState<R = f64> {
+    z: R,
+    last_x_mm: Option<R>,
 }
 
-impl Default for DirectionState {
-    /// z = 1, the positive direction, before any motion.
+impl<R: Real> Default for DirectionState<R> {
     fn default() -> Self {
-        Self {
-            z: 1.0,
-            last_x_mm: None,
-        }
+        Self::new()
     }
 }
 
-impl DirectionState {
+impl<R: Real> DirectionState<R> {
+    /// z = 1, the positive direction, before any motion.
+    pub const fn new() -> Self {
+        Self {
+            z: R::ONE,
+            last_x_mm: None,
+        }
+    }
+
     /// Updates the state with the next motion and returns z in [−1, 1].
-    pub fn step(&mut self, rule: Direction, motion: Motion) -> f64 {
-        let dx = self.last_x_mm.map_or(0.0, |last| motion.x_mm - last);
+    pub fn step(&mut self, rule: Direction, motion: Motion<R>) -> R {
+        let dx = self.last_x_mm.map_or(R::ZERO, |last| motion.x_mm - last);
         self.last_x_mm = Some(motion.x_mm);
         match rule {
             Direction::Sign => {
-                if motion.v_mm_s > 0.0 {
-                    self.z = 1.0;
-                } else if motion.v_mm_s < 0.0 {
-                    self.z = -1.0;
+                if motion.v_mm_s > R::ZERO {
+                    self.z = R::ONE;
+                } else if motion.v_mm_s < R::ZERO {
+                    self.z = -R::ONE;
                 }
             }
             Direction::Play { delta_mm } => {
-                self.z = (self.z + 2.0 * dx / delta_mm).clamp(-1.0, 1.0);
+                let z = self.z + (dx + dx) / R::of(delta_mm);
+                self.z = clamp(z, R::ONE);
             }
             Direction::Dahl { delta_mm } => {
-                let s = if dx > 0.0 {
-                    1.0
-                } else if dx < 0.0 {
-                    -1.0
+                let s = if dx > R::ZERO {
+                    R::ONE
+                } else if dx < R::ZERO {
+                    -R::ONE
                 } else {
                     return self.z;
                 };
-                self.z = s + (self.z - s) * libm::exp(-libm::fabs(dx) / delta_mm);
+                self.z = s + (self.z - s) * (-dx.abs() / R::of(delta_mm)).exp();
             }
         }
         self.z
     }
 }
 
+/// `value` limited to [−limit, limit]; a NaN is kept.
+pub(crate) fn clamp<R: Real>(value: R, limit: R) -> R {
+    if value > limit {
+        limit
+    } else if value < -limit {
+        -limit
+    } else {
+        value
+    }
+}
+
 /// The force of the table for direction z, N. Outside the nodes the parameters of the
 /// first or last node apply at the actual position.
-pub fn force_n(table: &TableView<'_>, z: f64, motion: Motion) -> f64 {
+pub fn force_n<R: Real>(table: &TableView<'_, R>, z: R, motion: Motion<R>) -> R {
     let (left, weight) = locate(table.x_mm, table.lookup, motion.x_mm);
-    let plus = 0.5 * (1.0 + z);
-    let minus = 0.5 * (1.0 - z);
-    let mut force = 0.0;
-    if plus > 0.0 {
+    let plus = R::HALF * (R::ONE + z);
+    let minus = R::HALF * (R::ONE - z);
+    let mut force = R::ZERO;
+    if plus > R::ZERO {
         force += plus * branch_force_n(&table.positive, left, weight, motion);
     }
-    if minus > 0.0 {
+    if minus > R::ZERO {
         force += minus * branch_force_n(&table.negative, left, weight, motion);
     }
     force
 }
 
-/// m a + b v + k x + F0 with each parameter interpolated separately.
-fn branch_force_n(branch: &BranchView<'_>, left: usize, weight: f64, motion: Motion) -> f64 {
-    let at = |p: &[f64]| {
-        if weight == 0.0 {
-            p[left]
-        } else {
-            p[left] + weight * (p[left + 1] - p[left])
+/// The table's mass, kg, and the force without it, N, for direction z: the force is
+/// linear in the acceleration.
+pub fn mass_and_force<R: Real>(table: &TableView<'_, R>, z: R, x_mm: R, v_mm_s: R) -> (R, R) {
+    let (left, weight) = locate(table.x_mm, table.lookup, x_mm);
+    let (mut mass_kg, mut force_n) = (R::ZERO, R::ZERO);
+    for (branch, z) in [(&table.positive, z), (&table.negative, -z)] {
+        let share = R::HALF * (R::ONE + z);
+        if share > R::ZERO {
+            let motion = Motion {
+                x_mm,
+                v_mm_s,
+                a_m_s2: R::ZERO,
+            };
+            mass_kg += share * between(branch.m_kg, left, weight);
+            force_n += share * branch_force_n(branch, left, weight, motion);
         }
-    };
+    }
+    (mass_kg, force_n)
+}
+
+/// A parameter at `weight` of the way from node `left` to the next.
+#[inline]
+fn between<R: Real>(parameter: &[R], left: usize, weight: R) -> R {
+    if weight == R::ZERO {
+        parameter[left]
+    } else {
+        parameter[left] + weight * (parameter[left + 1] - parameter[left])
+    }
+}
+
+/// m a + b v + k x + F0 with each parameter interpolated separately.
+fn branch_force_n<R: Real>(
+    branch: &BranchView<'_, R>,
+    left: usize,
+    weight: R,
+    motion: Motion<R>,
+) -> R {
+    let at = |parameter| between(parameter, left, weight);
     at(branch.m_kg) * motion.a_m_s2
         + at(branch.b_n_s_per_mm) * motion.v_mm_s
         + at(branch.k_n_per_mm) * motion.x_mm
@@ -213,14 +269,15 @@ fn branch_force_n(branch: &BranchView<'_>, left: usize, weight: f64, motion: Mot
 
 /// Index of the node to the left of x and the weight of the next node, in [0, 1).
 /// Beyond the ends the parameters are constant.
-pub fn locate(nodes: &[f64], lookup: Lookup, x_mm: f64) -> (usize, f64) {
+pub fn locate<R: Real>(nodes: &[R], lookup: Lookup, x_mm: R) -> (usize, R) {
     let last = nodes.len() - 1;
-    // NaN uses the first node.
-    if x_mm.is_nan() || x_mm <= nodes[0] {
-        return (0, 0.0);
+    // `>` is false for NaN, which uses the first node.
+    let inside = x_mm > nodes[0];
+    if !inside {
+        return (0, R::ZERO);
     }
     if x_mm >= nodes[last] {
-        return (last, 0.0);
+        return (last, R::ZERO);
     }
     let left = nodes.partition_point(|node| *node <= x_mm) - 1;
     let weight = (x_mm - nodes[left]) / (nodes[left + 1] - nodes[left]);

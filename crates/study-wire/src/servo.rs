@@ -26,8 +26,9 @@
 mod low_pass;
 pub mod tally;
 
-use crate::predict::{self, Direction, DirectionState, Motion, TableView};
-use low_pass::LowPass;
+use crate::predict::{self, Direction, DirectionState, Motion, TableView, clamp};
+use crate::real::Real;
+use low_pass::{DirectForm, LowPass};
 use tally::Tally;
 
 /// What the device adds to a table, and its limits.
@@ -43,6 +44,7 @@ pub struct ServoSettings {
     pub acceleration_hz: f64,
     /// Smallest mass that is rendered, kg, zero or negative. A device cannot
     /// compensate more than its own moving mass: below that the motion is unstable.
+    /// State minus that mass once it is known; the default is 0.
     pub least_mass_kg: f64,
     /// Damping added to the table's, N·s/mm.
     pub damping_n_s_per_mm: f64,
@@ -61,14 +63,21 @@ pub struct ServoSettings {
 }
 
 impl Default for ServoSettings {
-    /// 4 kHz, 12 N, 1 m/s and the values given in `docs/simulation.md`.
     fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl ServoSettings {
+    /// 4 kHz, 12 N, 1 m/s, no negative mass and the values given in
+    /// `docs/simulation.md`.
+    pub const fn new() -> Self {
         Self {
             servo_hz: 4000.0,
             force_n: 12.0,
             velocity_mm_s: 1000.0,
             acceleration_hz: 20.0,
-            least_mass_kg: f64::NEG_INFINITY,
+            least_mass_kg: 0.0,
             damping_n_s_per_mm: 0.002,
             wall_n_per_mm: 10.0,
             wall_n_s_per_mm: 0.01,
@@ -82,9 +91,9 @@ impl Default for ServoSettings {
 
 /// What is played: a table, its direction rule and the identified range.
 #[derive(Debug, Clone, Copy)]
-pub struct Rendering<'a> {
+pub struct Rendering<'a, R = f64> {
     /// The parameters.
-    pub table: TableView<'a>,
+    pub table: TableView<'a, R>,
     /// How the branches for the two directions are combined.
     pub rule: Direction,
     /// Identified range of positions, mm.
@@ -119,20 +128,70 @@ pub enum ServoState {
 
 /// A servo with its filters, direction state and totals.
 #[derive(Debug, Clone)]
-pub struct Servo {
+pub struct Servo<R = f64> {
     settings: ServoSettings,
-    acceleration_filter: LowPass,
+    constants: Constants<R>,
+    acceleration_filter: LowPass<R>,
     /// Extracts the slow part of the force; the rest is roughness.
-    force_filter: LowPass,
+    force_filter: DirectForm<R>,
     state: ServoState,
-    direction: DirectionState,
+    direction: DirectionState<R>,
     forwards: bool,
     /// Slew-limited force before the ramp, N.
-    slewed_n: f64,
+    slewed_n: R,
     /// Force commanded in the current period, N.
-    held_n: f64,
+    held_n: R,
     clamping: bool,
-    tally: Tally,
+    tally: Tally<R>,
+}
+
+/// The settings in the servo's precision.
+#[derive(Debug, Clone, Copy)]
+struct Constants<R> {
+    force_n: R,
+    velocity_mm_s: R,
+    least_mass_kg: R,
+    damping_n_s_per_mm: R,
+    wall_n_per_mm: R,
+    wall_n_s_per_mm: R,
+    overtravel_mm: R,
+    jump_mm: R,
+    /// Largest change of force in a servo period, N.
+    slew_n: R,
+    servo_hz: R,
+    ramp_s: R,
+}
+
+impl<R: Real> Constants<R> {
+    const ZERO: Self = Self {
+        force_n: R::ZERO,
+        velocity_mm_s: R::ZERO,
+        least_mass_kg: R::ZERO,
+        damping_n_s_per_mm: R::ZERO,
+        wall_n_per_mm: R::ZERO,
+        wall_n_s_per_mm: R::ZERO,
+        overtravel_mm: R::ZERO,
+        jump_mm: R::ZERO,
+        slew_n: R::ZERO,
+        servo_hz: R::ZERO,
+        ramp_s: R::ZERO,
+    };
+
+    fn of(settings: &ServoSettings) -> Self {
+        Self {
+            force_n: R::of(settings.force_n),
+            velocity_mm_s: R::of(settings.velocity_mm_s),
+            least_mass_kg: R::of(settings.least_mass_kg),
+            damping_n_s_per_mm: R::of(settings.damping_n_s_per_mm),
+            wall_n_per_mm: R::of(settings.wall_n_per_mm),
+            wall_n_s_per_mm: R::of(settings.wall_n_s_per_mm),
+            overtravel_mm: R::of(settings.overtravel_mm),
+            jump_mm: R::of(settings.jump_mm),
+            slew_n: R::of(settings.slew_n_s / settings.servo_hz),
+            servo_hz: R::of(settings.servo_hz),
+            ramp_s: R::of(settings.ramp_s),
+        }
+    }
 }
 
 /// A clamp ends when the force falls below this fraction of the limit, so that noise
@@ -141,20 +200,31 @@ const CLAMP_END_FRACTION: f64 = 0.9;
 /// Force above this frequency counts as roughness, Hz.
 const ROUGHNESS_HZ: f64 = 20.0;
 
-impl Servo {
+impl<R: Real> Servo<R> {
     /// A servo at zero force.
     pub fn new(settings: ServoSettings) -> Self {
         Self {
-            settings,
+            constants: Constants::of(&settings),
             acceleration_filter: LowPass::new(settings.acceleration_hz, settings.servo_hz),
-            force_filter: LowPass::new(ROUGHNESS_HZ, settings.servo_hz),
+            force_filter: DirectForm::new(ROUGHNESS_HZ, settings.servo_hz),
+            ..Self::limp_with(settings)
+        }
+    }
+
+    /// A servo that is not ready to play before [`Servo::start`], for constants.
+    pub(crate) const fn limp_with(settings: ServoSettings) -> Self {
+        Self {
+            settings,
+            constants: Constants::ZERO,
+            acceleration_filter: LowPass::ZERO,
+            force_filter: DirectForm::ZERO,
             state: ServoState::Limp,
-            direction: DirectionState::default(),
+            direction: DirectionState::new(),
             forwards: true,
-            slewed_n: 0.0,
-            held_n: 0.0,
+            slewed_n: R::ZERO,
+            held_n: R::ZERO,
             clamping: false,
-            tally: Tally::default(),
+            tally: Tally::new(),
         }
     }
 
@@ -164,12 +234,12 @@ impl Servo {
     }
 
     /// The commanded force, N.
-    pub fn held_n(&self) -> f64 {
+    pub fn held_n(&self) -> R {
         self.held_n
     }
 
     /// Totals since the last start.
-    pub fn tally(&self) -> Tally {
+    pub fn tally(&self) -> Tally<R> {
         self.tally
     }
 
@@ -181,7 +251,7 @@ impl Servo {
 
     /// Sets the force to zero at once. Totals and a trip are kept.
     pub fn limp(&mut self) {
-        self.held_n = 0.0;
+        self.held_n = R::ZERO;
         if self.state == ServoState::Playing {
             self.state = ServoState::Limp;
         }
@@ -189,56 +259,56 @@ impl Servo {
 
     /// Sets the force to zero and latches this state until the next start.
     pub fn trip(&mut self, cause: Trip) {
-        self.held_n = 0.0;
+        self.held_n = R::ZERO;
         self.state = ServoState::Tripped(cause);
     }
 
     /// Runs one servo period and returns the force to hold until the next, N.
-    pub fn step(&mut self, what: &Rendering<'_>, motion: Motion) -> f64 {
+    pub fn step(&mut self, what: &Rendering<'_, R>, motion: Motion<R>) -> R {
         if self.state != ServoState::Playing {
-            return 0.0;
+            return R::ZERO;
         }
-        if let Some(cause) = self.trip_cause(what, motion) {
+        let range_mm = what.range_mm.map(R::of);
+        if let Some(cause) = self.trip_cause(range_mm, motion) {
             self.trip(cause);
-            return 0.0;
+            return R::ZERO;
         }
-        self.tally
-            .add_motion(self.held_n, motion.x_mm, what.range_mm);
+        self.tally.add_motion(self.held_n, motion.x_mm, range_mm);
 
-        let settings = self.settings;
-        let wanted_n = self.table_n(what, motion) + settings.damping_n_s_per_mm * motion.v_mm_s;
+        let constants = self.constants;
+        let wanted_n =
+            self.table_n(what, range_mm, motion) + constants.damping_n_s_per_mm * motion.v_mm_s;
         if !wanted_n.is_finite() {
             self.trip(Trip::NotANumber);
-            return 0.0;
+            return R::ZERO;
         }
         let ramp = self.ramp();
         self.count_clamps(wanted_n * ramp);
         // The target of the slew limit is clamped as well. Otherwise a force far
         // above the limit would delay the return to a smaller one.
-        let change_n = within(wanted_n, settings.force_n) - self.slewed_n;
-        let allowed_n = within(change_n, settings.slew_n_s / settings.servo_hz);
+        let change_n = within(wanted_n, constants.force_n) - self.slewed_n;
+        let allowed_n = within(change_n, constants.slew_n);
         self.tally.slewed += u64::from(allowed_n != change_n);
         self.slewed_n += allowed_n;
-        self.held_n = within(self.slewed_n * ramp, settings.force_n);
+        self.held_n = within(self.slewed_n * ramp, constants.force_n);
         let rough_n = self.held_n - self.force_filter.step(self.held_n);
         self.tally.add_force(self.held_n, rough_n);
         self.held_n
     }
 
-    fn trip_cause(&self, what: &Rendering<'_>, motion: Motion) -> Option<Trip> {
+    fn trip_cause(&self, [low, high]: [R; 2], motion: Motion<R>) -> Option<Trip> {
         let Motion { x_mm, v_mm_s, .. } = motion;
         if !motion.is_finite() {
             return Some(Trip::NotANumber);
         }
-        let beyond = self.settings.overtravel_mm;
-        let [low, high] = what.range_mm;
+        let beyond = self.constants.overtravel_mm;
         // With `<=` a limit that is NaN trips.
-        let slow_enough = libm::fabs(v_mm_s) <= self.settings.velocity_mm_s;
+        let slow_enough = v_mm_s.abs() <= self.constants.velocity_mm_s;
         let near_enough = x_mm >= low - beyond && x_mm <= high + beyond;
         let steady = self
             .tally
             .last_x_mm()
-            .is_none_or(|last| libm::fabs(x_mm - last) <= self.settings.jump_mm);
+            .is_none_or(|last| (x_mm - last).abs() <= self.constants.jump_mm);
         if !slow_enough {
             Some(Trip::Velocity)
         } else if !near_enough {
@@ -252,75 +322,68 @@ impl Servo {
 
     /// The table's force, N: inside the identified range at the actual position,
     /// outside at the edge plus the wall.
-    fn table_n(&mut self, what: &Rendering<'_>, motion: Motion) -> f64 {
-        let settings = self.settings;
+    fn table_n(&mut self, what: &Rendering<'_, R>, [low, high]: [R; 2], motion: Motion<R>) -> R {
+        let constants = self.constants;
         let a_m_s2 = self.acceleration_filter.step(motion.a_m_s2);
         let z = self.direction.step(what.rule, motion);
-        if (z >= 0.0) != self.forwards {
+        if (z >= R::ZERO) != self.forwards {
             self.forwards = !self.forwards;
             self.tally.switches += 1;
         }
 
-        let [low, high] = what.range_mm;
         let x_mm = motion.x_mm.max(low).min(high);
-        let v_mm_s = within(motion.v_mm_s, what.trained_mm_s);
-        let force_at = |a_m_s2| {
-            let limited = Motion {
-                x_mm,
-                v_mm_s,
-                a_m_s2,
-            };
-            predict::force_n(&what.table, z, limited)
-        };
-        // The force is linear in a, so the difference is the table's mass.
-        let without_mass_n = force_at(0.0);
-        let mut mass_kg = force_at(1.0) - without_mass_n;
-        if mass_kg < settings.least_mass_kg {
+        let v_mm_s = within(motion.v_mm_s, R::of(what.trained_mm_s));
+        let (mut mass_kg, without_mass_n) = predict::mass_and_force(&what.table, z, x_mm, v_mm_s);
+        if mass_kg < constants.least_mass_kg {
             self.tally.mass_held += 1;
-            mass_kg = settings.least_mass_kg;
+            mass_kg = constants.least_mass_kg;
         }
         let mut force_n = without_mass_n + mass_kg * a_m_s2;
         let beyond_mm = motion.x_mm - x_mm;
-        if beyond_mm != 0.0 {
+        if beyond_mm != R::ZERO {
             let wall_n =
-                settings.wall_n_per_mm * beyond_mm + settings.wall_n_s_per_mm * motion.v_mm_s;
+                constants.wall_n_per_mm * beyond_mm + constants.wall_n_s_per_mm * motion.v_mm_s;
             // The wall only pushes back into the range; its damping never pulls.
-            force_n += if beyond_mm > 0.0 {
-                wall_n.max(0.0)
+            force_n += if beyond_mm > R::ZERO {
+                wall_n.max(R::ZERO)
             } else {
-                wall_n.min(0.0)
+                wall_n.min(R::ZERO)
             };
         }
         force_n
     }
 
     /// Ramp factor of the current period: half a cosine from 0 to 1.
-    fn ramp(&self) -> f64 {
-        let since_s = self.tally.steps as f64 / self.settings.servo_hz;
-        if since_s >= self.settings.ramp_s {
-            return 1.0;
+    fn ramp(&self) -> R {
+        let Constants {
+            servo_hz, ramp_s, ..
+        } = self.constants;
+        let since_s = R::of(self.tally.steps as f64) / servo_hz;
+        if since_s < ramp_s {
+            let fraction = since_s / ramp_s;
+            R::HALF - R::HALF * (R::of(core::f64::consts::PI) * fraction).cos()
+        } else {
+            R::ONE
         }
-        let fraction = since_s / self.settings.ramp_s;
-        0.5 - 0.5 * libm::cos(core::f64::consts::PI * fraction)
     }
 
-    fn count_clamps(&mut self, force_n: f64) {
-        let size = libm::fabs(force_n);
-        if size > self.settings.force_n {
+    fn count_clamps(&mut self, force_n: R) {
+        let size = force_n.abs();
+        if size > self.constants.force_n {
             self.tally.clamps += u64::from(!self.clamping);
             self.clamping = true;
-        } else if size < CLAMP_END_FRACTION * self.settings.force_n {
+        } else if size < R::of(CLAMP_END_FRACTION) * self.constants.force_n {
             self.clamping = false;
         }
     }
 }
 
 /// `value` limited to [−limit, limit]; 0 if the limit is not finite and positive.
-fn within(value: f64, limit: f64) -> f64 {
-    if limit.is_finite() && limit > 0.0 {
-        value.clamp(-limit, limit)
+fn within<R: Real>(value: R, limit: R) -> R {
+    if limit.is_finite() && limit > R::ZERO {
+        clamp(value, limit)
     } else {
-        0.0
+        R::ZERO
     }
 }
 

@@ -3,6 +3,7 @@
 use super::{Drive, Measured, Options};
 use study_base::rng::Stream;
 use study_haptics::plant::{DT_S, Hand, HandParameters, Parameters, Probe, Target};
+use study_wire::estimate::Estimator;
 use study_wire::predict::Motion;
 
 /// Corner frequency of the one-pole low-pass of the speed, Hz.
@@ -236,39 +237,24 @@ impl ProbeContact {
 #[derive(Debug)]
 struct Sensor {
     encoder_mm: f64,
-    x_mm: f64,
-    v_mm_s: f64,
-    servo_hz: f64,
-    /// Smoothing factor of the one-pole low-pass.
-    smoothing: f64,
+    estimator: Estimator,
 }
 
 impl Sensor {
     fn new(x_mm: f64, probe: &Probe, servo_hz: f64) -> Self {
         let mut sensor = Self {
             encoder_mm: probe.encoder_mm,
-            x_mm: 0.0,
-            v_mm_s: 0.0,
-            servo_hz,
-            smoothing: 1.0 - libm::exp(-std::f64::consts::TAU * SPEED_HZ / servo_hz),
+            estimator: Estimator::new(SPEED_HZ, servo_hz),
         };
-        sensor.x_mm = sensor.quantised(x_mm);
+        sensor.read(Motion::at_rest(x_mm));
         sensor
     }
 
     fn read(&mut self, motion: Motion) -> Motion {
-        let x_mm = self.quantised(motion.x_mm);
-        let difference = (x_mm - self.x_mm) * self.servo_hz;
-        self.v_mm_s += self.smoothing * (difference - self.v_mm_s);
-        self.x_mm = x_mm;
+        let x_mm = (motion.x_mm / self.encoder_mm).round() * self.encoder_mm;
         Motion {
-            x_mm,
-            v_mm_s: self.v_mm_s,
             a_m_s2: motion.a_m_s2,
+            ..self.estimator.step(x_mm)
         }
-    }
-
-    fn quantised(&self, x_mm: f64) -> f64 {
-        (x_mm / self.encoder_mm).round() * self.encoder_mm
     }
 }

@@ -2,10 +2,10 @@
 
 use super::table::{Bounds, Refused, require};
 use super::{Drive, Handler, Measured, Out};
-
 use crate::message::{
     DeviceState, Fault, PathBegin, PathChunk, RecordedPoint, Refusal, UploadCrc, fixed,
 };
+use crate::real::Real;
 
 /// Largest deviation from the path, mm.
 const MAX_DEVIATION_MM: f64 = 5.0;
@@ -32,12 +32,12 @@ pub(super) struct PathBuffer<const N: usize> {
 }
 
 impl<const N: usize> PathBuffer<N> {
-    pub(super) fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self {
             x_nm: [0; N],
             len: 0,
             begin: None,
-            crc: UploadCrc::default(),
+            crc: UploadCrc::new(),
             bad: None,
             from_mm: None,
             approach: 0,
@@ -175,13 +175,13 @@ impl<const N: usize> PathBuffer<N> {
     }
 }
 
-impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
+impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R> {
     /// Runs one servo period of a recording.
-    pub(super) fn follow(&mut self, measured: Measured, now_ms: u32, out: Out<'_>) -> Drive {
+    pub(super) fn follow(&mut self, measured: Measured<R>, now_ms: u32, out: Out<'_>) -> Drive<R> {
         let servo_hz = self.profile.servo.servo_hz;
-        let motion = measured.motion;
+        let motion = measured.motion.f64();
         let bounds = self.profile.bounds;
-        let finite = motion.is_finite() && measured.force_n.is_none_or(f64::is_finite);
+        let finite = motion.is_finite() && measured.force_n.is_none_or(R::is_finite);
         // With `<=` a limit that is NaN trips.
         let slow = libm::fabs(motion.v_mm_s) <= self.path.velocity_mm_s();
         let inside = motion.x_mm >= bounds.stroke_mm[0] && motion.x_mm <= bounds.stroke_mm[1];
@@ -196,7 +196,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         };
         if fault != Fault::None {
             self.trip(fault, now_ms, out);
-            return Drive::Force(0.0);
+            return Drive::Force(R::ZERO);
         }
         if self.state == DeviceState::Ramp {
             if let Some((x_mm, v_mm_s)) = self.path.approach(motion.x_mm, servo_hz) {
@@ -209,7 +209,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         let Some((x_mm, v_mm_s, reached)) = self.path.along(servo_hz) else {
             self.end();
             self.supervise(now_ms, out);
-            return Drive::Force(0.0);
+            return Drive::Force(R::ZERO);
         };
         self.path.ticks = self.path.ticks.saturating_add(1);
         self.run.ticks = self.path.ticks;
@@ -234,15 +234,15 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
         v_mm_s: f64,
         now_ms: u32,
         out: Out<'_>,
-    ) -> Drive {
+    ) -> Drive<R> {
         if libm::fabs(x_mm - actual_mm) > MAX_DEVIATION_MM {
             self.trip(Fault::Following, now_ms, out);
-            return Drive::Force(0.0);
+            return Drive::Force(R::ZERO);
         }
         Drive::Position {
-            x_mm,
-            v_mm_s,
-            force_n: self.limit_n,
+            x_mm: R::of(x_mm),
+            v_mm_s: R::of(v_mm_s),
+            force_n: R::of(self.limit_n),
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::message::{
     Constants, DeviceState, EventKind, Fault, Header, Heartbeat, Hello, Identity, Loaded, MINOR,
     Outcome, Play, Pulse, Record, Refusal, Reply, Request, Stop, VERSION, WireError, kind,
 };
+use crate::real::Real;
 use crate::servo::{Servo, ServoSettings};
 use core::num::NonZeroU32;
 
@@ -19,7 +20,7 @@ const COMMIT_MS: u16 = 50;
 /// Success, or a refusal and its detail.
 type Answer = Result<(), Refused>;
 
-impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
+impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R> {
     /// Handles the body of a valid frame.
     pub(super) fn handle(&mut self, body: &[u8], now_ms: u32, out: Out<'_>) {
         let Some(header) = Header::read(body) else {
@@ -195,7 +196,7 @@ impl<const NODES: usize, const POINTS: usize> Handler<NODES, POINTS> {
             velocity_mm_s,
             ..self.profile.servo
         });
-        self.run = Run::default();
+        self.run = Run::new();
         self.limit_n = limit_n;
         self.loaded = loaded;
         self.crc = crc;

@@ -2,11 +2,12 @@
 
 use super::Measured;
 use crate::message::{FixedVec, Recorded, RecordedPoint, Reply, Telemetry, TelemetrySample, fixed};
+use crate::real::Real;
 use crate::servo::tally::Tally;
 use core::num::NonZeroU32;
 
 /// The current or last playback or recording.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Run {
     /// The host's number for it; 0 before the first.
     pub(super) playback: u32,
@@ -27,9 +28,8 @@ pub(super) struct Run {
 }
 
 /// Samples collected for the next message.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 enum Batch {
-    #[default]
     None,
     Telemetry(FixedVec<TelemetrySample, { Telemetry::MAX_SAMPLES }>),
     Recorded(FixedVec<RecordedPoint, { Recorded::MAX_POINTS }>),
@@ -40,6 +40,21 @@ enum Batch {
 const MAX_WAIT_S: f64 = 0.025;
 
 impl Run {
+    /// None so far.
+    pub(super) const fn new() -> Self {
+        Self {
+            playback: 0,
+            ticks: 0,
+            samples: 0,
+            since_ms: 0,
+            longest_ms: None,
+            every: None,
+            max_wait: 0,
+            batch: Batch::None,
+            newest_ms: 0,
+        }
+    }
+
     /// A new playback.
     pub(super) fn play(
         playback: u32,
@@ -54,7 +69,7 @@ impl Run {
             longest_ms: Some(longest_ms),
             every,
             max_wait: (MAX_WAIT_S * servo_hz) as u32,
-            ..Self::default()
+            ..Self::new()
         }
     }
 
@@ -63,7 +78,7 @@ impl Run {
         Self {
             playback,
             since_ms: now_ms,
-            ..Self::default()
+            ..Self::new()
         }
     }
 
@@ -74,7 +89,12 @@ impl Run {
     }
 
     /// Counts a servo period of a playback; true if the batch should be sent.
-    pub(super) fn add_period(&mut self, measured: Measured, force_n: f64, now_ms: u32) -> bool {
+    pub(super) fn add_period<R: Real>(
+        &mut self,
+        measured: Measured<R>,
+        force_n: R,
+        now_ms: u32,
+    ) -> bool {
         let tick = self.ticks;
         self.ticks = self.ticks.saturating_add(1);
         let Some(every) = self.every else {
@@ -116,7 +136,7 @@ impl Run {
     }
 
     /// Takes the batch as a message, if it has samples.
-    pub(super) fn take(&mut self, tally: &Tally) -> Option<Reply> {
+    pub(super) fn take<R: Real>(&mut self, tally: &Tally<R>) -> Option<Reply> {
         let first = |count: usize| self.samples.saturating_sub(count as u32);
         let reply = match &self.batch {
             Batch::Telemetry(samples) if !samples.as_slice().is_empty() => {

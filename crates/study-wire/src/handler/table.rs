@@ -3,6 +3,7 @@
 use crate::certificate::{Certificate, Certifier, Range};
 use crate::message::{Node, Refusal, TableBegin, TableChunk, UploadCrc};
 use crate::predict::{BranchView, Lookup, TableView};
+use crate::real::Real;
 
 /// Limits of a device for every upload.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,34 +20,90 @@ pub struct Bounds {
     pub stroke_mm: [f64; 2],
 }
 
+/// Nodes of a table in the servo's precision.
+#[derive(Debug, Clone)]
+struct Nodes<const N: usize, R> {
+    x_mm: [R; N],
+    /// m, b, k, F0 for v > 0; below for v < 0.
+    positive: [[R; N]; 4],
+    negative: [[R; N]; 4],
+}
+
+impl<const N: usize, R: Real> Nodes<N, R> {
+    const fn new() -> Self {
+        Self {
+            x_mm: [R::ZERO; N],
+            positive: [[R::ZERO; N]; 4],
+            negative: [[R::ZERO; N]; 4],
+        }
+    }
+
+    fn set(&mut self, at: usize, node: &Node) {
+        self.x_mm[at] = R::of(node.x_mm);
+        for parameter in 0..4 {
+            self.positive[parameter][at] = R::of(node.positive[parameter]);
+            self.negative[parameter][at] = R::of(node.negative[parameter]);
+        }
+    }
+
+    /// Whether node `at` has only finite numbers and lies behind the one before it.
+    fn evaluable(&self, at: usize) -> bool {
+        let ascends = at == 0 || self.x_mm[at - 1] < self.x_mm[at];
+        let mut parameters = self.positive.iter().chain(&self.negative);
+        ascends && self.x_mm[at].is_finite() && parameters.all(|values| values[at].is_finite())
+    }
+
+    /// The first `len` nodes.
+    fn view(&self, len: usize, lookup: Lookup) -> TableView<'_, R> {
+        TableView {
+            x_mm: &self.x_mm[..len],
+            positive: branch(&self.positive, len),
+            negative: branch(&self.negative, len),
+            lookup,
+        }
+    }
+
+    /// Removes the first of `len` nodes.
+    fn shift(&mut self, len: usize) {
+        self.x_mm.copy_within(1..len, 0);
+        for values in self.positive.iter_mut().chain(&mut self.negative) {
+            values.copy_within(1..len, 0);
+        }
+    }
+}
+
+/// Nodes that are kept in double precision: those of a chunk that wait to be judged, the
+/// last one that was, and the one before.
+const WINDOW: usize = TableChunk::MAX_NODES + 2;
+
 /// A table with a capacity of `N` nodes.
 #[derive(Debug, Clone)]
-pub(super) struct TableBuffer<const N: usize> {
-    x_mm: [f64; N],
-    /// m, b, k, F0 for v > 0; below for v < 0.
-    positive: [[f64; N]; 4],
-    negative: [[f64; N]; 4],
+pub(super) struct TableBuffer<const N: usize, R> {
+    nodes: Nodes<N, R>,
     len: usize,
     pub(super) begin: Option<TableBegin>,
     crc: UploadCrc,
     /// The first node that is not finite or does not ascend.
     bad: Option<usize>,
+    /// The last nodes as they were received; the certificate is that of the host.
+    window: Nodes<WINDOW, f64>,
+    window_len: usize,
     certifier: Certifier,
 }
 
 /// A refusal and its detail, see [`Refusal`].
 pub(super) type Refused = (Refusal, u32);
 
-impl<const N: usize> TableBuffer<N> {
-    pub(super) fn new() -> Self {
+impl<const N: usize, R: Real> TableBuffer<N, R> {
+    pub(super) const fn new() -> Self {
         Self {
-            x_mm: [0.0; N],
-            positive: [[0.0; N]; 4],
-            negative: [[0.0; N]; 4],
+            nodes: Nodes::new(),
             len: 0,
             begin: None,
-            crc: UploadCrc::default(),
+            crc: UploadCrc::new(),
             bad: None,
+            window: Nodes::new(),
+            window_len: 0,
             certifier: Certifier::new(),
         }
     }
@@ -65,6 +122,7 @@ impl<const N: usize> TableBuffer<N> {
         self.begin = None;
         self.len = 0;
         self.bad = None;
+        self.window_len = 0;
         self.certifier = Certifier::new();
     }
 
@@ -84,16 +142,18 @@ impl<const N: usize> TableBuffer<N> {
     }
 
     fn add(&mut self, node: &Node) {
-        let at = self.len;
-        let ascends = at == 0 || self.x_mm[at - 1] < node.x_mm;
-        let mut parameters = node.positive.iter().chain(&node.negative);
-        if !(ascends && node.x_mm.is_finite() && parameters.all(|value| value.is_finite())) {
-            self.bad = self.bad.or(Some(at));
+        if self.window_len == WINDOW {
+            let first = self.len - WINDOW;
+            while self.certifier.judged() < first + 2 && self.judge() {}
+            self.window.shift(WINDOW);
+            self.window_len -= 1;
         }
-        self.x_mm[at] = node.x_mm;
-        for parameter in 0..4 {
-            self.positive[parameter][at] = node.positive[parameter];
-            self.negative[parameter][at] = node.negative[parameter];
+        let at = self.window_len;
+        self.window.set(at, node);
+        self.window_len += 1;
+        self.nodes.set(self.len, node);
+        if !(self.window.evaluable(at) && self.nodes.evaluable(self.len)) {
+            self.bad = self.bad.or(Some(self.len));
         }
         self.crc.node(node);
         self.len += 1;
@@ -103,14 +163,9 @@ impl<const N: usize> TableBuffer<N> {
         self.crc.value()
     }
 
-    pub(super) fn view(&self) -> TableView<'_> {
+    pub(super) fn view(&self) -> TableView<'_, R> {
         let lookup = self.begin.map(|begin| begin.lookup);
-        TableView {
-            x_mm: &self.x_mm[..self.len],
-            positive: branch(&self.positive, self.len),
-            negative: branch(&self.negative, self.len),
-            lookup: lookup.unwrap_or(Lookup::Linear),
-        }
+        self.nodes.view(self.len, lookup.unwrap_or(Lookup::Linear))
     }
 
     /// Received nodes whose certificate has not been computed.
@@ -134,9 +189,14 @@ impl<const N: usize> TableBuffer<N> {
         if !known || self.bad.is_some() {
             return false;
         }
-        let mut certifier = self.certifier;
-        certifier.step(&self.view(), nodes, begin.direction, range(&begin));
-        self.certifier = certifier;
+        let view = self.window.view(self.window_len, begin.lookup);
+        let at = at + self.window_len - self.len;
+        let range = Range {
+            x_mm: begin.range_mm,
+            v_mm_s: begin.trained_mm_s,
+        };
+        self.certifier
+            .step(&view, at, nodes, begin.direction, range);
         true
     }
 
@@ -151,7 +211,7 @@ impl<const N: usize> TableBuffer<N> {
         self.check_evaluable(&begin)?;
         check_limits(&begin, bounds)?;
         while self.judge() {}
-        let certificate = self.certifier.finish(&self.view(), range(&begin));
+        let certificate = self.certifier.finish();
         match (check_physics(&certificate, bounds), begin.uncertified_n) {
             (Ok(()), _) => Ok(begin.force_n),
             (Err(_), Some(cap_n)) => Ok(cap_n.min(begin.force_n)),
@@ -179,14 +239,7 @@ impl<const N: usize> TableBuffer<N> {
     }
 }
 
-fn range(begin: &TableBegin) -> Range {
-    Range {
-        x_mm: begin.range_mm,
-        v_mm_s: begin.trained_mm_s,
-    }
-}
-
-fn branch<const N: usize>(parameters: &[[f64; N]; 4], len: usize) -> BranchView<'_> {
+fn branch<const N: usize, R>(parameters: &[[R; N]; 4], len: usize) -> BranchView<'_, R> {
     let [m, b, k, f0] = parameters;
     BranchView {
         m_kg: &m[..len],
@@ -240,6 +293,7 @@ fn positive(value: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::certificate::certify;
     use crate::message::FixedVec;
     use crate::predict::Direction;
     use proptest::prelude::*;
@@ -274,7 +328,7 @@ mod tests {
                 velocity_mm_s: 100.0,
                 uncertified_n: None,
             };
-            let mut table = TableBuffer::<16>::new();
+            let mut table = TableBuffer::<16, f64>::new();
             table.begin(&begin).unwrap();
             for (at, (some, judged)) in nodes.chunks(3).zip(judged).enumerate() {
                 let first = (3 * at) as u16;
@@ -285,9 +339,9 @@ mod tests {
             }
             while table.judge() {}
             prop_assert_eq!(table.unjudged(), 0);
-            let view = table.view();
-            let whole = crate::certificate::certify(&view, begin.direction, range(&begin));
-            prop_assert_eq!(table.certifier.finish(&view, range(&begin)), whole);
+            let range = Range { x_mm: begin.range_mm, v_mm_s: begin.trained_mm_s };
+            let whole = certify(&table.view(), begin.direction, range);
+            prop_assert_eq!(table.certifier.finish(), whole);
         }
     }
 }

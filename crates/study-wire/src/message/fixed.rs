@@ -3,8 +3,10 @@
 //! Each function names its unit. Values that do not fit saturate, and NaN becomes 0,
 //! so that a reader always gets a finite number.
 
+use crate::real::Real;
+
 /// mm to nm: ±2147 mm.
-pub fn nm(x_mm: f64) -> i32 {
+pub fn nm<R: Real>(x_mm: R) -> i32 {
     scaled(x_mm, 1e6)
 }
 
@@ -14,7 +16,7 @@ pub fn from_nm(nm: i32) -> f64 {
 }
 
 /// mm/s to µm/s: ±2,147,483 mm/s.
-pub fn um_s(v_mm_s: f64) -> i32 {
+pub fn um_s<R: Real>(v_mm_s: R) -> i32 {
     scaled(v_mm_s, 1e3)
 }
 
@@ -24,7 +26,7 @@ pub fn from_um_s(um_s: i32) -> f64 {
 }
 
 /// N to µN: ±2147 N.
-pub fn un(force_n: f64) -> i32 {
+pub fn un<R: Real>(force_n: R) -> i32 {
     scaled(force_n, 1e6)
 }
 
@@ -34,7 +36,7 @@ pub fn from_un(un: i32) -> f64 {
 }
 
 /// m/s² to µm/s²: ±2147 m/s².
-pub fn um_s2(a_m_s2: f64) -> i32 {
+pub fn um_s2<R: Real>(a_m_s2: R) -> i32 {
     scaled(a_m_s2, 1e6)
 }
 
@@ -43,9 +45,9 @@ pub fn from_um_s2(um_s2: i32) -> f64 {
     f64::from(um_s2) / 1e6
 }
 
-fn scaled(value: f64, scale: f64) -> i32 {
-    // `as` saturates and turns NaN into 0; i32::MIN is reserved for "no sensor".
-    (libm::round(value * scale) as i32).max(-i32::MAX)
+fn scaled<R: Real>(value: R, scale: f64) -> i32 {
+    // i32::MIN is reserved for "no sensor".
+    (value * R::of(scale)).round().to_i32().max(-i32::MAX)
 }
 
 #[cfg(test)]

@@ -274,13 +274,14 @@ impl Name {
     pub const LEN: usize = 32;
 
     /// As much of `text` as fits, cut between characters.
-    pub fn new(text: &str) -> Self {
-        let mut end = text.len().min(Self::LEN);
-        while !text.is_char_boundary(end) {
+    pub const fn new(text: &str) -> Self {
+        let mut end = text.len();
+        while end > Self::LEN || !text.is_char_boundary(end) {
             end -= 1;
         }
         let mut bytes = [0; Self::LEN];
-        bytes[..end].copy_from_slice(&text.as_bytes()[..end]);
+        let (used, _) = bytes.split_at_mut(end);
+        used.copy_from_slice(text.as_bytes().split_at(end).0);
         Self(bytes)
     }
 

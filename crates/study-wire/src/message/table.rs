@@ -118,6 +118,11 @@ impl TableChunk {
 pub struct UploadCrc(RunningCrc);
 
 impl UploadCrc {
+    /// Of nothing so far.
+    pub const fn new() -> Self {
+        Self(RunningCrc::new())
+    }
+
     /// Starts with TABLE_BEGIN.
     pub fn of_table(begin: &TableBegin) -> Self {
         Self::default().with(begin)

@@ -1,8 +1,11 @@
 //! Totals of a playback: energy, strokes, counts.
 
-/// Totals since the start of a playback.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Tally {
+use crate::real::Real;
+
+/// Totals since the start of a playback, in double precision also with a servo in single
+/// precision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tally<R = f64> {
     /// Servo periods.
     pub steps: u64,
     /// Energy that the hand has put in, J.
@@ -23,7 +26,7 @@ pub struct Tally {
     pub peak_force_n: f64,
     /// Sum of the squares of the force above 20 Hz, N².
     rough_sum: f64,
-    last_x_mm: Option<f64>,
+    last_x_mm: Option<R>,
     last_end: Option<End>,
 }
 
@@ -37,7 +40,31 @@ enum End {
 /// Fraction of the range at either side that counts as its end.
 const END_FRACTION: f64 = 0.2;
 
-impl Tally {
+impl<R: Real> Default for Tally<R> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<R: Real> Tally<R> {
+    /// Before the first servo period.
+    pub const fn new() -> Self {
+        Self {
+            steps: 0,
+            energy_j: 0.0,
+            least_energy_j: 0.0,
+            switches: 0,
+            clamps: 0,
+            slewed: 0,
+            mass_held: 0,
+            strokes: 0,
+            peak_force_n: 0.0,
+            rough_sum: 0.0,
+            last_x_mm: None,
+            last_end: None,
+        }
+    }
+
     /// Mean square of the force above 20 Hz, N², a measure of roughness.
     pub fn rough_n2(&self) -> f64 {
         if self.steps == 0 {
@@ -48,27 +75,27 @@ impl Tally {
     }
 
     /// Position in the previous period, mm.
-    pub(super) fn last_x_mm(&self) -> Option<f64> {
+    pub(super) fn last_x_mm(&self) -> Option<R> {
         self.last_x_mm
     }
 
     /// Adds a servo period with the force `held_n`, of which `rough_n` is above 20 Hz.
-    pub(super) fn add_force(&mut self, held_n: f64, rough_n: f64) {
+    pub(super) fn add_force(&mut self, held_n: R, rough_n: R) {
         self.steps += 1;
-        self.peak_force_n = self.peak_force_n.max(libm::fabs(held_n));
-        self.rough_sum += rough_n * rough_n;
+        self.peak_force_n = self.peak_force_n.max(held_n.abs().f64());
+        self.rough_sum += (rough_n * rough_n).f64();
     }
 
     /// Adds the motion to `x_mm` in a period with the force `held_n`.
-    pub(super) fn add_motion(&mut self, held_n: f64, x_mm: f64, range_mm: [f64; 2]) {
+    pub(super) fn add_motion(&mut self, held_n: R, x_mm: R, range_mm: [R; 2]) {
         if let Some(last) = self.last_x_mm {
-            self.energy_j += held_n * (x_mm - last) * 1e-3;
+            self.energy_j += (held_n * (x_mm - last) * R::of(1e-3)).f64();
             self.least_energy_j = self.least_energy_j.min(self.energy_j);
         }
         self.last_x_mm = Some(x_mm);
 
         let [low, high] = range_mm;
-        let zone = END_FRACTION * (high - low);
+        let zone = R::of(END_FRACTION) * (high - low);
         let end = if x_mm <= low + zone {
             End::Low
         } else if x_mm >= high - zone {
@@ -89,7 +116,7 @@ mod tests {
 
     /// Full strokes of four seconds of 15 mm ± `amplitude` at 1 Hz over 0 … 30 mm.
     fn strokes(centre_mm: f64, amplitude_mm: f64) -> u32 {
-        let mut tally = Tally::default();
+        let mut tally = Tally::new();
         for i in 0..16_000 {
             let phase = core::f64::consts::TAU * f64::from(i) / 4000.0;
             let x_mm = centre_mm + amplitude_mm * libm::sin(phase);
@@ -109,7 +136,7 @@ mod tests {
     /// 2 N over 10 mm, 3 N over the same distance back, 3 N forwards again.
     #[test]
     fn energy_counts_from_the_hand_and_its_smallest_value_is_kept() {
-        let mut tally = Tally::default();
+        let mut tally = Tally::new();
         for (held_n, x_mm) in [(0.0, 10.0), (2.0, 20.0), (3.0, 10.0), (3.0, 20.0)] {
             tally.add_motion(held_n, x_mm, [0.0, 30.0]);
         }

@@ -1,0 +1,135 @@
+//! The servo in single precision against the one in double precision.
+
+use study_base::rng::Stream;
+use study_haptics::model::Realization;
+use study_haptics::plant::{Hand, HandParameters};
+use study_wire::predict::{BranchView, Motion, TableView};
+use study_wire::servo::{Rendering, Servo, ServoSettings, ServoState};
+
+/// Largest difference that is allowed, N.
+const MOST_N: f64 = 1e-3;
+
+/// A table in single precision.
+struct Single {
+    x_mm: Vec<f32>,
+    parameters: Vec<Vec<f32>>,
+}
+
+impl Single {
+    fn of(table: &TableView<'_>) -> Self {
+        let single = |values: &[f64]| values.iter().map(|value| *value as f32).collect();
+        let of = |branch: &BranchView<'_>| {
+            [
+                branch.m_kg,
+                branch.b_n_s_per_mm,
+                branch.k_n_per_mm,
+                branch.f0_n,
+            ]
+            .map(single)
+        };
+        Self {
+            x_mm: single(table.x_mm),
+            parameters: [of(&table.positive), of(&table.negative)].concat(),
+        }
+    }
+
+    fn branch(&self, first: usize) -> BranchView<'_, f32> {
+        BranchView {
+            m_kg: &self.parameters[first],
+            b_n_s_per_mm: &self.parameters[first + 1],
+            k_n_per_mm: &self.parameters[first + 2],
+            f0_n: &self.parameters[first + 3],
+        }
+    }
+}
+
+/// Largest difference of the forces of both servos, N, while a hand of this vigour plays
+/// the table for half a minute against the force in double precision.
+fn difference_n(realization: &Realization, seed: u64, servo_hz: f64) -> f64 {
+    let hand = HandParameters::default();
+    let settings = ServoSettings {
+        servo_hz,
+        force_n: 12.0,
+        least_mass_kg: -hand.slider_kg,
+        ..ServoSettings::default()
+    };
+    let table = realization.table();
+    let copy = Single::of(&table);
+    let range_mm = realization.trained.x_mm;
+    let double = Rendering {
+        table,
+        rule: realization.direction,
+        range_mm,
+        trained_mm_s: realization.trained.v_mm_s,
+    };
+    let single = Rendering {
+        table: TableView {
+            x_mm: &copy.x_mm,
+            positive: copy.branch(0),
+            negative: copy.branch(4),
+            lookup: double.table.lookup,
+        },
+        rule: double.rule,
+        range_mm,
+        trained_mm_s: double.trained_mm_s,
+    };
+    let mut servos = (Servo::<f64>::new(settings), Servo::<f32>::new(settings));
+    servos.0.start();
+    servos.1.start();
+    let [low, high] = range_mm;
+    let margin = (0.1 * (high - low)).min(1.5);
+    let ends = [low + margin, high - margin];
+    let mut hand = Hand::new(hand, ends, Stream::new(seed, &["precision"]));
+    let mut worst_n = 0.0_f64;
+    let mut force_n = 0.0;
+    for _ in 0..(30.0 * servo_hz) as usize {
+        // What an encoder of 1 µm reads: both see the same single-precision numbers.
+        let motion = hand.step(force_n, 1.0 / servo_hz);
+        let [x, v, a] = [motion.x_mm, motion.v_mm_s, motion.a_m_s2]
+            .map(|value| ((value * 1e3).round() / 1e3) as f32);
+        force_n = servos.0.step(
+            &double,
+            Motion {
+                x_mm: f64::from(x),
+                v_mm_s: f64::from(v),
+                a_m_s2: f64::from(a),
+            },
+        );
+        let other_n = servos.1.step(
+            &single,
+            Motion {
+                x_mm: x,
+                v_mm_s: v,
+                a_m_s2: a,
+            },
+        );
+        assert_eq!(servos.0.state(), ServoState::Playing);
+        assert_eq!(servos.1.state(), ServoState::Playing);
+        worst_n = worst_n.max((f64::from(other_n) - force_n).abs());
+    }
+    let (double, single) = (servos.0.tally(), servos.1.tally());
+    assert!(double.peak_force_n > 1.0, "nothing was felt: {double:?}");
+    assert_eq!(double.strokes, single.strokes);
+    assert!(
+        (double.energy_j - single.energy_j).abs() < 1e-4,
+        "{double:?} {single:?}"
+    );
+    worst_n
+}
+
+/// A floor or nearest look-up jumps at a node. There both precisions may be one period
+/// apart, which the shipped tables, with the same single-precision positions, never are.
+#[test]
+fn single_precision_renders_every_shipped_table_within_1_mn() {
+    let mut worst = (0.0, String::new());
+    for (name, realization) in super::shipped::shipped() {
+        for (seed, servo_hz) in [(1, 4000.0), (2, 1000.0), (3, 10_000.0)] {
+            let error_n = difference_n(&realization, seed, servo_hz);
+            assert!(error_n < MOST_N, "{name} at {servo_hz} Hz: {error_n} N");
+            if error_n > worst.0 {
+                worst = (error_n, format!("{name} at {servo_hz} Hz"));
+            }
+        }
+    }
+    eprintln!("largest difference {:.4} mN: {}", 1e3 * worst.0, worst.1);
+}
