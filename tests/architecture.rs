@@ -43,7 +43,11 @@ const CRATES: [(&str, &[&str], &[&str]); 7] = [
 
 /// Module → the modules that it may import. `study-base` is open to all who depend
 /// on it; `study-stats` and `study-wire` count as one module each.
+<<<<<<< HEAD
 const IMPORTS: &[(&str, &[&str])] = &[
+=======
+const IMPORTS: [(&str, &[&str]); 23] = [
+>>>>>>> c938553 (power: simulated studies decided as the analysis does; examples/golden)
     ("diagnostic", &["text"]),
     ("procedure", &["stats"]),
     ("schedule", &["protocol"]),
@@ -52,6 +56,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("store", &["protocol", "outcome"]),
     ("rendering", &["protocol", "outcome", "wire"]),
     ("analyze", &["protocol", "outcome", "stats"]),
+    ("power", &["protocol", "outcome", "analyze", "stats"]),
     ("model", &["wire"]),
     ("trajectory", &["wire"]),
     ("plant", &["trajectory", "wire"]),

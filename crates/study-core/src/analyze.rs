@@ -11,6 +11,7 @@
 
 mod adjusted;
 mod cells;
+mod deciding;
 mod describe;
 mod design;
 mod deviation;
@@ -38,6 +39,7 @@ mod warning;
 mod warnings;
 
 pub use crate::protocol::Exclusion;
+pub use deciding::{Deciding, deciding};
 pub use design::Design;
 pub use deviation::{Deviation, PreregisteredRule, deviations};
 pub use effects::MAX_PAIRED;

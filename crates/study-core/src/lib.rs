@@ -8,6 +8,7 @@
 
 pub mod analyze;
 pub mod outcome;
+pub mod power;
 pub mod procedure;
 pub mod protocol;
 pub mod rendering;

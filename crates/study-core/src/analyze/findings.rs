@@ -376,6 +376,23 @@ pub(super) fn findings(
     (found, pairs)
 }
 
+/// The finding about VAF alone, from the statistics that decide it.
+pub(super) fn of_vaf(
+    cells: &Cells<'_>,
+    design: Design,
+    rules: &Rules,
+    values: &Values,
+) -> Option<Finding> {
+    vaf::vaf(&Facts {
+        cells,
+        design,
+        rules,
+        values,
+        pairs: Vec::new(),
+        ranked: Vec::new(),
+    })
+}
+
 /// The numbers of a finding, as `finding/ID/*`.
 fn put(f: &Finding, values: &mut Values) {
     let why = f.reason().unwrap_or("the question has no such number");

@@ -53,6 +53,11 @@ enum NotFitted {
     Estimation(#[from] LmmError),
 }
 
+/// Only `lmm_vaf_crossed`.
+pub(super) fn only_crossed(cells: &Cells<'_>, values: &mut Values) {
+    vaf_crossed(cells, &Data::of(cells), values);
+}
+
 pub(super) fn mixed(cells: &Cells<'_>, values: &mut Values) {
     let data = Data::of(cells);
     model(cells, &data, values);

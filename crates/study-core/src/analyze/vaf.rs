@@ -19,6 +19,7 @@ use study_stats::correlation::{
 };
 use study_stats::describe::{is_constant, mean};
 use study_stats::friedman::page;
+use study_stats::lmm::LmmError;
 use study_stats::paired::one_sample;
 use study_stats::permutation::{self, Statistic};
 use study_stats::regression::slope;
@@ -47,11 +48,8 @@ pub(super) fn against_vaf(
     if adjusted.design.is_complete() {
         values.copy_group("corr/", "corr_adjusted/");
     } else {
-        match &adjusted.means {
-            Ok(means) => {
-                let of = |m: usize| Some(means[adjusted.models.binary_search(&m).ok()?]);
-                Points::of(cells, &models, of).correlate("corr_adjusted", rules, values);
-            }
+        match adjusted_points(cells, adjusted, &models) {
+            Ok(points) => points.correlate("corr_adjusted", rules, values),
             Err(why) => values
                 .group("corr_adjusted/pearson", why.to_string())
                 .none(&["r", "p_t"]),
@@ -61,6 +59,29 @@ pub(super) fn against_vaf(
     trend(&table, &vaf, values);
     resampled(&table, &vaf, rules, values);
     within(cells, &models, values);
+}
+
+/// Of `corr_adjusted/*` what the finding rests on.
+pub(super) fn deciding(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules, values: &mut Values) {
+    let mut models = cells.tested();
+    models.retain(|&m| cells.vaf[m].is_some());
+    match adjusted_points(cells, adjusted, &models) {
+        Ok(p) => pearson_of("corr_adjusted", &p.vaf, &p.means, rules, values),
+        Err(why) => values
+            .group("corr_adjusted/pearson", why.to_string())
+            .none(&["r", "p_t"]),
+    }
+}
+
+/// The realizations with the means on which verdicts rest.
+fn adjusted_points<'a>(
+    cells: &'a Cells<'_>,
+    adjusted: &Adjusted,
+    models: &[usize],
+) -> Result<Points<'a>, LmmError> {
+    let means = adjusted.means.as_ref().map_err(|why| *why)?;
+    let of = |m: usize| Some(means[adjusted.models.binary_search(&m).ok()?]);
+    Ok(Points::of(cells, models, of))
 }
 
 /// The realizations as points.
@@ -100,18 +121,42 @@ fn correlations(
     rules: &Rules,
     values: &mut Values,
 ) {
-    let n = x.len();
-    values.group(group, "").put("n_models", n as f64);
-    let why = if n < 3 {
+    pearson_of(group, x, y, rules, values);
+    let why = undefined(x);
+    // Two points always lie on a line.
+    let enough = |r: Option<f64>| r.filter(|_| x.len() >= 3);
+    values
+        .group(format!("{group}/spearman"), why)
+        .maybe("rho", enough(spearman(x, y)));
+    values
+        .group(format!("{group}/kendall"), why)
+        .maybe("tau_b", enough(kendall(x, y)));
+    for (name, statistic) in [
+        ("spearman", Statistic::Spearman),
+        ("kendall", Statistic::Kendall),
+    ] {
+        permuted(&format!("{group}/{name}"), statistic, x, y, rules, values);
+    }
+    leave_one_out(&format!("{group}/leave_one_out"), x, y, names, why, values);
+}
+
+/// Why there is no correlation, if there is none.
+fn undefined(x: &[f64]) -> &'static str {
+    if x.len() < 3 {
         FEW
     } else if is_constant(x) {
         "all realizations have the same VAF"
     } else {
         "all realizations have the same mean rating"
-    };
-    // Two points always lie on a line.
-    let enough = |r: Option<f64>| r.filter(|_| n >= 3);
-    let r = enough(pearson(x, y));
+    }
+}
+
+/// Pearson's correlation with its tests: what decides whether VAF predicts the rating.
+fn pearson_of(group: &str, x: &[f64], y: &[f64], rules: &Rules, values: &mut Values) {
+    let n = x.len();
+    values.group(group, "").put("n_models", n as f64);
+    let why = undefined(x);
+    let r = pearson(x, y).filter(|_| n >= 3);
     let line = "the means lie on a line";
     let mut g = values.group(format!("{group}/pearson"), why);
     g.maybe("r", r);
@@ -130,31 +175,35 @@ fn correlations(
     g.put_or("ci95_hi", interval.map(|i| i.1), no_interval);
     let bf10 = r.and_then(|r| correlation_bf10(r, n));
     g.put_or("bf10", bf10, if r.is_some() { line } else { why });
-    let rho = enough(spearman(x, y));
-    values
-        .group(format!("{group}/spearman"), why)
-        .maybe("rho", rho);
-    values
-        .group(format!("{group}/kendall"), why)
-        .maybe("tau_b", enough(kendall(x, y)));
-    for (name, statistic) in [
-        ("pearson", Statistic::Pearson),
-        ("spearman", Statistic::Spearman),
-        ("kendall", Statistic::Kendall),
-    ] {
-        let mut draws = Draws::new(rules.seed, "permutation");
-        let test = permutation::test(statistic, x, y, &mut draws);
-        let mut g = values.group(format!("{group}/{name}"), why);
-        let kind = if n > permutation::MAX_EXACT {
-            "monte_carlo"
-        } else {
-            "exact"
-        };
-        g.maybe(&format!("p_{kind}_two_sided"), test.map(|t| t.two_sided));
-        g.maybe(&format!("p_{kind}_greater"), test.map(|t| t.greater));
-        g.maybe("smallest_p_two_sided", test.map(|t| t.smallest));
-    }
-    leave_one_out(&format!("{group}/leave_one_out"), x, y, names, why, values);
+    permuted(
+        &format!("{group}/pearson"),
+        Statistic::Pearson,
+        x,
+        y,
+        rules,
+        values,
+    );
+}
+
+fn permuted(
+    group: &str,
+    statistic: Statistic,
+    x: &[f64],
+    y: &[f64],
+    rules: &Rules,
+    values: &mut Values,
+) {
+    let mut draws = Draws::new(rules.seed, "permutation");
+    let test = permutation::test(statistic, x, y, &mut draws);
+    let mut g = values.group(group, undefined(x));
+    let kind = if x.len() > permutation::MAX_EXACT {
+        "monte_carlo"
+    } else {
+        "exact"
+    };
+    g.maybe(&format!("p_{kind}_two_sided"), test.map(|t| t.two_sided));
+    g.maybe(&format!("p_{kind}_greater"), test.map(|t| t.greater));
+    g.maybe("smallest_p_two_sided", test.map(|t| t.smallest));
 }
 
 /// The correlations without each realization in turn.

@@ -23,9 +23,9 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// Prepares decisions of [`super::test`] at the level `alpha`. `None` for fewer than
-    /// three x or if they do not vary.
-    pub fn new(x: &[f64], alpha: f64) -> Option<Self> {
+    /// Prepares decisions of [`super::test`]: p ≤ `alpha`, which keeps the level, or, unless
+    /// `inclusive`, p < `alpha`. `None` for fewer than three x or if they do not vary.
+    pub fn new(x: &[f64], alpha: f64, inclusive: bool) -> Option<Self> {
         let x = standardized(x)?;
         let exact = x.len() <= MAX_EXACT;
         let all = if exact {
@@ -33,11 +33,14 @@ impl Decision {
         } else {
             DRAWS + 1
         };
-        // The smallest count whose share is not below α; the observed order counts too.
+        // The smallest count whose share is too large; the observed order counts too.
         let from = (alpha * all as f64) as u64;
-        let limit = (from.saturating_sub(1)..=from + 1)
-            .find(|&count| count as f64 / all as f64 >= alpha)
-            .unwrap_or(from + 1);
+        let too_many = |count: &u64| {
+            let p = *count as f64 / all as f64;
+            p > alpha || (p >= alpha && !inclusive)
+        };
+        let near = from.saturating_sub(1)..=from + 1;
+        let limit = near.into_iter().find(too_many).unwrap_or(from + 2);
         let mut found = Self {
             limit,
             halves: Vec::new(),
@@ -65,7 +68,7 @@ impl Decision {
         Some(found)
     }
 
-    /// Whether the two-sided p of x and y is below α. `random` is used only above
+    /// Whether the two-sided p of x and y is small enough. `random` is used only above
     /// [`MAX_EXACT`] pairs, and less of it than [`super::test`] uses. `None` if y does not
     /// vary or is not as long as x.
     pub fn rejects(&self, y: &[f64], random: &mut impl RandomSource) -> Option<bool> {
@@ -187,7 +190,7 @@ mod tests {
     #[test]
     fn decisions_are_those_of_the_test() {
         let mut noise = SplitMix64::new(5);
-        let mut rejected = 0;
+        let (mut rejected, mut apart) = (0, 0);
         for round in 0..240 {
             let n = 3 + round % 9;
             let x: Vec<f64> = (0..n)
@@ -207,12 +210,18 @@ mod tests {
             let alpha = [0.05, 0.01, 0.25][round / 9 % 3];
             let seeded = || SplitMix64::new(round as u64);
             let whole = test(Statistic::Pearson, &x, &y, &mut seeded());
-            let decision = Decision::new(&x, alpha).unwrap();
-            let found = decision.rejects(&y, &mut seeded());
-            assert_eq!(found, whole.map(|t| t.two_sided < alpha), "{x:?} {y:?}");
-            rejected += u32::from(found == Some(true));
+            let decided = |inclusive| {
+                let decision = Decision::new(&x, alpha, inclusive).unwrap();
+                decision.rejects(&y, &mut seeded())
+            };
+            let (with, without) = (decided(true), decided(false));
+            assert_eq!(with, whole.map(|t| t.two_sided <= alpha), "{x:?} {y:?}");
+            assert_eq!(without, whole.map(|t| t.two_sided < alpha), "{x:?} {y:?}");
+            rejected += u32::from(with == Some(true));
+            apart += u32::from(with != without);
         }
         assert!((40..200).contains(&rejected), "{rejected}");
-        assert!(Decision::new(&[1.0; 4], 0.05).is_none());
+        assert!(apart > 0);
+        assert!(Decision::new(&[1.0; 4], 0.05, true).is_none());
     }
 }

@@ -1,0 +1,199 @@
+//! How many participants, realizations and repetitions does a study need?
+//!
+//! A simulated study is a table of drawn numbers: rating = mean + level of the participant
+//! + (slope + own slope)·x + scatter of the realization + interaction + residual, cut to
+//! the scale of the question, where x is VAF, standardised over the realizations. It is
+//! decided by the tests of [`crate::analyze`]: by their closed forms if the table is
+//! complete, else by the analysis itself. `docs/power.md` explains every number.
+//!
+//! Results are reproducible: the numbers of study k of a cell follow from the seed, the
+//! text of the cell and k, never from threads, shards or other cells. Counts are integers;
+//! sums run over chunks of [`CHUNK`] studies in order.
+
+mod decide;
+mod draw;
+mod expected;
+mod pilot;
+mod tally;
+
+pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
+pub use pilot::{Parameters, Pilot, PilotError};
+pub use tally::{CellResult, Chunk, Tally, TestResult, merge, run_chunk};
+
+use study_stats::power::covariate::Spread;
+
+/// Version of the numbers: the same seed gives other numbers under another version.
+pub const STREAM: &str = "power/1";
+
+/// Studies of a chunk, the unit of work.
+pub const CHUNK: u64 = 1000;
+
+/// A design to simulate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Cell {
+    /// Realizations that are tested, with a VAF.
+    pub realizations: usize,
+    /// Repetitions of each.
+    pub repetitions: usize,
+    /// Participants.
+    pub participants: usize,
+}
+
+impl Cell {
+    /// The text that names its random streams.
+    pub fn canonical(&self) -> String {
+        format!(
+            "participants={} realizations={} repetitions={}",
+            self.participants, self.realizations, self.repetitions
+        )
+    }
+
+    /// Ratings of a complete study.
+    pub fn ratings(&self) -> usize {
+        self.participants * self.realizations * self.repetitions
+    }
+}
+
+/// A distribution of what is below an ordered scale.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Link {
+    /// A normal residual.
+    Probit,
+    /// A standard logistic residual.
+    Logit,
+}
+
+/// How a number becomes a rating.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Scale {
+    /// It is the rating.
+    Continuous,
+    /// It is rounded to the nearest whole number from the first to the second.
+    Rounded(i64, i64),
+    /// The rating is `from` plus the number of thresholds below it.
+    Ordinal {
+        /// Distribution of the residual.
+        link: Link,
+        /// Rising.
+        thresholds: Vec<f64>,
+        /// Lowest rating.
+        from: i64,
+    },
+}
+
+/// Where the VAF of a simulated study come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Vaf {
+    /// Those of the protocol; for other numbers of realizations as [`Vaf::Spread`].
+    Listed,
+    /// Even steps over the range of the protocol's.
+    Spread,
+    /// Drawn from a normal distribution in each study.
+    Drawn,
+}
+
+/// What is assumed of the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assumptions {
+    /// Rating points per standard deviation of VAF (with denominator q).
+    pub slope: f64,
+    /// The smallest slope of interest.
+    pub smallest: Option<f64>,
+    /// Mean rating, on the latent scale.
+    pub mean: f64,
+    /// Standard deviations of the random effects.
+    pub spread: Spread,
+    /// How numbers become ratings.
+    pub scale: Scale,
+    /// Where VAF come from.
+    pub vaf: Vaf,
+    /// Share of participants that are lost whole.
+    pub dropout: f64,
+    /// Share of trials without a rating.
+    pub missing: f64,
+}
+
+/// A test whose power is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Test {
+    /// The verdict of the analysis on VAF.
+    Verdict,
+    /// Pearson's r over realizations, t test.
+    Pearson,
+    /// The permutation test of Pearson's r: p ≤ α. (The verdict wants p < α.)
+    Permutation,
+    /// The slope of the crossed mixed model.
+    Crossed,
+    /// Friedman's test of the realizations, Iman and Davenport's F.
+    Friedman,
+    /// The slope of the crossed ordinal model, by its likelihood ratio.
+    Clmm,
+}
+
+impl Test {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Verdict,
+        Self::Pearson,
+        Self::Permutation,
+        Self::Crossed,
+        Self::Friedman,
+        Self::Clmm,
+    ];
+
+    /// Its name in protocols and `--json`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Verdict => "verdict",
+            Self::Pearson => "pearson",
+            Self::Permutation => "permutation",
+            Self::Crossed => "crossed",
+            Self::Friedman => "friedman",
+            Self::Clmm => "clmm",
+        }
+    }
+}
+
+/// What a simulation needs besides its cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The assumptions.
+    pub assumptions: Assumptions,
+    /// The pilot whose uncertainty each study draws from, in place of the assumed slope
+    /// and standard deviations.
+    pub pilot: Option<Pilot>,
+    /// VAF of the protocol's tested realizations.
+    pub listed: Vec<f64>,
+    /// The tests.
+    pub tests: Vec<Test>,
+    /// Level of significance, two-sided.
+    pub alpha: f64,
+    /// Seed of all numbers.
+    pub seed: u64,
+    /// Studies of each cell.
+    pub studies: u64,
+}
+
+impl Settings {
+    /// The VAF of so many realizations; empty if each study draws them.
+    pub fn vaf(&self, realizations: usize) -> Vec<f64> {
+        match self.assumptions.vaf {
+            Vaf::Drawn => Vec::new(),
+            Vaf::Listed if realizations == self.listed.len() => self.listed.clone(),
+            Vaf::Listed | Vaf::Spread => {
+                let ends = |f: fn(f64, f64) -> f64| self.listed.iter().copied().reduce(f);
+                let (low, high) = match (ends(f64::min), ends(f64::max)) {
+                    (Some(low), Some(high)) if low < high => (low, high),
+                    _ => (0.0, 1.0),
+                };
+                let step = (high - low) / (realizations.max(2) - 1) as f64;
+                (0..realizations).map(|i| low + step * i as f64).collect()
+            }
+        }
+    }
+
+    /// Chunks of a cell.
+    pub fn chunks(&self) -> u64 {
+        self.studies.div_ceil(CHUNK)
+    }
+}

@@ -1,0 +1,408 @@
+//! Counting what studies show: chunks, and the results of a cell.
+
+use super::decide::Judge;
+use super::draw::{Drawn, Draws};
+use super::{CHUNK, Cell, STREAM, Settings, Test};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use study_base::rng::Stream;
+use study_stats::proportion::clopper_pearson;
+
+/// What a test shows in some studies.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tally {
+    /// Studies in which it rejects.
+    pub rejected: u64,
+    /// Of these, how many have the wrong sign.
+    pub wrong_sign: u64,
+    /// Sum over these of |estimate| over |slope|.
+    pub exaggeration: f64,
+    /// Studies in which it is undefined, by reason.
+    pub undefined: BTreeMap<String, u64>,
+}
+
+/// The studies of a chunk.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Chunk {
+    /// Number of studies.
+    pub studies: u64,
+    /// By test, in the order of the settings.
+    pub tests: Vec<Tally>,
+    /// Studies in which the crossed model has no scatter of the realizations.
+    pub boundary: u64,
+    /// Studies with an interval of the slope.
+    pub intervals: u64,
+    /// Sum of their half-widths.
+    pub half_width: f64,
+}
+
+/// Simulates a chunk of a cell: studies `index` · [`CHUNK`] to the next, or to the last one.
+pub fn run_chunk(settings: &Settings, cell: &Cell, index: u64) -> Chunk {
+    let text = cell.canonical();
+    let mut study = Drawn::new(cell, settings);
+    let mut judge = Judge::new(settings, *cell);
+    let mut world = settings.assumptions.clone();
+    let mut chunk = Chunk {
+        tests: vec![Tally::default(); settings.tests.len()],
+        ..Chunk::default()
+    };
+    let from = index * CHUNK;
+    for k in from..settings.studies.min(from + CHUNK) {
+        let number = k.to_string();
+        let mut draws = Draws(Stream::new(settings.seed, &[STREAM, &text, &number]));
+        if let Some(pilot) = &settings.pilot {
+            pilot.parameters(settings.seed, k).apply(&mut world);
+        }
+        study.draw(cell, &world, &mut draws);
+        let permutations = || {
+            let path = [STREAM, &text, &number, "permutations"];
+            Draws(Stream::new(settings.seed, &path))
+        };
+        let outcome = judge.decide(&study, &permutations);
+        chunk.studies += 1;
+        chunk.boundary += u64::from(outcome.boundary);
+        if let Some(half_width) = outcome.half_width {
+            chunk.intervals += 1;
+            chunk.half_width += half_width;
+        }
+        for (tally, test) in chunk.tests.iter_mut().zip(outcome.tests) {
+            match test {
+                Ok(true) => {
+                    tally.rejected += 1;
+                    if let Some(slope) = outcome.slope.filter(|_| world.slope != 0.0) {
+                        tally.wrong_sign += u64::from(slope * world.slope < 0.0);
+                        tally.exaggeration += slope.abs() / world.slope.abs();
+                    }
+                }
+                Ok(false) => {}
+                Err(why) => *tally.undefined.entry(why.to_owned()).or_default() += 1,
+            }
+        }
+    }
+    chunk
+}
+
+/// The power of a test in a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TestResult {
+    /// The test.
+    pub test: Test,
+    /// Studies in which it rejects.
+    pub rejected: u64,
+    /// Studies. Those in which it is undefined count as not rejected.
+    pub studies: u64,
+    /// Rejected over studies.
+    pub power: f64,
+    /// Exact 95 % interval (Clopper and Pearson).
+    pub interval: (f64, f64),
+    /// Monte Carlo standard error.
+    pub mcse: f64,
+    /// Share of rejections with the wrong sign; `None` without rejections or slope.
+    pub type_s: Option<f64>,
+    /// Mean of |estimate| over |slope| among rejections.
+    pub type_m: Option<f64>,
+    /// Studies in which it is undefined, by reason.
+    pub undefined: BTreeMap<String, u64>,
+}
+
+impl TestResult {
+    /// Share of the studies in which it is undefined.
+    pub fn undefined_share(&self) -> f64 {
+        self.undefined.values().sum::<u64>() as f64 / self.studies.max(1) as f64
+    }
+
+    /// Rejected over the studies in which it is defined.
+    pub fn power_if_defined(&self) -> Option<f64> {
+        let defined = self.studies - self.undefined.values().sum::<u64>();
+        (defined > 0).then(|| self.rejected as f64 / defined as f64)
+    }
+}
+
+/// The results of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellResult {
+    /// The design.
+    pub cell: Cell,
+    /// By test, in the order of the settings.
+    pub tests: Vec<TestResult>,
+    /// Share of the studies in which the crossed model has no scatter of the realizations.
+    pub boundary_share: f64,
+    /// Mean half-width of the interval of the slope over realizations.
+    pub half_width: Option<f64>,
+}
+
+/// The results of a cell from its chunks, in their order. `None` without studies.
+pub fn merge<'c>(
+    settings: &Settings,
+    cell: Cell,
+    chunks: impl IntoIterator<Item = &'c Chunk>,
+) -> Option<CellResult> {
+    let mut all = Chunk {
+        tests: vec![Tally::default(); settings.tests.len()],
+        ..Chunk::default()
+    };
+    for chunk in chunks {
+        all.studies += chunk.studies;
+        all.boundary += chunk.boundary;
+        all.intervals += chunk.intervals;
+        all.half_width += chunk.half_width;
+        for (sum, own) in all.tests.iter_mut().zip(&chunk.tests) {
+            sum.rejected += own.rejected;
+            sum.wrong_sign += own.wrong_sign;
+            sum.exaggeration += own.exaggeration;
+            for (why, n) in &own.undefined {
+                *sum.undefined.entry(why.clone()).or_default() += n;
+            }
+        }
+    }
+    let n = all.studies;
+    let has_slope = settings.assumptions.slope != 0.0 || settings.pilot.is_some();
+    let result = |(test, tally): (&Test, Tally)| {
+        let power = tally.rejected as f64 / n as f64;
+        let among = |sum: f64| {
+            let some = tally.rejected > 0 && has_slope;
+            some.then(|| sum / tally.rejected as f64)
+        };
+        Some(TestResult {
+            test: *test,
+            rejected: tally.rejected,
+            studies: n,
+            power,
+            interval: clopper_pearson(tally.rejected, n, 0.95)?,
+            mcse: (power * (1.0 - power) / n as f64).sqrt(),
+            type_s: among(tally.wrong_sign as f64),
+            type_m: among(tally.exaggeration),
+            undefined: tally.undefined,
+        })
+    };
+    Some(CellResult {
+        cell,
+        tests: (settings.tests.iter().zip(all.tests))
+            .map(result)
+            .collect::<Option<_>>()?,
+        boundary_share: all.boundary as f64 / n as f64,
+        half_width: (all.intervals > 0).then(|| all.half_width / all.intervals as f64),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Assumptions, Link, Scale, Vaf, closed};
+    use super::*;
+    use study_stats::power::covariate::Spread;
+
+    const PAPER: [f64; 5] = [0.7672, 0.7851, 0.7904, 0.7798, 0.7425];
+    const UNEVEN_8: [f64; 8] = [
+        0.6, 0.642_857, 0.685_714, 0.728_571, 0.771_429, 0.814_286, 0.857_143, 0.9,
+    ];
+    const ROUNDED: Scale = Scale::Rounded(1, 7);
+
+    fn settings(slope: f64, realization: f64, scale: Scale, listed: &[f64]) -> Settings {
+        Settings {
+            assumptions: Assumptions {
+                slope,
+                smallest: None,
+                mean: 4.0,
+                spread: Spread {
+                    subject: 0.6,
+                    realization,
+                    interaction: 0.4,
+                    residual: 0.8,
+                    slope: 0.0,
+                },
+                scale,
+                vaf: Vaf::Listed,
+                dropout: 0.0,
+                missing: 0.0,
+            },
+            pilot: None,
+            listed: listed.to_vec(),
+            tests: vec![Test::Pearson, Test::Permutation, Test::Crossed],
+            alpha: 0.05,
+            seed: 2007,
+            studies: 4000,
+        }
+    }
+
+    fn result(settings: &Settings, participants: usize, repetitions: usize) -> CellResult {
+        let cell = Cell {
+            realizations: settings.listed.len(),
+            repetitions,
+            participants,
+        };
+        let chunks: Vec<Chunk> = (0..settings.chunks())
+            .map(|i| run_chunk(settings, &cell, i))
+            .collect();
+        merge(settings, cell, &chunks).unwrap()
+    }
+
+    fn agrees(found: f64, expected: f64, mcse: f64, n: f64) {
+        let allowed = 4.0 * (mcse * mcse + found * (1.0 - found) / n).sqrt();
+        assert!((found - expected).abs() <= allowed, "{found}, {expected}");
+    }
+
+    /// Rates of 40 000 studies each, simulated in numpy with the closed forms of its own.
+    #[test]
+    fn rates_agree_with_an_independent_simulation() {
+        let thresholds = vec![0.5, 2.0, 3.2, 4.0, 4.5, 4.9];
+        let skewed = Scale::Ordinal {
+            link: Link::Probit,
+            thresholds,
+            from: 1,
+        };
+        let even_4 = [0.6, 0.7, 0.8, 0.9];
+        // slope, σ of the realizations, scale, VAF, n, R; rates of the three tests
+        type Case<'a> = (f64, f64, Scale, &'a [f64], usize, usize, [f64; 3], f64);
+        let cases: [Case<'_>; 6] = [
+            (
+                0.5,
+                0.3,
+                Scale::Continuous,
+                &PAPER,
+                10,
+                3,
+                [0.567_825, 0.553_55, 0.570_85],
+                0.169_125,
+            ),
+            (
+                0.5,
+                0.3,
+                Scale::Continuous,
+                &PAPER,
+                10,
+                1,
+                [0.460_075, 0.451_65, 0.479_275],
+                0.294_725,
+            ),
+            (
+                0.0,
+                0.5,
+                Scale::Continuous,
+                &PAPER,
+                10,
+                3,
+                [0.048_925, 0.0495, 0.0526],
+                0.056_875,
+            ),
+            (
+                1.0,
+                0.3,
+                Scale::Continuous,
+                &even_4,
+                20,
+                3,
+                [0.8409, 0.0, 0.8409],
+                0.157_55,
+            ),
+            (
+                0.5,
+                0.5,
+                ROUNDED,
+                &UNEVEN_8,
+                10,
+                3,
+                [0.595_275, 0.591_575, 0.595_275],
+                0.009_975,
+            ),
+            (
+                0.5,
+                0.4,
+                skewed,
+                &UNEVEN_8,
+                10,
+                3,
+                [0.746_475, 0.738_825, 0.7465],
+                0.027_925,
+            ),
+        ];
+        for (slope, realization, scale, vaf, n, r, rates, boundary) in cases {
+            let continuous = scale == Scale::Continuous;
+            let settings = settings(slope, realization, scale, vaf);
+            let found = result(&settings, n, r);
+            for (test, rate) in found.tests.iter().zip(rates) {
+                agrees(test.power, rate, 0.0025, 4000.0);
+            }
+            agrees(found.boundary_share, boundary, 0.0025, 4000.0);
+            if continuous {
+                let closed = closed(&settings, &found.cell).unwrap();
+                agrees(found.tests[0].power, closed.power, 0.0, 4000.0);
+                assert!((found.half_width.unwrap() / closed.half_width - 1.0).abs() < 0.03);
+                if let (Some(own), Some(m)) = (found.tests[0].type_m, closed.type_m) {
+                    assert!((own - m).abs() < 0.02, "{own}, {m}");
+                }
+            }
+        }
+    }
+
+    /// Standard logistic residuals; 40 000 studies in numpy.
+    #[test]
+    fn logit_thresholds_agree_with_an_independent_simulation() {
+        let scale = Scale::Ordinal {
+            link: Link::Logit,
+            thresholds: vec![-3.2, -2.0, -1.1, -0.2, 1.0, 2.4],
+            from: 1,
+        };
+        let mut settings = settings(0.8, 0.4, scale, &PAPER);
+        settings.assumptions.mean = 0.0;
+        settings.assumptions.spread.subject = 1.0;
+        settings.assumptions.spread.interaction = 0.5;
+        let found = result(&settings, 10, 3);
+        for (test, rate) in found.tests.iter().zip([0.625_75, 0.6058, 0.634_15]) {
+            agrees(test.power, rate, 0.0025, 4000.0);
+        }
+        agrees(found.boundary_share, 0.305_525, 0.0025, 4000.0);
+    }
+
+    /// With slopes of participants the size is the closed form's, not α.
+    #[test]
+    fn slopes_of_participants_raise_the_size() {
+        let mut settings = settings(0.0, 0.3, Scale::Continuous, &PAPER);
+        settings.assumptions.spread.slope = 0.4;
+        let found = result(&settings, 10, 3);
+        agrees(found.tests[0].power, 0.0882, 0.0014, 4000.0);
+        agrees(found.tests[2].power, 0.097_125, 0.0015, 4000.0);
+        assert_eq!(found.tests[0].type_s, None);
+    }
+
+    /// A study has the same numbers in every cell list, chunk and number of studies, and
+    /// the numbers do not depend on the slope.
+    #[test]
+    fn studies_are_numbered() {
+        let all = settings(0.5, 0.3, Scale::Continuous, &PAPER);
+        let fewer = Settings {
+            studies: 1500,
+            ..all.clone()
+        };
+        let cell = Cell {
+            realizations: 5,
+            repetitions: 3,
+            participants: 10,
+        };
+        assert_eq!(run_chunk(&all, &cell, 0), run_chunk(&fewer, &cell, 0));
+        assert_eq!(run_chunk(&fewer, &cell, 1).studies, 500);
+        assert_ne!(run_chunk(&all, &cell, 0), run_chunk(&all, &cell, 1));
+        // With common numbers power rises with the slope in every thousand studies.
+        let mut last = 0;
+        for slope in [0.3, 0.35, 0.4, 0.45, 0.5] {
+            let mut settings = all.clone();
+            settings.assumptions.slope = slope;
+            let rejected = run_chunk(&settings, &cell, 0).tests[0].rejected;
+            assert!(rejected > last, "{slope}");
+            last = rejected;
+        }
+        let text = serde_json::to_string(&run_chunk(&all, &cell, 0)).unwrap();
+        let read: Chunk = serde_json::from_str(&text).unwrap();
+        assert_eq!(read, run_chunk(&all, &cell, 0));
+    }
+
+    #[test]
+    fn undefined_studies_are_counted_with_their_reason() {
+        let mut settings = settings(0.5, 0.3, ROUNDED, &PAPER);
+        settings.assumptions.dropout = 0.9;
+        settings.studies = 200;
+        let found = result(&settings, 3, 3);
+        let test = &found.tests[2];
+        assert!(test.undefined_share() > 0.5 && test.undefined.len() == 1);
+        assert!(test.power_if_defined().unwrap() > test.power);
+    }
+}
