@@ -43,11 +43,7 @@ const CRATES: [(&str, &[&str], &[&str]); 7] = [
 
 /// Module → the modules that it may import. `study-base` is open to all who depend
 /// on it; `study-stats` and `study-wire` count as one module each.
-<<<<<<< HEAD
 const IMPORTS: &[(&str, &[&str])] = &[
-=======
-const IMPORTS: [(&str, &[&str]); 23] = [
->>>>>>> c938553 (power: simulated studies decided as the analysis does; examples/golden)
     ("diagnostic", &["text"]),
     ("procedure", &["stats"]),
     ("schedule", &["protocol"]),

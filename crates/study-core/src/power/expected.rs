@@ -107,7 +107,7 @@ pub fn reach(settings: &Settings, q: usize, r: usize, target: f64, most: usize) 
         participants: 2,
     };
     let design = design(settings, &cell);
-    let ceiling = design.expected(settings.alpha)?.ceiling;
+    let ceiling = design.ceiling(settings.alpha)?;
     if ceiling < target {
         return Some(Reach::Ceiling(ceiling));
     }

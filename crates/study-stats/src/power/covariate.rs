@@ -98,10 +98,8 @@ impl Design {
         s.realization.powi(2) + error
     }
 
-    /// Power and its relatives at the two-sided level `alpha`. `None` for fewer than three
-    /// realizations, no repetition or subject, a negative standard deviation, means without
-    /// scatter, or `alpha` outside (0, 1).
-    pub fn expected(&self, alpha: f64) -> Option<Expected> {
+    /// Whether power is defined, with the degrees of freedom and the critical t.
+    fn critical(&self, alpha: f64) -> Option<(f64, f64)> {
         let s = &self.spread;
         let sds = [s.subject, s.realization, s.interaction, s.residual, s.slope];
         let v = self.scatter();
@@ -114,59 +112,79 @@ impl Design {
         if !(valid && v > 0.0 && v.is_finite() && self.slope.is_finite()) {
             return None;
         }
+        let df = self.realizations as f64 - 2.0;
+        Some((df, t_quantile(1.0 - alpha / 2.0, df)?))
+    }
+
+    /// κ for a covariate with this Σx².
+    fn inflation(&self, sxx: f64) -> f64 {
+        self.subjects.map_or(1.0, |n| {
+            1.0 + sxx * self.spread.slope.powi(2) / (n as f64 * self.scatter())
+        })
+    }
+
+    /// The probability that Pearson's t test rejects at the two-sided level `alpha`. `None`
+    /// for fewer than three realizations, no repetition or subject, a negative standard
+    /// deviation, means without scatter, or `alpha` outside (0, 1).
+    pub fn power(&self, alpha: f64) -> Option<f64> {
+        let (df, critical) = self.critical(alpha)?;
+        let v = self.scatter();
+        let given = |sxx: f64| {
+            let root = self.inflation(sxx).sqrt();
+            rejected(self.slope * (sxx / v).sqrt() / root, df, critical / root)
+        };
         let q = self.realizations as f64;
-        let df = q - 2.0;
-        let critical = t_quantile(1.0 - alpha / 2.0, df)?;
-        let inflation = |sxx: f64| match self.subjects {
-            Some(n) => 1.0 + sxx * s.slope.powi(2) / (n as f64 * v),
-            None => 1.0,
-        };
-        // Power for a slope, averaged over Σx² if the covariate is drawn.
-        let power = |slope: f64| {
-            let given = |sxx: f64| {
-                let root = inflation(sxx).sqrt();
-                rejected(slope * (sxx / v).sqrt() / root, df, critical / root)
+        Some(match self.values {
+            Values::Fixed => given(q),
+            Values::Drawn => average(q - 1.0, |u| given((q - 1.0) * u * u)),
+        })
+    }
+
+    /// Power with endlessly many subjects, defined as [`Design::power`].
+    pub fn ceiling(&self, alpha: f64) -> Option<f64> {
+        self.critical(alpha)?;
+        if self.spread.realization > 0.0 {
+            let endless = Self {
+                subjects: None,
+                ..*self
             };
-            match self.values {
-                Values::Fixed => given(q),
-                Values::Drawn => average(q - 1.0, |u| given((q - 1.0) * u * u)),
-            }
-        };
+            endless.power(alpha)
+        } else {
+            Some(if self.slope == 0.0 { alpha } else { 1.0 })
+        }
+    }
+
+    /// Power and its relatives, defined as [`Design::power`].
+    pub fn expected(&self, alpha: f64) -> Option<Expected> {
+        let (df, critical) = self.critical(alpha)?;
+        let (s, v) = (&self.spread, self.scatter());
+        let q = self.realizations as f64;
         let rho = |v: f64| self.slope / (self.slope.powi(2) + v).sqrt();
-        let (ncp, kappa) = (self.slope * (q / v).sqrt(), inflation(q));
+        let (ncp, kappa) = (self.slope * (q / v).sqrt(), self.inflation(q));
         let errors = (self.slope != 0.0 && self.values == Values::Fixed)
             .then(|| errors(ncp.abs() / kappa.sqrt(), df, critical / kappa.sqrt()));
-        let ceiling = match self.subjects {
-            None => power(self.slope),
-            Some(_) if s.realization > 0.0 => {
-                let endless = Self {
-                    subjects: None,
-                    ..*self
-                };
-                endless.expected(alpha)?.power
-            }
-            Some(_) if self.slope != 0.0 => 1.0,
-            Some(_) => alpha,
+        let null = Self {
+            slope: 0.0,
+            ..*self
         };
-        let rho_true = rho(s.realization.powi(2));
         Some(Expected {
             df,
             ncp,
             slope_inflation: kappa,
-            power: power(self.slope),
-            size: power(0.0),
-            rho_true: finite(rho_true),
+            power: self.power(alpha)?,
+            size: null.power(alpha)?,
+            rho_true: finite(rho(s.realization.powi(2))),
             rho_observed: rho(v),
             reliability: (self.slope.powi(2) + s.realization.powi(2)) / (self.slope.powi(2) + v),
             half_width: critical * (v / q).sqrt() * mean_root(df),
-            ceiling,
+            ceiling: self.ceiling(alpha)?,
             type_s: errors.map(|e| e.0),
             type_m: errors.map(|e| e.1),
         })
     }
 
     /// The fewest subjects, of a range, with this power. `None` if no number of them has
-    /// it, or where [`Design::expected`] is not defined.
+    /// it, or where [`Design::power`] is not defined.
     pub fn least_subjects(
         &self,
         target: f64,
@@ -178,7 +196,7 @@ impl Design {
                 subjects: Some(n),
                 ..*self
             };
-            Some(design.expected(alpha)?.power >= target)
+            Some(design.power(alpha)? >= target)
         };
         if self.spread.slope > 0.0 {
             // Power can fall with n, as the size does.
@@ -200,9 +218,9 @@ impl Design {
     }
 
     /// The smallest slope with this power: a root in the slope. `None` unless
-    /// size < `target` < 1, or where [`Design::expected`] is not defined.
+    /// size < `target` < 1, or where [`Design::power`] is not defined.
     pub fn detectable_slope(&self, target: f64, alpha: f64) -> Option<f64> {
-        let power = |slope: f64| Some(Self { slope, ..*self }.expected(alpha)?.power);
+        let power = |slope: f64| Self { slope, ..*self }.power(alpha);
         if !(target < 1.0 && target > power(0.0)?) {
             return None;
         }
@@ -251,7 +269,7 @@ pub fn least_realizations(rho: f64, target: f64, alpha: f64, values: Values) -> 
     if !(rho != 0.0 && rho.abs() < 1.0 && alpha > 0.0 && target > alpha && target < 1.0) {
         return None;
     }
-    let power = |q: usize| Some(limit(rho, q, values).expected(alpha)?.power);
+    let power = |q: usize| limit(rho, q, values).power(alpha);
     let (mut low, mut high) = (2, 3);
     while power(high)? < target {
         (low, high) = (high, 2 * high);
