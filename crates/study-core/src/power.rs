@@ -1,9 +1,9 @@
 //! How many participants, realizations and repetitions does a study need?
 //!
-//! A simulated study is a table of drawn numbers: rating = mean + level of the participant
-//! + (slope + own slope)·x + scatter of the realization + interaction + residual, cut to
-//! the scale of the question, where x is VAF, standardised over the realizations. It is
-//! decided by the tests of [`crate::analyze`]: by their closed forms if the table is
+//! A simulated study is a table of drawn numbers. A rating is the sum of a mean, the level
+//! of the participant, (slope + own slope)·x, the scatter of the realization, an
+//! interaction and a residual, cut to the scale of the question; x is VAF, standardised
+//! over the realizations. The study is decided by the tests of [`crate::analyze`]: by their closed forms if the table is
 //! complete, else by the analysis itself. `docs/power.md` explains every number.
 //!
 //! Results are reproducible: the numbers of study k of a cell follow from the seed, the
