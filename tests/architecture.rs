@@ -108,11 +108,20 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("main", &["cli"]),
     // between the modules of study-wire
     ("certificate", &["predict"]),
-    ("message", &["frame", "predict"]),
-    ("servo", &["predict"]),
+    ("predict", &["real"]),
+    ("estimate", &["predict", "real"]),
+    ("message", &["frame", "predict", "real"]),
+    ("servo", &["predict", "real"]),
     (
         "handler",
-        &["certificate", "frame", "message", "predict", "servo"],
+        &[
+            "certificate",
+            "frame",
+            "message",
+            "predict",
+            "real",
+            "servo",
+        ],
     ),
     ("stats", &[]),
 ];
