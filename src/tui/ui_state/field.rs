@@ -16,7 +16,7 @@ pub enum Field {
     Rating {
         /// The chosen number.
         chosen: Option<i64>,
-        /// Digits that may be continued, such as the 1 of 10.
+        /// Digits typed so far.
         typed: String,
     },
     /// A slider.
@@ -187,17 +187,15 @@ fn ask_for(question: &Question, words: &Words) -> String {
 
 /// Why an answer is not accepted, as a request.
 fn in_words(why: AnswerError, words: &Words) -> String {
-    let number = |min: Option<f64>, max: Option<f64>| match (min, max) {
-        (Some(min), Some(max)) => {
-            Some(words.fill(Phrase::OffScale, &[("from", &min), ("to", &max)]))
-        }
-        (Some(min), None) => Some(words.fill(Phrase::RangeFrom, &[("from", &min)])),
-        (None, Some(max)) => Some(words.fill(Phrase::RangeTo, &[("to", &max)])),
-        (None, None) => None,
-    };
+    let both = |phrase, from: f64, to: f64| words.fill(phrase, &[("from", &from), ("to", &to)]);
     let words = match why {
-        AnswerError::OffScale(from, to) => number(Some(from), Some(to)),
-        AnswerError::OutOfRange { min, max } => number(min, max),
+        AnswerError::OffScale(from, to) => Some(both(Phrase::OffScale, from, to)),
+        AnswerError::OutOfRange { min, max } => match (min, max) {
+            (Some(min), Some(max)) => Some(both(Phrase::Range, min, max)),
+            (Some(min), None) => Some(words.fill(Phrase::RangeFrom, &[("from", &min)])),
+            (None, Some(max)) => Some(words.fill(Phrase::RangeTo, &[("to", &max)])),
+            (None, None) => None,
+        },
         _ => None,
     };
     words.unwrap_or_else(|| sentence(&why.to_string()))
@@ -224,12 +222,17 @@ fn rating(
                 if number.is_some() {
                     *chosen = number;
                 }
-                *typed = if more { start } else { String::new() };
+                *typed = start;
                 return Handled::Yes;
             }
         }
         typed.clear();
         return Handled::Notice(words.fill(Phrase::OffScale, &[("from", &from), ("to", &to)]));
+    }
+    if key == Key::Backspace {
+        typed.pop();
+        *chosen = typed.parse().ok().filter(|n| (from..=to).contains(n));
+        return Handled::Yes;
     }
     let big = (to.saturating_sub(from) / 10).max(1);
     let next = match key {
@@ -296,6 +299,11 @@ fn slider(
         }
         typed.clear();
         return Handled::Notice(words.fill(Phrase::OffScale, &[("from", &from), ("to", &to)]));
+    }
+    if key == Key::Backspace {
+        typed.pop();
+        *value = parse(typed).filter(|n| (from..=to).contains(n));
+        return Handled::Yes;
     }
     // The first key sets the marker to the middle, which favours neither end.
     let moved = |steps: f64| value.map_or((from + to) / 2.0, |v| v + steps * step);
@@ -441,6 +449,33 @@ mod tests {
     }
 
     #[test]
+    fn backspace_takes_the_last_digit_back_and_then_the_choice() {
+        let keys = |text: &str| -> Vec<Key> {
+            let key = |c| {
+                if c == '<' {
+                    Key::Backspace
+                } else {
+                    Key::Char(c)
+                }
+            };
+            text.chars().map(key).collect()
+        };
+        let percent = scale(0, 100);
+        assert_eq!(after(&percent, &keys("57<")), Some(5.0));
+        assert_eq!(after(&percent, &keys("57<8")), Some(58.0));
+        assert_eq!(after(&percent, &keys("57<<")), None);
+        assert_eq!(after(&scale(1, 7), &keys("5<")), None);
+        let slider = question(QuestionKind::Slider {
+            from: 0.0,
+            to: 100.0,
+            step: 1.0,
+            labels: BTreeMap::new(),
+        });
+        assert_eq!(after(&slider, &keys("57<")), Some(5.0));
+        assert_eq!(after(&slider, &keys("5<")), None);
+    }
+
+    #[test]
     fn arrows_start_at_an_end_and_stay_on_the_scale() {
         let scale = scale(1, 7);
         assert_eq!(after(&scale, &[Key::Right]), Some(1.0));
@@ -520,7 +555,7 @@ mod tests {
         }
         assert_eq!(
             field.answer(&number, &Words::default()),
-            Err("A number from 0 to 120.".to_owned())
+            Err("Type a number from 0 to 120.".to_owned())
         );
         // Letters are no part of a number: "nan" and "inf" cannot be typed.
         assert_eq!(

@@ -106,6 +106,7 @@ phrases! {
     TypeAnswerFirst "type-answer-first" "Type an answer first.";
     NumberLike "number-like" "Type a number, such as 12.5.";
     OffScale "off-scale" "The scale goes from {from} to {to}.";
+    Range "range" "Type a number from {from} to {to}.";
     RangeFrom "range-from" "Type a number from {from} up.";
     RangeTo "range-to" "Type a number up to {to}.";
     PlainRange "plain-range" "Type a number from {from} to {to}, then press Enter.";
