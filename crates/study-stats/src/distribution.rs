@@ -15,6 +15,11 @@ pub fn normal_upper(z: f64) -> f64 {
     0.5 * libm::erfc(z / SQRT_2)
 }
 
+/// The density of the standard normal distribution at z.
+pub fn normal_density(z: f64) -> f64 {
+    (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
+}
+
 /// P(Z ≤ z) for the standard normal Z.
 pub fn normal_cdf(z: f64) -> f64 {
     normal_upper(-z)
@@ -36,8 +41,7 @@ pub fn normal_quantile(p: f64) -> Option<f64> {
         } else {
             high = z;
         }
-        let density = (-0.5 * z * z).exp() / (2.0 * PI).sqrt();
-        let newton = z + error / density;
+        let newton = z + error / normal_density(z);
         let next = if newton > low && newton < high {
             newton
         } else {

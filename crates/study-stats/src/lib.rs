@@ -14,6 +14,11 @@
 //! | Does a rating depend on the one before? | [`carry_over`] |
 //! | How large an effect would be found? How many subjects and realizations does it take? | [`power`] |
 //! | How large is a share of trials? | [`proportion`] |
+//! | At which level is a stimulus felt? | [`psychometric`] |
+//! | How well are two stimuli told apart? | [`detection`] |
+//! | Which is preferred, in pairs? | [`pairs`] |
+//! | How do estimated magnitudes grow? | [`magnitude`] |
+//! | Who is screened in a MUSHRA test? | [`mushra`] |
 //! | Can a printed mean and standard deviation be right? | [`grim`] |
 //! | Tail probabilities, quantiles, ranks | [`distribution`], [`rank`] |
 //!
@@ -44,16 +49,22 @@ pub mod clm;
 pub mod clmm;
 pub mod correlation;
 pub mod describe;
+pub mod detection;
 pub mod disagreement;
 pub mod distribution;
 pub mod friedman;
 pub mod grim;
 pub mod lmm;
+pub mod magnitude;
 mod matrix;
+pub mod mushra;
 pub mod paired;
+pub mod pairs;
 pub mod permutation;
 pub mod power;
 pub mod proportion;
+pub mod psychometric;
+mod quadrature;
 pub mod random;
 pub mod rank;
 pub mod regression;

@@ -1,6 +1,6 @@
 //! The share of trials with some property: clustered in subjects, or independent.
 
-use super::distribution::{f_quantile, t_quantile};
+use super::distribution::{f_quantile, normal_quantile, t_quantile};
 use super::finite;
 
 /// A share with its 95 % interval.
@@ -32,12 +32,7 @@ pub fn share(clusters: &[(f64, f64)]) -> Option<Share> {
     } else {
         s
     };
-    let ci95 = t_quantile(0.975, s - 1.0).map(|t| {
-        let (z2, n) = (t * t, n_effective);
-        let centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
-        let half = t / (1.0 + z2 / n) * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
-        ((centre - half).max(0.0), (centre + half).min(1.0))
-    });
+    let ci95 = t_quantile(0.975, s - 1.0).map(|t| interval(p, n_effective, t));
     Some(Share {
         share: p,
         n_effective,
@@ -66,6 +61,22 @@ pub fn clopper_pearson(hits: u64, trials: u64, level: f64) -> Option<(f64, f64)>
         1.0 - low(rest, x)?
     };
     Some((at_least, at_most))
+}
+
+/// Wilson's 95 % interval (1927) of `hits` of `n` independent trials. `None` unless
+/// 0 ≤ hits ≤ n and n > 0.
+pub fn wilson(hits: f64, n: f64) -> Option<(f64, f64)> {
+    let valid = n > 0.0 && hits >= 0.0 && hits <= n;
+    let z = normal_quantile(0.975).filter(|_| valid)?;
+    Some(interval(hits / n, n, z))
+}
+
+/// Wilson's interval of a share of n trials, with `z` standard errors.
+fn interval(share: f64, n: f64, z: f64) -> (f64, f64) {
+    let z2 = z * z;
+    let centre = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
+    let half = z / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
+    ((centre - half).max(0.0), (centre + half).min(1.0))
 }
 
 #[cfg(test)]
@@ -120,5 +131,15 @@ mod tests {
         assert!((low - 10.0 / (10.0 + 2.262_157f64.powi(2))).abs() < 1e-6);
         assert_eq!(share(&[(1.0, 3.0)]).unwrap().ci95, None);
         assert_eq!(share(&[]), None);
+    }
+
+    /// R 4.2, prop.test(76, 100, correct = FALSE).
+    #[test]
+    fn wilson_agrees_with_r() {
+        let (low, high) = wilson(76.0, 100.0).unwrap();
+        assert!((low - 0.667_676_636_501_855_3).abs() < 1e-12);
+        assert!((high - 0.833_086_744_430_512_2).abs() < 1e-12);
+        assert_eq!(wilson(3.0, 2.0), None);
+        assert_eq!(wilson(0.0, 0.0), None);
     }
 }

@@ -1,0 +1,429 @@
+//! Paired comparisons: Bradley–Terry with order effect and Davidson's ties, Thurstone's
+//! Case V, circular triads.
+//!
+//! With abilities a that sum to zero, the order effect δ and the tie parameter ν, the
+//! logarithmic weights of the outcomes are a_i + δ/2 (the first is preferred), a_j − δ/2
+//! (the second) and ln ν + (a_i + a_j)/2 (a tie; Davidson 1970). Without ties this is
+//! Bradley & Terry (1952), and the probability of the first is
+//! 1/(1 + exp(−(a_i − a_j + δ))).
+
+mod existence;
+
+use super::clm::newton::{Evaluation, maximise};
+use super::distribution::{normal_cdf, normal_density, normal_upper};
+use super::matrix::{Cholesky, SymmetricMatrix, dot};
+use thiserror::Error;
+
+/// Answers to one pair in one order, of one participant or added up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Comparison {
+    /// The item that was presented first.
+    pub first: usize,
+    /// The item that was presented second.
+    pub second: usize,
+    /// How often the first was preferred.
+    pub first_preferred: f64,
+    /// How often the second was preferred.
+    pub second_preferred: f64,
+    /// How often neither was.
+    pub tied: f64,
+    /// The participant.
+    pub cluster: usize,
+}
+
+/// What a model has beside abilities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Model {
+    /// How abilities become probabilities.
+    pub link: Link,
+    /// An effect of the order of presentation.
+    pub order: bool,
+}
+
+/// How abilities become probabilities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Link {
+    /// Bradley–Terry, in logits. Ties are left out.
+    BradleyTerry,
+    /// Davidson, in logits, with ties.
+    Davidson,
+    /// Thurstone's Case V, Φ(a_i − a_j + δ). Ties are left out.
+    Thurstone,
+}
+
+/// Why abilities have no estimate.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum NoAbilities {
+    /// Fewer than two items, or an item with itself.
+    #[error("there are not two items to compare")]
+    NoPairs,
+    /// Groups of items that nobody compared.
+    #[error("no comparison joins these groups of items")]
+    Disconnected(Vec<Vec<usize>>),
+    /// A group that was never less preferred than an item outside it: Ford's (1957)
+    /// condition fails.
+    #[error("some items were preferred every time: their abilities are unbounded")]
+    Unbounded(Vec<usize>),
+    /// The order effect needs pairs that were presented in both orders.
+    #[error("no pair was presented in both orders")]
+    OneOrder,
+    /// The search found no maximum.
+    #[error("the likelihood has no maximum that was found")]
+    NotFound,
+}
+
+/// An estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effect {
+    /// The estimate.
+    pub estimate: f64,
+    /// Standard error.
+    pub se: f64,
+    /// Two-sided p of no effect.
+    pub p: f64,
+}
+
+impl Effect {
+    fn new(estimate: f64, variance: f64) -> Self {
+        let se = variance.max(0.0).sqrt();
+        Self {
+            estimate,
+            se,
+            p: 2.0 * normal_upper((estimate / se).abs()),
+        }
+    }
+}
+
+/// Estimated abilities.
+#[derive(Debug, Clone)]
+pub struct Abilities {
+    /// Each ability; they sum to zero.
+    pub abilities: Vec<f64>,
+    /// Standard errors of abilities that sum to zero. They depend on that constraint;
+    /// [`difference`](Self::difference) does not.
+    pub ses: Vec<f64>,
+    /// First minus second, if the model has it.
+    pub order: Option<Effect>,
+    /// ln ν, if the model has it and there are ties.
+    pub tie: Option<Effect>,
+    /// 2·(saturated − fitted), over the pairs in each order.
+    pub deviance: f64,
+    /// Its degrees of freedom.
+    pub df: usize,
+    model: Model,
+    covariance: Covariance,
+    clustered: Option<SymmetricMatrix>,
+}
+
+#[derive(Debug, Clone)]
+struct Covariance(SymmetricMatrix);
+
+/// The difference of two abilities.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Difference {
+    /// a − b with its model-based standard error, which takes all answers for
+    /// independent.
+    pub effect: Effect,
+    /// The same with the sandwich over participants, V·(Σ s sᵀ)·V, without a factor for
+    /// small samples. `None` with one participant.
+    pub clustered: Option<Effect>,
+    /// Probability that a is preferred to b, without order effect and without a tie.
+    pub preferred: f64,
+}
+
+impl Abilities {
+    /// The ability of item `a` minus that of `b`.
+    pub fn difference(&self, a: usize, b: usize) -> Difference {
+        let contrast = minus(
+            &ability(a, self.abilities.len(), self.covariance.0.size()),
+            &ability(b, self.abilities.len(), self.covariance.0.size()),
+        );
+        let estimate = self.abilities[a] - self.abilities[b];
+        Difference {
+            effect: Effect::new(estimate, quadratic(&self.covariance.0, &contrast)),
+            clustered: (self.clustered.as_ref())
+                .map(|v| Effect::new(estimate, quadratic(v, &contrast))),
+            preferred: match self.model.link {
+                Link::Thurstone => normal_cdf(estimate),
+                Link::BradleyTerry | Link::Davidson => 1.0 / (1.0 + (-estimate).exp()),
+            },
+        }
+    }
+
+    /// The rank of each item; 1 is the most preferred.
+    pub fn ranks(&self) -> Vec<usize> {
+        let above = |a: &f64| self.abilities.iter().filter(|b| *b > a).count();
+        self.abilities.iter().map(|a| above(a) + 1).collect()
+    }
+}
+
+/// Ability `i` as a linear function of the parameters: the last one is minus the sum.
+fn ability(i: usize, items: usize, size: usize) -> Vec<f64> {
+    let mut vector = vec![0.0; size];
+    if i + 1 < items {
+        vector[i] = 1.0;
+    } else {
+        vector[..items - 1].fill(-1.0);
+    }
+    vector
+}
+
+fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(x, y)| x - y).collect()
+}
+
+/// vᵀMv.
+fn quadratic(m: &SymmetricMatrix, v: &[f64]) -> f64 {
+    let n = v.len();
+    (0..n)
+        .flat_map(|i| (0..n).map(move |j| (i, j)))
+        .map(|(i, j)| v[i] * v[j] * m.get(i, j))
+        .sum()
+}
+
+/// One row of data as outcomes: how often, and the weight as a function of the
+/// parameters.
+struct Row {
+    cluster: usize,
+    outcomes: Vec<(f64, Vec<f64>)>,
+}
+
+impl Row {
+    fn trials(&self) -> f64 {
+        self.outcomes.iter().map(|o| o.0).sum()
+    }
+
+    /// Probability of each outcome.
+    fn probabilities(&self, link: Link, at: &[f64]) -> Vec<f64> {
+        let weights: Vec<f64> = self.outcomes.iter().map(|o| dot(&o.1, at)).collect();
+        if link == Link::Thurstone {
+            let x = weights[0] - weights[1];
+            return vec![normal_cdf(x), normal_cdf(-x)];
+        }
+        let top = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let powers: Vec<f64> = weights.iter().map(|w| (w - top).exp()).collect();
+        let sum: f64 = powers.iter().sum();
+        powers.iter().map(|p| p / sum).collect()
+    }
+
+    /// Adds value, gradient and Hessian of the log-likelihood.
+    fn add(&self, link: Link, at: &[f64], to: &mut Evaluation) {
+        let probabilities = self.probabilities(link, at);
+        for ((count, _), p) in self.outcomes.iter().zip(&probabilities) {
+            if *count > 0.0 {
+                to.value += count * p.ln();
+            }
+        }
+        if link == Link::Thurstone {
+            let contrast = minus(&self.outcomes[0].1, &self.outcomes[1].1);
+            let x = dot(&contrast, at);
+            let (a, b) = (mills(x), mills(-x));
+            let (first, second) = (self.outcomes[0].0, self.outcomes[1].0);
+            let slope = first * a - second * b;
+            let curve = -first * a * (a + x) - second * b * (b - x);
+            for (g, c) in to.gradient.iter_mut().zip(&contrast) {
+                *g += slope * c;
+            }
+            to.hessian.add_outer(curve, &contrast);
+            return;
+        }
+        let n = self.trials();
+        let mut mean = vec![0.0; at.len()];
+        for ((count, vector), p) in self.outcomes.iter().zip(&probabilities) {
+            for ((g, m), v) in to.gradient.iter_mut().zip(&mut mean).zip(vector) {
+                *g += (count - n * p) * v;
+                *m += p * v;
+            }
+            to.hessian.add_outer(-n * p, vector);
+        }
+        to.hessian.add_outer(n, &mean);
+    }
+}
+
+/// φ(x)/Φ(x).
+fn mills(x: f64) -> f64 {
+    // Beyond this Φ underflows, and the ratio is −x.
+    if x < -37.0 {
+        return -x;
+    }
+    normal_density(x) / normal_cdf(x)
+}
+
+/// Maximum-likelihood abilities of items 0 … `items` − 1, with standard errors from the
+/// observed information.
+pub fn abilities(
+    items: usize,
+    comparisons: &[Comparison],
+    model: Model,
+) -> Result<Abilities, NoAbilities> {
+    let ties = model.link == Link::Davidson;
+    let sum = |f: fn(&Comparison) -> f64| comparisons.iter().map(f).sum::<f64>();
+    let with_ties = ties && sum(|c| c.tied) > 0.0;
+    existence::check(items, comparisons, with_ties, model.order)?;
+    let order_place = items - 1;
+    let tie_place = order_place + usize::from(model.order);
+    let size = tie_place + usize::from(with_ties);
+    let rows: Vec<Row> = (comparisons.iter())
+        .map(|c| {
+            let mut first = ability(c.first, items, size);
+            let mut second = ability(c.second, items, size);
+            let mut tied: Vec<f64> = (first.iter().zip(&second))
+                .map(|(a, b)| 0.5 * (a + b))
+                .collect();
+            if model.order {
+                first[order_place] = 0.5;
+                second[order_place] = -0.5;
+            }
+            let mut outcomes = vec![(c.first_preferred, first), (c.second_preferred, second)];
+            if with_ties {
+                tied[tie_place] = 1.0;
+                outcomes.push((c.tied, tied));
+            }
+            Row {
+                cluster: c.cluster,
+                outcomes,
+            }
+        })
+        .collect();
+    let evaluate = |at: &[f64]| {
+        let mut sum = Evaluation::zero(size);
+        for row in &rows {
+            row.add(model.link, at, &mut sum);
+        }
+        sum.value.is_finite().then_some(sum)
+    };
+    let found = maximise(vec![0.0; size], evaluate).ok_or(NoAbilities::NotFound)?;
+    // The likelihood still rises where an effect is practically infinite.
+    if found.at.iter().any(|x| x.abs() > 20.0) {
+        return Err(NoAbilities::NotFound);
+    }
+    let factor = Cholesky::definite(&found.information).ok_or(NoAbilities::NotFound)?;
+    let covariance = inverse(&factor, size);
+    let vectors: Vec<Vec<f64>> = (0..items).map(|i| ability(i, items, size)).collect();
+    let effect = |place: usize| Effect::new(found.at[place], covariance.get(place, place));
+    let (deviance, cells) = deviance(&rows, comparisons, model.link, &found.at);
+    Ok(Abilities {
+        abilities: vectors.iter().map(|v| dot(v, &found.at)).collect(),
+        ses: (vectors.iter())
+            .map(|v| quadratic(&covariance, v).sqrt())
+            .collect(),
+        order: model.order.then(|| effect(order_place)),
+        tie: with_ties.then(|| effect(tie_place)),
+        deviance,
+        df: (cells * (1 + usize::from(with_ties))).saturating_sub(size),
+        model,
+        clustered: sandwich(&rows, model.link, &found.at, &factor),
+        covariance: Covariance(covariance),
+    })
+}
+
+fn inverse(factor: &Cholesky, size: usize) -> SymmetricMatrix {
+    let mut inverse = SymmetricMatrix::zero(size);
+    for i in 0..size {
+        let mut unit = vec![0.0; size];
+        unit[i] = 1.0;
+        let column = factor.solve(&unit);
+        for (j, value) in column.iter().enumerate().take(i + 1) {
+            inverse.add(i, j, *value);
+        }
+    }
+    inverse
+}
+
+/// V·(Σ s sᵀ)·V over the clusters.
+fn sandwich(rows: &[Row], link: Link, at: &[f64], factor: &Cholesky) -> Option<SymmetricMatrix> {
+    let clusters = rows.iter().map(|r| r.cluster + 1).max()?;
+    let mut scores = vec![Evaluation::zero(at.len()); clusters];
+    for row in rows {
+        row.add(link, at, &mut scores[row.cluster]);
+    }
+    let mut sandwich = SymmetricMatrix::zero(at.len());
+    for score in &scores {
+        sandwich.add_outer(1.0, &factor.solve(&score.gradient));
+    }
+    (clusters > 1).then_some(sandwich)
+}
+
+/// The deviance of the pairs in each order, added up, and their number.
+fn deviance(rows: &[Row], comparisons: &[Comparison], link: Link, at: &[f64]) -> (f64, usize) {
+    struct Cell {
+        pair: (usize, usize),
+        counts: Vec<f64>,
+        probabilities: Vec<f64>,
+    }
+    let mut cells: Vec<Cell> = Vec::new();
+    for (row, c) in rows.iter().zip(comparisons) {
+        if row.trials() <= 0.0 {
+            continue;
+        }
+        let counts = row.outcomes.iter().map(|o| o.0);
+        let pair = (c.first, c.second);
+        match cells.iter_mut().find(|cell| cell.pair == pair) {
+            Some(cell) => cell
+                .counts
+                .iter_mut()
+                .zip(counts)
+                .for_each(|(sum, k)| *sum += k),
+            None => cells.push(Cell {
+                pair,
+                counts: counts.collect(),
+                probabilities: row.probabilities(link, at),
+            }),
+        }
+    }
+    let term = |counts: &[f64], probabilities: &[f64]| -> f64 {
+        let n: f64 = counts.iter().sum();
+        (counts.iter().zip(probabilities))
+            .filter(|(k, _)| **k > 0.0)
+            .map(|(k, p)| 2.0 * k * (k / (n * p)).ln())
+            .sum()
+    };
+    (
+        cells
+            .iter()
+            .map(|c| term(&c.counts, &c.probabilities))
+            .sum(),
+        cells.len(),
+    )
+}
+
+/// How consistent one complete round of comparisons is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triads {
+    /// Triples in which a is preferred to b, b to c and c to a.
+    pub circular: f64,
+    /// 1 without any, 0 with as many as there can be (Kendall & Babington Smith 1940).
+    pub consistency: f64,
+}
+
+/// The circular triads of one round: each pair once, as (preferred, other).
+/// d = T(T − 1)(2T − 1)/12 − ½Σw². `None` with fewer than three items, or unless each
+/// pair occurs once.
+pub fn circular_triads(items: usize, preferred: &[(usize, usize)]) -> Option<Triads> {
+    let mut seen = vec![false; items * items];
+    let mut wins = vec![0.0; items];
+    for (winner, loser) in preferred {
+        let (low, high) = (*winner.min(loser), *winner.max(loser));
+        if low == high || high >= items || std::mem::replace(&mut seen[low * items + high], true) {
+            return None;
+        }
+        wins[*winner] += 1.0;
+    }
+    if items < 3 || preferred.len() != items * (items - 1) / 2 {
+        return None;
+    }
+    let t = items as f64;
+    let squares: f64 = wins.iter().map(|w| w * w).sum();
+    let circular = t * (t - 1.0) * (2.0 * t - 1.0) / 12.0 - squares / 2.0;
+    let most = match items % 2 {
+        1 => (t * t * t - t) / 24.0,
+        _ => (t * t * t - 4.0 * t) / 24.0,
+    };
+    Some(Triads {
+        circular,
+        consistency: 1.0 - circular / most,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,232 @@
+//! Quadrature over threshold, ln width, λ, η and γ.
+//!
+//! The box of integration starts as the support of the priors, and shrinks to where the
+//! density is above 10⁻⁷ of the highest one found. A coarse grid may miss the peak; the
+//! limit is then lower and the box larger, and the next grid is finer.
+
+use super::rows::{ETAS, Table};
+use super::{Experiment, Interval, MOST_ETA, MOST_RATE, Posterior, Problem};
+use crate::quadrature::gauss_legendre;
+
+/// ln(10⁻⁷).
+const NEGLIGIBLE: f64 = -16.118;
+/// Grids of thresholds and of widths while the box shrinks, and at the end.
+const COARSE: usize = 25;
+const FINE: usize = 56;
+/// Values of λ, and of γ.
+const RATES: usize = 8;
+
+/// Bounds of the five axes.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    threshold: (f64, f64),
+    log_width: (f64, f64),
+    lambda: (f64, f64),
+    eta: (f64, f64),
+    gamma: (f64, f64),
+}
+
+/// An axis: nodes with weights, the highest density and the mass at each.
+struct Axis {
+    nodes: Vec<(f64, f64)>,
+    highest: Vec<f64>,
+    mass: Vec<f64>,
+}
+
+impl Axis {
+    fn new(nodes: Vec<(f64, f64)>) -> Self {
+        Self {
+            highest: vec![f64::NEG_INFINITY; nodes.len()],
+            mass: vec![0.0; nodes.len()],
+            nodes,
+        }
+    }
+
+    /// Equal distances.
+    fn even(n: usize, (low, high): (f64, f64)) -> Self {
+        let step = (high - low) / (n - 1) as f64;
+        Self::new((0..n).map(|i| (low + step * i as f64, step)).collect())
+    }
+
+    fn gauss(n: usize, (low, high): (f64, f64)) -> Self {
+        Self::new(gauss_legendre(n, low, high))
+    }
+
+    /// The part whose density counts, up to the next nodes.
+    fn shrunk(&self, top: f64, (low, high): (f64, f64)) -> (f64, f64) {
+        let counts = |h: &f64| *h > top + NEGLIGIBLE;
+        let first = self.highest.iter().position(counts).unwrap_or(0);
+        let last = self.highest.iter().rposition(counts);
+        let last = last.unwrap_or(self.nodes.len() - 1);
+        (
+            if first == 0 {
+                low
+            } else {
+                self.nodes[first - 1].0
+            },
+            self.nodes.get(last + 1).map_or(high, |n| n.0),
+        )
+    }
+
+    fn mean(&self, f: impl Fn(f64) -> f64) -> f64 {
+        let sum: f64 = self.mass.iter().sum();
+        let weighted = self.nodes.iter().zip(&self.mass);
+        weighted.map(|(n, m)| f(n.0) * m).sum::<f64>() / sum
+    }
+
+    /// The quantile of a density that is linear between even nodes.
+    fn quantile(&self, p: f64) -> f64 {
+        let step = self.nodes[1].0 - self.nodes[0].0;
+        let areas = || self.mass.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+        let mut left = p * areas().sum::<f64>();
+        for (i, area) in areas().enumerate() {
+            if left <= area && area > 0.0 {
+                let (a, b) = (self.mass[i], self.mass[i + 1]);
+                // a t + (b − a) t²/2 = left
+                let root = (a * a + 2.0 * (b - a) * left).max(0.0).sqrt();
+                return self.nodes[i].0 + step * (2.0 * left / (a + root)).clamp(0.0, 1.0);
+            }
+            left -= area;
+        }
+        self.nodes[self.nodes.len() - 1].0
+    }
+}
+
+/// The posterior over one box.
+struct Grid {
+    threshold: Axis,
+    log_width: Axis,
+    lambda: Axis,
+    eta: Axis,
+    gamma: Axis,
+}
+
+pub(super) fn integrate(problem: &Problem) -> Option<Posterior> {
+    let support = &problem.support;
+    let range = support.high - support.low;
+    let mut bounds = Bounds {
+        threshold: (support.low - range / 2.0, support.high + range / 2.0),
+        log_width: (support.least.ln(), (3.0 * range).ln()),
+        lambda: (0.0, MOST_RATE),
+        eta: (0.0, MOST_ETA),
+        gamma: (0.0, MOST_RATE),
+    };
+    for _ in 0..4 {
+        let grid = evaluate(problem, &bounds, COARSE)?;
+        let top = grid.threshold.highest.iter().copied();
+        let top = top.fold(f64::NEG_INFINITY, f64::max);
+        bounds = Bounds {
+            threshold: grid.threshold.shrunk(top, bounds.threshold),
+            log_width: grid.log_width.shrunk(top, bounds.log_width),
+            lambda: grid.lambda.shrunk(top, bounds.lambda),
+            eta: grid.eta.shrunk(top, bounds.eta),
+            gamma: grid.gamma.shrunk(top, bounds.gamma),
+        };
+    }
+    let grid = evaluate(problem, &bounds, FINE)?;
+    let interval = |axis: &Axis, back: fn(f64) -> f64| Interval {
+        mean: axis.mean(back),
+        ci95: (back(axis.quantile(0.025)), back(axis.quantile(0.975))),
+    };
+    Some(Posterior {
+        threshold: interval(&grid.threshold, |t| t),
+        width: interval(&grid.log_width, f64::exp),
+        lambda: grid.lambda.mean(|x| x),
+        gamma: match problem.experiment {
+            Experiment::ForcedChoice(_) => None,
+            Experiment::Comparison => Some(grid.lambda.mean(|x| x)),
+            Experiment::YesNo => Some(grid.gamma.mean(|x| x)),
+        },
+        eta: grid.eta.mean(|x| x),
+    })
+}
+
+fn evaluate(problem: &Problem, bounds: &Bounds, n: usize) -> Option<Grid> {
+    let mut threshold = Axis::even(n, bounds.threshold);
+    let mut log_width = Axis::even(n, bounds.log_width);
+    let mut lambda = Axis::gauss(RATES, bounds.lambda);
+    let mut eta = Axis::gauss(ETAS, bounds.eta);
+    let mut gamma = match problem.experiment {
+        Experiment::YesNo => Axis::gauss(RATES, bounds.gamma),
+        // One value: given, or that of λ.
+        Experiment::ForcedChoice(_) | Experiment::Comparison => Axis::new(vec![(0.0, 1.0)]),
+    };
+    let etas: [f64; ETAS] = std::array::from_fn(|i| eta.nodes[i].0);
+    let table = Table::new(&problem.levels, &etas);
+    // Densities are relative to the highest at the middle of nothing known: the sum is
+    // kept relative to the highest term so far.
+    let mut scale = f64::NEG_INFINITY;
+    let mut shares = vec![0.0; problem.levels.len()];
+    for t in 0..n {
+        let (at, _) = threshold.nodes[t];
+        let prior_t = problem.support.threshold(at);
+        for w in 0..n {
+            let (log_w, _) = log_width.nodes[w];
+            let width = log_w.exp();
+            // The density of ln W is W times that of W.
+            let prior = prior_t + problem.support.width(width) + log_w;
+            if prior == f64::NEG_INFINITY {
+                continue;
+            }
+            for (share, l) in shares.iter_mut().zip(&problem.levels) {
+                *share = problem.core.value((l.level - at) / width);
+            }
+            for l in 0..lambda.nodes.len() {
+                let (lapse, weight_l) = lambda.nodes[l];
+                for g in 0..gamma.nodes.len() {
+                    let (free, weight_g) = gamma.nodes[g];
+                    let guess = problem.experiment.guess(lapse).unwrap_or(free);
+                    let inner = 1.0 - guess - lapse;
+                    if inner <= 0.0 {
+                        continue;
+                    }
+                    let mut logs = [0.0; ETAS];
+                    for (row, share) in shares.iter().enumerate() {
+                        table.add(row, guess + inner * share, &mut logs);
+                    }
+                    for (e, log) in logs.iter().enumerate() {
+                        let (eta_at, weight_e) = eta.nodes[e];
+                        let log = log + prior + problem.rates(lapse, guess, eta_at);
+                        for axis in [
+                            (&mut threshold, t),
+                            (&mut log_width, w),
+                            (&mut lambda, l),
+                            (&mut eta, e),
+                            (&mut gamma, g),
+                        ] {
+                            let highest = &mut axis.0.highest[axis.1];
+                            *highest = highest.max(log);
+                        }
+                        if log > scale {
+                            let shrink = (scale - log).exp();
+                            for axis in [
+                                &mut threshold,
+                                &mut log_width,
+                                &mut lambda,
+                                &mut eta,
+                                &mut gamma,
+                            ] {
+                                axis.mass.iter_mut().for_each(|m| *m *= shrink);
+                            }
+                            scale = log;
+                        }
+                        let mass = (log - scale).exp() * weight_l * weight_g * weight_e;
+                        threshold.mass[t] += mass;
+                        log_width.mass[w] += mass;
+                        lambda.mass[l] += mass;
+                        eta.mass[e] += mass;
+                        gamma.mass[g] += mass;
+                    }
+                }
+            }
+        }
+    }
+    let grid = Grid {
+        threshold,
+        log_width,
+        lambda,
+        eta,
+        gamma,
+    };
+    scale.is_finite().then_some(grid)
+}
