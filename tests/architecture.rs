@@ -51,7 +51,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("session", &["protocol", "schedule", "outcome"]),
     ("store", &["protocol", "outcome"]),
     ("rendering", &["protocol", "outcome", "wire"]),
-    ("analyze", &["protocol", "outcome", "stats"]),
+    ("analyze", &["protocol", "procedure", "outcome", "stats"]),
     ("power", &["protocol", "outcome", "analyze", "stats"]),
     ("model", &["wire"]),
     ("trajectory", &["wire"]),

@@ -5,10 +5,12 @@
 //! | file | values |
 //! |---|---|
 //! | `"format": "study-power-golden/1"` | `<case id>/<path in expected>` |
+//! | a `kind`, as the files of `tests/golden/psychophysics` | identifiers of docs/statistics-psychophysics.md |
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod power;
+mod psychophysics;
 
 use serde_json::{Map, Value, json};
 use std::process::ExitCode;
@@ -26,13 +28,17 @@ enum GoldenError {
     Format,
     #[error("{case}: {what}")]
     Case { case: String, what: String },
+    #[error(transparent)]
+    Psychophysics(#[from] psychophysics::Error),
 }
 
 fn values() -> Result<Map<String, Value>, GoldenError> {
     let path = std::env::args_os().nth(1).ok_or(GoldenError::Usage)?;
-    let document: Value = serde_json::from_str(&std::fs::read_to_string(path)?)?;
+    let text = std::fs::read_to_string(path)?;
+    let document: Value = serde_json::from_str(&text)?;
     match document["format"].as_str() {
         Some("study-power-golden/1") => power::values(&document),
+        None if document["kind"].is_string() => Ok(psychophysics::values(&text)?),
         _ => Err(GoldenError::Format),
     }
 }

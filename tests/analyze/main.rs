@@ -11,6 +11,7 @@ mod nist;
 mod odd;
 mod possible;
 mod properties;
+mod psychophysics;
 mod report_answers;
 mod report_figures;
 mod report_html;

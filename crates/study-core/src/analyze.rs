@@ -28,6 +28,7 @@ mod order;
 mod ordinal;
 mod overflow;
 mod pairs;
+pub mod psychophysics;
 mod range;
 mod reference;
 mod select;

@@ -13,7 +13,7 @@ pub struct Screening {
     pub anchor_above: f64,
     /// Screened if more than this percentage of a participant's items breaks one of the
     /// two rules.
-    pub more_than_percent: u32,
+    pub more_than_percent: f64,
 }
 
 impl Default for Screening {
@@ -21,7 +21,7 @@ impl Default for Screening {
         Self {
             reference_below: 90.0,
             anchor_above: 90.0,
-            more_than_percent: 15,
+            more_than_percent: 15.0,
         }
     }
 }
@@ -45,8 +45,9 @@ impl Screening {
             .filter(|r| **r < self.reference_below)
             .count();
         let above = anchor.iter().filter(|r| **r > self.anchor_above).count();
-        // In whole numbers: 3 of 20 is not more than 15 %.
-        let more = |count: usize, of: usize| count * 100 > of * self.more_than_percent as usize;
+        // Exact for whole percentages: 3 of 20 is not more than 15 %.
+        let more =
+            |count: usize, of: usize| count as f64 * 100.0 > of as f64 * self.more_than_percent;
         let share = |count: usize, of: usize| (of > 0).then(|| count as f64 / of as f64);
         Screened {
             reference_below: share(below, reference.len()),

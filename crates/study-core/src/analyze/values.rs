@@ -59,7 +59,7 @@ impl Values {
     }
 
     /// Adds all statistics of another set.
-    pub(super) fn extend(&mut self, mut other: Self) {
+    pub fn extend(&mut self, mut other: Self) {
         self.0.append(&mut other.0);
     }
 

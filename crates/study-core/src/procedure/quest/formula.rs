@@ -1,8 +1,8 @@
 //! Formulas of psychometric functions.
 //!
-//! `+ - * / ^`, parentheses, `exp ln log10 sqrt abs Phi min max`; a product needs no
+//! `+ - * / ^` (also `−`, `·` and `×`), parentheses, `exp ln log10 sqrt abs Phi min max`; a product needs no
 //! sign: `2 lambda`, `(1 - gamma)(1 - exp(-x))`. A result may be named, `psi = …`, and
-//! parts may follow it: `psi = gamma + … t …; t = max(c, intensity)`.
+//! parts may follow it: `psi = gamma + … t …; t = max(c, intensity)`, or `… where t = …`.
 
 use super::{ProcedureError, normal_cdf};
 
@@ -194,11 +194,22 @@ fn tokens(text: &str) -> Result<Vec<(Token, usize)>, ProcedureError> {
             found.push((Token::Number(value), start + 1));
         } else if c.is_alphabetic() || c == '_' {
             at = take(&|i| chars[i].is_alphanumeric() || chars[i] == '_');
-            let name = chars[start..at].iter().collect();
-            found.push((Token::Name(name), start + 1));
-        } else if "+-*/^()=,;".contains(c) {
+            let name: String = chars[start..at].iter().collect();
+            let token = match name.as_str() {
+                "where" => Token::Sign(';'),
+                _ => Token::Name(name),
+            };
+            found.push((token, start + 1));
+        } else if "+-−*·×/^()[]=,;".contains(c) {
             at += 1;
-            found.push((Token::Sign(c), start + 1));
+            let sign = match c {
+                '−' => '-',
+                '·' | '×' => '*',
+                '[' => '(',
+                ']' => ')',
+                other => other,
+            };
+            found.push((Token::Sign(sign), start + 1));
         } else if c.is_whitespace() {
             at += 1;
         } else {
@@ -391,6 +402,7 @@ mod tests {
             ("(1-2 x)(p)", -9.0),
             ("psi = max(x, p, 1) min(x, p)", 6.0),
             ("psi = x t; t = u + 1, u = p", 8.0),
+            ("psi = x·[t − 1] where t = p", 4.0),
             ("1e-1 x", 0.2),
             ("exp(ln(x))", 2.0),
             ("log10(100) + sqrt(4) + abs(-1)", 5.0),

@@ -1,0 +1,16 @@
+//! Statistics of thresholds and comparisons: tracks, psychometric functions, detection,
+//! paired preferences, magnitude estimation, MUSHRA. Each function takes what was
+//! answered and returns statistics by identifier; `docs/statistics-psychophysics.md`
+//! defines them.
+
+mod detection;
+mod fits;
+mod preferences;
+mod scales;
+mod tracks;
+
+pub use detection::{Detection, Task, detection};
+pub use fits::{FitCell, FitSettings, psychometric};
+pub use preferences::{Choice, Preference, preferences};
+pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
+pub use tracks::{TrackName, quest_plus, staircase, track_order};

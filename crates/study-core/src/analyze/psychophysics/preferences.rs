@@ -1,0 +1,153 @@
+//! Paired preferences: `pairs/…`.
+
+use crate::analyze::identifiers::{group_id, pair_id};
+use crate::analyze::values::Values;
+use std::collections::BTreeSet;
+use study_stats::paired::holm;
+use study_stats::pairs::{Comparison, Link, Model, NoAbilities, abilities};
+
+/// What was answered to a pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Choice {
+    /// The first was preferred, so often.
+    First(f64),
+    /// The second was preferred, so often.
+    Second(f64),
+    /// Neither was, so often.
+    Tie(f64),
+}
+
+/// One answer, or several like it, to a pair in the order in which it was presented.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Preference {
+    /// Participant; empty if nobody knows. Untrusted.
+    pub participant: String,
+    /// The item presented first. Untrusted.
+    pub first: String,
+    /// The item presented second. Untrusted.
+    pub second: String,
+    /// The answer.
+    pub choice: Choice,
+}
+
+/// Abilities, their differences, order effect and ties. Items sort by name.
+pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
+    let mut values = Values::default();
+    let items: BTreeSet<&str> = rows
+        .iter()
+        .flat_map(|r| [r.first.as_str(), &r.second])
+        .collect();
+    let items: Vec<&str> = items.into_iter().collect();
+    let people: BTreeSet<&str> = rows.iter().map(|r| r.participant.as_str()).collect();
+    let people: Vec<&str> = people.into_iter().collect();
+    let place = |name: &str| items.binary_search(&name).unwrap_or_default();
+    let comparisons: Vec<Comparison> = (rows.iter())
+        .map(|row| {
+            let mut comparison = Comparison {
+                first: place(&row.first),
+                second: place(&row.second),
+                first_preferred: 0.0,
+                second_preferred: 0.0,
+                tied: 0.0,
+                cluster: people
+                    .binary_search(&row.participant.as_str())
+                    .unwrap_or_default(),
+            };
+            match row.choice {
+                Choice::First(n) => comparison.first_preferred = n,
+                Choice::Second(n) => comparison.second_preferred = n,
+                Choice::Tie(n) => comparison.tied = n,
+            }
+            comparison
+        })
+        .collect();
+    let link = match ties {
+        true => Link::Davidson,
+        false => Link::BradleyTerry,
+    };
+    let fit = abilities(items.len(), &comparisons, Model { link, order });
+    let why = fit
+        .as_ref()
+        .err()
+        .map_or_else(String::new, |e| reason(e, &items));
+    let found = fit.as_ref().ok();
+    for (i, item) in items.iter().enumerate() {
+        let mut group = values.group("pairs", why.as_str());
+        let id = |name: &str| group_id(name, &[item]);
+        group.maybe(&id("ability"), found.map(|f| f.abilities[i]));
+        group.maybe(&id("ability_se"), found.map(|f| f.ses[i]));
+    }
+    let mut group = values.group("pairs", why.as_str());
+    if order {
+        let effect = found.and_then(|f| f.order);
+        group.maybe("order", effect.map(|e| e.estimate));
+        group.maybe("order_se", effect.map(|e| e.se));
+        group.maybe("order_p", effect.map(|e| e.p));
+    }
+    if ties {
+        let why = if why.is_empty() {
+            "there are no ties"
+        } else {
+            &why
+        };
+        let tie = found.and_then(|f| f.tie);
+        group.put_or("tie_log_nu", tie.map(|e| e.estimate), why);
+        group.put_or("tie_log_nu_se", tie.map(|e| e.se), why);
+    } else {
+        let tied = comparisons.iter().map(|c| c.tied).sum();
+        group.put("ties_left_out", tied);
+    }
+    group.maybe("deviance", found.map(|f| f.deviance));
+    group.maybe("df", found.map(|f| f.df as f64));
+    if let Some(fit) = found {
+        let ranks = fit.ranks().into_iter().map(|r| r as f64).collect();
+        group.list("rank", ranks);
+    }
+    let pairs: Vec<(usize, usize)> = (0..items.len())
+        .flat_map(|a| (a + 1..items.len()).map(move |b| (a, b)))
+        .collect();
+    let differences: Vec<_> = (pairs.iter())
+        .map(|(a, b)| found.map(|f| f.difference(*a, *b)))
+        .collect();
+    // The clustered error, where there are enough participants for one.
+    let enough = people.len() >= 10;
+    let p: Vec<Option<f64>> = (differences.iter())
+        .map(|d| d.map(|d| d.clustered.filter(|_| enough).unwrap_or(d.effect).p))
+        .collect();
+    for (((a, b), difference), (p, p_holm)) in
+        pairs.iter().zip(&differences).zip(p.iter().zip(holm(&p)))
+    {
+        let mut group = values.group(pair_id("pairs", items[*a], items[*b]), why.as_str());
+        group.maybe("difference", difference.map(|d| d.effect.estimate));
+        group.maybe("se", difference.map(|d| d.effect.se));
+        group.maybe("preferred", difference.map(|d| d.preferred));
+        if people.len() > 1 {
+            let clustered = difference.and_then(|d| d.clustered);
+            group.maybe("se_clustered", clustered.map(|e| e.se));
+        }
+        group.maybe("p", *p);
+        group.maybe("p_holm", p_holm);
+    }
+    values
+}
+
+/// The reason with the names of the items.
+fn reason(error: &NoAbilities, items: &[&str]) -> String {
+    let names = |group: &Vec<usize>| {
+        let names: Vec<&str> = group.iter().map(|i| items[*i]).collect();
+        format!("{{{}}}", names.join(", "))
+    };
+    match error {
+        NoAbilities::Disconnected(groups) => {
+            let groups: Vec<String> = groups.iter().map(names).collect();
+            format!("no comparison joins {}", groups.join(" with "))
+        }
+        NoAbilities::Unbounded(top) => {
+            format!(
+                "{} was never less preferred than the others: its ability is unbounded",
+                names(top)
+            )
+        }
+        NoAbilities::NoPairs | NoAbilities::OneOrder | NoAbilities::NotFound => error.to_string(),
+    }
+}
