@@ -29,6 +29,7 @@ use std::time::Duration;
 use study_base::limits::Limits;
 use study_core::outcome::{Playback, Sample};
 use study_haptics::model::Realization;
+use study_wire::servo::{self, ServoSettings};
 
 /// Identity and limits of a device.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +42,8 @@ pub struct Identity {
     pub telemetry: bool,
     /// Limits that it never exceeds.
     pub limits: Limits,
+    /// The constants of its servo, if it tells them.
+    pub servo: Option<ServoSettings>,
 }
 
 /// Why a command was refused immediately.
@@ -75,6 +78,16 @@ pub struct Stimulus<'a> {
     pub by_hand: bool,
     /// Whether a table that fails its certificate may be played.
     pub allow_uncertified: bool,
+}
+
+/// A table as a servo plays it.
+pub fn rendering_of(table: &Realization) -> servo::Rendering<'_> {
+    servo::Rendering {
+        table: table.table(),
+        rule: table.direction,
+        range_mm: table.trained.x_mm,
+        trained_mm_s: table.trained.v_mm_s,
+    }
 }
 
 impl<'a> Stimulus<'a> {

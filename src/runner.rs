@@ -12,7 +12,7 @@ pub mod clock;
 pub mod rehearsal;
 pub mod saver;
 
-use crate::device::{Device, Report, Stimulus, manual};
+use crate::device::{Device, Report, Stimulus, manual, rendering_of};
 use clock::Clock;
 use saver::{Job, SaveEvent, Saver};
 use std::collections::{BTreeMap, VecDeque};
@@ -21,12 +21,14 @@ use std::sync::Arc;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::{ModelId, ParticipantId};
-use study_core::outcome::Event;
+use study_core::outcome::{Event, Fidelity, Playback, Sample};
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol};
+use study_core::rendering::{Played, judge};
 use study_core::session::{Effect, Ending, Input, Session, Unsaved, View, input::Claim};
 use study_core::store::{ClaimRequest, Copies, Receipt, SeatKind, StudyFolder};
 use study_haptics::model::Realization;
+use study_wire::servo::ServoSettings;
 
 /// Longest wait for an input while nothing else is expected: clocks on the screen move.
 const IDLE: Duration = Duration::from_millis(100);
@@ -34,6 +36,8 @@ const IDLE: Duration = Duration::from_millis(100);
 const PLAYING: Duration = Duration::from_millis(20);
 /// Longest wait while an event is being saved.
 const SAVING: Duration = Duration::from_millis(2);
+/// Samples of a playback that are judged: ten minutes at 1 kHz.
+const MOST_SAMPLES: usize = 600_000;
 /// A playback is lost if a device with telemetry reports nothing for this time.
 const SILENCE: Duration = Duration::from_secs(1);
 /// Operates a session: sees the view and gives inputs.
@@ -118,6 +122,10 @@ pub struct Runner {
     codes: BTreeMap<ModelId, String>,
     /// Whether the current playback reports telemetry.
     has_telemetry: bool,
+    /// Its samples.
+    samples: Vec<Sample>,
+    /// Whether wrong playbacks are only marked.
+    only_flags: bool,
 }
 
 impl Runner {
@@ -128,6 +136,7 @@ impl Runner {
             Session::new(setup.protocol.clone(), setup.orders.clone(), config, at);
         let uneven_loads = uneven_loads(&setup.protocol, &setup.models);
         let codes = sample_codes(&setup.protocol);
+        let only_flags = !setup.study.manifest().judges_rendering;
         let mut runner = Self {
             setup,
             session,
@@ -142,6 +151,8 @@ impl Runner {
             last_report: None,
             codes,
             has_telemetry: false,
+            samples: Vec::new(),
+            only_flags,
         };
         runner.device_limp();
         runner.perform(effects);
@@ -323,6 +334,7 @@ impl Runner {
         }
         let limits = playback_limits(protocol, table);
         self.has_telemetry = !by_hand && self.setup.device.identity().telemetry;
+        self.samples.clear();
         let stimulus = Stimulus {
             model: model.as_str(),
             table,
@@ -352,6 +364,10 @@ impl Runner {
             if let Report::Stopped(_) | Report::Fault(_) | Report::Lost(_) = &report {
                 self.send(Job::TelemetryEnd);
             }
+            if let Report::Stopped(playback) = &report {
+                let fidelity = Box::new(self.judge(playback));
+                self.feed(Input::DeviceJudged(fidelity));
+            }
             let input = match report {
                 Report::Loaded if self.uneven_loads => {
                     self.loaded_due = Some(end_of_slot(self.load_began, at));
@@ -361,6 +377,8 @@ impl Runner {
                 Report::Mount(code) => Input::DeviceMount(code),
                 Report::Started => Input::DeviceStarted,
                 Report::Telemetry(samples) => {
+                    let room = MOST_SAMPLES.saturating_sub(self.samples.len());
+                    self.samples.extend(samples.iter().take(room));
                     self.send(Job::Telemetry(samples));
                     Input::DeviceSampled
                 }
@@ -384,6 +402,43 @@ impl Runner {
             let what = format!("the device has sent nothing for {} s", SILENCE.as_secs());
             self.feed(Input::PlaybackLost(what));
         }
+    }
+
+    /// Whether the force of the playback that has just ended was that of its table.
+    fn judge(&self, playback: &Playback) -> Fidelity {
+        let (protocol, device) = (&self.setup.protocol, self.setup.device.identity());
+        let Some(model) = self.session.playing_model() else {
+            return Fidelity::default();
+        };
+        if !self.has_telemetry {
+            return Fidelity::unverified("the device reports no samples");
+        }
+        let Some(table) = self.setup.models.get(model) else {
+            return Fidelity::unverified("the realization has no table");
+        };
+        let limits = playback_limits(protocol, Some(table)).capped_at(device.limits);
+        let others: Vec<_> = (self.setup.models.iter())
+            .filter(|(id, _)| *id != model)
+            .map(|(id, table)| (id.clone(), rendering_of(table)))
+            .collect();
+        let played = Played {
+            model,
+            what: rendering_of(table),
+            servo: ServoSettings {
+                force_n: limits.force_n.get(),
+                ..device.servo.unwrap_or_default()
+            },
+            servo_told: device.servo.is_some(),
+            samples: &self.samples,
+            lost: playback.samples_lost,
+            time_ratio: playback.time_ratio,
+            others: &others,
+        };
+        let mut fidelity = judge(&played, &protocol.device.rendering);
+        if self.only_flags {
+            fidelity.only_flag("the study was begun with an earlier release");
+        }
+        fidelity
     }
 
     fn poll_saver(&mut self) {

@@ -62,7 +62,15 @@ const IMPORTS: &[(&str, &[&str])] = &[
     (
         "runner",
         &[
-            "session", "device", "store", "outcome", "protocol", "model", "rater",
+            "session",
+            "device",
+            "store",
+            "outcome",
+            "protocol",
+            "rendering",
+            "model",
+            "rater",
+            "wire",
         ],
     ),
     (

@@ -9,11 +9,13 @@
 //! port, [`virtual_device`](super::virtual_device) in virtual time with the simulated
 //! device.
 
+mod arrivals;
 mod clock;
 mod replies;
 mod stage;
 pub(super) mod upload;
 
+pub use arrivals::Arrivals;
 pub use clock::DeviceClock;
 
 use super::{DeviceError, Identity, Report, Stimulus};
@@ -25,6 +27,7 @@ use study_base::limits::Limits;
 use study_base::text::{Untrusted, is_unsafe};
 use study_wire::frame::Decoder;
 use study_wire::message::{self, Heartbeat, Hello, Play, Reply, Request, Stop, WireError};
+use study_wire::servo::ServoSettings;
 
 /// Time after which an unanswered request is sent again.
 pub const RETRY_INTERVAL: Duration = Duration::from_millis(100);
@@ -125,6 +128,8 @@ pub struct Host {
     playback: u32,
     received: u64,
     lost: u64,
+    /// When the samples of the playback arrived.
+    arrivals: Arrivals,
     /// Strokes and clamps in the last progress report.
     reported: (u32, u32),
     heartbeat_count: u32,
@@ -257,6 +262,7 @@ impl Host {
             every: Some(sample_interval(device.servo_hz, self.settings.telemetry_hz)),
         };
         (self.received, self.lost, self.reported) = (0, 0, (0, 0));
+        self.arrivals = Arrivals::default();
         self.stage = Stage::Starting;
         self.send(Request::Play(play), at);
         Ok(())
@@ -514,7 +520,26 @@ fn identity(device: &message::Identity) -> Option<Identity> {
         simulated: device.flags.simulated,
         telemetry: device.flags.telemetry,
         limits: Limits::new(device.force_n, device.velocity_mm_s).ok()?,
+        servo: device.constants.map(|told| servo(device, &told)),
     })
+}
+
+/// The servo of a device that tells its constants.
+fn servo(device: &message::Identity, told: &message::Constants) -> ServoSettings {
+    ServoSettings {
+        servo_hz: device.servo_hz,
+        force_n: device.force_n,
+        velocity_mm_s: device.velocity_mm_s,
+        acceleration_hz: told.acceleration_hz,
+        least_mass_kg: told.least_mass_kg,
+        damping_n_s_per_mm: told.damping_n_s_per_mm,
+        wall_n_per_mm: told.wall_n_per_mm,
+        wall_n_s_per_mm: told.wall_n_s_per_mm,
+        overtravel_mm: told.overtravel_mm,
+        jump_mm: told.jump_mm,
+        slew_n_s: told.slew_n_s,
+        ramp_s: told.ramp_s,
+    }
 }
 
 /// A device's text with unsafe characters replaced, for files and terminals.

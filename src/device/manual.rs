@@ -75,6 +75,7 @@ impl Device for Manual {
             telemetry: false,
             // No limit in practice, because a sample has no motor.
             limits: Limits::new(1e3, 1e5).expect("positive constants"),
+            servo: None,
         }
     }
 

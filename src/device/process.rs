@@ -14,12 +14,13 @@
 mod child;
 mod messages;
 
+use super::host::Arrivals;
 use super::{Device, DeviceError, Identity, Report, Stimulus};
 use child::{ChildFailure, Running};
 use messages::{ChildMessage, Hello, MessageError};
 use std::time::{Duration, Instant};
 use study_base::limits::Limits;
-use study_core::outcome::Playback;
+use study_core::outcome::{Playback, Sample};
 
 pub use messages::FORMAT;
 
@@ -43,6 +44,8 @@ pub struct ProcessDevice {
     load: u64,
     /// Samples of the current playback.
     samples: u64,
+    /// When they arrived.
+    arrivals: Arrivals,
     /// When `alive` was last sent.
     alive_at: Duration,
     reports: Vec<Report>,
@@ -95,6 +98,7 @@ impl Opening {
                 phase: Phase::Idle,
                 load: 0,
                 samples: 0,
+                arrivals: Arrivals::default(),
                 alive_at: Duration::ZERO,
                 reports: Vec::new(),
                 reported_loss: None,
@@ -190,7 +194,7 @@ impl ProcessDevice {
             let Some(child) = &mut self.child else { return };
             let result = match child.receive(Duration::ZERO) {
                 Ok(None) => return,
-                Ok(Some(message)) => self.handle(message).map_err(ChildFailure::from),
+                Ok(Some(message)) => self.handle(message, at).map_err(ChildFailure::from),
                 Err(failure) => Err(failure),
             };
             if let (Err(failure), Some(child)) = (result, &mut self.child) {
@@ -200,7 +204,7 @@ impl ProcessDevice {
         }
     }
 
-    fn handle(&mut self, message: ChildMessage) -> Result<(), MessageError> {
+    fn handle(&mut self, message: ChildMessage, at: Duration) -> Result<(), MessageError> {
         if let Phase::Opening { .. } = self.phase {
             let identity = identity(message.hello()?);
             if identity.id != self.identity.id {
@@ -240,7 +244,10 @@ impl ProcessDevice {
             (ChildMessage::Started { .. }, Phase::Stopping) => {}
             (ChildMessage::Samples { samples, .. }, Phase::Playing | Phase::Stopping) => {
                 self.samples += samples.len() as u64;
-                let samples = samples.into_iter().map(Into::into).collect();
+                let samples: Vec<Sample> = samples.into_iter().map(Into::into).collect();
+                if let Some(last) = samples.last() {
+                    self.arrivals.add(at, last.t_s);
+                }
                 self.reports.push(Report::Telemetry(samples));
             }
             (
@@ -253,6 +260,7 @@ impl ProcessDevice {
                 self.phase = Phase::Idle;
                 self.reports.push(Report::Stopped(Playback {
                     samples: self.samples,
+                    time_ratio: self.arrivals.time_ratio(),
                     ..outcome.into()
                 }));
             }
@@ -315,6 +323,7 @@ fn identity(hello: Hello) -> Identity {
         simulated: hello.simulated,
         telemetry: hello.telemetry,
         limits: hello.limits,
+        servo: None,
     }
 }
 
@@ -334,6 +343,7 @@ impl Device for ProcessDevice {
         }
         self.load += 1;
         self.samples = 0;
+        self.arrivals = Arrivals::default();
         self.phase = Phase::Loading;
         let limits = limits.capped_at(self.identity.limits);
         self.send(messages::load(self.load, what, limits), at);

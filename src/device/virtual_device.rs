@@ -228,6 +228,7 @@ impl Device for VirtualDevice {
             simulated: true,
             telemetry: true,
             limits: firmware::Options::default().limits,
+            servo: None,
         })
     }
 

@@ -59,6 +59,8 @@ fn row(who: &str, model: &str, repetition: u32, rating: i64) -> RatingRow {
             _ => 0.9,
         }),
         covariates: BTreeMap::new(),
+        rendering: None,
+        rendered_vaf: None,
     }
 }
 

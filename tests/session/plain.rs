@@ -145,13 +145,14 @@ impl Lines {
 }
 
 /// Times, checksums, and what the device measured.
-const NOT_COMPARED: [&str; 9] = [
+const NOT_COMPARED: [&str; 10] = [
     "crc",
     "prev",
     "seq",
     "wall",
     "mono_ns",
     "playback",
+    "rendering",
     "telemetry",
     "reference_s",
     "response_s",

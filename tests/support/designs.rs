@@ -44,7 +44,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
                 velocity_mm_s: limit(1000.0),
             },
             uncertified: None,
-            rendering: None,
+            rendering: Default::default(),
         },
         trial: TrialRules {
             reference: None,

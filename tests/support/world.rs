@@ -195,9 +195,11 @@ pub fn ended(trial: u32, attempt: u32) -> Event {
             clamp_count: 1,
             samples: 3250,
             samples_lost: 0,
+            time_ratio: None,
         },
         stopped: false,
         telemetry: None,
+        rendering: None,
     }
 }
 

@@ -202,9 +202,9 @@ pub struct DeviceRules {
     pub limits: Limits,
     /// Permission to play tables that fail their passivity certificate.
     pub uncertified: Option<Uncertified>,
-    /// What a playback has to keep to, if the file says it.
+    /// When a playback is right. Not part of the stimulus.
     #[serde(skip)]
-    pub rendering: Option<RenderingRules>,
+    pub rendering: RenderingRules,
 }
 
 /// `[device.rendering]`: when a playback is right.
@@ -235,7 +235,7 @@ impl Default for RenderingRules {
             gain: [0.93, 1.07],
             max_bias_n: 0.2,
             max_delay_ms: 5.0,
-            max_error_n: 0.5,
+            max_error_n: 0.7,
             max_measured_error_n: 0.5,
             on_fault: None,
         }

@@ -28,7 +28,7 @@ const LEAST_MOTION_S: f64 = 0.1;
 const LEAST_TRAVEL_MM: f64 = 5.0;
 /// Least standard deviation of the table's force, N.
 const LEAST_SD_N: f64 = 0.1;
-/// Telemetry with longer intervals is too slow for a fault, s.
+/// Telemetry with longer intervals is too slow for a verdict, s.
 const SLOW_S: f64 = 0.0025;
 /// Duration of the window of [`Fidelity::rendered_error_n`], s.
 const WINDOW_S: f64 = 0.02;
@@ -118,7 +118,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
         enough: too_little.is_none(),
     };
     fidelity.defects = defects(&fidelity, &found, rules);
-    settle(&mut fidelity, played, rules, too_little, interval_s);
+    settle(&mut fidelity, played, rules, too_little);
     fidelity
 }
 
@@ -201,7 +201,6 @@ fn settle(
     played: &Played<'_>,
     rules: &RenderingRules,
     too_little: Option<&'static str>,
-    interval_s: f64,
 ) {
     let fails = |defect: &Defect| match rules.on_fault {
         None => defect.is_grave(),
@@ -224,8 +223,6 @@ fn settle(
     }
     if !played.servo_told {
         fidelity.only_flag("the device does not tell the constants of its servo");
-    } else if interval_s > SLOW_S {
-        fidelity.only_flag("the device reports fewer than 400 samples per second");
     }
 }
 
@@ -310,7 +307,7 @@ fn explore(played: &Played<'_>, samples: &[Sample], interval_s: f64, fidelity: &
     }
     // Either of them moves by more than rest.
     let rest_mm = REST_MM_S * WINDOW_S;
-    if f64::max(xx, vv) > n * rest_mm * rest_mm {
+    if interval_s <= SLOW_S && f64::max(xx, vv) > n * rest_mm * rest_mm {
         fidelity.speed_gain = Some(if xx > 0.0 { xv / xx } else { f64::MAX });
     }
 }
@@ -487,7 +484,9 @@ fn too_little(
         .filter(|(_, keep)| **keep)
         .map(|(w, _)| (w[1].x_mm - w[0].x_mm).abs())
         .sum();
-    if !lasting(compared().count(), LEAST_S) {
+    if interval_s > SLOW_S {
+        Some("the device reports fewer than 400 samples per second")
+    } else if !lasting(compared().count(), LEAST_S) {
         Some("too few samples after the ramp and below the limit")
     } else if ![1.0, -1.0]
         .iter()

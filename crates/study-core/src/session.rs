@@ -41,7 +41,7 @@ pub use unsaved::Unsaved;
 pub use view::{Screen, View};
 
 use crate::outcome::fold::History;
-use crate::outcome::{Event, Moment};
+use crate::outcome::{Event, Fidelity, Moment};
 use crate::protocol::phrases::Words;
 use crate::protocol::{DeviceKind, FileOrders, Protocol, Seat};
 use phase::{DeviceProblem, Phase};
@@ -77,6 +77,8 @@ pub struct Session {
     /// Start of the pause.
     paused: Option<Moment>,
     device_problem: Option<DeviceProblem>,
+    /// The judgement of the playback whose end is reported next.
+    judged: Option<Box<Fidelity>>,
     /// The device does not respond.
     device_lost: bool,
     saves: SaveState,
@@ -121,6 +123,7 @@ impl Session {
             phase: Phase::Identify,
             paused: None,
             device_problem: None,
+            judged: None,
             device_lost: false,
             saves: SaveState::default(),
             passed: BTreeSet::new(),
@@ -172,6 +175,7 @@ impl Session {
             Input::DeviceStarted => self.device_started(at),
             Input::DeviceSampled => self.device_sampled(at),
             Input::DeviceProgress { strokes } => self.device_progress(strokes),
+            Input::DeviceJudged(fidelity) => self.judged = Some(fidelity),
             Input::DeviceStopped(playback) => self.device_stopped(playback, at),
             Input::DeviceFault(what) => self.device_fault(&what, at),
             Input::DeviceLost(what) => self.device_gone(&what, at),
@@ -237,6 +241,7 @@ fn is_deliberate(input: &Input) -> bool {
             | Input::DeviceStarted
             | Input::DeviceSampled
             | Input::DeviceProgress { .. }
+            | Input::DeviceJudged(_)
             | Input::DeviceStopped(_)
             | Input::DeviceReady
     )

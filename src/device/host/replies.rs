@@ -58,7 +58,7 @@ impl Host {
                 }
             }
             Reply::Pulse(pulse) => self.pulse(pulse, at),
-            Reply::Telemetry(telemetry) => self.telemetry(&telemetry),
+            Reply::Telemetry(telemetry) => self.telemetry(&telemetry, at),
             Reply::Event(event) if event.playback == self.playback => match event.kind {
                 EventKind::Started => {}
                 EventKind::Stopped => self.ask_outcome(at),
@@ -210,6 +210,7 @@ impl Host {
             clamp_count: u64::from(outcome.clamps),
             samples: self.received,
             samples_lost,
+            time_ratio: self.arrivals.time_ratio(),
         }));
         self.make_idle(at);
     }
@@ -247,7 +248,7 @@ impl Host {
         }
     }
 
-    fn telemetry(&mut self, telemetry: &Telemetry) {
+    fn telemetry(&mut self, telemetry: &Telemetry, at: Duration) {
         let playing = matches!(
             self.stage,
             Stage::Starting
@@ -273,6 +274,9 @@ impl Host {
         self.received += samples.len() as u64;
         self.health.samples += samples.len() as u64;
         let servo_hz = device.servo_hz;
+        if let Some(last) = samples.last() {
+            self.arrivals.add(at, f64::from(last.tick) / servo_hz);
+        }
         let samples = samples
             .iter()
             .map(|sample| Sample {

@@ -122,6 +122,7 @@ impl From<PlaybackOutcome> for Playback {
             clamp_count: outcome.clamps,
             samples: 0,
             samples_lost: 0,
+            time_ratio: None,
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use super::rig::{DeviceMood, Rig, name};
 use super::studies::{plain, rich};
-use study_core::outcome::{Event, Failure, Playback};
+use study_base::text::ModelId;
+use study_core::outcome::{Defect, Event, Failure, Fidelity, Playback, Verdict};
 use study_core::protocol::DeviceKind;
 use study_core::session::view::{DeviceState, Telemetry};
 use study_core::session::{Effect, Input, Screen};
@@ -292,6 +293,67 @@ fn a_stopped_playback_can_be_rated() {
     rig.finish();
     rig.assert_whole();
     assert_eq!(rig.closed()[&1], Some(1));
+}
+
+/// A judgement with this verdict.
+fn judged(verdict: Verdict) -> Input {
+    Input::DeviceJudged(Box::new(Fidelity {
+        verdict,
+        defects: vec![Defect::OtherTable],
+        nearest_model: Some(ModelId::new("spring").unwrap()),
+        ..Fidelity::default()
+    }))
+}
+
+#[test]
+fn a_wrong_playback_fails_its_attempt_and_names_nothing() {
+    let mut rig = in_phase("Playing");
+    let playback = rig.playback;
+    rig.send(Input::Advance);
+    rig.send(judged(Verdict::Fault));
+    rig.send(Input::DeviceStopped(playback));
+    let Screen::DeviceTrouble { what, can_go_on } = rig.view().screen else {
+        panic!("{:?}", rig.view().screen);
+    };
+    assert_eq!(what, "the device did not do what it was told");
+    assert!(can_go_on);
+    let failures: Vec<Event> = (rig.journal.iter().map(|e| e.event.clone()))
+        .filter(|e| matches!(e, Event::AttemptFailed { .. }))
+        .collect();
+    let [
+        Event::AttemptFailed {
+            trial: 1,
+            failure: Failure::Rendering,
+            detail,
+            ..
+        },
+    ] = &failures[..]
+    else {
+        panic!("{failures:?}");
+    };
+    assert_eq!(detail, "other-table");
+    rig.finish();
+    rig.assert_whole();
+    assert_eq!(rig.closed()[&1], Some(2), "the second attempt counts");
+}
+
+#[test]
+fn a_marked_playback_is_rated_and_the_next_has_its_own_judgement() {
+    let mut rig = in_phase("Playing");
+    let playback = rig.playback;
+    rig.send(Input::Advance).send(judged(Verdict::Flag));
+    rig.send(Input::DeviceStopped(playback));
+    assert_eq!(screen(&rig), "Form");
+    rig.finish();
+    rig.assert_whole();
+    let stored: Vec<Option<Verdict>> = (rig.journal.iter())
+        .filter_map(|e| match &e.event {
+            Event::PlaybackEnded { rendering, .. } => Some(rendering.as_deref().map(|r| r.verdict)),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(stored[0], Some(Verdict::Flag));
+    assert!(stored[1..].iter().all(Option::is_none), "{stored:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The cells of a row, and the header of each table of a study.
 
 use super::rows::{AttemptEvent, AttemptRow, ParticipantRow, RatingRow};
-use super::{Author, Failure, Sample, State, Status};
+use super::{Author, Failure, Sample, State, Status, Verdict};
 use crate::protocol::columns::{
     AttemptColumn, Column, ParticipantColumn, RatingColumn, Repeats, SampleColumn,
 };
@@ -90,6 +90,7 @@ fields! {
     Status: |status, _| Cell::text(status.as_str());
     State: |state, _| Cell::text(state.as_str());
     Failure: |failure, _| Cell::text(failure.as_str());
+    Verdict: |verdict, _| Cell::text(verdict.as_str());
     Author: |author, _| Cell::text(author.as_str());
     Answer: |answer, _| match answer {
         Answer::Rating(n) => Cell::Whole((*n).into()),
@@ -229,6 +230,8 @@ row! {
         Status: status,
         Vaf: vaf,
         Covariates: covariates,
+        Rendering: rendering,
+        RenderedVaf: rendered_vaf,
     }
 }
 

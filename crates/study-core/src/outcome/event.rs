@@ -4,6 +4,7 @@
 //! events and optional fields but must not change these. `store` adds a sequence
 //! number, checksums and clocks to each event.
 
+use super::fidelity::Fidelity;
 use crate::protocol::fingerprint::Fingerprints;
 use crate::protocol::{Answer, DeviceKind, Seat, Trial};
 use chrono::{DateTime, FixedOffset};
@@ -85,6 +86,8 @@ named! {
         Stopped = "stopped",
         /// The program ended during the attempt.
         Interrupted = "interrupted",
+        /// The force was not that of the table.
+        Rendering = "rendering",
     }
 }
 
@@ -152,6 +155,9 @@ pub struct Playback {
     pub samples: u64,
     /// Telemetry samples known to have been lost.
     pub samples_lost: u64,
+    /// Time of the samples over time of the host, if both are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_ratio: Option<f64>,
 }
 
 /// JSON has no NaN: it is written as null, which must not make a line unreadable.
@@ -282,6 +288,9 @@ pub enum Event {
         /// releases.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         telemetry: Option<TelemetryFile>,
+        /// Whether the force was that of the table; not in journals of earlier releases.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        rendering: Option<Box<Fidelity>>,
     },
     /// The telemetry of the attempt could not be saved, or only in part.
     TelemetryLost {

@@ -122,7 +122,7 @@ impl Failure {
     /// the trial is simply felt again.
     pub fn counts(self) -> bool {
         match self {
-            Self::DeviceFault | Self::PlaybackLost | Self::MarkedBad => true,
+            Self::DeviceFault | Self::PlaybackLost | Self::MarkedBad | Self::Rendering => true,
             Self::Stopped | Self::Interrupted => false,
         }
     }
@@ -210,12 +210,14 @@ impl History {
                 playback,
                 stopped,
                 telemetry: _,
+                rendering,
             } => {
                 if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
                     attempt.ended = Some(Ended {
                         playback: *playback,
                         stopped: *stopped,
                     });
+                    attempt.rendering.extend(rendering.as_deref().cloned());
                     attempt.rating = Some((at, at));
                 }
             }

@@ -2,6 +2,7 @@
 //! which `protocol::columns` declares.
 
 use super::event::{Author, Event, Failure, State};
+use super::fidelity::Verdict;
 use crate::protocol::{Answer, DeviceKind, Role};
 use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,8 @@ pub struct RatingRow {
     pub status: Status,
     pub vaf: Option<f64>,
     pub covariates: BTreeMap<String, f64>,
+    pub rendering: Option<Verdict>,
+    pub rendered_vaf: Option<f64>,
 }
 
 study_base::named! {

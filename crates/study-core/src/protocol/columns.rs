@@ -50,6 +50,8 @@ pub struct Column {
     pub empty: Option<&'static str>,
     /// Whether there are several.
     pub repeats: Repeats,
+    /// Whether a table in which all its cells are empty does not have it.
+    pub optional: bool,
 }
 
 impl Column {
@@ -61,7 +63,13 @@ impl Column {
             meaning,
             empty: None,
             repeats: Repeats::Once,
+            optional: false,
         }
+    }
+
+    const fn optional(mut self) -> Self {
+        self.optional = true;
+        self
     }
 
     const fn unit(mut self, unit: &'static str) -> Self {
@@ -233,6 +241,18 @@ table! {
         ).empty("neither states it"),
         Covariates: number("one for each covariate", "covariate of the realization, sorted by name")
             .empty("the realization does not have it").repeats(Repeats::Covariate),
+        Rendering: level("rendering", &[
+            ("ok", "the force was that of the table"),
+            ("unverified", "the device reports no samples, or plays no table"),
+            ("too-little", "too little was felt or reported to judge it"),
+            ("flag", "the force was not that of the table, and the protocol marks it"),
+            ("fault", "the force was not that of the table, and the attempt failed"),
+        ], "whether the force was that of the table; of several playbacks the worst")
+            .empty("no playback ended, or it was not judged").optional(),
+        RenderedVaf: number(
+            "rendered_vaf",
+            "share of the variance of the table's force for the reported motion that the device commanded",
+        ).empty("not known, or the force did not vary").optional(),
     }
 }
 
@@ -273,6 +293,7 @@ table! {
             ("marked-bad", "marked as bad by a person"),
             ("stopped", "stopped, and played again instead of rated"),
             ("interrupted", "the program ended during the attempt"),
+            ("rendering", "the force was not that of the table"),
         ], "why the attempt failed").empty("the event is no failure"),
         By: level("by", &[
             ("participant", "the participant"),

@@ -16,7 +16,7 @@
 //! * wording: title, authors and the like; all texts, prompts and labels; consent;
 //!   questions asked once (setup, intake, outro); who types, and when a session
 //!   can be resumed.
-//! * analysis: `[analysis]`, planned participants, VAF and covariates.
+//! * analysis: `[analysis]`, planned participants, VAF and covariates, `[device.rendering]`.
 
 use super::{FileOrders, Order, Protocol, Question, QuestionKind};
 use serde::{Deserialize, Serialize};
@@ -143,11 +143,15 @@ pub fn of(
         .iter()
         .map(|m| json!({ "id": m.id, "vaf": m.vaf, "covariates": m.covariates }))
         .collect();
-    let analysis = json!({
+    let mut analysis = json!({
         "analysis": analysis,
         "participants": participants,
         "models": known,
     });
+    // Absent from the fingerprints of protocols without it.
+    if device.rendering != super::RenderingRules::default() {
+        analysis["rendering"] = json!(device.rendering);
+    }
     Fingerprints {
         stimulus: hex(canonical(&stimulus).as_bytes()),
         wording: hex(canonical(&wording).as_bytes()),
@@ -328,6 +332,10 @@ mod tests {
             [false, false, true]
         );
         assert_eq!(parts(&|p| p.design.participants = 12), [false, false, true]);
+        assert_eq!(
+            parts(&|p| p.device.rendering.min_vaf = 0.9),
+            [false, false, true]
+        );
         assert_eq!(
             parts(&|p| p.models[0].file = Some("elsewhere.toml".to_owned())),
             [false, false, false]

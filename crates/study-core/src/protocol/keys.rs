@@ -48,6 +48,8 @@ pub enum Kind {
     Id(Id),
     /// A list of ids of realizations.
     ModelIds,
+    /// A list of finite numbers, not empty.
+    NumberList,
     /// A file inside the folder of the protocol, with `/` between folders.
     Path,
     /// A whole number, at least and at most so large.
@@ -170,6 +172,7 @@ impl Kind {
             Self::Id(Id::Model) => format!("text: {ids} . _ -`"),
             Self::Id(Id::Question) => format!("text: {ids} _ -`"),
             Self::ModelIds => "a list of ids of realizations".to_owned(),
+            Self::NumberList => "a list of numbers, not empty".to_owned(),
             Self::Path => "a path inside the protocol's folder, with `/`".to_owned(),
             Self::Whole(i64::MIN, _) => "a whole number".to_owned(),
             Self::Whole(least, most) if most >= i64::from(u32::MAX) => {

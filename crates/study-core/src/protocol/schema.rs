@@ -60,6 +60,9 @@ fn of(kind: Kind) -> Value {
         Kind::Constant(text) => json!({ "const": text }),
         Kind::Id(id) => json!({ "type": "string", "pattern": id.pattern() }),
         Kind::ModelIds => json!({ "type": "array", "items": of(Kind::Id(super::keys::Id::Model)) }),
+        Kind::NumberList => {
+            json!({ "type": "array", "minItems": 1, "items": { "type": "number" } })
+        }
         Kind::Whole(least, most) => whole(least, most),
         Kind::Number(range, _) => number(range),
         Kind::Flag => json!({ "type": "boolean" }),

@@ -339,6 +339,10 @@ fn too_little_is_never_ok() {
         );
         assert!(found.because.is_some());
     }
+    // A slow report of everything.
+    let slow: Vec<Sample> = right().into_iter().step_by(5).collect();
+    let found = verdict_of(&slow);
+    assert_eq!(found.verdict, Verdict::TooLittle, "{found:?}");
     // Half a stroke: never back.
     let found = verdict_of(&right()[..500]);
     assert_eq!(found.verdict, Verdict::TooLittle, "{found:?}");

@@ -62,6 +62,14 @@ impl Session {
         self.device_problem = Some(DeviceProblem { what, fault });
     }
 
+    /// One text for every defect and every realization.
+    pub(super) fn show_wrong_force(&mut self) {
+        self.device_problem = Some(DeviceProblem {
+            what: WRONG_FORCE.to_owned(),
+            fault: false,
+        });
+    }
+
     pub(super) fn show_device_lost(&mut self) {
         self.device_problem = Some(DeviceProblem {
             what: "the device does not respond".to_owned(),
@@ -197,6 +205,9 @@ impl Session {
 
 /// What the screen shows instead of a device's reason for not playing a realization.
 const REFUSED: &str = "the device does not play this trial; the journal has its reason";
+
+/// What the screen shows after a playback with a wrong force.
+const WRONG_FORCE: &str = "the device did not do what it was told";
 
 /// The text with "…" for each number: a position or speed may depend on the realization.
 fn without_numbers(text: &str) -> String {

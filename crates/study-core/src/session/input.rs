@@ -1,6 +1,6 @@
 //! The inputs and effects of a session.
 
-use crate::outcome::{Author, Choice, Entry, Event, FormId, Playback};
+use crate::outcome::{Author, Choice, Entry, Event, Fidelity, FormId, Playback};
 use crate::protocol::fingerprint::Fingerprints;
 use crate::protocol::{Answer, DeviceKind, Seat};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
@@ -82,6 +82,9 @@ pub enum Input {
         /// Full strokes so far.
         strokes: u32,
     },
+    /// Whether the playback that has just stopped had the force of its table;
+    /// [`Input::DeviceStopped`] follows.
+    DeviceJudged(Box<Fidelity>),
     /// The device confirms that it has stopped.
     DeviceStopped(Playback),
     /// The device reports a fault; it is limp.

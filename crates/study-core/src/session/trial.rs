@@ -2,7 +2,7 @@
 
 use super::phase::Phase;
 use super::{Effect, Session};
-use crate::outcome::{Event, Failure, Moment, Playback};
+use crate::outcome::{Event, Failure, Fidelity, Moment, Playback, Verdict};
 use crate::protocol::{DeviceKind, Trial};
 
 impl Session {
@@ -107,6 +107,7 @@ impl Session {
 
     /// The confirmed end of the playback. Only after it can the trial be rated.
     pub(super) fn device_stopped(&mut self, playback: Playback, at: Moment) {
+        let rendering = self.judged.take();
         let (aborted, pause) = match self.phase {
             Phase::Playing { .. } => (false, false),
             Phase::Stopping { aborted, pause, .. } => (aborted, pause),
@@ -130,12 +131,25 @@ impl Session {
             stopped: aborted,
             // The saver knows the file.
             telemetry: None,
+            rendering: rendering.clone(),
         };
         self.record(ended, at);
-        self.after_playback(at);
+        match rendering {
+            Some(found) if found.verdict == Verdict::Fault => self.wrong_force(&found, at),
+            _ => self.after_playback(at),
+        }
         if pause {
             self.start_pause(at);
         }
+    }
+
+    /// The force was not that of the table: nothing is asked about it.
+    fn wrong_force(&mut self, found: &Fidelity, at: Moment) {
+        self.out.push(Effect::Limp);
+        let defects: Vec<&str> = found.defects.iter().map(|d| d.as_str()).collect();
+        self.fail(Failure::Rendering, &defects.join(", "), at);
+        self.proceed(at);
+        self.show_wrong_force();
     }
 
     /// Enters the rating, or the choice if the playback was stopped or too short.

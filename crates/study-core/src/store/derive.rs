@@ -6,6 +6,7 @@
 use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
 use super::{StudyFolder, atomic, journal, layout, tables};
+use crate::outcome::cell::{Cell, Row as _};
 use crate::outcome::fold::attempt_rows;
 use crate::outcome::{AttemptRow, ParticipantRow, RatingRow, State};
 use crate::protocol::Protocol;
@@ -104,7 +105,12 @@ impl Derived {
 
     /// File name and bytes of each table.
     pub(super) fn tables(&self, protocol: &Protocol) -> io::Result<[(&'static str, Vec<u8>); 3]> {
-        let ratings = tables::csv(&RatingColumn::header(protocol), &self.rows)?;
+        let mut header = RatingColumn::header(protocol);
+        header.retain(|(column, name)| {
+            let used = |row: &RatingRow| row.cell(*column, name) != Cell::Empty;
+            !column.column().optional || self.rows.iter().any(used)
+        });
+        let ratings = tables::csv(&header, &self.rows)?;
         let attempts = tables::csv(&AttemptColumn::header(), &self.attempts)?;
         let header = ParticipantColumn::header(protocol);
         let participants = tables::csv(&header, &self.participants)?;

@@ -30,6 +30,10 @@ pub struct Manifest {
     pub created: DateTime<FixedOffset>,
     /// Versions of the protocol, from 1, without gaps.
     pub versions: Vec<Version>,
+    /// Whether wrong playbacks fail since the first session; not in studies of earlier
+    /// releases, which only mark them.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub judges_rendering: bool,
     /// Whether the file agreed with its checksum when it was read; `None` for one of an
     /// earlier release, which has none.
     #[serde(skip)]
@@ -70,6 +74,7 @@ impl Manifest {
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
             created: at.wall,
             versions: vec![first],
+            judges_rendering: true,
             intact: Some(true),
         }
     }

@@ -27,6 +27,7 @@ mod tests {
     use crate::outcome::ratings::Ratings;
     use crate::outcome::{
         AttemptEvent, AttemptRow, Author, Failure, ParticipantRow, RatingRow, State, Status,
+        Verdict,
     };
     use crate::protocol::columns::{
         AttemptColumn, Column, Kind, ParticipantColumn, RatingColumn, Repeats,
@@ -161,6 +162,16 @@ mod tests {
             status,
             vaf: d.maybe(Draws::number),
             covariates: BTreeMap::from([("lambda".to_owned(), d.number())]),
+            rendering: d.maybe(|d| {
+                d.of(&[
+                    Verdict::Ok,
+                    Verdict::Unverified,
+                    Verdict::TooLittle,
+                    Verdict::Flag,
+                    Verdict::Fault,
+                ])
+            }),
+            rendered_vaf: d.maybe(Draws::number),
         }
     }
 

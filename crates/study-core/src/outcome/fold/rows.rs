@@ -58,6 +58,7 @@ impl History {
         let played = shown.and_then(|a| a.ended).map(|e| e.playback);
         // Without telemetry nothing was counted.
         let sampled = played.filter(|p| p.samples > 0);
+        let worst = shown.and_then(|a| a.rendering.iter().max_by_key(|r| r.verdict));
         let finite = |x: f64| Some(x).filter(|x| x.is_finite());
         let done = counted.and_then(|a| a.done);
         let sitting = shown.map_or(&self.sitting, |a| &a.sitting);
@@ -107,6 +108,8 @@ impl History {
             },
             vaf: entry.and_then(|m| m.vaf),
             covariates: entry.map(|m| m.covariates.clone()).unwrap_or_default(),
+            rendering: worst.map(|w| w.verdict),
+            rendered_vaf: worst.and_then(|w| w.rendered_vaf),
             answers: answers(given.into_iter()),
         }
     }

@@ -78,6 +78,7 @@ fn play(trial: u32, attempt: u32, samples: u64) -> [Event; 3] {
             },
             stopped: false,
             telemetry: None,
+            rendering: None,
         },
     ]
 }

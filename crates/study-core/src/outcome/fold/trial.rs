@@ -1,6 +1,7 @@
 //! The history of one trial: its attempts.
 
 use crate::outcome::event::{Moment, Playback};
+use crate::outcome::fidelity::Fidelity;
 use study_base::text::ModelId;
 
 /// What the events say of one trial.
@@ -56,6 +57,8 @@ pub struct Attempt {
     pub start: Option<AttemptStart>,
     /// The confirmed end of its playback.
     pub ended: Option<Ended>,
+    /// Whether the force was that of the table, for each playback that was judged.
+    pub rendering: Vec<Fidelity>,
     /// Rating time before the program was last left, s.
     pub rated_earlier_s: f64,
     /// First and last moment of the rating in this sitting.
@@ -106,6 +109,7 @@ impl Attempt {
             sitting: sitting.clone(),
             start,
             ended: None,
+            rendering: Vec::new(),
             rated_earlier_s: 0.0,
             rating: None,
             done: None,

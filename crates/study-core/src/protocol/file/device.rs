@@ -1,8 +1,9 @@
 //! `[device]`.
 
+use super::models::AT_MOST_1;
 use super::section::Section;
 use crate::protocol::keys::{Key, Kind, Words as _, keys};
-use crate::protocol::{DeviceKind, DeviceRules, Uncertified};
+use crate::protocol::{DeviceKind, DeviceRules, OnFault, RenderingRules, Uncertified};
 use study_base::diagnostic::Fault;
 use study_base::limits::Limits;
 
@@ -15,6 +16,28 @@ pub(super) const DEVICE: &[Key] = keys! {
     /// Permission to play tables that fail their passivity certificate, which could put
     /// energy into the hand. Without it such a table is refused.
     "uncertified": Kind::Table(UNCERTIFIED), r#"{ play = true, force_n = 9.0, reason = "the paper's own realizations" }"#;
+    /// When the force of a playback was that of its table, and what follows if it was not.
+    /// Needs a device that reports samples.
+    "rendering": Kind::Table(RENDERING), r#"{ min_vaf = 0.9, on_fault = "fail" }"#;
+};
+
+const RENDERING: &[Key] = keys! {
+    /// Least share of the variance of the table's force that the device commands.
+    "min_vaf": Kind::Number(AT_MOST_1, ""), "0.9", default("0.98");
+    /// Least and largest slope of the commanded on the table's force, and of the measured on
+    /// the commanded force.
+    "gain": Kind::NumberList, "[0.9, 1.1]", default("[0.93, 1.07]");
+    /// Largest mean difference of commanded and table's force.
+    "max_bias_n": Kind::positive("N"), "0.5", default("0.2");
+    /// Largest delay of the commanded force.
+    "max_delay_ms": Kind::positive("ms"), "10.0", default("5.0");
+    /// Largest difference of commanded and table's force that lasts 20 ms.
+    "max_error_n": Kind::positive("N"), "1.0", default("0.7");
+    /// Largest mean size of measured minus commanded force.
+    "max_measured_error_n": Kind::positive("N"), "1.0", default("0.5");
+    /// What a wrong playback is. Without this key it fails if the force passed its limit, was
+    /// that of another table or had the wrong sign, and is marked otherwise.
+    "on_fault": Kind::Word(OnFault::WORDS), r#""fail""#;
 };
 
 const LIMITS: &[Key] = keys! {
@@ -38,6 +61,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
     let given = section.value("limits").is_some();
     let limits = section.section("limits").and_then(limits);
     let uncertified = section.section("uncertified").and_then(uncertified);
+    let rendering = section.section("rendering").and_then(rendering);
     if !given && kind != Some(DeviceKind::Manual) {
         section.report_missing("limits", section.key("limits").such_as());
     }
@@ -62,7 +86,32 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
             None => return None,
         },
         uncertified,
-        rendering: None,
+        rendering: rendering?,
+    })
+}
+
+fn rendering(mut section: Section<'_, '_>) -> Option<RenderingRules> {
+    let default = RenderingRules::default();
+    let gain = match section.numbers("gain").as_deref() {
+        None => default.gain,
+        Some([low, high]) if low < high => [*low, *high],
+        Some(_) => {
+            section.fault_at(
+                "gain",
+                Fault::error("`gain` needs two numbers, the smaller one first")
+                    .hint("such as gain = [0.9, 1.1]"),
+            );
+            return None;
+        }
+    };
+    Some(RenderingRules {
+        min_vaf: section.number("min_vaf")?,
+        gain,
+        max_bias_n: section.number("max_bias_n")?,
+        max_delay_ms: section.number("max_delay_ms")?,
+        max_error_n: section.number("max_error_n")?,
+        max_measured_error_n: section.number("max_measured_error_n")?,
+        on_fault: section.word("on_fault"),
     })
 }
 

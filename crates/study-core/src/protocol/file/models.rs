@@ -8,7 +8,7 @@ use std::ops::Bound;
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, QuestionId};
 
-const AT_MOST_1: NumberRange = (Bound::Unbounded, Bound::Included(1.0));
+pub(super) const AT_MOST_1: NumberRange = (Bound::Unbounded, Bound::Included(1.0));
 
 pub(super) const MODELS: &[Key] = keys! {
     /// The name of the realization in every file.

@@ -239,6 +239,17 @@ impl<'d, 't> Section<'d, 't> {
         values.iter().flatten().filter_map(parsed).collect()
     }
 
+    /// A list of finite numbers, not empty; `None` if the key is absent.
+    pub(super) fn numbers(&mut self, name: &str) -> Option<Vec<f64>> {
+        let list = self.value(name)?;
+        let values = list.array()?;
+        if values.is_empty() {
+            list.fault(Fault::error(format!("`{}` is empty", list.path())));
+        }
+        let each = |value| number(value, Kind::ANY_NUMBER);
+        Some(values.iter().filter_map(each).collect())
+    }
+
     /// The id of a question.
     pub(super) fn question_id(&mut self, name: &str) -> Option<QuestionId> {
         parsed(&self.value(name)?)

@@ -312,6 +312,7 @@ fn bad_values(kind: Kind) -> Vec<Value> {
         Kind::Constant(_) => parsed(&["\"x\"", "1"]),
         Kind::Id(_) => parsed(&["1", "\"\"", "\"a b\"", "\"a/b\"", "\"ä\""]),
         Kind::ModelIds => parsed(&["\"a\"", "[1]", "[\"a b\"]"]),
+        Kind::NumberList => parsed(&["1", "[]", "[\"1\"]", "[nan]"]),
         Kind::Path => parsed(&["1", "\"\"", "\"../a\"", "\"/a\"", "\"a\\\\b\""]),
         Kind::Whole(least, most) => {
             let mut bad = parsed(&["1.5", "\"1\"", "true"]);
