@@ -101,6 +101,8 @@ enum Truth {
     Vaf,
     /// No realization is better, but 0.3 of a rating is carried over to the next.
     Carried,
+    /// The last two are equally good, the others are lower by 1.5.
+    TwoBest,
 }
 
 /// A trial: participant, realization, repetition, impression.
@@ -128,13 +130,16 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
     let k = world.realizations;
     let x = standardized(&vafs(k));
     let (slope, spread) = match truth {
-        Truth::Equal | Truth::Carried => (0.0, 0.0),
+        Truth::Equal | Truth::TwoBest | Truth::Carried => (0.0, 0.0),
         Truth::Unrelated => (0.0, 0.5),
         Truth::Vaf => (0.5, 0.3),
     };
-    let means: Vec<f64> = x
-        .iter()
-        .map(|x| slope * x + spread * noise.normal())
+    let lower = |m: usize| {
+        let is_lower = truth == Truth::TwoBest && m + 2 < k;
+        if is_lower { 1.5 } else { 0.0 }
+    };
+    let means: Vec<f64> = (0..k)
+        .map(|m| slope * x[m] + spread * noise.normal() - lower(m))
         .collect();
     let mut trials = Vec::new();
     for p in 0..world.participants {
@@ -393,6 +398,13 @@ fn main() {
         null,
         true,
         &with(Truth::Unrelated),
+        verdicts,
+    );
+    table(
+        "Two are equally good, the others worse",
+        null,
+        true,
+        &with(Truth::TwoBest),
         verdicts,
     );
     table(

@@ -12,6 +12,7 @@
 
 pub mod editor;
 pub mod keys;
+pub mod pace;
 pub mod surface;
 mod terminal;
 pub mod theme;
@@ -26,6 +27,7 @@ pub use theme::Colour;
 
 use crate::runner::{Operator, OperatorError};
 use crossterm::event::{Event, MouseEventKind};
+use pace::Pace;
 use std::time::{Duration, Instant};
 use study_core::session::{Input, Screen, View};
 use terminal::Terminal;
@@ -96,7 +98,9 @@ const SUSPEND_WAIT: Duration = Duration::from_secs(2);
 pub struct Tui {
     terminal: Terminal,
     surface: Surface,
-    drawn: Option<View>,
+    /// The last page, and whether it did not offer Enter.
+    drawn: Option<(View, bool)>,
+    pace: Pace,
     suspend_since: Option<Instant>,
 }
 
@@ -110,17 +114,21 @@ impl Tui {
             terminal: Terminal::open(options.mouse)?,
             surface: Surface::new(options.colour).with_live(options.live),
             drawn: None,
+            pace: Pace::new(Instant::now()),
             suspend_since: None,
         })
     }
 
     /// Draws the view if anything visible has changed.
     fn draw(&mut self, view: &View) -> Result<(), OperatorError> {
-        let now = as_shown(view);
+        let waits = self.pace.waits(Instant::now());
+        let now = (as_shown(view), waits);
         if self.drawn.as_ref() == Some(&now) {
             return Ok(());
         }
         let surface = &mut self.surface;
+        let turns = surface.turns(view);
+        surface.set_waits(waits);
         let drawn = self.terminal.draw(|frame| {
             let area = frame.area();
             surface.follow(view, area);
@@ -129,6 +137,9 @@ impl Tui {
             }
         });
         drawn?;
+        if turns {
+            self.pace.turned(Instant::now());
+        }
         self.terminal.allow_paste(!view.armed);
         self.drawn = Some(now);
         Ok(())
@@ -165,8 +176,12 @@ impl Operator for Tui {
             self.draw(view)?;
             let left = until.saturating_duration_since(Instant::now());
             match self.terminal.event(left.min(SLICE))? {
-                Some(Event::Mouse(mouse)) if mouse.kind == MouseEventKind::Moved => {}
-                Some(event) => {
+                Some((Event::Mouse(mouse), _)) if mouse.kind == MouseEventKind::Moved => {}
+                Some((event, at)) => {
+                    let dialog = self.surface.state().dialog().is_some();
+                    if !self.pace.accepts(&event, at, dialog, view.armed) {
+                        continue;
+                    }
                     self.drawn = None;
                     let inputs = self.surface.event(&event, view);
                     if !inputs.is_empty() {

@@ -46,6 +46,7 @@ const CRATES: [(&str, &[&str], &[&str]); 7] = [
 const IMPORTS: &[(&str, &[&str])] = &[
     ("diagnostic", &["text"]),
     ("procedure", &["stats"]),
+    ("protocol", &["stats"]),
     ("schedule", &["protocol"]),
     ("outcome", &["protocol"]),
     ("session", &["protocol", "schedule", "outcome"]),

@@ -2,6 +2,7 @@
 
 use super::{Console, Failure, load, study_folder};
 use std::path::PathBuf;
+use study_base::text::Untrusted;
 use study_core::store::Frozen;
 
 /// Arguments of `study amend`.
@@ -33,9 +34,19 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: &loaded.files,
         fingerprints: &loaded.fingerprints,
     };
-    let version = study.amend(&frozen, reason, study_folder::now())?;
+    let changes = study_folder::changes(&study, &loaded)?;
+    let version = study
+        .amend(&frozen, reason, study_folder::now())
+        .map_err(|error| study_folder::refused(error, &loaded))?;
     console.out(format!(
         "{id}: froze version {version} of the protocol. New sessions use it.\n"
     ))?;
+    for change in &changes {
+        let values = study_folder::values(change);
+        console.out(format!(
+            "  {}\n",
+            Untrusted(&format!("{}: {values}", change.key))
+        ))?;
+    }
     study_folder::refresh(&study, console)
 }

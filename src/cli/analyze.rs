@@ -138,7 +138,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             None if args.json => None,
             None => Some(folder.join("analysis")),
         };
+        let blocked = out.is_some() && args.out.is_none();
+        let blocked = blocked.then(|| study.check_analysis().err()).flatten();
+        let out = out.filter(|_| blocked.is_none());
         show(args, &input, out.as_deref(), console)?;
+        if let Some(error) = blocked {
+            study_folder::tables_unwritten(&error.into(), console);
+        }
         truncated = truncated.and(study_folder::whole(study, &sessions));
     }
     truncated

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::ModelId;
 use study_core::protocol::file::{self, Named, Parsed};
-use study_core::protocol::fingerprint::{self, Fingerprints};
+use study_core::protocol::fingerprint::{self, Fingerprints, Parts};
 use study_core::protocol::{FileOrders, Order, Protocol, check};
 use study_core::store::layout;
 use study_haptics::model::Realization;
@@ -44,6 +44,8 @@ pub struct Loaded {
     /// The files of the study: relative path, separated by `/`, and bytes;
     /// `protocol.toml` first, then each other file once.
     pub files: Vec<(String, Vec<u8>)>,
+    /// What the fingerprints are made of.
+    pub parts: Parts,
     /// Fingerprints of the study.
     pub fingerprints: Fingerprints,
     /// The warnings of all files.
@@ -113,14 +115,14 @@ impl Purpose<'_> {
             Self::Design => false,
             Self::Sessions(results) => [results.join(study), results.to_owned()]
                 .iter()
-                .any(|folder| folder.join(layout::MANIFEST).exists()),
+                .any(|folder| folder.join(layout::MANIFEST).symlink_metadata().is_ok()),
             Self::Data => true,
         }
     }
 }
 
 fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
-    let path = if path.is_dir() {
+    let path = if path.is_dir() && purpose != Purpose::Data {
         path.join(FILE_NAME)
     } else {
         path.to_owned()
@@ -177,7 +179,7 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     findings.sort();
 
     let mut files = vec![(FILE_NAME.to_owned(), bytes)];
-    let fingerprints = fingerprint::of(&protocol, &others.bytes_by_model(), orders.as_ref());
+    let parts = fingerprint::parts(&protocol, &others.bytes_by_model(), orders.as_ref());
     let models = others.realizations();
     files.extend(others.take_bytes());
     let all = others.findings(findings);
@@ -191,7 +193,8 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
         models,
         orders,
         files,
-        fingerprints,
+        fingerprints: parts.fingerprints(),
+        parts,
         findings: all.clone(),
     };
     (Some(loaded), all)

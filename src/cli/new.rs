@@ -72,7 +72,7 @@ fn starter(dir: &Path, seed: u64) -> Result<Files, Failure> {
 /// another study.
 fn replication(results: &Path, today: &str, seed: u64) -> Result<Files, Failure> {
     let (folder, version) = frozen(results)?;
-    let loaded = load::load_frozen(&folder)?;
+    let loaded = load::load_frozen(&folder.join(load::FILE_NAME))?;
     let study = &loaded.protocol.study;
     let mut id = format!("{}-replication", study.id);
     id.truncate(64);

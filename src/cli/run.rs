@@ -4,17 +4,21 @@ mod unsaved;
 
 use super::console::shell_command;
 use super::device_selection::{self, DeviceArgs, WaitDisplay};
-use super::{Console, Failure, Kind, load};
+use super::{Console, Failure, Kind, load, study_folder};
 use crate::plain::Plain;
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Operator, Runner, Setup};
 use crate::tui::{self, Tui};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
 use study_base::text::ParticipantId;
 use study_core::protocol::DeviceKind;
-use study_core::session::{Config, Ending, MAX_OPERATOR};
-use study_core::store::{Copies, Frozen, SeatKind, StoreError, StudyFolder, layout};
+use study_core::session::roster::Newcomer;
+use study_core::session::{Config, Ending, MAX_OPERATOR, Roster};
+use study_core::store::{
+    Copies, Frozen, SeatKind, SessionData, StoreError, StudyFolder, layout, next_row, participants,
+};
 
 /// Arguments of `study run`.
 #[derive(Debug, clap::Args)]
@@ -34,7 +38,7 @@ pub(super) struct Args {
     pilot: bool,
     /// Rows that may be assigned, such as 1-40: give each of two rigs its own range
     #[arg(long, value_name = "A-B", value_parser = super::schedule::parse_rows)]
-    rows: Option<std::ops::RangeInclusive<u32>>,
+    rows: Option<RangeInclusive<u32>>,
     /// Folder for the results of all studies
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
@@ -83,13 +87,17 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         Some(mirror) => Some(mirror.clone()),
         None => device_selection::mirror()?,
     };
-    let open = || match &mirror {
-        Some(mirror) => StudyFolder::open_or_create_mirrored(&args.results, mirror, &frozen, at),
-        None => StudyFolder::open_or_create(&args.results, &frozen, at).map(|s| (s, Vec::new())),
+    let open = || {
+        let results = &args.results;
+        let opened = match &mirror {
+            Some(mirror) => StudyFolder::open_or_create_mirrored(results, mirror, &frozen, at),
+            None => StudyFolder::open_or_create(results, &frozen, at).map(|s| (s, Vec::new())),
+        };
+        opened.map_err(|error| study_folder::refused(error, &loaded))
     };
     let begun = args.results.join(loaded.protocol.study.id.as_str());
     let mut notices = Vec::new();
-    let begun = match begun.join(layout::MANIFEST).exists() {
+    let begun = match begun.join(layout::MANIFEST).symlink_metadata().is_ok() {
         true => {
             let (study, caught_up) = open()?;
             notices = caught_up;
@@ -97,8 +105,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         }
         false => None,
     };
-    if let (Some(study), Some(participant)) = (&begun, &participant) {
-        study.check_id(participant)?;
+    let mut known = Vec::new();
+    if let Some(study) = &begun {
+        known = study.sessions()?;
+        if let Some(participant) = &participant {
+            study.check_id(participant)?;
+        }
     }
     let options = tui::Options {
         mouse: !args.no_mouse,
@@ -158,6 +170,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let config = Config {
         participant: args.participant.clone().unwrap_or_default(),
         operator: args.operator.clone().unwrap_or_default(),
+        roster: Some(Arc::new(roster(&known, seats, args.rows.as_ref()))),
         auto_identify: false,
     };
     let study = setup.study.clone();
@@ -200,6 +213,15 @@ fn protocol_here() -> Result<PathBuf, Failure> {
              `study new my-study` writes one",
         ),
     )
+}
+
+/// The participants so far, and what a new one becomes.
+fn roster(sessions: &[SessionData], kind: SeatKind, rows: Option<&RangeInclusive<u32>>) -> Roster {
+    let newcomer = match kind {
+        SeatKind::Real => next_row(rows, sessions).map_or(Newcomer::NoRow, Newcomer::Row),
+        SeatKind::Pilot | SeatKind::Simulated => Newcomer::Pilot,
+    };
+    Roster::new(&participants(sessions), newcomer)
 }
 
 /// Says which of results folder and mirror was left behind.
@@ -375,6 +397,8 @@ mod tests {
     use std::cell::RefCell;
     use std::path::Path;
     use std::rc::Rc;
+    use study_core::outcome::State;
+    use study_core::protocol::Seat;
 
     #[derive(Clone, Default)]
     struct Written(Rc<RefCell<Vec<u8>>>);
@@ -424,6 +448,36 @@ mod tests {
         assert!(failure.hint.unwrap().contains("--rebuild"));
         let text = String::from_utf8(out.0.borrow().clone()).unwrap();
         assert!(text.contains("Resume it with: study run X"), "{text}");
+    }
+
+    #[test]
+    fn the_first_screen_knows_everybody_and_the_next_row_of_this_rig() {
+        let study = StudyFolder::open(Path::new("results/turn-signal-example")).unwrap();
+        let mut sessions = study.sessions().unwrap();
+        sessions[0].seat = Some(Seat::Row(1));
+        sessions[1].history.standing.state = State::Unfinished;
+        sessions[2].history.standing.state = State::DroppedOut;
+        let of = |kind, rows: Option<RangeInclusive<u32>>| roster(&sessions, kind, rows.as_ref());
+        let all = of(SeatKind::Real, None);
+        assert_eq!(all.who("nobody-yet").unwrap(), "new, row 2");
+        assert_eq!(
+            of(SeatKind::Real, Some(40..=50)).who("N1").unwrap(),
+            "new, row 40"
+        );
+        assert_eq!(
+            of(SeatKind::Real, Some(1..=1)).who("N1").unwrap(),
+            "new, but no row is free"
+        );
+        assert_eq!(of(SeatKind::Pilot, None).who("N1").unwrap(), "new, a pilot");
+        for (id, who) in [
+            ("SIM001", "finished"),
+            ("SIM002", "unfinished, 15 of 15 trials saved"),
+            (" SIM003 ", "dropped-out"),
+            ("sim003", "too similar to SIM003"),
+        ] {
+            assert_eq!(all.who(id).unwrap(), who);
+        }
+        assert_eq!(all.who("../x"), None);
     }
 
     #[test]

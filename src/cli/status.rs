@@ -59,7 +59,7 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {
         out.push_str(&table(rows));
     }
     let _ = writeln!(out, "\n{}", summary(study, &real));
-    let _ = match next_row(sessions) {
+    let _ = match next_row(None, sessions) {
         Some(row) => writeln!(out, "Next free row: {row}"),
         None => writeln!(out, "No row is free"),
     };

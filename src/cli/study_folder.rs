@@ -4,7 +4,10 @@ use super::failure::Kind;
 use super::load::{self, Loaded};
 use super::{Console, Failure};
 use std::path::Path;
+use study_base::diagnostic::{Fault, Findings};
 use study_core::outcome::Moment;
+use study_core::protocol::difference::{self, Change};
+use study_core::protocol::file;
 use study_core::protocol::question::MAX_TEXT_BYTES;
 use study_core::store::{Finding, SessionData, StoreError, StudyFolder, layout, plain};
 
@@ -25,14 +28,22 @@ impl From<StoreError> for Failure {
 
 /// The studies of RESULTS, a results folder or the folder of one study in it.
 pub(super) fn studies(path: &Path) -> Result<Vec<StudyFolder>, Failure> {
-    if path.join(layout::MANIFEST).exists() {
+    // A link that leads nowhere is there, too.
+    let is_study = |folder: &Path| folder.join(layout::MANIFEST).symlink_metadata().is_ok();
+    if is_study(path) {
         return Ok(vec![StudyFolder::open(path)?]);
     }
-    let failed = |e: &std::io::Error| Failure::results(format!("{}: {}", path.display(), plain(e)));
+    let failed = |e: &std::io::Error| {
+        let why = match e.kind() {
+            std::io::ErrorKind::NotADirectory => "a file, not a results folder".to_owned(),
+            _ => plain(e),
+        };
+        Failure::results(format!("{}: {why}", path.display()))
+    };
     let mut folders = Vec::new();
     for item in std::fs::read_dir(path).map_err(|e| failed(&e))? {
         let folder = item.map_err(|e| failed(&e))?.path();
-        if folder.join(layout::MANIFEST).exists() {
+        if is_study(&folder) {
             folders.push(folder);
         }
     }
@@ -74,6 +85,49 @@ pub(super) fn frozen_version(study: &StudyFolder, version: u32) -> Result<Loaded
     })
 }
 
+/// What differs between the newest frozen protocol of a study and another.
+pub(super) fn changes(study: &StudyFolder, loaded: &Loaded) -> Result<Vec<Change>, Failure> {
+    Ok(difference::changes(&frozen(study)?.parts, &loaded.parts))
+}
+
+/// The failure to open or amend a study with a protocol. If the stimuli differ, each
+/// difference is shown with its key and line.
+pub(super) fn refused(error: StoreError, loaded: &Loaded) -> Failure {
+    let StoreError::StimulusChanged { path, .. } = &error else {
+        return error.into();
+    };
+    let study = StudyFolder::open(path).ok();
+    let found = study.and_then(|study| changes(&study, loaded).ok());
+    let bytes = loaded.files.first().map(|(_, bytes)| bytes.as_slice());
+    let text = String::from_utf8_lossy(bytes.unwrap_or_default());
+    let path = loaded.path.display().to_string();
+    let spans = file::parse(&path, &text).spans;
+    let mut findings = Findings::new(path, text);
+    for change in found.unwrap_or_default().iter().filter(|c| c.fixed) {
+        let fault = Fault::error(format!("{} cannot change while the study runs", change.key))
+            .at(change.span(|place| spans.get(place)))
+            .label(values(change));
+        findings.faults.push(fault);
+    }
+    let mut failure = Failure::from(error);
+    if !findings.faults.is_empty() {
+        findings.sort();
+        failure.findings = vec![findings];
+    }
+    failure
+}
+
+/// What a change replaces, in a few words.
+pub(super) fn values(change: &Change) -> String {
+    match (&change.old, &change.new) {
+        (Some(old), Some(new)) if old == new => format!("{new} differs"),
+        (Some(old), Some(new)) => format!("{old} → {new}"),
+        (None, Some(new)) => format!("new: {new}"),
+        (Some(old), None) => format!("removed: {old}"),
+        (None, None) => String::new(),
+    }
+}
+
 /// The problems of the journals and the frozen protocol of a study, as `study verify`
 /// reports them; one sentence each.
 pub(super) fn warnings(
@@ -96,12 +150,15 @@ pub(super) fn frozen_versions(study: &StudyFolder, newest: Option<&Loaded>) -> V
     let mut found = Vec::new();
     for version in &study.manifest().versions {
         let number = version.version;
-        let path = layout::protocol(study.path(), number).join(layout::PROTOCOL);
+        let folder = layout::protocol(study.path(), number);
+        let is_link = folder.is_symlink();
+        let path = folder.join(layout::PROTOCOL);
         let prints = match newest {
             Some(loaded) if number == study.version() => Ok(loaded.fingerprints.clone()),
             _ => load::load_frozen(&path).map(|loaded| loaded.fingerprints),
         };
         let what = match prints {
+            Ok(_) if is_link => "a symbolic link in the place of a folder".to_owned(),
             Ok(prints) if prints == version.fingerprints => continue,
             Ok(_) => "its fingerprints differ from those in study.json".to_owned(),
             Err(_) => format!("it cannot be read; see `study check {}`", path.display()),

@@ -7,7 +7,7 @@ use study_core::outcome::{Author, Choice};
 use study_core::protocol::Answer;
 use study_core::protocol::phrases::Phrase;
 use study_core::session::view::{Correctable, DeviceState, Mirror, Telemetry};
-use study_core::session::{Input, Screen, View};
+use study_core::session::{Input, Roster, Screen, View};
 
 /// What the lines that begin with a slash do, in the order of the help.
 const COMMANDS: [(&str, &str); 9] = [
@@ -111,10 +111,11 @@ impl Dialogue {
         if let Screen::Who {
             participant,
             operator,
-            claiming,
+            claiming: false,
+            roster,
         } = &view.screen
         {
-            self.who(&mut page, participant, operator, *claiming);
+            self.who(&mut page, participant, operator, roster.as_deref());
         }
         let old = self.page.as_ref();
         let new_page = old.is_none_or(|old| !old.is_like(&page));
@@ -156,11 +157,7 @@ impl Dialogue {
         self.entered.clear();
     }
 
-    fn who(&mut self, page: &mut Page, participant: &str, operator: &str, claiming: bool) {
-        if claiming {
-            page.lines = vec!["One moment.".to_owned()];
-            return;
-        }
+    fn who(&self, page: &mut Page, participant: &str, operator: &str, roster: Option<&Roster>) {
         page.lines = vec!["Who takes part?".to_owned()];
         let known = |preset: &str, word: &str| match preset {
             "" => format!("Type {word}, then press Enter."),
@@ -171,7 +168,11 @@ impl Dialogue {
         };
         page.prompt = match &self.participant {
             None => known(participant, "the participant's pseudonym, such as P01"),
-            Some(_) => known(operator, "the operator's initials or a code"),
+            Some(id) => {
+                let who = roster.and_then(|roster| roster.who(id));
+                let who = who.map_or_else(String::new, |who| format!("{}: {who}. ", Untrusted(id)));
+                who + &known(operator, "the operator's initials or a code")
+            }
         };
     }
 
@@ -328,6 +329,7 @@ impl Dialogue {
                 participant,
                 operator,
                 claiming: false,
+                ..
             } => self.identify(line.trim(), participant, operator),
             Screen::ResumeChoice { .. } => match key.as_str() {
                 "b" => Ok(vec![Input::Resume(Choice::RestartBlock)]),

@@ -33,6 +33,7 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
         ..Page::default()
     };
     match &view.screen {
+        Screen::Who { claiming: true, .. } => page.lines.push("One moment.".to_owned()),
         Screen::Who { .. } => {}
         Screen::Form {
             questions,

@@ -69,6 +69,7 @@ pub fn run_one(
         participant: participant.to_owned(),
         operator: "simulated".to_owned(),
         auto_identify: true,
+        ..Config::default()
     };
     let mut runner = Runner::new(setup, config);
     let mut plan = Plan::default();

@@ -4,7 +4,7 @@
 //! sessions by keys.
 
 use super::theme::{Colour, Theme};
-use super::ui_state::UiState;
+use super::ui_state::{UiState, same_page};
 use super::views::Page;
 use crossterm::event::{Event, MouseButton, MouseEventKind};
 use ratatui::buffer::Buffer;
@@ -20,6 +20,7 @@ pub struct Surface {
     area: Rect,
     screen: Option<Screen>,
     live: bool,
+    waits: bool,
 }
 
 impl Surface {
@@ -31,6 +32,7 @@ impl Surface {
             area: Rect::ZERO,
             screen: None,
             live: false,
+            waits: false,
         }
     }
 
@@ -39,6 +41,17 @@ impl Surface {
     pub fn with_live(mut self, live: bool) -> Self {
         self.live = live;
         self
+    }
+
+    /// Whether a view has another page than the last one that was followed.
+    pub fn turns(&self, view: &View) -> bool {
+        let old = self.screen.as_ref();
+        old.is_none_or(|old| !same_page(old, &view.screen))
+    }
+
+    /// Sets whether an Enter would not advance now; the page then does not offer it.
+    pub fn set_waits(&mut self, waits: bool) {
+        self.waits = waits;
     }
 
     /// The state of the interface.
@@ -66,6 +79,7 @@ impl Surface {
             view,
             state: &self.state,
             live: self.live,
+            waits: self.waits,
             theme: self.theme,
         }
     }

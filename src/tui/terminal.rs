@@ -38,7 +38,7 @@ use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError, TryLockError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Whether the terminal is in raw mode and on the alternate screen.
 static TAKEN: AtomicBool = AtomicBool::new(false);
@@ -95,7 +95,7 @@ pub(super) struct Terminal {
     /// Never dropped: its drop prints to a terminal that may be gone, and panics.
     /// [`restore`] shows the cursor again.
     screen: ManuallyDrop<ratatui::Terminal<CrosstermBackend<Stdout>>>,
-    events: Receiver<io::Result<Event>>,
+    events: Receiver<io::Result<(Event, Instant)>>,
     ended: Arc<AtomicBool>,
     signals: Signals,
 }
@@ -214,8 +214,11 @@ impl Terminal {
         Ok(false)
     }
 
-    /// The next event, within a time.
-    pub(super) fn event(&self, timeout: Duration) -> Result<Option<Event>, TerminalError> {
+    /// The next event and when it arrived, within a time.
+    pub(super) fn event(
+        &self,
+        timeout: Duration,
+    ) -> Result<Option<(Event, Instant)>, TerminalError> {
         match self.events.recv_timeout(timeout) {
             Ok(Ok(event)) => Ok(Some(event)),
             Ok(Err(error)) => Err(TerminalError::Read(error)),
@@ -310,7 +313,7 @@ fn page_written() -> Option<MutexGuard<'static, ()>> {
 }
 
 /// Sends events until it is told to stop or the receiver is gone.
-fn read(send: &Sender<io::Result<Event>>, stop: &AtomicBool) {
+fn read(send: &Sender<io::Result<(Event, Instant)>>, stop: &AtomicBool) {
     while !stop.load(Ordering::SeqCst) && !hung_up() {
         let event = match crossterm::event::poll(READ_SLICE) {
             Ok(false) => continue,
@@ -319,6 +322,7 @@ fn read(send: &Sender<io::Result<Event>>, stop: &AtomicBool) {
             Ok(true) => crossterm::event::read(),
             Err(error) => Err(error),
         };
+        let event = event.map(|event| (event, Instant::now()));
         let failed = event.is_err();
         if send.send(event).is_err() || failed {
             return;

@@ -43,7 +43,7 @@ impl Waiting {
         let theme = self.theme;
         let drawn = self.terminal.draw(|frame| draw(frame, &words, theme));
         match self.terminal.event(SLICE) {
-            Ok(Some(Event::Key(key))) => matches!(
+            Ok(Some((Event::Key(key), _))) => matches!(
                 keys::read(&key),
                 Some(Key::Esc | Key::Quit | Key::Char('q' | 'Q'))
             ),

@@ -109,6 +109,7 @@ fn pages(
         participant: "P01".to_owned(),
         operator: "lw".to_owned(),
         auto_identify: true,
+        ..Config::default()
     };
     let mut runner = Runner::new(setup, config);
     let mut surface = Surface::new(Colour::None).with_live(true);

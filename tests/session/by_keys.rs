@@ -6,6 +6,7 @@ use crate::support::player::{play_to_end, play_until as until};
 use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 fn start(folder: &Path, protocol: &Path) -> Terminal {
     let path = protocol.to_str().unwrap();
@@ -75,7 +76,26 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     );
 
     let mut terminal = start(folder.path(), protocol);
+    terminal.keys("P01");
+    terminal.wait_for(&format!("unfinished, 2 of {trials} trials saved"));
+    terminal.keys("\r");
+    terminal.wait_for(&format!("welcome back: 2 of {trials} trials are saved"));
     play_to_end(&mut terminal, "P01");
+
+    // who a typed id is, before it takes a row
+    let mut terminal = start(folder.path(), protocol);
+    for (id, who) in [
+        ("P01", "finished"),
+        ("p01", "too similar to P01"),
+        ("P02", "new, a pilot"),
+    ] {
+        terminal.keys(&format!("\u{15}{id}"));
+        terminal.wait_for(who);
+    }
+    terminal.keys(F10);
+    terminal.wait_for("Are you sure?");
+    terminal.keys("y");
+    assert_eq!(terminal.exit_code(), 0);
 
     let results = folder.path().join("results").join(id);
     let (code, out, err) = study(&["verify", "results"], folder.path());
@@ -198,4 +218,43 @@ fn an_erasure_lists_what_goes_and_asks_for_the_id() {
         assert_eq!(screen.contains("Nothing is erased."), !goes, "{screen}");
         assert_eq!(journal.exists(), !goes);
     }
+}
+
+/// Nobody rates what was not felt, and no answer comes from keys that were typed before
+/// the question appeared.
+#[test]
+fn held_quick_or_early_keys_answer_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let protocol = folder.path().join("paper");
+    changed_protocol("turn-signal", &protocol, &[PATIENT]);
+    let mut terminal = start(folder.path(), &protocol);
+    play_until(&mut terminal, "Enter: when ready");
+    terminal.keys("\r\r\r\r");
+    terminal.wait_for("Feel the device");
+    // held: the first repeat comes late, the others quickly
+    for pause_ms in [600, 30, 30, 30, 30, 30, 30, 30, 30, 30] {
+        std::thread::sleep(Duration::from_millis(pause_ms));
+        terminal.keys("\r");
+        let screen = terminal.screen();
+        assert!(!screen.contains("1–7: choose"), "{screen}");
+    }
+    // one deliberate Enter rates; what comes with it is too early for the question
+    let rated = |screen: &str| screen.contains("1–7: choose");
+    for _ in 0..20 {
+        play_until(&mut terminal, "Enter: rate");
+        terminal.keys("\r6\r");
+        terminal.wait_until("the question", |s| rated(s) || s.contains("DEVICE TROUBLE"));
+        if rated(&terminal.screen()) {
+            break;
+        }
+    }
+    std::thread::sleep(Duration::from_millis(300));
+    let screen = terminal.screen();
+    assert!(rated(&screen) && !screen.contains("┃  6  ┃"), "{screen}");
+    // in a dialog every key counts
+    terminal.keys(&format!("{F2}quickly\r"));
+    play_until(&mut terminal, "trial 2 of");
+    let journal = "results/turn-signal/sessions/P01/1/journal.jsonl";
+    let journal = fs::read_to_string(folder.path().join(journal)).unwrap();
+    assert!(journal.contains("quickly"), "{journal}");
 }

@@ -435,7 +435,7 @@ fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
     });
     rig.device.control("plug");
     // while it plays
-    rig.to("Enter: rate");
+    rig.to("Feel the device");
     rig.device.control("unplug");
     rig.terminal.wait_for("DEVICE TROUBLE");
     rig.device.control("plug");
@@ -449,11 +449,11 @@ fn a_cable_that_is_pulled_in_each_state_costs_no_answer() {
     rig.to("DEVICE TROUBLE");
     rig.device.control("plug");
     // power, while it plays
-    rig.to("Enter: rate");
+    rig.to("Feel the device");
     rig.device.control("reset");
     rig.terminal.wait_for("DEVICE TROUBLE");
     // the stop button of the device
-    rig.to("Enter: rate");
+    rig.to("Feel the device");
     rig.device.control("trip");
     rig.terminal.wait_for("DEVICE TROUBLE");
     let (rows, events) = rig.finish();

@@ -98,6 +98,7 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
         participant: "P01".to_owned(),
         operator: "lw".to_owned(),
         auto_identify: true,
+        ..Config::default()
     };
     let mut runner = Runner::new(setup, config);
     let mut operator = Operator {

@@ -53,7 +53,7 @@ fn kills(seed: u64, count: u32) {
             24,
             80,
         );
-        let until = Instant::now() + Duration::from_secs_f64(0.05 + 0.5 * chance.unit());
+        let until = Instant::now() + Duration::from_secs_f64(0.05 + 2.0 * chance.unit());
         let mut seen = 0;
         while Instant::now() < until && terminal.runs() {
             let screen = terminal.screen();

@@ -34,6 +34,7 @@ fn poison(view: &mut View, text: &str, n: f64) {
             view.screen = Screen::Who {
                 participant: t(),
                 operator: t(),
+                roster: None,
                 claiming: false,
             };
         }

@@ -398,6 +398,7 @@ fn the_first_screen_asks_for_both_and_sends_what_was_typed() {
     let mut desk = Desk::with(Screen::Who {
         participant: String::new(),
         operator: String::new(),
+        roster: None,
         claiming: false,
     });
     assert_eq!(desk.enter(), []);

@@ -143,6 +143,7 @@ fn quitting_names_what_is_not_saved_and_writes_it_elsewhere() {
     desk.fail();
     desk.rate("6\tlate\r");
     // A second attempt, in a new segment, fails as well.
+    desk.terminal.wait_for("Enter: try again");
     desk.terminal.keys("\r");
     desk.terminal.wait_for("journal-2");
     desk.terminal.keys(F10);
@@ -184,6 +185,7 @@ fn a_repaired_disk_gets_everything() {
     desk.fail();
     desk.rate("6\tlate\r");
     desk.repair();
+    desk.terminal.wait_for("Enter: try again");
     desk.terminal.keys("\r");
     desk.terminal.wait_for("saved ✓ 1 of 1");
     play_to_end(&mut desk.terminal, "P01");

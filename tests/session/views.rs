@@ -227,6 +227,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             view(Screen::Who {
                 participant: text("S03"),
                 operator: String::new(),
+                roster: None,
                 claiming: false,
             }),
         ),

@@ -441,16 +441,31 @@ fn amend_keeps_the_old_version_and_refuses_other_stimuli() {
     amend()
         .assert()
         .success()
-        .stdout(predicate::str::contains("version 2"));
+        .stdout(predicate::str::contains("version 2").and(predicate::str::contains(
+            "\n  trial.reference: \"Operate the real switch.\" → \"Please: Operate the real switch.\"\n",
+        )));
     assert!(folder.join("protocol/1/protocol.toml").exists());
     assert!(folder.join("protocol/2/protocol.toml").exists());
     let design = "repetitions = 3";
     assert!(text.contains(design));
     std::fs::write(&file, text.replace(design, "repetitions = 4")).unwrap();
-    amend()
+    let line = text.lines().position(|l| l.starts_with(design)).unwrap() + 1;
+    let refused = predicate::str::contains("stimuli")
+        .and(predicate::str::contains(
+            "design.repetitions cannot change while the study runs",
+        ))
+        .and(predicate::str::contains(format!("protocol.toml:{line}:")))
+        .and(predicate::str::contains("3 → 4"));
+    amend().assert().code(1).stderr(refused);
+    // and so does `run`
+    study_command()
+        .arg("run")
+        .arg(&file)
+        .arg("--results")
+        .arg(results.path())
         .assert()
         .code(1)
-        .stderr(predicate::str::contains("stimuli"));
+        .stderr(predicate::str::contains("design.repetitions cannot change"));
     study_command()
         .arg("verify")
         .arg(results.path())

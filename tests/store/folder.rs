@@ -85,7 +85,7 @@ fn the_row_of_a_drop_out_is_assigned_again() {
         set(&study, "P02", State::DroppedOut, false).unwrap(),
         Some(2)
     );
-    assert_eq!(next_row(&study.sessions().unwrap()), Some(2));
+    assert_eq!(next_row(None, &study.sessions().unwrap()), Some(2));
     let back = study.claim(&real("P02"));
     assert!(matches!(back, Err(StoreError::InState { .. })), "{back:?}");
     assert_eq!(run(&study, &real("P04"), 8), Seat::Row(2));
@@ -180,7 +180,7 @@ fn a_no_show_has_no_row_and_can_still_take_part() {
         "{unknown:?}"
     );
     set(&study, "P01", State::NoShow, false).unwrap();
-    assert_eq!(next_row(&study.sessions().unwrap()), Some(1));
+    assert_eq!(next_row(None, &study.sessions().unwrap()), Some(1));
     assert_eq!(
         participants(&study.sessions().unwrap())[0].state,
         State::NoShow

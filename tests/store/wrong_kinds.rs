@@ -54,6 +54,79 @@ fn a_link_in_the_place_of_a_folder_or_journal_is_named_by_every_command() {
 }
 
 #[test]
+fn a_link_or_folder_in_the_place_of_a_file_is_named_with_what_to_do() {
+    for place in ["study.json", "sessions/P01/1/journal.jsonl"] {
+        let results = tempfile::tempdir().unwrap();
+        let file = turn_signal(results.path()).join(place);
+        std::fs::remove_file(&file).unwrap();
+        symlink("nowhere", &file).unwrap();
+        each_names(results.path(), place, "replace the link by the file");
+        std::fs::remove_file(&file).unwrap();
+        std::fs::create_dir(&file).unwrap();
+        each_names(results.path(), place, "a folder in the place of a file");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("results");
+    std::fs::write(&file, "x").unwrap();
+    for command in ["status", "verify"] {
+        let asserted = study_command().arg(command).arg(&file).assert().code(4);
+        asserted.stderr(predicate::str::contains("a file, not a results folder"));
+    }
+}
+
+/// A frozen protocol behind a link is read, and reported.
+#[test]
+fn a_linked_version_of_the_protocol_is_reported() {
+    let results = tempfile::tempdir().unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    link(&folder.join("protocol/1"), &elsewhere.path().join("x"));
+    for command in ["status", "analyze", "verify"] {
+        let done = study_command().arg(command).arg(results.path()).assert();
+        let output = done.get_output().clone();
+        let said = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
+        let named = "protocol/1/protocol.toml: a symbolic link in the place of a folder";
+        assert!(said.contains(named), "{command}: {said}");
+    }
+}
+
+/// What a link leads to would not be erased, and single ratings are not written through
+/// one.
+#[test]
+fn nothing_is_analyzed_into_a_link_or_erased_beside_one() {
+    let results = tempfile::tempdir().unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let folder = turn_signal(results.path());
+    let analysis = folder.join("analysis");
+    symlink(elsewhere.path(), &analysis).unwrap();
+    let analyzed = study_command().arg("analyze").arg(&folder).assert();
+    analyzed
+        .success()
+        .stderr(predicate::str::contains("analysis: a symbolic link"));
+    assert_eq!(std::fs::read_dir(elsewhere.path()).unwrap().count(), 0);
+    let erase = || {
+        let mut command = study_command();
+        command.arg("participant").arg(&folder);
+        command.args(["P01", "--state", "withdrawn", "--reason", "x"]);
+        command.args(["--erase", "--yes"]);
+        command.assert()
+    };
+    erase()
+        .code(4)
+        .stderr(predicate::str::contains("analysis: a symbolic link"));
+    std::fs::remove_file(&analysis).unwrap();
+    let telemetry = folder.join("sessions/P01/1/telemetry");
+    let _ = std::fs::remove_dir_all(&telemetry);
+    symlink(elsewhere.path(), &telemetry).unwrap();
+    erase()
+        .code(4)
+        .stderr(predicate::str::contains("telemetry: a symbolic link"));
+    assert!(folder.join("sessions/P01/1/journal.jsonl").exists());
+    std::fs::remove_file(&telemetry).unwrap();
+    erase().success();
+}
+
+#[test]
 fn a_file_in_the_place_of_a_folder_is_named_by_every_command() {
     for place in ["sessions/P03", "sessions/P01/2"] {
         let results = tempfile::tempdir().unwrap();

@@ -128,6 +128,16 @@ fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<I
             return did;
         }
     }
+    // A page that follows an Enter offers the next one a moment later.
+    if key == "\r" && !before.text.contains("Enter: ") {
+        let offered = waited(terminal, until, "Enter to be offered", |now| {
+            before = now.clone();
+            now.text.contains("Enter: ")
+        });
+        if !offered {
+            return did;
+        }
+    }
     terminal.keys(key);
     let before = asked(&before);
     waited(terminal, until, "the page to change", |now| {

@@ -39,7 +39,7 @@ mod verdicts;
 mod warning;
 mod warnings;
 
-pub use crate::protocol::Exclusion;
+pub use crate::protocol::{ALPHA, Exclusion};
 pub use deciding::{Deciding, deciding};
 pub use design::Design;
 pub use deviation::{Deviation, PreregisteredRule, deviations};
@@ -59,9 +59,6 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// The level of significance of a study that states none.
-pub const ALPHA: f64 = 0.05;
 
 /// The rules of the analysis, fixed before the data were seen.
 #[derive(Debug, Clone, PartialEq)]
@@ -138,7 +135,7 @@ impl Rules {
             exclude: protocol.analysis.exclude.clone(),
             equivalence_margin: protocol.analysis.equivalence_margin.filter(|_| primary),
             deviations: Vec::new(),
-            alpha: protocol.analysis.alpha.unwrap_or(ALPHA),
+            alpha: protocol.analysis.alpha(),
             construct: protocol.analysis.construct.clone().filter(|_| primary),
         }
     }

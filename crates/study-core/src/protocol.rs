@@ -9,6 +9,7 @@
 
 pub mod check;
 pub mod columns;
+pub mod difference;
 pub mod example;
 mod exclusion;
 pub mod file;
@@ -323,6 +324,9 @@ words! {
     }
 }
 
+/// The level of significance of a study that states none.
+pub const ALPHA: f64 = 0.05;
+
 /// `[analysis]`: decisions that were made before the data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AnalysisRules {
@@ -348,6 +352,13 @@ pub struct AnalysisRules {
     /// absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub construct: Option<String>,
+}
+
+impl AnalysisRules {
+    /// The level of significance.
+    pub fn alpha(&self) -> f64 {
+        self.alpha.unwrap_or(ALPHA)
+    }
 }
 
 words! {

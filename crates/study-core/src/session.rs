@@ -30,6 +30,7 @@ pub mod input;
 mod opening;
 mod phase;
 mod project_view;
+pub mod roster;
 mod saving;
 mod trial;
 mod unsaved;
@@ -37,6 +38,7 @@ pub mod view;
 
 pub use input::{Claim, Effect, Ending, Input};
 pub use opening::MAX_OPERATOR;
+pub use roster::Roster;
 pub use unsaved::Unsaved;
 pub use view::{Screen, View};
 
@@ -57,6 +59,8 @@ pub struct Config {
     pub participant: String,
     /// Operator code shown on the first screen; may be empty.
     pub operator: String,
+    /// Who is known already, for a line on the first screen.
+    pub roster: Option<Arc<Roster>>,
     /// Use the presets without showing the first screen.
     pub auto_identify: bool,
 }
@@ -70,6 +74,7 @@ pub struct Session {
     /// As typed on the first screen.
     participant: String,
     operator: String,
+    roster: Option<Arc<Roster>>,
     /// Seat and device; `None` until the session's folder is claimed.
     claim: Option<ClaimFacts>,
     history: History,
@@ -118,6 +123,7 @@ impl Session {
             orders,
             participant: config.participant.clone(),
             operator: config.operator.clone(),
+            roster: config.roster,
             claim: None,
             history: History::default(),
             phase: Phase::Identify,

@@ -2,7 +2,7 @@
 //! and SD (GRIM and GRIMMER).
 
 use crate::cli::{Console, Failure};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Write as _;
 use study_base::text::Untrusted;
 use study_stats::grim::{
@@ -16,11 +16,11 @@ pub(super) fn run(given: &[String], as_json: bool, console: &mut Console) -> Res
     let published = parse(given)
         .map_err(|e| e.hint("for example: --possible mean=4.800 sd=0.997 n=30 scale=1..7"))?;
     let found = check(&published);
-    console.out(if as_json {
-        document(&published, &found)
+    if as_json {
+        console.json(&document(&published, &found))
     } else {
-        page(&published, &found)
-    })
+        console.out(page(&published, &found))
+    }
 }
 
 fn parse(given: &[String]) -> Result<Published, Failure> {
@@ -191,7 +191,7 @@ fn page(q: &Published, found: &[SdCheck]) -> String {
     out
 }
 
-fn document(q: &Published, found: &[SdCheck]) -> String {
+fn document(q: &Published, found: &[SdCheck]) -> Value {
     let all = possible_sums(q);
     let definitions: Vec<_> = (found.iter())
         .map(|f| {
@@ -220,7 +220,7 @@ fn document(q: &Published, found: &[SdCheck]) -> String {
             })
         })
         .collect();
-    let document = json!({
+    json!({
         "format": FORMAT,
         "mean": as_given(q.mean),
         "sd": as_given(q.sd),
@@ -228,6 +228,5 @@ fn document(q: &Published, found: &[SdCheck]) -> String {
         "scale": [q.scale.0 as i64, q.scale.1 as i64],
         "mean_possible": !all.is_empty(),
         "definitions": definitions,
-    });
-    format!("{document:#}\n")
+    })
 }

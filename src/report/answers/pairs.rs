@@ -31,8 +31,12 @@ pub(super) fn best_two(a: &Analysis) -> Option<Answer> {
             let (all, mean) = (apa::listing(&f.names), mean(&f.names[0]));
             return format!("{verdict}: {all} share the highest {what}, {mean}.");
         };
+        let alone = match a.design.realizations {
+            2 => "",
+            _ => ", these two only, not corrected",
+        };
         format!(
-            "{verdict}: {both}, {} ({}).",
+            "{verdict}: {both}, {} ({}{alone}).",
             sentences::tested(test, f.participants),
             sentences::corrected(test)
         )

@@ -36,6 +36,8 @@ pub struct Page<'a> {
     pub state: &'a UiState,
     /// Whether it shows that telemetry arrives.
     pub live: bool,
+    /// Whether an Enter would not advance now.
+    pub waits: bool,
     /// The styles.
     pub theme: Theme,
 }
@@ -82,7 +84,10 @@ impl<'a> Page<'a> {
 
     fn who(&self) -> Option<WhoView<'a>> {
         match &self.view.screen {
-            Screen::Who { claiming, .. } => Some(WhoView {
+            Screen::Who {
+                claiming, roster, ..
+            } => Some(WhoView {
+                roster: roster.as_deref(),
                 who: self.state.who()?,
                 claiming: *claiming,
                 focused: self.state.dialog().is_none(),
@@ -271,6 +276,7 @@ impl Widget for &Page<'_> {
         let words = &self.view.words;
         let keys: Vec<(&str, &str)> = keys
             .iter()
+            .filter(|(key, _)| !(self.waits && key == "Enter"))
             .map(|(key, what)| (key.as_str(), words.get(*what)))
             .collect();
         if self.state.dialog().is_none() {

@@ -6,12 +6,15 @@ use crate::tui::widgets::{TextField, centre, left, middle, row, styled};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget;
+use study_core::session::Roster;
 
 /// The widget of the first screen.
 #[derive(Debug)]
 pub struct WhoView<'a> {
     /// What has been entered.
     pub who: &'a Who,
+    /// Tells who a typed id is.
+    pub roster: Option<&'a Roster>,
     /// Whether the session folder is being claimed.
     pub claiming: bool,
     /// Whether it has the focus.
@@ -26,7 +29,7 @@ const WIDE: u16 = 56;
 const LABEL: u16 = 14;
 
 impl WhoView<'_> {
-    fn fields(&self, area: Rect) -> [(&'static str, &'static str, TextField<'_>, Rect); 2] {
+    fn fields(&self, area: Rect) -> [(&'static str, String, TextField<'_>, Rect); 2] {
         let place = middle(area, WIDE, 9);
         let at = |y| {
             let label = LABEL.min(place.width);
@@ -43,16 +46,19 @@ impl WhoView<'_> {
             theme: self.theme,
         };
         let (participant, operator) = (&self.who.participant, &self.who.operator);
+        let who = self
+            .roster
+            .and_then(|roster| roster.who(participant.text()));
         [
             (
                 "Participant",
-                "a pseudonym, such as P01",
+                who.unwrap_or_else(|| "a pseudonym, such as P01".to_owned()),
                 field(participant, false),
                 at(3),
             ),
             (
                 "Operator",
-                "your initials or a code",
+                "your initials or a code".to_owned(),
                 field(operator, true),
                 at(6),
             ),

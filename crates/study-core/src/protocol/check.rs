@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, Untrusted, counted};
+use study_stats::distribution::t_quantile;
 
 /// Number of test realizations from which a correlation over them is informative.
 const ENOUGH_REALIZATIONS: usize = 8;
@@ -168,12 +169,14 @@ fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     if n >= ENOUGH_REALIZATIONS {
         return;
     }
-    let so = match n {
-        0..=2 => "no correlation of ratings with VAF can be tested".to_owned(),
-        _ => format!(
-            "|r| with VAF has to exceed {:.3} for p < .05",
-            critical_r(n)
-        ),
+    let alpha = protocol.analysis.alpha();
+    let so = match critical_r(n, alpha) {
+        None => "no correlation of ratings with VAF can be tested".to_owned(),
+        Some(r) => {
+            let level = alpha.to_string();
+            let level = level.trim_start_matches('0');
+            format!("|r| with VAF has to exceed {r:.3} for p < {level}")
+        }
     };
     let count = counted(n, "test realization", "test realizations");
     faults.push(
@@ -185,18 +188,11 @@ fn realizations(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     );
 }
 
-/// |r| of n points at two-sided p = .05: t/√(t² + n − 2).
-fn critical_r(n: usize) -> f64 {
-    // t(.975, df) for df = 1 … 5
-    let t: f64 = match n {
-        3 => 12.7062,
-        4 => 4.3027,
-        5 => 3.1824,
-        6 => 2.7764,
-        _ => 2.5706,
-    };
-    let df = n as f64 - 2.0;
-    t / (t * t + df).sqrt()
+/// |r| of n points at a two-sided p of `alpha`: t/√(t² + n − 2).
+fn critical_r(n: usize, alpha: f64) -> Option<f64> {
+    let df = n.checked_sub(2).filter(|df| *df > 0)? as f64;
+    let t = t_quantile(1.0 - alpha / 2.0, df)?;
+    Some(t / (t * t + df).sqrt())
 }
 
 fn vaf(protocol: &Protocol, spans: &Spans, unread: &[&ModelId], faults: &mut Vec<Fault>) {
@@ -352,6 +348,13 @@ mod tests {
         assert_eq!(
             found,
             ["5 test realizations: |r| with VAF has to exceed 0.878 for p < .05"]
+        );
+        // by the level of the protocol; R: qt(.995, 3) / sqrt(qt(.995, 3)^2 + 3)
+        let mut protocol = example::protocol(5, 3);
+        protocol.analysis.alpha = Some(0.01);
+        assert_eq!(
+            messages(&protocol),
+            ["5 test realizations: |r| with VAF has to exceed 0.959 for p < .01"]
         );
     }
 

@@ -36,13 +36,36 @@ pub struct Fingerprints {
     pub analysis: String,
 }
 
-/// The fingerprints of a protocol (with VAFs filled in from the model files), the
-/// bytes of each model file, and the orders file, if any.
-pub fn of(
+/// What the three fingerprints are made of, as JSON.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts {
+    /// What cannot change while a study runs.
+    pub stimulus: Value,
+    /// What is read.
+    pub wording: Value,
+    /// What concerns only the analysis.
+    pub analysis: Value,
+}
+
+impl Parts {
+    /// The fingerprints.
+    pub fn fingerprints(&self) -> Fingerprints {
+        let of = |part| hex(canonical(part).as_bytes());
+        Fingerprints {
+            stimulus: of(&self.stimulus),
+            wording: of(&self.wording),
+            analysis: of(&self.analysis),
+        }
+    }
+}
+
+/// The parts of a protocol (with VAFs filled in from the model files), the bytes of each
+/// model file, and the orders file, if any.
+pub fn parts(
     protocol: &Protocol,
     model_bytes: &BTreeMap<ModelId, Vec<u8>>,
     orders: Option<&FileOrders>,
-) -> Fingerprints {
+) -> Parts {
     // No `..`: a new field has to be assigned to a fingerprint.
     let Protocol {
         study,
@@ -152,10 +175,10 @@ pub fn of(
     if device.rendering != super::RenderingRules::default() {
         analysis["rendering"] = json!(device.rendering);
     }
-    Fingerprints {
-        stimulus: hex(canonical(&stimulus).as_bytes()),
-        wording: hex(canonical(&wording).as_bytes()),
-        analysis: hex(canonical(&analysis).as_bytes()),
+    Parts {
+        stimulus,
+        wording,
+        analysis,
     }
 }
 
@@ -251,6 +274,14 @@ mod tests {
             .collect()
     }
 
+    fn of(
+        protocol: &Protocol,
+        bytes: &BTreeMap<ModelId, Vec<u8>>,
+        orders: Option<&FileOrders>,
+    ) -> Fingerprints {
+        parts(protocol, bytes, orders).fingerprints()
+    }
+
     fn print(protocol: &Protocol) -> Fingerprints {
         of(protocol, &bytes(protocol), None)
     }
@@ -285,7 +316,7 @@ mod tests {
     fn each_change_affects_one_fingerprint() {
         let base = example::protocol(3, 2);
         let first = print(&base);
-        let parts = |f: &dyn Fn(&mut Protocol)| {
+        let changed = |f: &dyn Fn(&mut Protocol)| {
             let mut changed = base.clone();
             f(&mut changed);
             let prints = of(&changed, &bytes(&base), None);
@@ -295,32 +326,32 @@ mod tests {
                 prints.analysis != first.analysis,
             ]
         };
-        assert_eq!(parts(&|p| p.study.seed += 1), [true, false, false]);
+        assert_eq!(changed(&|p| p.study.seed += 1), [true, false, false]);
         assert_eq!(
-            parts(&|p| p.design.order = Order::Shuffled),
+            changed(&|p| p.design.order = Order::Shuffled),
             [true, false, false]
         );
         assert_eq!(
-            parts(&|p| p.device.limits.force_n = study_base::limits::Limit::new(9.0).unwrap()),
+            changed(&|p| p.device.limits.force_n = study_base::limits::Limit::new(9.0).unwrap()),
             [true, false, false]
         );
         assert_eq!(
-            parts(&|p| p.questions[1].required = true),
+            changed(&|p| p.questions[1].required = true),
             [true, false, false]
         );
         assert_eq!(
-            parts(&|p| p.text = Text {
+            changed(&|p| p.text = Text {
                 welcome: Some("hello".to_owned()),
                 ..Text::default()
             }),
             [false, true, false]
         );
         assert_eq!(
-            parts(&|p| p.questions[0].prompt.push('?')),
+            changed(&|p| p.questions[0].prompt.push('?')),
             [false, true, false]
         );
         assert_eq!(
-            parts(&|p| {
+            changed(&|p| {
                 if let QuestionKind::Rating { labels, .. } = &mut p.questions[0].kind {
                     labels.insert(4, "so so".to_owned());
                 }
@@ -328,16 +359,19 @@ mod tests {
             [false, true, false]
         );
         assert_eq!(
-            parts(&|p| p.models[0].vaf = Some(0.5)),
-            [false, false, true]
-        );
-        assert_eq!(parts(&|p| p.design.participants = 12), [false, false, true]);
-        assert_eq!(
-            parts(&|p| p.device.rendering.min_vaf = 0.9),
+            changed(&|p| p.models[0].vaf = Some(0.5)),
             [false, false, true]
         );
         assert_eq!(
-            parts(&|p| p.models[0].file = Some("elsewhere.toml".to_owned())),
+            changed(&|p| p.device.rendering.min_vaf = 0.9),
+            [false, false, true]
+        );
+        assert_eq!(
+            changed(&|p| p.design.participants = 12),
+            [false, false, true]
+        );
+        assert_eq!(
+            changed(&|p| p.models[0].file = Some("elsewhere.toml".to_owned())),
             [false, false, false]
         );
     }

@@ -65,6 +65,7 @@ impl Session {
             Phase::Identify | Phase::Claiming => Screen::Who {
                 participant: self.participant.clone(),
                 operator: self.operator.clone(),
+                roster: self.roster.clone(),
                 claiming: matches!(self.phase, Phase::Claiming),
             },
             Phase::ResumeChoice { gap_s } => Screen::ResumeChoice {

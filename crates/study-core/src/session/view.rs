@@ -1,5 +1,6 @@
 //! What a session shows. Nothing here identifies a realization.
 
+use super::roster::Roster;
 use crate::outcome::FormId;
 use crate::protocol::phrases::Words;
 use crate::protocol::{Answer, DeviceKind, Entry, Question};
@@ -137,6 +138,8 @@ pub enum Screen {
         participant: String,
         /// Preset operator.
         operator: String,
+        /// Tells who a typed id is.
+        roster: Option<Arc<Roster>>,
         /// Whether the session is being claimed.
         claiming: bool,
     },

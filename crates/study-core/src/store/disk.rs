@@ -101,6 +101,17 @@ impl ItemKind {
     }
 }
 
+/// Something else in the place of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{} in the place of a file", .0.as_str())]
+pub struct NotAFile(pub ItemKind);
+
+impl From<NotAFile> for io::Error {
+    fn from(error: NotAFile) -> Self {
+        Self::other(error)
+    }
+}
+
 /// A file system. No file is opened, created, truncated or removed through a symbolic
 /// link in the last part of its path.
 ///
@@ -211,7 +222,7 @@ impl Disk for RealDisk {
         let file = system::open(path, OpenOptions::new().read(true))?;
         let known = file.metadata()?;
         if !known.is_file() {
-            return Err(io::Error::other("not a file"));
+            return Err(NotAFile(kind_of(known.file_type())).into());
         }
         if known.len() > MAX_FILE_BYTES {
             return Err(io::ErrorKind::FileTooLarge.into());

@@ -1,6 +1,6 @@
 //! Errors of the results folder.
 
-use super::disk::ItemKind;
+use super::disk::{ItemKind, NotAFile};
 use crate::outcome::State;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -247,6 +247,11 @@ impl StoreError {
                 "replace the link by the folder that it leads to".to_owned()
             }
             Self::WrongKind { .. } => "move it elsewhere".to_owned(),
+            Self::Io { source, .. } => match source.get_ref()?.downcast_ref()? {
+                NotAFile(ItemKind::Link) => "replace the link by the file that it leads to",
+                NotAFile(_) => "move it elsewhere and restore the file from a copy",
+            }
+            .to_owned(),
             Self::NoMirror { .. } => {
                 "connect the disk, or create the folder; nothing is mirrored into a folder that does not exist".to_owned()
             }

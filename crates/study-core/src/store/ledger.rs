@@ -355,25 +355,19 @@ fn next_seat(request: &ClaimRequest, all: &[SessionData]) -> Result<Seat, StoreE
         SeatKind::Pilot => Ok(Seat::Pilot(numbers(SeatKind::Pilot))),
         SeatKind::Simulated => Ok(Seat::Simulated(numbers(SeatKind::Simulated))),
         SeatKind::Real => {
-            let rows = request.rows.clone().unwrap_or(1..=u32::MAX);
-            free_row(rows.clone(), all)
-                .map(Seat::Row)
-                .ok_or(StoreError::NoRow {
-                    from: *rows.start(),
-                    to: *rows.end(),
-                })
+            let rows = request.rows.as_ref();
+            next_row(rows, all).map(Seat::Row).ok_or(StoreError::NoRow {
+                from: rows.map_or(1, |rows| *rows.start()),
+                to: rows.map_or(u32::MAX, |rows| *rows.end()),
+            })
         }
     }
 }
 
-/// The row that the next participant would get, from all sessions of a study.
-pub fn next_row(sessions: &[SessionData]) -> Option<u32> {
-    free_row(1..=u32::MAX, sessions)
-}
-
-/// The lowest row of a range that no participant keeps.
-fn free_row(rows: RangeInclusive<u32>, all: &[SessionData]) -> Option<u32> {
-    let held: BTreeSet<u32> = all.iter().filter_map(SessionData::held_row).collect();
-    let mut rows = (*rows.start()).max(1)..=*rows.end();
-    rows.find(|row| !held.contains(row))
+/// The row that the next participant would get, from all sessions of a study: the lowest
+/// that no participant keeps, of a range or of all.
+pub fn next_row(rows: Option<&RangeInclusive<u32>>, sessions: &[SessionData]) -> Option<u32> {
+    let held: BTreeSet<u32> = sessions.iter().filter_map(SessionData::held_row).collect();
+    let (from, to) = rows.map_or((1, u32::MAX), |rows| (*rows.start(), *rows.end()));
+    (from.max(1)..=to).find(|row| !held.contains(row))
 }

@@ -6,7 +6,7 @@
 use super::disk::Disk;
 use super::error::{At as _, StoreError};
 use super::journal::{self, Journal};
-use super::sessions::SessionData;
+use super::sessions::{SessionData, check_kind};
 use super::tombstone::{ErasedSession, Tombstone};
 use super::{StudyFolder, layout};
 use crate::outcome::{Event, Moment, State};
@@ -60,6 +60,14 @@ impl StudyFolder {
         let id = &request.participant;
         self.check_id(id)?;
         let own = self.sessions_of(id)?;
+        if request.erase {
+            // What a link leads to would not be erased.
+            self.check_analysis()?;
+            for session in own.iter().filter(|s| s.tombstone.is_none()) {
+                let is_telemetry = |name: &str| name == layout::TELEMETRY;
+                check_kind(self.disk.as_ref(), &session.path, is_telemetry)?;
+            }
+        }
         if let Some(stone) = own.last().and_then(|s| s.tombstone.as_ref()) {
             if !request.erase {
                 return Err(StoreError::Erased {
@@ -251,6 +259,15 @@ impl StudyFolder {
         }
         self.disk.sync_folder(&folder).at(&folder)?;
         Ok(numbers.len())
+    }
+
+    /// Checks that nothing else has the name of the folder `analysis/`.
+    ///
+    /// # Errors
+    /// [`StoreError::WrongKind`] if something has, such as a link.
+    pub fn check_analysis(&self) -> Result<(), StoreError> {
+        let is_analysis = |name: &str| name == layout::ANALYSIS;
+        check_kind(self.disk.as_ref(), &self.path, is_analysis).map(drop)
     }
 
     /// Removes the folder `analysis/`, which contains single ratings and comments;

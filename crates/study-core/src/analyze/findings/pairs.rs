@@ -138,7 +138,11 @@ fn not_compared(facts: &Facts<'_>, pair: Option<&Pair>) -> String {
     }
 }
 
-/// Whether the realization with the highest mean differs from the second.
+/// Whether the realization with the highest mean differs from the second: two-sided, and
+/// not corrected for the number of realizations. Of the realizations that are really the
+/// highest, equal ones included, none is then taken for the only one in more than a share
+/// α of studies (Gutmann & Maymin 1987, Ann. Stat. 15, 456–461; Hung & Fithian 2019, Ann.
+/// Stat. 47, 758–782).
 pub(super) fn best(facts: &Facts<'_>) -> Option<Finding> {
     let [(mean, first), (next, second), ..] = facts.ranked[..] else {
         return None;
@@ -160,6 +164,16 @@ pub(super) fn best(facts: &Facts<'_>) -> Option<Finding> {
         (p.first == first && p.second == second) || (p.first == second && p.second == first)
     };
     let pair = facts.pairs.iter().find(either).map(|p| p.seen_from(first));
+    let p = facts.number(&format!("{}/p", pair_id("pair", first, second)));
+    let alone = |test: Test| Test {
+        comparisons: 1,
+        p: p.unwrap_or(test.p),
+        ..test
+    };
+    let pair = pair.map(|pair| Pair {
+        test: pair.test.map(alone),
+        ..pair
+    });
     let found = match pair {
         Some(Pair {
             test: Some(test),

@@ -1,6 +1,7 @@
 //! What `unix.rs` does, on other systems, by what the standard library offers.
 //! docs/results.md has the differences.
 
+use super::{ItemKind, NotAFile};
 use std::fs::{DirBuilder, File, OpenOptions};
 use std::io;
 use std::path::Path;
@@ -9,7 +10,7 @@ use std::path::Path;
 /// folder.
 pub(super) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     if std::fs::symlink_metadata(path).is_ok_and(|known| known.is_symlink()) {
-        return Err(io::Error::other("it is a symbolic link"));
+        return Err(NotAFile(ItemKind::Link).into());
     }
     options.open(path)
 }

@@ -1,5 +1,6 @@
 //! What only Unix offers: permissions, syncs and locks of folders, free space.
 
+use super::{ItemKind, NotAFile};
 use rustix::fs::{OFlags, statvfs};
 use rustix::io::Errno;
 use std::fs::{DirBuilder, File, OpenOptions};
@@ -13,9 +14,7 @@ pub(super) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits();
     let opened = options.mode(0o600).custom_flags(flags as i32).open(path);
     opened.map_err(|e| match e.raw_os_error() {
-        Some(number) if number == Errno::LOOP.raw_os_error() => {
-            io::Error::other("it is a symbolic link")
-        }
+        Some(number) if number == Errno::LOOP.raw_os_error() => NotAFile(ItemKind::Link).into(),
         _ => e,
     })
 }

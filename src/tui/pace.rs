@@ -1,0 +1,157 @@
+//! Which keys are meant for the page on the screen.
+//!
+//! A key that was pressed before a page appeared does not act on it, and an Enter right
+//! after another one does not advance: the key is held, or was pressed twice. In a dialog
+//! every key counts. Keys that stop, leave or open a dialog always count.
+
+use super::keys::{self, Key};
+use crossterm::event::{Event, KeyEventKind};
+use std::time::{Duration, Instant};
+
+/// Time without Enter before the next one advances. Most keyboards begin to repeat a held
+/// key sooner, and repeat it much faster.
+pub const QUIET: Duration = Duration::from_millis(700);
+
+/// Decides by the time of each event whether it is meant for the page.
+#[derive(Debug, Clone)]
+pub struct Pace {
+    /// Since when the page is on the screen.
+    shown: Instant,
+    /// The last Enter, if no other key came after it.
+    entered: Option<Instant>,
+}
+
+impl Pace {
+    /// A page that appears at a moment.
+    pub fn new(shown: Instant) -> Self {
+        Self {
+            shown,
+            entered: None,
+        }
+    }
+
+    /// Another page is on the screen since a moment.
+    pub fn turned(&mut self, shown: Instant) {
+        self.shown = shown;
+    }
+
+    /// Whether an Enter at a moment would not advance.
+    pub fn waits(&self, at: Instant) -> bool {
+        let since = |before: Instant| at.saturating_duration_since(before);
+        self.entered.is_some_and(|before| since(before) < QUIET)
+    }
+
+    /// Whether an event is meant for what is on the screen. `dialog`: a dialog is open;
+    /// `armed`: Space stops the device.
+    pub fn accepts(&mut self, event: &Event, at: Instant, dialog: bool, armed: bool) -> bool {
+        let key = match event {
+            Event::Key(event) => keys::read(event),
+            _ => None,
+        };
+        let on_time = dialog || at >= self.shown || always(event, key, armed);
+        if key == Some(Key::Enter) {
+            let repeated = matches!(event, Event::Key(key) if key.kind == KeyEventKind::Repeat);
+            let waits = repeated || self.waits(at);
+            self.entered = Some(at);
+            return dialog || (on_time && !waits);
+        }
+        if key.is_some() && on_time {
+            self.entered = None;
+        }
+        on_time
+    }
+}
+
+/// Whether an event counts even if it is older than the page.
+fn always(event: &Event, key: Option<Key>, armed: bool) -> bool {
+    match key {
+        Some(Key::Char(' ')) => armed,
+        Some(key) => matches!(
+            key,
+            Key::Esc
+                | Key::Quit
+                | Key::Suspend
+                | Key::Pause
+                | Key::Help
+                | Key::Remark
+                | Key::Correct
+                | Key::MarkBad
+        ),
+        None => matches!(event, Event::Resize(..)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+
+    fn key(code: KeyCode) -> Event {
+        Event::Key(KeyEvent::new(code, KeyModifiers::NONE))
+    }
+
+    /// Whether a key counts at each of these times, in ms, on a page that appears at 100.
+    fn accepted(code: KeyCode, times: &[u64], dialog: bool) -> Vec<bool> {
+        let start = Instant::now();
+        let at = |ms| start + Duration::from_millis(ms);
+        let mut pace = Pace::new(at(100));
+        let times = times.iter();
+        times
+            .map(|ms| pace.accepts(&key(code), at(*ms), dialog, false))
+            .collect()
+    }
+
+    #[test]
+    fn of_quick_or_held_enters_only_the_first_advances() {
+        let quick = [110, 200, 300, 400];
+        assert_eq!(
+            accepted(KeyCode::Enter, &quick, false),
+            [true, false, false, false]
+        );
+        // the first repeat comes late, the others every 33 ms, for longer than the pause
+        let held = [110, 770, 803, 836, 869, 902, 1602];
+        let expected = [true, false, false, false, false, false, true];
+        assert_eq!(accepted(KeyCode::Enter, &held, false), expected);
+        assert_eq!(accepted(KeyCode::Enter, &quick, true), [true; 4]);
+    }
+
+    #[test]
+    fn a_key_from_before_the_page_counts_only_if_it_stops() {
+        assert_eq!(
+            accepted(KeyCode::Char('5'), &[99, 100], false),
+            [false, true]
+        );
+        assert_eq!(accepted(KeyCode::Char('5'), &[99], true), [true]);
+        assert_eq!(accepted(KeyCode::Esc, &[99], false), [true]);
+        // it is forgotten, but one that follows at once is still its repetition
+        assert_eq!(
+            accepted(KeyCode::Enter, &[99, 150, 900], false),
+            [false, false, true]
+        );
+        let mut pace = Pace::new(Instant::now());
+        let before = Instant::now().checked_sub(QUIET).unwrap();
+        let space = key(KeyCode::Char(' '));
+        assert!(pace.accepts(&space, before, false, true));
+        assert!(!pace.accepts(&space, before, false, false));
+    }
+
+    #[test]
+    fn a_choice_between_two_enters_makes_the_second_deliberate() {
+        let start = Instant::now();
+        let mut pace = Pace::new(start);
+        assert!(pace.accepts(&key(KeyCode::Enter), start, false, false));
+        assert!(pace.waits(start));
+        assert!(pace.accepts(&key(KeyCode::Char('5')), start, false, false));
+        assert!(!pace.waits(start));
+        assert!(pace.accepts(&key(KeyCode::Enter), start, false, false));
+    }
+
+    #[test]
+    fn a_repeat_that_the_terminal_reports_never_advances() {
+        let start = Instant::now();
+        let mut pace = Pace::new(start);
+        let mut held = KeyEvent::new(KeyCode::Enter, KeyModifiers::NONE);
+        held.kind = KeyEventKind::Repeat;
+        assert!(!pace.accepts(&Event::Key(held), start + QUIET * 2, false, false));
+    }
+}
