@@ -170,8 +170,8 @@ impl Dialogue {
             None => known(participant, "the participant's pseudonym, such as P01"),
             Some(id) => {
                 let who = roster.and_then(|roster| roster.who(id));
-                let who = who.map_or_else(String::new, |who| format!("{}: {who}. ", Untrusted(id)));
-                who + &known(operator, "the operator's initials or a code")
+                let who = who.map_or_else(String::new, |who| format!(" {}: {who}.", Untrusted(id)));
+                known(operator, "the operator's initials or a code") + &who
             }
         };
     }

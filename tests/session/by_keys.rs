@@ -252,7 +252,7 @@ fn held_quick_or_early_keys_answer_nothing() {
     let screen = terminal.screen();
     assert!(rated(&screen) && !screen.contains("┃  6  ┃"), "{screen}");
     // in a dialog every key counts
-    terminal.keys(&format!("{F2}quickly\r"));
+    dialog(&mut terminal, F2, "Tab: author", "quickly\r");
     play_until(&mut terminal, "trial 2 of");
     let journal = "results/turn-signal/sessions/P01/1/journal.jsonl";
     let journal = fs::read_to_string(folder.path().join(journal)).unwrap();
