@@ -1,0 +1,227 @@
+//! How well thresholds are estimated: bias and standard deviation of simulated tracks,
+//! and how often the intervals of a fit hold the truth.
+//!
+//! `cargo bench --bench thresholds -- --tracks 2000` simulates a participant in a
+//! two-interval task whose function is a cumulative normal with mean 0.5 and standard
+//! deviation 0.2, on a ladder from 0 to 2. The seed is fixed: the same number of tracks
+//! prints the same tables for any number of threads.
+#![allow(clippy::print_stdout)]
+
+use rayon::prelude::*;
+use study_base::rng::Stream;
+use study_core::procedure::{
+    Answer, Constant, Ladder, QuestPlus, Rule, Scale, Staircase, Stop, Track,
+};
+use study_stats::describe;
+use study_stats::psychometric::{
+    Core, Curve, Experiment, Level, Support, maximum_likelihood, posterior,
+};
+
+const MEAN: f64 = 0.5;
+const SD: f64 = 0.2;
+/// Standard deviations in a width.
+const WIDTH: f64 = 3.289_707_253_902_944;
+
+fn main() {
+    let mut tracks = 200;
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        if argument == "--tracks" {
+            let given = arguments.next().and_then(|n| n.parse().ok());
+            tracks = given.expect("--tracks takes a number");
+        }
+    }
+    println!("{tracks} tracks each\n");
+    println!(
+        "| procedure | lapses | trials | target | bias | SD | not estimated |\n|---|---|---|---|---|---|---|"
+    );
+    for lambda in [0.0, 0.02, 0.05] {
+        for (name, rule) in procedures() {
+            print_bias(name, &rule, lambda, tracks);
+        }
+    }
+    println!(
+        "\n| data | lapses | interval | threshold | width | not estimated |\n|---|---|---|---|---|---|"
+    );
+    for (name, rule, lambda) in fits() {
+        print_coverage(name, &rule, lambda, tracks);
+    }
+}
+
+/// The function of the participant.
+fn participant(lambda: f64) -> Curve {
+    Curve {
+        core: Core::Norm,
+        threshold: MEAN,
+        width: WIDTH * SD,
+        gamma: 0.5,
+        lambda,
+    }
+}
+
+/// 101 levels from 0 to 2.
+fn ladder() -> Ladder {
+    Ladder::new((0..=100).map(|i| f64::from(i) / 50.0).collect()).expect("levels rise")
+}
+
+fn up_down(down: u32, reversals: u32, factor: f64) -> Rule {
+    Rule::Staircase(Staircase {
+        up: 1,
+        down,
+        start: 1.2,
+        steps: vec![0.2, 0.2, 0.1, 0.1, 0.05],
+        scale: Scale::Lin,
+        step_up_factor: factor,
+        min_level: None,
+        max_level: None,
+        initial_one_up_one_down: true,
+        stop: Stop {
+            reversals,
+            min_trials: 0,
+            max_trials: 200,
+        },
+        estimate_last: 6,
+    })
+}
+
+fn quest(trials: u32, lambda: f64) -> Rule {
+    let mean = (1..=30).map(|i| f64::from(i) * 0.05).collect();
+    let sd = vec![0.05, 0.1, 0.2, 0.4];
+    Rule::QuestPlus(QuestPlus::psi(mean, sd, 0.5, lambda, trials))
+}
+
+fn procedures() -> Vec<(&'static str, Rule)> {
+    vec![
+        ("1-up-2-down, 10 reversals", up_down(2, 10, 1.0)),
+        ("1-up-3-down, 8 reversals", up_down(3, 8, 1.0)),
+        ("1-up-3-down, 16 reversals", up_down(3, 16, 1.0)),
+        ("weighted, .75, 10 reversals", up_down(1, 10, 3.0)),
+        ("QUEST+, λ .02 in the model", quest(30, 0.02)),
+        ("QUEST+, λ .02 in the model", quest(50, 0.02)),
+        ("QUEST+, λ .04 in the model", quest(30, 0.04)),
+        ("QUEST+, λ .04 in the model", quest(50, 0.04)),
+    ]
+}
+
+/// One track: its answers, and the estimate at its end.
+fn simulate(rule: &Rule, curve: &Curve, stream: &mut Stream) -> (Vec<Answer>, Option<f64>) {
+    let ladder = ladder();
+    let mut track = Track::new(rule, &ladder, stream).expect("the rule is good");
+    let mut answers = Vec::new();
+    while let Some(proposal) = track.next() {
+        let presented = ladder.level(proposal.step);
+        let answer = Answer {
+            presented,
+            positive: stream.unit() < curve.value(presented),
+            easy: false,
+        };
+        track.answer(&answer);
+        answers.push(answer);
+    }
+    (answers, track.summary().estimate)
+}
+
+fn simulated(
+    name: &str,
+    rule: &Rule,
+    curve: &Curve,
+    tracks: u64,
+) -> Vec<(Vec<Answer>, Option<f64>)> {
+    (0..tracks)
+        .into_par_iter()
+        .map(|i| simulate(rule, curve, &mut Stream::new(i, &["thresholds", name])))
+        .collect()
+}
+
+fn print_bias(name: &str, rule: &Rule, lambda: f64, tracks: u64) {
+    let curve = participant(lambda);
+    // What the rule settles at: of an up-down rule the level of its target, of QUEST+ the
+    // mean of the function.
+    let target = match rule {
+        Rule::Staircase(rule) => rule.target().and_then(|share| curve.level_at(share)),
+        Rule::QuestPlus(_) | Rule::Constant(_) => Some(MEAN),
+    };
+    let target = target.expect("the function has the target");
+    let found = simulated(name, rule, &curve, tracks);
+    let trials: Vec<f64> = found.iter().map(|f| f.0.len() as f64).collect();
+    let estimates: Vec<f64> = found.iter().filter_map(|f| f.1).collect();
+    let mean = describe::mean(&estimates).unwrap_or_default();
+    println!(
+        "| {name} | {lambda} | {:.1} | {target:.3} | {:+.3} | {:.3} | {} |",
+        describe::mean(&trials).unwrap_or_default(),
+        mean - target,
+        describe::sd(&estimates).unwrap_or_default(),
+        found.len() - estimates.len(),
+    );
+}
+
+fn fits() -> Vec<(&'static str, Rule, f64)> {
+    let constant = |repetitions| {
+        Rule::Constant(Constant {
+            levels: vec![0.1, 0.24, 0.38, 0.5, 0.62, 0.76, 1.0],
+            repetitions,
+        })
+    };
+    vec![
+        ("constant, 7 × 20", constant(20), 0.02),
+        ("constant, 7 × 60", constant(60), 0.02),
+        ("1-up-3-down, 16 reversals", up_down(3, 16, 1.0), 0.02),
+        ("QUEST+, 50 trials", quest(50, 0.02), 0.02),
+        ("QUEST+, 200 trials", quest(200, 0.02), 0.02),
+    ]
+}
+
+/// Levels with their counts.
+fn levels(answers: &[Answer]) -> Vec<Level> {
+    (answers.iter())
+        .map(|a| Level {
+            level: a.presented,
+            positive: f64::from(u8::from(a.positive)),
+            trials: 1.0,
+        })
+        .collect()
+}
+
+fn print_coverage(name: &str, rule: &Rule, lambda: f64, tracks: u64) {
+    let curve = participant(lambda);
+    let found = simulated(name, rule, &curve, tracks);
+    let ladder = ladder();
+    let support = match rule {
+        Rule::Constant(_) => None,
+        _ => Support::of(ladder.levels().iter().copied()),
+    };
+    let within = |(low, high): (f64, f64), truth: f64| low <= truth && truth <= high;
+    let bayes: Vec<(bool, bool)> = (found.par_iter())
+        .filter_map(|(answers, _)| {
+            let experiment = Experiment::ForcedChoice(0.5);
+            let p = posterior(Core::Norm, &levels(answers), experiment, support).ok()?;
+            Some((
+                within(p.threshold.ci95, curve.threshold),
+                within(p.width.ci95, curve.width),
+            ))
+        })
+        .collect();
+    let wald: Vec<(bool, bool)> = (found.par_iter())
+        .filter_map(|(answers, _)| {
+            let fit = maximum_likelihood(Core::Norm, &levels(answers), 0.5, lambda).ok()?;
+            let holds = |estimate: f64, se: f64, truth| {
+                within((estimate - 1.96 * se, estimate + 1.96 * se), truth)
+            };
+            Some((
+                holds(fit.curve.threshold, fit.threshold_se?, curve.threshold),
+                holds(fit.curve.width, fit.width_se?, curve.width),
+            ))
+        })
+        .collect();
+    for (kind, covered) in [("posterior", bayes), ("Wald, λ known", wald)] {
+        let share = |part: fn(&(bool, bool)) -> bool| {
+            covered.iter().filter(|c| part(c)).count() as f64 / covered.len() as f64
+        };
+        println!(
+            "| {name} | {lambda} | {kind} | {:.3} | {:.3} | {} |",
+            share(|c| c.0),
+            share(|c| c.1),
+            found.len() - covered.len(),
+        );
+    }
+}
