@@ -3,6 +3,7 @@
 mod grim;
 mod progress;
 mod report;
+mod trials;
 
 use super::load::Loaded;
 use super::{Console, Failure, study_folder};
@@ -53,6 +54,8 @@ pub(super) struct Args {
     /// Print the comments by realization
     #[arg(long, conflicts_with = "json")]
     comments: bool,
+    #[command(flatten, next_help_heading = "Thresholds and comparisons")]
+    trials: trials::Args,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -80,6 +83,15 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let Some(results) = &args.results else {
         return grim::run(&args.possible, args.json, console);
     };
+    if let Some(task) = &args.trials.task {
+        if !results.is_file() {
+            return Err(Failure::input(format!(
+                "{}: --task is for a table of trials; a study states its own",
+                results.display()
+            )));
+        }
+        return trials::run(results, task, &args.trials, args.json, console);
+    }
     if results.is_file() {
         let input = of_csv(results, args)?;
         return show(args, &input, args.out.as_deref(), console);

@@ -60,6 +60,10 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
                 "study analyze results --json",
                 "all values with their identifiers",
             ),
+            (
+                "study analyze trials.csv --task 2ifc",
+                "thresholds of any table with participant,level,positive,trials",
+            ),
         ],
     ),
     (

@@ -3,7 +3,7 @@
 use super::Source;
 use serde_json::{Map, Value as Json, json};
 use study_core::analyze::findings::{Direction, Estimate};
-use study_core::analyze::{Analysis, Finding, Value};
+use study_core::analyze::{Analysis, Finding, Value, Values};
 
 /// Name and version of the format.
 pub const FORMAT: &str = "study-analysis/1";
@@ -41,10 +41,10 @@ fn finding(f: &Finding) -> Json {
     })
 }
 
-/// The document, with a final line feed.
-pub fn document(source: &Source, analysis: &Analysis) -> String {
+/// Statistics by identifier, null if undefined, and the reasons of those.
+fn statistics(of: &Values) -> (Map<String, Json>, Map<String, Json>) {
     let (mut values, mut undefined) = (Map::new(), Map::new());
-    for (id, value) in analysis.values.iter() {
+    for (id, value) in of.iter() {
         let json = match value {
             Value::Number(x) => json!(x),
             Value::List(x) => json!(x),
@@ -55,6 +55,27 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
         };
         values.insert(id.to_owned(), json);
     }
+    (values, undefined)
+}
+
+/// The statistics of a table of trials, `study-trials/1`.
+pub fn trials(path: &str, task: &str, rows: usize, of: &Values) -> String {
+    let (values, undefined) = statistics(of);
+    let document = json!({
+        "format": "study-trials/1",
+        "tool_version": env!("CARGO_PKG_VERSION"),
+        "path": path,
+        "task": task,
+        "rows": rows,
+        "values": values,
+        "undefined": undefined,
+    });
+    format!("{document:#}\n")
+}
+
+/// The document, with a final line feed.
+pub fn document(source: &Source, analysis: &Analysis) -> String {
+    let (values, undefined) = statistics(&analysis.values);
     let c = &analysis.counts;
     let document = json!({
         "format": FORMAT,

@@ -5,6 +5,7 @@
 //! the data passes through [`Untrusted`].
 
 mod layout;
+mod trials;
 
 use super::answers::{answers, conditional};
 use super::plot::{Axis, bars};
@@ -13,6 +14,7 @@ use layout::{Grid, Paint, pad, wrap};
 use study_base::text::{Untrusted, counted, cut_middle};
 use study_core::analyze::{Analysis, RealizationSummary, group_id};
 use study_core::outcome::Role;
+pub use trials::trials;
 use unicode_width::UnicodeWidthStr as _;
 
 /// The terminal.

@@ -21,5 +21,6 @@ mod rows;
 mod rules;
 mod schema;
 mod study;
+mod trials;
 #[path = "../support/world.rs"]
 mod world;

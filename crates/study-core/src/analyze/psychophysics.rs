@@ -7,10 +7,14 @@ mod detection;
 mod fits;
 mod preferences;
 mod scales;
+mod table;
 mod tracks;
+mod trials;
 
 pub use detection::{Detection, Task, detection};
 pub use fits::{FitCell, FitSettings, psychometric};
 pub use preferences::{Choice, Preference, preferences};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
+pub use table::{TableError, TableKind, analyze_table};
 pub use tracks::{TrackName, quest_plus, staircase, track_order};
+pub use trials::{Asked, TrialCount, TrialSettings, discrimination};

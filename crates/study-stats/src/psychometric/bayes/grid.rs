@@ -10,11 +10,26 @@ use crate::quadrature::gauss_legendre;
 
 /// ln(10⁻⁷).
 const NEGLIGIBLE: f64 = -16.118;
-/// Grids of thresholds and of widths while the box shrinks, and at the end.
-const COARSE: usize = 25;
-const FINE: usize = 56;
-/// Values of λ, and of γ.
-const RATES: usize = 8;
+/// A term so far below the highest one does not count in the sums.
+const NOTHING: f64 = -40.0;
+
+/// Numbers of nodes: of thresholds and of widths, and of λ and of γ.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    curve: usize,
+    rate: usize,
+}
+
+impl Size {
+    /// While the box shrinks, and at the end. γ as a parameter multiplies the nodes.
+    fn of(experiment: Experiment) -> [Self; 2] {
+        let size = |curve, rate| Self { curve, rate };
+        match experiment {
+            Experiment::ForcedChoice(_) | Experiment::Comparison => [size(19, 4), size(44, 8)],
+            Experiment::YesNo => [size(17, 4), size(36, 6)],
+        }
+    }
+}
 
 /// Bounds of the five axes.
 #[derive(Debug, Clone, Copy)]
@@ -111,8 +126,9 @@ pub(super) fn integrate(problem: &Problem) -> Option<Posterior> {
         eta: (0.0, MOST_ETA),
         gamma: (0.0, MOST_RATE),
     };
+    let [coarse, fine] = Size::of(problem.experiment);
     for _ in 0..4 {
-        let grid = evaluate(problem, &bounds, COARSE)?;
+        let grid = evaluate(problem, &bounds, coarse)?;
         let top = grid.threshold.highest.iter().copied();
         let top = top.fold(f64::NEG_INFINITY, f64::max);
         bounds = Bounds {
@@ -123,7 +139,7 @@ pub(super) fn integrate(problem: &Problem) -> Option<Posterior> {
             gamma: grid.gamma.shrunk(top, bounds.gamma),
         };
     }
-    let grid = evaluate(problem, &bounds, FINE)?;
+    let grid = evaluate(problem, &bounds, fine)?;
     let interval = |axis: &Axis, back: fn(f64) -> f64| Interval {
         mean: axis.mean(back),
         ci95: (back(axis.quantile(0.025)), back(axis.quantile(0.975))),
@@ -141,20 +157,20 @@ pub(super) fn integrate(problem: &Problem) -> Option<Posterior> {
     })
 }
 
-fn evaluate(problem: &Problem, bounds: &Bounds, n: usize) -> Option<Grid> {
+fn evaluate(problem: &Problem, bounds: &Bounds, size: Size) -> Option<Grid> {
+    let n = size.curve;
     let mut threshold = Axis::even(n, bounds.threshold);
     let mut log_width = Axis::even(n, bounds.log_width);
-    let mut lambda = Axis::gauss(RATES, bounds.lambda);
+    let mut lambda = Axis::gauss(size.rate, bounds.lambda);
     let mut eta = Axis::gauss(ETAS, bounds.eta);
     let mut gamma = match problem.experiment {
-        Experiment::YesNo => Axis::gauss(RATES, bounds.gamma),
+        Experiment::YesNo => Axis::gauss(size.rate, bounds.gamma),
         // One value: given, or that of λ.
         Experiment::ForcedChoice(_) | Experiment::Comparison => Axis::new(vec![(0.0, 1.0)]),
     };
     let etas: [f64; ETAS] = std::array::from_fn(|i| eta.nodes[i].0);
     let table = Table::new(&problem.levels, &etas);
-    // Densities are relative to the highest at the middle of nothing known: the sum is
-    // kept relative to the highest term so far.
+    // The sums are relative to the highest term so far.
     let mut scale = f64::NEG_INFINITY;
     let mut shares = vec![0.0; problem.levels.len()];
     for t in 0..n {
@@ -187,6 +203,9 @@ fn evaluate(problem: &Problem, bounds: &Bounds, n: usize) -> Option<Grid> {
                     for (e, log) in logs.iter().enumerate() {
                         let (eta_at, weight_e) = eta.nodes[e];
                         let log = log + prior + problem.rates(lapse, guess, eta_at);
+                        if log < scale + NOTHING {
+                            continue;
+                        }
                         for axis in [
                             (&mut threshold, t),
                             (&mut log_width, w),

@@ -1,0 +1,101 @@
+//! `study analyze TABLE.csv --task …`: thresholds, sensitivities and preferences of
+//! somebody else's trials.
+
+use crate::cli::{Console, Failure};
+use crate::report::json;
+use crate::report::text::{Page, trials};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+use study_core::analyze::psychophysics::{TableKind, TrialSettings, analyze_table};
+use study_stats::psychometric::{Core, Support};
+
+/// Options of a table of trials.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// A CSV of trials and how they are answered; needs a table, not a study
+    #[arg(long, value_name = "KIND", value_parser = clap::builder::PossibleValuesParser::new(TableKind::names()))]
+    pub(super) task: Option<String>,
+    /// Shape of the psychometric functions
+    #[arg(long, value_name = "CORE", default_value = "norm", requires = "task",
+          value_parser = clap::builder::PossibleValuesParser::new(Core::NAMES.map(|n| n.1)))]
+    core: String,
+    /// Lapse rate of the fit by maximum likelihood; the posterior estimates it
+    #[arg(long, value_name = "RATE", default_value = "0.02", requires = "task", value_parser = parse_rate)]
+    lapse: f64,
+    /// The standard of a comparison, for PSE, JND and Weber fraction
+    #[arg(
+        long,
+        value_name = "LEVEL",
+        requires = "task",
+        allow_hyphen_values = true
+    )]
+    standard: Option<f64>,
+    /// Lowest and highest level of an adaptive track, with the step between levels, such as 0..2:0.05
+    #[arg(long, value_name = "LOW..HIGH:STEP", requires = "task", value_parser = parse_ladder, allow_hyphen_values = true)]
+    ladder: Option<Support>,
+    /// Simulated data sets for the p of the deviance; not for adaptive tracks
+    #[arg(long, value_name = "N", default_value = "0", requires = "task", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    bootstrap: u32,
+}
+
+/// A text that is not what an option takes.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum OptionError {
+    #[error("give a rate of at least 0 and less than 0.5")]
+    Rate,
+    #[error("give the lowest and the highest level and the step, such as 0..2:0.05")]
+    Ladder,
+}
+
+fn parse_rate(given: &str) -> Result<f64, OptionError> {
+    let rate = given.parse().ok().filter(|r| (0.0..0.5).contains(r));
+    rate.ok_or(OptionError::Rate)
+}
+
+fn parse_ladder(given: &str) -> Result<Support, OptionError> {
+    let number = |text: &str| text.trim().parse().ok().filter(|x: &f64| x.is_finite());
+    let found = || {
+        let (ends, step) = given.split_once(':')?;
+        let (low, high) = ends.split_once("..")?;
+        let support = Support {
+            low: number(low)?,
+            high: number(high)?,
+            least: number(step)?,
+        };
+        (support.least > 0.0 && support.low + support.least <= support.high).then_some(support)
+    };
+    found().ok_or(OptionError::Ladder)
+}
+
+/// Prints the statistics of a table of trials.
+pub(super) fn run(
+    path: &Path,
+    task: &str,
+    args: &Args,
+    as_json: bool,
+    console: &mut Console,
+) -> Result<(), Failure> {
+    let known = TableKind::named(task).zip(Core::named(&args.core));
+    let (kind, core) = known.ok_or_else(|| Failure::input("unknown task"))?;
+    let settings = TrialSettings {
+        core,
+        lambda: args.lapse,
+        standard: args.standard,
+        support: args.ladder,
+        repeats: args.bootstrap,
+        seed: 2007,
+    };
+    let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
+    let name = path.display().to_string();
+    let (values, rows) =
+        analyze_table(&name, BufReader::new(file), kind, &settings).map_err(Failure::input)?;
+    if as_json {
+        return console.document(json::trials(&name, task, rows, &values));
+    }
+    let page = Page {
+        width: console.width,
+        colour: console.colour,
+    };
+    console.out(trials(&name, task, rows, &values, page))
+}

@@ -1,0 +1,293 @@
+//! `study analyze TABLE.csv --task …`.
+#![allow(clippy::unwrap_used)]
+
+use assert_cmd::Command;
+use serde_json::Value as Json;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+fn analyze(folder: &Path, table: &str, args: &[&str]) -> Command {
+    let path = folder.join("t.csv");
+    fs::write(&path, table).unwrap();
+    let mut command = Command::cargo_bin("study").unwrap();
+    command
+        .current_dir(folder)
+        .args(["analyze", "t.csv"])
+        .args(args);
+    command
+}
+
+fn text(command: &mut Command) -> String {
+    let done = command.assert().success();
+    String::from_utf8(done.get_output().stdout.clone()).unwrap()
+}
+
+fn values(command: &mut Command) -> Json {
+    let document: Json = serde_json::from_str(&text(command)).unwrap();
+    assert_eq!(document["format"], "study-trials/1");
+    document["values"].clone()
+}
+
+/// The input of a reference file and the expected value of an identifier.
+fn golden(name: &str) -> Json {
+    let path = format!(
+        "{}/tests/golden/psychophysics/{name}.json",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn csv(head: &str, golden: &Json, row: impl Fn(&[Json]) -> String) -> String {
+    let mut table = format!("{head}\n");
+    for cells in golden["input"]["rows"].as_array().unwrap() {
+        writeln!(table, "{}", row(cells.as_array().unwrap())).unwrap();
+    }
+    table
+}
+
+fn plain(cell: &Json) -> String {
+    cell.as_str()
+        .map_or_else(|| cell.to_string(), str::to_owned)
+}
+
+fn joined(cells: &[Json]) -> String {
+    cells.iter().map(plain).collect::<Vec<_>>().join(",")
+}
+
+fn close(got: &Json, want: &Json, id: &str) {
+    let (got, want) = (
+        got[id].as_f64().unwrap(),
+        want["expected"][id]["value"].as_f64().unwrap(),
+    );
+    assert!(
+        (got - want).abs() <= 1e-4 * want.abs(),
+        "{id}: {got} is not {want}"
+    );
+}
+
+#[test]
+fn thresholds_of_a_forced_choice() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = golden("fit_sim_group");
+    let table = csv("participant,level,positive,trials", &file, joined);
+    let found = values(&mut analyze(
+        folder.path(),
+        &table,
+        &["--task", "2ifc", "--json"],
+    ));
+    close(&found, &file, "psy/P02/all/ml/threshold");
+    close(&found, &file, "psy/pooled/all/ml/width");
+    close(&found, &file, "psy_group/all/threshold/geometric_mean");
+    assert!(found["psy/P01/all/posterior/threshold/ci95_lo"].is_number());
+    assert!(found.get("psy/P01/all/ml/deviance_p_bootstrap").is_none());
+    let page = text(&mut analyze(folder.path(), &table, &["--task", "2ifc"]));
+    assert!(page.contains("t.csv\n2ifc, 28 rows\n"), "{page}");
+    assert!(
+        page.contains("P04") && page.contains("geometric mean"),
+        "{page}"
+    );
+    assert!(page.lines().all(|l| l.chars().count() <= 100), "{page}");
+    // trial by trial, with the target, gives the same
+    let mut single = "participant,level,target,answer\n".to_owned();
+    for row in file["input"]["rows"].as_array().unwrap() {
+        for trial in 0..row[3].as_u64().unwrap() {
+            let target = ["first", "second"][usize::from(trial % 2 == 1)];
+            let other = ["second", "first"][usize::from(trial % 2 == 1)];
+            let answer = if trial < row[2].as_u64().unwrap() {
+                target
+            } else {
+                other
+            };
+            writeln!(single, "{},{},{target},{answer}", plain(&row[0]), row[1]).unwrap();
+        }
+    }
+    let same = values(&mut analyze(
+        folder.path(),
+        &single,
+        &["--task", "2ifc", "--json"],
+    ));
+    assert_eq!(same, found);
+}
+
+#[test]
+fn a_comparison_has_a_pse() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = golden("fit_sim_pse");
+    let table = csv("participant,level,positive,trials", &file, |r| {
+        format!("P01,{}", joined(r))
+    });
+    let args = [
+        "--task",
+        "comparison",
+        "--standard",
+        "1",
+        "--lapse",
+        "0",
+        "--json",
+    ];
+    let found = values(&mut analyze(folder.path(), &table, &args));
+    for id in ["pse", "jnd", "weber_fraction", "constant_error"] {
+        close(&found, &file, &format!("psy/P01/all/{id}"));
+    }
+    let page = text(&mut analyze(folder.path(), &table, &args[..6]));
+    assert!(page.contains("Weber fraction"), "{page}");
+}
+
+#[test]
+fn sensitivities_come_from_targets_and_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut table = "participant,condition,target,answer,trials\n".to_owned();
+    let file = golden("sdt_2afc");
+    for row in file["input"]["rows"].as_array().unwrap() {
+        let n = |i: usize| row[i].as_u64().unwrap();
+        for (target, answer, count) in [
+            ("first", "first", n(1)),
+            ("first", "second", n(2) - n(1)),
+            ("second", "first", n(3)),
+            ("second", "second", n(4) - n(3)),
+        ] {
+            writeln!(table, "P01,{},{target},{answer},{count}", plain(&row[0])).unwrap();
+        }
+    }
+    let found = values(&mut analyze(
+        folder.path(),
+        &table,
+        &["--task", "2ifc", "--json"],
+    ));
+    for condition in ["unbiased", "first_favoured", "perfect"] {
+        close(&found, &file, &format!("sdt/P01/{condition}/d"));
+        close(&found, &file, &format!("sdt/P01/{condition}/d_se"));
+    }
+    close(&found, &file, "sdt/P01/first_favoured/interval_bias");
+    let page = text(&mut analyze(folder.path(), &table, &["--task", "2ifc"]));
+    assert!(
+        page.contains("d′") && page.contains("first_favoured"),
+        "{page}"
+    );
+}
+
+#[test]
+fn preferences_magnitudes_and_ratings_have_their_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = golden("pairs_sim_order_clusters");
+    let table = csv("participant,first,second,answer", &file, joined);
+    let found = values(&mut analyze(
+        folder.path(),
+        &table,
+        &["--task", "pairs", "--json"],
+    ));
+    close(&found, &file, "pairs/m1|m3/difference");
+    close(&found, &file, "pairs/m1|m3/se_clustered");
+    close(&found, &file, "pairs/order");
+    let page = text(&mut analyze(folder.path(), &table, &["--task", "pairs"]));
+    assert!(
+        page.contains("ability") && page.contains("Order:"),
+        "{page}"
+    );
+
+    let file = golden("magnitude_estimation");
+    let table = csv("participant,level,repetition,estimate", &file, joined);
+    let found = values(&mut analyze(
+        folder.path(),
+        &table,
+        &["--task", "magnitude", "--json"],
+    ));
+    close(&found, &file, "magnitude/exponent");
+    let page = text(&mut analyze(
+        folder.path(),
+        &table,
+        &["--task", "magnitude"],
+    ));
+    assert!(page.contains("1 estimate left out"), "{page}");
+
+    let file = golden("mushra_screening");
+    let table = csv("participant,item,condition,role,rating", &file, |r| {
+        let role = match plain(&r[2]).as_str() {
+            "hidden-reference" => "hidden-reference",
+            "anchor-mid" => "mid-anchor",
+            "anchor-low" => "low-anchor",
+            _ => "test",
+        };
+        format!("{},{role},{}", joined(&r[..3]), r[3])
+    });
+    let found = values(&mut analyze(
+        folder.path(),
+        &table,
+        &["--task", "mushra", "--json"],
+    ));
+    close(&found, &file, "mushra/m1/ci95_half");
+    assert_eq!(found["mushra/n_kept"], 4.0);
+    let page = text(&mut analyze(folder.path(), &table, &["--task", "mushra"]));
+    assert!(
+        page.contains("Screened, and not in this table: P04, P05."),
+        "{page}"
+    );
+}
+
+/// What cannot be estimated is named with its reason, and the command succeeds.
+#[test]
+fn what_is_undefined_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let table =
+        "participant,level,positive,trials\nP1,1,10,20\nP1,2,10,20\nP1,3,20,20\nP1,4,20,20\n";
+    let page = text(&mut analyze(folder.path(), table, &["--task", "2ifc"]));
+    assert!(
+        page.contains("P1 all: no maximum of the likelihood: a step"),
+        "{page}"
+    );
+    let table = "first,second,answer\na,b,first\nc,d,second\n";
+    let page = text(&mut analyze(folder.path(), table, &["--task", "pairs"]));
+    assert!(
+        page.contains("no comparison joins {a, b} with {c, d}"),
+        "{page}"
+    );
+}
+
+#[test]
+fn a_bad_table_is_refused_with_line_and_column() {
+    let folder = tempfile::tempdir().unwrap();
+    for (table, task, said) in [
+        (
+            "participant,level\nP1,1\n",
+            "2ifc",
+            "there is no column `answer`",
+        ),
+        (
+            "participant,level,positive,trials\nP1,1,3,2\n",
+            "2ifc",
+            "t.csv:2: positive is `3`, expected a number from 0 to 2",
+        ),
+        (
+            "participant,target,answer\nP1,first,yes\n",
+            "2ifc",
+            "t.csv:2: answer is `yes`, expected first, second",
+        ),
+        (
+            "participant,level,estimate\nP1,1,\u{1b}[2J\n",
+            "magnitude",
+            "estimate is",
+        ),
+        (
+            "participant,level,estimate\n",
+            "magnitude",
+            "there are no rows",
+        ),
+        ("participant,level,estimate\nP1,1\n", "magnitude", "t.csv"),
+    ] {
+        let done = analyze(folder.path(), table, &["--task", task])
+            .assert()
+            .code(1);
+        let said_in_fact = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+        assert!(said_in_fact.contains(said), "{said_in_fact}");
+        assert!(!said_in_fact.contains('\u{1b}'), "{said_in_fact:?}");
+    }
+    let folder_given = Command::cargo_bin("study")
+        .unwrap()
+        .current_dir(folder.path())
+        .args(["analyze", ".", "--task", "2ifc"])
+        .assert()
+        .code(1);
+    let said = String::from_utf8(folder_given.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("--task is for a table of trials"), "{said}");
+}
