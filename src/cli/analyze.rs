@@ -55,7 +55,7 @@ pub(super) struct Args {
     #[arg(long, conflicts_with = "json")]
     comments: bool,
     #[command(flatten, next_help_heading = "Thresholds and comparisons")]
-    trials: trials::Args,
+    trials: trials::TrialArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

@@ -12,7 +12,7 @@ use study_stats::psychometric::{Core, Support};
 
 /// Options of a table of trials.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub(super) struct TrialArgs {
     /// A CSV of trials and how they are answered; needs a table, not a study
     #[arg(long, value_name = "KIND", value_parser = clap::builder::PossibleValuesParser::new(TableKind::names()))]
     pub(super) task: Option<String>,
@@ -72,7 +72,7 @@ fn parse_ladder(given: &str) -> Result<Support, OptionError> {
 pub(super) fn run(
     path: &Path,
     task: &str,
-    args: &Args,
+    args: &TrialArgs,
     as_json: bool,
     console: &mut Console,
 ) -> Result<(), Failure> {

@@ -4,7 +4,7 @@
 //! density is above 10⁻⁷ of the highest one found. A coarse grid may miss the peak; the
 //! limit is then lower and the box larger, and the next grid is finer.
 
-use super::rows::{ETAS, Table};
+use super::rows::{ETAS, Table, cubic};
 use super::{Experiment, Interval, MOST_ETA, MOST_RATE, Posterior, Problem};
 use crate::quadrature::gauss_legendre;
 
@@ -89,21 +89,36 @@ impl Axis {
         weighted.map(|(n, m)| f(n.0) * m).sum::<f64>() / sum
     }
 
-    /// The quantile of a density that is linear between even nodes.
+    /// A quantile over even nodes. Between them the density is a cubic polynomial through
+    /// four nodes, in small linear pieces.
     fn quantile(&self, p: f64) -> f64 {
-        let step = self.nodes[1].0 - self.nodes[0].0;
-        let areas = || self.mass.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+        const PIECES: usize = 8;
+        let at = |i: usize, offset: usize| {
+            let place = (i + offset).checked_sub(1);
+            place.and_then(|k| self.mass.get(k)).copied().unwrap_or(0.0)
+        };
+        let last = self.nodes.len() - 1;
+        let density: Vec<f64> = (0..=last * PIECES)
+            .map(|piece| {
+                let (i, t) = (piece / PIECES, (piece % PIECES) as f64 / PIECES as f64);
+                let sum: f64 = (0..4).map(|k| cubic(t)[k] * at(i, k)).sum();
+                sum.max(0.0)
+            })
+            .collect();
+        let step = (self.nodes[1].0 - self.nodes[0].0) / PIECES as f64;
+        let areas = || density.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
         let mut left = p * areas().sum::<f64>();
         for (i, area) in areas().enumerate() {
             if left <= area && area > 0.0 {
-                let (a, b) = (self.mass[i], self.mass[i + 1]);
+                let (a, b) = (density[i], density[i + 1]);
                 // a t + (b − a) t²/2 = left
                 let root = (a * a + 2.0 * (b - a) * left).max(0.0).sqrt();
-                return self.nodes[i].0 + step * (2.0 * left / (a + root)).clamp(0.0, 1.0);
+                let t = (2.0 * left / (a + root)).clamp(0.0, 1.0);
+                return self.nodes[0].0 + step * (i as f64 + t);
             }
             left -= area;
         }
-        self.nodes[self.nodes.len() - 1].0
+        self.nodes[last].0
     }
 }
 

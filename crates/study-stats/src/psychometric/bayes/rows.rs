@@ -31,6 +31,16 @@ fn partial_sums(base: f64, theta: f64, counts: &[usize], mut found: impl FnMut(u
     }
 }
 
+/// Weights of the nodes i − 1 … i + 2 at i + t: Lagrange's polynomial through them.
+pub(super) fn cubic(t: f64) -> [f64; 4] {
+    [
+        -t * (t - 1.0) * (t - 2.0) / 6.0,
+        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+        -(t + 1.0) * t * (t - 2.0) / 2.0,
+        (t + 1.0) * t * (t - 1.0) / 6.0,
+    ]
+}
+
 /// Number of values of η of a table.
 pub(super) const ETAS: usize = 8;
 /// Distance of the nodes in ln(ψ/(1 − ψ)), and their number on each side of 0.
@@ -81,13 +91,7 @@ impl Table {
         let x = (logit / STEP).clamp(-most, most) + SIDE as f64;
         let i = x as usize;
         let t = x - i as f64;
-        // Lagrange's polynomial through the nodes i − 1 … i + 2.
-        let weights = [
-            -t * (t - 1.0) * (t - 2.0) / 6.0,
-            (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-            -(t + 1.0) * t * (t - 2.0) / 2.0,
-            (t + 1.0) * t * (t - 1.0) / 6.0,
-        ];
+        let weights = cubic(t);
         let from = row * (2 * SIDE + 1) + i - 1;
         for (node, weight) in self.nodes[from..from + 4].iter().zip(weights) {
             for (sum, value) in to.iter_mut().zip(node) {
