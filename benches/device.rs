@@ -44,6 +44,7 @@ fn realization() -> Realization {
         positive: branch(1.0),
         negative: branch(-1.0),
         x_mm,
+        mechanism: None,
     }
 }
 

@@ -121,6 +121,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("estimate", &["predict", "real"]),
     ("message", &["frame", "predict", "real"]),
     ("servo", &["predict", "real"]),
+    ("mechanism", &["certificate", "predict"]),
     (
         "handler",
         &[

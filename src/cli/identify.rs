@@ -8,19 +8,20 @@ pub(super) use args::Args;
 
 use super::console::{PATIENCE, progress};
 use super::{Console, Failure, Kind};
-use args::NamedPath;
+use args::{MethodName, NamedPath};
 use std::fs::File;
 use std::io::BufReader;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use study_base::text::Untrusted;
 use study_haptics::identify::grid::{self, Cell, Plan};
+use study_haptics::identify::mechanism::Progress;
 use study_haptics::identify::signal::{self, Acceleration, Excitation, filter};
 use study_haptics::identify::validation::{self, Ceiling, Validation};
 use study_haptics::identify::{IdentifyError, Training};
-use study_haptics::recording::{self, Recording};
+use study_haptics::recording::{self, Names, Recording, RecordingError, RecordingFault};
 use study_wire::certificate::{Certificate, SERVO_RATES_HZ};
 
 /// The results of an identification, for [`output`] and [`files`].
@@ -55,17 +56,30 @@ impl Results<'_> {
 /// Identifies a grid of realizations, prints it and writes the files.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let plan = args.plan()?;
+    let names = args.names()?;
     let mut training = Vec::new();
     for named in &args.training {
-        training.push((named, read(named, args, console)?));
+        training.push((named, read(named, &names, args, console)?));
     }
     let mut recordings = Vec::new();
     for named in args.validate.iter().chain(&args.test) {
-        recordings.push((named, read(named, args, console)?));
+        recordings.push((named, read(named, &names, args, console)?));
     }
     let mut repeats = Vec::new();
     for named in &args.repeat {
-        repeats.push((named, read(named, args, console)?));
+        repeats.push((named, read(named, &names, args, console)?));
+    }
+    let offset_mm = offset_mm(&training[0].1);
+    if offset_mm != 0.0 {
+        let all = (training.iter_mut())
+            .chain(&mut recordings)
+            .chain(&mut repeats);
+        for x in all.flat_map(|(_, recording)| &mut recording.x_mm) {
+            *x -= offset_mm;
+        }
+        console.say(format!(
+            "x is far from its origin, which costs digits: identified at x - {offset_mm} mm; model files have the positions of the recording"
+        ));
     }
     check_distinct(training.iter().chain(&recordings).chain(&repeats))?;
     for (named, training) in &mut training {
@@ -94,8 +108,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     for cell in &mut cells {
         cell.realization.provenance.filter = Some(filter.clone());
     }
-    let best = grid::best(&cells, args.validate.len());
     let detents = validation::detents(first);
+    let best = grid::best(&cells, args.validate.len());
     let validations = recordings
         .iter()
         .map(|(_, recording)| {
@@ -114,7 +128,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         files: Vec::new(),
     };
     if let Some(dir) = &args.out {
+        let shift = |cells: &mut [Cell], by_mm| {
+            (cells.iter_mut()).for_each(|cell| cell.realization.shift(by_mm));
+        };
+        shift(&mut results.cells, offset_mm);
         results.files = files::models(&mut results.cells, args, dir)?;
+        shift(&mut results.cells, -offset_mm);
         files::write(dir, &results.files, args.force)?;
     }
     if let Some(dir) = &args.figures {
@@ -160,6 +179,22 @@ pub(super) fn required_damping(certificate: &Certificate) -> String {
         SERVO_RATES_HZ.map(at).join(", ")
     )
 }
+
+/// What is subtracted from all positions before identification, mm: 0 unless the middle of
+/// the range is more than [`FAR`] ranges from the origin, because the origin matters to a cold
+/// start. A whole number of mm, so that nodes keep their places.
+fn offset_mm(training: &Recording) -> f64 {
+    let [low, high] = training.range_mm();
+    let middle = 0.5 * (low + high);
+    if middle.abs() > FAR * (high - low) {
+        middle.round()
+    } else {
+        0.0
+    }
+}
+
+/// Ranges from the origin at which cold recursions lose more than two digits.
+const FAR: f64 = 100.0;
 
 /// The ceiling of VAF on each recording, from the repetitions.
 fn ceilings(
@@ -222,13 +257,67 @@ fn warn_about_filters<'a>(
     }
 }
 
-fn read(named: &NamedPath, args: &Args, console: &mut Console) -> Result<Recording, Failure> {
+/// The failure of reading a recording, with what to do about it.
+fn unreadable(path: &Path, error: &RecordingError) -> Failure {
+    let failure = Failure::input(format!(
+        "{}: line {}: {}",
+        path.display(),
+        error.line,
+        error.fault
+    ));
+    match &error.fault {
+        RecordingFault::MissingColumn { .. } => failure.hint(
+            "name the columns of your file: --columns t=NAME,x=NAME:UNIT,f=NAME:UNIT, with units such as mm, deg, rad, N and N·m",
+        ),
+        RecordingFault::Ragged { found, expected } if *found == 2 * expected => {
+            failure.hint("decimal commas need semicolons or tabs between the columns")
+        }
+        _ => failure,
+    }
+}
+
+fn read(
+    named: &NamedPath,
+    names: &Names,
+    args: &Args,
+    console: &mut Console,
+) -> Result<Recording, Failure> {
     let path = &named.path;
     let file = File::open(path).map_err(|e| Failure::file(path, &e))?;
-    let recording = recording::read(&named.name, BufReader::with_capacity(1 << 16, file))
-        .map_err(|e| Failure::input(format!("{}: line {}: {}", path.display(), e.line, e.fault)))?;
+    let mut recording =
+        recording::read_as(&named.name, BufReader::with_capacity(1 << 16, file), names)
+            .map_err(|e| unreadable(path, &e))?;
     for warning in &recording.warnings {
         console.say(format!("warning: {}: {warning}", path.display()));
+    }
+    if args.robust {
+        let replaced = recording.without_spikes();
+        console.say(format!("{}: {replaced} spikes replaced", path.display()));
+    }
+    // swapped columns, which are warned of, have the opposite energy as well
+    let swapped = |w: &recording::Warning| matches!(w, recording::Warning::Swapped { .. });
+    if let Some(energy) = recording.energy()
+        && energy.negative
+        && !args.active
+        && !recording.warnings.iter().any(swapped)
+    {
+        return Err(Failure::input(format!(
+            "{}: the target supplies energy: the work of the force over closed cycles is {:.3} J on {:.0} mm, but no passive target gives any",
+            path.display(),
+            energy.supplied_j,
+            energy.path_mm,
+        ))
+        .hint("F is the force that the probe applies to the target, positive with +x: change its sign. For a target with a motor: --active"));
+    }
+    if let Some((even, most_s)) = signal::without_jitter(&recording)
+        && args.needs_even_samples()
+    {
+        console.say(format!(
+            "{}: intervals deviate by up to {:.1} µs: resampled at even intervals by cubics",
+            path.display(),
+            1e6 * most_s
+        ));
+        recording = even;
     }
     signal::prepare(&recording, args.signals())
         .map_err(|e| Failure::input(format!("{}: {e}", path.display())))
@@ -274,13 +363,27 @@ fn identify(
     let training = Training::of(&training)?;
     let recordings: Vec<&Recording> = recordings.iter().map(|(_, r)| *r).collect();
     let (began, done, bar) = (Instant::now(), AtomicU64::new(0), OnceLock::new());
-    let cells = grid::run(&training, plan, args.lookup, &recordings, || {
+    let cell_done = || {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        if began.elapsed() > PATIENCE {
+        if began.elapsed() > PATIENCE && args.method() != MethodName::Mechanism {
             bar.get_or_init(|| progress(plan.cells() as u64, "cells"))
                 .set_position(done);
         }
-    });
+    };
+    let step_done = |step: Progress| {
+        if began.elapsed() > PATIENCE {
+            bar.get_or_init(|| progress(step.of as u64, "steps"))
+                .set_position(step.steps as u64);
+        }
+    };
+    let cells = grid::run_in_steps(
+        &training,
+        plan,
+        args.lookup,
+        &recordings,
+        cell_done,
+        step_done,
+    );
     if let Some(bar) = bar.get() {
         bar.finish_and_clear();
     }

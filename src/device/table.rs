@@ -9,6 +9,8 @@ use study_haptics::model::{Branch, Realization};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum TableError {
+    #[error("it is a mechanism, which devices cannot play yet")]
+    Mechanism,
     #[error("it has fewer than two nodes")]
     TooFewNodes,
     #[error("it has {0} nodes; at most 65535 can be sent")]
@@ -53,6 +55,9 @@ pub fn check(realization: &Realization) -> Result<(), TableError> {
     let positive = |value: f64| value.is_finite() && value > 0.0;
     if !positive(realization.trained.v_mm_s) {
         return Err(TableError::Speed(realization.trained.v_mm_s));
+    }
+    if realization.mechanism.is_some() {
+        return Err(TableError::Mechanism);
     }
     match realization.direction.delta_mm() {
         Some(delta_mm) if !positive(delta_mm) => Err(TableError::Delta(delta_mm)),

@@ -242,6 +242,7 @@ mod tests {
             x_mm: nodes.clone(),
             positive: branch(1.0),
             negative: branch(-1.0),
+            mechanism: None,
         }
     }
 

@@ -49,6 +49,7 @@ fn detents(mass: f64, damping: f64, direction: Direction) -> Realization {
         x_mm: nodes.clone(),
         positive: branch(1.0),
         negative: branch(-1.0),
+        mechanism: None,
     }
 }
 
@@ -437,6 +438,7 @@ prop_compose! {
             positive: branch(0),
             negative: branch(4),
             x_mm,
+            mechanism: None,
         }
     }
 }

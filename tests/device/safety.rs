@@ -49,6 +49,7 @@ fn table() -> Realization {
         x_mm: nodes,
         positive: branch.clone(),
         negative: branch,
+        mechanism: None,
     }
 }
 

@@ -105,6 +105,7 @@ fn table(id: &str, mass_kg: f64) -> Realization {
         positive: branch(1.0),
         negative: branch(-1.0),
         x_mm,
+        mechanism: None,
     }
 }
 

@@ -100,6 +100,144 @@ fn a_good_recording_has_no_warning() {
 }
 
 #[test]
+fn a_force_of_the_wrong_sign_is_refused_by_its_energy_unless_the_target_is_active() {
+    let mut flipped = training();
+    flipped.iter_mut().for_each(|row| row[4] = -row[4]);
+    let flipped = text(NAMES, &flipped);
+    refused(&flipped, "training.csv: the target supplies energy: ");
+    refused(&flipped, "change its sign");
+    let (code, out, err) = identify(&flipped, &["--active"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("VAF"), "{out}");
+}
+
+#[test]
+fn a_spike_is_named_and_replaced_on_request() {
+    let mut spiked = training();
+    spiked[700][4] = 1e8;
+    let spiked = text(NAMES, &spiked);
+    warned(&spiked, "1 spike in f_n, the largest 100000000 at 1.4000 s");
+    let vaf = |training: &str, more: &[&str]| {
+        let (code, out, err) = identify(training, &[&["--json"], more].concat());
+        assert_eq!(code, 0, "{err}");
+        let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+        document["cells"][0]["vaf"]["validation"].as_f64().unwrap()
+    };
+    let good = vaf(&text(NAMES, &training()), &[]);
+    let robust = vaf(&spiked, &["--robust"]);
+    assert!((good - robust).abs() < 0.001, "{good} {robust}");
+    assert!(vaf(&spiked, &[]) < -1e3);
+}
+
+#[test]
+fn jitter_is_resampled_for_a_filter_and_said() {
+    let mut rows = training();
+    for (i, row) in rows.iter_mut().enumerate() {
+        row[0] += if i % 3 == 1 { 0.0006 } else { 0.0 };
+    }
+    let (code, _, err) = identify(&text(NAMES, &rows), &["--filter", "30"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("resampled at even intervals"), "{err}");
+}
+
+/// The same table at an offset of 10⁸ mm, with the positions of the recording.
+#[test]
+fn a_far_origin_is_moved_and_said() {
+    let far: Vec<[f64; 5]> = (training().iter())
+        .map(|[t, x, v, a, f]| [*t, (x * 1e3).round() / 1e3 + 1e8, *v, *a, *f])
+        .collect();
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str, text: &str| {
+        let path = dir.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let other: Vec<[f64; 5]> = (rows(&[(1.5, 15.0)]).iter())
+        .map(|[t, x, v, a, f]| [*t, x + 1e8, *v, *a, *f])
+        .collect();
+    let (one, two) = (
+        path("t.csv", &text(NAMES, &far)),
+        path("v.csv", &text(NAMES, &other)),
+    );
+    let out = dir.path().join("models");
+    let output = Command::cargo_bin("study")
+        .unwrap()
+        .args(["identify", &one, "--validate", &two, "--dx", "1", "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    let err = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{err}");
+    assert!(err.contains("identified at x - 100000018 mm"), "{err}");
+    let model = fs::read_to_string(out.join("passive-dx-1.toml")).unwrap();
+    assert!(model.contains("100000010.0"), "{model}");
+    let vaf = |text: &str| -> f64 {
+        let (_, rest) = text.split_once("[vaf]\nv = ").unwrap();
+        rest.lines().next().unwrap().parse().unwrap()
+    };
+    assert!(vaf(&model) > 0.95, "{model}");
+}
+
+/// A knob in degrees and N·m, in a file with semicolons and decimal commas, has the VAF of
+/// the same recording in mm and N.
+#[test]
+fn a_knob_with_semicolons_and_decimal_commas_is_read_at_its_lever() {
+    let lever = 25.0;
+    let mut text = String::from("time;pos;torque\n");
+    let mut plain = String::from("t_s,x_mm,f_n\n");
+    for [t, x, _, _, f] in training() {
+        let (deg, n_m) = ((x / lever).to_degrees(), 1e-3 * f * lever);
+        let _ = writeln!(
+            text,
+            "{}",
+            format!("{t};{deg:.9};{n_m:.9}").replace('.', ",")
+        );
+        let _ = writeln!(plain, "{t},{x:.9},{f:.9}");
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let vaf = |name: &str, training: &str, more: &[&str]| {
+        let path = dir.path().join(name);
+        fs::write(&path, training).unwrap();
+        let half: String = (training.lines().enumerate())
+            .filter(|(i, _)| *i == 0 || *i > 900)
+            .map(|(_, line)| format!("{line}\n"))
+            .collect();
+        let other = dir.path().join("v.csv");
+        fs::write(&other, half).unwrap();
+        let output = Command::cargo_bin("study")
+            .unwrap()
+            .arg("identify")
+            .args([&path, &PathBuf::from("--validate"), &other])
+            .args(["--dx", "1", "--json"])
+            .args(more)
+            .output()
+            .unwrap();
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        let document: Option<serde_json::Value> = serde_json::from_slice(&output.stdout).ok();
+        let vaf = document.and_then(|d| d["cells"][0]["vaf"]["v"].as_f64());
+        (vaf, err)
+    };
+    let columns = "t=time,x=pos:deg,f=torque:N·m";
+    let (of_knob, said) = vaf("k.csv", &text, &["--columns", columns, "--lever", "25"]);
+    assert!(
+        said.contains("columns are separated by semicolons"),
+        "{said}"
+    );
+    let (of_slider, _) = vaf("s.csv", &plain, &[]);
+    assert!(
+        (of_knob.unwrap() - of_slider.unwrap()).abs() < 1e-4,
+        "{of_knob:?} {of_slider:?}"
+    );
+    let (none, said) = vaf("k.csv", &text, &[]);
+    assert!(
+        none.is_none() && said.contains("--columns t=NAME"),
+        "{said}"
+    );
+    let (none, said) = vaf("k.csv", &text, &["--columns", columns]);
+    assert!(none.is_none() && said.contains("--lever MM"), "{said}");
+}
+
+#[test]
 fn gaps_give_a_warning_and_cannot_be_filtered() {
     let mut rows = training();
     rows.drain(300..420);

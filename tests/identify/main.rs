@@ -6,6 +6,7 @@ mod estimators_switches;
 mod estimators_tables;
 mod golden;
 mod grid;
+mod mechanism;
 mod metamorphic;
 mod record;
 mod shipped;

@@ -180,6 +180,7 @@ fn a_version_1_file_reads_as_it_always_did() {
             k_n_per_mm: vec![1.5, -1.5, 2.0],
             f0_n: zero,
         },
+        mechanism: None,
     };
     assert_eq!(realization, Some(expected));
 }

@@ -4,6 +4,7 @@
 //! order at 30 Hz. Simulation, not measurement.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(dead_code, reason = "the test and the bench use different parts")]
 #![allow(unreachable_pub, reason = "a module of a test and a bench")]
 
 use std::f64::consts::TAU;
@@ -54,6 +55,19 @@ fn sum(sines: &[(f64, f64, f64, f64)]) -> Motion {
     motion
 }
 
+/// 17.5 + 14 sin(2π 0.3 t).
+pub fn slow(t: f64) -> Motion {
+    sum(&[(14.0, 0.3 * t, 0.3, 0.0)])
+}
+
+/// 17.5 + 9 sin(2π 0.8 t) + 4 sin(2π 2.7 t).
+pub fn two_sines(t: f64) -> Motion {
+    sum(&[(9.0, 0.8 * t, 0.8, 0.0), (4.0, 2.7 * t, 2.7, 0.0)])
+}
+
+/// Maxwell-slip friction of the handle: springs (N/mm) that slide at a force (N).
+pub type Slips = [(f64, f64); 4];
+
 /// Imposes a motion on a switch for `seconds` after the ramp.
 pub fn record(
     name: &str,
@@ -62,13 +76,33 @@ pub fn record(
     seconds: f64,
     noise: &mut Stream,
 ) -> Recording {
+    record_with(name, parameters, &[(0.0, 0.0); 4], motion, seconds, noise)
+}
+
+/// [`record`] with friction that neither a table nor the mechanism has.
+pub fn record_with(
+    name: &str,
+    parameters: &Parameters,
+    slips: &Slips,
+    motion: impl Fn(f64) -> Motion,
+    seconds: f64,
+    noise: &mut Stream,
+) -> Recording {
+    let mut springs_n = [0.0; 4];
+    let mut before_mm: Option<f64> = None;
     let mut target = Target::new(parameters.clone(), 17.5).unwrap();
     let samples = ((RAMP_S + seconds) * 1e3) as u32;
     let [mut x, mut a, mut f] = [const { Vec::new() }; 3];
     for i in 0..samples * STEPS_PER_SAMPLE {
         let t = f64::from(i) * DT_S;
         let ramped = ramp(motion(t), t);
-        let force_n = target.step(ramped);
+        let mut force_n = target.step(ramped);
+        let moved_mm = ramped.x_mm - before_mm.unwrap_or(ramped.x_mm);
+        before_mm = Some(ramped.x_mm);
+        for (spring_n, (n_per_mm, most_n)) in springs_n.iter_mut().zip(slips) {
+            *spring_n = (*spring_n + n_per_mm * moved_mm).clamp(-most_n, *most_n);
+            force_n += *spring_n;
+        }
         if i % STEPS_PER_SAMPLE == 0 {
             x.push((ramped.x_mm / 0.005).round() * 0.005);
             a.push(ramped.a_m_s2 + 0.05 * noise.normal());
@@ -161,4 +195,16 @@ pub fn random_switch(i: u64) -> Parameters {
     p.follower_kg = within(0.10, 0.18);
     p.backlash_mm = within(0.4, 1.0);
     p
+}
+
+/// Four Maxwell-slip elements of switch `i`, which slide after 0.05 to 2 mm, together at 0.3
+/// to 0.8 N.
+pub fn random_slips(i: u64) -> Slips {
+    let mut draw = Stream::new(2007, &["slips", &i.to_string()]);
+    let mut within = |low: f64, high: f64| low + (high - low) * draw.unit();
+    let total_n = within(0.3, 0.8);
+    [(0.05, 0.1), (0.1, 0.3), (0.3, 0.8), (0.8, 2.0)].map(|(low, high)| {
+        let (mm, n) = (within(low, high), 0.25 * total_n);
+        (n / mm, n)
+    })
 }

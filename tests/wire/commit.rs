@@ -182,6 +182,7 @@ fn spring() -> Realization {
         x_mm: vec![0.0, 30.0],
         positive: branch(),
         negative: branch(),
+        mechanism: None,
     }
 }
 

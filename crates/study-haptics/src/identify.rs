@@ -32,6 +32,7 @@ pub mod grid;
 mod hat;
 mod hat_table;
 pub mod lanes;
+pub mod mechanism;
 pub mod method;
 mod passive;
 mod problem;
@@ -48,6 +49,7 @@ pub use samples::{Samples, Theta};
 
 use crate::model::{Branch, Provenance, Realization, Trained};
 use crate::recording::{Recording, range};
+use mechanism::{Fitted, Progress};
 use method::{Ewls, Sort, Start, TwoSided, Width};
 use problem::START_UP_SAMPLES;
 use resample::{Resample, Resampled};
@@ -151,6 +153,7 @@ impl<'r> Training<'r> {
             Method::TwoSided(options) => self.two_sided(options, dx_mm, lookup),
             Method::Hat(options) => self.hat(options, dx_mm, lookup),
             Method::Passive(options) => self.passive(options, dx_mm, lookup),
+            Method::Mechanism(options) => self.mechanism(options, dx_mm, |_| ()),
             Method::Static => self.static_profile(dx_mm, lookup),
             Method::Segments(options) => self.segments(options, lookup),
             Method::Spring => Ok(self.spring(lookup)),
@@ -316,6 +319,43 @@ impl<'r> Training<'r> {
         Ok(identified)
     }
 
+    /// The virtual mechanism. `progress` is called after each step of its fit.
+    ///
+    /// # Errors
+    /// As [`mechanism::identify`].
+    pub fn mechanism(
+        &self,
+        options: method::Mechanism,
+        dx_mm: f64,
+        progress: impl Fn(Progress) + Sync,
+    ) -> Result<Identified, IdentifyError> {
+        self.nodes(dx_mm)?;
+        let settings = mechanism::Settings {
+            dx_mm,
+            recorded_hz: options.recorded_hz,
+        };
+        let fitted = mechanism::identify(self, settings, progress)?;
+        let provenance = Provenance {
+            dx_mm: Some(dx_mm),
+            ..self.provenance(Method::Mechanism(options))
+        };
+        let trained = Trained {
+            x_mm: self.range_mm,
+            v_mm_s: self.top_speed_mm_s,
+        };
+        Ok(Identified {
+            realization: Realization::of_mechanism(
+                String::new(),
+                provenance,
+                std::collections::BTreeMap::new(),
+                trained,
+                fitted.mechanism.clone(),
+            ),
+            warnings: fitted.warnings(),
+            fitted: Some(Box::new(fitted)),
+        })
+    }
+
     /// A warning about nodes where the recursion of either direction has seen few
     /// samples. A warm start has none.
     fn start_up(&self, options: &Ewls, nodes: &[f64]) -> Option<Warning> {
@@ -395,8 +435,10 @@ impl<'r> Training<'r> {
                 x_mm: nodes,
                 positive: branch(&positive.theta),
                 negative: branch(&negative.theta),
+                mechanism: None,
             },
             warnings,
+            fitted: None,
         }
     }
 }
@@ -415,10 +457,12 @@ pub struct Estimates {
 /// An identified realization; its id and VAF are empty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identified {
-    /// The table.
+    /// The table or mechanism.
     pub realization: Realization,
     /// What is doubtful about it.
     pub warnings: Vec<Warning>,
+    /// How a mechanism was fitted.
+    pub fitted: Option<Box<Fitted>>,
 }
 
 fn branch(theta: &[Theta]) -> Branch {

@@ -11,10 +11,13 @@ pub mod file;
 
 use std::collections::BTreeMap;
 use study_wire::certificate::{self, Certificate};
+use study_wire::mechanism::{self, MechanismView, Scalars};
 use study_wire::predict::{BranchView, Direction, Lookup, TableView};
 
 /// The `format` of a model file.
 pub const FORMAT: &str = "study-model/1";
+/// The `format` of a model file with a mechanism.
+pub const FORMAT_2: &str = "study-model/2";
 
 /// A haptic model's parameters and their origin: the contents of a model file.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +40,9 @@ pub struct Realization {
     pub positive: Branch,
     /// Parameters for v < 0.
     pub negative: Branch,
+    /// The mechanism that is rendered instead of the table. The table then has its mass,
+    /// damping and static force: what it is at rest and in slow motion.
+    pub mechanism: Option<Mechanism>,
 }
 
 /// The parameters of one direction, one value per node.
@@ -50,6 +56,65 @@ pub struct Branch {
     pub k_n_per_mm: Vec<f64>,
     /// Offset force, N.
     pub f0_n: Vec<f64>,
+}
+
+/// A virtual mechanism, see [`study_wire::mechanism`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mechanism {
+    /// The parameters that do not depend on the position.
+    pub scalars: Scalars,
+    /// The detent force on the follower, N.
+    pub detent: Profile,
+    /// The Coulomb friction of the follower, N.
+    pub friction: Profile,
+    /// Corner of the zero-phase low-pass that the recorded force had passed, Hz, and that
+    /// its prediction therefore passes as well.
+    pub recorded_hz: Option<f64>,
+}
+
+/// Values at equally spaced positions, at least two.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// Position of the first value, mm.
+    pub first_mm: f64,
+    /// Distance of two values, mm.
+    pub step_mm: f64,
+    /// The values, N.
+    pub n: Vec<f64>,
+}
+
+impl Mechanism {
+    /// What it is at rest and in slow motion, at some positions: for v > 0 and v < 0.
+    pub fn at_rest(&self, x_mm: &[f64]) -> [Branch; 2] {
+        let (view, p) = (self.view(), &self.scalars);
+        [true, false].map(|forwards| Branch {
+            m_kg: vec![p.handle_kg + p.follower_kg; x_mm.len()],
+            b_n_s_per_mm: vec![p.follower_n_s_per_mm + p.handle_n_s_per_mm; x_mm.len()],
+            k_n_per_mm: vec![0.0; x_mm.len()],
+            f0_n: x_mm.iter().map(|x| view.static_n(*x, forwards)).collect(),
+        })
+    }
+
+    /// As borrowed slices.
+    pub fn view(&self) -> MechanismView<'_> {
+        MechanismView::new(self.scalars, self.detent.view(), self.friction.view())
+    }
+}
+
+impl Profile {
+    /// As a borrowed slice.
+    pub fn view(&self) -> mechanism::Profile<'_> {
+        mechanism::Profile {
+            first_mm: self.first_mm,
+            step_mm: self.step_mm,
+            n: &self.n,
+        }
+    }
+
+    /// The positions of the values, mm.
+    pub fn x_mm(&self) -> impl Iterator<Item = f64> {
+        (0..self.n.len()).map(|i| self.first_mm + i as f64 * self.step_mm)
+    }
 }
 
 /// The range in which a realization was identified; outside it, the target is unknown.
@@ -83,6 +148,52 @@ pub struct Provenance {
 }
 
 impl Realization {
+    /// A mechanism, with a table of what it is at rest.
+    pub fn of_mechanism(
+        id: String,
+        provenance: Provenance,
+        vaf: BTreeMap<String, f64>,
+        trained: Trained,
+        mechanism: Mechanism,
+    ) -> Self {
+        let [low, high] = trained.x_mm;
+        let inside = |x: &f64| *x > low && *x < high;
+        let mut x_mm = vec![low];
+        x_mm.extend(mechanism.detent.x_mm().filter(inside));
+        x_mm.push(high);
+        let [positive, negative] = mechanism.at_rest(&x_mm);
+        Self {
+            id,
+            provenance,
+            vaf,
+            lookup: Lookup::Linear,
+            direction: Direction::Play {
+                delta_mm: mechanism.scalars.gap_mm + mechanism.scalars.slip_mm,
+            },
+            trained,
+            x_mm,
+            positive,
+            negative,
+            mechanism: Some(mechanism),
+        }
+    }
+
+    /// The same at positions counted from elsewhere: a position of x mm becomes x + `by_mm`.
+    pub fn shift(&mut self, by_mm: f64) {
+        for x in self.x_mm.iter_mut().chain(&mut self.trained.x_mm) {
+            *x += by_mm;
+        }
+        for branch in [&mut self.positive, &mut self.negative] {
+            for (f0, k) in branch.f0_n.iter_mut().zip(&branch.k_n_per_mm) {
+                *f0 -= k * by_mm;
+            }
+        }
+        if let Some(mechanism) = &mut self.mechanism {
+            mechanism.detent.first_mm += by_mm;
+            mechanism.friction.first_mm += by_mm;
+        }
+    }
+
     /// The table as borrowed slices, for [`study_wire::predict`].
     pub fn table(&self) -> TableView<'_> {
         TableView {
@@ -96,6 +207,9 @@ impl Realization {
     /// The passivity certificate over the trained range: whether the realization can
     /// supply energy to a hand.
     pub fn certificate(&self) -> Certificate {
+        if let Some(mechanism) = &self.mechanism {
+            return mechanism.view().certificate(self.trained.v_mm_s);
+        }
         let range = certificate::Range {
             x_mm: self.trained.x_mm,
             v_mm_s: self.trained.v_mm_s,

@@ -10,12 +10,17 @@
 //! have at least three rows; time ascends strictly; x and F vary.
 
 mod column;
+mod differences;
+mod doubts;
 mod motion;
+mod names;
 mod rows;
 mod swapped;
 mod write;
 
 pub(crate) use column::{mean_and_variance, range};
+pub use doubts::Energy;
+pub use names::{NameError, Named, Names};
 pub use write::{Columns, write};
 
 use std::io::BufRead;
@@ -120,6 +125,8 @@ pub enum Warning {
         column: &'static str,
         formula: &'static str,
     },
+    #[error("columns are separated by {0}")]
+    Separated(&'static str),
     /// Intervals longer than 1.5 median ones.
     #[error("{count} gap{} in time, the longest {longest_s:.4} s at {at_s:.4} s", if *.count == 1 { "" } else { "s" })]
     Gaps {
@@ -127,6 +134,18 @@ pub enum Warning {
         longest_s: f64,
         at_s: f64,
     },
+    /// The largest one with its time.
+    #[error("{count} spike{} in {column}, the largest {value} at {at_s:.4} s: --robust replaces {}", if *.count == 1 { "" } else { "s" }, if *.count == 1 { "it" } else { "them" })]
+    Spikes {
+        column: &'static str,
+        count: usize,
+        value: f64,
+        at_s: f64,
+    },
+    #[error(
+        "f_n stays at exactly {force_n} N for {count} samples: the sensor seems to be saturated"
+    )]
+    Saturated { count: usize, force_n: f64 },
     #[error("the target moves in one direction only")]
     OneDirection,
     #[error("the differences of x_mm are {ratio:.3e} times {column}: check its unit and sign")]
@@ -194,8 +213,20 @@ pub enum RecordingFault {
 /// # Errors
 /// [`RecordingError`] with the line of the first fault.
 pub fn read(name: impl Into<String>, input: impl BufRead) -> Result<Recording, RecordingError> {
+    read_as(name, input, &Names::default())
+}
+
+/// Reads a recording whose columns have other names or units.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_as(
+    name: impl Into<String>,
+    input: impl BufRead,
+    names: &Names,
+) -> Result<Recording, RecordingError> {
     let name = name.into();
-    match rows::read(input) {
+    match rows::read(input, names) {
         Ok(rows) => motion::complete(name, rows),
         Err((line, fault)) => Err(RecordingError { name, line, fault }),
     }
@@ -274,6 +305,33 @@ mod tests {
         let r = read_text(text).unwrap();
         assert_eq!(r.header, ["made elsewhere"]);
         assert_eq!(r.x_mm, [1.0, 3.0, 1.0]);
+    }
+
+    #[test]
+    fn semicolons_tabs_and_decimal_commas_are_read_and_said() {
+        let plain = read_text(GOOD).unwrap();
+        for (separator, said) in [(";", "semicolons"), ("\t", "tabs")] {
+            let text = GOOD.replace(',', separator);
+            let (header, rows) = text.split_once("f_n\n").unwrap();
+            let r = read_text(&format!("{header}f_n\n{}", rows.replace('.', ","))).unwrap();
+            assert_eq!((&r.t_s, &r.a_m_s2), (&plain.t_s, &plain.a_m_s2));
+            let warnings: Vec<_> = r.warnings.iter().map(ToString::to_string).collect();
+            assert!(
+                warnings.contains(&format!("columns are separated by {said}")),
+                "{warnings:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_knob_in_degrees_and_newton_metres_is_read_at_its_lever() {
+        let given: Vec<Named> = ["t=time", "x=pos:deg", "f=torque:N·m"]
+            .map(|text| text.parse().unwrap())
+            .into();
+        let text = "time,pos,torque\n0,0,0.1\n1,90,0.2\n2,10,0.1\n";
+        let r = read_as("k", text.as_bytes(), &Names::new(&given, 20.0)).unwrap();
+        assert!((r.x_mm[1] - 10.0 * std::f64::consts::PI).abs() < 1e-12);
+        assert!((r.f_n[1] - 10.0).abs() < 1e-12);
     }
 
     #[test]

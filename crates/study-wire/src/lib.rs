@@ -29,6 +29,7 @@
 //!
 //! - [`predict`]: the force of a table at a given motion. Start here; `examples/servo.rs`
 //!   plays a small table.
+//! - [`mechanism`]: a virtual mechanism in place of a table.
 //! - [`certificate`]: whether a table is passive.
 //! - [`estimate`]: speed and acceleration from an encoder, and rotary devices.
 //! - [`servo`]: one servo period, with trips, slew limit, ramp and clamp.
@@ -48,6 +49,7 @@ pub mod certificate;
 pub mod estimate;
 pub mod frame;
 pub mod handler;
+pub mod mechanism;
 pub mod message;
 pub mod predict;
 pub mod real;

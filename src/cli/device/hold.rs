@@ -150,5 +150,6 @@ fn constant_force() -> Realization {
         x_mm,
         positive: branch.clone(),
         negative: branch,
+        mechanism: None,
     }
 }

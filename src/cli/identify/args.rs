@@ -8,10 +8,11 @@ use study_base::text::Untrusted;
 use study_haptics::identify::Method;
 use study_haptics::identify::grid::Plan;
 use study_haptics::identify::method::{
-    Delta, Ewls, Hat, Passive, Segments, Sort, Start, State, TwoSided, Width, Window,
+    self, Delta, Ewls, Hat, Passive, Segments, Sort, Start, State, TwoSided, Width, Window,
 };
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::signal::{Acceleration, Settings};
+use study_haptics::recording::{Named, Names};
 use study_wire::predict::Lookup;
 
 /// Longer lists of numbers are a typing error.
@@ -126,6 +127,22 @@ pub(in crate::cli) struct Args {
     #[arg(long)]
     pub(super) thin: bool,
 
+    /// Names and units of the columns: t=time:ms,x=pos:deg,f=torque:N·m
+    #[arg(long, value_name = "KEY=NAME:UNIT", value_delimiter = ',')]
+    pub(super) columns: Vec<Named>,
+
+    /// Lever arm of a rotary target: positions in mm and forces in N are those at its end
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) lever: Option<f64>,
+
+    /// Replace spikes of x and F, samples that differ from their neighbours as no motion does
+    #[arg(long)]
+    pub(super) robust: bool,
+
+    /// Accept a target that supplies energy: without this flag it is refused, because most likely the force has the wrong sign
+    #[arg(long)]
+    pub(super) active: bool,
+
     /// Estimator [default: passive; ewls if an option of its recursion is given]
     #[arg(long, value_enum)]
     method: Option<MethodName>,
@@ -215,6 +232,8 @@ pub(super) enum MethodName {
     Hat,
     /// A hat table with one mass and bounds: passes its certificate by construction
     Passive,
+    /// A virtual mechanism with backlash, two masses and friction, fitted by simulation
+    Mechanism,
     /// Baseline: mean force by position and direction
     Static,
     /// Baseline: piecewise linear force by direction
@@ -371,6 +390,16 @@ fn distinct(lists: &[Numbers]) -> Vec<f64> {
 }
 
 impl Args {
+    /// Names and units of the columns of all recordings.
+    pub(super) fn names(&self) -> Result<Names, Failure> {
+        match (self.columns.iter().any(Named::is_rotary), self.lever) {
+            (true, None) => Err(Failure::usage("columns in units of rotation need --lever")
+                .hint("--lever MM is the radius at which the hand holds: model files, limits and reports are in mm and N there")),
+            (false, Some(_)) => Err(Failure::usage("--lever without a column in units of rotation")),
+            (_, lever_mm) => Ok(Names::new(&self.columns, lever_mm.unwrap_or(1.0))),
+        }
+    }
+
     /// The estimator. The options of the paper's recursion mean this recursion.
     pub(super) fn method(&self) -> MethodName {
         let recursion = !self.lambda.is_empty()
@@ -381,6 +410,13 @@ impl Args {
             true => MethodName::Ewls,
             false => MethodName::Passive,
         })
+    }
+
+    /// Whether a filter, a difference or a simulation needs even intervals.
+    pub(super) fn needs_even_samples(&self) -> bool {
+        self.filter.is_some()
+            || self.acceleration == Acceleration::Encoder
+            || self.method() == MethodName::Mechanism
     }
 
     /// How signals are prepared.
@@ -396,6 +432,7 @@ impl Args {
         self.check_options_apply()?;
         let dx_mm = match distinct(&self.dx) {
             given if !given.is_empty() => given,
+            _ if self.method() == MethodName::Mechanism => vec![DEFAULT_DX_MM[0]],
             _ if self.figures.is_some() => FIGURE_DX_MM.to_vec(),
             _ => DEFAULT_DX_MM.to_vec(),
         };
@@ -422,6 +459,9 @@ impl Args {
             }
             MethodName::Hat => vec![self.hat()],
             MethodName::Passive => vec![self.passive()],
+            MethodName::Mechanism => vec![Method::Mechanism(method::Mechanism {
+                recorded_hz: self.filter,
+            })],
             MethodName::Static => vec![Method::Static],
             MethodName::Segments => vec![Method::Segments(
                 self.segments
@@ -474,14 +514,14 @@ impl Args {
     /// Rejects options that the method does not have. Those of the paper's recursion are
     /// accepted at their defaults, so that one script can identify baselines as well.
     fn check_options_apply(&self) -> Result<(), Failure> {
-        use MethodName::{Constrained, Ewls, Hat, Passive, Segments, Static, TwoSided};
+        use MethodName::{Constrained, Ewls, Hat, Mechanism, Passive, Segments, Static, TwoSided};
         let (lambda, dx) = (!self.lambda.is_empty(), !self.dx.is_empty());
         let given: [(&str, bool, &[MethodName]); 10] = [
             ("--lambda", lambda, &[Ewls, Constrained, TwoSided]),
             (
                 "--dx",
                 dx,
-                &[Ewls, Constrained, TwoSided, Hat, Passive, Static],
+                &[Ewls, Constrained, TwoSided, Hat, Passive, Mechanism, Static],
             ),
             (
                 "--start warm",

@@ -27,6 +27,7 @@ pub(super) fn models(
         MethodName::TwoSided => "two-sided-{lambda}-dx-{dx}",
         MethodName::Hat => "hat-dx-{dx}",
         MethodName::Passive => "passive-dx-{dx}",
+        MethodName::Mechanism => "mechanism-dx-{dx}",
         MethodName::Static => "static-dx-{dx}",
         MethodName::Segments => "segments",
         MethodName::Spring => "spring",

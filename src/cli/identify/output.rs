@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use study_base::text::Untrusted;
 use study_haptics::identify::Method;
 use study_haptics::identify::grid::Cell;
+use study_haptics::identify::mechanism::{Filter, Fitted, PARAMETERS};
 use study_haptics::identify::vaf::Score;
 use study_haptics::identify::validation::{Accuracy, JUST_NOTICEABLE_N};
 use study_haptics::recording::Recording;
@@ -51,6 +52,7 @@ pub(super) fn json(results: &Results<'_>) -> String {
                 "negative_damping": cell.certificate.negative_damping,
                 "certificate": certificate(&cell.certificate),
                 "warnings": warnings,
+                "mechanism": cell.fitted.as_deref().map(mechanism),
             })
         })
         .collect();
@@ -94,6 +96,7 @@ pub(super) fn json(results: &Results<'_>) -> String {
                 "detents": detents,
                 "ceiling": ceiling.map(|c| json!({
                     "vaf": c.vaf, "noise_n": c.noise_n, "apart_mm": c.apart_mm,
+                    "residual_over_least": c.residual(v.whole.vaf),
                 })),
             });
             Some((named.name.clone(), document))
@@ -141,6 +144,80 @@ fn certificate(certificate: &Certificate) -> Value {
         "damping_n_s_per_mm": certificate.damping_n_s_per_mm,
         "mass_kg": certificate.mass_kg,
     })
+}
+
+/// The parameters of a mechanism, its low-pass and all starts.
+fn mechanism(fitted: &Fitted) -> Value {
+    let values = fitted.mechanism.scalars.to_array();
+    let parameters: Vec<Value> = (PARAMETERS.iter().zip(values))
+        .zip(fitted.standard_errors)
+        .map(|(((name, unit, _), value), error)| {
+            json!({ "name": name, "unit": unit, "value": value, "standard_error": error })
+        })
+        .collect();
+    let starts: Vec<Value> = (fitted.attempts.iter())
+        .map(|a| {
+            json!({
+                "gap_mm": a.gap_mm, "mass_kg": a.mass_kg,
+                "compared_rms_n": a.compared_n, "fitted_rms_n": a.fitted_n,
+            })
+        })
+        .collect();
+    let (filtered, corner_hz) = match fitted.filter {
+        Filter::Recorded(hz) => (true, hz),
+        Filter::Both(hz) => (false, hz),
+    };
+    json!({
+        "parameters": parameters,
+        "starts": starts,
+        "iterations": fitted.iterations,
+        "recorded_force_low_passed": filtered,
+        "corner_hz": corner_hz,
+    })
+}
+
+/// The parameters of a mechanism as text.
+fn mechanism_in_detail(fitted: &Fitted) -> String {
+    let mut rows = vec![
+        ["mechanism", "", "standard error", ""]
+            .map(String::from)
+            .to_vec(),
+    ];
+    let values = fitted.mechanism.scalars.to_array();
+    for (((name, unit, _), value), error) in
+        (PARAMETERS.iter().zip(values)).zip(fitted.standard_errors)
+    {
+        let error = error.map_or("-".to_owned(), |error| format!("{error:.2e}"));
+        rows.push(vec![
+            (*name).to_owned(),
+            format!("{value:.4e}"),
+            error,
+            (*unit).to_owned(),
+        ]);
+    }
+    let mut out = align(&rows);
+    let _ = match fitted.filter {
+        Filter::Recorded(hz) => writeln!(
+            out,
+            "the recorded force has passed a low-pass of about {hz} Hz; the predicted one passes it as well"
+        ),
+        Filter::Both(hz) => writeln!(
+            out,
+            "the recorded force was not filtered; fitted below {hz} Hz, predicted without a filter"
+        ),
+    };
+    out += "starts, with their rms error on a part and on all of the training recordings:\n";
+    for a in &fitted.attempts {
+        let fitted_n = a
+            .fitted_n
+            .map_or("not continued".to_owned(), |n| format!("{n:.4} N"));
+        let _ = writeln!(
+            out,
+            "    backlash {:.2} mm, mass {:.3} kg: {:.4} N, {fitted_n}",
+            a.gap_mm, a.mass_kg, a.compared_n
+        );
+    }
+    out
 }
 
 /// The names of start and sort, for the methods that have them.
@@ -266,17 +343,19 @@ fn best_in_detail(results: &Results<'_>) -> String {
         if let Some(c) = ceiling {
             let _ = writeln!(
                 ceilings,
-                "highest VAF that a model can reach on {}: {:.6} (its repetition differs by noise of {:.3} N)",
+                "highest VAF that a model can reach on {}: {:.6} (its repetition differs by noise of {:.3} N); the residual is {:.1} times the least one",
                 Untrusted(&named.name),
                 c.vaf,
-                c.noise_n
+                c.noise_n,
+                c.residual(v.whole.vaf)
             );
         }
     }
     let provenance = &cell.realization.provenance;
     let filter = provenance.filter.as_deref().unwrap_or("unknown");
+    let mechanism = (cell.fitted.as_deref()).map_or(String::new(), mechanism_in_detail);
     format!(
-        "\nthe {} cell in detail; signals: {filter}; JND: just noticeable difference, {JUST_NOTICEABLE_N} N\n{}{ceilings}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n",
+        "\nthe {} cell in detail; signals: {filter}; JND: just noticeable difference, {JUST_NOTICEABLE_N} N\n{}{ceilings}{mechanism}certificate {}\n    {}\n    m < 0 at {:.0} % of the nodes, b < 0 at {:.0} %\n",
         if results.cells.len() == 1 {
             "only"
         } else {

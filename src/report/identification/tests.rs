@@ -24,6 +24,7 @@ fn realization(scale: f64) -> Realization {
         x_mm: vec![0.0, 1.0, 2.0],
         positive: branch(scale),
         negative: branch(-1.0),
+        mechanism: None,
     }
 }
 

@@ -16,6 +16,7 @@ mod runs;
 use super::lanes::errors::errors;
 use super::lanes::recursion::{self, Run, Sums};
 use super::lanes::{LAMBDAS_PER_PASS, Processor};
+use super::mechanism::{Fitted, Progress};
 use super::method::{Ewls, Sort, Start};
 use super::resample::{Resample, Resampled};
 use super::vaf::{self, Score};
@@ -70,6 +71,8 @@ pub struct Cell {
     pub certificate: Certificate,
     /// What is doubtful about the realization.
     pub warnings: Vec<Warning>,
+    /// How a mechanism was fitted.
+    pub fitted: Option<Box<Fitted>>,
 }
 
 /// Identifies every cell, method by method, and scores it on `recordings`. Calls
@@ -87,6 +90,22 @@ pub fn run(
     run_on(Processor::best(), training, plan, lookup, recordings, done)
 }
 
+/// [`run`], which also calls `step` after each step of the fit of a mechanism.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_in_steps(
+    training: &Training<'_>,
+    plan: &Plan,
+    lookup: Lookup,
+    recordings: &[&Recording],
+    done: impl Fn() + Sync,
+    step: impl Fn(Progress) + Sync,
+) -> Result<Vec<Cell>, IdentifyError> {
+    let best = Processor::best();
+    run_steps_on(best, training, plan, lookup, recordings, done, &step)
+}
+
 /// [`run`] with the loops of one instruction set.
 ///
 /// # Errors
@@ -102,6 +121,20 @@ pub fn run_on(
     recordings: &[&Recording],
     done: impl Fn() + Sync,
 ) -> Result<Vec<Cell>, IdentifyError> {
+    run_steps_on(processor, training, plan, lookup, recordings, done, &|_| ())
+}
+
+type Step<'s> = &'s (dyn Fn(Progress) + Sync);
+
+fn run_steps_on(
+    processor: Processor,
+    training: &Training<'_>,
+    plan: &Plan,
+    lookup: Lookup,
+    recordings: &[&Recording],
+    done: impl Fn() + Sync,
+    step: Step<'_>,
+) -> Result<Vec<Cell>, IdentifyError> {
     // check the arguments before the long computation
     for method in &plan.methods {
         method.check()?;
@@ -115,7 +148,7 @@ pub fn run_on(
             });
         }
     }
-    let identified = identify(processor, training, &plan.methods, &tables, lookup)?;
+    let identified = identify(processor, training, &plan.methods, &tables, lookup, step)?;
     let methods: Vec<Method> = plan
         .methods
         .iter()
@@ -140,6 +173,7 @@ fn identify(
     methods: &[Method],
     tables: &[Nodes],
     lookup: Lookup,
+    step: Step<'_>,
 ) -> Result<Vec<Vec<Identified>>, IdentifyError> {
     let mut identified: Vec<Option<Result<Vec<Identified>, IdentifyError>>> =
         vec![None; methods.len()];
@@ -156,7 +190,9 @@ fn identify(
     identified
         .into_par_iter()
         .zip(methods)
-        .map(|(done, method)| done.unwrap_or_else(|| one_method(training, *method, tables, lookup)))
+        .map(|(done, method)| {
+            done.unwrap_or_else(|| one_method(training, *method, tables, lookup, step))
+        })
         .collect::<Vec<_>>()
         .into_iter()
         .collect()
@@ -168,6 +204,7 @@ fn one_method(
     method: Method,
     tables: &[Nodes],
     lookup: Lookup,
+    step: Step<'_>,
 ) -> Result<Vec<Identified>, IdentifyError> {
     match method {
         Method::Ewls(options) => {
@@ -178,6 +215,10 @@ fn one_method(
         }
         Method::Segments(options) => Ok(vec![training.segments(options, lookup)?]),
         Method::Spring => Ok(vec![training.spring(lookup)]),
+        // each fit uses all threads
+        Method::Mechanism(options) => (tables.iter())
+            .map(|nodes| training.mechanism(options, nodes.dx_mm, step))
+            .collect(),
         Method::TwoSided(_) | Method::Hat(_) | Method::Passive(_) | Method::Static => tables
             .par_iter()
             .map(|nodes| training.identify(method, nodes.dx_mm, lookup))
@@ -389,6 +430,7 @@ fn cell(
     let Identified {
         mut realization,
         warnings,
+        fitted,
     } = identified;
     for (recording, score) in recordings.iter().zip(&scores) {
         let name = recording.name.clone();
@@ -402,6 +444,7 @@ fn cell(
         realization,
         scores,
         warnings,
+        fitted,
     }
 }
 

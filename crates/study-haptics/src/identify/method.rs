@@ -22,6 +22,8 @@ pub enum Method {
     Hat(Hat),
     /// The hat table with one mass and bounds that make it passive.
     Passive(Passive),
+    /// A virtual mechanism, by the simulation error of the force.
+    Mechanism(Mechanism),
     /// Baseline: mean force by position and direction.
     Static,
     /// Baseline: force by direction, piecewise linear between few nodes.
@@ -39,6 +41,7 @@ impl Method {
             Self::TwoSided(_) => "two-sided",
             Self::Hat(_) => "hat",
             Self::Passive(_) => "passive",
+            Self::Mechanism(_) => "mechanism",
             Self::Static => "static",
             Self::Segments(_) => "segments",
             Self::Spring => "spring",
@@ -90,6 +93,10 @@ impl Method {
                 not_negative("the ridge on F", options.ridge_force)?;
                 not_negative("the ridge on b", options.ridge_damping)
             }
+            Self::Mechanism(options) => match options.recorded_hz {
+                Some(hz) => positive("the corner of the low-pass", hz),
+                None => Ok(()),
+            },
             Self::Segments(options) => {
                 if (1..super::resample::MAX_NODES).contains(&options.count) {
                     Ok(())
@@ -219,6 +226,13 @@ impl Default for Hat {
             bounded: true,
         }
     }
+}
+
+/// Options of the virtual mechanism.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Mechanism {
+    /// The corner of the low-pass that the recorded forces have passed, Hz; `None`: found.
+    pub recorded_hz: Option<f64>,
 }
 
 /// Options of the passive table.
@@ -359,6 +373,10 @@ impl fmt::Display for Method {
                 }
             }
             Self::Segments(options) => write!(f, " count={}", options.count),
+            Self::Mechanism(options) => match options.recorded_hz {
+                Some(hz) => write!(f, " recorded={hz}"),
+                None => Ok(()),
+            },
             Self::Static | Self::Spring => Ok(()),
         }
     }

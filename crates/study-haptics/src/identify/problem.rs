@@ -43,6 +43,10 @@ pub enum IdentifyError {
         "the recording leaves parameters of the table undetermined: choose a larger ridge or a larger dx"
     )]
     Undetermined,
+    #[error(transparent)]
+    Signal(#[from] super::signal::SignalError),
+    #[error("no start led to a mechanism whose force is finite: check the units of x and F")]
+    NoMechanism,
     #[error(
         "the estimates with lambda = {lambda} diverge: the recording does not excite all parameters; choose a larger lambda"
     )]
@@ -94,6 +98,13 @@ pub enum Warning {
         "the best delta, {delta_mm} mm, is at an end of the scan: a better one may lie beyond it"
     )]
     DeltaAtEnd { delta_mm: f64 },
+    #[error("{parameter} = {value:.3} is not determined by the recordings{}: {excitation}", .error.map_or(String::new(), |e| format!(" (standard error {e:.2})")))]
+    NotDetermined {
+        parameter: &'static str,
+        value: f64,
+        error: Option<f64>,
+        excitation: &'static str,
+    },
     #[error("the stiffness of the spring is negative: {k_n_per_mm:.4} N/mm")]
     NegativeSpring { k_n_per_mm: f64 },
 }

@@ -83,6 +83,59 @@ pub fn sampling_interval_s(recording: &Recording) -> Result<f64, SignalError> {
     Ok(mean_s)
 }
 
+/// The largest deviation of an interval from the mean one that resampling bridges, as a
+/// share of the mean: sampling with jitter, but without gaps.
+const JITTER: f64 = 0.5;
+
+/// A recording with jitter, interpolated at even intervals by cubics through the samples,
+/// and the largest deviation of an interval from the mean one, s. `None` if it is even, or
+/// so uneven that samples are missing.
+pub fn without_jitter(recording: &Recording) -> Option<(Recording, f64)> {
+    let (t, n) = (&recording.t_s, recording.len());
+    let mean_s = recording.duration_s() / (n - 1) as f64;
+    let deviations = t.windows(2).map(|pair| (pair[1] - pair[0] - mean_s).abs());
+    let most_s = deviations.fold(0.0, f64::max);
+    if most_s <= INTERVAL_TOLERANCE * mean_s || most_s > JITTER * mean_s {
+        return None;
+    }
+    let even: Vec<f64> = (0..n).map(|i| t[0] + i as f64 * mean_s).collect();
+    let mut left = 0;
+    let places: Vec<usize> = (even.iter())
+        .map(|at| {
+            while left + 2 < n && t[left + 1] <= *at {
+                left += 1;
+            }
+            left
+        })
+        .collect();
+    let resampled = |y: &[f64]| -> Vec<f64> {
+        let slope = |i: usize| {
+            let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
+            (y[b] - y[a]) / (t[b] - t[a])
+        };
+        (even.iter().zip(&places))
+            .map(|(at, i)| {
+                let h = t[i + 1] - t[*i];
+                let u = ((at - t[*i]) / h).clamp(0.0, 1.0);
+                let (u2, u3) = (u * u, u * u * u);
+                (2.0 * u3 - 3.0 * u2 + 1.0) * y[*i]
+                    + (u3 - 2.0 * u2 + u) * h * slope(*i)
+                    + (3.0 * u2 - 2.0 * u3) * y[i + 1]
+                    + (u3 - u2) * h * slope(i + 1)
+            })
+            .collect()
+    };
+    let even = Recording {
+        x_mm: resampled(&recording.x_mm),
+        v_mm_s: resampled(&recording.v_mm_s),
+        a_m_s2: resampled(&recording.a_m_s2),
+        f_n: resampled(&recording.f_n),
+        t_s: even,
+        ..recording.clone()
+    };
+    Some((even, most_s))
+}
+
 /// The recording with its signals filtered and its velocity and acceleration computed
 /// as `settings` demand.
 ///
@@ -183,6 +236,28 @@ mod tests {
             .map(|i| (encoder.a_m_s2[i] - done.a_m_s2[i]).abs())
             .fold(0.0, f64::max);
         assert!(worst < 2e-4, "{worst}");
+    }
+
+    #[test]
+    fn jitter_is_resampled_and_a_gap_is_not() {
+        let even = recording(2000, None);
+        assert_eq!(without_jitter(&even), None);
+        assert_eq!(without_jitter(&recording(300, Some(100))), None);
+        // the same motion at times that deviate by up to 0.3 ms
+        let mut text = String::from("t_s,x_mm,f_n\n");
+        let w = TAU * 2.0;
+        for i in 0..2000_u32 {
+            let t = 1e-3 * f64::from(i) + 3e-4 * (0.5 - f64::from(i * 7919 % 100) / 99.0);
+            text += &format!("{t:.9},{},{}\n", 5.0 * (w * t).sin(), (w * t).cos());
+        }
+        let rough = crate::recording::read("r", text.as_bytes()).unwrap();
+        assert!(sampling_interval_s(&rough).is_err());
+        let (smooth, most_s) = without_jitter(&rough).unwrap();
+        assert!(most_s > 1e-4 && most_s < 5e-4, "{most_s}");
+        assert!(sampling_interval_s(&smooth).is_ok());
+        for (t, x) in smooth.t_s.iter().zip(&smooth.x_mm) {
+            assert!((x - 5.0 * (w * t).sin()).abs() < 1e-4, "{t}");
+        }
     }
 
     #[test]

@@ -30,18 +30,22 @@ pub(super) fn motion(recording: &Recording, i: usize) -> Motion {
     }
 }
 
-/// The predicted force of each sample, N.
+/// The predicted force of each sample, N. That of a mechanism passes the low-pass that the
+/// recorded force had passed when it was identified.
 pub fn predict<'r>(
     realization: &'r Realization,
     recording: &'r Recording,
-) -> impl Iterator<Item = f64> + 'r {
+) -> Box<dyn Iterator<Item = f64> + 'r> {
+    if let Some(mechanism) = &realization.mechanism {
+        return Box::new(super::mechanism::low_passed(mechanism, recording).into_iter());
+    }
     let table = realization.table();
     let rule = realization.direction;
     let mut state = DirectionState::default();
-    (0..recording.len()).map(move |i| {
+    Box::new((0..recording.len()).map(move |i| {
         let motion = motion(recording, i);
         force_n(&table, state.step(rule, motion), motion)
-    })
+    }))
 }
 
 /// The prediction error F̂ − F of each sample, N.

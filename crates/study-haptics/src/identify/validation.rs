@@ -173,6 +173,14 @@ pub struct Ceiling {
     pub apart_mm: f64,
 }
 
+impl Ceiling {
+    /// The variance that a model with this VAF does not explain, in multiples of the one that
+    /// no model can explain: (1 − VAF)/(1 − ceiling).
+    pub fn residual(&self, vaf: f64) -> f64 {
+        (1.0 - vaf) / (1.0 - self.vaf)
+    }
+}
+
 /// The ceiling of VAF on `recording` from a second recording of its trajectory; `None`
 /// if the trajectories differ or overlap by less than half in time.
 ///

@@ -1,6 +1,7 @@
 //! Reading and writing model files.
 //!
-//! A model file is TOML with `format = "study-model/1"`. Reading is strict and reports
+//! A model file is TOML with `format = "study-model/1"`, or `"study-model/2"` with a `kind`: a
+//! `table`, whose other keys are those of version 1, or a `mechanism`. Reading is strict and reports
 //! every fault with its line: unknown keys, numbers that are not finite, positions that
 //! do not ascend, lists of different lengths, reversed ranges. Writing is reproducible:
 //! the same realization gives the same bytes, numbers have the fewest digits that read
@@ -10,12 +11,13 @@ mod write;
 
 pub use write::write;
 
-use super::{Branch, FORMAT, Provenance, Realization, Trained};
+use super::{Branch, FORMAT, FORMAT_2, Mechanism, Profile, Provenance, Realization, Trained};
 use std::collections::BTreeMap;
 use study_base::diagnostic::table::{self, Table, Value};
 use study_base::diagnostic::{Fault, Findings};
 use study_base::limits::Limit;
 use study_base::text::{ModelId, Untrusted};
+use study_wire::mechanism::{Flaw, SCALARS, Scalars};
 use study_wire::predict::{Direction, Lookup};
 
 /// Most nodes of a table.
@@ -31,7 +33,14 @@ pub fn parse(path: &str, text: &str) -> (Option<Realization>, Findings) {
 }
 
 fn read(mut root: Table<'_, '_>) -> Option<Realization> {
-    if !root.has_format(FORMAT, "a model file") {
+    let second = root.value("format").and_then(|v| v.text()).as_deref() == Some(FORMAT_2);
+    if second {
+        let kinds = [("table", false), ("mechanism", true)];
+        let kind = root.required("kind").and_then(|v| v.word(&kinds));
+        if kind? {
+            return read_mechanism(root);
+        }
+    } else if !root.has_format(FORMAT, "a model file") {
         return None;
     }
     let id = id(&mut root);
@@ -64,6 +73,102 @@ fn read(mut root: Table<'_, '_>) -> Option<Realization> {
         x_mm: x_mm?,
         positive: positive?,
         negative: negative?,
+        mechanism: None,
+    })
+}
+
+/// A mechanism of version 2.
+fn read_mechanism(mut root: Table<'_, '_>) -> Option<Realization> {
+    let id = id(&mut root);
+    let trained = root.required("trained").and_then(trained);
+    let provenance = root.required("provenance").and_then(provenance);
+    let vaf = root.value("vaf").map_or(Some(BTreeMap::new()), vaf);
+    let mechanism = root
+        .required("mechanism")
+        .and_then(|v| mechanism(v, &trained));
+    root.finish();
+    let (trained, mechanism) = (trained?, mechanism?);
+    Some(Realization::of_mechanism(
+        id?,
+        provenance?,
+        vaf?,
+        trained,
+        mechanism,
+    ))
+}
+
+/// The keys of the scalars, in the order of [`Scalars::to_array`].
+const SCALAR_KEYS: [&str; SCALARS] = [
+    "handle_kg",
+    "follower_kg",
+    "contact_n_per_mm",
+    "contact_n_s_per_mm",
+    "gap_mm",
+    "follower_n_s_per_mm",
+    "slip_mm",
+    "stribeck",
+    "stribeck_mm_s",
+    "handle_n",
+    "handle_slip_mm",
+    "handle_n_s_per_mm",
+    "offset_n",
+];
+
+fn mechanism(value: Value<'_, '_>, trained: &Option<Trained>) -> Option<Mechanism> {
+    let mut table = value.table()?;
+    let scalars = SCALAR_KEYS.map(|key| table.required(key).and_then(|v| finite(&v)));
+    let recorded_hz = table.value("recorded_hz").and_then(|v| positive(&v));
+    let detent = table.required("detent").and_then(profile);
+    let friction = table.required("friction").and_then(profile);
+    let mut values = [0.0; SCALARS];
+    for (value, scalar) in values.iter_mut().zip(scalars) {
+        *value = scalar?;
+    }
+    let mechanism = Mechanism {
+        scalars: Scalars::from_array(values),
+        detent: detent?,
+        friction: friction?,
+        recorded_hz,
+    };
+    let top_mm_s = trained.as_ref().map_or(0.0, |trained| trained.v_mm_s);
+    let fault = match mechanism.view().check(2.0 * top_mm_s) {
+        Ok(()) => None,
+        Err(Flaw::Scalar(i)) => Some((
+            SCALAR_KEYS[i],
+            "has to be positive, or 0 where nothing is divided by it",
+        )),
+        Err(Flaw::Profile | Flaw::Value) => Some(("friction", "has a negative value")),
+        Err(Flaw::Friction) => Some((
+            "friction",
+            "rises too steeply from a small value: the mechanism would not be passive",
+        )),
+    };
+    if let Some((key, message)) = fault {
+        table.fault_at(key, Fault::error(format!("`{key}` {message}")));
+    }
+    table.finish();
+    fault.is_none().then_some(mechanism)
+}
+
+fn profile(value: Value<'_, '_>) -> Option<Profile> {
+    let mut table = value.table()?;
+    let first_mm = table.required("first_mm").and_then(|v| finite(&v));
+    let step_mm = table.required("step_mm").and_then(|v| positive(&v));
+    let n = table.required("n").and_then(|value| {
+        let numbers = numbers(&value)?;
+        if (2..=MAX_NODES).contains(&numbers.len()) {
+            return Some(numbers);
+        }
+        value.refuse(format_args!(
+            "has {} values: 2 to {MAX_NODES}",
+            numbers.len()
+        ))
+    });
+    table.finish();
+    Some(Profile {
+        first_mm: first_mm?,
+        step_mm: step_mm?,
+        n: n?,
     })
 }
 

@@ -1,5 +1,6 @@
 //! Velocity and acceleration where they are absent, and plausibility checks.
 
+use super::differences::{acceleration, velocity};
 use super::rows::Rows;
 use super::swapped::swapped;
 use super::{Recording, RecordingError, RecordingFault, Warning, range};
@@ -30,9 +31,11 @@ pub(super) fn complete(name: String, rows: Rows) -> Result<Recording, RecordingE
         return refuse(RecordingFault::Metres { stroke_mm });
     }
     let mut warnings: Vec<Warning> = gaps(&t_s).into_iter().collect();
+    warnings.extend(rows.separator.map(Warning::Separated));
     if rows.v_mm_s.is_none() && rows.a_m_s2.is_none() {
         warnings.extend(swapped(&t_s, &x_mm, &f_n));
     }
+    warnings.extend(super::doubts::warnings(&x_mm, &f_n, &t_s));
     let velocity = |i: usize| velocity(&t_s, &x_mm, i);
     let acceleration = |i: usize| acceleration(&t_s, &x_mm, i);
     if let Some(given) = &rows.v_mm_s {
@@ -74,21 +77,6 @@ pub(super) fn complete(name: String, rows: Rows) -> Result<Recording, RecordingE
 
 fn is_constant(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] == pair[1])
-}
-
-/// The central difference at row `i`, one-sided at the ends, mm/s.
-fn velocity(t: &[f64], x: &[f64], i: usize) -> f64 {
-    let before = i.saturating_sub(1);
-    let after = (i + 1).min(t.len() - 1);
-    (x[after] - x[before]) / (t[after] - t[before])
-}
-
-/// The second central difference at row `i`, at the ends that of the neighbour, m/s².
-fn acceleration(t: &[f64], x: &[f64], i: usize) -> f64 {
-    let i = i.clamp(1, t.len() - 2);
-    let before = (x[i] - x[i - 1]) / (t[i] - t[i - 1]);
-    let after = (x[i + 1] - x[i]) / (t[i + 1] - t[i]);
-    (after - before) / (0.5 * (t[i + 1] - t[i - 1])) / 1000.0
 }
 
 /// A warning about intervals longer than 1.5 median ones.

@@ -1,10 +1,13 @@
 //! Reading the rows of a recording's CSV file.
 //!
-//! Not a general CSV reader: every field is a number, so a comma always separates
+//! Not a general CSV reader: every field is a number, so a separator always separates
 //! fields and a line is always a row. This gives exact line numbers and needs no memory
-//! except for the columns and one line.
+//! except for the columns and one line. The separator is a semicolon or a tab if the line
+//! of column names has one, and a comma otherwise; numbers may have decimal commas unless
+//! the comma is the separator.
 
 use super::RecordingFault;
+use super::names::{COLUMNS, Names};
 use sha2::{Digest as _, Sha256};
 use std::io::{BufRead, Read as _};
 use study_base::text::Untrusted;
@@ -18,8 +21,6 @@ pub(super) const MAX_LINE_BYTES: usize = 65_536;
 /// Most header lines that are stored.
 const MAX_HEADER_LINES: usize = 1000;
 
-/// Names of the columns.
-const COLUMNS: [&str; 5] = ["t_s", "x_mm", "v_mm_s", "a_m_s2", "f_n"];
 /// The required ones, as indices of [`COLUMNS`].
 const REQUIRED: [usize; 3] = [0, 1, 4];
 
@@ -36,15 +37,17 @@ pub(super) struct Rows {
     /// Number of the line of column names.
     pub(super) header_line: u64,
     pub(super) sha256: String,
+    /// What separates fields, unless it is a comma.
+    pub(super) separator: Option<&'static str>,
 }
 
 type Fault = (u64, RecordingFault);
 
 /// Reads all rows.
-pub(super) fn read(input: impl BufRead) -> Result<Rows, Fault> {
+pub(super) fn read(input: impl BufRead, names: &Names) -> Result<Rows, Fault> {
     let mut lines = Lines::new(input);
     let mut header = Vec::new();
-    let fields = loop {
+    let (fields, separator) = loop {
         let Some(line) = lines.next()? else {
             return Err((lines.number.max(1), RecordingFault::NoColumns));
         };
@@ -54,7 +57,9 @@ pub(super) fn read(input: impl BufRead) -> Result<Rows, Fault> {
                 header.push(String::from_utf8_lossy(text).into_owned());
             }
         } else {
-            break columns(line).map_err(|fault| (lines.number, fault))?;
+            let separator = separator(line);
+            let fields = columns(line, separator, names);
+            break (fields.map_err(|fault| (lines.number, fault))?, separator);
         }
     };
     let header_line = lines.number;
@@ -67,7 +72,8 @@ pub(super) fn read(input: impl BufRead) -> Result<Rows, Fault> {
         if rows == MAX_ROWS {
             return Err((lines.number, RecordingFault::TooLong));
         }
-        row(line, &fields, &mut columns).map_err(|fault| (lines.number, fault))?;
+        row(line, separator, &fields, names, &mut columns)
+            .map_err(|fault| (lines.number, fault))?;
         rows += 1;
     }
     if rows < MIN_ROWS {
@@ -84,20 +90,28 @@ pub(super) fn read(input: impl BufRead) -> Result<Rows, Fault> {
         header,
         header_line,
         sha256: lines.sha256(),
+        separator: match separator {
+            b';' => Some("semicolons"),
+            b'\t' => Some("tabs"),
+            _ => None,
+        },
     })
 }
 
+/// What separates the fields of a file with these column names.
+fn separator(line: &[u8]) -> u8 {
+    let has = |byte: &u8| line.contains(byte);
+    *[b';', b'\t'].iter().find(|byte| has(byte)).unwrap_or(&b',')
+}
+
 /// For each field the index of its column in [`COLUMNS`]; `None` for other columns.
-fn columns(line: &[u8]) -> Result<Vec<Option<usize>>, RecordingFault> {
+fn columns(line: &[u8], separator: u8, own: &Names) -> Result<Vec<Option<usize>>, RecordingFault> {
     let text = String::from_utf8_lossy(line);
     let names: Vec<&str> = text
-        .split(',')
+        .split(char::from(separator))
         .map(|name| name.trim().trim_matches('"'))
         .collect();
-    let fields: Vec<Option<usize>> = names
-        .iter()
-        .map(|name| COLUMNS.iter().position(|column| column == name))
-        .collect();
+    let fields: Vec<Option<usize>> = names.iter().map(|name| own.column(name)).collect();
     for (column, name) in COLUMNS.into_iter().enumerate() {
         let found = fields.iter().filter(|f| **f == Some(column)).count();
         if found > 1 {
@@ -117,26 +131,29 @@ fn columns(line: &[u8]) -> Result<Vec<Option<usize>>, RecordingFault> {
 /// Appends one row.
 fn row(
     line: &[u8],
+    separator: u8,
     fields: &[Option<usize>],
+    names: &Names,
     columns: &mut [Vec<f64>; 5],
 ) -> Result<(), RecordingFault> {
-    let found = line.iter().filter(|byte| **byte == b',').count() + 1;
+    let found = line.iter().filter(|byte| **byte == separator).count() + 1;
     if found != fields.len() {
         return Err(RecordingFault::Ragged {
             found,
             expected: fields.len(),
         });
     }
-    for (field, column) in line.split(|byte| *byte == b',').zip(fields) {
+    for (field, column) in line.split(|byte| *byte == separator).zip(fields) {
         let Some(column) = *column else { continue };
         let name = COLUMNS[column];
         let value: f64 = std::str::from_utf8(field)
             .ok()
-            .and_then(|text| text.trim().parse().ok())
+            .and_then(|text| number(text.trim(), separator))
             .ok_or_else(|| RecordingFault::NotANumber {
                 column: name,
                 text: shown(String::from_utf8_lossy(field).trim()),
             })?;
+        let value = value * names.factor(column);
         if !value.is_finite() {
             return Err(RecordingFault::NotFinite {
                 column: name,
@@ -155,6 +172,16 @@ fn row(
         columns[column].push(value);
     }
     Ok(())
+}
+
+/// A number, with a decimal comma unless the comma separates fields.
+fn number(text: &str, separator: u8) -> Option<f64> {
+    match text.parse() {
+        Err(_) if separator != b',' && text.contains(',') => {
+            text.replacen(',', ".", 1).parse().ok()
+        }
+        parsed => parsed.ok(),
+    }
 }
 
 /// Text of the file for a message: truncated and escaped.

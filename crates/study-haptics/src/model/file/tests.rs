@@ -162,12 +162,12 @@ fn every_fault_has_its_line() {
 
 #[test]
 fn a_newer_format_is_refused_without_further_faults() {
-    let newer = "study-model/2\"\ncolour = \"red";
+    let newer = "study-model/3\"\ncolour = \"red";
     assert_eq!(
         faults("study-model/1", newer),
         ["1: this is not a study-model/1 file"]
     );
-    let (_, findings) = parse("a.toml", &SMALL.replacen("/1", "/2", 1));
+    let (_, findings) = parse("a.toml", &SMALL.replacen("/1", "/3", 1));
     assert_eq!(findings.faults[0].label.as_deref(), Some("a newer format"));
 }
 
@@ -238,6 +238,7 @@ proptest! {
             },
             trained: Trained { x_mm: [x_mm[0], x_mm[x_mm.len() - 1]], v_mm_s: delta_mm },
             x_mm, positive, negative,
+            mechanism: None,
         };
         let (back, findings) = parse("p.toml", &write(&r));
         prop_assert_eq!(&findings.faults, &[]);

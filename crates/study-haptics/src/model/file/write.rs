@@ -1,6 +1,6 @@
 //! The text of a model file.
 
-use super::{FORMAT, PARAMETERS};
+use super::{FORMAT, FORMAT_2, PARAMETERS, SCALAR_KEYS};
 use crate::model::{Branch, Realization};
 use std::fmt::Write as _;
 /// Numbers of a list per line.
@@ -10,15 +10,24 @@ const PER_LINE: usize = 6;
 pub fn write(realization: &Realization) -> String {
     let r = realization;
     let mut out = Text::default();
-    out.text("format", FORMAT);
-    out.text("id", &r.id);
-    out.text("lookup", r.lookup.as_str());
-    let rule = r.direction.as_str();
-    let direction = match r.direction.delta_mm() {
-        None => format!("{{ rule = \"{rule}\" }}"),
-        Some(delta_mm) => format!("{{ rule = \"{rule}\", delta_mm = {delta_mm:?} }}"),
-    };
-    out.raw("direction", &direction);
+    match &r.mechanism {
+        None => {
+            out.text("format", FORMAT);
+            out.text("id", &r.id);
+            out.text("lookup", r.lookup.as_str());
+            let rule = r.direction.as_str();
+            let direction = match r.direction.delta_mm() {
+                None => format!("{{ rule = \"{rule}\" }}"),
+                Some(delta_mm) => format!("{{ rule = \"{rule}\", delta_mm = {delta_mm:?} }}"),
+            };
+            out.raw("direction", &direction);
+        }
+        Some(_) => {
+            out.text("format", FORMAT_2);
+            out.text("kind", "mechanism");
+            out.text("id", &r.id);
+        }
+    }
     let [low, high] = r.trained.x_mm;
     out.raw(
         "trained",
@@ -27,7 +36,9 @@ pub fn write(realization: &Realization) -> String {
             r.trained.v_mm_s
         ),
     );
-    out.list("x_mm", &r.x_mm);
+    if r.mechanism.is_none() {
+        out.list("x_mm", &r.x_mm);
+    }
 
     let p = &r.provenance;
     out.table("provenance");
@@ -62,8 +73,30 @@ pub fn write(realization: &Realization) -> String {
             out.number(&key(name), *vaf);
         }
     }
-    out.branch("positive", &r.positive);
-    out.branch("negative", &r.negative);
+    match &r.mechanism {
+        None => {
+            out.branch("positive", &r.positive);
+            out.branch("negative", &r.negative);
+        }
+        Some(mechanism) => {
+            out.table("mechanism");
+            for (key, value) in SCALAR_KEYS.iter().zip(mechanism.scalars.to_array()) {
+                out.number(key, value);
+            }
+            if let Some(hz) = mechanism.recorded_hz {
+                out.number("recorded_hz", hz);
+            }
+            for (name, profile) in [
+                ("mechanism.detent", &mechanism.detent),
+                ("mechanism.friction", &mechanism.friction),
+            ] {
+                out.table(name);
+                out.number("first_mm", profile.first_mm);
+                out.number("step_mm", profile.step_mm);
+                out.list("n", &profile.n);
+            }
+        }
+    }
     out.0
 }
 
