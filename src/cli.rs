@@ -15,6 +15,7 @@ mod help;
 mod identify;
 mod new;
 mod participant;
+mod power;
 mod record;
 mod rehearse;
 mod run;
@@ -50,6 +51,8 @@ enum Command {
     Analyze(analyze::Args),
     /// Check a protocol and its models
     Check(check::Args),
+    /// How many participants, realizations and repetitions? Power of the planned design
+    Power(Box<power::Args>),
     /// Show the presentation orders and their balance
     Schedule(schedule::Args),
     /// Show the state of each participant and the next row
@@ -96,6 +99,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Rehearse(args) => rehearse::run(&args, console),
         Command::Analyze(args) => analyze::run(&args, console),
         Command::Check(args) => check::run(&args, console),
+        Command::Power(args) => power::run(&args, console),
         Command::Schedule(args) => schedule::run(&args, console),
         Command::Status(args) => status::run(&args, console),
         Command::Participant(args) => participant::run(&args, console),

@@ -14,6 +14,7 @@ pub mod identification;
 pub mod json;
 pub mod picture;
 pub mod plot;
+pub mod power;
 mod sentences;
 pub mod text;
 pub mod wide;

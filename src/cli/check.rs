@@ -3,10 +3,13 @@
 use super::{Console, Failure, load};
 use serde::Serialize;
 use std::path::PathBuf;
+use study_base::apa;
 use study_base::diagnostic::{Findings, Severity};
 use study_base::text::{ModelId, Untrusted, counted};
-use study_core::protocol::{DeviceKind, ModelEntry, check};
+use study_core::power;
+use study_core::protocol::{DeviceKind, ModelEntry, Protocol, check};
 use study_haptics::model::Realization;
+use study_stats::power::detectable_correlation;
 
 /// Arguments of `study check`.
 #[derive(Debug, clap::Args)]
@@ -34,6 +37,44 @@ struct Report<'a> {
     minutes: Option<f64>,
     fingerprints: Option<&'a study_core::protocol::fingerprint::Fingerprints>,
     certificates: Vec<Certified<'a>>,
+    /// Null without three realizations with a VAF.
+    sensitivity: Option<Sensitivity>,
+}
+
+/// What the number of realizations allows.
+#[derive(Debug, Serialize)]
+struct Sensitivity {
+    /// The smallest correlation of VAF with the true means that is found with 80 %, even
+    /// with endlessly many participants.
+    correlation: f64,
+    /// The smallest p of the permutation test.
+    smallest_p: Option<f64>,
+}
+
+impl Sensitivity {
+    fn of(protocol: &Protocol) -> Option<Self> {
+        let plan = power::Plan::of(protocol, &power::Overrides::default()).ok()?;
+        let (q, settings) = (plan.own.realizations, &plan.settings);
+        let floor = power::floor(&settings.vaf(q), settings.alpha);
+        Some(Self {
+            correlation: detectable_correlation(q, 0.8, settings.alpha)?,
+            smallest_p: floor.map(|f| f.smallest_p),
+        })
+    }
+
+    fn in_words(&self) -> String {
+        let floor = self.smallest_p.map_or(String::new(), |p| {
+            format!(
+                "; the smallest p of the permutation test is {}",
+                apa::bare_p(p)
+            )
+        });
+        format!(
+            "power: 80 % take a correlation of {} between VAF and the true means, however many the \
+             participants{floor}; see `study power`\n",
+            apa::r(self.correlation)
+        )
+    }
 }
 
 /// The certificate of one realization. A margin that is not finite is null.
@@ -86,6 +127,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             minutes,
             fingerprints: loaded.as_ref().map(|l| &l.fingerprints),
             certificates: loaded.as_ref().map(certified).unwrap_or_default(),
+            sensitivity: loaded.as_ref().and_then(|l| Sensitivity::of(&l.protocol)),
         };
         let document = serde_json::to_string_pretty(&report)
             .map_err(|e| Failure::new(super::Kind::Bug, format!("the report: {e}")))?;
@@ -110,6 +152,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     console.findings(&findings);
     console.out(certificates(&loaded, args.verbose))?;
+    if let Some(sensitivity) = Sensitivity::of(&loaded.protocol) {
+        console.out(sensitivity.in_words())?;
+    }
     console.out(format!(
         "{}: ok, {}, {}, about {minutes:.0} minutes, {}\n",
         loaded.protocol.study.id,

@@ -4,7 +4,7 @@
 //! It uses 60 to 100 columns. Colour only repeats what the text says. Everything from
 //! the data passes through [`Untrusted`].
 
-mod layout;
+pub(super) mod layout;
 mod trials;
 
 use super::answers::{answers, conditional};

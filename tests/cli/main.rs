@@ -1,6 +1,7 @@
 //! What the other commands say, above all of bad input.
 
 mod bad_input;
+mod power;
 mod protocol_check;
 mod protocol_docs;
 mod protocol_schema;

@@ -72,10 +72,15 @@ fn the_shipped_protocols_have_no_errors() {
     assert_eq!(code, 0, "{err}");
     let lines: Vec<&str> = out.lines().collect();
     // one line a realization, and the verdict last
-    assert_eq!(lines.len(), 5 + 1 + 1, "{out}");
+    assert_eq!(lines.len(), 5 + 1 + 1 + 1, "{out}");
     assert!(lines.contains(&"lambda-0.9995: FAIL"), "{out}");
     assert_eq!(
         lines[6],
+        "power: 80 % take a correlation of .885 between VAF and the true means, however many the \
+         participants; the smallest p of the permutation test is .008; see `study power`"
+    );
+    assert_eq!(
+        lines[7],
         "turn-signal: ok, 5 models, 15 trials, about 16 minutes, 1 warning"
     );
     let verbose = ["check", "protocols/turn-signal", "--verbose"];
@@ -144,6 +149,7 @@ fn a_sample_mounted_by_hand_has_no_certificate() {
         out.lines().collect::<Vec<_>>(),
         [
             "note: 5 samples are mounted by hand; `study device codes ./protocol.toml` lists what to write on them",
+            "power: 80 % take a correlation of .885 between VAF and the true means, however many the participants; the smallest p of the permutation test is .008; see `study power`",
             "turn-signal: ok, 5 models, 15 trials, about 23 minutes, 1 warning",
         ]
     );

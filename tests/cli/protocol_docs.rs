@@ -70,7 +70,10 @@ fn section(out: &mut String, key: &Key, path: &str, keys: &[Key]) {
                 table(out, &format!("`{path}`"), "", keys);
                 words(out, keys);
             }
-            Kind::WordOrTable(_, keys) => table(out, &format!("`{path}` as a table"), "", keys),
+            Kind::WordOrTable(_, keys) => {
+                table(out, &format!("`{path}` as a table"), "", keys);
+                words(out, keys);
+            }
             Kind::Variants(variants) => {
                 let _ = writeln!(out, "\n### `[[{path}]]`");
                 alternatives(out, variants);

@@ -72,6 +72,18 @@ fn the_schema_and_the_reader_know_the_same_keys() {
             "[design.order]".to_owned(),
         ),
         (
+            "/properties/power/properties/sd".to_owned(),
+            "[power.sd]".to_owned(),
+        ),
+        (
+            "/properties/power/properties/grid".to_owned(),
+            "[power.grid]".to_owned(),
+        ),
+        (
+            "/properties/power/properties/scale/oneOf/1".to_owned(),
+            "[power.scale]".to_owned(),
+        ),
+        (
             "/properties/device/properties/limits".to_owned(),
             "[device.limits]".to_owned(),
         ),
@@ -85,7 +97,7 @@ fn the_schema_and_the_reader_know_the_same_keys() {
         ),
     ];
     for section in [
-        "study", "text", "consent", "design", "session", "device", "trial", "analysis",
+        "study", "text", "consent", "design", "session", "device", "trial", "analysis", "power",
     ] {
         places.push((format!("/properties/{section}"), format!("[{section}]")));
     }

@@ -60,6 +60,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         setup: Vec::new(),
         intake: Vec::new(),
         outro: Vec::new(),
+        power: Default::default(),
         analysis: AnalysisRules {
             primary: QuestionId::new("realism").expect("an identifier"),
             vaf: None,

@@ -14,11 +14,15 @@ mod decide;
 mod draw;
 mod expected;
 mod pilot;
+mod plan;
 mod tally;
 
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
 pub use pilot::{Parameters, Pilot, PilotError};
+pub use plan::{Overrides, Plan, PlanError};
 pub use tally::{CellResult, Chunk, Tally, TestResult, merge, run_chunk};
+
+pub use crate::protocol::power::{PowerLink as Link, PowerTest as Test, PowerVaf as Vaf};
 
 use study_stats::power::covariate::Spread;
 
@@ -54,15 +58,6 @@ impl Cell {
     }
 }
 
-/// A distribution of what is below an ordered scale.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Link {
-    /// A normal residual.
-    Probit,
-    /// A standard logistic residual.
-    Logit,
-}
-
 /// How a number becomes a rating.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Scale {
@@ -79,17 +74,6 @@ pub enum Scale {
         /// Lowest rating.
         from: i64,
     },
-}
-
-/// Where the VAF of a simulated study come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Vaf {
-    /// Those of the protocol; for other numbers of realizations as [`Vaf::Spread`].
-    Listed,
-    /// Even steps over the range of the protocol's.
-    Spread,
-    /// Drawn from a normal distribution in each study.
-    Drawn,
 }
 
 /// What is assumed of the world.
@@ -111,47 +95,6 @@ pub struct Assumptions {
     pub dropout: f64,
     /// Share of trials without a rating.
     pub missing: f64,
-}
-
-/// A test whose power is simulated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Test {
-    /// The verdict of the analysis on VAF.
-    Verdict,
-    /// Pearson's r over realizations, t test.
-    Pearson,
-    /// The permutation test of Pearson's r: p ≤ α. (The verdict wants p < α.)
-    Permutation,
-    /// The slope of the crossed mixed model.
-    Crossed,
-    /// Friedman's test of the realizations, Iman and Davenport's F.
-    Friedman,
-    /// The slope of the crossed ordinal model, by its likelihood ratio.
-    Clmm,
-}
-
-impl Test {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Verdict,
-        Self::Pearson,
-        Self::Permutation,
-        Self::Crossed,
-        Self::Friedman,
-        Self::Clmm,
-    ];
-
-    /// Its name in protocols and `--json`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Verdict => "verdict",
-            Self::Pearson => "pearson",
-            Self::Permutation => "permutation",
-            Self::Crossed => "crossed",
-            Self::Friedman => "friedman",
-            Self::Clmm => "clmm",
-        }
-    }
 }
 
 /// What a simulation needs besides its cells.
@@ -180,6 +123,7 @@ impl Settings {
         match self.assumptions.vaf {
             Vaf::Drawn => Vec::new(),
             Vaf::Listed if realizations == self.listed.len() => self.listed.clone(),
+            // As many as are not listed are spread alike.
             Vaf::Listed | Vaf::Spread => {
                 let ends = |f: fn(f64, f64) -> f64| self.listed.iter().copied().reduce(f);
                 let (low, high) = match (ends(f64::min), ends(f64::max)) {

@@ -17,6 +17,7 @@ pub mod fingerprint;
 pub mod keys;
 pub mod phrases;
 pub mod plan;
+pub mod power;
 pub mod question;
 pub mod schema;
 
@@ -62,6 +63,9 @@ pub struct Protocol {
     pub outro: Vec<Question>,
     /// `[analysis]`
     pub analysis: AnalysisRules,
+    /// `[power]`; in no fingerprint.
+    #[serde(skip)]
+    pub power: power::PowerPlan,
 }
 
 /// `[study]`: identity and provenance of the study.

@@ -7,18 +7,18 @@ use unicode_width::UnicodeWidthStr as _;
 
 /// Terminal styles, if enabled.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Paint(pub(super) bool);
+pub(in crate::report) struct Paint(pub(in crate::report) bool);
 
 impl Paint {
-    pub(super) fn strong(self, text: &str) -> String {
+    pub(in crate::report) fn strong(self, text: &str) -> String {
         self.style("1", text)
     }
 
-    pub(super) fn dim(self, text: &str) -> String {
+    pub(in crate::report) fn dim(self, text: &str) -> String {
         self.style("2", text)
     }
 
-    pub(super) fn warn(self, text: &str) -> String {
+    pub(in crate::report) fn warn(self, text: &str) -> String {
         self.style("33", text)
     }
 
@@ -40,13 +40,13 @@ impl Paint {
 }
 
 /// Text padded with spaces to some columns.
-pub(super) fn pad(text: &str, width: usize) -> String {
+pub(in crate::report) fn pad(text: &str, width: usize) -> String {
     format!("{text}{}", " ".repeat(width.saturating_sub(text.width())))
 }
 
 /// Wraps text between words, and inside words longer than a line; each line ends with a
 /// line feed.
-pub(super) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String {
+pub(in crate::report) fn wrap(text: &str, width: usize, first: &str, rest: &str) -> String {
     let mut out = String::new();
     let mut line = first.to_owned();
     let mut empty = true;

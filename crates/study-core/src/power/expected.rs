@@ -169,6 +169,7 @@ pub fn smallest(
                     (r.cell.realizations, r.cell.repetitions) == (realizations, repetitions)
                         && r.cell.participants.abs_diff(participants) <= 1
                 };
+                // Without simulation the closed form decides.
                 let mut near: Vec<&CellResult> = results.iter().filter(own).collect();
                 near.sort_by_key(|r| r.cell.participants);
                 let enough = |r: &&CellResult| r.tests.first().is_some_and(|t| t.power >= target);
@@ -179,6 +180,7 @@ pub fn smallest(
                         power: test.power,
                         sure: test.interval.0 >= target,
                     },
+                    None if results.is_empty() => reach,
                     None => Reach::MoreThan(participants + 1),
                 };
             }

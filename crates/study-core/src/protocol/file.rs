@@ -15,6 +15,7 @@ mod device;
 mod general;
 mod models;
 mod orders;
+mod power;
 mod questions;
 mod section;
 
@@ -62,6 +63,9 @@ pub const ROOT: &[Key] = keys! {
     "outro": Kind::Variants(&questions::QUESTIONS), "";
     /// Decisions that were made before the data.
     "analysis": Kind::Table(analysis::ANALYSIS), "", required;
+    /// What is assumed before the data, for `study power`. It changes no session and no
+    /// result.
+    "power": Kind::Table(power::POWER), "";
 };
 
 /// Largest protocol file that is read, bytes.
@@ -191,6 +195,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let intake = questions::read(&mut root, "intake");
     let outro = questions::read(&mut root, "outro");
     let analysis = root.section("analysis").and_then(analysis::read);
+    let power = root.section("power").and_then(power::read);
 
     let mut sections = Sections {
         design: design.as_ref(),
@@ -231,6 +236,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         design: design?,
         device: device?,
         analysis: analysis?,
+        power: power?,
     })
 }
 

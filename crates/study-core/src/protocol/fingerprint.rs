@@ -6,7 +6,7 @@
 //! Each is the SHA-256 of a canonical JSON text: no white space, keys sorted,
 //! numbers as serde_json writes them (the shortest text that reads back the same).
 //! Every field of a [`Protocol`] is in exactly one of the three, except the paths of
-//! files, because moving a file does not change the stimulus.
+//! files, because moving a file does not change the stimulus, and `[power]`.
 //!
 //! * stimulus: study id and seed; the design without the planned number of
 //!   participants (more of them change no order); device kind, limits,
@@ -81,6 +81,8 @@ pub fn parts(
         intake,
         outro,
         analysis,
+        // It changes no session and no result.
+        power: _,
     } = protocol;
     let super::Study {
         id,

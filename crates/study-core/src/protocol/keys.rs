@@ -56,6 +56,8 @@ pub enum Kind {
     Whole(i64, i64),
     /// A finite number in a range, and its unit, which may be empty.
     Number(NumberRange, &'static str),
+    /// A list of whole numbers, each at least and at most so large.
+    WholeList(i64, i64),
     /// `true` or `false`.
     Flag,
     /// One of a list of words.
@@ -188,6 +190,9 @@ impl Kind {
                 (_, Bound::Included(high)) => format!("a finite number, at most {high}"),
                 _ => "a finite number".to_owned(),
             },
+            Self::WholeList(least, most) => {
+                format!("a list of whole numbers from {least} to {most}")
+            }
             Self::Flag => "`true` or `false`".to_owned(),
             Self::Word(words) => one_of(words),
             Self::WordOrTable(words, keys) => {

@@ -65,6 +65,7 @@ fn of(kind: Kind) -> Value {
         }
         Kind::Whole(least, most) => whole(least, most),
         Kind::Number(range, _) => number(range),
+        Kind::WholeList(least, most) => json!({ "type": "array", "items": whole(least, most) }),
         Kind::Flag => json!({ "type": "boolean" }),
         Kind::Word(words) => one_of(words),
         Kind::WordOrTable(words, keys) => json!({ "oneOf": [one_of(words), object(keys)] }),

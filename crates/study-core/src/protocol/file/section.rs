@@ -185,6 +185,24 @@ impl<'d, 't> Section<'d, 't> {
         number.or_else(|| self.default(name)?.parse().ok())
     }
 
+    /// A list of whole numbers in the range of its key.
+    pub(super) fn wholes(&mut self, name: &str) -> Vec<u32> {
+        let values = self.value(name).and_then(|value| value.array());
+        let Kind::WholeList(least, most) = self.key(name).kind else {
+            panic!("`{name}` is not declared as a list of whole numbers");
+        };
+        let in_range = |value: &Value<'_, '_>| {
+            let number = value.i64()?;
+            if (least..=most).contains(&number) {
+                u32::try_from(number).ok()
+            } else {
+                let expected = format!("from {least} to {most}");
+                out_of_range(value, &expected, number)
+            }
+        };
+        values.iter().flatten().filter_map(in_range).collect()
+    }
+
     /// A finite number above 0.
     pub(super) fn limit(&mut self, name: &str) -> Option<Limit> {
         Limit::new(self.number(name)?).ok()

@@ -147,9 +147,9 @@ fn tables(path: Path, keys: &'static [Key], cases: &mut Vec<Case>) {
     let mut document = least();
     let parent = path[..path.len() - 1].to_vec();
     let name = path[path.len() - 1];
-    if path.len() == 1 {
-        document.entry(name).or_insert_with(|| Table::new().into());
-    }
+    document
+        .entry(path[0])
+        .or_insert_with(|| Table::new().into());
     table_at(&mut document, &parent).insert(name.to_owned(), with_examples(keys).into());
     cases.push(Case {
         document,
@@ -334,6 +334,7 @@ fn bad_values(kind: Kind) -> Vec<Value> {
             });
             bad
         }
+        Kind::WholeList(..) => parsed(&["1", "[\"1\"]", "[1.5]", "[-1]"]),
         Kind::Flag => parsed(&["1", "\"true\""]),
         Kind::Word(_) => parsed(&["1", "\"zzzzzzzz\"", "\"\""]),
         Kind::WordOrTable(..) => parsed(&["1", "\"zzzzzzzz\"", "{}"]),

@@ -1,0 +1,324 @@
+//! From a protocol to settings: defaults, then `[power]`, then a pilot, then flags.
+
+use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
+use crate::analyze::ALPHA;
+use crate::protocol::power::{PowerLink, PowerPlan, PowerScale};
+use crate::protocol::{Protocol, QuestionKind, Role};
+use study_stats::power::covariate::Spread;
+use thiserror::Error;
+
+/// Assumed where nobody says otherwise.
+const SLOPE: f64 = 0.5;
+const SPREAD: Spread = Spread {
+    subject: 0.6,
+    realization: 0.3,
+    interaction: 0.4,
+    residual: 0.8,
+    slope: 0.0,
+};
+const STUDIES: u64 = 10_000;
+const TARGETS: [f64; 2] = [0.8, 0.9];
+
+/// Why a protocol has no plan.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum PlanError {
+    /// Too few realizations with a VAF.
+    #[error("{0} tested realizations have a VAF, but a correlation over them takes three")]
+    FewRealizations(usize),
+    /// Both ways to state the effect.
+    #[error("the slope and rho state the same effect: give one of them")]
+    SlopeAndRho,
+    /// A correlation without scatter.
+    #[error("rho needs scatter of the realizations: sd.realization is 0")]
+    RhoWithoutScatter,
+    /// Listed VAF for another number of realizations.
+    #[error(
+        "vaf = \"listed\" allows only the {0} listed realizations; use \"spread\" or \"drawn\""
+    )]
+    Listed(usize),
+    /// A residual for the link `logit`.
+    #[error("the link `logit` has its own residual: leave sd.residual out")]
+    LogitResidual,
+    /// Thresholds of another scale.
+    #[error(
+        "{0} thresholds are given, but the primary question has {1} levels: one fewer is needed"
+    )]
+    Thresholds(usize, i64),
+    /// An ordered scale for a question without levels.
+    #[error("the primary question is no rating: only scale = \"continuous\" is possible")]
+    NoLevels,
+    /// A pilot for latent logits.
+    #[error("the estimates of a pilot are rating points, not logits: use another scale")]
+    PilotLogit,
+}
+
+/// What flags state; later than `[power]`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Overrides {
+    /// As in `[power]`.
+    pub plan: PowerPlan,
+    /// Seed of all numbers; without it that of the study.
+    pub seed: Option<u64>,
+    /// Level of significance; without it that of the analysis.
+    pub pilot: Option<Pilot>,
+}
+
+/// What to simulate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// How.
+    pub settings: Settings,
+    /// The protocol's own design.
+    pub own: Cell,
+    /// The designs that are compared.
+    pub grid: Vec<Cell>,
+    /// Power that is wanted.
+    pub targets: Vec<f64>,
+    /// What nobody stated, and so has a default; `key = value`.
+    pub defaults: Vec<String>,
+    /// Exclusion rules of the protocol, which are not simulated.
+    pub exclusions: usize,
+}
+
+impl Plan {
+    /// The plan of a protocol (with VAF filled in) and flags.
+    ///
+    /// # Errors
+    /// If the two contradict each other, or too few realizations have a VAF.
+    pub fn of(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
+        let (base, over) = (&protocol.power, &flags.plan);
+        let mut defaults = Vec::new();
+        let mut stated = |key: &str, value: Option<f64>, default: f64| {
+            value.unwrap_or_else(|| {
+                defaults.push(format!("{key} = {default}"));
+                default
+            })
+        };
+        let listed: Vec<f64> = (protocol.models.iter())
+            .filter(|m| m.role == Role::Test && m.duplicate_of.is_none())
+            .filter_map(|m| m.vaf)
+            .collect();
+        if listed.len() < 3 {
+            return Err(PlanError::FewRealizations(listed.len()));
+        }
+        let scale = scale(protocol, over.scale.as_ref().or(base.scale.as_ref()))?;
+        let logit = matches!(
+            scale,
+            Scale::Ordinal {
+                link: PowerLink::Logit,
+                ..
+            }
+        );
+        let pilot = flags.pilot.as_ref();
+        if logit && pilot.is_some() {
+            return Err(PlanError::PilotLogit);
+        }
+        let of_pilot = |f: fn(&Spread) -> f64| pilot.map(|p| f(&p.estimate.spread));
+        let sd = |own: fn(&PowerPlan) -> Option<f64>, pilot: Option<f64>| {
+            own(over).or(pilot).or(own(base))
+        };
+        let residual = sd(|p| p.sd.residual, of_pilot(|s| s.residual));
+        if logit && residual.is_some() {
+            return Err(PlanError::LogitResidual);
+        }
+        let spread = Spread {
+            subject: stated(
+                "sd.participant",
+                sd(|p| p.sd.participant, of_pilot(|s| s.subject)),
+                SPREAD.subject,
+            ),
+            realization: stated(
+                "sd.realization",
+                sd(|p| p.sd.realization, of_pilot(|s| s.realization)),
+                SPREAD.realization,
+            ),
+            interaction: stated(
+                "sd.interaction",
+                sd(|p| p.sd.interaction, of_pilot(|s| s.interaction)),
+                SPREAD.interaction,
+            ),
+            residual: if logit {
+                0.0
+            } else {
+                stated("sd.residual", residual, SPREAD.residual)
+            },
+            slope: stated("sd.slope", sd(|p| p.sd.slope, None), SPREAD.slope),
+        };
+        let effect = |plan: &PowerPlan| {
+            (plan.slope.is_some() || plan.rho.is_some()).then_some((plan.slope, plan.rho))
+        };
+        let of_pilot = pilot.map(|p| (Some(p.estimate.slope), None));
+        let slope = match effect(over).or(of_pilot).or_else(|| effect(base)) {
+            Some((Some(_), Some(_))) => return Err(PlanError::SlopeAndRho),
+            Some((None, Some(_))) if spread.realization == 0.0 => {
+                return Err(PlanError::RhoWithoutScatter);
+            }
+            Some((None, Some(rho))) => spread.realization * rho / (1.0 - rho * rho).sqrt(),
+            Some((slope, _)) => slope.unwrap_or(SLOPE),
+            None => stated("slope", None, SLOPE),
+        };
+        let middle = match &scale {
+            Scale::Ordinal { thresholds, .. } => {
+                thresholds.iter().sum::<f64>() / thresholds.len().max(1) as f64
+            }
+            _ => ends(protocol).map_or(0.0, |(low, high)| f64::midpoint(low, high)),
+        };
+        let mean = over.mean.or(pilot.map(|p| p.estimate.mean)).or(base.mean);
+        let mean = stated("mean", mean, middle);
+        let own = Cell {
+            realizations: listed.len(),
+            repetitions: protocol.design.repetitions as usize,
+            participants: protocol.design.participants as usize,
+        };
+        let numbers = |of: fn(&PowerPlan) -> &Vec<u32>, default: Vec<usize>| -> Vec<usize> {
+            let given = [of(over), of(base)]
+                .into_iter()
+                .find(|list| !list.is_empty());
+            let mut list = given.map_or(default, |list| list.iter().map(|n| *n as usize).collect());
+            list.sort_unstable();
+            list.dedup();
+            list
+        };
+        let n = own.participants.max(2);
+        let vaf = over.vaf.or(base.vaf);
+        let more: Vec<usize> = match vaf {
+            Some(Vaf::Listed) => vec![own.realizations],
+            _ => [own.realizations, 8, 12]
+                .into_iter()
+                .filter(|q| *q >= own.realizations)
+                .collect(),
+        };
+        let participants = numbers(|p| &p.participants, vec![n, 2 * n, 4 * n]);
+        let realizations = numbers(|p| &p.realizations, more);
+        let repetitions = numbers(|p| &p.repetitions, vec![1, own.repetitions.max(1)]);
+        if vaf == Some(Vaf::Listed) && realizations != [own.realizations] {
+            return Err(PlanError::Listed(own.realizations));
+        }
+        let mut grid = Vec::new();
+        for &realizations in &realizations {
+            for &repetitions in &repetitions {
+                grid.extend(participants.iter().map(|&participants| Cell {
+                    realizations,
+                    repetitions,
+                    participants,
+                }));
+            }
+        }
+        let list = |of: fn(&PowerPlan) -> &Vec<Test>| {
+            let given = [of(over), of(base)]
+                .into_iter()
+                .find(|list| !list.is_empty());
+            let mut tests = given.cloned().unwrap_or_else(|| vec![Test::Verdict]);
+            let all = tests.clone();
+            let mut at = 0;
+            tests.retain(|test| {
+                at += 1;
+                !all[..at - 1].contains(test)
+            });
+            tests
+        };
+        let targets = [&over.targets, &base.targets]
+            .into_iter()
+            .find(|t| !t.is_empty());
+        let mut targets = targets.map_or(TARGETS.to_vec(), Clone::clone);
+        targets.sort_by(f64::total_cmp);
+        targets.dedup();
+        Ok(Self {
+            settings: Settings {
+                assumptions: Assumptions {
+                    slope,
+                    smallest: over.smallest.or(base.smallest),
+                    mean,
+                    spread,
+                    scale,
+                    vaf: vaf.unwrap_or(Vaf::Listed),
+                    dropout: over.dropout.or(base.dropout).unwrap_or(0.0),
+                    missing: over.missing.or(base.missing).unwrap_or(0.0),
+                },
+                pilot: flags.pilot.clone(),
+                listed,
+                tests: list(|p| &p.tests),
+                alpha: protocol.analysis.alpha.unwrap_or(ALPHA),
+                seed: flags.seed.unwrap_or(protocol.study.seed),
+                studies: over.studies.or(base.studies).unwrap_or(STUDIES),
+            },
+            own,
+            grid,
+            targets,
+            defaults,
+            exclusions: protocol.analysis.exclude.len(),
+        })
+    }
+
+    /// A digest of everything that the numbers depend on, SHA-256 in hexadecimal.
+    pub fn digest(&self, version: &str) -> String {
+        use sha2::{Digest as _, Sha256};
+        // Numbers are printed as the shortest text that reads back the same.
+        let text = format!("{version} {:?} {:?}", self.settings, self.cells());
+        let digest = Sha256::digest(text.as_bytes());
+        digest.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Realizations and repetitions of the grid.
+    pub fn shapes(&self) -> Vec<(usize, usize)> {
+        let mut shapes: Vec<(usize, usize)> = (self.grid.iter())
+            .map(|c| (c.realizations, c.repetitions))
+            .collect();
+        shapes.dedup();
+        shapes
+    }
+
+    /// The largest number of participants that is considered for the smallest designs.
+    pub fn most_participants(&self) -> usize {
+        let most = self.grid.iter().map(|c| c.participants).max();
+        (5 * most.unwrap_or(0)).max(200)
+    }
+
+    /// All cells to simulate, sorted: the grid, the protocol's own design, and the
+    /// candidates for the smallest designs.
+    pub fn cells(&self) -> Vec<Cell> {
+        let mut cells = self.grid.clone();
+        cells.push(self.own);
+        let most = self.most_participants();
+        cells.extend(super::candidates(
+            &self.settings,
+            &self.shapes(),
+            &self.targets,
+            most,
+        ));
+        cells.sort_unstable();
+        cells.dedup();
+        cells
+    }
+}
+
+/// Lowest and highest answer of the primary question.
+fn ends(protocol: &Protocol) -> Option<(f64, f64)> {
+    match &protocol.primary()?.kind {
+        QuestionKind::Rating { from, to, .. } => Some((*from as f64, *to as f64)),
+        QuestionKind::Slider { from, to, .. } => Some((*from, *to)),
+        _ => None,
+    }
+}
+
+fn scale(protocol: &Protocol, given: Option<&PowerScale>) -> Result<Scale, PlanError> {
+    let levels = match protocol.primary().map(|q| &q.kind) {
+        Some(QuestionKind::Rating { from, to, .. }) => Some((*from, *to)),
+        _ => None,
+    };
+    match (given, levels) {
+        (None | Some(PowerScale::Rounded), Some((from, to))) => Ok(Scale::Rounded(from, to)),
+        (None | Some(PowerScale::Continuous), _) => Ok(Scale::Continuous),
+        (Some(PowerScale::Ordinal { link, thresholds }), Some((from, to))) => {
+            if thresholds.len() as i64 != to - from {
+                return Err(PlanError::Thresholds(thresholds.len(), to - from + 1));
+            }
+            Ok(Scale::Ordinal {
+                link: *link,
+                thresholds: thresholds.clone(),
+                from,
+            })
+        }
+        (Some(_), None) => Err(PlanError::NoLevels),
+    }
+}

@@ -1,0 +1,144 @@
+//! `[power]`: assumptions for `study power`.
+
+use super::section::Section;
+use crate::protocol::keys::{Key, Kind, Word, Words, keys};
+use crate::protocol::power::{PowerLink, PowerPlan, PowerScale, PowerSpread, PowerTest, PowerVaf};
+use std::ops::Bound;
+use study_base::diagnostic::Fault;
+
+const SHARE: Kind = Kind::Number((Bound::Included(0.0), Bound::Excluded(1.0)), "");
+
+pub(super) const POWER: &[Key] = keys! {
+    /// How many studies are simulated for each design.
+    "studies": Kind::Whole(100, 10_000_000), "40000", default("10000");
+    /// The power that is wanted.
+    "targets": Kind::NumberList, "[0.8, 0.9]";
+    /// The tests whose power is simulated: `verdict`, `pearson`, `permutation`, `crossed`,
+    /// `friedman`, `clmm`. The first one decides about designs. Without it: the verdict of
+    /// the analysis.
+    "tests": Kind::Texts(1), r#"["verdict", "crossed"]"#;
+    /// Rating points per standard deviation of VAF (with the number of realizations as the
+    /// denominator).
+    "slope": Kind::ANY_NUMBER, "0.5";
+    /// Instead of `slope`: the correlation of VAF with the means that endlessly many
+    /// participants would give.
+    "rho": Kind::Number((Bound::Excluded(-1.0), Bound::Excluded(1.0)), ""), "0.86";
+    /// The smallest slope of interest: how wrong would a significant estimate of it be?
+    "smallest": Kind::positive("points"), "0.3";
+    /// The mean rating, before it is cut to the scale. Without it: the middle of the scale.
+    "mean": Kind::ANY_NUMBER, "4.5";
+    /// Standard deviations of the random effects, in rating points.
+    "sd": Kind::Table(SD), "{ realization = 0.3, residual = 0.8 }";
+    /// How a number becomes a rating. Without it: rounded for a rating, else continuous.
+    "scale": Kind::WordOrTable(SCALES, ORDINAL), r#""continuous""#;
+    /// Where VAF come from. Without it: those listed for as many realizations, else even
+    /// steps over their range.
+    "vaf": Kind::Word(PowerVaf::WORDS), r#""drawn""#;
+    /// The share of participants who are lost whole.
+    "dropout": SHARE, "0.1";
+    /// The share of trials without a rating.
+    "missing": SHARE, "0.02";
+    /// The designs that are compared.
+    "grid": Kind::Table(GRID), "{ participants = [10, 20, 40] }";
+};
+
+const SD: &[Key] = keys! {
+    /// Levels of the participants. No test of VAF depends on it.
+    "participant": Kind::not_negative("points"), "0.6";
+    /// True means of the realizations about the line: what more participants cannot
+    /// average away.
+    "realization": Kind::not_negative("points"), "0.3";
+    /// Participant × realization.
+    "interaction": Kind::not_negative("points"), "0.4";
+    /// Repetition to repetition. Not with the link `logit`, which has its own.
+    "residual": Kind::not_negative("points"), "0.8";
+    /// Slopes of the participants.
+    "slope": Kind::not_negative("points"), "0.2";
+};
+
+const SCALES: &[Word] = &[
+    Word::new("continuous", "The number is the rating."),
+    Word::new(
+        "rounded",
+        "It is rounded to the scale of the primary question.",
+    ),
+];
+
+const ORDINAL: &[Key] = keys! {
+    /// The distribution of the residual, which sets the unit of all standard deviations.
+    "link": Kind::Word(PowerLink::WORDS), r#""logit""#, required;
+    /// The rating is the lowest one plus the number of thresholds below the number: one
+    /// fewer than levels, rising.
+    "thresholds": Kind::NumberList, "[-2, -1, 0, 1]", required;
+};
+
+const GRID: &[Key] = keys! {
+    /// Numbers of participants.
+    "participants": Kind::WholeList(2, 10_000), "[10, 20, 40]";
+    /// Numbers of realizations.
+    "realizations": Kind::WholeList(3, 200), "[5, 8, 12]";
+    /// Numbers of repetitions.
+    "repetitions": Kind::WholeList(1, 100), "[1, 3]";
+};
+
+pub(super) fn read(mut section: Section<'_, '_>) -> Option<PowerPlan> {
+    let tests = (section.texts("tests").into_iter())
+        .filter_map(|(value, _)| value.word(PowerTest::VALUES))
+        .collect();
+    let targets = section.numbers("targets").unwrap_or_default();
+    if targets.iter().any(|power| *power <= 0.0 || *power >= 1.0) {
+        section.fault_at(
+            "targets",
+            Fault::error("a power that is wanted has to be between 0 and 1"),
+        );
+    }
+    let mut plan = PowerPlan {
+        studies: section.whole("studies"),
+        targets,
+        tests,
+        slope: section.number("slope"),
+        rho: section.number("rho"),
+        smallest: section.number("smallest"),
+        mean: section.number("mean"),
+        scale: scale(&mut section),
+        vaf: section.word("vaf"),
+        dropout: section.number("dropout"),
+        missing: section.number("missing"),
+        ..PowerPlan::default()
+    };
+    if let Some(mut sd) = section.section("sd") {
+        plan.sd = PowerSpread {
+            participant: sd.number("participant"),
+            realization: sd.number("realization"),
+            interaction: sd.number("interaction"),
+            residual: sd.number("residual"),
+            slope: sd.number("slope"),
+        };
+    }
+    if let Some(mut grid) = section.section("grid") {
+        plan.participants = grid.wholes("participants");
+        plan.realizations = grid.wholes("realizations");
+        plan.repetitions = grid.wholes("repetitions");
+    }
+    Some(plan)
+}
+
+fn scale(section: &mut Section<'_, '_>) -> Option<PowerScale> {
+    let value = section.value("scale")?;
+    if !value.is_table() {
+        return value.word(&[
+            ("continuous", PowerScale::Continuous),
+            ("rounded", PowerScale::Rounded),
+        ]);
+    }
+    let mut table = section.section("scale")?;
+    let (link, thresholds) = (table.word("link"), table.numbers("thresholds"));
+    let thresholds = thresholds.unwrap_or_default();
+    if !thresholds.is_sorted_by(|a, b| a < b) {
+        table.fault_at("thresholds", Fault::error("the thresholds do not rise"));
+    }
+    Some(PowerScale::Ordinal {
+        link: link?,
+        thresholds,
+    })
+}

@@ -1,0 +1,201 @@
+//! `study power`: how many participants, realizations and repetitions?
+
+mod assume;
+mod shards;
+mod slurm;
+
+use super::{Console, Failure, load};
+use crate::report::picture::png::Painter;
+use crate::report::power::{Report, document, figure, head, results};
+use crate::report::text::Page;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use study_base::text::Untrusted;
+use study_core::power::{Cell, CellResult, Chunk, Plan, merge, run_chunk};
+
+/// Arguments of `study power`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Each rating is mean + participant + (slope + own slope) · VAF + realization + interaction + residual; \
+                        docs/power.md explains the numbers."
+)]
+pub(super) struct Args {
+    /// A protocol.toml or the folder that contains it
+    #[arg(required_unless_present = "merge")]
+    protocol: Option<PathBuf>,
+    #[command(flatten)]
+    assume: assume::Assume,
+    /// Only the closed forms, at once
+    #[arg(long, conflicts_with_all = ["shards", "merge", "slurm"])]
+    closed: bool,
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+    /// Folder for power.json and figures, or for the files of --shard
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Threads; they change no number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Divide the work into this many parts, of which --shard is done
+    #[arg(long, value_name = "N", requires = "shard", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    shards: Option<u64>,
+    /// The part to do, from 0; --out has its file
+    #[arg(long, value_name = "I", requires = "shards", requires = "out")]
+    shard: Option<u64>,
+    /// Merge the parts in a folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["shards", "slurm"])]
+    merge: Option<PathBuf>,
+    /// Merge although parts are missing
+    #[arg(long, requires = "merge")]
+    partial: bool,
+    /// Write scripts for a Slurm cluster into a folder; nothing is submitted
+    #[arg(long, value_name = "DIR", conflicts_with = "shard")]
+    slurm: Option<PathBuf>,
+    /// Tasks of the Slurm array (default: one for each unit of work, at most 1000)
+    #[arg(long, value_name = "N", requires = "slurm", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    tasks: Option<u64>,
+}
+
+/// A cell and one of its chunks.
+type Unit = (Cell, u64);
+
+/// All units of work, in order.
+fn units(plan: &Plan) -> Vec<Unit> {
+    let chunks = plan.settings.chunks();
+    let cells = plan.cells().into_iter();
+    cells
+        .flat_map(|cell| (0..chunks).map(move |chunk| (cell, chunk)))
+        .collect()
+}
+
+/// Runs units on all threads, with a progress bar; the results are in their order.
+fn simulate(plan: &Plan, units: &[Unit], threads: Option<u16>) -> Result<Vec<Chunk>, Failure> {
+    let bar = super::console::progress(units.len() as u64, "thousand studies");
+    let work = || {
+        (units.par_iter().with_max_len(1))
+            .map(|(cell, chunk)| {
+                let found = run_chunk(&plan.settings, cell, *chunk);
+                bar.inc(1);
+                found
+            })
+            .collect()
+    };
+    let found = match threads {
+        None => work(),
+        Some(threads) => rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build()
+            .map_err(Failure::input)?
+            .install(work),
+    };
+    bar.finish_and_clear();
+    Ok(found)
+}
+
+/// The results of the cells whose chunks are there.
+fn merged(plan: &Plan, units: &[Unit], chunks: &[Option<Chunk>]) -> Vec<CellResult> {
+    let mut found = Vec::new();
+    let mut start = 0;
+    for same in units.chunk_by(|a, b| a.0 == b.0) {
+        let own = chunks[start..start + same.len()].iter().flatten();
+        found.extend(merge(&plan.settings, same[0].0, own));
+        start += same.len();
+    }
+    found
+}
+
+/// Runs `study power`.
+pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
+    let Some(path) = &args.protocol else {
+        let Some(dir) = &args.merge else {
+            return Err(Failure::usage("name a protocol"));
+        };
+        let again = shards::arguments(dir, args)?;
+        return run(&again, console);
+    };
+    let loaded = load::load(path)?;
+    let plan = assume::plan(&loaded.protocol, &args.assume, console)?;
+    let page = Page {
+        width: console.width,
+        colour: console.colour,
+    };
+    let mut report = Report {
+        title: loaded.protocol.study.title.clone(),
+        study: loaded.protocol.study.id.clone(),
+        plan,
+        results: Vec::new(),
+        missing_units: 0,
+    };
+    let units = units(&report.plan);
+    if let (Some(of), Some(shard), Some(out)) = (args.shards, args.shard, &args.out) {
+        return shards::run(
+            &report.plan,
+            &units,
+            (shard, of),
+            out,
+            args.threads,
+            console,
+        );
+    }
+    if let Some(dir) = &args.slurm {
+        return slurm::write(&report.plan, &units, dir, args.tasks, console);
+    }
+    if !args.json {
+        console.out(head(&report, page))?;
+    }
+    if let Some(dir) = &args.merge {
+        let chunks = shards::read(&report.plan, &units, dir, args.partial)?;
+        report.missing_units = chunks.iter().filter(|c| c.is_none()).count();
+        report.results = merged(&report.plan, &units, &chunks);
+    } else if !args.closed {
+        let chunks = simulate(&report.plan, &units, args.threads)?;
+        let chunks: Vec<Option<Chunk>> = chunks.into_iter().map(Some).collect();
+        report.results = merged(&report.plan, &units, &chunks);
+    }
+    if let Some(out) = &args.out {
+        write(out, &report)?;
+    }
+    if args.json {
+        return console.json(&document(&report));
+    }
+    console.out(results(&report, page))
+}
+
+/// Writes the document and the figure.
+fn write(out: &Path, report: &Report) -> Result<(), Failure> {
+    let made = std::fs::create_dir_all(out);
+    made.map_err(|e| Failure::file(out, &e))?;
+    let text = study_base::text::escaped_json(&format!("{:#}\n", document(report))).to_string();
+    let mut files = vec![("power.json", text.into_bytes())];
+    if let Some(figure) = figure(report) {
+        let picture = figure.picture();
+        let png = Painter::default().png(&picture);
+        files.push(("power.svg", picture.to_svg().into_bytes()));
+        files.push(("power.pdf", picture.to_pdf()));
+        files.push((
+            "power.png",
+            png.map_err(|e| Failure::new(super::Kind::Bug, e))?,
+        ));
+    }
+    for (name, content) in files {
+        replace(&out.join(name), &content)?;
+    }
+    Ok(())
+}
+
+/// Writes a file under another name first.
+fn replace(path: &Path, content: &[u8]) -> Result<(), Failure> {
+    let part = path.with_extension(format!("{}.part", std::process::id()));
+    let written = std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path));
+    written.map_err(|e| {
+        // The first error is the one to report.
+        let _ = std::fs::remove_file(&part);
+        Failure::file(path, &e)
+    })
+}
+
+/// A path for messages.
+fn shown(path: &Path) -> String {
+    Untrusted(&path.display().to_string()).to_string()
+}
