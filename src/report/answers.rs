@@ -77,7 +77,21 @@ fn differ(a: &Analysis) -> Option<Answer> {
     });
     let friedman = sentences::friedman(a).map(|s| format!("{s}."));
     answer.main.extend(friedman);
+    answer.more.extend(residuals(a));
     Some(answer)
+}
+
+/// The shape of what the analysis of variance leaves unexplained.
+fn residuals(a: &Analysis) -> Option<String> {
+    let get = |id: &str| a.values.number(&format!("residuals/{id}"));
+    let (skewness, kurtosis) = (get("skewness")?, get("excess_kurtosis")?);
+    Some(format!(
+        "Residuals of the cell means: skewness {}, excess kurtosis {} (0 if normally distributed); the \
+         largest is {} standard deviations.",
+        apa::two(skewness),
+        apa::two(kurtosis),
+        apa::two(get("largest")?)
+    ))
 }
 
 /// Whether participants differ in how they rate the realizations.
@@ -94,6 +108,19 @@ fn disagreement(a: &Analysis) -> Option<Answer> {
         answer.main.push(format!(
             "Participants × realizations are {} of the variance.",
             apa::percent(share.value)
+        ));
+    }
+    let get = |id: &str| a.values.number(&format!("slope_variance/{id}"));
+    if let (Some(sd), Some(slope), Some(chi2), Some(p)) =
+        (get("sd"), get("slope"), get("chi2"), get("p"))
+    {
+        answer.more.push(format!(
+            "The slopes of the participants on VAF have the mean {} and the standard deviation {} per .01 \
+             of VAF (mixed model with random slopes and realizations; of the variance, χ² = {}, p {}).",
+            apa::two(slope / 100.0),
+            apa::two(sd / 100.0),
+            apa::two(chi2),
+            apa::p(p)
         ));
     }
     Some(answer)

@@ -41,6 +41,10 @@ pub struct Details {
     pub order: Option<String>,
     /// Number of participants by state.
     pub states: Vec<(String, usize)>,
+    /// Sentences on the sample from the intake questions, for the methods.
+    pub sample: Vec<String>,
+    /// The ethics approval.
+    pub ethics: Option<String>,
     /// Sentences on the conduct of the sessions, for the methods.
     pub conduct: Vec<String>,
     /// Instruction shown before each trial.

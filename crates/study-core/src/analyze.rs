@@ -11,6 +11,7 @@
 
 mod adjusted;
 mod cells;
+mod checks;
 mod deciding;
 mod describe;
 mod design;
@@ -79,7 +80,8 @@ pub struct Rules {
     pub primary: bool,
     /// The preregistered exclusion rules.
     pub exclude: Vec<Exclusion>,
-    /// Equivalence margin for differences from a hidden reference, in rating points.
+    /// Equivalence margin for differences between realizations and from a hidden reference,
+    /// and for the effect of VAF, in rating points.
     pub equivalence_margin: Option<f64>,
     /// Changes to these rules after the study began.
     pub deviations: Vec<Deviation>,
@@ -219,6 +221,8 @@ pub struct Analysis {
     pub realistic_from: Option<f64>,
     /// Lowest and highest rating of the scale.
     pub scale: Option<(f64, f64)>,
+    /// Equivalence margin, in rating points.
+    pub equivalence_margin: Option<f64>,
     /// Level of significance of every test, two-sided.
     pub alpha: f64,
     /// What the ratings measure, as a noun. Untrusted.
@@ -312,6 +316,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         comments: comments(&used),
         realistic_from: rules.realistic_from,
         scale: rules.scale,
+        equivalence_margin: rules.equivalence_margin,
         alpha: rules.alpha,
         construct: rules.construct.clone(),
         covariates: memory::covariates(&used),
@@ -344,7 +349,7 @@ struct Inputs<'a> {
 type Group = fn(&Inputs<'_>, &mut Values);
 
 /// Independent groups of statistics, the slowest ones first.
-const GROUPS: [Group; 13] = [
+const GROUPS: [Group; 14] = [
     |i, values| order::order(i.cells, values),
     |i, values| vaf::against_vaf(i.cells, i.adjusted, i.rules, values),
     |i, values| ordinal::ordinal(i.cells, values),
@@ -356,8 +361,9 @@ const GROUPS: [Group; 13] = [
     |i, values| effects::pairs(i.cells, values),
     |i, values| reference::reference(i.cells, i.rules, values),
     |i, values| adjusted::adjusted(i.cells, i.adjusted, values),
-    |i, values| pairs::pairs(i.cells, i.adjusted, values),
+    |i, values| pairs::pairs(i.cells, i.adjusted, i.rules, values),
     |i, values| disagreement::disagreement(i.cells, values),
+    |i, values| checks::checks(i.cells, i.rules, values),
 ];
 
 /// All statistics. Each group runs on one thread, so the number of threads changes

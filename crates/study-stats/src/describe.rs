@@ -46,6 +46,34 @@ pub fn sum(x: &[f64]) -> f64 {
     x.iter().copied().collect::<Sum>().get()
 }
 
+/// The shape of a distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// m₃/m₂^1.5 of the central moments, 0 if symmetric.
+    pub skewness: f64,
+    /// m₄/m₂² − 3, 0 for a normal distribution.
+    pub excess_kurtosis: f64,
+    /// Largest distance from the mean in standard deviations √m₂.
+    pub largest: f64,
+}
+
+/// The shape of a sample, from its central moments mᵣ = Σ(x − x̄)ʳ/n. `None` for no
+/// numbers, or if all are equal.
+pub fn shape(x: &[f64]) -> Option<Shape> {
+    let centre = mean(x)?;
+    let moment = |r: i32| mean_of(x.iter().map(|x| (x - centre).powi(r)));
+    let (m2, m3, m4) = (moment(2)?, moment(3)?, moment(4)?);
+    let largest = x
+        .iter()
+        .fold(0.0f64, |most, x| most.max((x - centre).abs()));
+    (m2 > 0.0).then_some(())?;
+    Some(Shape {
+        skewness: finite(m3 / m2.powf(1.5))?,
+        excess_kurtosis: finite(m4 / (m2 * m2) - 3.0)?,
+        largest: finite(largest / m2.sqrt())?,
+    })
+}
+
 /// The arithmetic mean, Σx/n, or Σ(x/n) if the sum overflows. `None` for no numbers.
 pub fn mean(x: &[f64]) -> Option<f64> {
     mean_of(x.iter().copied())
@@ -186,6 +214,26 @@ pub fn is_constant(x: &[f64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// R 4.2: x <- c(1, 2, 2, 3, 4, 9); m <- function(r) mean((x - mean(x))^r);
+    /// c(m(3)/m(2)^1.5, m(4)/m(2)^2 - 3, max(abs(x - mean(x)))/sqrt(m(2)))
+    #[test]
+    fn the_shape_is_that_of_the_central_moments() {
+        let found = shape(&[1.0, 2.0, 2.0, 3.0, 4.0, 9.0]).unwrap();
+        let expected = [
+            1.319_368_078_200_359,
+            0.359_703_875_743_939_2,
+            2.091_290_026_730_777,
+        ];
+        for (x, y) in [found.skewness, found.excess_kurtosis, found.largest]
+            .into_iter()
+            .zip(expected)
+        {
+            assert!((x - y).abs() < 1e-12, "{x} {y}");
+        }
+        assert_eq!(shape(&[2.0, 2.0]), None);
+        assert_eq!(shape(&[]), None);
+    }
 
     /// 30 ratings, sum 144, sum of squares 720.
     #[test]

@@ -11,12 +11,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
+use study_base::apa;
 use study_base::text::counted;
 use study_core::analyze::Analysis;
 use study_core::outcome::{ParticipantRow, RatingRow, Status};
 use study_core::protocol::columns::SampleColumn;
-use study_core::protocol::{Order, Protocol, QuestionKind};
+use study_core::protocol::{Answer, Order, Protocol, Question, QuestionKind};
 use study_core::store::{StudyFolder, layout};
+use study_stats::describe::mean;
 
 /// Largest number of samples that are read of a playback.
 const MAX_SAMPLES: usize = 200_000;
@@ -142,6 +144,8 @@ pub(super) fn details(
         facts,
         repetitions: Some(protocol.design.repetitions),
         order: Some(order(&protocol.design.order).to_owned()),
+        sample: sample(protocol, participants),
+        ethics: s.ethics.clone(),
         conduct: conduct(protocol, &devices),
         states: states(participants),
         reference: protocol.trial.reference.clone(),
@@ -168,13 +172,62 @@ pub(super) fn details(
 /// Number of participants by state; pilots and simulated ones only if there are no
 /// others.
 fn states(participants: &[ParticipantRow]) -> Vec<(String, usize)> {
-    let real = |p: &&ParticipantRow| !p.pilot && !p.simulated;
-    let any = participants.iter().any(|p| real(&p));
     let mut by: BTreeMap<&str, usize> = BTreeMap::new();
-    for p in participants.iter().filter(|p| real(p) || !any) {
+    for p in described(participants) {
         *by.entry(p.state.as_str()).or_default() += 1;
     }
     by.into_iter().map(|(s, n)| (s.to_owned(), n)).collect()
+}
+
+/// The participants; pilots and simulated ones only if there are no others.
+fn described(participants: &[ParticipantRow]) -> impl Iterator<Item = &ParticipantRow> {
+    let real = |p: &ParticipantRow| !p.pilot && !p.simulated;
+    let any = participants.iter().any(real);
+    participants.iter().filter(move |p| real(p) || !any)
+}
+
+/// Most options that a sentence lists.
+const MAX_OPTIONS: usize = 6;
+
+/// A sentence for each intake question that is answered by a number or a choice.
+fn sample(protocol: &Protocol, participants: &[ParticipantRow]) -> Vec<String> {
+    let sentence = |question: &Question| {
+        let answers: Vec<&Answer> = described(participants)
+            .filter_map(|p| p.answers.get(&question.id))
+            .filter(|answer| !answer.is_declined())
+            .collect();
+        let numbers: Vec<f64> = answers.iter().filter_map(|a| a.number()).collect();
+        let unit = match &question.kind {
+            QuestionKind::Number {
+                unit: Some(unit), ..
+            } => format!(" {unit}"),
+            _ => String::new(),
+        };
+        let prompt = question.prompt.trim_end_matches([':', '.']);
+        if let Some(mean) = mean(&numbers) {
+            let low = numbers.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+            let high = numbers.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+            let (mean, n) = (apa::number(mean, 2), numbers.len());
+            return Some(format!(
+                "“{prompt}”: mean {mean}{unit}, range {low} to {high} (n = {n})."
+            ));
+        }
+        let QuestionKind::Choice { options, .. } = &question.kind else {
+            return None;
+        };
+        let chosen = |option: &String| {
+            let by = |a: &&&Answer| matches!(a, Answer::Choice(all) if all.contains(option));
+            answers.iter().filter(by).count()
+        };
+        let counts: Vec<String> = (options.iter())
+            .map(|option| (chosen(option), option))
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, option)| format!("{option} {n}"))
+            .take(MAX_OPTIONS)
+            .collect();
+        (!counts.is_empty()).then(|| format!("“{prompt}”: {}.", counts.join(", ")))
+    };
+    protocol.intake.iter().filter_map(sentence).collect()
 }
 
 /// Sentences on the conduct of the sessions, for the methods.

@@ -3,7 +3,7 @@
 use super::Answer;
 use crate::report::{apa, sentences};
 use study_base::text::counted;
-use study_core::analyze::{Analysis, MAX_PAIRED, Question};
+use study_core::analyze::{Analysis, MAX_PAIRED, Question, Test};
 
 /// Pairs that are listed.
 const MAX_LISTED: usize = 10;
@@ -87,6 +87,7 @@ pub(super) fn which(a: &Analysis) -> Option<Answer> {
             .main
             .push(format!("{more} more are in the table of pairs."));
     }
+    answer.main.extend(equivalent(a));
     if let Some(dz) = a.values.number("sensitivity/difference") {
         answer.more.push(format!(
             "A single difference of {} standard deviations (of the differences) is found with a power \
@@ -102,4 +103,23 @@ pub(super) fn which(a: &Analysis) -> Option<Answer> {
         ));
     }
     Some(answer)
+}
+
+/// The pairs that are equivalent within the preregistered margin.
+fn equivalent(a: &Analysis) -> Option<String> {
+    let test = a.pairs.iter().find_map(|p| p.equivalence.as_ref())?;
+    let margin = a.equivalence_margin?;
+    let pairs: Vec<String> = (a.pairs.iter())
+        .filter(|p| p.equivalence.as_ref().is_some_and(Test::is_significant))
+        .map(|p| format!("{} and {}", p.first, p.second))
+        .take(MAX_LISTED)
+        .collect();
+    let which = match &pairs[..] {
+        [] => "no pair".to_owned(),
+        pairs => pairs.join("; "),
+    };
+    Some(format!(
+        "Equivalence within {margin} points is shown for {which} ({}).",
+        sentences::corrected(test)
+    ))
 }

@@ -85,6 +85,14 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
             apa::percent(share)
         ));
     }
+    answer
+        .more
+        .extend(v.number("corr_adjusted/pearson/bf10").map(|bf| {
+            format!(
+                "Bayes factor of a correlation against none, with a flat prior on r: BF₁₀ = {}.",
+                apa::two(bf)
+            )
+        }));
     Some(answer)
 }
 

@@ -61,6 +61,7 @@ fn complete_only(a: &Analysis) -> Option<String> {
 /// Participants, realizations, order, device and question.
 fn design(d: &Details, a: &Analysis) -> Vec<String> {
     let mut text = vec![ratings(d, a)];
+    text.extend(sample(d));
     let others: Vec<String> = (a.realizations.iter())
         .filter(|m| !m.tested)
         .map(|m| match &m.duplicate_of {
@@ -121,6 +122,23 @@ fn design(d: &Details, a: &Analysis) -> Vec<String> {
 }
 
 /// How many participants rated how many realizations how often.
+/// The sample and the ethics approval, with placeholders for what the study does not say.
+fn sample(d: &Details) -> Vec<String> {
+    let mut text = d.sample.clone();
+    text.push(
+        match d.sample.is_empty() {
+            true => "[Participants: age, gender, handedness, recruitment, compensation.]",
+            false => "[Participants: recruitment, compensation.]",
+        }
+        .to_owned(),
+    );
+    text.push(match &d.ethics {
+        Some(approval) => format!("Ethics: {approval}."),
+        None => "[Ethics approval and consent.]".to_owned(),
+    });
+    text
+}
+
 fn ratings(d: &Details, a: &Analysis) -> String {
     let c = &a.counts;
     let all = |one, many| counted(c.with_ratings, one, many);

@@ -9,6 +9,7 @@ use super::identifiers::group_id;
 use super::values::Values;
 use study_stats::anova::one_way;
 use study_stats::distribution::t_quantile;
+use study_stats::paired::equivalence_of;
 use study_stats::power::{detectable_correlation, detectable_difference};
 use study_stats::proportion::share;
 
@@ -21,6 +22,34 @@ pub(super) fn headline(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     }
     components(cells, values);
     sensitivity(Design::of(cells), rules.alpha, values);
+    if let Some(margin) = rules.equivalence_margin {
+        little_effect_of_vaf(cells, margin, values);
+    }
+}
+
+/// Whether the rating changes by less than the margin from the lowest to the highest VAF,
+/// by the slope of the crossed mixed model.
+fn little_effect_of_vaf(cells: &Cells<'_>, margin: f64, values: &mut Values) {
+    let vaf = |&m: &usize| cells.vaf[m];
+    let vaf: Vec<f64> = cells.tested().iter().filter_map(vaf).collect();
+    let range = vaf.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b))
+        - vaf.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    let get = |what: &str| values.number(&format!("lmm_vaf_crossed/{what}"));
+    let slope = get("slope")
+        .zip(get("slope_se"))
+        .zip(get("slope_satterthwaite_df"));
+    let found = slope.and_then(|((slope, se), df)| {
+        let tests = equivalence_of(slope * range, se * range, df, margin)?;
+        Some((slope * range, tests))
+    });
+    let mut g = values.group(
+        "equivalence/vaf",
+        "there is no slope of the crossed mixed model",
+    );
+    g.put("margin", margin);
+    g.maybe("effect", found.map(|(effect, _)| effect));
+    g.maybe("p", found.map(|(_, tests)| tests.p));
+    g.interval("ci90", found.map(|(_, tests)| tests.ci90));
 }
 
 /// The smallest effects that the design finds with a power of 80 %.

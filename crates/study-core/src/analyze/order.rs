@@ -1,11 +1,13 @@
 //! Learning and carry-over: `order_trial/*`, `order_previous_rating/*`,
-//! `order_repetition/*`.
+//! `order_repetition/*`, `drift/*`.
 
 use super::cells::Cells;
+use super::identifiers::group_id;
 use super::values::Values;
 use std::collections::BTreeMap;
 use study_stats::carry_over::{OrderedRating, carry_over};
 use study_stats::describe::Sum;
+use study_stats::paired::holm;
 use study_stats::two_way_slope::{TwoWaySlope, two_way_slope};
 
 pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
@@ -42,6 +44,7 @@ pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
     );
     put("order_trial", by_trial, values);
     put("order_previous_rating", by_previous, values);
+    drift(cells, &known, &trial, values);
     carry_over_of(cells, values);
     let mut by_repetition: BTreeMap<u32, (Sum, f64)> = BTreeMap::new();
     for (&i, &v) in cells.order.iter().zip(&cells.sorted) {
@@ -58,6 +61,36 @@ pub(super) fn order(cells: &Cells<'_>, values: &mut Values) {
             .put("mean", sum.get() / n + cells.offset);
     }
 }
+
+/// Most realizations whose drift is given.
+const MAX_DRIFTS: usize = 60;
+
+/// The change of the rating of each realization per trial, with fixed effects of subjects.
+fn drift(cells: &Cells<'_>, rows: &[usize], trial: &[f64], values: &mut Values) {
+    let tested = cells.tested();
+    let repeated = cells.cells.iter().any(|c| c.rows.len() > 1);
+    if !repeated || rows.is_empty() || tested.len() > MAX_DRIFTS {
+        return;
+    }
+    let mut own: Vec<(Vec<usize>, Vec<f64>)> = vec![Default::default(); cells.ratings.models.len()];
+    for (&i, &t) in rows.iter().zip(trial) {
+        if let Some(m) = cells.ratings.model[i] {
+            own[m as usize].0.push(i);
+            own[m as usize].1.push(t);
+        }
+    }
+    let found: Vec<Option<TwoWaySlope>> = (tested.iter())
+        .map(|&m| slope(cells, &own[m].0, &own[m].1))
+        .collect();
+    let p_holm = holm(&found.iter().map(|f| f.as_ref()?.p).collect::<Vec<_>>());
+    for ((&m, found), p_holm) in tested.iter().zip(found).zip(p_holm) {
+        let id = group_id("drift", &[cells.model_name(m)]);
+        put(&id, found, values);
+        values.group(id, NOT_KNOWN).maybe("p_holm", p_holm);
+    }
+}
+
+const NOT_KNOWN: &str = "the order is not known, or is confounded with subjects and realizations";
 
 /// The dependence of a rating on the one before it, by comparison with all orders of a
 /// block. A block is a repetition if each participant's repetitions follow each other.
@@ -118,8 +151,7 @@ fn slope(cells: &Cells<'_>, rows: &[usize], x: &[f64]) -> Option<TwoWaySlope> {
 }
 
 fn put(id: &str, found: Option<TwoWaySlope>, values: &mut Values) {
-    let why = "the order is not known, or is confounded with subjects and realizations";
-    let mut g = values.group(id, why);
+    let mut g = values.group(id, NOT_KNOWN);
     g.maybe("slope", found.map(|f| f.slope));
     g.maybe("se", found.map(|f| f.se));
     g.maybe("t", found.and_then(|f| f.t));

@@ -4,8 +4,10 @@
 //! they are too few, contrasts of the mixed model of all cells. Holm's correction is
 //! over all pairs. Up to [`MAX_PAIRED`] realizations every pair is given, above the
 //! realization with the highest mean against each other one; the correction counts
-//! the pairs that are not given, because the highest mean is chosen by the ratings.
+//! the pairs that are not given, because the highest mean is chosen by the ratings. With a
+//! preregistered margin each pair is also tested for equivalence.
 
+use super::Rules;
 use super::adjusted::{Adjusted, MAX_COMPARED};
 use super::cells::Cells;
 use super::effects::MAX_PAIRED;
@@ -13,7 +15,7 @@ use super::identifiers::pair_id;
 use super::values::Values;
 use study_stats::describe::{mean, sd};
 use study_stats::lmm::ContrastT;
-use study_stats::paired::{holm, one_sample};
+use study_stats::paired::{Equivalence, equivalence_of, holm, one_sample};
 
 /// A difference, first minus second.
 struct Difference {
@@ -24,7 +26,7 @@ struct Difference {
     dz: Option<f64>,
 }
 
-pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, values: &mut Values) {
+pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules, values: &mut Values) {
     let k = adjusted.models.len();
     if !(2..=MAX_COMPARED).contains(&k) {
         return;
@@ -55,10 +57,14 @@ pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, values: &mut Values)
         }
     };
     let p_holm = holm(&found.iter().map(|d| d.t.p).collect::<Vec<_>>());
+    let margin = rules.equivalence_margin;
+    let tost = |d: &Difference| equivalence_of(d.t.estimate, d.t.se, d.t.df?, margin?);
+    let tost: Vec<Option<Equivalence>> = found.iter().map(tost).collect();
+    let tost_holm = holm(&tost.iter().map(|e| e.map(|e| e.p)).collect::<Vec<_>>());
     let compared = p_holm.iter().flatten().count();
     let best = (k > MAX_PAIRED).then(|| highest(adjusted.means.as_deref().unwrap_or_default()));
     values.group("pair", "").put("n_compared", compared as f64);
-    for (d, p_holm) in found.iter().zip(p_holm) {
+    for (i, (d, p_holm)) in found.iter().zip(p_holm).enumerate() {
         if best.is_some_and(|best| best != Some(d.first) && best != Some(d.second)) {
             continue;
         }
@@ -74,6 +80,11 @@ pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, values: &mut Values)
         g.maybe("p_holm", p_holm);
         g.interval("ci95", d.t.ci95);
         g.maybe("dz", d.dz);
+        if margin.is_some() {
+            g.maybe("p_tost", tost[i].map(|e| e.p));
+            g.maybe("p_tost_holm", tost_holm[i]);
+            g.interval("ci90", tost[i].map(|e| e.ci90));
+        }
     }
 }
 

@@ -77,6 +77,7 @@ pub(super) fn warnings(
     headline(&mut warn, values, findings);
     design(&mut warn, cells, values);
     raters(&mut warn, cells, values);
+    ends(&mut warn, cells, values);
     found
 }
 
@@ -312,6 +313,41 @@ fn raters(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values
             people(constant)
         ),
     );
+}
+
+/// Most of the ratings at an end of the scale.
+const MOST: f64 = 0.5;
+
+/// Realizations that most ratings put at an end of the scale.
+fn ends(warn: &mut impl FnMut(&'static str, String), cells: &Cells<'_>, values: &Values) {
+    for (code, share, end, beyond) in [
+        ("floor", "share_low", "lowest", "below"),
+        ("ceiling", "share_high", "highest", "above"),
+    ] {
+        let tested = cells.tested().into_iter().map(|m| cells.model_name(m));
+        let names: Vec<&str> = tested
+            .filter(|name| {
+                let id = group_id("ends", &[name]);
+                values
+                    .number(&format!("{id}/{share}"))
+                    .is_some_and(|share| share > MOST)
+            })
+            .collect();
+        if let [first, ..] = names[..] {
+            let others = match names.len() - 1 {
+                0 => String::new(),
+                n => format!(
+                    " and {}",
+                    counted(n, "other realization", "other realizations")
+                ),
+            };
+            let text = format!(
+                "most ratings of {first}{others} are the {end} of the scale: differences {beyond} it \
+                 cannot show"
+            );
+            warn(code, text);
+        }
+    }
 }
 
 fn people(n: usize) -> String {

@@ -6,6 +6,7 @@ use crate::analyze::exclude;
 use crate::analyze::identifiers::group_id;
 use crate::analyze::values::Values;
 use crate::protocol::Role;
+use study_base::apa;
 
 /// Adjusted mean and name of the tested realizations, the highest mean first, equal
 /// ones by name.
@@ -134,11 +135,29 @@ pub(super) fn order(facts: &Facts<'_>) -> Option<Finding> {
     let test = Test::single(TestKind::SlopeT, p, facts.rules.alpha);
     let test = test.with("t", get("t"), &[get("df")]);
     let direction = Some(Direction::of(slope)).filter(|_| test.is_significant());
-    Some(Finding {
+    let mut found = Finding {
         direction,
         estimate: Estimate::of("slope", slope),
         ..Finding::decided(Question::Order, test, facts.design)
-    })
+    };
+    for (_, name) in &facts.ranked {
+        let id = group_id("drift", &[name]);
+        let get = |what: &str| facts.number(&format!("{id}/{what}"));
+        let (Some(slope), Some(p)) = (get("slope"), get("p_holm")) else {
+            continue;
+        };
+        if p < facts.rules.alpha {
+            let shown = apa::number(slope, 3);
+            let p = apa::p_beside(p, facts.rules.alpha);
+            found.caveat(
+                "drift",
+                format!(
+                    "the rating of {name} changes by {shown} per trial (p {p}, Holm's correction)"
+                ),
+            );
+        }
+    }
+    Some(found)
 }
 
 /// Whether a rating depends on the one before it.

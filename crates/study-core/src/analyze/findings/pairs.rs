@@ -28,6 +28,9 @@ pub struct Pair {
     pub test: Option<Test>,
     /// Whether they differ.
     pub verdict: Verdict,
+    /// Two one-sided tests that they differ by less than the preregistered margin, with
+    /// Holm's correction over all pairs.
+    pub equivalence: Option<Test>,
 }
 
 impl Pair {
@@ -94,6 +97,10 @@ pub(super) fn all(cells: &Cells<'_>, rules: &Rules, values: &Values) -> Vec<Pair
                 verdict: (test.as_ref())
                     .map_or_else(|| Verdict::Undefined(why().to_owned()), Test::verdict),
                 test,
+                equivalence: get("p_tost_holm").map(|p| Test {
+                    comparisons,
+                    ..Test::single(TestKind::Equivalence, p, rules.alpha)
+                }),
             });
         }
     }

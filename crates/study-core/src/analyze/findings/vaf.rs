@@ -1,6 +1,6 @@
 //! Does VAF predict the rating?
 
-use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind};
+use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind, Verdict};
 use study_base::apa;
 
 /// The group of statistics that decides: correlations with adjusted means, which are the
@@ -52,6 +52,21 @@ fn decided(facts: &Facts<'_>) -> Option<Finding> {
 
 fn caveats(facts: &Facts<'_>, found: &mut Finding) {
     let alpha = facts.rules.alpha;
+    if let (Some(p), Some(margin), Verdict::NotShown) = (
+        facts.number("equivalence/vaf/p"),
+        facts.number("equivalence/vaf/margin"),
+        &found.verdict,
+    ) && p < alpha
+    {
+        found.caveat(
+            "equivalent",
+            format!(
+                "from the lowest to the highest VAF the rating changes by less than {margin} points \
+                 (two one-sided t tests, p {})",
+                apa::p_beside(p, alpha)
+            ),
+        );
+    }
     let of = |what: &str| facts.number(&format!("{DECIDING}/pearson/{what}"));
     let least = of("smallest_p_two_sided");
     if let Some(least) = least.filter(|p| *p >= alpha) {

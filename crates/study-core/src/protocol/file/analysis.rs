@@ -14,8 +14,8 @@ pub(super) const ANALYSIS: &[Key] = keys! {
     "vaf": Kind::Text, r#""validation-1.5hz""#;
     /// The least rating that counts as realistic. It has to be on the primary scale.
     "realistic_from": Kind::ANY_NUMBER, "5";
-    /// The margin of the equivalence test against a hidden reference: smaller differences
-    /// count as none.
+    /// The margin of the tests of equivalence, between realizations, against a hidden
+    /// reference and of the effect of VAF: smaller differences count as none.
     "equivalence_margin": Kind::positive("points of the primary scale"), "0.5";
     /// Whether the ratings of unfinished sessions and of drop-outs are analyzed.
     "unfinished": Kind::Word(Unfinished::WORDS), r#""exclude""#, default(r#""include""#);
