@@ -73,6 +73,7 @@ footer { margin-top: 3rem; font-size: .85rem; border-top: 1px solid #bbb; paddin
   .wide { display: none; }
   .narrow { display: block; }
   figure { margin: 0 0 2.5mm; }
+  figure svg { max-height: 200mm; }
   footer { margin-top: 5mm; }
   h2, h3, caption, summary { break-after: avoid; }
   figure, .banner, .warning, blockquote, tr, .whole { break-inside: avoid; }
