@@ -132,7 +132,7 @@ proptest! {
         let shuffled = format!("{}\n{}\n", csv.lines().next().unwrap(), lines.join("\n"));
         // Of one subject the order of the file is the order in time.
         let (a, b) = (of(&csv), of(&shuffled));
-        same(&a, &b, |x| x, &["univariate", "subject", "order_trial", "order_previous_rating"])?;
+        same(&a, &b, |x| x, &["univariate", "subject", "order_trial", "order_previous_rating", "drift"])?;
     }
 }
 
@@ -183,7 +183,7 @@ fn changed(csv: &str, rating: impl Fn(f64) -> f64, name: impl Fn(&str) -> String
 }
 
 /// Groups that have the unit of a rating, or its origin.
-const WITH_UNITS: [&str; 20] = [
+const WITH_UNITS: [&str; 22] = [
     "adjusted",
     "finding",
     "lmm_cells",
@@ -195,6 +195,8 @@ const WITH_UNITS: [&str; 20] = [
     "subject_slope",
     "order_repetition",
     "order_trial",
+    "drift",
+    "slope_variance",
     "realistic",
     "rmanova",
     "lmm_model",
