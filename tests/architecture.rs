@@ -17,7 +17,7 @@ const MAX_MAIN_LINES: usize = 30;
 
 /// Crate → the crates of this workspace that it may depend on, then those that only
 /// its tests may.
-const CRATES: [(&str, &[&str], &[&str]); 7] = [
+const CRATES: [(&str, &[&str], &[&str]); 8] = [
     ("study-base", &[], &[]),
     ("study-wire", &[], &[]),
     ("study-stats", &[], &[]),
@@ -39,6 +39,7 @@ const CRATES: [(&str, &[&str], &[&str]); 7] = [
         &[],
     ),
     ("study-firmware", &["study-wire"], &[]),
+    ("study-device", &["study-wire"], &[]),
 ];
 
 /// Module → the modules that it may import. `study-base` is open to all who depend
@@ -278,6 +279,7 @@ fn folder(package: &str) -> PathBuf {
     match package {
         "study" => root().to_owned(),
         "study-firmware" => root().join("firmware"),
+        "study-device" => root().join("firmware/c"),
         _ => root().join("crates").join(package),
     }
 }
@@ -313,7 +315,9 @@ fn imported<'a>(from: &'a Source, path: &'a [String]) -> Option<&'a str> {
         "super" if up == from.path().len() => path.get(up)?.as_str(),
         "study_base" => return None,
         "study_stats" => "stats",
-        "study_wire" if from.package != "study-firmware" => "wire",
+        "study_wire" if !["study-firmware", "study-device"].contains(&from.package.as_str()) => {
+            "wire"
+        }
         "crate" | "study" | "study_core" | "study_haptics" => path.get(1)?.as_str(),
         _ => return None,
     };

@@ -6,5 +6,6 @@ mod firmware_probe;
 mod firmware_states;
 mod fuzz;
 mod minor;
+mod rules;
 mod support;
 mod v1;

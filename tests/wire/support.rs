@@ -27,6 +27,8 @@ pub(crate) struct Host {
     offset_ms: u32,
     /// Messages that were not a reply to a request.
     pub(crate) heard: Vec<Reply>,
+    /// Their sequence numbers.
+    numbers: Vec<u16>,
 }
 
 impl Host {
@@ -43,6 +45,7 @@ impl Host {
             beats: 0,
             offset_ms,
             heard: Vec::new(),
+            numbers: Vec::new(),
         }
     }
 
@@ -68,7 +71,11 @@ impl Host {
         let mut replies = Vec::new();
         for byte in self.device.take_output() {
             if let Some(body) = self.decoder.push(byte) {
-                replies.push(Reply::decode(body.unwrap()).unwrap().1);
+                let (header, reply) = Reply::decode(body.unwrap()).unwrap();
+                if reply.kind() >= kind::TELEMETRY {
+                    self.numbers.push(header.sequence);
+                }
+                replies.push(reply);
             }
         }
         replies
@@ -145,6 +152,23 @@ impl Host {
         }
     }
 
+    /// Sequence numbers of the unsolicited messages since the last call.
+    pub(crate) fn unsolicited(&mut self) -> Vec<u16> {
+        std::mem::take(&mut self.numbers)
+    }
+
+    /// The chunks of a table.
+    pub(crate) fn chunks(&self, nodes: &[Node]) -> Vec<Request> {
+        let chunks = nodes.chunks(TableChunk::MAX_NODES).enumerate();
+        let chunk = |(i, some)| {
+            Request::TableChunk(TableChunk {
+                first: (i * TableChunk::MAX_NODES) as u16,
+                nodes: FixedVec::of(some),
+            })
+        };
+        chunks.map(chunk).collect()
+    }
+
     /// Uploads a table; the reply to COMMIT or the first refusal, and the CRC.
     pub(crate) fn upload(&mut self, begin: TableBegin, nodes: &[Node]) -> (Ack, u32) {
         let mut crc = UploadCrc::of_table(&begin);
@@ -153,11 +177,8 @@ impl Host {
         if first.refusal != Refusal::None {
             return (first, crc.value());
         }
-        for (i, some) in nodes.chunks(TableChunk::MAX_NODES).enumerate() {
-            let ack = self.ack(Request::TableChunk(TableChunk {
-                first: (i * TableChunk::MAX_NODES) as u16,
-                nodes: FixedVec::of(some),
-            }));
+        for chunk in self.chunks(nodes) {
+            let ack = self.ack(chunk);
             if ack.refusal != Refusal::None {
                 return (ack, crc.value());
             }

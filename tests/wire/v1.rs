@@ -13,7 +13,7 @@ mod requests;
 use self::replies::replies;
 use self::requests::requests;
 use std::num::NonZeroU16;
-use study_wire::frame::{Decoder, crc32};
+use study_wire::frame::{Decoder, crc32, is_stream};
 use study_wire::handler::{Bounds, Handler, Measured, Profile};
 use study_wire::message::{
     Ack, Commit, Constants, DeviceState, Event, EventKind, Fault, Features, FixedVec, Flags,
@@ -238,7 +238,10 @@ fn every_request_has_the_specified_bytes() {
 fn every_reply_has_the_specified_bytes() {
     let mut kinds = Vec::new();
     for golden in replies() {
-        let body = bytes_agree(&golden, golden.message.frame(golden.sequence).as_bytes());
+        let frame = golden.message.frame(golden.sequence);
+        let body = bytes_agree(&golden, frame.as_bytes());
+        let stream = golden.message.kind() >= kind::TELEMETRY;
+        assert_eq!(is_stream(frame.as_bytes()), stream, "{}", golden.name);
         let (header, message) = Reply::decode(&body).unwrap();
         assert_eq!(message, golden.message, "{}", golden.name);
         assert_eq!(header.sequence, golden.sequence);

@@ -147,6 +147,14 @@ impl fmt::Debug for Frame {
     }
 }
 
+/// Whether a frame of a device is part of a stream that a full queue may drop: TELEMETRY,
+/// EVENT or RECORDED, and not a reply. Version and type are not zero, so COBS leaves them
+/// where they are.
+pub fn is_stream(frame: &[u8]) -> bool {
+    const FIRST_STREAM: u8 = 0x90;
+    frame.get(3).is_some_and(|kind| *kind >= FIRST_STREAM)
+}
+
 /// Finds frames in a stream of bytes.
 #[derive(Debug, Clone)]
 pub struct Decoder {

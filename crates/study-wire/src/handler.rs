@@ -118,6 +118,8 @@ pub struct Handler<const NODES: usize, const POINTS: usize, R = f64> {
     fault: Fault,
     /// Nonce of the connection.
     connection: Option<u32>,
+    /// Minor version of the connection.
+    minor: u8,
     last_request: Option<LastRequest>,
     /// Count of the newest heartbeat.
     heartbeat: Option<u32>,
@@ -154,6 +156,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             state: DeviceState::Boot,
             fault: Fault::None,
             connection: None,
+            minor: 0,
             last_request: None,
             heartbeat: None,
             alive: None,

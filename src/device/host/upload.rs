@@ -49,8 +49,13 @@ pub(super) fn of(
     let count = table.x_mm.len();
     let nodes = u16::try_from(count).map_err(|_| TableError::TooManyNodes(count))?;
     let certificate = table.certificate();
+    // As the device judges it in the minor version of the connection.
+    let stiffness_n_per_mm = match device.constants {
+        Some(_) => certificate.rendered_n_per_mm(),
+        None => certificate.stiffness_n_per_mm,
+    };
     let certified = certificate.passes()
-        && certificate.stiffness_n_per_mm <= device.stiffness_n_per_mm
+        && stiffness_n_per_mm <= device.stiffness_n_per_mm
         && certificate.damping_n_s_per_mm <= device.damping_n_s_per_mm;
     let armed = allow_uncertified && !certified;
     let begin = TableBegin {

@@ -111,7 +111,10 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             }
             Request::TableCommit(commit) => {
                 self.may_continue()?;
-                let validated = self.table.validate(commit.crc, &self.profile.bounds);
+                // With a host of minor version 0 the stiffness is that of version 1.
+                let with_state = self.minor > 0;
+                let bounds = &self.profile.bounds;
+                let validated = self.table.validate(commit.crc, bounds, with_state);
                 self.accept_upload(validated, Loaded::Table, commit.crc, now_ms)
             }
             Request::PathBegin(begin) => {
@@ -282,6 +285,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             self.alive = None;
             self.unsolicited = 0;
         }
+        self.minor = hello.minor.min(MINOR);
         let profile = &self.profile;
         let flags = profile.flags;
         Reply::Identity(Identity {
@@ -304,14 +308,14 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             stroke_mm: profile.bounds.stroke_mm,
             firmware: profile.firmware,
             serial: profile.serial,
-            constants: (hello.minor > 0).then(|| self.constants(hello.minor.min(MINOR))),
+            constants: (self.minor > 0).then(|| self.constants()),
         })
     }
 
-    fn constants(&self, minor: u8) -> Constants {
+    fn constants(&self) -> Constants {
         let servo = &self.profile.servo;
         Constants {
-            minor,
+            minor: self.minor,
             features: self.profile.features,
             commit_ms: COMMIT_MS,
             acceleration_hz: servo.acceleration_hz,

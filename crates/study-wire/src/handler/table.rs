@@ -201,7 +201,13 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
     }
 
     /// Checks that the table is complete and may be played; its force limit, N.
-    pub(super) fn validate(&mut self, crc: u32, bounds: &Bounds) -> Result<f64, Refused> {
+    /// `with_state`: the stiffness includes the change of force over the direction state.
+    pub(super) fn validate(
+        &mut self,
+        crc: u32,
+        bounds: &Bounds,
+        with_state: bool,
+    ) -> Result<f64, Refused> {
         let Some(begin) = self.begin else {
             return Err((Refusal::WrongState, 0));
         };
@@ -212,7 +218,10 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
         check_limits(&begin, bounds)?;
         while self.judge() {}
         let certificate = self.certifier.finish();
-        match (check_physics(&certificate, bounds), begin.uncertified_n) {
+        match (
+            check_physics(&certificate, bounds, with_state),
+            begin.uncertified_n,
+        ) {
             (Ok(()), _) => Ok(begin.force_n),
             (Err(_), Some(cap_n)) => Ok(cap_n.min(begin.force_n)),
             (Err(refused), None) => Err(refused),
@@ -265,13 +274,16 @@ fn check_limits(begin: &TableBegin, bounds: &Bounds) -> Result<(), Refused> {
 
 /// Conditions for playing a table without the explicit permission to play it
 /// uncertified.
-fn check_physics(certificate: &Certificate, bounds: &Bounds) -> Result<(), Refused> {
-    let c = certificate;
+fn check_physics(c: &Certificate, bounds: &Bounds, with_state: bool) -> Result<(), Refused> {
     require(c.mass.holds(), Refusal::Uncertified, 1)?;
     require(c.damping.holds(), Refusal::Uncertified, 2)?;
     require(c.hysteresis.holds(), Refusal::Uncertified, 3)?;
     // NaN is not within a bound.
-    let stiffness = c.stiffness_n_per_mm <= bounds.stiffness_n_per_mm;
+    let asked_n_per_mm = match with_state {
+        true => c.rendered_n_per_mm(),
+        false => c.stiffness_n_per_mm,
+    };
+    let stiffness = asked_n_per_mm <= bounds.stiffness_n_per_mm;
     require(stiffness, Refusal::Limit, 4)?;
     let damping = c.damping_n_s_per_mm <= bounds.damping_n_s_per_mm;
     require(damping, Refusal::Limit, 5)

@@ -90,6 +90,11 @@ impl Field for TableBegin {
             cap_n,
         ] = <[f64; 7]>::read(from)?;
         let lookup = Lookup::NAMES.get(usize::from(lookup));
+        // What is not used is zero: the CRC of COMMIT includes it.
+        let unused = |value: f64| value.to_bits() == 0;
+        if (rule == 0 && !unused(delta_mm)) || (!uncertified && !unused(cap_n)) {
+            return Err(WireError::Field);
+        }
         Ok(Self {
             nodes,
             lookup: lookup.ok_or(WireError::Field)?.1,
