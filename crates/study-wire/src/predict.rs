@@ -342,6 +342,37 @@ mod tests {
         assert_eq!(force(Lookup::Linear, -1.0, 1.0), 10.0);
     }
 
+    /// The masses of both directions are blended; the servo limits the result.
+    #[test]
+    fn mass_and_force_are_the_parts_of_the_force() {
+        let (x, f0, zero, lookup) = table(Lookup::Linear);
+        let (light, heavy, negative) = ([-0.2, -0.2, 0.1], [0.4; 3], [10.0; 3]);
+        let branch = |m_kg, f0_n| BranchView {
+            m_kg,
+            b_n_s_per_mm: &f0,
+            k_n_per_mm: &zero,
+            f0_n,
+        };
+        let view = TableView {
+            x_mm: &x,
+            positive: branch(&light, &f0),
+            negative: branch(&heavy, &negative),
+            lookup,
+        };
+        for z in [-1.0, -0.3, 0.0, 0.4, 1.0] {
+            let (mass_kg, rest_n) = mass_and_force(&view, z, 0.75, 20.0);
+            let motion = Motion {
+                x_mm: 0.75,
+                v_mm_s: 20.0,
+                a_m_s2: -3.0,
+            };
+            let whole_n = force_n(&view, z, motion);
+            assert!((mass_kg * -3.0 + rest_n - whole_n).abs() < 1e-12, "{z}");
+            let blended_kg = 0.5 * (1.0 + z) * -0.2 + 0.5 * (1.0 - z) * 0.4;
+            assert!((mass_kg - blended_kg).abs() < 1e-12, "{z}");
+        }
+    }
+
     #[test]
     fn at_rest_the_sign_is_kept_and_play_follows_the_distance() {
         let motion = |x_mm, v_mm_s| Motion {
