@@ -230,9 +230,7 @@ fn a_device_in_memory_of_c_answers_and_a_wrong_call_does_nothing() {
         assert_eq!(init(at, DEVICE_SIZE, &good), 0);
         assert_eq!(study_device_state(at), 0);
         // HELLO of docs/wire-frames.json
-        let hello = [
-            0, 3, 1, 1, 1, 1, 9, 1, 0xee, 0xff, 0xc0, 0x4e, 0x71, 0x7f, 0x1c, 0,
-        ];
+        let hello = b"\0\x03\x01\x01\x01\x09\x01\xee\xff\xc0\x4e\x71\x7f\x1c\0";
         study_device_receive(at, hello.as_ptr(), hello.len(), 5);
         assert_eq!(study_device_state(at), 1);
         assert_eq!(sent.len(), 1);
