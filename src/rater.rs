@@ -13,10 +13,14 @@
 //! seed, the rater's number and the order of the calls. The number of random draws of an
 //! answer never depends on the realization.
 
+mod comparison;
 mod impression;
 mod remarks;
 
+pub use comparison::Percepts;
 pub use impression::Impression;
+
+use comparison::Comparing;
 
 use study_base::rng::Stream;
 use study_core::protocol::{Answer, Question, QuestionKind};
@@ -41,6 +45,7 @@ pub struct Rater {
     lapse_rate: f64,
     /// Probability of a comment.
     comment_rate: f64,
+    comparing: Comparing,
 }
 
 /// Midpoint of the scale of opinions, which goes from 1 to 7.
@@ -58,6 +63,7 @@ impl Rater {
             comment_rate: 0.1 + 0.4 * stream.unit(),
             stream,
             effect,
+            comparing: Comparing::new(seed, number),
         }
     }
 

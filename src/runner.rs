@@ -23,7 +23,7 @@ use study_base::limits::Limits;
 use study_base::text::{ModelId, ParticipantId};
 use study_core::outcome::{Event, Fidelity, Playback, Sample};
 use study_core::protocol::fingerprint::Fingerprints;
-use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol};
+use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
 use study_core::rendering::{Played, judge};
 use study_core::session::{Effect, Ending, Input, Session, Unsaved, View, input::Claim};
 use study_core::store::{ClaimRequest, Copies, Receipt, SeatKind, StudyFolder};
@@ -61,7 +61,7 @@ pub struct Setup {
     pub protocol: Arc<Protocol>,
     /// Presentation orders, if they come from a file.
     pub orders: Option<Arc<FileOrders>>,
-    /// Realizations by their id in the protocol.
+    /// Realizations by their id in the protocol, with the levels of families.
     pub models: BTreeMap<ModelId, Realization>,
     /// Fingerprints of the protocol.
     pub fingerprints: Fingerprints,
@@ -209,6 +209,12 @@ impl Runner {
         self.session.playing_model()
     }
 
+    /// The trial that plays or is answered, and the realization of each interval: for a
+    /// simulated rater only, too.
+    pub fn presented(&self) -> Option<(&Trial, &[ModelId])> {
+        self.session.presented()
+    }
+
     /// The folder of the study.
     pub fn study(&self) -> &StudyFolder {
         &self.setup.study
@@ -250,7 +256,8 @@ impl Runner {
                 trial,
                 attempt,
                 model,
-            } => self.load(trial, attempt, &model),
+                interval,
+            } => self.load(trial, attempt, &model, interval),
             Effect::Start => {
                 let at = self.device_time();
                 let started = self.setup.device.start(at);
@@ -320,7 +327,13 @@ impl Runner {
         self.send(Job::Append(at, event));
     }
 
-    fn load(&mut self, trial: u32, attempt: u32, model: &ModelId) -> Option<Input> {
+    fn load(
+        &mut self,
+        trial: u32,
+        attempt: u32,
+        model: &ModelId,
+        interval: Option<u32>,
+    ) -> Option<Input> {
         let protocol = &self.setup.protocol;
         let entry = protocol.model(model);
         let own = entry.and_then(|m: &ModelEntry| m.device);
@@ -346,7 +359,11 @@ impl Runner {
         self.load_began = at;
         match self.setup.device.load(&stimulus, limits, at) {
             Ok(()) => {
-                self.send(Job::TelemetryBegin { trial, attempt });
+                self.send(Job::TelemetryBegin {
+                    trial,
+                    attempt,
+                    interval,
+                });
                 None
             }
             Err(error) => Some(Input::DeviceFault(error.to_string())),
@@ -535,10 +552,10 @@ pub fn playback_limits(protocol: &Protocol, table: Option<&Realization>) -> Limi
 
 /// Whether the tables of a study differ in size, or are not known.
 fn uneven_loads(protocol: &Protocol, models: &BTreeMap<ModelId, Realization>) -> bool {
-    let nodes = |entry: &ModelEntry| models.get(&entry.id).map(|table| table.x_mm.len());
-    let mut sizes = protocol.models.iter().map(nodes);
-    let first = sizes.next().flatten();
-    first.is_none() || sizes.any(|size| size != first)
+    let unknown = (protocol.models.iter()).any(|entry| !models.contains_key(&entry.id));
+    let mut sizes = models.values().map(|table| table.x_mm.len());
+    let first = sizes.next();
+    unknown || first.is_none() || sizes.any(|size| Some(size) != first)
 }
 
 /// The first multiple of [`LOAD_SLOT`] after `began` that is not before `now`.

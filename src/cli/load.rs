@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::ModelId;
 use study_core::protocol::file::{self, Named, Parsed};
-use study_core::protocol::fingerprint::{self, Fingerprints, Parts};
+use study_core::protocol::fingerprint::{self, Fingerprints, Parts, family_file};
 use study_core::protocol::{FileOrders, Order, Protocol, check};
 use study_core::store::layout;
 use study_haptics::model::Realization;
 
+mod families;
 mod join;
 
 /// Largest model file and orders file that are read, bytes.
@@ -39,6 +40,8 @@ pub struct Loaded {
     pub path: PathBuf,
     /// The table of each realization that has a file.
     pub models: BTreeMap<ModelId, Realization>,
+    /// The tables of all levels and standards of families.
+    pub levels: BTreeMap<ModelId, Realization>,
     /// The orders file, if the design has one.
     pub orders: Option<FileOrders>,
     /// The files of the study: relative path, separated by `/`, and bytes;
@@ -53,6 +56,12 @@ pub struct Loaded {
 }
 
 impl Loaded {
+    /// Every table that a session may play.
+    pub fn tables(&self) -> BTreeMap<ModelId, Realization> {
+        let all = self.models.iter().chain(&self.levels);
+        all.map(|(id, table)| (id.clone(), table.clone())).collect()
+    }
+
     /// Number of trials of a session, including practice.
     pub fn trials(&self) -> usize {
         match self.orders.as_ref().and_then(|rows| rows.values().next()) {
@@ -166,6 +175,8 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     if purpose != Purpose::Data {
         join::certificates(&protocol, &others, &spans, &mut findings);
     }
+    let played = purpose != Purpose::Data;
+    let levels = families::realizations(&protocol, &others, &spans, played, &mut findings);
     let orders = others.orders.take();
     // An order whose file is missing cannot be checked.
     if orders.is_some() || !matches!(protocol.design.order, Order::File(_)) {
@@ -191,6 +202,7 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
         folder,
         path,
         models,
+        levels,
         orders,
         files,
         fingerprints: parts.fingerprints(),
@@ -209,6 +221,8 @@ struct OtherFiles<'f> {
     orders: Option<FileOrders>,
     /// Realization → index in `opened`.
     models: BTreeMap<ModelId, usize>,
+    /// The same for the ends of families.
+    ends: BTreeMap<ModelId, usize>,
 }
 
 #[derive(Debug)]
@@ -226,6 +240,7 @@ impl<'f> OtherFiles<'f> {
             opened: Vec::new(),
             orders: None,
             models: BTreeMap::new(),
+            ends: BTreeMap::new(),
         }
     }
 
@@ -271,15 +286,19 @@ impl<'f> OtherFiles<'f> {
         Ok(())
     }
 
-    /// Assigns each realization its file.
+    /// Assigns each realization and each end of a family its file.
     fn assign(&mut self, protocol: &Protocol) {
+        let index = |file: Option<&String>| self.opened.iter().position(|o| Some(&o.file) == file);
         for model in &protocol.models {
-            let index = self
-                .opened
-                .iter()
-                .position(|o| Some(&o.file) == model.file.as_ref());
-            if let Some(index) = index {
+            if let Some(index) = index(model.file.as_ref()) {
                 self.models.insert(model.id.clone(), index);
+            }
+        }
+        for family in &protocol.families {
+            for (end, file) in [("from", Some(&family.from)), ("to", family.to.as_ref())] {
+                if let (Some(id), Some(index)) = (family_file(&family.id, end), index(file)) {
+                    self.ends.insert(id, index);
+                }
             }
         }
     }
@@ -292,7 +311,8 @@ impl<'f> OtherFiles<'f> {
     }
 
     fn realization(&self, id: &ModelId) -> Option<&Realization> {
-        self.opened[*self.models.get(id)?].realization.as_ref()
+        let index = self.models.get(id).or_else(|| self.ends.get(id))?;
+        self.opened[*index].realization.as_ref()
     }
 
     fn realizations(&self) -> BTreeMap<ModelId, Realization> {
@@ -303,8 +323,7 @@ impl<'f> OtherFiles<'f> {
     }
 
     fn bytes_by_model(&self) -> BTreeMap<ModelId, Vec<u8>> {
-        self.models
-            .iter()
+        (self.models.iter().chain(&self.ends))
             .map(|(id, index)| (id.clone(), self.opened[*index].bytes.clone()))
             .collect()
     }

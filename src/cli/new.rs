@@ -24,6 +24,42 @@ const MODELS: [(&str, &str); 3] = [
     ),
 ];
 
+/// The table that families vary: it passes its certificate.
+const STATIC: (&str, &str) = (
+    "models/static.toml",
+    include_str!("../../protocols/turn-signal-extended/models/static.toml"),
+);
+
+/// What a trial of a new study is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TrialKind {
+    /// One realization is rated
+    Rating,
+    /// Two realizations, one is chosen
+    Pairs,
+    /// Two-interval forced choice with constant stimuli
+    #[value(name = "2ifc")]
+    TwoIntervals,
+    /// A threshold by staircases
+    Staircase,
+    /// A threshold by QUEST+
+    #[value(name = "questplus")]
+    QuestPlus,
+}
+
+impl TrialKind {
+    /// The commented protocol and its model files.
+    fn files(self) -> (&'static str, &'static [(&'static str, &'static str)]) {
+        match self {
+            Self::Rating => (PROTOCOL, &MODELS),
+            Self::Pairs => (include_str!("new/pairs.toml"), &MODELS),
+            Self::TwoIntervals => (include_str!("new/constant.toml"), &[STATIC]),
+            Self::Staircase => (include_str!("new/staircase.toml"), &[STATIC]),
+            Self::QuestPlus => (include_str!("new/questplus.toml"), &[STATIC]),
+        }
+    }
+}
+
 /// Arguments of `study new`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
@@ -32,6 +68,9 @@ pub(super) struct Args {
     /// Start a replication of the study in this results folder
     #[arg(long, value_name = "RESULTS")]
     from: Option<PathBuf>,
+    /// What a trial is
+    #[arg(long, value_enum, default_value_t = TrialKind::Rating, conflicts_with = "from")]
+    kind: TrialKind,
 }
 
 /// Runs `study new`.
@@ -42,7 +81,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let seed = today.format("%Y%m%d").to_string().parse().unwrap_or(1);
     let files = match &args.from {
         Some(results) => replication(results, &today.to_string(), seed)?,
-        None => starter(dir, seed)?,
+        None => starter(dir, seed, args.kind)?,
     };
     write(dir, &files)?;
     let shown = dir.display().to_string();
@@ -57,13 +96,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
 /// Relative path, with `/`, and bytes.
 type Files = Vec<(String, Vec<u8>)>;
 
-fn starter(dir: &Path, seed: u64) -> Result<Files, Failure> {
+fn starter(dir: &Path, seed: u64, kind: TrialKind) -> Result<Files, Failure> {
     let name = std::path::absolute(dir).map_err(|e| Failure::file(dir, &e))?;
     let name = name.file_name().unwrap_or_default().to_string_lossy();
-    let text = with_values(PROTOCOL, &study_id(&name), seed)?;
+    let (text, models) = kind.files();
+    let text = with_values(text, &study_id(&name), seed)?;
     let mut files = vec![(load::FILE_NAME.to_owned(), text.into_bytes())];
-    for (path, text) in MODELS {
-        files.push((path.to_owned(), text.as_bytes().to_vec()));
+    for (path, text) in models {
+        files.push(((*path).to_owned(), text.as_bytes().to_vec()));
     }
     Ok(files)
 }

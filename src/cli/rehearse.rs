@@ -5,14 +5,12 @@ use super::{Console, Failure, Kind, load};
 use crate::device::faults::FaultPlan;
 use crate::device::manual::Manual;
 use crate::device::virtual_device::{Options, VirtualDevice};
-use crate::rater::{Effect, Impression, Rater};
+use crate::rater::{Effect, Percepts, Rater};
 use crate::runner::Setup;
 use crate::runner::clock::{Clock as _, VirtualClock};
 use crate::runner::rehearsal::{first_day, run_one};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use study_base::text::ModelId;
 use study_core::outcome::{State, Status};
 use study_core::protocol::{DeviceKind, Seat};
 use study_core::store::{Frozen, SeatKind, StudyFolder};
@@ -73,11 +71,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let folder = study.path().to_owned();
     refuse_occupied(&study, &folder)?;
 
-    let impressions: BTreeMap<ModelId, Impression> = loaded
-        .models
-        .iter()
-        .map(|(id, realization)| (id.clone(), Impression::of(realization)))
-        .collect();
+    let tables = loaded.tables();
+    let percepts = Percepts::of(&loaded.protocol, &tables);
     let effect = match args.effect {
         EffectArg::BuiltIn => Effect::BuiltIn,
         EffectArg::None => Effect::None,
@@ -103,7 +98,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let setup = Setup {
             protocol: protocol.clone(),
             orders: orders.clone(),
-            models: loaded.models.clone(),
+            models: tables.clone(),
             fingerprints: loaded.fingerprints.clone(),
             study: folder_of_study,
             kind: SeatKind::Simulated,
@@ -119,7 +114,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         };
         let mut rater = Rater::new(seed, number, effect);
         let id = format!("SIM{number:03}");
-        run_one(setup, &id, &clock, &mut rater, &impressions)
+        run_one(setup, &id, &clock, &mut rater, &percepts)
             .map_err(|e| Failure::new(Kind::Results, e))?;
         progress.inc(1);
     }

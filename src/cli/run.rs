@@ -152,11 +152,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let folder = study.path().to_owned();
     // After a kill the tables may be older than the journals: update them first.
     study.refresh(&loaded.protocol)?;
+    let models = loaded.tables();
     let protocol = Arc::new(loaded.protocol);
     let setup = Setup {
         protocol: protocol.clone(),
         orders: loaded.orders.map(Arc::new),
-        models: loaded.models,
+        models,
         fingerprints: loaded.fingerprints,
         study,
         kind: seats,

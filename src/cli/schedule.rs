@@ -1,11 +1,12 @@
 //! `study schedule`: the orders of a protocol and their balance.
 
+mod parts;
 mod table;
 
 use super::{Console, Failure, Kind, study_folder};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
-use study_core::protocol::{FileOrders, Protocol, Seat, Trial};
+use study_core::protocol::{FileOrders, Protocol, Seat, Stimuli, Trial};
 use study_core::schedule::{Planner, ScheduleError};
 use study_core::store::{StudyFolder, layout};
 
@@ -23,7 +24,8 @@ pub(super) struct Args {
     /// Rows to show, such as 7 or 1-40 [default: all planned participants]
     #[arg(long, value_name = "RANGE", value_parser = parse_rows)]
     rows: Option<RangeInclusive<u32>>,
-    /// Print CSV: row,trial,block,position,model,repetition,practice
+    /// Print CSV: row,trial,block,position,model,repetition,practice; with parts also
+    /// part,first,second,track,intervals
     #[arg(long)]
     csv: bool,
     /// Folder of the results; the orders of a started study are not shown
@@ -109,6 +111,9 @@ fn show(
         let plans = rows
             .map(|row| Ok((row, plan(row)?)))
             .collect::<Result<Vec<_>, Failure>>()?;
+        if !protocol.parts.is_empty() {
+            return console.out(parts::render(protocol, &plans));
+        }
         console.out(table::render(
             protocol,
             planner.models(),
@@ -132,30 +137,53 @@ fn csv(header: bool, plans: &[(u32, Vec<Trial>)]) -> Result<String, Failure> {
     let mut out = csv::WriterBuilder::new()
         .terminator(csv::Terminator::CRLF)
         .from_writer(Vec::new());
+    const NAMES: [&str; 7] = [
+        "row",
+        "trial",
+        "block",
+        "position",
+        "model",
+        "repetition",
+        "practice",
+    ];
+    /// Further columns of a study with parts.
+    const OF_PARTS: [&str; 5] = ["part", "first", "second", "track", "intervals"];
+    let has_parts = plans
+        .iter()
+        .any(|(_, plan)| plan.iter().any(|t| t.part.is_some()));
+    let more = if has_parts { &OF_PARTS[..] } else { &[] };
     if header {
-        out.write_record([
-            "row",
-            "trial",
-            "block",
-            "position",
-            "model",
-            "repetition",
-            "practice",
-        ])
-        .map_err(|e| broken(&e))?;
+        out.write_record(NAMES.iter().chain(more))
+            .map_err(|e| broken(&e))?;
     }
     for (row, plan) in plans {
         for t in plan {
-            out.write_record([
-                row.to_string().as_str(),
-                t.trial.to_string().as_str(),
-                t.block.to_string().as_str(),
-                t.position.to_string().as_str(),
-                t.model.as_str(),
-                t.repetition.to_string().as_str(),
-                if t.practice { "true" } else { "false" },
-            ])
-            .map_err(|e| broken(&e))?;
+            let mut record = vec![
+                row.to_string(),
+                t.trial.to_string(),
+                t.block.to_string(),
+                t.position.to_string(),
+                t.model().map_or_else(String::new, ToString::to_string),
+                t.repetition.to_string(),
+                t.practice.to_string(),
+            ];
+            if has_parts {
+                let (first, second) = match &t.stimuli {
+                    Stimuli::Pair { pair: [a, b] } => (a.to_string(), b.to_string()),
+                    _ => (String::new(), String::new()),
+                };
+                let intervals = match &t.stimuli {
+                    Stimuli::Track { intervals, .. } => parts::intervals(intervals),
+                    _ => String::new(),
+                };
+                let part = t
+                    .part
+                    .as_ref()
+                    .map_or_else(String::new, ToString::to_string);
+                let track = t.track().map_or_else(String::new, ToString::to_string);
+                record.extend([part, first, second, track, intervals]);
+            }
+            out.write_record(record).map_err(|e| broken(&e))?;
         }
     }
     let bytes = out.into_inner().map_err(|e| broken(&e))?;

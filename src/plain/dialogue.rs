@@ -10,7 +10,7 @@ use study_core::session::view::{Correctable, DeviceState, Mirror, Telemetry};
 use study_core::session::{Input, Roster, Screen, View};
 
 /// What the lines that begin with a slash do, in the order of the help.
-const COMMANDS: [(&str, &str); 9] = [
+const COMMANDS: [(&str, &str); 10] = [
     ("/stop", "stops the device at once"),
     ("/remark TEXT", "keeps a remark of the experimenter"),
     ("/says TEXT", "keeps a remark of the participant"),
@@ -19,6 +19,10 @@ const COMMANDS: [(&str, &str); 9] = [
     ("/bad REASON", "marks the trial as bad; it is repeated"),
     ("/pause", "pauses"),
     ("/again", "says the page again"),
+    (
+        "/replay",
+        "lets a trial be felt again, where that is possible",
+    ),
     ("/quit", "leaves; the session can be resumed"),
 ];
 
@@ -295,6 +299,8 @@ impl Dialogue {
                 Ok(vec![Input::MarkBad { reason }])
             }
             "/pause" => Ok(vec![Input::Pause]),
+            "/replay" if view.can_replay => Ok(vec![Input::PlayAgain]),
+            "/replay" => say("This cannot be felt again."),
             "/again" => {
                 self.repeat();
                 Ok(Vec::new())

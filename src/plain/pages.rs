@@ -2,6 +2,7 @@
 
 use super::answers;
 use crate::tui::theme::{Colour, Theme};
+use crate::tui::views::playing::ordinal;
 use crate::tui::views::prose::prose;
 use crate::tui::views::trouble::Trouble;
 use std::fmt::Display;
@@ -40,7 +41,15 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
             to_experimenter,
             ..
         } => page.form(view, questions, at, *to_experimenter),
-        Screen::Playing { keep_exploring, .. } => {
+        Screen::Playing {
+            keep_exploring,
+            interval,
+            ..
+        } => {
+            if let Some((at, of)) = interval {
+                let which = capital(words.get(ordinal(*at)));
+                page.lines.push(format!("{which} ({at} / {of})"));
+            }
             page.lines.push(
                 match view.device {
                     DeviceKind::Manual => words.get(Phrase::FeelSample),
@@ -65,14 +74,14 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
 fn top(view: &View) -> Vec<String> {
     let mut parts = Vec::new();
     if let Some(progress) = view.progress {
-        let phrase = match progress.practice {
-            true => Phrase::PracticeOf,
-            false => Phrase::TrialOf,
+        let number = ("n", &progress.current as &dyn Display);
+        let phrase = match (progress.practice, progress.total) {
+            (true, _) => Phrase::PracticeOf,
+            (false, Some(_)) => Phrase::TrialOf,
+            (false, None) => Phrase::TrialNumber,
         };
-        let values = [
-            ("n", &progress.current as &dyn Display),
-            ("total", &progress.total),
-        ];
+        let total = progress.total.unwrap_or(progress.current);
+        let values = [number, ("total", &total as &dyn Display)];
         parts.push(capital(&view.words.fill(phrase, &values)));
     }
     if let Screen::Form { page, pages, .. } = &view.screen
@@ -113,6 +122,10 @@ impl Page {
         let (lines, prompt) = answers::ask(question, &view.words);
         self.lines.extend(lines);
         self.prompt = prompt;
+        if view.can_replay {
+            let again = view.words.get(Phrase::FeelAgain);
+            self.prompt.push_str(&format!(" /replay: {again}."));
+        }
     }
 
     fn trouble(&mut self, view: &View) {

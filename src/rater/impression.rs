@@ -94,25 +94,7 @@ impl Impression {
     /// first call also simulates the target.
     pub fn of(realization: &Realization) -> Self {
         let reference = &*REFERENCE;
-        let table = realization.table();
-        let [low, high] = realization.trained.x_mm;
-        let trained = realization.trained.v_mm_s;
-        let mut state = DirectionState::default();
-        let predicted: Vec<f64> = reference
-            .motion
-            .iter()
-            .map(|motion| {
-                let z = state.step(realization.direction, *motion);
-                // Limited to the trained range, as on the device.
-                let limited = Motion {
-                    x_mm: motion.x_mm.max(low).min(high),
-                    v_mm_s: motion.v_mm_s.max(-trained).min(trained),
-                    ..*motion
-                };
-                force_n(&table, z, limited)
-            })
-            .collect();
-        let predicted = smoothed(&predicted);
+        let predicted = predicted(realization);
         let difference = |keep: &dyn Fn(&Motion) -> bool| {
             let squares: Vec<f64> = reference
                 .motion
@@ -132,6 +114,14 @@ impl Impression {
             detent: largest(&predicted) / reference.largest_n,
             crispness: rate(&predicted) / reference.rate,
         }
+    }
+
+    /// Root mean square difference of the forces of two realizations in the fixed
+    /// exploration, N.
+    pub(super) fn distance_n(a: &Realization, b: &Realization) -> f64 {
+        let (a, b) = (predicted(a), predicted(b));
+        let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
+        (squares / a.len() as f64).sqrt()
     }
 
     /// Opinion of a rater without bias and noise, on a scale from 1 to 7.
@@ -155,6 +145,27 @@ const BEST: f64 = 6.0;
 const PER_NEWTON: f64 = 0.7;
 /// Decrease of the opinion per unit of activeness.
 const PER_ACTIVENESS: f64 = 0.5;
+
+/// The force of a realization in the fixed exploration.
+fn predicted(realization: &Realization) -> Vec<f64> {
+    let table = realization.table();
+    let [low, high] = realization.trained.x_mm;
+    let trained = realization.trained.v_mm_s;
+    let mut state = DirectionState::default();
+    let forces: Vec<f64> = (REFERENCE.motion.iter())
+        .map(|motion| {
+            let z = state.step(realization.direction, *motion);
+            // Limited to the trained range, as on the device.
+            let limited = Motion {
+                x_mm: motion.x_mm.max(low).min(high),
+                v_mm_s: motion.v_mm_s.max(-trained).min(trained),
+                ..*motion
+            };
+            force_n(&table, z, limited)
+        })
+        .collect();
+    smoothed(&forces)
+}
 
 fn activeness(realization: &Realization) -> f64 {
     let hand = HandParameters::default();

@@ -7,12 +7,11 @@
 
 use super::clock::VirtualClock;
 use super::{Runner, Setup};
-use crate::rater::{Impression, Rater};
+use crate::rater::{Percepts, Rater};
 use chrono::{DateTime, FixedOffset};
-use std::collections::BTreeMap;
 use std::time::Duration;
 use study_base::text::{ModelId, QuestionId};
-use study_core::protocol::{Answer, Question};
+use study_core::protocol::{Answer, Protocol, Question, Trial};
 use study_core::session::{Config, Ending, Input, Screen, View};
 
 /// Time that a rater spends on a screen without a question, s.
@@ -63,7 +62,7 @@ pub fn run_one(
     participant: &str,
     clock: &VirtualClock,
     rater: &mut Rater,
-    impressions: &BTreeMap<ModelId, Impression>,
+    percepts: &Percepts,
 ) -> Result<Ending, RehearsalError> {
     let config = Config {
         participant: participant.to_owned(),
@@ -71,6 +70,7 @@ pub fn run_one(
         auto_identify: true,
         ..Config::default()
     };
+    let protocol = setup.protocol.clone();
     let mut runner = Runner::new(setup, config);
     let mut plan = Plan::default();
     for _ in 0..MAX_TURNS {
@@ -94,8 +94,13 @@ pub fn run_one(
             }
             _ => {}
         }
-        let felt = runner.felt().and_then(|id| impressions.get(id));
-        let inputs = plan.turn(&view, rater, felt, clock);
+        let felt = Felt {
+            protocol: &protocol,
+            percepts,
+            model: runner.felt(),
+            trial: runner.presented(),
+        };
+        let inputs = plan.turn(&view, rater, &felt, clock);
         if let Some(ended) = runner.step(inputs) {
             let why = match ended.unsaved {
                 None => return Ok(ended.ending),
@@ -113,6 +118,14 @@ pub fn run_one(
     })
 }
 
+/// What stands for feeling: the realization that was played last, and the whole trial.
+struct Felt<'a> {
+    protocol: &'a Protocol,
+    percepts: &'a Percepts,
+    model: Option<&'a ModelId>,
+    trial: Option<(&'a Trial, &'a [ModelId])>,
+}
+
 /// State of a rater during a session.
 #[derive(Debug, Default)]
 struct Plan {
@@ -126,7 +139,7 @@ impl Plan {
         &mut self,
         view: &View,
         rater: &mut Rater,
-        felt: Option<&Impression>,
+        felt: &Felt<'_>,
         clock: &VirtualClock,
     ) -> Vec<Input> {
         let pass = |s: f64| clock.advance(Duration::from_secs_f64(s.max(0.0)));
@@ -134,7 +147,7 @@ impl Plan {
             self.exploring_s = None;
         }
         match &view.screen {
-            Screen::Who { .. } | Screen::Loading | Screen::Stopping | Screen::Saving => {
+            Screen::Who { .. } | Screen::Loading { .. } | Screen::Stopping | Screen::Saving => {
                 pass(0.02);
                 Vec::new()
             }
@@ -203,11 +216,18 @@ impl Plan {
 fn answers(
     questions: &[Question],
     rater: &mut Rater,
-    felt: Option<&Impression>,
+    felt: &Felt<'_>,
 ) -> Vec<(QuestionId, Answer)> {
+    let impression = felt.model.and_then(|id| felt.percepts.impression(id));
+    let mut answer = |question: &Question| {
+        let trial = felt.trial;
+        let compared =
+            trial.and_then(|trial| rater.compare(question, trial, felt.protocol, felt.percepts));
+        compared.unwrap_or_else(|| rater.answer(question, impression))
+    };
     questions
         .iter()
-        .map(|q| (q.id.clone(), rater.answer(q, felt)))
+        .map(|q| (q.id.clone(), answer(q)))
         .filter(|(_, answer)| !matches!(answer, Answer::Text(text) if text.is_empty()))
         .collect()
 }

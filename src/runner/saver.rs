@@ -30,6 +30,8 @@ pub enum Job {
         trial: u32,
         /// Attempt number, part of the file name.
         attempt: u32,
+        /// Interval, part of the file name, if the trial has several.
+        interval: Option<u32>,
     },
     /// Write samples of that attempt.
     Telemetry(Vec<Sample>),
@@ -81,18 +83,19 @@ struct Worker {
     broken: bool,
 }
 
+/// Trial, attempt and, if the trial has several, interval.
+type Presented = (u32, u32, Option<u32>);
+
 /// The telemetry of the attempt under way.
 struct Telemetry {
-    trial: u32,
-    attempt: u32,
+    of: Presented,
     /// The file, or why there is none.
     file: Result<TelemetryWriter, String>,
 }
 
 /// A completed telemetry file, or why there is none.
 struct Ended {
-    trial: u32,
-    attempt: u32,
+    of: Presented,
     file: Result<TelemetryFile, String>,
 }
 
@@ -231,14 +234,17 @@ impl Worker {
                     Err(error) => vec![SaveEvent::Failed(error.to_string())],
                 }
             }
-            Job::TelemetryBegin { trial, attempt } => {
+            Job::TelemetryBegin {
+                trial,
+                attempt,
+                interval,
+            } => {
                 let mut events = self.end_telemetry();
-                let file = self.folder.telemetry(trial, attempt);
+                let file = self.folder.telemetry_of(trial, attempt, interval);
                 let file = file.map_err(|error| error.to_string());
                 events.extend(file.as_ref().err().cloned().map(SaveEvent::TelemetryLost));
                 self.telemetry = Some(Telemetry {
-                    trial,
-                    attempt,
+                    of: (trial, attempt, interval),
                     file,
                 });
                 events
@@ -269,10 +275,11 @@ impl Worker {
             trial,
             attempt,
             telemetry,
+            interval,
             ..
         } = &mut event
             && let Some(ended) = self.ended.take()
-            && (ended.trial, ended.attempt) == (*trial, *attempt)
+            && ended.of == (*trial, *attempt, *interval)
         {
             match ended.file {
                 Ok(file) => *telemetry = Some(file),
@@ -282,6 +289,7 @@ impl Worker {
                         trial: *trial,
                         attempt: *attempt,
                         reason,
+                        interval: *interval,
                     },
                     awaited: false,
                 }),
@@ -314,12 +322,7 @@ impl Worker {
 
     /// Finishes the telemetry file.
     fn end_telemetry(&mut self) -> Vec<SaveEvent> {
-        let Some(Telemetry {
-            trial,
-            attempt,
-            file,
-        }) = self.telemetry.take()
-        else {
+        let Some(Telemetry { of, file }) = self.telemetry.take() else {
             return Vec::new();
         };
         let mut events = Vec::new();
@@ -329,11 +332,7 @@ impl Worker {
                 error.to_string()
             })
         });
-        self.ended = Some(Ended {
-            trial,
-            attempt,
-            file,
-        });
+        self.ended = Some(Ended { of, file });
         events
     }
 

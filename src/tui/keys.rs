@@ -61,6 +61,8 @@ pub enum Key {
     Pause,
     /// F6 or Ctrl-D.
     Decline,
+    /// F7 or Ctrl-F.
+    Replay,
     /// F10, Ctrl-Q or Ctrl-C.
     Quit,
     /// Ctrl-Z.
@@ -101,6 +103,7 @@ pub fn read(event: &KeyEvent) -> Option<Key> {
         KeyCode::F(4) => Key::MarkBad,
         KeyCode::F(5) => Key::Pause,
         KeyCode::F(6) => Key::Decline,
+        KeyCode::F(7) => Key::Replay,
         KeyCode::F(10) => Key::Quit,
         // AltGr arrives as Ctrl and Alt on some systems: a character.
         KeyCode::Char(c) if control && alt => Key::Char(c),
@@ -118,6 +121,7 @@ fn with_control(c: char) -> Option<Key> {
         'c' | 'q' => Key::Quit,
         'd' => Key::Decline,
         'e' => Key::Correct,
+        'f' => Key::Replay,
         'h' => Key::Backspace,
         'j' => Key::NewLine,
         'p' => Key::Pause,

@@ -24,7 +24,8 @@ each with its line and, where there is one, a suggestion. Paths are relative to 
 folder, so that a study can be copied as a whole. Texts can be in any language and have at most 64 KiB.
 
 \"If absent\" says what a key means that is left out: *required* is an error, a value is the default, and — means
-that the study has no such thing. Every key belongs to the format `study-protocol/1`.
+that the study has no such thing. `[[parts]]`, `[[families]]` and `[[tracks]]` need the format `study-protocol/2`;
+every other key belongs to both formats.
 
 Changes of the design, of models, limits and rating scales make a new study. Changes of texts, of `[analysis]`, of
 the planned participants, VAFs and covariates can be made while a study runs, with `study amend`.
@@ -35,15 +36,25 @@ A whole protocol is in [protocols/turn-signal](../protocols/turn-signal/protocol
 fn page() -> String {
     let mut out = HEAD.to_owned();
     table(&mut out, "The top level", "", &ROOT[..1]);
+    words(&mut out, &ROOT[..1]);
     let mut questions = Vec::new();
     for key in &ROOT[1..] {
         match key.kind {
             Kind::Table(keys) => section(&mut out, key, key.name, keys),
             Kind::Tables(keys) => {
-                table(&mut out, &format!("`[[{}]]`", key.name), key.effect, keys);
+                let path = format!("[[{}]]", key.name);
+                table(&mut out, &format!("`{path}`"), key.effect, keys);
                 words(&mut out, keys);
+                nested(&mut out, key.name, keys);
             }
-            Kind::Variants(variants) => questions.push((key, variants)),
+            Kind::Variants(variants) if std::ptr::eq(variants, file::QUESTIONS) => {
+                questions.push((key, variants));
+            }
+            Kind::Variants(variants) => {
+                let _ = writeln!(out, "\n## `[[{}]]`\n\n{}", key.name, key.effect);
+                alternatives(&mut out, variants);
+                nested(&mut out, key.name, variants.common);
+            }
             _ => panic!("{}", key.name),
         }
     }
@@ -63,6 +74,11 @@ fn page() -> String {
 fn section(out: &mut String, key: &Key, path: &str, keys: &[Key]) {
     table(out, &format!("`[{path}]`"), key.effect, keys);
     words(out, keys);
+    nested(out, path, keys);
+}
+
+/// The tables inside a section.
+fn nested(out: &mut String, path: &str, keys: &[Key]) {
     for key in keys {
         let path = format!("{path}.{}", key.name);
         match key.kind {
@@ -78,6 +94,21 @@ fn section(out: &mut String, key: &Key, path: &str, keys: &[Key]) {
                 let _ = writeln!(out, "\n### `[[{path}]]`");
                 alternatives(out, variants);
             }
+            Kind::Variant(variants) => {
+                let _ = writeln!(out, "\n### `{path}`");
+                alternatives(out, variants);
+                let shapes = variants.shapes.iter();
+                let mut seen: Vec<&str> = Vec::new();
+                for key in shapes.flat_map(|shape| shape.keys) {
+                    let own = std::slice::from_ref(key);
+                    if !seen.contains(&key.name) {
+                        seen.push(key.name);
+                        words(out, own);
+                        nested(out, &path, own);
+                    }
+                }
+            }
+            Kind::Tables(keys) => table(out, &format!("`[[{path}]]`"), "", keys),
             _ => {}
         }
     }
@@ -128,7 +159,8 @@ fn rows(out: &mut String, keys: &[Key]) {
                 format!("{}, in {unit}", key.kind.describe())
             }
             Kind::Table(_) => "a table, below".to_owned(),
-            Kind::Variants(_) => "tables, below".to_owned(),
+            Kind::Variant(_) => "a table, below".to_owned(),
+            Kind::Variants(_) | Kind::Tables(_) => "tables, below".to_owned(),
             Kind::Word(_) => "a word, below".to_owned(),
             Kind::WordOrTable(..) => "a word or a table, below".to_owned(),
             kind => kind.describe(),

@@ -235,6 +235,33 @@ fn the_shipped_protocols_are_valid_and_broken_ones_are_not() {
     }
 }
 
+/// The templates of studies with parts are read without a fault and fit the schema; of a
+/// misspelt key both say so.
+#[test]
+fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
+    let schema = schema();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["pairs", "constant", "staircase", "questplus"] {
+        let file = format!("src/cli/new/{name}.toml");
+        let text = std::fs::read_to_string(root.join(&file)).unwrap();
+        let parsed = file::parse("p", &text);
+        assert!(
+            parsed.findings.faults.is_empty(),
+            "{}",
+            parsed.findings.render(false)
+        );
+        let as_json = |text: &str| {
+            let value: toml::Value = toml::from_str(text).unwrap();
+            serde_json::to_value(value).unwrap()
+        };
+        let found = |text: &str| faults(&schema, &schema, &as_json(text), &file);
+        assert_eq!(found(&text), Vec::<String>::new());
+        let broken = text.replacen("prompt =", "pompt =", 1);
+        assert!(!found(&broken).is_empty());
+        assert!(file::parse("p", &broken).protocol.is_none());
+    }
+}
+
 /// Validates by the part of JSON Schema that is used; another keyword fails the test.
 fn faults(root: &Value, schema: &Value, value: &Value, at: &str) -> Vec<String> {
     let mut found = Vec::new();
@@ -315,6 +342,13 @@ fn faults(root: &Value, schema: &Value, value: &Value, at: &str) -> Vec<String> 
             "exclusiveMinimum" if number <= rule.as_f64() => say(format!("not above {rule}")),
             "minLength" if value.as_str() == Some("") => say("empty".to_owned()),
             "minItems" if value.as_array().is_some_and(Vec::is_empty) => say("empty".to_owned()),
+            "exclusiveMaximum" if number >= rule.as_f64() => say(format!("not below {rule}")),
+            "maxItems" => {
+                let most = rule.as_u64().unwrap() as usize;
+                if value.as_array().is_some_and(|list| list.len() > most) {
+                    say(format!("more than {most}"));
+                }
+            }
             "pattern" => {
                 if value
                     .as_str()
@@ -324,7 +358,7 @@ fn faults(root: &Value, schema: &Value, value: &Value, at: &str) -> Vec<String> 
                 }
             }
             "const" | "enum" | "minimum" | "maximum" | "exclusiveMinimum" | "minLength"
-            | "minItems" => {}
+            | "minItems" | "exclusiveMaximum" => {}
             other => panic!("keyword {other}"),
         }
     }
@@ -347,6 +381,10 @@ fn matches(pattern: &str, text: &str) -> bool {
         "^[a-z0-9-]{1,64}$" => of(64, "-", false),
         "^[A-Za-z0-9._-]{1,32}$" => of(32, "._-", true),
         "^[A-Za-z0-9_-]{1,32}$" => of(32, "_-", true),
+        "^[A-Za-z0-9_-]{1,20}$" => of(20, "_-", true),
+        "^(all|adjacent|versus:[A-Za-z0-9._-]{1,32})$" => {
+            matches!(text, "all" | "adjacent") || text.starts_with("versus:")
+        }
         "^-?[0-9]+$" => text.parse::<i64>().is_ok(),
         "^-?[0-9]+([.][0-9]+)?$" => text.parse::<f64>().is_ok(),
         other => panic!("pattern {other}"),

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use study::device::virtual_device::{Options, VirtualDevice};
 use study::device::{Device, DeviceError, Identity, Report, Stimulus};
-use study::rater::{Effect, Rater};
+use study::rater::{Effect, Percepts, Rater};
 use study::runner::clock::{Clock as _, VirtualClock};
 use study::runner::rehearsal::{first_day, run_one};
 use study::runner::{Setup, playback_limits};
@@ -173,7 +173,7 @@ fn session(falls_silent: bool) -> (Vec<Load>, Vec<serde_json::Value>) {
         threaded: false,
     };
     let mut rater = Rater::new(1, 1, Effect::None);
-    run_one(setup, "SIM001", &clock, &mut rater, &BTreeMap::new()).unwrap();
+    run_one(setup, "SIM001", &clock, &mut rater, &Percepts::default()).unwrap();
     let journal = std::fs::read_to_string(journal).unwrap();
     let lines = journal
         .lines()

@@ -195,7 +195,7 @@ impl Run {
         let screen = self.session.view(self.now).screen;
         let between_trials = matches!(
             screen,
-            Screen::Reference { .. } | Screen::Loading | Screen::Playing { .. }
+            Screen::Reference { .. } | Screen::Loading { .. } | Screen::Playing { .. }
         );
         if between_trials && chance.percent(3) {
             let gap_s = [60, 40_000][chance.below(2)];
@@ -208,7 +208,7 @@ impl Run {
             }
             Screen::Reference { .. } if chance.percent(6) => self.send(mark()),
             Screen::Reference { .. } => self.send(Input::Advance),
-            Screen::Loading => match chance.below(12) {
+            Screen::Loading { .. } => match chance.below(12) {
                 0 | 1 => self.send(fault()),
                 2 => self.send(Input::Stop),
                 3 => self.send(Input::Pause),
@@ -273,11 +273,13 @@ fn check(journal: &[Entry], design: &Design, tally: &mut Tally) {
     let mut flagged = false;
     for entry in journal {
         let decided = match &entry.event {
-            Event::PlaybackStarted { trial: t, attempt } => {
+            Event::PlaybackStarted {
+                trial: t, attempt, ..
+            } => {
                 let same = goes_on && last.is_some_and(|(last, _)| last == *t);
                 (last, goes_on) = (Some((*t, *attempt)), false);
                 if !same && !trial(*t).practice {
-                    felt.push(&trial(*t).model);
+                    felt.extend(trial(*t).model());
                     if violates(&felt, felt.len() - 1, design) {
                         tally.violations += 1;
                         assert!(flagged, "unflagged: {felt:?}, {design:?}, {journal:#?}");
@@ -327,7 +329,7 @@ fn check(journal: &[Entry], design: &Design, tally: &mut Tally) {
         let order: Vec<_> = felt
             .iter()
             .copied()
-            .chain(to_come.map(|t| &t.model))
+            .chain(to_come.filter_map(|t| t.model()))
             .collect();
         let expected = (felt.len()..order.len()).any(|at| violates(&order, at, design));
         assert_eq!(broken, expected, "{order:?}, {design:?}, {:?}", entry.event);

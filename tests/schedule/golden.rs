@@ -18,7 +18,7 @@ fn order(protocol: &Protocol, seat: Seat) -> String {
             text.push(' ');
             block = trial.block;
         }
-        text.push_str(trial.model.as_str());
+        text.push_str(trial.model().expect("one realization").as_str());
     }
     text
 }

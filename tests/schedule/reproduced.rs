@@ -56,7 +56,7 @@ fn seats(last: u32) -> [(Kind, u32); 3] {
 
 /// Numbers of realizations, as the document counts them.
 fn numbers(planner: &Planner, trials: &[Trial]) -> Vec<usize> {
-    let number = |t: &Trial| planner.models().iter().position(|m| *m == t.model);
+    let number = |t: &Trial| planner.models().iter().position(|m| Some(m) == t.model());
     trials
         .iter()
         .map(|t| number(t).expect("it is scheduled"))
@@ -164,7 +164,11 @@ fn a_script_written_from_the_document_makes_the_same_orders() {
             for number in 1..=last {
                 for trial in planner.plan(kind(number)).unwrap() {
                     let kind = kind(number).stream();
-                    ours += &format!("{kind},{number},{},{}\n", trial.position, trial.model);
+                    ours += &format!(
+                        "{kind},{number},{},{}\n",
+                        trial.position,
+                        trial.model().unwrap()
+                    );
                 }
             }
             let mut python = Command::new("python3");

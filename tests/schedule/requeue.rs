@@ -43,7 +43,7 @@ proptest! {
             if stopped && felt.trials.last().is_some_and(|t| *t == queue[0]) {
                 queue.remove(0);
             }
-            let all: Vec<_> = felt.trials.iter().chain(&queue).map(|t| &t.model).collect();
+            let all: Vec<_> = felt.trials.iter().chain(&queue).filter_map(|t| t.model()).collect();
             let violates = |&i: &usize| {
                 let back = all[..i].iter().rposition(|m| *m == all[i]).map(|last| i - last);
                 let run = all[..=i].iter().rev().take_while(|m| **m == all[i]).count();

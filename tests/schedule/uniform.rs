@@ -49,7 +49,7 @@ fn enumerate(protocol: &Protocol) -> BTreeSet<String> {
 }
 
 fn text(plan: &[Trial]) -> String {
-    plan.iter().map(|t| t.model.as_str()).collect()
+    plan.iter().map(|t| t.model().unwrap().as_str()).collect()
 }
 
 /// The point that chi-square is below with probability `p`.
@@ -138,11 +138,11 @@ proptest! {
         let planned = study_core::schedule::plan(&protocol, None, Seat::Row(row));
         prop_assert_eq!(planned.is_err(), infeasible);
         let Ok(planned) = planned else { return Ok(()) };
-        let models: Vec<_> = planned.iter().map(|t| &t.model).collect();
+        let models: Vec<_> = planned.iter().filter_map(|t| t.model()).collect();
         prop_assert_eq!(first_violation(&models, max_run, min_distance), None);
         for model in &protocol.models {
             let times: Vec<_> =
-                planned.iter().filter(|t| t.model == model.id).map(|t| t.repetition).collect();
+                planned.iter().filter(|t| t.model() == Some(&model.id)).map(|t| t.repetition).collect();
             prop_assert_eq!(times, (1..=repetitions).collect::<Vec<_>>());
         }
         for (at, trial) in (1..).zip(&planned) {
@@ -176,7 +176,7 @@ fn an_order_under_constraints_is_made_for_designs_of_every_size() {
         let planner = Planner::new(&protocol, None).unwrap();
         for row in 1..=20 {
             let planned = planner.plan(Seat::Row(row)).unwrap();
-            let models: Vec<_> = planned.iter().map(|t| &t.model).collect();
+            let models: Vec<_> = planned.iter().filter_map(|t| t.model()).collect();
             assert_eq!(first_violation(&models, max_run, min_distance), None);
         }
     }

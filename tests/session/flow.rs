@@ -6,6 +6,7 @@ mod agreement;
 mod blinding;
 mod device;
 mod forms;
+mod parts;
 mod random;
 mod resume;
 mod rig;

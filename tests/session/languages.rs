@@ -22,12 +22,13 @@ fn pages_of_a_session(words: &Arc<Words>) -> Vec<(&'static str, View)> {
                 wait_s: 12.0,
             },
         ),
-        ("loading", Screen::Loading),
+        ("loading", Screen::Loading { interval: None }),
         (
             "playing",
             Screen::Playing {
                 since_s: 4.0,
                 keep_exploring: true,
+                interval: None,
             },
         ),
         ("stopped", Screen::Stopped { can_rate: true }),

@@ -88,6 +88,7 @@ fn playing() -> Screen {
     Screen::Playing {
         since_s: 3.0,
         keep_exploring: false,
+        interval: None,
     }
 }
 
@@ -362,7 +363,7 @@ fn consent_and_drop_out_are_confirmed() {
     let old = Screen::ResumeChoice {
         gap_h: 5.0,
         done: 1,
-        total: 15,
+        total: Some(15),
     };
     let mut desk = Desk::with(old);
     assert_eq!(desk.types("b"), [Input::Resume(Choice::RestartBlock)]);
@@ -385,6 +386,7 @@ fn enter_advances_only_when_the_session_allows_it() {
     let mut desk = Desk::with(Screen::Playing {
         since_s: 1.0,
         keep_exploring: true,
+        interval: None,
     });
     assert_eq!(desk.enter(), []);
     let mut desk = Desk::with(Screen::SaveTrouble {

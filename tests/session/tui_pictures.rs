@@ -57,6 +57,7 @@ fn a_smaller_terminal_says_what_is_needed() {
     let playing = view(Screen::Playing {
         since_s: 1.0,
         keep_exploring: false,
+        interval: None,
     });
     insta::assert_snapshot!("small_40x10", fresh(&playing, 40, 10));
     assert!(
@@ -112,6 +113,7 @@ fn the_arrival_of_telemetry_is_shown_on_request() {
     let mut playing = view(Screen::Playing {
         since_s: 14.0,
         keep_exploring: false,
+        interval: None,
     });
     for (telemetry, words) in [
         (Telemetry::Arrives, "running · telemetry arrives"),

@@ -113,11 +113,11 @@ fn by_hand(screen: Screen, state: DeviceState) -> View {
 pub(crate) fn view(screen: Screen) -> View {
     let armed = matches!(
         screen,
-        Screen::Playing { .. } | Screen::Loading | Screen::Mount { .. }
+        Screen::Playing { .. } | Screen::Loading { .. } | Screen::Mount { .. }
     );
     let device = match screen {
         Screen::Playing { .. } => DeviceState::Running(Telemetry::Arrives),
-        Screen::Loading => DeviceState::Loading,
+        Screen::Loading { .. } => DeviceState::Loading,
         Screen::Stopping => DeviceState::Stopping,
         Screen::DeviceTrouble { .. } => DeviceState::Fault,
         Screen::Who { .. } => DeviceState::Unknown,
@@ -133,10 +133,11 @@ pub(crate) fn view(screen: Screen) -> View {
         _ => false,
     };
     View {
+        can_replay: false,
         progress: before.then_some(Progress {
             practice: false,
             current: 7,
-            total: 15,
+            total: Some(15),
         }),
         line: StatusLine {
             participant: if device == DeviceState::Unknown {
@@ -206,6 +207,7 @@ pub(crate) fn view(screen: Screen) -> View {
 
 pub(crate) fn pilot(screen: Screen) -> View {
     View {
+        can_replay: false,
         banner: Some(Banner::Pilot),
         ..view(screen)
     }
@@ -213,6 +215,7 @@ pub(crate) fn pilot(screen: Screen) -> View {
 
 pub(crate) fn asked(screen: Screen) -> View {
     View {
+        can_replay: false,
         entry: Entry::Experimenter,
         ..view(screen)
     }
@@ -236,7 +239,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             view(Screen::ResumeChoice {
                 gap_h: 19.25,
                 done: 6,
-                total: 15,
+                total: Some(15),
             }),
         ),
         (
@@ -279,7 +282,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
                 wait_s: 4.2,
             }),
         ),
-        ("loading", view(Screen::Loading)),
+        ("loading", view(Screen::Loading { interval: None })),
         (
             "mount",
             view(Screen::Mount {
@@ -291,6 +294,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             view(Screen::Playing {
                 since_s: 14.3,
                 keep_exploring: false,
+                interval: None,
             }),
         ),
         (
@@ -298,6 +302,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             pilot(Screen::Playing {
                 since_s: 3.0,
                 keep_exploring: true,
+                interval: None,
             }),
         ),
         (
@@ -306,6 +311,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
                 Screen::Playing {
                     since_s: 14.3,
                     keep_exploring: false,
+                    interval: None,
                 },
                 DeviceState::Felt,
             ),

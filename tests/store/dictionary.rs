@@ -6,7 +6,8 @@
 use std::fs;
 use std::path::Path;
 use study_core::protocol::columns::{
-    AttemptColumn, Column, Kind, ParticipantColumn, RatingColumn, SampleColumn, UsedColumn,
+    AttemptColumn, Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, SampleColumn,
+    UsedColumn,
 };
 
 const START: &str = "<!-- columns -->\n";
@@ -66,6 +67,11 @@ fn dictionary() -> String {
             "participants.csv",
             "One row for each participant, by the last session.",
             ParticipantColumn::ALL.iter().map(|c| c.column()),
+        ),
+        table(
+            "intervals.csv",
+            "One row for each presentation, of failed attempts, too; only in a study with parts.",
+            IntervalColumn::ALL.iter().map(|c| c.column()),
         ),
         table(
             "telemetry/TRIAL-aATTEMPT.csv",

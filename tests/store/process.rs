@@ -151,6 +151,7 @@ fn with_telemetry(folder: &SessionFolder, event: &Event) -> Vec<Event> {
                 trial: *trial,
                 attempt: *attempt,
                 reason: e.to_string(),
+                interval: None,
             };
             vec![lost, event]
         }

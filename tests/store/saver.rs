@@ -36,6 +36,7 @@ fn playback(disk: &MemoryDisk, before: impl Fn(&MemoryDisk)) -> (StudyFolder, Ve
     saver.send(Job::TelemetryBegin {
         trial: 1,
         attempt: 1,
+        interval: None,
     });
     saver.send(Job::Telemetry(vec![SAMPLE; 3250]));
     saver.send(Job::TelemetryEnd);

@@ -32,6 +32,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             practice: Vec::new(),
             breaks: None,
             max_attempts: 3,
+            parts_order: PartsOrder::Fixed,
         },
         session: SessionRules {
             entry: Entry::Participant,
@@ -58,6 +59,9 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             .collect(),
         questions: Vec::new(),
         setup: Vec::new(),
+        parts: Vec::new(),
+        families: Vec::new(),
+        tracks: Vec::new(),
         intake: Vec::new(),
         outro: Vec::new(),
         power: Default::default(),

@@ -137,9 +137,10 @@ pub fn schedule() -> Vec<Trial> {
             trial: n,
             block: 1,
             position: n,
-            model: model(id),
+            stimuli: Stimuli::One { model: model(id) },
             repetition: 1,
             practice: false,
+            part: None,
         })
         .collect()
 }
@@ -178,8 +179,10 @@ pub fn begun(trial: u32, attempt: u32, position: u32, id: &str) -> Event {
         trial,
         attempt,
         position,
-        model: model(id),
+        model: Some(model(id)),
         reference_s: 1.5,
+        intervals: Vec::new(),
+        level: None,
     }
 }
 
@@ -200,6 +203,7 @@ pub fn ended(trial: u32, attempt: u32) -> Event {
         stopped: false,
         telemetry: None,
         rendering: None,
+        interval: None,
     }
 }
 
@@ -230,7 +234,11 @@ pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
     let mut events = vec![started(id, number, seat), intake, Event::InstructionsRead];
     let play = |events: &mut Vec<Event>, trial, attempt, position, id| {
         events.push(begun(trial, attempt, position, id));
-        events.push(Event::PlaybackStarted { trial, attempt });
+        events.push(Event::PlaybackStarted {
+            trial,
+            attempt,
+            interval: None,
+        });
         events.push(ended(trial, attempt));
     };
     let done = |trial, attempt| Event::TrialDone {

@@ -118,21 +118,23 @@ pub fn is_unsafe(c: char) -> bool {
 
 /// A string that is not an identifier.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{}` is not a {what}: use 1 to 32 of {allowed}", Untrusted(.given))]
+#[error("`{}` is not a {what}: use 1 to {most} of {allowed}", Untrusted(.given))]
 pub struct BadId {
     /// The string.
     pub given: String,
     what: &'static str,
+    most: usize,
     allowed: &'static str,
 }
 
 fn check_id(
     given: &str,
     what: &'static str,
+    most: usize,
     allowed: &'static str,
     extra: &[char],
 ) -> Result<(), BadId> {
-    let good = (1..=32).contains(&given.len())
+    let good = (1..=most).contains(&given.len())
         && given
             .chars()
             .all(|c| c.is_ascii_alphanumeric() || extra.contains(&c));
@@ -142,13 +144,14 @@ fn check_id(
         Err(BadId {
             given: given.to_owned(),
             what,
+            most,
             allowed,
         })
     }
 }
 
 macro_rules! identifier {
-    ($(#[$doc:meta])* $name:ident, $what:literal, $allowed:literal, $extra:expr) => {
+    ($(#[$doc:meta])* $name:ident, $what:literal, $most:literal, $allowed:literal, $extra:expr) => {
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
         #[serde(try_from = "String", into = "String")]
@@ -161,7 +164,7 @@ macro_rules! identifier {
             /// [`BadId`] if it is empty, too long or holds another character.
             pub fn new(given: impl Into<String>) -> Result<Self, BadId> {
                 let given = given.into();
-                check_id(&given, $what, $allowed, $extra)?;
+                check_id(&given, $what, $most, $allowed, $extra)?;
                 Ok(Self(given))
             }
 
@@ -207,15 +210,21 @@ macro_rules! identifier {
 
 identifier!(
     /// A participant's pseudonym: `[A-Za-z0-9_-]{1,32}`. Names a folder.
-    ParticipantId, "participant id", "A-Z a-z 0-9 _ -", &['_', '-']
+    ParticipantId, "participant id", 32, "A-Z a-z 0-9 _ -", &['_', '-']
 );
 identifier!(
     /// A realization's id: `[A-Za-z0-9._-]{1,32}`. Names a file, without its extension.
-    ModelId, "model id", "A-Z a-z 0-9 . _ -", &['.', '_', '-']
+    ModelId, "model id", 32, "A-Z a-z 0-9 . _ -", &['.', '_', '-']
 );
 identifier!(
     /// A question's id: `[A-Za-z0-9_-]{1,32}`. Names a column.
-    QuestionId, "question id", "A-Z a-z 0-9 _ -", &['_', '-']
+    QuestionId, "question id", 32, "A-Z a-z 0-9 _ -", &['_', '-']
+);
+identifier!(
+    /// The id of a part, family or track of a protocol: `[A-Za-z0-9_-]{1,20}`. The
+    /// answer of a part is a question of this id, and the realizations of a family or
+    /// track have it before a dot, which its length leaves room for.
+    PartId, "part id", 20, "A-Z a-z 0-9 _ -", &['_', '-']
 );
 
 #[cfg(test)]
@@ -303,6 +312,8 @@ mod tests {
         assert!(ParticipantId::new("P01").is_ok());
         assert!(ModelId::new("lambda-0.9995").is_ok());
         assert!(ModelId::new("a/b").is_err());
+        assert!(PartId::new("x".repeat(20)).is_ok());
+        assert!(PartId::new("x".repeat(21)).is_err());
     }
 
     #[test]

@@ -36,7 +36,10 @@ fn main() {
     for row in 1..=protocol.design.participants {
         match planner.plan(Seat::Row(row)) {
             Ok(trials) => {
-                let models: Vec<&str> = trials.iter().map(|t| t.model.as_str()).collect();
+                let models: Vec<&str> = trials
+                    .iter()
+                    .filter_map(|t| Some(t.model()?.as_str()))
+                    .collect();
                 println!("row {row}: {}", models.join(" "));
             }
             Err(error) => println!("row {row}: {error}"),

@@ -15,9 +15,10 @@ pub mod rows;
 
 pub use event::{
     Author, Choice, Entry, Event, Failure, FormId, Moment, Playback, Start, State, TelemetryFile,
+    TrackLevel,
 };
 pub use fidelity::{Defect, Fidelity, Verdict};
-pub use rows::{AttemptEvent, AttemptRow, ParticipantRow, RatingRow, Status};
+pub use rows::{AttemptEvent, AttemptRow, IntervalRow, ParticipantRow, RatingRow, Status};
 
 /// A row says what its realization is; readers of rows need no protocol for it.
 pub use crate::protocol::Role;

@@ -15,6 +15,7 @@ mod exclusion;
 pub mod file;
 pub mod fingerprint;
 pub mod keys;
+pub mod parts;
 pub mod phrases;
 pub mod plan;
 pub mod power;
@@ -22,7 +23,11 @@ pub mod question;
 pub mod schema;
 
 pub use exclusion::Exclusion;
-pub use plan::{Seat, Trial};
+pub use parts::{
+    Compared, Exposure, FamilyRules, Interval, IntervalOrder, Method, Pairs, Part, Presentations,
+    Task, TrackRules, Vary,
+};
+pub use plan::{Seat, Stimuli, Trial};
 pub use question::{Answer, AnswerError, Question, QuestionKind};
 
 use keys::words;
@@ -31,8 +36,10 @@ use std::collections::BTreeMap;
 use study_base::limits::{Limit, Limits};
 use study_base::text::{ModelId, QuestionId};
 
-/// The file format, with its version, that this program reads.
+/// The file format, with its version, of a protocol without parts.
 pub const FORMAT: &str = "study-protocol/1";
+/// The format that `[[parts]]`, `[[families]]` and `[[tracks]]` need.
+pub const FORMAT_2: &str = "study-protocol/2";
 
 /// A whole study file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -63,6 +70,15 @@ pub struct Protocol {
     pub outro: Vec<Question>,
     /// `[analysis]`
     pub analysis: AnalysisRules,
+    /// `[[parts]]`; without any, the study is one rating part.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<Part>,
+    /// `[[families]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub families: Vec<FamilyRules>,
+    /// `[[tracks]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tracks: Vec<TrackRules>,
     /// `[power]`; in no fingerprint.
     #[serde(skip)]
     pub power: power::PowerPlan,
@@ -133,7 +149,8 @@ pub struct Consent {
 pub struct Design {
     /// Planned participants; an analysis with fewer is interim.
     pub participants: u32,
-    /// Trials of each realization that is not for practice.
+    /// Trials of each realization that is not for practice. With parts, each part has
+    /// this and the next four for itself, see [`Protocol::design_of`].
     pub repetitions: u32,
     /// How orders are made.
     pub order: Order,
@@ -147,6 +164,18 @@ pub struct Design {
     pub breaks: Option<Breaks>,
     /// Failed attempts after which a trial is closed as failed.
     pub max_attempts: u32,
+    /// The order of the parts.
+    pub parts_order: PartsOrder,
+}
+
+words! {
+    /// The order of the parts of a session.
+    PartsOrder {
+        /// As in the file.
+        Fixed = "fixed",
+        /// Lines of a Williams design, by row.
+        Williams = "williams",
+    }
 }
 
 /// How the order of trials is made; `docs/schedule.md` specifies each.

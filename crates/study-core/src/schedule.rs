@@ -21,18 +21,20 @@ mod completions;
 pub mod constraints;
 mod inclusion;
 pub mod orders;
+mod pairs;
 mod requeue;
+mod sequence;
+mod tracks;
 
 pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
-use crate::protocol::{Design, FileOrders, Order, Protocol};
-use completions::Completions;
-use constraints::{Rule, Violation};
-use inclusion::Inclusion;
-use std::collections::HashMap;
-use study_base::rng::Stream;
-use study_base::text::ModelId;
+use crate::protocol::{FileOrders, PartsOrder, Protocol, Stimuli, Task};
+use constraints::Violation;
+use pairs::PairOrders;
+use sequence::Sequence;
+use study_base::text::{ModelId, PartId};
+use tracks::TrackOrders;
 
 /// Most trials of a session; more are probably a typing error.
 pub const MAX_TRIALS: u64 = 10_000;
@@ -55,6 +57,14 @@ pub enum ScheduleError {
         realizations: usize,
         /// Trials of each.
         repetitions: u32,
+        /// All trials.
+        trials: u64,
+    },
+    /// More than [`MAX_TRIALS`] trials of tracks.
+    #[error("the tracks of `{part}` have up to {trials} trials; at most {MAX_TRIALS} are possible")]
+    LongTracks {
+        /// The part.
+        part: PartId,
         /// All trials.
         trials: u64,
     },
@@ -174,6 +184,7 @@ impl ScheduleError {
             | Self::SeatZero(_)
             | Self::NoOrders
             | Self::WrongLength { .. }
+            | Self::LongTracks { .. }
             | Self::WrongCount { .. } => None,
         }
     }
@@ -197,50 +208,32 @@ pub fn plan(
 /// Makes the orders of a study.
 #[derive(Debug)]
 pub struct Planner {
-    seed: u64,
-    max_run: Option<u32>,
-    min_distance: Option<u32>,
-    repetitions: u32,
+    parts_order: PartsOrder,
+    parts: Vec<PartOrders>,
+}
+
+/// Makes the orders of one part, or of a study without parts.
+#[derive(Debug)]
+struct PartOrders {
+    part: Option<PartId>,
     practice: Vec<ModelId>,
-    models: Vec<ModelId>,
-    source: Source,
+    kind: Kind,
 }
 
-/// How orders are made.
 #[derive(Debug)]
-enum Source {
-    Blocked { distance: usize },
-    Shuffled,
-    ShuffledWithin(Counted),
-    Lines { of: Lines, symbols: Vec<usize> },
-    Fixed,
-    File(FileOrders),
+enum Kind {
+    Rating(Sequence),
+    Pairs(PairOrders),
+    Tracks(TrackOrders),
 }
 
-/// The valid orders of a shuffled design under a rule, counted by either method. Both
-/// have the same order at each place.
+/// A trial of a part before it is numbered.
 #[derive(Debug)]
-enum Counted {
-    States(Completions),
-    Terms(Inclusion),
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Lines {
-    Williams,
-    Latin,
-}
-
-impl Lines {
-    /// Number of rows after which the orders repeat.
-    fn cycle(self, realizations: usize, repetitions: u32) -> u32 {
-        let order = match self {
-            Self::Williams => Order::Williams,
-            Self::Latin => Order::LatinSquare,
-        };
-        let rows = balance::balances(&order, realizations, repetitions).map(|b| b.participants);
-        rows.and_then(|rows| u32::try_from(rows).ok()).unwrap_or(1)
-    }
+struct Planned {
+    /// Block of the part, from 1.
+    block: u32,
+    stimuli: Stimuli,
+    repetition: u32,
 }
 
 impl Planner {
@@ -251,59 +244,71 @@ impl Planner {
     /// # Errors
     /// [`ScheduleError`] if no seat can have an order.
     pub fn new(protocol: &Protocol, orders: Option<&FileOrders>) -> Result<Self, ScheduleError> {
-        let design = &protocol.design;
-        let models: Vec<ModelId> = protocol.scheduled_models().map(|m| m.id.clone()).collect();
-        let rule = feasible(design, models.len())?;
         let seed = protocol.study.seed;
-        let repetitions = design.repetitions as usize;
-        let source = match &design.order {
-            Order::Blocked => Source::Blocked {
-                // Each realization occurs once in a block: no run is longer than two.
-                distance: match rule {
-                    Rule::Distance(d) => d as usize,
-                    Rule::Run(_) | Rule::None => 1,
-                },
-            },
-            Order::Shuffled => match rule {
-                Rule::None => Source::Shuffled,
-                rule => {
-                    Source::ShuffledWithin(counted(models.len(), repetitions, rule).ok_or_else(
-                        || ScheduleError::TooManyStates {
-                            realizations: models.len(),
-                            repetitions: design.repetitions,
-                            constraint: rule.to_string(),
-                        },
-                    )?)
+        let parts_order = protocol.design.parts_order;
+        if protocol.parts.is_empty() {
+            let models = protocol.scheduled_models().map(|m| m.id.clone()).collect();
+            let only = PartOrders {
+                part: None,
+                practice: protocol.design.practice.clone(),
+                kind: Kind::Rating(Sequence::of_models(
+                    seed,
+                    None,
+                    &protocol.design,
+                    models,
+                    orders,
+                )?),
+            };
+            return Ok(Self {
+                parts_order,
+                parts: vec![only],
+            });
+        }
+        let part = |part: &crate::protocol::Part| {
+            let id = Some(&part.id);
+            let design = protocol.design_of(id);
+            let kind = match &part.task {
+                Task::Rating(own) => Kind::Rating(Sequence::of_models(
+                    seed,
+                    id,
+                    &design,
+                    own.models.clone(),
+                    None,
+                )?),
+                Task::Pairs(own) => Kind::Pairs(PairOrders::new(seed, &part.id, own, &design)?),
+                Task::Discrimination { tracks } => {
+                    Kind::Tracks(TrackOrders::new(seed, &part.id, protocol, tracks)?)
                 }
-            },
-            Order::Williams => Source::Lines {
-                of: Lines::Williams,
-                symbols: orders::symbols(seed, models.len()),
-            },
-            Order::LatinSquare => Source::Lines {
-                of: Lines::Latin,
-                symbols: orders::symbols(seed, models.len()),
-            },
-            Order::Fixed => Source::Fixed,
-            Order::File(_) => Source::File(orders.ok_or(ScheduleError::NoOrders)?.clone()),
+            };
+            Ok(PartOrders {
+                part: id.cloned(),
+                practice: design.practice,
+                kind,
+            })
         };
+        let parts: Result<Vec<_>, ScheduleError> = protocol.parts.iter().map(part).collect();
         Ok(Self {
-            seed,
-            max_run: design.max_run,
-            min_distance: design.min_distance,
-            repetitions: design.repetitions,
-            practice: design.practice.clone(),
-            models,
-            source,
+            parts_order,
+            parts: parts?,
         })
     }
 
-    /// The realizations that are scheduled, in the order of the protocol.
+    /// The realizations that are scheduled, in the order of the protocol; none in a study
+    /// with parts.
     pub fn models(&self) -> &[ModelId] {
-        &self.models
+        match &self.parts[..] {
+            [
+                PartOrders {
+                    part: None,
+                    kind: Kind::Rating(sequence),
+                    ..
+                },
+            ] => sequence.models(),
+            _ => &[],
+        }
     }
 
-    /// The order of a seat: practice first, then every trial that counts.
+    /// The order of a seat: in each part practice first, then every trial that counts.
     ///
     /// # Errors
     /// [`ScheduleError`] if the number is 0, or the given order of this seat is
@@ -312,7 +317,23 @@ impl Planner {
         if seat.number() == 0 {
             return Err(ScheduleError::SeatZero(seat));
         }
-        Ok(self.trials(&self.valid_order(seat)?))
+        let mut trials = Vec::new();
+        for part in self.parts_of(seat) {
+            part.plan(seat, &mut trials)?;
+        }
+        Ok(trials)
+    }
+
+    /// The parts in their order for a seat.
+    fn parts_of(&self, seat: Seat) -> Vec<&PartOrders> {
+        let n = self.parts.len();
+        match self.parts_order {
+            PartsOrder::Williams if n > 0 => {
+                let line = orders::williams_line(n, u64::from(seat.number() - 1));
+                line.into_iter().map(|i| &self.parts[i]).collect()
+            }
+            PartsOrder::Fixed | PartsOrder::Williams => self.parts.iter().collect(),
+        }
     }
 
     /// Checks the orders of the planned rows, and all orders that are given: the whole
@@ -323,210 +344,78 @@ impl Planner {
     /// [`ScheduleError`] for the first order that is missing, incomplete or breaks a
     /// constraint.
     pub fn verify(&self, participants: u32) -> Result<(), ScheduleError> {
-        let check = |row| self.valid_order(Seat::Row(row)).map(drop);
-        match &self.source {
-            // Random orders are valid.
-            Source::Blocked { .. } | Source::Shuffled | Source::ShuffledWithin(_) => Ok(()),
-            Source::Fixed => check(1),
-            Source::Lines { of, .. } => {
-                (1..=of.cycle(self.models.len(), self.repetitions)).try_for_each(check)
-            }
-            Source::File(file) => {
-                let missing = (1..=participants).find(|row| !file.contains_key(row));
-                let rows = file.keys().copied();
-                rows.chain(missing).try_for_each(check)
-            }
-        }
-    }
-
-    /// The order of a seat; verified if it is given.
-    fn valid_order(&self, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
-        let order = self.order(seat)?;
-        let random = matches!(
-            self.source,
-            Source::Blocked { .. } | Source::Shuffled | Source::ShuffledWithin(_)
-        );
-        if !random && (self.max_run.is_some() || self.min_distance.is_some()) {
-            let models: Vec<&ModelId> = order.iter().map(|&m| &self.models[m]).collect();
-            if let Some(violation) =
-                constraints::first_violation(&models, self.max_run, self.min_distance)
-            {
-                return Err(ScheduleError::Broken { seat, violation });
-            }
-        }
-        Ok(order)
-    }
-
-    /// Indices of realizations in the order of a seat.
-    fn order(&self, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
-        let n = self.models.len();
-        let repetitions = self.repetitions as usize;
-        let stream = || {
-            let number = seat.number().to_string();
-            Stream::new(self.seed, &["schedule", seat.stream(), &number])
-        };
-        Ok(match &self.source {
-            Source::Blocked { distance } => {
-                orders::blocked(&mut stream(), n, repetitions, *distance)
-            }
-            Source::Shuffled => orders::shuffled(&mut stream(), n, repetitions),
-            Source::ShuffledWithin(Counted::States(states)) => states.draw(&mut stream()),
-            Source::ShuffledWithin(Counted::Terms(terms)) => terms.draw(&mut stream()),
-            Source::Lines { of, symbols } => {
-                let first = u64::from(self.repetitions) * u64::from(seat.number() - 1);
-                (0..u64::from(self.repetitions))
-                    .flat_map(|block| match of {
-                        Lines::Williams => orders::williams_line(n, first + block),
-                        Lines::Latin => orders::latin_line(n, first + block),
-                    })
-                    .map(|symbol| symbols[symbol])
-                    .collect()
-            }
-            Source::Fixed => (0..repetitions).flat_map(|_| 0..n).collect(),
-            Source::File(file) => self.row_of(file, seat)?,
+        self.parts.iter().try_for_each(|part| match &part.kind {
+            Kind::Rating(sequence) => sequence.verify(participants),
+            Kind::Pairs(_) | Kind::Tracks(_) => Ok(()),
         })
     }
+}
 
-    /// A row of the file of orders, checked to be complete.
-    ///
-    /// Pilots and simulated participants take the rows of the file in turn, starting
-    /// again after the last.
-    fn row_of(&self, file: &FileOrders, seat: Seat) -> Result<Vec<usize>, ScheduleError> {
-        let row = match seat {
-            Seat::Row(row) => row,
-            Seat::Pilot(number) | Seat::Simulated(number) => {
-                let turn = (number as usize - 1) % file.len().max(1);
-                *file
-                    .keys()
-                    .nth(turn)
-                    .ok_or(ScheduleError::NoRow { row: number })?
-            }
+impl PartOrders {
+    /// Adds the trials of this part, numbered on from those before.
+    fn plan(&self, seat: Seat, trials: &mut Vec<Trial>) -> Result<(), ScheduleError> {
+        let planned = match &self.kind {
+            Kind::Rating(sequence) => ratings(sequence, seat)?,
+            Kind::Pairs(pairs) => pairs.plan(seat)?,
+            Kind::Tracks(tracks) => tracks.plan(seat),
         };
-        let named = file.get(&row).ok_or(ScheduleError::NoRow { row })?;
-        let place: HashMap<&ModelId, usize> = self
-            .models
-            .iter()
-            .enumerate()
-            .map(|(i, m)| (m, i))
-            .collect();
-        let mut counts = vec![0u32; self.models.len()];
-        let mut order = Vec::with_capacity(named.len());
-        for (i, model) in named.iter().enumerate() {
-            let Some(&index) = place.get(model) else {
-                return Err(ScheduleError::UnknownModel {
-                    row,
-                    position: i + 1,
-                    model: model.clone(),
-                });
-            };
-            counts[index] += 1;
-            order.push(index);
-        }
-        let expected = self.models.len() * self.repetitions as usize;
-        if order.len() != expected {
-            return Err(ScheduleError::WrongLength {
-                row,
-                found: order.len(),
-                expected,
-            });
-        }
-        match counts.iter().position(|&c| c != self.repetitions) {
-            Some(wrong) => Err(ScheduleError::WrongCount {
-                row,
-                model: self.models[wrong].clone(),
-                found: counts[wrong],
-                expected: self.repetitions,
-            }),
-            None => Ok(order),
-        }
-    }
-
-    /// Numbers the trials.
-    fn trials(&self, order: &[usize]) -> Vec<Trial> {
-        let blocks = !matches!(
-            self.source,
-            Source::Shuffled | Source::ShuffledWithin(_) | Source::File(_)
-        );
-        let mut trials = Vec::with_capacity(self.practice.len() + order.len());
-        let mut number = 0;
-        for (position, model) in (1..).zip(&self.practice) {
+        let last = |of: fn(&Trial) -> u32, practice: bool| {
+            let same = trials.iter().filter(|t| t.practice == practice);
+            same.map(of).max().unwrap_or(0)
+        };
+        let mut number = u32::try_from(trials.len()).unwrap_or(u32::MAX);
+        let block = last(|t| t.block, false);
+        let (practised, position) = (last(|t| t.position, true), last(|t| t.position, false));
+        for (place, model) in (1..).zip(&self.practice) {
             number += 1;
             trials.push(Trial {
                 trial: number,
                 block: 0,
-                position,
-                model: model.clone(),
+                position: practised + place,
+                stimuli: Stimuli::One {
+                    model: model.clone(),
+                },
                 repetition: 0,
                 practice: true,
+                part: self.part.clone(),
             });
         }
-        let mut repetitions = vec![0u32; self.models.len()];
-        for (position, &model) in (1..).zip(order) {
+        for (place, planned) in (1..).zip(planned) {
             number += 1;
-            repetitions[model] += 1;
             trials.push(Trial {
                 trial: number,
-                // Each block contains each realization once.
-                block: if blocks { repetitions[model] } else { 1 },
-                position,
-                model: self.models[model].clone(),
-                repetition: repetitions[model],
+                block: block + planned.block,
+                position: position + place,
+                stimuli: planned.stimuli,
+                repetition: planned.repetition,
                 practice: false,
+                part: self.part.clone(),
             });
         }
-        trials
+        Ok(())
     }
 }
 
-/// Counts the valid orders; `None` if the design is too large for both methods.
-fn counted(n: usize, repetitions: usize, rule: Rule) -> Option<Counted> {
-    let states = || Completions::count(n, repetitions, rule).map(Counted::States);
-    let terms = || Inclusion::count(n, repetitions, rule).map(Counted::Terms);
-    states().or_else(terms)
-}
-
-/// The rule that the constraints of the design reduce to, if there is a valid order.
-fn feasible(design: &Design, realizations: usize) -> Result<Rule, ScheduleError> {
-    let repetitions = design.repetitions;
-    if realizations == 0 {
-        return Err(ScheduleError::NoRealizations);
-    }
-    if repetitions == 0 {
-        return Err(ScheduleError::NoRepetitions);
-    }
-    let trials = (realizations as u64).saturating_mul(u64::from(repetitions));
-    if trials > MAX_TRIALS {
-        return Err(ScheduleError::TooLong {
-            realizations,
-            repetitions,
-            trials,
-        });
-    }
-    if design.max_run == Some(0) {
-        return Err(ScheduleError::MaxRunZero);
-    }
-    if let Some(max_run) = design.max_run
-        && realizations == 1
-        && max_run < repetitions
-    {
-        return Err(ScheduleError::MaxRun {
-            max_run,
-            repetitions,
-        });
-    }
-    // The first positions of the n realizations are at least 0 … n−1 and the last ones
-    // at most the last n of all n R. First and last are thus at most n (R − 1) apart on
-    // average, which is R − 1 distances each: the mean distance is at most n.
-    if let Some(min_distance) = design.min_distance
-        && repetitions > 1
-        && min_distance as usize > realizations
-    {
-        return Err(ScheduleError::MinDistance {
-            min_distance,
-            realizations,
-        });
-    }
-    Ok(Rule::of(design.max_run, design.min_distance, repetitions))
+/// The trials of a rating part.
+fn ratings(sequence: &Sequence, seat: Seat) -> Result<Vec<Planned>, ScheduleError> {
+    let mut repetitions = vec![0u32; sequence.models().len()];
+    let trial = |model: usize| {
+        repetitions[model] += 1;
+        Planned {
+            // Each block contains each realization once.
+            block: if sequence.has_blocks() {
+                repetitions[model]
+            } else {
+                1
+            },
+            stimuli: Stimuli::One {
+                model: sequence.models()[model].clone(),
+            },
+            repetition: repetitions[model],
+        }
+    };
+    let order = sequence.valid_order(seat)?;
+    Ok(order.into_iter().map(trial).collect())
 }
 
 #[cfg(test)]

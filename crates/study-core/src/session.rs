@@ -32,6 +32,7 @@ mod phase;
 mod project_view;
 pub mod roster;
 mod saving;
+mod tracks;
 mod trial;
 mod unsaved;
 pub mod view;
@@ -45,12 +46,12 @@ pub use view::{Screen, View};
 use crate::outcome::fold::History;
 use crate::outcome::{Event, Fidelity, Moment};
 use crate::protocol::phrases::Words;
-use crate::protocol::{DeviceKind, FileOrders, Protocol, Seat};
+use crate::protocol::{DeviceKind, FileOrders, Protocol, Seat, Trial};
 use phase::{DeviceProblem, Phase};
 use saving::SaveState;
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use study_base::text::ModelId;
+use study_base::text::{ModelId, PartId};
 
 /// Presets from the command line.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -89,6 +90,12 @@ pub struct Session {
     saves: SaveState,
     /// Forms and messages completed in this process, in addition to the history.
     passed: BTreeSet<flow::Step>,
+    /// Parts whose text was shown in this process.
+    parts_shown: BTreeSet<PartId>,
+    /// Tracks in progress.
+    running: Vec<tracks::Running>,
+    /// Whether the last answer was correct, until the participant is told.
+    feedback: Option<bool>,
     notice: Option<String>,
     mirror: Option<view::Mirror>,
     /// When the session's folder was claimed.
@@ -133,6 +140,9 @@ impl Session {
             device_lost: false,
             saves: SaveState::default(),
             passed: BTreeSet::new(),
+            parts_shown: BTreeSet::new(),
+            running: Vec::new(),
+            feedback: None,
             notice: None,
             mirror: None,
             opened: None,
@@ -160,7 +170,16 @@ impl Session {
     /// The realization being felt or rated. For the simulated rater only: it must
     /// never reach a screen or a log.
     pub fn playing_model(&self) -> Option<&ModelId> {
-        self.history.open().map(|open| &open.trial.model)
+        let attempt = self.history.open()?.attempt;
+        let interval = attempt.interval().unwrap_or(attempt.intervals());
+        attempt.models.get(interval.checked_sub(1)? as usize)
+    }
+
+    /// The trial being felt or answered, and the realization of each interval. For the
+    /// simulated rater only, too.
+    pub fn presented(&self) -> Option<(&Trial, &[ModelId])> {
+        let open = self.history.open()?;
+        Some((open.trial, &open.attempt.models))
     }
 
     /// The events so far; equal to the history of the journal.

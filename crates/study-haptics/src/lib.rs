@@ -34,6 +34,7 @@
 #![doc = include_str!("../examples/identify.rs")]
 //! ```
 
+pub mod family;
 pub mod identify;
 pub mod model;
 pub mod plant;

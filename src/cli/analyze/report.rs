@@ -12,7 +12,7 @@ use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 use study_base::apa;
-use study_base::text::counted;
+use study_base::text::{ModelId, counted};
 use study_core::analyze::Analysis;
 use study_core::outcome::{ParticipantRow, RatingRow, Status};
 use study_core::protocol::columns::SampleColumn;
@@ -297,7 +297,10 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
         .iter()
         .filter(|r| !r.practice && r.status == Status::Ok)
     {
-        let (model, participant) = (row.model.as_str(), row.participant.as_str());
+        let Some(model) = row.model.as_ref().map(ModelId::as_str) else {
+            continue;
+        };
+        let participant = row.participant.as_str();
         let own = shown.entry(model).or_default();
         let enough = own.len() >= MAX_TRACES || own.contains(participant);
         if enough || !included.contains(&(participant, model, row.repetition)) {
@@ -309,13 +312,13 @@ pub(super) fn traces(study: &StudyFolder, rows: &[RatingRow], analysis: &Analysi
             .join(layout::telemetry(row.trial, attempt, 1));
         if path.is_file() {
             own.insert(participant);
-            wanted.push((row, path));
+            wanted.push((row, model, path));
         }
     }
-    let read = wanted.par_iter().with_max_len(1).map(|(row, path)| {
+    let read = wanted.par_iter().with_max_len(1).map(|(row, model, path)| {
         let (points, measured) = trace(path)?;
         Some(Trace {
-            model: row.model.to_string(),
+            model: (*model).to_owned(),
             label: format!("{} trial {}", row.participant, row.trial),
             measured,
             points,

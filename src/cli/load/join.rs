@@ -195,14 +195,20 @@ fn keys(error: &ScheduleError, protocol: &Protocol) -> &'static [&'static str] {
     match error {
         ScheduleError::MinDistance { .. } => &["design.min_distance"],
         ScheduleError::MaxRun { .. } | ScheduleError::MaxRunZero => &["design.max_run"],
-        ScheduleError::TooLong { .. } | ScheduleError::NoRepetitions => &["design.repetitions"],
-        ScheduleError::Broken { .. } | ScheduleError::TooManyStates { .. } => {
-            &["design.max_run", "design.min_distance", "design.order"]
+        ScheduleError::TooLong { .. } | ScheduleError::NoRepetitions => {
+            &["design.repetitions", "parts"]
         }
+        ScheduleError::LongTracks { .. } => &["tracks", "parts"],
+        ScheduleError::Broken { .. } | ScheduleError::TooManyStates { .. } => &[
+            "design.max_run",
+            "design.min_distance",
+            "design.order",
+            "parts",
+        ],
         _ if matches!(protocol.design.order, Order::File(_)) => {
             &["design.order.file", "design.order"]
         }
-        _ => &["design.order"],
+        _ => &["design.order", "parts"],
     }
 }
 

@@ -196,7 +196,8 @@ fn orders(out: &mut String, plans: &[(u32, Vec<Trial>)], codes: &Codes, width: u
                 out.push_str(bar);
                 column += bar.chars().count();
             }
-            let _ = write!(out, " {:>cell$}", codes.of_model(&trial.model));
+            let model = trial.model().map_or("", |model| codes.of_model(model));
+            let _ = write!(out, " {model:>cell$}");
             column += 1 + cell;
         }
         out.push('\n');

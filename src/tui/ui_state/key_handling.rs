@@ -154,6 +154,10 @@ impl UiState {
                 Key::Enter => self.notify(view.words.get(Phrase::ChooseYesOrNo)),
                 _ => Vec::new(),
             },
+            Screen::Form { .. } if key == Key::Replay => match view.can_replay {
+                true => vec![Input::PlayAgain],
+                false => Vec::new(),
+            },
             Screen::Form { questions, .. } => self.press_form(key, questions, &view.words),
             Screen::Message { .. } | Screen::End { .. } | Screen::Break { .. } => {
                 self.press_reading(key, view)
@@ -168,7 +172,7 @@ impl UiState {
                 _ => Vec::new(),
             },
             Screen::Reference { .. }
-            | Screen::Loading
+            | Screen::Loading { .. }
             | Screen::Mount { .. }
             | Screen::Playing { .. }
             | Screen::Stopping

@@ -208,6 +208,9 @@ impl FormView<'_> {
             };
             keys.push(("Tab".to_owned(), other));
         }
+        if self.view.can_replay {
+            keys.push(("F7".to_owned(), Phrase::FeelAgain));
+        }
         keys.push(("Enter".to_owned(), Phrase::Save));
         keys
     }

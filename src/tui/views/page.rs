@@ -167,17 +167,7 @@ impl<'a> Page<'a> {
             who.render(area, buf);
         } else if let Some(trouble) = Trouble::new(self.view, self.theme) {
             trouble.render(area, buf);
-        } else if let Screen::Playing {
-            since_s,
-            keep_exploring,
-        } = &self.view.screen
-        {
-            let playing = Playing {
-                view: self.view,
-                since_s: *since_s,
-                keep_exploring: *keep_exploring,
-                theme: self.theme,
-            };
+        } else if let Some(playing) = Playing::of(self.view, self.theme) {
             playing.render(area, buf);
         } else if let Some(prose) = prose(self.view) {
             self.prose(&prose).render(area, buf);
@@ -197,10 +187,15 @@ impl<'a> Page<'a> {
             Screen::Who {
                 claiming: false, ..
             } => own(&[("Tab", Phrase::OtherField), ("Enter", Phrase::Begin)]),
-            Screen::Playing { .. } if self.view.can_advance => {
-                own(&[("Enter", Phrase::Rate), ("Esc", Phrase::Stop)])
+            Screen::Playing { interval, .. } if self.view.can_advance => {
+                let on = match interval {
+                    None => Phrase::Rate,
+                    Some((at, of)) if at == of => Phrase::Answer,
+                    Some(_) => Phrase::Next,
+                };
+                own(&[("Enter", on), ("Esc", Phrase::Stop)])
             }
-            Screen::Playing { .. } | Screen::Loading => own(&[("Esc", Phrase::Stop)]),
+            Screen::Playing { .. } | Screen::Loading { .. } => own(&[("Esc", Phrase::Stop)]),
             Screen::DeviceTrouble {
                 can_go_on: true, ..
             } => own(&[("Enter", Phrase::Continue), ("F10", Phrase::Quit)]),

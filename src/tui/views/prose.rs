@@ -8,6 +8,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use study_base::text::counted;
 use study_core::protocol::phrases::Phrase;
 use study_core::protocol::{DeviceKind, Entry};
 use study_core::session::view::MessageKind;
@@ -58,10 +59,17 @@ pub fn prose(view: &View) -> Option<Prose> {
     Some(match &view.screen {
         Screen::ResumeChoice { gap_h, done, total } => Prose {
             title: "This session was not finished.".to_owned(),
-            body: format!(
-                "{done} of {total} trials are done. The last one was {} ago.",
-                ago(*gap_h)
-            ),
+            body: match total {
+                Some(total) => format!(
+                    "{done} of {total} trials are done. The last one was {} ago.",
+                    ago(*gap_h)
+                ),
+                None => format!(
+                    "{} done. The last one was {} ago.",
+                    counted(*done as usize, "trial is", "trials are"),
+                    ago(*gap_h)
+                ),
+            },
             choices: vec![
                 (
                     "b",
@@ -102,7 +110,8 @@ pub fn prose(view: &View) -> Option<Prose> {
             above: match kind {
                 MessageKind::Welcome | MessageKind::Instructions => read_out("Read out"),
                 MessageKind::Practice => words.get(Phrase::Practice).to_owned(),
-                MessageKind::PracticeOver => String::new(),
+                MessageKind::PracticeOver | MessageKind::Feedback => String::new(),
+                MessageKind::Part => read_out("Read out"),
             },
             body: wrap::flow(text),
             long: true,
@@ -120,7 +129,7 @@ pub fn prose(view: &View) -> Option<Prose> {
             keys: ready.to_vec(),
             ..Prose::default()
         },
-        Screen::Loading => Prose {
+        Screen::Loading { .. } => Prose {
             title: words.get(Phrase::OneMoment).to_owned(),
             body: words.get(Phrase::Preparing).to_owned(),
             ..Prose::default()

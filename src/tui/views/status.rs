@@ -132,15 +132,14 @@ impl Widget for &Top<'_> {
             words.push(self.view.words.fill(Phrase::PageOf, &page));
         }
         if let Some(progress) = self.view.progress {
-            let phrase = if progress.practice {
-                Phrase::PracticeOf
-            } else {
-                Phrase::TrialOf
+            let number = ("n", &progress.current as &dyn Display);
+            let phrase = match (progress.practice, progress.total) {
+                (true, _) => Phrase::PracticeOf,
+                (false, Some(_)) => Phrase::TrialOf,
+                (false, None) => Phrase::TrialNumber,
             };
-            let values = [
-                ("n", &progress.current as &dyn Display),
-                ("total", &progress.total),
-            ];
+            let total = progress.total.unwrap_or(progress.current);
+            let values = [number, ("total", &total as &dyn Display)];
             words.push(self.view.words.fill(phrase, &values));
         }
         if !words.is_empty() {

@@ -518,6 +518,7 @@ fn the_rating_waits_for_the_strokes_that_are_asked_for() {
         rig.view().screen,
         Screen::Playing {
             keep_exploring: true,
+            interval: None,
             ..
         }
     ));

@@ -334,7 +334,7 @@ fn a_trial_marked_as_bad_too_often_is_closed() {
     let mut rig = Rig::new(plain());
     while rig.count(|e| matches!(e, Event::TrialClosed { .. })) == 0 {
         rig.until("Playing");
-        let first = rig.session.playing_model() == Some(&rig.schedule()[0].model);
+        let first = rig.session.playing_model() == rig.schedule()[0].model();
         if first && rig.closed().len() < 3 {
             rig.send(bad("again"));
         } else {

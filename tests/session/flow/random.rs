@@ -166,7 +166,7 @@ proptest! {
                 break;
             }
             rig = perform(rig, act);
-            if matches!(rig.view().screen, Screen::Loading | Screen::Stopping) {
+            if matches!(rig.view().screen, Screen::Loading { .. } | Screen::Stopping) {
                 prop_assert!(rig.view().armed);
             }
         }

@@ -37,7 +37,7 @@ fn eventful() -> Rig {
     rig.until("Form").send(Input::Pause).wait(20.0);
     while rig.count(|e| matches!(e, Event::TrialClosed { .. })) == 0 {
         rig.until("Playing");
-        if rig.session.playing_model() == rig.schedule().last().map(|t| &t.model) {
+        if rig.session.playing_model() == rig.schedule().last().and_then(|t| t.model()) {
             rig.send(Input::DeviceFault("broken".to_owned()));
         } else {
             rig.step();
@@ -158,7 +158,7 @@ fn a_playback_that_was_interrupted_comes_next_and_costs_no_attempt() {
         };
         assert_eq!(rig.count(failed), 1);
         rig.step();
-        assert_eq!(rig.session.playing_model(), Some(&rig.schedule()[1].model));
+        assert_eq!(rig.session.playing_model(), rig.schedule()[1].model());
         rig.finish();
         rig.assert_whole();
         assert_eq!(rig.closed()[&2], Some(2));
@@ -255,7 +255,7 @@ fn after_a_long_gap_the_operator_chooses() {
         panic!("{:?}", rig.view().screen);
     };
     assert!((gap_h - 5.0).abs() < 1e-6);
-    assert_eq!((done, total), (4, 6));
+    assert_eq!((done, total), (4, Some(6)));
     let before = rig.journal.len();
     rig.send(Input::Advance);
     assert_eq!(screen(&rig), "ResumeChoice", "Enter does not choose");

@@ -182,8 +182,11 @@ impl Rig {
                 Effect::Load { trial, attempt, .. } => {
                     let asked = matches!(
                         self.journal.last().map(|e| &e.event),
-                        Some(Event::AttemptStarted { trial: t, attempt: a, .. })
-                            if t == trial && a == attempt
+                        Some(
+                            Event::AttemptStarted { trial: t, attempt: a, .. }
+                            | Event::PlaybackEnded { trial: t, attempt: a, .. }
+                            | Event::Replayed { trial: t, attempt: a }
+                        ) if t == trial && a == attempt
                     );
                     assert!(asked, "a load that is not in the journal");
                     self.loads += 1;
@@ -385,7 +388,7 @@ impl Rig {
                 self.wait(wait_s).send(Input::Advance)
             }
             Screen::Mount { .. } => self.send(Input::Advance).send(Input::DeviceStarted),
-            Screen::Loading => self.send(Input::DeviceLoaded).send(Input::DeviceStarted),
+            Screen::Loading { .. } => self.send(Input::DeviceLoaded).send(Input::DeviceStarted),
             Screen::Playing { .. } => self
                 .send(Input::DeviceProgress { strokes: 9 })
                 .send(Input::Advance),
@@ -513,7 +516,7 @@ pub(crate) fn name(screen: &Screen) -> &'static str {
         Screen::Message { .. } => "Message",
         Screen::Form { .. } => "Form",
         Screen::Reference { .. } => "Reference",
-        Screen::Loading => "Loading",
+        Screen::Loading { .. } => "Loading",
         Screen::Mount { .. } => "Mount",
         Screen::Playing { .. } => "Playing",
         Screen::Stopping => "Stopping",

@@ -332,8 +332,8 @@ fn progress_counts_practice_by_itself_and_trials_from_one_to_all() {
         }
         rig.step();
     }
-    let mut expected = vec![(true, 1, 1)];
-    expected.extend((1..=6).map(|k| (false, k, 6)));
+    let mut expected = vec![(true, 1, Some(1))];
+    expected.extend((1..=6).map(|k| (false, k, Some(6))));
     assert_eq!(seen, expected);
 }
 
@@ -361,7 +361,7 @@ fn the_simulated_rater_alone_learns_what_is_played() {
     rig.until("Reference");
     assert_eq!(rig.session.playing_model(), None);
     rig.step();
-    let first = rig.schedule()[0].model.clone();
+    let first = rig.schedule()[0].model().unwrap().clone();
     assert_eq!(rig.session.playing_model(), Some(&first));
     rig.until("Form");
     assert_eq!(rig.session.playing_model(), Some(&first));

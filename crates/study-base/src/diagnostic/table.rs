@@ -354,6 +354,11 @@ impl<'d, 't> Value<'d, 't> {
         self.value.is_table()
     }
 
+    /// Whether the value is a list.
+    pub fn is_array(&self) -> bool {
+        self.value.is_array()
+    }
+
     /// The value as text.
     pub fn text(&self) -> Option<String> {
         let text = self.value.as_str().map(str::to_owned);

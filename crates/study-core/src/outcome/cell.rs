@@ -1,16 +1,16 @@
 //! The cells of a row, and the header of each table of a study.
 
-use super::rows::{AttemptEvent, AttemptRow, ParticipantRow, RatingRow};
+use super::rows::{AttemptEvent, AttemptRow, IntervalRow, ParticipantRow, RatingRow};
 use super::{Author, Failure, Sample, State, Status, Verdict};
 use crate::protocol::columns::{
-    AttemptColumn, Column, ParticipantColumn, RatingColumn, Repeats, SampleColumn,
+    AttemptColumn, Column, IntervalColumn, ParticipantColumn, RatingColumn, Repeats, SampleColumn,
 };
 use crate::protocol::{Answer, DeviceKind, Protocol, Role};
 use chrono::{DateTime, FixedOffset};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use study_base::text::{ModelId, ParticipantId, QuestionId};
+use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 
 /// A cell of a table. Its `Display` is the cell's text in a CSV, not yet quoted.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,6 +85,7 @@ fields! {
     ParticipantId: |id, _| Cell::text(id.as_str());
     ModelId: |id, _| Cell::text(id.as_str());
     QuestionId: |id, _| Cell::text(id.as_str());
+    PartId: |id, _| Cell::text(id.as_str());
     Role: |role, _| Cell::text(role.as_str());
     DeviceKind: |kind, _| Cell::text(kind.as_str());
     Status: |status, _| Cell::text(status.as_str());
@@ -127,6 +128,7 @@ fn header<C: Copy>(all: &[C], declaration: fn(C) -> Column, repeated: &Repeated<
         Repeats::Covariate => repeated.covariates.clone(),
     };
     (all.iter())
+        .filter(|c| declaration(**c).is_in(repeated.has_parts))
         .flat_map(|c| {
             names(declaration(*c))
                 .into_iter()
@@ -139,6 +141,8 @@ fn header<C: Copy>(all: &[C], declaration: fn(C) -> Column, repeated: &Repeated<
 struct Repeated<'a> {
     questions: Vec<&'a str>,
     covariates: Vec<&'a str>,
+    /// Whether the study has parts.
+    has_parts: bool,
 }
 
 impl RatingColumn {
@@ -152,6 +156,7 @@ impl RatingColumn {
         let repeated = Repeated {
             questions: protocol.questions.iter().map(|q| q.id.as_str()).collect(),
             covariates: covariates.into_iter().collect(),
+            has_parts: !protocol.parts.is_empty(),
         };
         header(Self::ALL, Self::column, &repeated)
     }
@@ -164,13 +169,20 @@ impl AttemptColumn {
     }
 }
 
+impl IntervalColumn {
+    /// The header of `intervals.csv`.
+    pub fn header() -> Header<Self> {
+        header(Self::ALL, Self::column, &Repeated::default())
+    }
+}
+
 impl ParticipantColumn {
     /// The header of `participants.csv`: questions of setup, intake and outro.
     pub fn header(protocol: &Protocol) -> Header<Self> {
         let forms = [&protocol.setup, &protocol.intake, &protocol.outro];
         let repeated = Repeated {
             questions: forms.into_iter().flatten().map(|q| q.id.as_str()).collect(),
-            covariates: Vec::new(),
+            ..Repeated::default()
         };
         header(Self::ALL, Self::column, &repeated)
     }
@@ -230,6 +242,36 @@ row! {
         Status: status,
         Vaf: vaf,
         Covariates: covariates,
+        Part: part,
+        Track: track,
+        Level: level,
+        Correct: correct,
+        Replays: replays,
+        Rendering: rendering,
+        RenderedVaf: rendered_vaf,
+    }
+}
+
+row! {
+    IntervalRow: IntervalColumn {
+        Study: study,
+        Participant: participant,
+        Session: session,
+        Part: part,
+        Trial: trial,
+        Attempt: attempt,
+        Interval: interval,
+        Model: model,
+        Level: level,
+        LevelProposed: level_proposed,
+        Track: track,
+        TrackTrial: track_trial,
+        Target: target,
+        Catch: catch,
+        GapS: gap_s,
+        Replays: replays,
+        ExplorationS: exploration_s,
+        Strokes: strokes,
         Rendering: rendering,
         RenderedVaf: rendered_vaf,
     }

@@ -10,7 +10,7 @@ use crate::protocol::{Answer, DeviceKind, Seat, Trial};
 use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use study_base::named;
-use study_base::text::{ModelId, ParticipantId, QuestionId};
+use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 
 /// A point in time by both clocks. Durations come from the monotonic clock; the
 /// wall clock, which gives the date, may step.
@@ -165,6 +165,17 @@ fn null_as_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Erro
     Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
+/// The level of a trial of a track.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TrackLevel {
+    /// The rule's own level; `None` for an easy or catch trial, which it does not
+    /// propose.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub proposed: Option<f64>,
+    /// The level of the comparison, a step of the ladder.
+    pub presented: f64,
+}
+
 /// A completed telemetry file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TelemetryFile {
@@ -270,12 +281,26 @@ pub enum Event {
         attempt: u32,
         /// Its position in the order as felt, from 1.
         position: u32,
-        model: ModelId,
+        /// The realization, unless the trial has several intervals.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        model: Option<ModelId>,
         /// Duration of the reference prompt, s.
         reference_s: f64,
+        /// The realization of each interval, if there are several.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        intervals: Vec<ModelId>,
+        /// What a track presents.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        level: Option<TrackLevel>,
     },
     /// The device confirmed that it plays.
-    PlaybackStarted { trial: u32, attempt: u32 },
+    PlaybackStarted {
+        trial: u32,
+        attempt: u32,
+        /// Which interval, from 1, if the trial has several.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        interval: Option<u32>,
+    },
     /// The device confirmed that it has stopped. Only now can the trial be rated.
     PlaybackEnded {
         trial: u32,
@@ -291,7 +316,12 @@ pub enum Event {
         /// Whether the force was that of the table; not in journals of earlier releases.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         rendering: Option<Box<Fidelity>>,
+        /// Which interval, from 1, if the trial has several.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        interval: Option<u32>,
     },
+    /// All intervals of the attempt are felt again before it is answered.
+    Replayed { trial: u32, attempt: u32 },
     /// The telemetry of the attempt could not be saved, or only in part.
     TelemetryLost {
         /// [`Trial::trial`].
@@ -300,6 +330,9 @@ pub enum Event {
         attempt: u32,
         /// Reason.
         reason: String,
+        /// Which interval, from 1, if the trial has several.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        interval: Option<u32>,
     },
     /// The attempt does not count.
     AttemptFailed {
@@ -325,6 +358,12 @@ pub enum Event {
         trial: u32,
         /// Last attempt.
         attempt: u32,
+    },
+    /// A track has ended: its other planned trials do not take place.
+    TrackEnded {
+        track: PartId,
+        /// Whether its rule was fulfilled, not only its largest number of trials reached.
+        finished: bool,
     },
     /// A remark was entered.
     Remark {

@@ -18,16 +18,19 @@
 
 mod attempt_log;
 mod facts;
+mod interval_log;
 mod rows;
+mod tracks;
 mod trial;
 
 pub use attempt_log::attempt_rows;
-pub use trial::{Attempt, AttemptStart, Completion, Ended, Sitting};
+pub use interval_log::interval_rows;
+pub use trial::{Attempt, AttemptStart, Completion, Ended, Presentation, Sitting};
 
 use super::event::{Choice, Entry, Event, Failure, FormId, Moment, Start, State};
 use crate::protocol::{Answer, Trial};
 use std::collections::{BTreeMap, BTreeSet};
-use study_base::text::QuestionId;
+use study_base::text::{PartId, QuestionId};
 use trial::TrialHistory;
 
 /// What the events of a session add up to.
@@ -55,6 +58,10 @@ pub struct History {
     felt: Vec<(u32, u32)>,
     /// Whether the last presentation was stopped or interrupted.
     goes_on: bool,
+    /// Tracks whose other planned trials do not take place.
+    ended_tracks: BTreeSet<PartId>,
+    /// Completed trials of tracks, in the order in which the tracks were told.
+    told: Vec<(u32, u32)>,
     /// Numbers of closed trials after which a break began.
     pub breaks: BTreeSet<u32>,
     /// When the break under way began.
@@ -189,19 +196,33 @@ impl History {
                 trial,
                 attempt,
                 position,
+                model,
                 reference_s,
-                ..
+                intervals,
+                level,
             } => {
                 let start = AttemptStart {
                     at,
                     position: *position,
-                    previous: self.last_felt().map(|t| t.model.clone()),
+                    previous: self.last_model().cloned(),
                     reference_s: *reference_s,
                 };
-                self.begin(*trial, Attempt::new(*attempt, &self.sitting, Some(start)));
+                let mut attempt = Attempt::new(*attempt, &self.sitting, Some(start));
+                attempt.models = match model {
+                    Some(model) => vec![model.clone()],
+                    None => intervals.clone(),
+                };
+                attempt.level = *level;
+                self.begin(*trial, attempt);
             }
-            Event::PlaybackStarted { trial, attempt } => {
-                self.attempt_mut(*trial, *attempt);
+            Event::PlaybackStarted {
+                trial,
+                attempt,
+                interval,
+            } => {
+                if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
+                    attempt.started(interval.unwrap_or(1), at);
+                }
                 self.presented(*trial, *attempt);
             }
             Event::PlaybackEnded {
@@ -211,15 +232,28 @@ impl History {
                 stopped,
                 telemetry: _,
                 rendering,
+                interval,
             } => {
                 if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
-                    attempt.ended = Some(Ended {
+                    let ended = Ended {
                         playback: *playback,
                         stopped: *stopped,
-                    });
+                    };
                     attempt.rendering.extend(rendering.as_deref().cloned());
-                    attempt.rating = Some((at, at));
+                    let judged = rendering.as_deref().map(|r| (r.verdict, r.rendered_vaf));
+                    attempt.interval_ended(interval.unwrap_or(1), ended, judged, at);
                 }
+            }
+            Event::Replayed { trial, attempt } => {
+                if let Some(attempt) = self.attempt_mut(*trial, *attempt) {
+                    attempt.replays += 1;
+                    attempt.ended = None;
+                }
+            }
+            Event::TrackEnded { track, .. } => {
+                self.ended_tracks.insert(track.clone());
+                let queue = std::mem::take(&mut self.queue);
+                self.set_queue(&queue);
             }
             Event::AttemptFailed {
                 trial,
@@ -288,6 +322,7 @@ impl History {
         {
             open.rated_earlier_s += last.seconds_since(&from);
         }
+        self.reopen_tracks(queue);
         self.set_queue(queue);
         match choice {
             Some(Choice::RestartBlock) => self.restarted(queue),
@@ -302,6 +337,7 @@ impl History {
                 trial.send_back();
             }
         }
+        self.told.retain(|(trial, _)| !queue.contains(trial));
         self.open = self.open.filter(|t| !queue.contains(t));
         self.last_done = self.last_done.filter(|t| !queue.contains(t));
         let closed = self.closed(false);
@@ -345,6 +381,8 @@ impl History {
         if let Some(attempt) = self.attempt_mut(trial, attempt) {
             attempt.void = true;
         }
+        self.told.retain(|t| *t != (trial, attempt));
+        self.reopen_tracks(queue);
         self.set_queue(queue);
         if self.open == Some(trial) && self.attempts(trial) == attempt {
             self.open = None;
@@ -360,12 +398,17 @@ impl History {
     fn done(&mut self, trial: u32, attempt: u32, response_s: f64, at: Moment) {
         let practice = self.planned(trial).is_some_and(|t| t.practice);
         let number = self.closed(practice) + 1;
+        let told = self.first_answer(trial, attempt);
         if let Some(attempt) = self.attempt_mut(trial, attempt) {
+            attempt.told = told;
             attempt.done = Some(Completion {
                 at,
                 response_s,
                 number,
             });
+        }
+        if self.planned(trial).is_some_and(|t| t.track().is_some()) {
+            self.told.push((trial, attempt));
         }
         self.queue.retain(|t| *t != trial);
         self.open = None;
@@ -405,9 +448,25 @@ impl History {
         given
     }
 
+    /// Sets the trials to come: those that are planned, and of no track that has ended.
     fn set_queue(&mut self, queue: &[u32]) {
-        let planned = |trial: &&u32| self.planned(**trial).is_some();
-        self.queue = queue.iter().filter(planned).copied().collect();
+        let takes_place = |trial: &&u32| self.takes_place(**trial);
+        self.queue = queue.iter().filter(takes_place).copied().collect();
+    }
+
+    /// A trial that comes again takes its track up again, if that had ended.
+    fn reopen_tracks(&mut self, queue: &[u32]) {
+        let again: Vec<PartId> = (queue.iter())
+            .filter_map(|t| self.planned(*t)?.track().cloned())
+            .collect();
+        self.ended_tracks.retain(|track| !again.contains(track));
+    }
+
+    /// The answer with which a trial began: the first that was given.
+    fn first_answer(&self, trial: u32, attempt: u32) -> Option<Answer> {
+        let form = FormId::Trial { trial, attempt };
+        let first = self.answers.iter().find(|g| g.form == form);
+        first.map(|g| g.answer.clone())
     }
 }
 

@@ -187,10 +187,14 @@ impl Practice {
 }
 
 impl Ratings {
-    /// The ratings in the rows of a study: the answers to one question.
+    /// The ratings in the rows of a study: the answers to one question. Trials of tracks
+    /// and of several intervals are no ratings of a realization.
     pub fn from_rows(rows: &[RatingRow], question: &QuestionId) -> Self {
         let mut builder = Builder::new(question.to_string());
         for (i, r) in rows.iter().enumerate() {
+            let Some(rated) = r.model.as_ref().filter(|_| r.track.is_none()) else {
+                continue;
+            };
             let origin = Origin::of(r.simulated, r.pilot);
             let answer = r.answers.get(question);
             let mut row = Row {
@@ -208,11 +212,11 @@ impl Ratings {
                 source_row: u32::try_from(i + 1).unwrap_or(u32::MAX),
             };
             if r.practice {
-                builder.practice(r.participant.as_str(), r.model.as_str(), row);
+                builder.practice(r.participant.as_str(), rated.as_str(), row);
                 continue;
             }
             row.subject = builder.subject(r.participant.as_str());
-            let model = builder.model(r.model.as_str(), r.role, || r.covariates.clone());
+            let model = builder.model(rated.as_str(), r.role, || r.covariates.clone());
             row.model = Some(model);
             for (question, text) in comments(r) {
                 builder.comment(question, text);

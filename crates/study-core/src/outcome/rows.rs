@@ -7,7 +7,7 @@ use crate::protocol::{Answer, DeviceKind, Role};
 use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use study_base::text::{ModelId, ParticipantId, QuestionId};
+use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 
 study_base::named! {
     /// The outcome of a trial.
@@ -37,7 +37,7 @@ pub struct RatingRow {
     pub block: u32,
     pub position: Option<u32>,
     pub planned_position: u32,
-    pub model: ModelId,
+    pub model: Option<ModelId>,
     pub role: Role,
     pub repetition: u32,
     pub previous_model: Option<ModelId>,
@@ -67,6 +67,37 @@ pub struct RatingRow {
     pub status: Status,
     pub vaf: Option<f64>,
     pub covariates: BTreeMap<String, f64>,
+    pub part: Option<PartId>,
+    pub track: Option<PartId>,
+    pub level: Option<f64>,
+    pub correct: Option<bool>,
+    pub replays: Option<u32>,
+    pub rendering: Option<Verdict>,
+    pub rendered_vaf: Option<f64>,
+}
+
+/// One row of `intervals.csv`: a presentation.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "IntervalColumn has the meanings")]
+pub struct IntervalRow {
+    pub study: String,
+    pub participant: ParticipantId,
+    pub session: u32,
+    pub part: Option<PartId>,
+    pub trial: u32,
+    pub attempt: u32,
+    pub interval: u32,
+    pub model: Option<ModelId>,
+    pub level: Option<f64>,
+    pub level_proposed: Option<f64>,
+    pub track: Option<PartId>,
+    pub track_trial: Option<u32>,
+    pub target: Option<bool>,
+    pub catch: Option<bool>,
+    pub gap_s: Option<f64>,
+    pub replays: u32,
+    pub exploration_s: Option<f64>,
+    pub strokes: Option<u32>,
     pub rendering: Option<Verdict>,
     pub rendered_vaf: Option<f64>,
 }

@@ -3,6 +3,8 @@
 //! No finding here prevents a study from running. Warnings that need the models'
 //! tables or the orders are given where these are loaded.
 
+mod parts;
+
 use super::phrases::{self, Phrase};
 use super::{Design, DeviceKind, Exclusion, ModelEntry, Protocol, Question, QuestionKind, Role};
 use std::collections::BTreeMap;
@@ -21,7 +23,7 @@ const TRIALS_WITHOUT_BREAK: u32 = 15;
 const LONG_SESSION_MIN: f64 = 60.0;
 
 /// Just noticeable difference of a force, N (Doerrer & Werthschützky 2002).
-const FORCE_JND_N: f64 = 0.1;
+pub const FORCE_JND_N: f64 = 0.1;
 
 /// Standard deviation of the force of a turn-signal switch operated by hand, N. It
 /// converts a VAF to a residual force if there is no recording. The simulated switch
@@ -36,9 +38,15 @@ pub type Spans = BTreeMap<String, Range<usize>>;
 pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<Fault> {
     let mut faults = Vec::new();
     language(protocol, spans, &mut faults);
-    realizations(protocol, spans, &mut faults);
-    vaf(protocol, spans, unread, &mut faults);
-    practice(protocol, spans, &mut faults);
+    if parts::is_about_realizations(protocol) {
+        realizations(protocol, spans, &mut faults);
+        vaf(protocol, spans, unread, &mut faults);
+    }
+    if protocol.parts.is_empty() {
+        practice(protocol, spans, &mut faults);
+    } else {
+        parts::warnings(protocol, spans, &mut faults);
+    }
     duration(protocol, spans, &mut faults);
     roles(protocol, spans, &mut faults);
     faults
@@ -74,8 +82,13 @@ fn language(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     );
 }
 
-/// Trials of a session, practice included, unless an orders file has fewer.
+/// Trials of a session, practice included, unless an orders file has fewer; with staircases
+/// the most.
 pub fn trials(protocol: &Protocol) -> u32 {
+    if !protocol.parts.is_empty() {
+        let parts = protocol.parts.iter();
+        return parts.map(|part| parts::trials(protocol, part)).sum();
+    }
     let Design {
         repetitions,
         practice,
@@ -99,6 +112,8 @@ mod pace {
     pub(super) const MOUNT_S: f64 = 30.0;
     /// Exploring a realization without a time limit.
     pub(super) const EXPLORE_S: f64 = 25.0;
+    /// The same for an interval that is compared with another.
+    pub(super) const COMPARE_S: f64 = 10.0;
     /// Answering a question by choosing and by typing.
     pub(super) const CHOOSE_S: f64 = 6.0;
     pub(super) const TYPE_S: f64 = 15.0;
@@ -125,7 +140,15 @@ pub fn minutes(protocol: &Protocol) -> f64 {
         DeviceKind::Manual => pace::MOUNT_S,
         DeviceKind::Simulated | DeviceKind::Serial | DeviceKind::Process => pace::LOAD_S,
     };
-    let repetitions = f64::from(protocol.design.repetitions);
+    for part in &protocol.parts {
+        seconds += parts::seconds(protocol, part, reference);
+    }
+    let whole = protocol.parts.is_empty();
+    let repetitions = f64::from(if whole {
+        protocol.design.repetitions
+    } else {
+        0
+    });
     for model in protocol.scheduled_models() {
         seconds += repetitions * (trial + load(model));
     }
@@ -256,7 +279,8 @@ fn practice(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
 fn duration(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     let counted = trials(protocol).saturating_sub(practice_trials(protocol));
     let minutes = minutes(protocol);
-    let place = spans.get("design.repetitions").cloned();
+    let part = || spans.get("parts[0]").cloned().map(first_line);
+    let place = spans.get("design.repetitions").cloned().or_else(part);
     if protocol.design.breaks.is_none() && counted > TRIALS_WITHOUT_BREAK {
         faults.push(
             Fault::warning(format!("{counted} trials without a break"))

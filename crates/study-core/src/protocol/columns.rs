@@ -52,6 +52,17 @@ pub struct Column {
     pub repeats: Repeats,
     /// Whether a table in which all its cells are empty does not have it.
     pub optional: bool,
+    /// Which studies have it.
+    pub study: Studies,
+}
+
+/// Which studies have a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Studies {
+    /// All.
+    All,
+    /// Those with parts.
+    WithParts,
 }
 
 impl Column {
@@ -64,6 +75,7 @@ impl Column {
             empty: None,
             repeats: Repeats::Once,
             optional: false,
+            study: Studies::All,
         }
     }
 
@@ -85,6 +97,16 @@ impl Column {
     const fn repeats(mut self, repeats: Repeats) -> Self {
         self.repeats = repeats;
         self
+    }
+
+    const fn with_parts(mut self) -> Self {
+        self.study = Studies::WithParts;
+        self
+    }
+
+    /// Whether a study has it.
+    pub fn is_in(&self, has_parts: bool) -> bool {
+        has_parts || self.study == Studies::All
     }
 
     /// Whether another column of its table may not have this name, in any case.
@@ -169,14 +191,14 @@ table! {
         Position: whole("position", "position among the trials that count, in the order of presentation")
             .empty(NEVER_PRESENTED),
         PlannedPosition: whole("planned_position", "position in the planned order"),
-        Model: text("model", "realization"),
+        Model: text("model", "realization").empty("the trial has several intervals"),
         Role: level("role", &[
             ("test", "what the study asks about"),
             ("practice", "for practice trials only"),
             ("hidden-reference", "the target itself, unannounced among the others"),
             ("low-anchor", "known to be poor"),
             ("physical", "a physical sample"),
-        ], "role of the realization"),
+        ], "role of the realization; `test` for a level and where there are several"),
         Repetition: whole("repetition", "repetition of the realization, from 1; 0 for practice"),
         PreviousModel: text(
             "previous_model",
@@ -241,6 +263,14 @@ table! {
         ).empty("neither states it"),
         Covariates: number("one for each covariate", "covariate of the realization, sorted by name")
             .empty("the realization does not have it").repeats(Repeats::Covariate),
+        Part: text("part", "part of the session").with_parts(),
+        Track: text("track", "track").empty("the trial belongs to none").with_parts(),
+        Level: number("level", "level of the comparison, in units of its family")
+            .empty("the trial has no family, or was never presented").with_parts(),
+        Correct: flag("correct", "whether the answer is correct, after corrections")
+            .empty("no answer is correct or wrong, or it was not answered").with_parts(),
+        Replays: whole("replays", "how often all intervals were felt again before the answer")
+            .empty(NEVER_PRESENTED).with_parts(),
         Rendering: level("rendering", &[
             ("ok", "the force was that of the table"),
             ("unverified", "the device reports no samples, or plays no table"),
@@ -253,6 +283,39 @@ table! {
             "rendered_vaf",
             "share of the variance of the table's force for the reported motion that the device commanded",
         ).empty("not known, or the force did not vary").optional(),
+    }
+}
+
+table! {
+    /// The columns of `intervals.csv`: one row for each presentation, of failed attempts,
+    /// too. Only studies with parts have it.
+    IntervalColumn {
+        Study: RatingColumn::Study.column(),
+        Participant: PARTICIPANT,
+        Session: RatingColumn::Session.column(),
+        Part: text("part", "part of the session"),
+        Trial: RatingColumn::Trial.column(),
+        Attempt: whole("attempt", "attempt at the trial, from 1"),
+        Interval: whole("interval", "interval of the trial, from 1"),
+        Model: text("model", "realization; a level is named after its family and its place on the ladder")
+            .empty("the record of the attempt's start is damaged"),
+        Level: number("level", "level that was presented, in units of its family")
+            .empty("the realization is no level of a family"),
+        LevelProposed: number("level_proposed", "level that the rule proposed for the trial, before it was rounded to the ladder")
+            .empty("the trial belongs to no track, or is an easy or catch trial"),
+        Track: text("track", "track").empty("the trial belongs to none"),
+        TrackTrial: whole("track_trial", "trial of the track, from 1, in the planned order")
+            .empty("the trial belongs to no track"),
+        Target: flag("target", "whether the interval has the comparison")
+            .empty("the trial belongs to no track"),
+        Catch: flag("catch", "whether the trial has no signal").empty("the trial belongs to no track"),
+        GapS: number("gap_s", "from the confirmed end of the interval before to the confirmed start of this one")
+            .unit("s").empty("it is the first interval"),
+        Replays: whole("replays", "how often the intervals had been felt before in this attempt"),
+        ExplorationS: RatingColumn::ExplorationS.column(),
+        Strokes: RatingColumn::Strokes.column(),
+        Rendering: RatingColumn::Rendering.column(),
+        RenderedVaf: RatingColumn::RenderedVaf.column(),
     }
 }
 
@@ -368,9 +431,24 @@ table! {
     }
 }
 
-/// Whether `ratings.csv` has a fixed column of this name, in any case.
+/// Whether `ratings.csv` of a study without parts has a fixed column of this name, in any
+/// case.
 pub fn is_ratings_column(name: &str) -> bool {
+    let all = RatingColumn::ALL.iter().map(|c| c.column());
+    all.filter(|c| c.is_in(false)).any(|c| c.reserves(name))
+}
+
+/// The same for a study with parts.
+pub fn is_parts_column(name: &str) -> bool {
     (RatingColumn::ALL.iter()).any(|c| c.column().reserves(name))
+}
+
+/// Whether a header of `ratings.csv` is that of a study with parts. A covariate of a study
+/// without may have the name of one of their columns, but not of all, one after the other.
+pub fn are_of_parts(header: &[String]) -> bool {
+    let all = RatingColumn::ALL.iter().map(|c| c.column());
+    let own: Vec<&str> = all.filter(|c| !c.is_in(false)).map(|c| c.name).collect();
+    header.windows(own.len()).any(|w| w == own)
 }
 
 /// Whether `participants.csv` has a fixed column of this name, in any case.
@@ -383,8 +461,9 @@ mod tests {
     use super::*;
 
     /// The declarations of every table.
-    fn tables() -> [Vec<Column>; 5] {
+    fn tables() -> [Vec<Column>; 6] {
         [
+            IntervalColumn::ALL.iter().map(|c| c.column()).collect(),
             RatingColumn::ALL.iter().map(|c| c.column()).collect(),
             AttemptColumn::ALL.iter().map(|c| c.column()).collect(),
             ParticipantColumn::ALL.iter().map(|c| c.column()).collect(),
@@ -440,6 +519,7 @@ mod tests {
     fn names_of_fixed_columns_are_reserved_in_any_case() {
         assert!(is_ratings_column("Status") && is_ratings_column("vaf"));
         assert!(is_participants_column("reason") && !is_participants_column("vaf"));
+        assert!(is_parts_column("Level") && !is_ratings_column("level"));
         assert!(!is_ratings_column("realism") && !is_ratings_column("one for each question"));
     }
 }

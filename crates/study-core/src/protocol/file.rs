@@ -12,17 +12,21 @@ mod agree;
 mod analysis;
 mod design;
 mod device;
+mod families;
 mod general;
 mod models;
 mod orders;
+mod parts;
 mod power;
 mod questions;
+mod resolve;
 mod section;
+mod tracks;
 
 pub use orders::parse_orders;
 
-use super::keys::{Key, Kind, keys};
-use super::{FORMAT, Protocol, Question};
+use super::keys::{Key, Kind, Variants, Word, keys};
+use super::{FORMAT, FORMAT_2, Protocol, Question};
 use agree::Sections;
 use models::PartialModel;
 use questions::PartialQuestion;
@@ -36,7 +40,7 @@ use study_base::text::Untrusted;
 /// Every key of a protocol file, by section.
 pub const ROOT: &[Key] = keys! {
     /// The file format with its version.
-    "format": Kind::Constant(FORMAT), r#""study-protocol/1""#, required;
+    "format": Kind::Word(FORMATS), r#""study-protocol/1""#, required;
     /// Identity and provenance of the study.
     "study": Kind::Table(general::STUDY), "", required;
     /// What participants read, in any language. Each text can be left out.
@@ -52,9 +56,17 @@ pub const ROOT: &[Key] = keys! {
     /// How a trial goes.
     "trial": Kind::Table(general::TRIAL), "";
     /// The realizations; at least one whose role is not `practice`.
-    "models": Kind::Tables(models::MODELS), "", required;
+    "models": Kind::Tables(models::MODELS), "", derived("required, unless every part takes its levels from families");
+    /// The parts of a session, in their order. Without any, the study is one rating part, whose
+    /// keys are in `[design]`. Parts need the format `study-protocol/2`.
+    "parts": Kind::Variants(&parts::PARTS), "";
+    /// Dimensions of the stimulus: each is a ladder of levels, and each level a table of its
+    /// own, certified and hashed before the session. Needs the format `study-protocol/2`.
+    "families": Kind::Tables(families::FAMILIES), "";
+    /// Tracks of the parts of kind `discrimination`. Needs the format `study-protocol/2`.
+    "tracks": Kind::Tables(tracks::TRACKS), "";
     /// Asked after each trial; at least one.
-    "questions": Kind::Variants(&questions::QUESTIONS), "", required;
+    "questions": Kind::Variants(&questions::QUESTIONS), "", derived("required, unless every part has an answer of its own");
     /// Asked of the experimenter before the first trial.
     "setup": Kind::Variants(&questions::QUESTIONS), "";
     /// Asked of the participant once, before the first trial.
@@ -67,6 +79,18 @@ pub const ROOT: &[Key] = keys! {
     /// result.
     "power": Kind::Table(power::POWER), "";
 };
+
+/// The keys of a question, the same in four places.
+pub static QUESTIONS: &Variants = &questions::QUESTIONS;
+
+/// The formats of a protocol.
+const FORMATS: &[Word] = &[
+    Word::new(FORMAT, "A study of ratings."),
+    Word::new(FORMAT_2, "A study of parts, such as pairs and thresholds."),
+];
+
+/// Sections that need [`FORMAT_2`].
+const OF_FORMAT_2: [&str; 3] = ["parts", "families", "tracks"];
 
 /// Largest protocol file that is read, bytes.
 pub const MAX_FILE_BYTES: usize = 1024 * 1024;
@@ -163,14 +187,25 @@ fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
         return true;
     };
     if format == FORMAT {
+        for name in OF_FORMAT_2 {
+            if let Some(value) = root.value(name) {
+                value.fault(
+                    Fault::error(format!("[[{name}]] needs the format `{FORMAT_2}`"))
+                        .hint(format!("write format = \"{FORMAT_2}\" in the first line")),
+                );
+            }
+        }
+        return true;
+    }
+    if format == FORMAT_2 {
         return true;
     }
     let version =
         |format: &str| -> Option<u32> { format.strip_prefix("study-protocol/")?.parse().ok() };
     let given = Untrusted(&format);
-    value.fault(match (version(&format), version(FORMAT)) {
+    value.fault(match (version(&format), version(FORMAT_2)) {
         (Some(theirs), Some(ours)) if theirs > ours => Fault::error(format!(
-            "the format `{given}` is newer than this program, which reads `{FORMAT}`"
+            "the format `{given}` is newer than this program, which reads `{FORMAT_2}`"
         ))
         .hint("use a newer version of study"),
         _ => Fault::error(format!("`{given}` is not a format of a protocol"))
@@ -185,12 +220,25 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let study = root.section("study").and_then(general::study);
     let text = root.section("text").map(general::text);
     let consent = root.section("consent").and_then(general::consent);
-    let design = root.section("design").and_then(design::read);
+    let raw = resolve::Raw {
+        parts: parts::read(&mut root),
+        families: (root.sections("families").into_iter())
+            .map(families::read)
+            .collect(),
+        tracks: root
+            .sections("tracks")
+            .into_iter()
+            .map(tracks::read)
+            .collect(),
+    };
+    let has_parts = !raw.parts.is_empty();
+    let design = (root.section("design")).and_then(|section| design::read(section, has_parts));
     let session = root.section("session").and_then(general::session);
     let device = root.section("device").and_then(device::read);
     let trial = root.section("trial").and_then(general::trial);
     let models = root.sections("models").into_iter().map(models::read);
-    let questions = questions::read(&mut root, "questions");
+    let mut questions = questions::read(&mut root, "questions");
+    questions.extend(raw.questions());
     let setup = questions::read(&mut root, "setup");
     let intake = questions::read(&mut root, "intake");
     let outro = questions::read(&mut root, "outro");
@@ -207,11 +255,14 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         intake,
         outro,
         analysis: analysis.as_ref(),
+        has_parts,
     };
     named.extend(sections.files());
+    named.extend(raw.files());
     if !broken {
         sections.agree(document);
     }
+    let resolved = raw.resolve(&sections, document, broken);
     sections.fill_duplicates();
     let Sections {
         models,
@@ -236,6 +287,9 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         design: design?,
         device: device?,
         analysis: analysis?,
+        parts: resolved.parts?,
+        families: resolved.families?,
+        tracks: resolved.tracks?,
         power: power?,
     })
 }

@@ -12,18 +12,19 @@
 //!   participants (more of them change no order); device kind, limits,
 //!   `uncertified`; each realization's id, role, device, `duplicate_of` and the
 //!   SHA-256 of its file; minimum strokes and duration of the reference; id,
-//!   scale and `required` of the questions after a trial; the orders file.
+//!   scale and `required` of the questions after a trial; the orders file; parts
+//!   without their texts, tracks, and families with the SHA-256 of their files.
 //! * wording: title, authors and the like; all texts, prompts and labels; consent;
 //!   questions asked once (setup, intake, outro); who types, and when a session
 //!   can be resumed.
 //! * analysis: `[analysis]`, planned participants, VAF and covariates, `[device.rendering]`.
 
-use super::{FileOrders, Order, Protocol, Question, QuestionKind};
+use super::{FamilyRules, FileOrders, Order, Part, Protocol, Question, QuestionKind};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use study_base::text::ModelId;
+use study_base::text::{ModelId, PartId};
 
 /// The fingerprints of a study, SHA-256 in hexadecimal.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,6 +82,9 @@ pub fn parts(
         intake,
         outro,
         analysis,
+        parts,
+        families,
+        tracks,
         // It changes no session and no result.
         power: _,
     } = protocol;
@@ -104,6 +108,7 @@ pub fn parts(
         practice,
         breaks,
         max_attempts,
+        parts_order,
     } = design;
     let super::TrialRules {
         reference,
@@ -128,7 +133,7 @@ pub fn parts(
             })
         })
         .collect();
-    let stimulus = json!({
+    let mut stimulus = json!({
         "study": { "id": id, "seed": seed },
         "design": {
             "repetitions": repetitions,
@@ -145,7 +150,14 @@ pub fn parts(
         "models": stimuli,
         "questions": questions.iter().map(scale).collect::<Vec<_>>(),
     });
-    let wording = json!({
+    // A study without parts has the fingerprint that it had before there were any.
+    if !parts.is_empty() {
+        stimulus["parts_order"] = json!(parts_order);
+        stimulus["parts"] = parts.iter().map(trials).collect();
+        stimulus["families"] = families.iter().map(|f| levels(f, model_bytes)).collect();
+        stimulus["tracks"] = json!(tracks);
+    }
+    let mut wording = json!({
         "study": {
             "title": title,
             "authors": authors,
@@ -164,6 +176,12 @@ pub fn parts(
         "intake": intake,
         "outro": outro,
     });
+    if !parts.is_empty() {
+        let texts = parts
+            .iter()
+            .map(|part| json!({ "id": part.id, "text": part.text }));
+        wording["parts"] = texts.collect();
+    }
     let known: Vec<Value> = models
         .iter()
         .map(|m| json!({ "id": m.id, "vaf": m.vaf, "covariates": m.covariates }))
@@ -182,6 +200,45 @@ pub fn parts(
         wording,
         analysis,
     }
+}
+
+/// What of a part determines its trials.
+fn trials(part: &Part) -> Value {
+    let Part {
+        id,
+        task,
+        text: _,
+        asks,
+        exposure,
+        gap_s,
+    } = part;
+    json!({ "id": id, "task": task, "asks": asks, "exposure": exposure, "gap_s": gap_s })
+}
+
+/// What of a family determines its tables.
+fn levels(family: &FamilyRules, model_bytes: &BTreeMap<ModelId, Vec<u8>>) -> Value {
+    let FamilyRules {
+        id,
+        from: _,
+        vary,
+        to: _,
+        ladder,
+        unit,
+    } = family;
+    let sha256 = |end| family_file(id, end).and_then(|id| model_bytes.get(&id));
+    json!({
+        "id": id,
+        "vary": vary,
+        "levels": ladder,
+        "unit": unit,
+        "from": sha256("from").map(|bytes| hex(bytes)),
+        "to": sha256("to").map(|bytes| hex(bytes)),
+    })
+}
+
+/// Under which id the bytes of a family's file are passed to [`of`]: `id.from`, `id.to`.
+pub fn family_file(family: &PartId, end: &str) -> Option<ModelId> {
+    ModelId::new(format!("{family}.{end}")).ok()
 }
 
 /// The part of a question that determines its answers.

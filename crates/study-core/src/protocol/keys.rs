@@ -42,14 +42,16 @@ pub enum Kind {
     Text,
     /// A list of texts, of at least so many.
     Texts(usize),
-    /// This text and no other.
-    Constant(&'static str),
     /// An identifier.
     Id(Id),
     /// A list of ids of realizations.
     ModelIds,
+    /// A list of identifiers.
+    Ids(Id),
     /// A list of finite numbers, not empty.
     NumberList,
+    /// Which pairs are compared: words, or a list of pairs of ids of realizations.
+    Pairs,
     /// A file inside the folder of the protocol, with `/` between folders.
     Path,
     /// A whole number, at least and at most so large.
@@ -78,6 +80,8 @@ pub enum Kind {
     Tables(&'static [Key]),
     /// An array of tables whose keys depend on one of them.
     Variants(&'static Variants),
+    /// A table whose keys depend on one of them.
+    Variant(&'static Variants),
 }
 
 /// Tables whose keys depend on the value of one of them.
@@ -120,6 +124,8 @@ pub enum Id {
     Model,
     /// A question.
     Question,
+    /// A part, family or track.
+    Part,
 }
 
 /// A range of numbers.
@@ -132,6 +138,7 @@ impl Id {
             Self::Study => "^[a-z0-9-]{1,64}$",
             Self::Model => "^[A-Za-z0-9._-]{1,32}$",
             Self::Question => "^[A-Za-z0-9_-]{1,32}$",
+            Self::Part => "^[A-Za-z0-9_-]{1,20}$",
         }
     }
 }
@@ -169,12 +176,17 @@ impl Kind {
             Self::Text => "text".to_owned(),
             Self::Texts(0) => "a list of texts".to_owned(),
             Self::Texts(_) => "a list of texts, not empty".to_owned(),
-            Self::Constant(text) => format!("`\"{text}\"`"),
             Self::Id(Id::Study) => "text: 1 to 64 of `a-z 0-9 -`".to_owned(),
             Self::Id(Id::Model) => format!("text: {ids} . _ -`"),
             Self::Id(Id::Question) => format!("text: {ids} _ -`"),
-            Self::ModelIds => "a list of ids of realizations".to_owned(),
+            Self::Id(Id::Part) => "text: 1 to 20 of `A-Z a-z 0-9 _ -`".to_owned(),
+            Self::ModelIds | Self::Ids(Id::Model) => "a list of ids of realizations".to_owned(),
+            Self::Ids(_) => "a list of ids".to_owned(),
             Self::NumberList => "a list of numbers, not empty".to_owned(),
+            Self::Pairs => {
+                "`all`, `adjacent`, `versus:ID` or a list of pairs of ids of realizations"
+                    .to_owned()
+            }
             Self::Path => "a path inside the protocol's folder, with `/`".to_owned(),
             Self::Whole(i64::MIN, _) => "a whole number".to_owned(),
             Self::Whole(least, most) if most >= i64::from(u32::MAX) => {
@@ -184,6 +196,9 @@ impl Kind {
             Self::Number(range, _) => match range {
                 (Bound::Excluded(low), Bound::Excluded(high)) => {
                     format!("a number between {low} and {high}")
+                }
+                (Bound::Included(low), Bound::Excluded(high)) => {
+                    format!("a number, at least {low} and below {high}")
                 }
                 (Bound::Excluded(low), _) => format!("a finite number above {low}"),
                 (Bound::Included(low), _) => format!("a finite number, {low} or more"),
@@ -205,7 +220,7 @@ impl Kind {
             Self::NumberLabels => "a table of texts by number".to_owned(),
             Self::Numbers => "a table of numbers by name".to_owned(),
             Self::Sentences => "a table of texts by the key of a sentence".to_owned(),
-            Self::Table(_) => "a table".to_owned(),
+            Self::Table(_) | Self::Variant(_) => "a table".to_owned(),
             Self::Tables(_) | Self::Variants(_) => "tables".to_owned(),
         }
     }

@@ -98,6 +98,13 @@ phrases! {
     Practice "practice" "Practice";
     TrialOf "trial-of" "trial {n} of {total}";
     PracticeOf "practice-of" "practice {n} of {total}";
+    TrialNumber "trial-number" "trial {n}";
+    First "first" "first";
+    Second "second" "second";
+    Third "third" "third";
+    Answer "answer" "answer";
+    Correct "correct" "That was correct.";
+    NotCorrect "not-correct" "That was not correct.";
     PageOf "page-of" "page {n} of {total}";
     NumberFirst "number-first" "Choose a number from {from} to {to} first.";
     SliderFirst "slider-first" "Set the slider first, with ← and →.";

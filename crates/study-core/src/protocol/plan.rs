@@ -3,9 +3,10 @@
 //! Both the schedule, which makes trials, and the outcomes, which record them, use
 //! these types.
 
+use super::parts::Interval;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use study_base::text::ModelId;
+use study_base::text::{ModelId, PartId};
 
 /// A planned trial. Frozen before the session starts.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,12 +18,60 @@ pub struct Trial {
     /// Position among the trials that count, from 1; for practice among the practice
     /// trials.
     pub position: u32,
-    /// The realization.
-    pub model: ModelId,
+    /// What is presented.
+    #[serde(flatten)]
+    pub stimuli: Stimuli,
     /// Repetition number among the trials that count, from 1; 0 for practice.
     pub repetition: u32,
     /// Whether it is practice, which is never analyzed.
     pub practice: bool,
+    /// The part to which it belongs; `None` in a study without parts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<PartId>,
+}
+
+/// What a planned trial presents, as far as it is known before the session.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Stimuli {
+    /// One realization.
+    One {
+        /// The realization.
+        model: ModelId,
+    },
+    /// Two realizations, in this order.
+    Pair {
+        /// The realizations.
+        pair: [ModelId; 2],
+    },
+    /// A trial of a track. Its level follows from the answers before it.
+    Track {
+        /// The track.
+        track: PartId,
+        /// What each interval presents.
+        intervals: Vec<Interval>,
+        /// Whether the comparison is the top of the ladder.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        easy: bool,
+    },
+}
+
+impl Trial {
+    /// The realization of a trial that presents a single, planned one.
+    pub fn model(&self) -> Option<&ModelId> {
+        match &self.stimuli {
+            Stimuli::One { model } => Some(model),
+            Stimuli::Pair { .. } | Stimuli::Track { .. } => None,
+        }
+    }
+
+    /// The track to which it belongs.
+    pub fn track(&self) -> Option<&PartId> {
+        match &self.stimuli {
+            Stimuli::Track { track, .. } => Some(track),
+            Stimuli::One { .. } | Stimuli::Pair { .. } => None,
+        }
+    }
 }
 
 /// What a participant's order is drawn from: a row, or the number of a pilot or of a

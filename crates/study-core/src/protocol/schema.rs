@@ -4,7 +4,7 @@
 //! checked by the reader and by `study check`.
 
 use super::file::ROOT;
-use super::keys::{Absent, Key, Kind, NumberRange, Shape, Variants, Word};
+use super::keys::{Absent, Id, Key, Kind, NumberRange, Shape, Variants, Word};
 use serde_json::{Map, Value, json};
 use std::ops::Bound;
 
@@ -14,7 +14,9 @@ pub fn json_schema() -> Value {
     let mut questions = None;
     for key in ROOT {
         // The kinds of question are the same in four places.
-        if let Kind::Variants(variants) = key.kind {
+        if let Kind::Variants(variants) = key.kind
+            && std::ptr::eq(variants, super::file::QUESTIONS)
+        {
             questions.get_or_insert_with(|| array_of(variants));
             schema["properties"][key.name] =
                 json!({ "$ref": "#/$defs/questions", "description": key.effect });
@@ -22,7 +24,11 @@ pub fn json_schema() -> Value {
     }
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
     schema["title"] = json!("study protocol");
-    schema["description"] = json!(format!("The protocol file of a study, {}.", super::FORMAT));
+    schema["description"] = json!(format!(
+        "The protocol file of a study, {} or {}.",
+        super::FORMAT,
+        super::FORMAT_2
+    ));
     schema["$defs"] = json!({ "questions": questions });
     schema
 }
@@ -57,11 +63,18 @@ fn of(kind: Kind) -> Value {
         Kind::Text | Kind::Path => text,
         Kind::Texts(0) => json!({ "type": "array", "items": text }),
         Kind::Texts(least) => json!({ "type": "array", "minItems": least, "items": text }),
-        Kind::Constant(text) => json!({ "const": text }),
         Kind::Id(id) => json!({ "type": "string", "pattern": id.pattern() }),
-        Kind::ModelIds => json!({ "type": "array", "items": of(Kind::Id(super::keys::Id::Model)) }),
+        Kind::ModelIds => of(Kind::Ids(Id::Model)),
+        Kind::Ids(id) => json!({ "type": "array", "items": of(Kind::Id(id)) }),
         Kind::NumberList => {
             json!({ "type": "array", "minItems": 1, "items": { "type": "number" } })
+        }
+        Kind::Pairs => {
+            let pair = json!({ "type": "array", "minItems": 2, "maxItems": 2, "items": of(Kind::Id(Id::Model)) });
+            json!({ "oneOf": [
+                { "type": "string", "pattern": "^(all|adjacent|versus:[A-Za-z0-9._-]{1,32})$" },
+                { "type": "array", "minItems": 1, "items": pair },
+            ] })
         }
         Kind::Whole(least, most) => whole(least, most),
         Kind::Number(range, _) => number(range),
@@ -71,10 +84,7 @@ fn of(kind: Kind) -> Value {
         Kind::WordOrTable(words, keys) => json!({ "oneOf": [one_of(words), object(keys)] }),
         Kind::WholeLabels => map("^-?[0-9]+$", text),
         Kind::NumberLabels => map("^-?[0-9]+([.][0-9]+)?$", text),
-        Kind::Numbers => map(
-            super::keys::Id::Question.pattern(),
-            json!({ "type": "number" }),
-        ),
+        Kind::Numbers => map(Id::Question.pattern(), json!({ "type": "number" })),
         Kind::Sentences => {
             let keys = super::phrases::Phrase::ALL.iter().map(|p| p.key());
             map(&format!("^({})$", keys.collect::<Vec<_>>().join("|")), text)
@@ -82,6 +92,7 @@ fn of(kind: Kind) -> Value {
         Kind::Table(keys) => object(keys),
         Kind::Tables(keys) => json!({ "type": "array", "items": object(keys) }),
         Kind::Variants(variants) => array_of(variants),
+        Kind::Variant(variants) => one_shape(variants),
     }
 }
 
@@ -121,6 +132,11 @@ fn map(keys: &str, value: Value) -> Value {
 }
 
 fn array_of(variants: &Variants) -> Value {
+    json!({ "type": "array", "items": one_shape(variants) })
+}
+
+/// One of the alternatives.
+fn one_shape(variants: &Variants) -> Value {
     let shape = |shape: &Shape| {
         let keys: Vec<Key> = variants.common.iter().chain(shape.keys).copied().collect();
         let mut schema = object(&keys);
@@ -132,5 +148,5 @@ fn array_of(variants: &Variants) -> Value {
         schema
     };
     let shapes: Vec<Value> = variants.shapes.iter().map(shape).collect();
-    json!({ "type": "array", "items": { "oneOf": shapes } })
+    json!({ "oneOf": shapes })
 }

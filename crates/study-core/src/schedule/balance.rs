@@ -79,7 +79,7 @@ impl Balance {
             let mut place = 0;
             let counted = plan.iter().filter(|t| !t.practice);
             for (position, trial) in counted.enumerate() {
-                let Some(&model) = index.get(&trial.model) else {
+                let Some(&model) = trial.model().and_then(|id| index.get(id)) else {
                     continue;
                 };
                 balance.blocks = balance.blocks.max(trial.block);

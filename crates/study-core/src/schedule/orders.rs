@@ -6,6 +6,7 @@
 //! 2, 149–168.
 
 use study_base::rng::Stream;
+use study_base::text::PartId;
 
 /// A new random permutation in each block; positions of the same realization differ
 /// by at least `distance` (1: no constraint), also across blocks.
@@ -52,9 +53,13 @@ pub(super) fn shuffled(stream: &mut Stream, n: usize, repetitions: usize) -> Vec
 
 /// The realization of each symbol of a Williams design or Latin square; the same for
 /// all seats of a study.
-pub(super) fn symbols(seed: u64, n: usize) -> Vec<usize> {
+pub(super) fn symbols(seed: u64, part: Option<&PartId>, n: usize) -> Vec<usize> {
     let mut symbols: Vec<usize> = (0..n).collect();
-    Stream::new(seed, &["schedule", "symbols"]).shuffle(&mut symbols);
+    let mut stream = match part {
+        None => Stream::new(seed, &["schedule", "symbols"]),
+        Some(part) => Stream::new(seed, &["schedule", "part", part.as_str(), "symbols"]),
+    };
+    stream.shuffle(&mut symbols);
     symbols
 }
 

@@ -1,5 +1,6 @@
 use super::balance::{Balance, balances};
 use super::*;
+use crate::protocol::Order;
 use crate::protocol::Role;
 use crate::protocol::example::{model, protocol};
 use std::collections::BTreeMap;
@@ -11,7 +12,7 @@ fn design(models: usize, repetitions: u32, order: Order) -> Protocol {
 }
 
 fn letters(plan: &[Trial]) -> String {
-    plan.iter().map(|t| t.model.as_str()).collect()
+    plan.iter().map(|t| t.model().unwrap().as_str()).collect()
 }
 
 fn file(rows: &[(u32, &str)]) -> FileOrders {
@@ -41,7 +42,7 @@ fn practice_comes_first_and_is_numbered_apart() {
                 t.trial,
                 t.block,
                 t.position,
-                t.model.as_str(),
+                t.model().unwrap().as_str(),
                 t.repetition,
                 t.practice,
             )
@@ -73,7 +74,9 @@ fn shuffled_and_given_orders_are_one_block() {
     let planned = plan(&p, None, Seat::Row(1)).unwrap();
     assert!(planned.iter().all(|t| t.block == 1));
     for model in ["A", "B", "C"] {
-        let times = planned.iter().filter(|t| t.model.as_str() == model);
+        let times = planned
+            .iter()
+            .filter(|t| t.model().unwrap().as_str() == model);
         assert_eq!(times.map(|t| t.repetition).collect::<Vec<_>>(), [1, 2]);
     }
 }
@@ -110,13 +113,16 @@ fn an_order_depends_on_seed_design_and_row_alone() {
 fn a_row_takes_the_lines_after_those_of_the_row_before() {
     let p = design(4, 3, Order::Williams);
     let planner = Planner::new(&p, None).unwrap();
-    let symbols = orders::symbols(p.study.seed, 4);
+    let symbols = orders::symbols(p.study.seed, None, 4);
     for row in 1..=9u32 {
         let plan = planner.plan(Seat::Row(row)).unwrap();
         for (r, block) in plan.chunks(4).enumerate() {
             let line = orders::williams_line(4, u64::from(3 * (row - 1)) + r as u64);
             let expected: Vec<_> = line.iter().map(|&s| &p.models[symbols[s]].id).collect();
-            assert_eq!(block.iter().map(|t| &t.model).collect::<Vec<_>>(), expected);
+            assert_eq!(
+                block.iter().filter_map(|t| t.model()).collect::<Vec<_>>(),
+                expected
+            );
         }
     }
 }
@@ -350,9 +356,12 @@ fn trials(text: &str) -> Vec<Trial> {
                 trial: number,
                 block,
                 position: number,
-                model: ModelId::new(letter.to_string()).unwrap(),
+                stimuli: Stimuli::One {
+                    model: ModelId::new(letter.to_string()).unwrap(),
+                },
                 repetition: block,
                 practice: false,
+                part: None,
             });
         }
     }

@@ -45,11 +45,7 @@ impl Session {
 
     /// Fails the attempt under way because of the device.
     pub(super) fn lose_attempt(&mut self, failure: Failure, what: &str, at: Moment) {
-        let preparing = matches!(
-            self.phase,
-            Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. }
-        );
-        let refused = failure == Failure::DeviceFault && preparing;
+        let refused = failure == Failure::DeviceFault && self.phase.preparing();
         self.fail(failure, what, at);
         self.proceed(at);
         self.set_problem(if refused { REFUSED } else { what }, failure);
@@ -164,7 +160,15 @@ impl Session {
         let planned = |n: &u32| self.history.planned(*n).cloned();
         let mut rest: Vec<Trial> = self.history.queue.iter().filter_map(planned).collect();
         rest.retain(|t| t.trial != number);
-        let design = &self.protocol.design;
+        // What is not told to a track that has ended takes it up again.
+        if trial
+            .track()
+            .is_some_and(|track| self.history.has_ended(track))
+        {
+            rest.extend(self.dropped(&[number]));
+            rest.sort_by_key(|t| t.trial);
+        }
+        let design = &self.protocol.design_of(trial.part.as_ref());
         let mut constraint_broken = false;
         let mut given_up = false;
         let queue = if !failure.counts() {
@@ -192,6 +196,18 @@ impl Session {
             let trial = number;
             self.record(Event::TrialClosed { trial, attempt }, at);
         }
+    }
+
+    /// The trials that the ends of the tracks of these trials have dropped.
+    pub(super) fn dropped(&self, again: &[u32]) -> Vec<Trial> {
+        let of = |n: &u32| self.history.planned(*n)?.track();
+        let tracks: Vec<_> = again.iter().filter_map(of).collect();
+        let schedule = self.history.schedule().iter();
+        schedule
+            .filter(|t| t.track().is_some_and(|track| tracks.contains(&track)))
+            .filter(|t| !self.history.takes_place(t.trial))
+            .cloned()
+            .collect()
     }
 
     /// What the constraints of the order look back to.

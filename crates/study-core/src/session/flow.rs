@@ -4,7 +4,7 @@ use super::Session;
 use super::phase::{Form, Phase};
 use super::view::MessageKind;
 use crate::outcome::{Author, Event, FormId, Moment};
-use crate::protocol::Entry;
+use crate::protocol::{Entry, Trial};
 
 /// A form or message that appears once in a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,13 +18,15 @@ pub(super) enum Step {
     Outro,
 }
 
-impl From<MessageKind> for Step {
-    fn from(kind: MessageKind) -> Self {
+impl Step {
+    /// That of a message, unless each part has one.
+    fn of(kind: MessageKind) -> Option<Self> {
         match kind {
-            MessageKind::Welcome => Self::Welcome,
-            MessageKind::Instructions => Self::Instructions,
-            MessageKind::Practice => Self::Practice,
-            MessageKind::PracticeOver => Self::PracticeOver,
+            MessageKind::Welcome => Some(Self::Welcome),
+            MessageKind::Instructions => Some(Self::Instructions),
+            MessageKind::Practice => Some(Self::Practice),
+            MessageKind::PracticeOver => Some(Self::PracticeOver),
+            MessageKind::Part | MessageKind::Feedback => None,
         }
     }
 }
@@ -34,6 +36,8 @@ impl Session {
     pub(super) fn proceed(&mut self, at: Moment) {
         if self.history.over() {
             self.phase = Phase::End;
+        } else if let Some(correct) = self.feedback.take() {
+            self.phase = Phase::Feedback { correct };
         } else if self.consent_is_missing() {
             self.phase = Phase::Consent;
         } else if !self.before_trials(at) && !self.trials(at) && !self.after_trials(at) {
@@ -119,6 +123,10 @@ impl Session {
             };
             return true;
         }
+        self.end_tracks(at);
+        if self.show_message(MessageKind::Part) {
+            return true;
+        }
         let Some(next) = self.history.next_trial() else {
             return false;
         };
@@ -147,7 +155,10 @@ impl Session {
     }
 
     fn show_message(&mut self, kind: MessageKind) -> bool {
-        let shown = self.passed.contains(&Step::from(kind));
+        let shown = match Step::of(kind) {
+            Some(step) => self.passed.contains(&step),
+            None => self.next_part_begun(),
+        };
         if !shown && self.message(kind).is_some() {
             self.phase = Phase::Message(kind);
             return true;
@@ -155,10 +166,21 @@ impl Session {
         false
     }
 
+    /// Whether the text of the next trial's part was shown, or a trial of it began.
+    fn next_part_begun(&self) -> bool {
+        let Some(part) = self.history.next_trial().and_then(|t| t.part.as_ref()) else {
+            return true;
+        };
+        let begun = |t: &Trial| t.part.as_ref() == Some(part) && self.history.attempts(t.trial) > 0;
+        self.parts_shown.contains(part) || self.history.schedule().iter().any(begun)
+    }
+
     /// The text of a message, if it is to be shown.
     pub(super) fn message(&self, kind: MessageKind) -> Option<&str> {
         let text = &self.protocol.text;
         match kind {
+            MessageKind::Part => self.part_of(self.history.next_trial()?)?.text.as_deref(),
+            MessageKind::Feedback => None,
             MessageKind::Welcome => text.welcome.as_deref(),
             MessageKind::Instructions => text.instructions.as_deref(),
             MessageKind::Practice => text.practice.as_deref().filter(|_| self.has_practice()),
@@ -189,9 +211,18 @@ impl Session {
     fn advance(&mut self, at: Moment) {
         match &self.phase {
             Phase::Message(kind) => {
-                self.passed.insert((*kind).into());
+                match Step::of(*kind) {
+                    Some(step) => {
+                        self.passed.insert(step);
+                    }
+                    None => {
+                        let next = self.history.next_trial().and_then(|t| t.part.clone());
+                        self.parts_shown.extend(next);
+                    }
+                }
                 self.proceed(at);
             }
+            Phase::Feedback { .. } => self.proceed(at),
             Phase::Reference { since } => {
                 let shown_s = at.seconds_since(since);
                 if self.reference_wait_s(at) > 0.0 {
@@ -203,7 +234,9 @@ impl Session {
                 }
             }
             Phase::Mounting { .. } => self.mounted(at),
-            &Phase::Playing { strokes, .. } => self.finish_playing(strokes, at),
+            &Phase::Playing { strokes, since, .. } => {
+                self.finish_playing(at.seconds_since(&since), strokes, at);
+            }
             Phase::Stopped => self.notify("choose: play it again or rate it"),
             Phase::Break { since, rested_s } => {
                 let rested_s = rested_s + at.seconds_since(since);

@@ -5,7 +5,7 @@ use super::flow::Step;
 use super::phase::{Form, Phase};
 use crate::outcome::{Author, Event, FormId, Moment};
 use crate::protocol::question::MAX_TEXT_BYTES;
-use crate::protocol::{Answer, AnswerError, Question, QuestionKind};
+use crate::protocol::{Answer, AnswerError, Question, QuestionKind, Stimuli};
 use study_base::text::QuestionId;
 
 /// Why an input was not accepted; shown to the operator.
@@ -32,14 +32,23 @@ pub(super) enum InputRefused {
 }
 
 impl Session {
-    /// The questions of a form.
-    pub(super) fn questions(&self, form: FormId) -> &[Question] {
-        match form {
+    /// The questions of a form, in their order.
+    pub(super) fn questions(&self, form: FormId) -> Vec<&Question> {
+        let all: &[Question] = match form {
             FormId::Setup => &self.protocol.setup,
             FormId::Intake => &self.protocol.intake,
-            FormId::Trial { .. } => &self.protocol.questions,
             FormId::Outro => &self.protocol.outro,
-        }
+            FormId::Trial { trial, .. } => {
+                let part = (self.history.planned(trial)).and_then(|t| self.part_of(t));
+                if let Some(part) = part {
+                    let question =
+                        |id: &QuestionId| self.protocol.questions.iter().find(|q| q.id == *id);
+                    return part.asks.iter().filter_map(question).collect();
+                }
+                &self.protocol.questions
+            }
+        };
+        all.iter().collect()
     }
 
     /// Opens a form at the first question after the last answered one; returns
@@ -53,8 +62,8 @@ impl Session {
             .iter()
             .rposition(|q| self.history.answer(form, &q.id).is_some())
             .map_or(0, |last| last + 1);
-        let total = pages(questions).len();
-        let mut left = pages(questions);
+        let mut left = pages(&questions);
+        let total = left.len();
         let mut index = 0;
         for page in &mut left {
             page.retain(|_| {
@@ -135,9 +144,25 @@ impl Session {
                 response_s: spent_s + earlier.unwrap_or(0.0),
             };
             self.record(done, at);
+            self.feedback = self.told(trial);
         }
         self.phase = Phase::Saving;
         self.proceed_if_saved(at);
+    }
+
+    /// Whether the answer to a trial is correct, if its participant is told.
+    fn told(&self, trial: u32) -> Option<bool> {
+        let planned = self.history.planned(trial)?;
+        let track = self.protocol.track(planned.track()?)?;
+        let (attempt, _) = self.history.completion(trial).filter(|_| track.feedback)?;
+        let question = self.part_of(planned)?.asks.first()?;
+        let answer = self
+            .history
+            .answer(FormId::Trial { trial, attempt }, question)?;
+        match &planned.stimuli {
+            Stimuli::Track { intervals, .. } => track.is_correct(intervals, answer),
+            Stimuli::One { .. } | Stimuli::Pair { .. } => None,
+        }
     }
 
     pub(super) fn remark(&mut self, by: Author, text: String, at: Moment) {
@@ -181,7 +206,7 @@ impl Session {
         reason: &str,
     ) -> Result<Answer, InputRefused> {
         self.accepts_records()?;
-        let asked = self.questions(form).iter().find(|q| q.id == *question);
+        let asked = self.questions(form).into_iter().find(|q| q.id == *question);
         let given = self.history.answer(form, question);
         let (Some(asked), Some(from), true) = (asked, given, self.history.is_current(form)) else {
             return Err(InputRefused::NothingToCorrect);
@@ -227,9 +252,9 @@ fn step_of(form: FormId) -> Option<Step> {
 
 /// The pages of a form: one question each, with an optional text that directly
 /// follows it.
-fn pages(questions: &[Question]) -> Vec<Vec<Question>> {
+fn pages(questions: &[&Question]) -> Vec<Vec<Question>> {
     let mut pages: Vec<Vec<Question>> = Vec::new();
-    for question in questions {
+    for &question in questions {
         let below = matches!(question.kind, QuestionKind::Text) && !question.required;
         match pages.last_mut() {
             Some(page) if below && page.len() == 1 => page.push(question.clone()),
@@ -287,6 +312,7 @@ mod tests {
     fn a_page_is_one_question_and_the_optional_text_below_it() {
         let mut questions = example::protocol(2, 1).questions;
         questions.extend([text("more", false), text("must", true), text("may", false)]);
+        let questions: Vec<&Question> = questions.iter().collect();
         let ids: Vec<Vec<_>> = pages(&questions)
             .iter()
             .map(|page| page.iter().map(|q| q.id.as_str().to_owned()).collect())

@@ -57,7 +57,8 @@ pub enum Input {
     /// Esc, or Space while a table is loaded or playing: stop the device. Repeated
     /// during a stop, it makes the device limp without waiting for the report.
     Stop,
-    /// After a stop: play the same trial again.
+    /// After a stop: play the same trial again. Before an answer, where the part permits
+    /// it: feel all intervals again.
     PlayAgain,
     /// After a stop: rate what was felt.
     RateStopped,
@@ -167,6 +168,8 @@ pub enum Effect {
         attempt: u32,
         /// Realization.
         model: ModelId,
+        /// Interval, for the name of the telemetry file, if the trial has several.
+        interval: Option<u32>,
     },
     /// Start playing what is loaded.
     Start,

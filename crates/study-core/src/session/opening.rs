@@ -5,7 +5,7 @@ use super::{Claim, ClaimFacts, Effect, Session};
 use crate::outcome::fold::History;
 use crate::outcome::{Choice, Entry, Event, Failure, Moment, Start, State};
 use crate::schedule;
-use study_base::text::ParticipantId;
+use study_base::text::{ParticipantId, counted};
 
 /// Longest operator code, in characters.
 pub const MAX_OPERATOR: usize = 64;
@@ -149,8 +149,10 @@ impl Session {
         };
         let planned = |trial: &u32| self.history.planned(*trial).cloned();
         let to_come: Vec<_> = queue.iter().filter_map(planned).collect();
+        let part = to_come.first().and_then(|t| t.part.as_ref());
+        let design = self.protocol.design_of(part);
         let constraint_broken =
-            restart && schedule::breaks_constraint(&self.felt(), &to_come, &self.protocol.design);
+            restart && schedule::breaks_constraint(&self.felt(), &to_come, &design);
         let device_id = self.claim.as_ref().map(|c| c.device_id.clone());
         let reopened = Event::Reopened {
             operator: self.operator.clone(),
@@ -162,11 +164,11 @@ impl Session {
             constraint_broken,
         };
         self.record(reopened, at);
-        let total = self.history.planned_total(false);
-        let greeting = format!(
-            "welcome back: {} of {total} trials are saved",
-            self.history.completed().count()
-        );
+        let saved = self.history.completed().count();
+        let greeting = match self.total(false) {
+            Some(total) => format!("welcome back: {saved} of {total} trials are saved"),
+            None => format!("welcome back: {} saved", counted(saved, "trial", "trials")),
+        };
         self.notice = Some(match self.notice.take() {
             Some(notice) => format!("{notice} · {greeting}"),
             None => greeting,
@@ -203,10 +205,16 @@ impl Session {
         };
         let in_block = |trial: &u32| history.planned(*trial).is_some_and(|t| t.block == block);
         let again = history.schedule().iter().filter(|t| t.block == block);
-        again
-            .map(|t| t.trial)
-            .chain(history.queue.iter().copied().filter(|t| !in_block(t)))
-            .collect()
+        let again: Vec<u32> = again.map(|t| t.trial).collect();
+        let mut later: Vec<u32> = (history.queue.iter().copied())
+            .filter(|t| !in_block(t))
+            .collect();
+        let dropped = self.dropped(&again);
+        if !dropped.is_empty() {
+            later.extend(dropped.iter().map(|t| t.trial).filter(|t| !in_block(t)));
+            later.sort_unstable();
+        }
+        again.into_iter().chain(later).collect()
     }
 
     pub(super) fn drop_out(&mut self, reason: &str, at: Moment) {

@@ -42,6 +42,13 @@ pub(super) enum Phase {
     Mounting {
         code: String,
     },
+    /// The next interval is loaded and waits for the end of the gap.
+    Gap {
+        /// The end of the interval before it.
+        ended: Moment,
+        /// When it starts after that, s.
+        start_after_s: f64,
+    },
     /// The start was requested.
     Ready {
         since: Moment,
@@ -65,6 +72,10 @@ pub(super) enum Phase {
     },
     /// Stopped: play again or rate.
     Stopped,
+    /// Whether the answer was correct is shown.
+    Feedback {
+        correct: bool,
+    },
     /// A scheduled break; `rested_s` is the part of it before a resume.
     Break {
         since: Moment,
@@ -91,9 +102,18 @@ impl Phase {
             self,
             Self::Loading { .. }
                 | Self::Mounting { .. }
+                | Self::Gap { .. }
                 | Self::Ready { .. }
                 | Self::Playing { .. }
                 | Self::Stopping { .. }
+        )
+    }
+
+    /// Whether something is requested from the device that does not play yet.
+    pub(super) fn preparing(&self) -> bool {
+        matches!(
+            self,
+            Self::Loading { .. } | Self::Mounting { .. } | Self::Gap { .. } | Self::Ready { .. }
         )
     }
 

@@ -4,12 +4,12 @@ use super::failures::title;
 use super::flow::Overlay;
 use super::phase::{Form, Phase, TELEMETRY_WITHIN_S};
 use super::view::{
-    Banner, Correctable, DeviceState, Progress, Screen, StatusLine, Telemetry, View,
+    Banner, Correctable, DeviceState, MessageKind, Progress, Screen, StatusLine, Telemetry, View,
 };
 use super::{Ending, Session};
 use crate::outcome::{FormId, Moment};
 use crate::protocol::phrases::Phrase;
-use crate::protocol::{DeviceKind, Seat};
+use crate::protocol::{DeviceKind, Seat, TrackRules};
 use study_base::text::Untrusted;
 
 impl Session {
@@ -33,6 +33,7 @@ impl Session {
                 Some(_) => self.unsaved_names(),
                 None => Vec::new(),
             },
+            can_replay: self.can_replay(),
             can_advance: can_advance(&screen),
             words: self.words.clone(),
             screen,
@@ -71,7 +72,7 @@ impl Session {
             Phase::ResumeChoice { gap_s } => Screen::ResumeChoice {
                 gap_h: gap_s / 3600.0,
                 done: self.history.closed(false),
-                total: self.history.planned_total(false),
+                total: self.total(false),
             },
             Phase::Consent => match &self.protocol.consent {
                 Some(consent) => Screen::Consent {
@@ -84,6 +85,16 @@ impl Session {
                 kind: *kind,
                 text: self.message(*kind).unwrap_or_default().to_owned(),
             },
+            Phase::Feedback { correct } => Screen::Message {
+                kind: MessageKind::Feedback,
+                text: (self.words)
+                    .get(if *correct {
+                        Phrase::Correct
+                    } else {
+                        Phrase::NotCorrect
+                    })
+                    .to_owned(),
+            },
             Phase::Form(form) => form_screen(form),
             Phase::Reference { .. } => Screen::Reference {
                 prompt: self
@@ -94,11 +105,14 @@ impl Session {
                     .unwrap_or_else(|| self.words.get(Phrase::ReferenceText).to_owned()),
                 wait_s: self.reference_wait_s(at),
             },
-            Phase::Loading { .. } | Phase::Ready { .. } => Screen::Loading,
+            Phase::Loading { .. } | Phase::Gap { .. } | Phase::Ready { .. } => Screen::Loading {
+                interval: self.interval_of(),
+            },
             Phase::Mounting { code } => Screen::Mount { code: code.clone() },
             Phase::Playing { since, strokes, .. } => Screen::Playing {
                 since_s: at.seconds_since(since),
-                keep_exploring: *strokes < self.strokes_needed(),
+                keep_exploring: self.too_little(at.seconds_since(since), *strokes),
+                interval: self.interval_of(),
             },
             Phase::Stopping { .. } => Screen::Stopping,
             Phase::Stopped => Screen::Stopped {
@@ -130,9 +144,16 @@ impl Session {
         })
     }
 
-    fn strokes_needed(&self) -> u32 {
-        let open = self.history.open();
-        open.map_or(0, |open| self.minimum_strokes(open.trial))
+    /// The interval under way and their number, if there are several.
+    fn interval_of(&self) -> Option<(u32, u32)> {
+        Some((self.interval()?, self.intervals()?))
+    }
+
+    /// Number of trials that count, or of practice trials; `None` if it depends on the
+    /// answers.
+    pub(super) fn total(&self, practice: bool) -> Option<u32> {
+        let known = practice || !self.protocol.is_adaptive();
+        known.then(|| self.history.planned_total(practice))
     }
 
     /// Counts closed trials, so that a repeated trial looks like any other.
@@ -146,11 +167,11 @@ impl Session {
             Some(open) => open.trial,
             None => self.history.next_trial()?,
         };
-        let total = self.history.planned_total(trial.practice);
+        let most = self.history.planned_total(trial.practice);
         Some(Progress {
             practice: trial.practice,
-            current: (self.history.closed(trial.practice) + 1).min(total),
-            total,
+            current: (self.history.closed(trial.practice) + 1).min(most),
+            total: self.total(trial.practice),
         })
     }
 
@@ -188,7 +209,7 @@ impl Session {
             }
             _ if none => DeviceState::ByHand,
             _ if self.current_device() == DeviceKind::Manual => DeviceState::Limp,
-            Phase::Loading { .. } => DeviceState::Loading,
+            Phase::Loading { .. } | Phase::Gap { .. } => DeviceState::Loading,
             Phase::Ready { .. } => DeviceState::Ready,
             Phase::Playing { telemetry, .. } => DeviceState::Running(match telemetry {
                 None => Telemetry::None,
@@ -203,10 +224,9 @@ impl Session {
     /// The device of the trial under way; between trials, that of the study.
     fn current_device(&self) -> DeviceKind {
         let under_way = self
-            .history
-            .open()
+            .playing_model()
             .filter(|_| self.phase.armed() || matches!(self.phase, Phase::Stopped));
-        let own = under_way.and_then(|open| self.protocol.model(&open.trial.model)?.device);
+        let own = under_way.and_then(|model| self.protocol.model(model)?.device);
         let claimed = self.claim.as_ref().map(|c| c.device_kind);
         own.or(claimed).unwrap_or(self.protocol.device.kind)
     }
@@ -222,8 +242,8 @@ impl Session {
         given
             .filter(|g| self.history.is_current(g.form))
             .filter_map(|g| {
-                let asked = self.questions(g.form).iter();
-                let question = asked.clone().find(|q| q.id == g.question)?.clone();
+                let asked = self.questions(g.form).into_iter();
+                let question = asked.cloned().find(|q| q.id == g.question)?;
                 Some(Correctable {
                     form: g.form,
                     title: self.form_title(g.form),
@@ -276,6 +296,18 @@ impl Session {
     }
 
     fn names_a_realization(&self, name: &str) -> bool {
+        let of_family = self.protocol.families.iter().any(|family| {
+            let files = [Some(&family.from), family.to.as_ref()];
+            name.contains(&format!("{}.", family.id))
+                || files
+                    .into_iter()
+                    .flatten()
+                    .any(|file| name.contains(file.as_str()))
+        });
+        let standard = |t: &TrackRules| name.contains(&format!("{}.standard", t.id));
+        if of_family || self.protocol.tracks.iter().any(standard) {
+            return true;
+        }
         self.protocol.models.iter().any(|model| {
             let id = model.id.as_str();
             let id_in = name.trim_end_matches('.') == id || (id.len() > 3 && name.contains(id));

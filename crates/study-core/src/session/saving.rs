@@ -99,7 +99,7 @@ impl Session {
                     self.retry_save();
                 }
             }
-            Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
+            phase if phase.preparing() => {
                 self.fail(Failure::Stopped, "the journal could not be written", at);
                 self.proceed(at);
             }
@@ -188,6 +188,10 @@ impl Session {
             let ending = ending.clone();
             return self.end(ending);
         }
+        if self.saves.trouble.is_none() && self.paused.is_none() {
+            self.end_gap(at);
+        }
+        self.end_exposure(at);
         self.device_deadlines(at);
         self.watch_clock(at);
     }

@@ -3,7 +3,7 @@
 use super::phase::Phase;
 use super::{Effect, Session};
 use crate::outcome::{Event, Failure, Fidelity, Moment, Playback, Verdict};
-use crate::protocol::{DeviceKind, Trial};
+use crate::protocol::{DeviceKind, Exposure, Trial};
 
 impl Session {
     /// Requests the next trial from the device. The event comes first, so that
@@ -12,21 +12,54 @@ impl Session {
         let Some(trial) = self.history.next_trial().cloned() else {
             return self.proceed(at);
         };
+        let Some(presenting) = self.presenting(&trial) else {
+            return self.notify("this trial cannot be presented; see `study verify`");
+        };
         let attempt = self.history.attempts(trial.trial) + 1;
+        let (model, intervals) = match <[_; 1]>::try_from(presenting.models) {
+            Ok([only]) => (Some(only), Vec::new()),
+            Err(several) => (None, several),
+        };
         let started = Event::AttemptStarted {
             trial: trial.trial,
             attempt,
             position: self.position(&trial),
-            model: trial.model.clone(),
+            model,
             reference_s,
+            intervals,
+            level: presenting.level,
         };
         self.record(started, at);
-        self.out.push(Effect::Load {
-            trial: trial.trial,
-            attempt,
-            model: trial.model,
-        });
+        self.load_interval(at);
+    }
+
+    /// Requests the next interval of the attempt under way from the device: each anew,
+    /// also one that is equal to the last, so that a swap tells nothing.
+    fn load_interval(&mut self, at: Moment) {
+        let (Some(open), Some(model)) = (self.history.open(), self.playing_model()) else {
+            return self.proceed(at);
+        };
+        let load = Effect::Load {
+            trial: open.trial.trial,
+            attempt: open.attempt.number,
+            model: model.clone(),
+            interval: self.interval(),
+        };
+        self.out.push(load);
         self.phase = Phase::Loading { since: at };
+    }
+
+    /// The interval under way, from 1, if the trial has several.
+    pub(super) fn interval(&self) -> Option<u32> {
+        let attempt = self.history.open()?.attempt;
+        let several = attempt.intervals() > 1;
+        attempt.interval().filter(|_| several)
+    }
+
+    /// The number of intervals of the trial under way, if it has several.
+    pub(super) fn intervals(&self) -> Option<u32> {
+        let intervals = self.history.open()?.attempt.intervals();
+        (intervals > 1).then_some(intervals)
     }
 
     /// Where a trial would stand if it were felt now: one more than the trials of
@@ -44,9 +77,45 @@ impl Session {
     }
 
     pub(super) fn device_loaded(&mut self, at: Moment) {
-        if matches!(self.phase, Phase::Loading { .. }) {
-            self.out.push(Effect::Start);
-            self.phase = Phase::Ready { since: at };
+        if !matches!(self.phase, Phase::Loading { .. }) {
+            return;
+        }
+        match self.gap(at) {
+            Some((ended, start_after_s)) => {
+                self.phase = Phase::Gap {
+                    ended,
+                    start_after_s,
+                };
+                self.end_gap(at);
+            }
+            None => self.start_playback(at),
+        }
+    }
+
+    fn start_playback(&mut self, at: Moment) {
+        self.out.push(Effect::Start);
+        self.phase = Phase::Ready { since: at };
+    }
+
+    /// The end of the interval before, and when the next one starts after it: after the
+    /// gap, or, if loading took longer, after a multiple of it.
+    fn gap(&self, at: Moment) -> Option<(Moment, f64)> {
+        let open = self.history.open()?;
+        let gap_s = self.part_of(open.trial)?.gap_s;
+        let (ended, _) = open.attempt.presentations.last()?.ended?;
+        let late = (at.seconds_since(&ended) / gap_s).ceil().max(1.0);
+        (gap_s > 0.0).then_some((ended, gap_s * late))
+    }
+
+    /// Starts the next interval at the end of the gap.
+    pub(super) fn end_gap(&mut self, at: Moment) {
+        if let Phase::Gap {
+            ended,
+            start_after_s,
+        } = self.phase
+            && at.seconds_since(&ended) >= start_after_s
+        {
+            self.start_playback(at);
         }
     }
 
@@ -59,8 +128,7 @@ impl Session {
 
     /// The sample is mounted: what is felt from here on counts.
     pub(super) fn mounted(&mut self, at: Moment) {
-        self.out.push(Effect::Start);
-        self.phase = Phase::Ready { since: at };
+        self.start_playback(at);
     }
 
     /// A device that starts without a request is made limp, which also cancels a
@@ -72,6 +140,7 @@ impl Session {
                 let started = Event::PlaybackStarted {
                     trial: open.trial.trial,
                     attempt: open.attempt.number,
+                    interval: self.interval(),
                 };
                 self.record(started, at);
                 self.phase = Phase::Playing {
@@ -81,7 +150,7 @@ impl Session {
                 };
             }
             (Phase::Playing { .. }, _) => {}
-            (Phase::Loading { .. } | Phase::Mounting { .. }, _) => {
+            (Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Gap { .. }, _) => {
                 self.out.push(Effect::Limp);
                 self.lose_attempt(Failure::DeviceFault, "the device started unasked", at);
             }
@@ -132,6 +201,7 @@ impl Session {
             // The saver knows the file.
             telemetry: None,
             rendering: rendering.clone(),
+            interval: self.interval(),
         };
         self.record(ended, at);
         match rendering {
@@ -157,6 +227,16 @@ impl Session {
         let Some(open) = self.history.open() else {
             return self.proceed(at);
         };
+        if open.attempt.interval().is_some() {
+            let last = open.attempt.presentations.last().and_then(|p| p.ended);
+            let least = self.minimum_strokes(open.trial);
+            if last.is_some_and(|(_, e)| !e.stopped && e.playback.strokes >= least) {
+                self.load_interval(at);
+            } else {
+                self.phase = Phase::Stopped;
+            }
+            return;
+        }
         let begun = self.history.any_answer(open.form());
         let aborted = open.attempt.ended.is_none_or(|e| e.stopped);
         if begun || (!aborted && self.can_rate()) {
@@ -171,9 +251,9 @@ impl Session {
         let Some(open) = self.history.open() else {
             return false;
         };
-        open.attempt
-            .ended
-            .is_some_and(|e| e.playback.strokes >= self.minimum_strokes(open.trial))
+        let least = self.minimum_strokes(open.trial);
+        let mut ended = open.attempt.presentations.iter().filter_map(|p| p.ended);
+        open.attempt.ended.is_some() && ended.all(|(_, e)| e.playback.strokes >= least)
     }
 
     /// Strokes required before a rating; 0 where they are not counted.
@@ -190,9 +270,19 @@ impl Session {
         self.claim.as_ref().is_some_and(|c| c.device_telemetry) && !self.by_hand(trial)
     }
 
+    /// Least and largest time that an interval of the trial under way is felt, s.
+    pub(super) fn exposure(&self) -> Exposure {
+        let part = self
+            .history
+            .open()
+            .and_then(|open| self.part_of(open.trial));
+        part.map(|part| part.exposure).unwrap_or_default()
+    }
+
     /// Whether the sample is mounted by a person, so that no deadline applies.
     pub(super) fn by_hand(&self, trial: &Trial) -> bool {
-        let own = self.protocol.model(&trial.model).and_then(|m| m.device);
+        let model = self.playing_model().or(trial.model());
+        let own = model.and_then(|id| self.protocol.model(id)?.device);
         let kind = own.or(self.claim.as_ref().map(|c| c.device_kind));
         kind == Some(DeviceKind::Manual)
     }
@@ -207,6 +297,16 @@ impl Session {
     }
 
     pub(super) fn play_again(&mut self, at: Moment) {
+        if self.can_replay()
+            && let Some(open) = self.history.open()
+        {
+            let replayed = Event::Replayed {
+                trial: open.trial.trial,
+                attempt: open.attempt.number,
+            };
+            self.record(replayed, at);
+            return self.load_interval(at);
+        }
         if !matches!(self.phase, Phase::Stopped) {
             return;
         }
@@ -219,15 +319,44 @@ impl Session {
         }
     }
 
-    /// Requests the stop that precedes the rating.
-    pub(super) fn finish_playing(&mut self, strokes: u32, at: Moment) {
-        let Some(open) = self.history.open() else {
-            return;
+    /// Whether all intervals may be felt again: before an answer, as often as the part
+    /// permits.
+    pub(super) fn can_replay(&self) -> bool {
+        let (Phase::Form(form), Some(open)) = (&self.phase, self.history.open()) else {
+            return false;
         };
-        if strokes < self.minimum_strokes(open.trial) {
+        form.id == open.form()
+            && !self.history.any_answer(form.id)
+            && open.attempt.replays < self.exposure().replays
+            && !self.device_lost
+    }
+
+    /// Whether more exploration is required after this time and these strokes.
+    pub(super) fn too_little(&self, felt_s: f64, strokes: u32) -> bool {
+        let open = self.history.open();
+        let least = open.map_or(0, |open| self.minimum_strokes(open.trial));
+        strokes < least || felt_s < self.exposure().min_s
+    }
+
+    /// Requests the stop that precedes the rating or the next interval.
+    pub(super) fn finish_playing(&mut self, felt_s: f64, strokes: u32, at: Moment) {
+        if self.history.open().is_none() {
+            return;
+        }
+        if self.too_little(felt_s, strokes) {
             return self.notify("keep exploring");
         }
         self.request_stop(false, false, at);
+    }
+
+    /// Stops the playback after the longest exposure.
+    pub(super) fn end_exposure(&mut self, at: Moment) {
+        if let Phase::Playing { since, .. } = &self.phase
+            && let Some(max_s) = self.exposure().max_s
+            && at.seconds_since(since) >= max_s
+        {
+            self.request_stop(false, false, at);
+        }
     }
 
     fn request_stop(&mut self, aborted: bool, pause: bool, at: Moment) {
@@ -252,7 +381,7 @@ impl Session {
                 *limped = true;
                 self.out.push(Effect::Limp);
             }
-            Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
+            phase if phase.preparing() => {
                 self.out.push(Effect::Limp);
                 self.fail(Failure::Stopped, "stopped before it played", at);
                 self.proceed(at);
@@ -266,7 +395,7 @@ impl Session {
         match &mut self.phase {
             Phase::Playing { .. } => self.request_stop(true, true, at),
             Phase::Stopping { pause, .. } => *pause = true,
-            Phase::Loading { .. } | Phase::Mounting { .. } | Phase::Ready { .. } => {
+            phase if phase.preparing() => {
                 self.stop(at);
                 self.start_pause(at);
             }

@@ -34,6 +34,9 @@ pub struct View {
     /// What is in memory only because saving has failed, such as "trial 3: realism = 5";
     /// empty otherwise.
     pub unsaved: Vec<String>,
+    /// Whether all intervals of the trial can be felt again:
+    /// [`PlayAgain`](super::Input::PlayAgain).
+    pub can_replay: bool,
     /// Whether Enter has an effect now.
     pub can_advance: bool,
     /// The fixed sentences that a participant reads.
@@ -47,8 +50,8 @@ pub struct Progress {
     pub practice: bool,
     /// Number of closed trials plus 1. A repeated trial looks like any other.
     pub current: u32,
-    /// Number of trials.
-    pub total: u32,
+    /// Number of trials; `None` if it depends on the answers.
+    pub total: Option<u32>,
 }
 
 /// Why the data are not those of a real participant.
@@ -149,8 +152,8 @@ pub enum Screen {
         gap_h: f64,
         /// Number of closed trials, without practice.
         done: u32,
-        /// Number of trials, without practice.
-        total: u32,
+        /// Number of trials, without practice; `None` if it depends on the answers.
+        total: Option<u32>,
     },
     /// The consent document.
     Consent {
@@ -186,8 +189,11 @@ pub enum Screen {
         /// Time until Enter works, s; 0 when it does.
         wait_s: f64,
     },
-    /// The table is being loaded.
-    Loading,
+    /// The table is being loaded, or the gap before the next interval passes.
+    Loading {
+        /// The interval that comes, from 1, and their number, if there are several.
+        interval: Option<(u32, u32)>,
+    },
     /// The experimenter mounts a sample and confirms with Enter.
     Mount {
         /// Opaque code on the sample.
@@ -199,6 +205,8 @@ pub enum Screen {
         since_s: f64,
         /// Whether more exploration is required before Enter works.
         keep_exploring: bool,
+        /// The interval, from 1, and their number, if there are several.
+        interval: Option<(u32, u32)>,
     },
     /// A stop is requested and not yet confirmed.
     Stopping,
@@ -254,6 +262,10 @@ pub enum MessageKind {
     Practice,
     /// End of the practice trials.
     PracticeOver,
+    /// Before the first trial of a part.
+    Part,
+    /// Whether the answer was correct.
+    Feedback,
 }
 
 /// An earlier answer that can be corrected.

@@ -7,10 +7,10 @@ use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
 use super::{StudyFolder, atomic, journal, layout, tables};
 use crate::outcome::cell::{Cell, Row as _};
-use crate::outcome::fold::attempt_rows;
-use crate::outcome::{AttemptRow, ParticipantRow, RatingRow, State};
+use crate::outcome::fold::{attempt_rows, interval_rows};
+use crate::outcome::{AttemptRow, IntervalRow, ParticipantRow, RatingRow, State};
 use crate::protocol::Protocol;
-use crate::protocol::columns::{AttemptColumn, ParticipantColumn, RatingColumn};
+use crate::protocol::columns::{AttemptColumn, IntervalColumn, ParticipantColumn, RatingColumn};
 use std::io;
 
 /// Every row of a study.
@@ -23,6 +23,8 @@ pub struct Derived {
     pub attempts: Vec<AttemptRow>,
     /// One for each participant, by the last session.
     pub participants: Vec<ParticipantRow>,
+    /// One for each presentation, in a study with parts.
+    pub intervals: Vec<IntervalRow>,
 }
 
 impl StudyFolder {
@@ -89,6 +91,11 @@ impl Derived {
         for session in sessions {
             if !matches!(session.standing().state, State::Void | State::Withdrawn) {
                 derived.rows.extend(session.history.rating_rows(protocol));
+                if !protocol.parts.is_empty() {
+                    derived
+                        .intervals
+                        .extend(interval_rows(&session.history, protocol));
+                }
             }
             if session.standing().state != State::Withdrawn {
                 let rows = attempt_rows(
@@ -103,8 +110,8 @@ impl Derived {
         derived
     }
 
-    /// File name and bytes of each table.
-    pub(super) fn tables(&self, protocol: &Protocol) -> io::Result<[(&'static str, Vec<u8>); 3]> {
+    /// File name and bytes of each table that the study has.
+    pub(super) fn tables(&self, protocol: &Protocol) -> io::Result<Vec<(&'static str, Vec<u8>)>> {
         let mut header = RatingColumn::header(protocol);
         header.retain(|(column, name)| {
             let used = |row: &RatingRow| row.cell(*column, name) != Cell::Empty;
@@ -114,11 +121,16 @@ impl Derived {
         let attempts = tables::csv(&AttemptColumn::header(), &self.attempts)?;
         let header = ParticipantColumn::header(protocol);
         let participants = tables::csv(&header, &self.participants)?;
-        Ok([
+        let mut tables = vec![
             (layout::RATINGS, ratings),
             (layout::ATTEMPTS, attempts),
             (layout::PARTICIPANTS, participants),
-        ])
+        ];
+        if !protocol.parts.is_empty() {
+            let intervals = tables::csv(&IntervalColumn::header(), &self.intervals)?;
+            tables.push((layout::INTERVALS, intervals));
+        }
+        Ok(tables)
     }
 }
 

@@ -283,6 +283,7 @@ mod tests {
             stopped: false,
             telemetry: None,
             rendering: None,
+            interval: None,
         };
         let bytes = encode(1, NO_LINE, &Record::Event(at, event)).unwrap();
         let Record::Event(_, Event::PlaybackEnded { playback, .. }) =

@@ -29,6 +29,8 @@ pub const REVEALS: &str = "reveals.jsonl";
 pub const RATINGS: &str = "ratings.csv";
 /// Derived: every attempt, answer, correction and failure.
 pub const ATTEMPTS: &str = "attempts.csv";
+/// Derived, in a study with parts: every presentation.
+pub const INTERVALS: &str = "intervals.csv";
 /// Derived: one row for each participant.
 pub const PARTICIPANTS: &str = "participants.csv";
 
@@ -36,7 +38,7 @@ pub const PARTICIPANTS: &str = "participants.csv";
 pub const OF_SESSION: [&str; 5] = [HEAD, ".head.json.tmp", RECEIPT, TELEMETRY, RESERVE];
 
 /// The derived tables.
-pub const TABLES: [&str; 3] = [RATINGS, ATTEMPTS, PARTICIPANTS];
+pub const TABLES: [&str; 4] = [RATINGS, ATTEMPTS, PARTICIPANTS, INTERVALS];
 /// Derived by `study analyze`: the results of the analysis.
 pub const ANALYSIS: &str = "analysis";
 
@@ -102,6 +104,18 @@ pub fn telemetry(trial: u32, attempt: u32, copy: u32) -> String {
     }
 }
 
+/// The same for an interval, if the trial has several.
+pub fn telemetry_of(trial: u32, attempt: u32, interval: Option<u32>, copy: u32) -> String {
+    let Some(interval) = interval else {
+        return telemetry(trial, attempt, copy);
+    };
+    let copy = match copy {
+        1 => String::new(),
+        copy => format!("-{copy}"),
+    };
+    format!("{trial:03}-a{attempt}-i{interval}{copy}.csv")
+}
+
 /// Parses a number from 1 without leading zeros.
 pub fn number(name: &str) -> Option<u32> {
     let n: u32 = name.parse().ok()?;
@@ -131,6 +145,8 @@ mod tests {
     fn the_design_names_the_telemetry() {
         assert_eq!(telemetry(7, 1, 1), "007-a1.csv");
         assert_eq!(telemetry(7, 1, 2), "007-a1-2.csv");
+        assert_eq!(telemetry_of(7, 1, Some(2), 1), "007-a1-i2.csv");
+        assert_eq!(telemetry_of(7, 1, Some(2), 3), "007-a1-i2-3.csv");
     }
 
     #[test]

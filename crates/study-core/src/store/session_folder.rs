@@ -45,6 +45,19 @@ impl SessionFolder {
     /// # Errors
     /// [`StoreError`] if it cannot be created.
     pub fn telemetry(&self, trial: u32, attempt: u32) -> Result<TelemetryWriter, StoreError> {
-        TelemetryWriter::create(Arc::clone(&self.lock), trial, attempt)
+        self.telemetry_of(trial, attempt, None)
+    }
+
+    /// The same for an interval, if the trial has several.
+    ///
+    /// # Errors
+    /// [`StoreError`] if it cannot be created.
+    pub fn telemetry_of(
+        &self,
+        trial: u32,
+        attempt: u32,
+        interval: Option<u32>,
+    ) -> Result<TelemetryWriter, StoreError> {
+        TelemetryWriter::create(Arc::clone(&self.lock), trial, attempt, interval)
     }
 }

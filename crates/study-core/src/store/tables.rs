@@ -26,17 +26,17 @@ mod tests {
     use crate::outcome::cell::{Cell, Header, Row};
     use crate::outcome::ratings::Ratings;
     use crate::outcome::{
-        AttemptEvent, AttemptRow, Author, Failure, ParticipantRow, RatingRow, State, Status,
-        Verdict,
+        AttemptEvent, AttemptRow, Author, Failure, IntervalRow, ParticipantRow, RatingRow, State,
+        Status, Verdict,
     };
     use crate::protocol::columns::{
-        AttemptColumn, Column, Kind, ParticipantColumn, RatingColumn, Repeats,
+        AttemptColumn, Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, Repeats,
     };
     use crate::protocol::{Answer, DeviceKind, Role};
     use chrono::{DateTime, FixedOffset};
     use proptest::prelude::*;
     use std::collections::BTreeMap;
-    use study_base::text::{ModelId, ParticipantId, QuestionId};
+    use study_base::text::{ModelId, PartId, ParticipantId, QuestionId};
 
     /// Values for the fields of a row, drawn from a list.
     struct Draws<'a>(std::iter::Cycle<std::slice::Iter<'a, u32>>);
@@ -120,7 +120,7 @@ mod tests {
             block: d.whole(),
             position: d.maybe(|d| d.whole() | 1),
             planned_position: d.whole(),
-            model: d.model(),
+            model: Some(d.model()),
             role: d.of(&[
                 Role::Test,
                 Role::Practice,
@@ -162,6 +162,46 @@ mod tests {
             status,
             vaf: d.maybe(Draws::number),
             covariates: BTreeMap::from([("lambda".to_owned(), d.number())]),
+            part: Some(PartId::new("p").unwrap()),
+            track: d.maybe(|_| PartId::new("t").unwrap()),
+            level: d.maybe(Draws::number),
+            correct: d.maybe(Draws::flag),
+            replays: d.maybe(Draws::whole),
+            rendering: d.maybe(|d| {
+                d.of(&[
+                    Verdict::Ok,
+                    Verdict::Unverified,
+                    Verdict::TooLittle,
+                    Verdict::Flag,
+                    Verdict::Fault,
+                ])
+            }),
+            rendered_vaf: d.maybe(Draws::number),
+        }
+    }
+
+    fn interval_row(draws: &[u32]) -> IntervalRow {
+        let mut d = Draws(draws.iter().cycle());
+        let id = |_: &mut Draws<'_>| PartId::new("p").unwrap();
+        IntervalRow {
+            study: "a-study".to_owned(),
+            participant: d.participant(),
+            session: d.whole(),
+            part: Some(id(&mut d)),
+            trial: d.whole(),
+            attempt: d.whole(),
+            interval: d.whole(),
+            model: d.maybe(Draws::model),
+            level: d.maybe(Draws::number),
+            level_proposed: d.maybe(Draws::number),
+            track: d.maybe(id),
+            track_trial: d.maybe(Draws::whole),
+            target: d.maybe(Draws::flag),
+            catch: d.maybe(Draws::flag),
+            gap_s: d.maybe(Draws::number),
+            replays: d.whole(),
+            exploration_s: d.maybe(Draws::number),
+            strokes: d.maybe(Draws::whole),
             rendering: d.maybe(|d| {
                 d.of(&[
                     Verdict::Ok,
@@ -290,6 +330,7 @@ mod tests {
         fn cells_are_what_their_columns_declare(draws in prop::collection::vec(any::<u32>(), 97)) {
             let columns = header(RatingColumn::ALL, RatingColumn::column, &QUESTIONS);
             check(&rating_row(&draws, 1), &columns, RatingColumn::column)?;
+            check(&interval_row(&draws), &IntervalColumn::header(), IntervalColumn::column)?;
             check(&attempt_row(&draws), &AttemptColumn::header(), AttemptColumn::column)?;
             let columns = header(ParticipantColumn::ALL, ParticipantColumn::column, &["hand"]);
             check(&participant_row(&draws), &columns, ParticipantColumn::column)?;
@@ -300,7 +341,7 @@ mod tests {
             draws in prop::collection::vec(prop::collection::vec(any::<u32>(), 97), 1..8)
         ) {
             let rows: Vec<RatingRow> = (1..).zip(&draws).map(|(n, d)| rating_row(d, n)).collect();
-            prop_assume!(rows.iter().any(|r| !r.practice));
+            prop_assume!(rows.iter().any(|r| !r.practice && r.track.is_none()));
             let columns = header(RatingColumn::ALL, RatingColumn::column, &QUESTIONS);
             let table = csv(&columns, &rows).unwrap();
             for asked in [None, Some("realism"), Some("effort")] {

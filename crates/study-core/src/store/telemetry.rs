@@ -52,6 +52,7 @@ impl TelemetryWriter {
         lock: Arc<SessionLock>,
         trial: u32,
         attempt: u32,
+        interval: Option<u32>,
     ) -> Result<Self, StoreError> {
         let folder = lock.path.join(layout::TELEMETRY);
         atomic::folder(lock.disk.as_ref(), &folder)?;
@@ -61,7 +62,7 @@ impl TelemetryWriter {
         })?;
         let mut copy = 1;
         let (name, path, file) = loop {
-            let name = layout::telemetry(trial, attempt, copy);
+            let name = layout::telemetry_of(trial, attempt, interval, copy);
             let path = folder.join(&name);
             match lock.disk.create(&path) {
                 Ok(file) => break (name, path, file),

@@ -1,6 +1,7 @@
 //! Verifying a results folder: every file is read again and compared.
 
 mod telemetry;
+mod tracks;
 
 use super::derive::Derived;
 use super::error::{At as _, StoreError, plain};
@@ -46,8 +47,8 @@ impl Finding {
 
 impl StudyFolder {
     /// Verifies the checksums and the chain of every journal, the hashes of the frozen
-    /// protocol, the number of telemetry samples and, given a protocol, the derived
-    /// tables.
+    /// protocol, the number of telemetry samples and, given a protocol, the levels of
+    /// tracks and the derived tables.
     ///
     /// # Errors
     /// [`StoreError`] if a folder or journal cannot be read at all.
@@ -59,6 +60,9 @@ impl StudyFolder {
             self.verify_telemetry(session, &place, &mut found)?;
         }
         if let Some(protocol) = protocol {
+            for session in &sessions {
+                tracks::verify_tracks(session, protocol, &place_of(session), &mut found);
+            }
             self.verify_tables(&sessions, protocol, &mut found)?;
         }
         Ok(found)

@@ -19,7 +19,7 @@ pub fn attempt_rows(
     let mut models: BTreeMap<u32, ModelId> = start
         .iter()
         .flat_map(|s| &s.schedule)
-        .map(|t| (t.trial, t.model.clone()))
+        .filter_map(|t| Some((t.trial, t.model()?.clone())))
         .collect();
     let mut rows = Vec::new();
     for entry in entries {
@@ -50,7 +50,9 @@ pub fn attempt_rows(
                 model,
                 ..
             } => {
-                models.insert(*trial, model.clone());
+                if let Some(model) = model {
+                    models.insert(*trial, model.clone());
+                }
                 (row.trial, row.attempt) = (Some(*trial), Some(*attempt));
             }
             Event::Answered {

@@ -4,7 +4,7 @@ use super::trial::TrialHistory;
 use super::{Attempt, Completion, GivenAnswer, History, OpenAttempt};
 use crate::outcome::event::{FormId, Moment, Start, State};
 use crate::protocol::{Answer, Trial};
-use study_base::text::QuestionId;
+use study_base::text::{ModelId, PartId, QuestionId};
 
 impl History {
     /// The first event, if the session has started.
@@ -37,9 +37,39 @@ impl History {
         self.schedule().iter().find(|t| t.trial == trial)
     }
 
-    /// Number of planned trials that count, or of practice trials.
+    /// Whether a trial is planned and of no track that ended before it.
+    pub fn takes_place(&self, trial: u32) -> bool {
+        let Some(planned) = self.planned(trial) else {
+            return false;
+        };
+        let ended = planned
+            .track()
+            .is_some_and(|t| self.ended_tracks.contains(t));
+        !ended || self.trials.contains_key(&trial)
+    }
+
+    /// Number of planned trials that count, or of practice trials. Trials after the end of
+    /// their track are none.
     pub fn planned_total(&self, practice: bool) -> u32 {
-        count(self.schedule().iter().filter(|t| t.practice == practice))
+        let planned = self.schedule().iter().filter(|t| t.practice == practice);
+        count(planned.filter(|t| self.takes_place(t.trial)))
+    }
+
+    /// Whether a track has ended.
+    pub fn has_ended(&self, track: &PartId) -> bool {
+        self.ended_tracks.contains(track)
+    }
+
+    /// The completed trials of a track that count, in the order in which it was told.
+    pub fn told<'a>(
+        &'a self,
+        track: &'a PartId,
+    ) -> impl Iterator<Item = (&'a Trial, &'a Attempt)> + 'a {
+        self.told.iter().filter_map(move |(trial, attempt)| {
+            let planned = self.planned(*trial).filter(|t| t.track() == Some(track))?;
+            let attempts = &self.trials.get(trial)?.attempts;
+            Some((planned, attempts.iter().find(|a| a.number == *attempt)?))
+        })
     }
 
     /// The trial under way or to come next.
@@ -122,6 +152,19 @@ impl History {
     /// The trial that was felt last.
     pub fn last_felt(&self) -> Option<&Trial> {
         self.felt.last().and_then(|(t, _)| self.planned(*t))
+    }
+
+    /// The realization that was felt last.
+    pub fn last_model(&self) -> Option<&ModelId> {
+        let (trial, number) = self.felt.last()?;
+        let planned = self.planned(*trial)?;
+        if planned.part.is_none() {
+            return planned.model();
+        }
+        let attempts = &self.trials.get(trial)?.attempts;
+        let attempt = attempts.iter().find(|a| a.number == *number)?;
+        let interval = attempt.presentations.last()?.interval as usize;
+        attempt.models.get(interval.checked_sub(1)?)
     }
 
     /// The current answer to a question.

@@ -4,17 +4,18 @@ use super::trial::TrialHistory;
 use super::{GivenAnswer, History};
 use crate::outcome::event::{FormId, Start};
 use crate::outcome::rows::{ParticipantRow, RatingRow, Status};
-use crate::protocol::{Answer, Protocol, Role, Trial};
+use crate::protocol::{Answer, Part, Protocol, Role, Stimuli, TrackRules, Trial};
 use std::collections::BTreeMap;
 use study_base::text::{ParticipantId, QuestionId};
 
 impl History {
     /// One row for each planned trial, practice included; none if the session never
-    /// started. `protocol` gives roles, VAFs and covariates.
+    /// started, and none for trials after the end of their track. `protocol` gives roles, VAFs and covariates.
     pub fn rating_rows(&self, protocol: &Protocol) -> Vec<RatingRow> {
         let row = |start| move |trial| self.rating_row(start, trial, protocol);
+        let takes_place = |trial: &&Trial| self.takes_place(trial.trial);
         (self.start().into_iter())
-            .flat_map(|start| start.schedule.iter().map(row(start)))
+            .flat_map(|start| start.schedule.iter().filter(takes_place).map(row(start)))
             .collect()
     }
 
@@ -52,9 +53,18 @@ impl History {
             Some(attempt) => self.answers_of(trial.trial, attempt).collect(),
             None => Vec::new(),
         };
-        let primary = &protocol.analysis.primary;
+        let part = trial.part.as_ref().and_then(|id| protocol.part(id));
+        let primary = match part.and_then(|part| part.asks.first()) {
+            Some(first) if !asks(part, &protocol.analysis.primary) => first,
+            _ => &protocol.analysis.primary,
+        };
         let primary = given.iter().find(|g| g.question == *primary);
-        let entry = protocol.model(&trial.model);
+        let model = trial.model().or(match shown.map(|a| &a.models[..]) {
+            Some([only]) => Some(only),
+            _ => None,
+        });
+        let entry = model.and_then(|id| protocol.model(id));
+        let track = trial.track().and_then(|id| protocol.track(id));
         let played = shown.and_then(|a| a.ended).map(|e| e.playback);
         // Without telemetry nothing was counted.
         let sampled = played.filter(|p| p.samples > 0);
@@ -71,7 +81,7 @@ impl History {
             block: trial.block,
             position: begun.map(|b| b.position),
             planned_position: trial.position,
-            model: trial.model.clone(),
+            model: model.cloned(),
             role: entry.map_or(Role::Test, |m| m.role),
             repetition: trial.repetition,
             previous_model: begun.and_then(|b| b.previous.clone()),
@@ -108,6 +118,13 @@ impl History {
             },
             vaf: entry.and_then(|m| m.vaf),
             covariates: entry.map(|m| m.covariates.clone()).unwrap_or_default(),
+            part: trial.part.clone(),
+            track: trial.track().cloned(),
+            level: (track.and_then(TrackRules::family))
+                .and_then(|_| shown?.level)
+                .map(|level| level.presented),
+            correct: correct(trial, track, part, &given),
+            replays: shown.map(|a| a.replays),
             rendering: worst.map(|w| w.verdict),
             rendered_vaf: worst.and_then(|w| w.rendered_vaf),
             answers: answers(given.into_iter()),
@@ -118,6 +135,26 @@ impl History {
         let form = FormId::Trial { trial, attempt };
         self.answers.iter().filter(move |g| g.form == form)
     }
+}
+
+/// Whether the trials of a part ask a question; all of a study without parts do.
+fn asks(part: Option<&Part>, question: &QuestionId) -> bool {
+    part.is_none_or(|part| part.asks.contains(question))
+}
+
+/// Whether the answer to a trial of a track is correct.
+fn correct(
+    trial: &Trial,
+    track: Option<&TrackRules>,
+    part: Option<&Part>,
+    given: &[&GivenAnswer],
+) -> Option<bool> {
+    let Stimuli::Track { intervals, .. } = &trial.stimuli else {
+        return None;
+    };
+    let question = part?.asks.first()?;
+    let answer = given.iter().find(|g| g.question == *question)?;
+    track?.is_correct(intervals, &answer.answer)
 }
 
 fn is_rating(given: &GivenAnswer) -> bool {

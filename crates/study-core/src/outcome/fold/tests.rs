@@ -2,7 +2,7 @@ use super::super::event::Playback;
 use super::super::rows::{RatingRow, Status};
 use super::*;
 use crate::protocol::fingerprint::Fingerprints;
-use crate::protocol::{DeviceKind, Seat, example};
+use crate::protocol::{DeviceKind, Seat, Stimuli, example};
 use study_base::text::{ModelId, ParticipantId};
 
 fn at(second: u64) -> Moment {
@@ -19,9 +19,12 @@ fn journal(events: Vec<Event>) -> Vec<Entry> {
         trial: n,
         block: 1,
         position: n,
-        model: ModelId::new(id).unwrap(),
+        stimuli: Stimuli::One {
+            model: ModelId::new(id).unwrap(),
+        },
         repetition: 1,
         practice: false,
+        part: None,
     };
     let start = Event::SessionStarted(Box::new(Start {
         study: "example".to_owned(),
@@ -57,15 +60,21 @@ fn begin(trial: u32, attempt: u32) -> Event {
         trial,
         attempt,
         position: trial,
-        model: ModelId::new(["A", "B", "C"][trial as usize - 1]).unwrap(),
+        model: Some(ModelId::new(["A", "B", "C"][trial as usize - 1]).unwrap()),
         reference_s: 1.0,
+        intervals: Vec::new(),
+        level: None,
     }
 }
 
 fn play(trial: u32, attempt: u32, samples: u64) -> [Event; 3] {
     [
         begin(trial, attempt),
-        Event::PlaybackStarted { trial, attempt },
+        Event::PlaybackStarted {
+            trial,
+            attempt,
+            interval: None,
+        },
         Event::PlaybackEnded {
             trial,
             attempt,
@@ -79,6 +88,7 @@ fn play(trial: u32, attempt: u32, samples: u64) -> [Event; 3] {
             stopped: false,
             telemetry: None,
             rendering: None,
+            interval: None,
         },
     ]
 }
@@ -293,7 +303,11 @@ fn a_stopped_presentation_that_is_resumed_is_one_presentation() {
         queue: vec![1, 2, 3],
         constraint_broken: false,
     };
-    let start = |attempt| Event::PlaybackStarted { trial: 1, attempt };
+    let start = |attempt| Event::PlaybackStarted {
+        trial: 1,
+        attempt,
+        interval: None,
+    };
     let mut events = vec![begin(1, 1), start(1), failed(1, Failure::Stopped)];
     assert!(History::of(&journal(events.clone())).goes_on());
     events.extend([begin(1, 2), failed(2, Failure::Interrupted)]);

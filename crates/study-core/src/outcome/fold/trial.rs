@@ -1,7 +1,8 @@
 //! The history of one trial: its attempts.
 
-use crate::outcome::event::{Moment, Playback};
-use crate::outcome::fidelity::Fidelity;
+use crate::outcome::event::{Moment, Playback, TrackLevel};
+use crate::outcome::fidelity::{Fidelity, Verdict};
+use crate::protocol::Answer;
 use study_base::text::ModelId;
 
 /// What the events say of one trial.
@@ -55,10 +56,21 @@ pub struct Attempt {
     pub sitting: Sitting,
     /// Its start; `None` if that line of the journal is damaged.
     pub start: Option<AttemptStart>,
-    /// The confirmed end of its playback.
+    /// The realization of each interval; empty if the line of its start is damaged.
+    pub models: Vec<ModelId>,
+    /// What its track presents.
+    pub level: Option<TrackLevel>,
+    /// Its presentations so far, in order. Each begins with its confirmed start.
+    pub presentations: Vec<Presentation>,
+    /// How often its intervals were felt again.
+    pub replays: u32,
+    /// The confirmed end of its playback; of several intervals that of the last one,
+    /// with the sums over all.
     pub ended: Option<Ended>,
     /// Whether the force was that of the table, for each playback that was judged.
     pub rendering: Vec<Fidelity>,
+    /// The answer that the track was told, as it was when the trial was completed.
+    pub told: Option<Answer>,
     /// Rating time before the program was last left, s.
     pub rated_earlier_s: f64,
     /// First and last moment of the rating in this sitting.
@@ -67,6 +79,23 @@ pub struct Attempt {
     pub done: Option<Completion>,
     /// Failed or sent back: its answers do not count.
     pub void: bool,
+}
+
+/// A presentation of one interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Presentation {
+    /// Interval, from 1.
+    pub interval: u32,
+    /// Number of earlier rounds through all intervals.
+    pub replays: u32,
+    /// When the device confirmed its start; `None` if that line is damaged.
+    pub started: Option<Moment>,
+    /// When the device confirmed its end, and its report.
+    pub ended: Option<(Moment, Ended)>,
+    /// From the end of the presentation before it in the attempt, s.
+    pub gap_s: Option<f64>,
+    /// Whether the force was that of the table, and the rendered VAF, if it was judged.
+    pub judged: Option<(Verdict, Option<f64>)>,
 }
 
 /// The start of an attempt.
@@ -102,14 +131,111 @@ pub struct Completion {
     pub number: u32,
 }
 
+impl Ended {
+    /// What two playbacks add up to.
+    fn and(self, next: Self) -> Self {
+        let (a, b) = (self.playback, next.playback);
+        Self {
+            playback: Playback {
+                exploration_s: a.exploration_s + b.exploration_s,
+                strokes: a.strokes.saturating_add(b.strokes),
+                least_energy_j: a.least_energy_j.min(b.least_energy_j),
+                // Per second of both.
+                switches_per_s: (a.switches_per_s * a.exploration_s
+                    + b.switches_per_s * b.exploration_s)
+                    / (a.exploration_s + b.exploration_s),
+                clamp_count: a.clamp_count + b.clamp_count,
+                samples: a.samples + b.samples,
+                samples_lost: a.samples_lost + b.samples_lost,
+                // That of each is in `intervals.csv`'s verdict; a mean would hide one.
+                time_ratio: None,
+            },
+            stopped: self.stopped || next.stopped,
+        }
+    }
+}
+
 impl Attempt {
+    /// Number of intervals of a round.
+    pub fn intervals(&self) -> u32 {
+        u32::try_from(self.models.len()).unwrap_or(u32::MAX).max(1)
+    }
+
+    /// The interval that plays or comes next, from 1; `None` once all have ended.
+    pub fn interval(&self) -> Option<u32> {
+        let round = self.round();
+        let ended = round.filter(|p| p.ended.is_some()).count();
+        let next = u32::try_from(ended).unwrap_or(u32::MAX).saturating_add(1);
+        (next <= self.intervals()).then_some(next)
+    }
+
+    /// The presentations of the present round.
+    fn round(&self) -> impl Iterator<Item = &Presentation> {
+        let present = self.replays;
+        (self.presentations.iter()).filter(move |p| p.replays == present)
+    }
+
+    /// The confirmed start of an interval.
+    pub(super) fn started(&mut self, interval: u32, at: Moment) {
+        let before = self.presentations.last().and_then(|p| p.ended);
+        self.presentations.push(Presentation {
+            interval,
+            replays: self.replays,
+            started: Some(at),
+            ended: None,
+            gap_s: before
+                .filter(|_| interval > 1)
+                .map(|(ended, _)| at.seconds_since(&ended)),
+            judged: None,
+        });
+    }
+
+    /// The confirmed end of an interval. The attempt ends with its last interval.
+    pub(super) fn interval_ended(
+        &mut self,
+        interval: u32,
+        ended: Ended,
+        judged: Option<(Verdict, Option<f64>)>,
+        at: Moment,
+    ) {
+        let replays = self.replays;
+        let open =
+            (self.presentations.last_mut()).filter(|p| p.interval == interval && p.ended.is_none());
+        match open {
+            Some(presentation) => {
+                presentation.ended = Some((at, ended));
+                presentation.judged = judged;
+            }
+            None => self.presentations.push(Presentation {
+                interval,
+                replays,
+                started: None,
+                ended: Some((at, ended)),
+                gap_s: None,
+                judged,
+            }),
+        }
+        if interval >= self.intervals() {
+            let all = self.presentations.iter().filter_map(|p| p.ended);
+            let sum = all.map(|(_, ended)| ended).reduce(Ended::and);
+            let several = interval > 1 || self.replays > 0;
+            self.ended = sum.filter(|_| several).or(Some(ended));
+            self.rating = Some((at, at));
+        }
+    }
+
     pub(super) fn new(number: u32, sitting: &Sitting, start: Option<AttemptStart>) -> Self {
         Self {
             number,
             sitting: sitting.clone(),
             start,
+            models: Vec::new(),
+            level: None,
+            presentations: Vec::new(),
+            replays: 0,
             ended: None,
             rendering: Vec::new(),
+            told: None,
             rated_earlier_s: 0.0,
             rating: None,
             done: None,

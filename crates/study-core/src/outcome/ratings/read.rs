@@ -5,7 +5,7 @@ use super::error::RatingsError;
 use super::{Builder, Origin, Ratings, Row};
 use crate::outcome::rows::Status;
 use crate::protocol::Role;
-use crate::protocol::columns::{Kind, RatingColumn as C, UsedColumn as Foreign};
+use crate::protocol::columns::{self, Kind, RatingColumn as C, UsedColumn as Foreign};
 use serde::de::{DeserializeOwned, IntoDeserializer as _};
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -177,6 +177,8 @@ struct Positions {
     /// Remarks, and the questions that are not read.
     texts: Vec<usize>,
     covariates: Vec<usize>,
+    /// The track of a trial, in a study with parts.
+    track: Option<usize>,
     near_misses: Vec<(String, &'static str)>,
 }
 
@@ -200,7 +202,11 @@ impl Positions {
                 expected: FOREIGN,
             })
         };
-        let own = |column: C| find(column.name());
+        let has_parts = columns::are_of_parts(header);
+        let own = |column: C| {
+            let declared = column.column().is_in(has_parts);
+            find(column.name()).filter(|_| declared)
+        };
         let (Some(subject), Some(_)) = (own(C::Participant), own(C::PlannedPosition)) else {
             let question = question.unwrap_or(Foreign::Rating.name());
             let optional = [
@@ -231,6 +237,7 @@ impl Positions {
                 least_energy: None,
                 texts: Vec::new(),
                 covariates: MEMORY.iter().filter_map(|c| find(c)).collect(),
+                track: None,
             });
         };
         // A repeated column fills the space between its neighbours.
@@ -271,6 +278,7 @@ impl Positions {
             least_energy: own(C::LeastEnergyJ),
             texts: texts.chain(own(C::Remarks)).collect(),
             covariates: repeated(C::Covariates).collect(),
+            track: own(C::Track),
         })
     }
 
@@ -279,6 +287,12 @@ impl Positions {
         let subject = line.text(self.subject);
         if subject.is_empty() {
             return Err(line.error(self.subject, "the name of a participant"));
+        }
+        // Of a study with parts only trials with a single, planned realization are rated.
+        if let Some(track) = self.track
+            && (line.text(self.model).is_empty() || !line.text(track).is_empty())
+        {
+            return Ok(());
         }
         let simulated = line.flag(self.simulated)?;
         let pilot = line.flag(self.pilot)?;

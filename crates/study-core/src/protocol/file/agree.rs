@@ -4,7 +4,7 @@
 use super::Named;
 use super::models::PartialModel;
 use super::questions::PartialQuestion;
-use crate::protocol::columns::{is_participants_column, is_ratings_column};
+use crate::protocol::columns::{is_participants_column, is_parts_column, is_ratings_column};
 use crate::protocol::{AnalysisRules, Design, DeviceKind, DeviceRules, Order, QuestionKind, Role};
 use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
@@ -22,6 +22,8 @@ pub(super) struct Sections<'a> {
     pub(super) intake: Vec<PartialQuestion>,
     pub(super) outro: Vec<PartialQuestion>,
     pub(super) analysis: Option<&'a AnalysisRules>,
+    /// Whether there are `[[parts]]`.
+    pub(super) has_parts: bool,
 }
 
 impl Sections<'_> {
@@ -82,6 +84,10 @@ impl Sections<'_> {
     }
 
     fn presence(&self, document: &Document<'_>) {
+        // What a part lacks is reported there.
+        if self.has_parts {
+            return;
+        }
         if self.models.iter().all(|m| m.role == Role::Practice) {
             document.fault(
                 Fault::error("nothing to present: no [[models]] whose role is not practice")
@@ -223,7 +229,11 @@ impl Sections<'_> {
     fn columns(&self, document: &Document<'_>) {
         let mut taken: Vec<String> = Vec::new();
         let (fixed_once, participants) = (is_participants_column, "participants.csv");
-        let (fixed_in_ratings, ratings) = (is_ratings_column, "ratings.csv");
+        let fixed_in_ratings = match self.has_parts {
+            true => is_parts_column,
+            false => is_ratings_column,
+        };
+        let ratings = "ratings.csv";
         for question in &self.questions {
             column(document, question, &mut taken, fixed_in_ratings, ratings);
         }
@@ -235,7 +245,7 @@ impl Sections<'_> {
         for model in &self.models {
             for name in model.covariates.keys() {
                 let place = document.span_of(&format!("{}.covariates.{name}", model.path));
-                let fault = if is_ratings_column(name) {
+                let fault = if fixed_in_ratings(name) {
                     fixed(name, ratings)
                 } else if taken.iter().any(|t| t.eq_ignore_ascii_case(name)) {
                     let name = Untrusted(name);
@@ -271,6 +281,9 @@ impl Sections<'_> {
                 min.unwrap_or(f64::NEG_INFINITY),
                 max.unwrap_or(f64::INFINITY),
             ),
+            Some(QuestionKind::Choice {
+                multiple: false, ..
+            }) if self.has_parts => return,
             Some(QuestionKind::Choice { .. } | QuestionKind::Text) => {
                 let what = "cannot be the primary question: its answers are not numbers";
                 let fault = Fault::error(format!("`{primary}` {what}")).at(place);
@@ -318,7 +331,7 @@ fn fixed(name: &str, table: &str) -> Fault {
     .label("choose another name")
 }
 
-fn collision(id: &str, other: &str) -> Fault {
+pub(super) fn collision(id: &str, other: &str) -> Fault {
     if id == other {
         Fault::error(format!("`{id}` is there twice"))
     } else {
@@ -327,7 +340,11 @@ fn collision(id: &str, other: &str) -> Fault {
     }
 }
 
-fn unknown<'a>(what: &str, given: &str, known: impl IntoIterator<Item = &'a str>) -> Fault {
+pub(super) fn unknown<'a>(
+    what: &str,
+    given: &str,
+    known: impl IntoIterator<Item = &'a str>,
+) -> Fault {
     let fault = Fault::error(format!("there is no {what} `{}`", Untrusted(given)));
     match did_you_mean(given, known) {
         Some(near) => fault.label(format!("did you mean `{near}`?")),
@@ -335,7 +352,7 @@ fn unknown<'a>(what: &str, given: &str, known: impl IntoIterator<Item = &'a str>
     }
 }
 
-fn at(document: &Document<'_>, path: &str, key: &str) -> Option<std::ops::Range<usize>> {
+pub(super) fn at(document: &Document<'_>, path: &str, key: &str) -> Option<std::ops::Range<usize>> {
     document
         .span_of(&format!("{path}.{key}"))
         .or_else(|| document.span_of(path))

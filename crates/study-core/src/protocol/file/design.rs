@@ -2,15 +2,16 @@
 
 use super::section::Section;
 use crate::protocol::keys::{Key, Kind, Word, Words, keys};
-use crate::protocol::{Breaks, Design, Order};
+use crate::protocol::{Breaks, Design, Order, PartsOrder};
+use study_base::diagnostic::Fault;
 
 pub(super) const DESIGN: &[Key] = keys! {
     /// How many participants are planned. An analysis of fewer is reported as interim.
     "participants": Kind::Whole(1, 100_000), "10", required;
     /// How often each participant rates each realization.
-    "repetitions": Kind::Whole(1, 10_000), "3", required;
+    "repetitions": Kind::Whole(1, 10_000), "3", derived("required, unless there are `[[parts]]`, which have their own");
     /// How the order of the trials is made. [schedule.md](schedule.md) specifies each.
-    "order": Kind::WordOrTable(Order::WORDS, ORDER_FILE), r#""blocked""#, required;
+    "order": Kind::WordOrTable(Order::WORDS, ORDER_FILE), r#""blocked""#, derived("required, unless there are `[[parts]]`, which have their own");
     /// The largest number of consecutive trials with the same realization; 1 forbids the
     /// same realization twice in a row.
     "max_run": Kind::COUNT, "1";
@@ -25,7 +26,18 @@ pub(super) const DESIGN: &[Key] = keys! {
     /// trial fails if the device does, or if somebody marks it as bad; until then it
     /// comes back at the end of its block.
     "max_attempts": Kind::COUNT, "5", default("3");
+    /// The order of the `[[parts]]`.
+    "parts_order": Kind::Word(PartsOrder::WORDS), r#""williams""#, default(r#""fixed""#);
 };
+
+/// Keys of `[design]` that each part has for itself.
+const OF_A_PART: [&str; 5] = [
+    "repetitions",
+    "order",
+    "max_run",
+    "min_distance",
+    "practice",
+];
 
 impl Words for Order {
     const VALUES: &'static [(&'static str, Self)] = &[
@@ -73,10 +85,29 @@ impl Order {
     }
 }
 
-pub(super) fn read(mut section: Section<'_, '_>) -> Option<Design> {
+/// `has_parts`: whether there are `[[parts]]`.
+pub(super) fn read(mut section: Section<'_, '_>, has_parts: bool) -> Option<Design> {
     let participants = section.whole("participants");
-    let repetitions = section.whole("repetitions");
-    let order = order(&mut section);
+    let mut repetitions = section.whole("repetitions");
+    let mut order = order(&mut section);
+    for name in OF_A_PART {
+        let given = section.value(name).is_some();
+        if has_parts && given {
+            let what = format!("`design.{name}` has no effect in a study with [[parts]]");
+            let hint = "each part has its own; write it there";
+            section.fault_at(name, Fault::error(what).hint(hint));
+        } else if !has_parts && !given && matches!(name, "repetitions" | "order") {
+            section.report_missing(name, section.key(name).such_as());
+        }
+    }
+    if !has_parts && section.value("parts_order").is_some() {
+        let what = "`design.parts_order` has no effect: there are no [[parts]]";
+        section.fault_at("parts_order", Fault::error(what));
+    }
+    if has_parts {
+        (repetitions, order) = (Some(1), Some(Order::Fixed));
+    }
+    let parts_order = section.word("parts_order");
     let max_run = section.whole("max_run");
     let min_distance = section.whole("min_distance");
     let practice = section.model_ids("practice");
@@ -91,6 +122,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<Design> {
         practice,
         breaks,
         max_attempts: max_attempts?,
+        parts_order: parts_order?,
     })
 }
 

@@ -98,6 +98,20 @@ pub(super) struct PartialQuestion {
 }
 
 impl PartialQuestion {
+    /// The question with which each trial of a part begins; its id is that of the part.
+    pub(super) fn of_part(path: &str, id: &str, prompt: &str, options: &[&str]) -> Self {
+        Self {
+            path: path.to_owned(),
+            id: QuestionId::new(id).ok(),
+            kind: Some(QuestionKind::Choice {
+                options: options.iter().map(|o| (*o).to_owned()).collect(),
+                multiple: false,
+            }),
+            prompt: Some(prompt.to_owned()),
+            required: Some(true),
+        }
+    }
+
     /// The question, if every part could be read.
     pub(super) fn finish(self) -> Option<Question> {
         let kind = self.kind?;

@@ -4,13 +4,13 @@
 //! its default, or `None`; a document with a fault becomes no protocol, whatever
 //! its values.
 
-use crate::protocol::keys::{Absent, Key, Kind, Shape, Word, Words, one_of};
+use crate::protocol::keys::{Absent, Key, Kind, Shape, Variants, Word, Words, one_of};
 use std::fmt::Display;
 use std::str::FromStr;
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::{Document, Table, Value};
 use study_base::limits::Limit;
-use study_base::text::{BadId, ModelId, QuestionId, Untrusted};
+use study_base::text::{BadId, ModelId, PartId, QuestionId, Untrusted};
 
 /// Longest text of one key, bytes.
 const MAX_FIELD_BYTES: usize = 64 * 1024;
@@ -257,6 +257,17 @@ impl<'d, 't> Section<'d, 't> {
         values.iter().flatten().filter_map(parsed).collect()
     }
 
+    /// The id of a part, family or track.
+    pub(super) fn part_id(&mut self, name: &str) -> Option<PartId> {
+        parsed(&self.value(name)?)
+    }
+
+    /// A list of identifiers; `None` if the key is absent.
+    pub(super) fn ids<T: FromStr<Err = BadId>>(&mut self, name: &str) -> Option<Vec<T>> {
+        let values = self.value(name)?.array()?;
+        Some(values.iter().filter_map(parsed).collect())
+    }
+
     /// A list of finite numbers, not empty; `None` if the key is absent.
     pub(super) fn numbers(&mut self, name: &str) -> Option<Vec<f64>> {
         let list = self.value(name)?;
@@ -340,40 +351,61 @@ impl<'d, 't> Section<'d, 't> {
         let Kind::Variants(declared) = self.key(name).kind else {
             panic!("`{name}` is not declared as an array of alternatives");
         };
+        let tables = self.tables(name);
+        (tables.into_iter())
+            .map(|table| self.alternative(table, declared, variants))
+            .collect()
+    }
+
+    /// The table whose keys depend on one of them, with its alternative.
+    pub(super) fn variant<T>(
+        &mut self,
+        name: &str,
+        variants: &'static [Variant<T>],
+    ) -> Option<(Self, Option<&'static Variant<T>>)> {
+        let Kind::Variant(declared) = self.key(name).kind else {
+            panic!("`{name}` is not declared as a table of alternatives");
+        };
+        let table = self.value(name)?.table()?;
+        Some(self.alternative(table, declared, variants))
+    }
+
+    fn alternative<T>(
+        &self,
+        mut table: Table<'d, 't>,
+        declared: &'static Variants,
+        variants: &'static [Variant<T>],
+    ) -> (Self, Option<&'static Variant<T>>) {
         let words: Vec<(&'static str, &'static Variant<T>)> =
             variants.iter().map(|v| (v.shape.word.word, v)).collect();
-        let mut found = Vec::new();
-        for mut table in self.tables(name) {
-            let tag = table.value(declared.tag);
-            let variant = tag.as_ref().and_then(|value| value.word(&words));
-            let mut section = Self {
-                document: self.document,
-                broken: self.broken,
-                table: None,
-                keys: declared.common.iter().collect(),
-                misspelt: Vec::new(),
-            };
-            section
-                .keys
-                .extend(variant.iter().flat_map(|v| v.shape.keys));
-            let mut known: Vec<&str> = section.keys.iter().map(|key| key.name).collect();
-            known.push(declared.tag);
-            if tag.is_none() {
-                // Perhaps it is misspelt: then that is the only fault.
-                let all = declared.shapes.iter().flat_map(|shape| shape.keys);
-                known.extend(all.map(|key| key.name));
-            }
-            if variant.is_some() || tag.is_none() {
-                section.misspelt = table.refuse_unknown(&known);
-            }
-            section.table = Some(table);
-            if tag.is_none() {
-                let words: Vec<Word> = declared.shapes.iter().map(|shape| shape.word).collect();
-                section.report_missing(declared.tag, one_of(&words));
-            }
-            found.push((section, variant));
+        let tag = table.value(declared.tag);
+        let variant = tag.as_ref().and_then(|value| value.word(&words));
+        let mut section = Self {
+            document: self.document,
+            broken: self.broken,
+            table: None,
+            keys: declared.common.iter().collect(),
+            misspelt: Vec::new(),
+        };
+        section
+            .keys
+            .extend(variant.iter().flat_map(|v| v.shape.keys));
+        let mut known: Vec<&str> = section.keys.iter().map(|key| key.name).collect();
+        known.push(declared.tag);
+        if tag.is_none() {
+            // Perhaps it is misspelt: then that is the only fault.
+            let all = declared.shapes.iter().flat_map(|shape| shape.keys);
+            known.extend(all.map(|key| key.name));
         }
-        found
+        if variant.is_some() || tag.is_none() {
+            section.misspelt = table.refuse_unknown(&known);
+        }
+        section.table = Some(table);
+        if tag.is_none() {
+            let words: Vec<Word> = declared.shapes.iter().map(|shape| shape.word).collect();
+            section.report_missing(declared.tag, one_of(&words));
+        }
+        (section, variant)
     }
 
     fn tables(&mut self, name: &str) -> Vec<Table<'d, 't>> {
@@ -413,7 +445,7 @@ pub(super) fn number(value: &Value<'_, '_>, kind: Kind) -> Option<f64> {
 }
 
 /// An identifier.
-fn parsed<T: FromStr<Err = BadId>>(value: &Value<'_, '_>) -> Option<T> {
+pub(super) fn parsed<T: FromStr<Err = BadId>>(value: &Value<'_, '_>) -> Option<T> {
     let id = value.text()?.parse::<T>();
     if let Err(bad) = &id {
         value.fault(Fault::error(bad.to_string()));

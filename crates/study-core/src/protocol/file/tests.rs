@@ -447,11 +447,11 @@ fn seed_and_counts_are_whole_and_not_negative() {
 
 #[test]
 fn another_format_is_one_clear_fault() {
-    let newer = LEAST.replace("study-protocol/1", "study-protocol/2") + "[[new_things]]\n";
+    let newer = LEAST.replace("study-protocol/1", "study-protocol/3") + "[[new_things]]\n";
     assert_eq!(
         messages(&newer),
         [
-            "the format `study-protocol/2` is newer than this program, which reads `study-protocol/1`"
+            "the format `study-protocol/3` is newer than this program, which reads `study-protocol/2`"
         ]
     );
     let foreign = LEAST.replace("study-protocol/1", "study-model/1");
@@ -521,6 +521,7 @@ fn any_text_is_read_without_a_panic() {
 }
 
 mod keys;
+mod parts;
 
 mod random {
     use super::*;

@@ -13,6 +13,9 @@ use crate::store::{StoreError, StudyFolder, layout, plain};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
+/// Trial, attempt and, if the trial has several, interval.
+type Presented = (u32, u32, Option<u32>);
+
 impl StudyFolder {
     /// Compares the telemetry files of a session with each playback in the journal. A
     /// playback without a confirmed end has none.
@@ -40,9 +43,10 @@ impl StudyFolder {
                     trial,
                     attempt,
                     reason,
+                    interval,
                 } => {
-                    known.insert((*trial, *attempt));
-                    let name = layout::telemetry(*trial, *attempt, 1);
+                    known.insert((*trial, *attempt, *interval));
+                    let name = layout::telemetry_of(*trial, *attempt, *interval, 1);
                     let what = format!("not saved, or only in part: {reason}");
                     found.push(Finding::note(format!("{folder}/{name}"), what));
                 }
@@ -51,23 +55,28 @@ impl StudyFolder {
                     attempt,
                     playback,
                     telemetry: Some(file),
+                    interval,
                     ..
                 } => {
-                    known.insert((*trial, *attempt));
+                    known.insert((*trial, *attempt, *interval));
                     self.verify_hash(session, file, playback.samples, &folder, found);
                 }
                 _ => {}
             }
         }
-        let mut counted: BTreeMap<(u32, u32), u64> = BTreeMap::new();
+        let mut counted: BTreeMap<Presented, u64> = BTreeMap::new();
         for (trial, attempt) in session.history.all_attempts() {
-            let samples = attempt.ended.map_or(0, |e| e.playback.samples);
-            if samples > 0 && !known.contains(&(trial, attempt.number)) {
-                *counted.entry((trial, attempt.number)).or_default() += samples;
+            for presentation in &attempt.presentations {
+                let several = (attempt.intervals() > 1).then_some(presentation.interval);
+                let presented = (trial, attempt.number, several);
+                let samples = presentation.ended.map_or(0, |(_, e)| e.playback.samples);
+                if samples > 0 && !known.contains(&presented) {
+                    *counted.entry(presented).or_default() += samples;
+                }
             }
         }
-        for ((trial, attempt), samples) in counted {
-            self.count_lines(session, (trial, attempt), samples, &folder, found);
+        for (presented, samples) in counted {
+            self.count_lines(session, presented, samples, &folder, found);
         }
         Ok(())
     }
@@ -101,15 +110,18 @@ impl StudyFolder {
     fn count_lines(
         &self,
         session: &SessionData,
-        (trial, attempt): (u32, u32),
+        (trial, attempt, interval): Presented,
         samples: u64,
         folder: &str,
         found: &mut Vec<Finding>,
     ) {
-        let place = format!("{folder}/{}", layout::telemetry(trial, attempt, 1));
+        let place = format!(
+            "{folder}/{}",
+            layout::telemetry_of(trial, attempt, interval, 1)
+        );
         let (mut exists, mut lines) = (false, 0);
         for copy in 1.. {
-            let name = layout::telemetry(trial, attempt, copy);
+            let name = layout::telemetry_of(trial, attempt, interval, copy);
             let read = self
                 .disk
                 .read(&session.path.join(layout::TELEMETRY).join(name));

@@ -1,0 +1,262 @@
+//! `[[parts]]`: trials of one kind each.
+
+use super::section::{Section, Variant, shapes};
+use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
+use crate::protocol::{Exposure, IntervalOrder, Order, Presentations};
+use study_base::diagnostic::Fault;
+use study_base::diagnostic::table::Value;
+use study_base::text::{ModelId, PartId, QuestionId, Untrusted};
+
+pub(super) static PARTS: Variants = Variants {
+    tag: "kind",
+    effect: "The kind of trial",
+    common: keys! {
+        /// The name of the part. The answers of pairs and of discrimination are in a column of
+        /// this name.
+        "id": Kind::Id(Id::Part), r#""which-is-more-real""#, required;
+        /// Shown before the first trial of the part.
+        "text": Kind::Text, r#""You will feel two switches in each trial.""#;
+        /// The `[[questions]]` of a trial, by id; after the answer, where the kind of trial has
+        /// one.
+        "questions": Kind::Ids(Id::Question), r#"["realism"]"#, derived("in a rating part all questions that no other part names, else none");
+        /// How long each interval is felt.
+        "exposure": Kind::Table(EXPOSURE), "{ min_s = 2, max_s = 8 }";
+    },
+    shapes: &SHAPES,
+};
+
+const EXPOSURE: &[Key] = keys! {
+    /// The least time that an interval is felt.
+    "min_s": Kind::not_negative("s"), "2", default("0");
+    /// The device stops by itself after this time.
+    "max_s": Kind::positive("s"), "8";
+    /// How often all intervals of a trial can be felt again before it is answered.
+    "replays": Kind::Whole(0, 100), "1", default("0");
+};
+
+static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
+
+/// The words of `order`: a part has no file of orders.
+const ORDER: Kind = Kind::Word(Order::WORDS);
+
+/// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
+pub(super) const KINDS: [Variant<RawTask>; 3] = [
+    Variant::new(
+        "rating",
+        "One realization is felt and rated.",
+        keys! {
+            /// The realizations, by id.
+            "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
+            /// How often each is rated.
+            "repetitions": Kind::Whole(1, 10_000), "3", required;
+            /// How the order of the trials is made.
+            "order": ORDER, r#""williams""#, default(r#""blocked""#);
+            /// The largest number of consecutive trials with the same realization.
+            "max_run": Kind::COUNT, "1";
+            /// The least distance between two positions of the same realization.
+            "min_distance": Kind::COUNT, "2";
+            /// The realizations of the practice trials of the part, in this order.
+            "practice": Kind::ModelIds, r#"["spring"]"#;
+        },
+        rating,
+    ),
+    Variant::new(
+        "pairs",
+        "Two realizations are felt one after the other, and one is chosen: `first` or `second`.",
+        keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""Which one felt more real?""#, required;
+            /// The realizations, by id.
+            "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995", "passive"]"#, derived("all whose role is not `practice`, without duplicates");
+            /// Which are compared: all with all, neighbours in the order of `models`, all with one,
+            /// or a list.
+            "pairs": Kind::Pairs, r#""versus:passive""#, default(r#""all""#);
+            /// How often each pair is compared.
+            "repetitions": Kind::Whole(1, 10_000), "2", required;
+            /// How the order of the pairs is made.
+            "order": ORDER, r#""shuffled""#, default(r#""blocked""#);
+            /// Whether "no difference" is an answer, `tie`.
+            "tie": Kind::Flag, "true", default("false");
+            /// Which of a pair comes first.
+            "interval_order": Kind::Word(IntervalOrder::WORDS), r#""random""#, default(r#""balanced""#);
+            /// From the end of the first interval to the start of the second. Both are loaded
+            /// anew in this time, whether they differ or not.
+            "gap_s": Kind::positive("s"), "1.5", default("1");
+        },
+        pairs,
+    ),
+    Variant::new(
+        "discrimination",
+        "Levels are told from a standard, on one track or several interleaved ones.",
+        keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""Which one had more damping?""#, required;
+            /// The `[[tracks]]`, by id; all of the same method. Each pass through the part takes
+            /// every unfinished track once, in random order.
+            "tracks": Kind::Ids(Id::Part), r#"["damping-up"]"#, required;
+            /// From the end of an interval to the start of the next. Every interval is loaded
+            /// anew in this time, also an equal one.
+            "gap_s": Kind::positive("s"), "1.5", default("1");
+        },
+        discrimination,
+    ),
+];
+
+/// A part as it was read; its ids are not looked up yet.
+#[derive(Debug)]
+pub(super) struct RawPart {
+    /// Such as `parts[0]`.
+    pub(super) path: String,
+    pub(super) id: Option<PartId>,
+    pub(super) text: Option<String>,
+    pub(super) questions: Option<Vec<QuestionId>>,
+    pub(super) exposure: Option<Exposure>,
+    pub(super) task: Option<RawTask>,
+}
+
+#[derive(Debug)]
+pub(super) enum RawTask {
+    Rating {
+        /// Its models are empty if none are named.
+        presentations: Presentations,
+    },
+    Pairs {
+        prompt: String,
+        models: Option<Vec<ModelId>>,
+        pairs: RawPairs,
+        repetitions: u32,
+        order: Order,
+        tie: bool,
+        interval_order: IntervalOrder,
+        gap_s: f64,
+    },
+    Discrimination {
+        prompt: String,
+        tracks: Vec<PartId>,
+        gap_s: f64,
+    },
+}
+
+/// Which pairs are compared.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum RawPairs {
+    All,
+    Adjacent,
+    Versus(ModelId),
+    List(Vec<[ModelId; 2]>),
+}
+
+pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<RawPart> {
+    (root.variants("parts", &KINDS).into_iter())
+        .map(|(mut section, kind)| RawPart {
+            path: section.path().to_owned(),
+            id: section.part_id("id"),
+            text: section.text("text"),
+            questions: section.ids("questions"),
+            exposure: section.section("exposure").and_then(exposure),
+            task: kind.and_then(|kind| (kind.read)(&mut section)),
+        })
+        .collect()
+}
+
+fn exposure(mut section: Section<'_, '_>) -> Option<Exposure> {
+    let (min_s, max_s) = (section.number("min_s"), section.number("max_s"));
+    let replays = section.whole("replays");
+    if let (Some(min), Some(max)) = (min_s, max_s)
+        && min > max
+    {
+        let what = format!("`{}.min_s` is above `max_s`: {min} > {max}", section.path());
+        section.fault_at("min_s", Fault::error(what));
+    }
+    Some(Exposure {
+        min_s: min_s?,
+        max_s,
+        replays: replays?,
+    })
+}
+
+fn rating(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let models = section.model_ids("models");
+    let repetitions = section.whole("repetitions");
+    let order = section.word("order");
+    let (max_run, min_distance) = (section.whole("max_run"), section.whole("min_distance"));
+    let practice = section.model_ids("practice");
+    Some(RawTask::Rating {
+        presentations: Presentations {
+            models,
+            order: order?,
+            repetitions: repetitions?,
+            max_run,
+            min_distance,
+            practice,
+        },
+    })
+}
+
+fn pairs(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let prompt = section.text("prompt");
+    let models = section.ids("models");
+    let pairs = match section.value("pairs") {
+        None => Some(RawPairs::All),
+        Some(value) => which(&value),
+    };
+    let repetitions = section.whole("repetitions");
+    let order = section.word("order");
+    let (tie, interval_order) = (section.flag("tie"), section.word("interval_order"));
+    let gap_s = section.number("gap_s");
+    Some(RawTask::Pairs {
+        prompt: prompt?,
+        models,
+        pairs: pairs?,
+        repetitions: repetitions?,
+        order: order?,
+        tie: tie?,
+        interval_order: interval_order?,
+        gap_s: gap_s?,
+    })
+}
+
+/// Reads `pairs`.
+fn which(value: &Value<'_, '_>) -> Option<RawPairs> {
+    let expected = Kind::Pairs.describe();
+    let refuse = |given: &str| {
+        let given = Untrusted(given);
+        value.refuse(format_args!("has to be {expected}, not `{given}`"))
+    };
+    if value.is_array() {
+        let list = value.array()?;
+        if list.is_empty() {
+            return value.refuse("is empty");
+        }
+        let mut pairs = Vec::new();
+        for pair in list {
+            let ids: Vec<ModelId> = (pair.array()?.iter())
+                .filter_map(super::section::parsed)
+                .collect();
+            match <[ModelId; 2]>::try_from(ids) {
+                Ok(ids) if ids[0] != ids[1] => pairs.push(ids),
+                _ => return pair.refuse("has to be two different ids of realizations"),
+            }
+        }
+        return Some(RawPairs::List(pairs));
+    }
+    let text = value.text()?;
+    match text.as_str() {
+        "all" => Some(RawPairs::All),
+        "adjacent" => Some(RawPairs::Adjacent),
+        other => match other.strip_prefix("versus:").map(ModelId::new) {
+            Some(Ok(id)) => Some(RawPairs::Versus(id)),
+            _ => refuse(other),
+        },
+    }
+}
+
+fn discrimination(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (prompt, tracks) = (section.text("prompt"), section.ids("tracks"));
+    let gap_s = section.number("gap_s");
+    Some(RawTask::Discrimination {
+        prompt: prompt?,
+        tracks: tracks?,
+        gap_s: gap_s?,
+    })
+}

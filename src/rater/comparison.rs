@@ -1,0 +1,202 @@
+//! Raters who compare intervals: pairs and tracks.
+//!
+//! Each interval is felt with normal noise of the rater's own, and the rater decides as an
+//! observer without memory would: the largest, the odd one, the nearer one, a distance
+//! beyond a criterion. Draws come from a stream of their own and their number never depends
+//! on the realizations.
+
+use super::{Effect, Impression, Rater};
+use std::collections::BTreeMap;
+use study_base::rng::Stream;
+use study_base::text::{ModelId, PartId};
+use study_core::protocol::{Answer, Method, Protocol, Question, Stimuli, Trial};
+use study_haptics::model::Realization;
+
+/// Median standard deviation of the noise of an interval of a track, N: the just
+/// noticeable difference of a force.
+const NOISE_N: f64 = 0.1;
+/// Criterion of "different", in standard deviations of the noise of one interval.
+const DIFFERENT: f64 = 1.8;
+/// Criterion of "yes", in the same unit.
+const YES: f64 = 1.0;
+/// Difference of two opinions below which a pair is a tie, in the same unit.
+const TIE: f64 = 0.5;
+
+/// What raters feel of the realizations of a study.
+#[derive(Debug, Default)]
+pub struct Percepts {
+    impressions: BTreeMap<ModelId, Impression>,
+    /// Of each realization of a track its distance from the track's standard, N, negative
+    /// for lower levels.
+    distances: BTreeMap<(PartId, ModelId), f64>,
+}
+
+impl Percepts {
+    /// Computes them from all tables of a study.
+    pub fn of(protocol: &Protocol, tables: &BTreeMap<ModelId, Realization>) -> Self {
+        let mut percepts = Self {
+            impressions: (tables.iter())
+                .map(|(id, table)| (id.clone(), Impression::of(table)))
+                .collect(),
+            distances: BTreeMap::new(),
+        };
+        for track in &protocol.tracks {
+            let standard = track.standard();
+            let steps = 0..protocol.ladder(track).levels().len();
+            let models = steps.filter_map(|step| protocol.comparison(track, step));
+            for model in models {
+                let (Some(a), Some(b)) = (tables.get(&model), tables.get(&standard)) else {
+                    continue;
+                };
+                let below = match (protocol.level_of(&model), track.standard_level()) {
+                    (Some(level), Some(standard)) => level < standard,
+                    _ => false,
+                };
+                let distance = Impression::distance_n(a, b);
+                let signed = if below { -distance } else { distance };
+                percepts.distances.insert((track.id.clone(), model), signed);
+            }
+        }
+        percepts
+    }
+
+    /// The impression of a realization.
+    pub fn impression(&self, model: &ModelId) -> Option<&Impression> {
+        self.impressions.get(model)
+    }
+}
+
+/// A rater's ability to compare.
+#[derive(Debug)]
+pub(super) struct Comparing {
+    stream: Stream,
+    /// Standard deviation of the noise, relative to the median rater's.
+    noise: f64,
+    lapse_rate: f64,
+}
+
+impl Comparing {
+    pub(super) fn new(seed: u64, number: u32) -> Self {
+        let mut stream = Stream::new(seed, &["rater", &number.to_string(), "comparing"]);
+        Self {
+            noise: libm::exp(0.25 * stream.normal()),
+            lapse_rate: 0.04 * stream.unit(),
+            stream,
+        }
+    }
+}
+
+impl Rater {
+    /// The answer with which a trial of several intervals, or of a track, begins; `None` if
+    /// the question is another one.
+    pub fn compare(
+        &mut self,
+        question: &Question,
+        (trial, models): (&Trial, &[ModelId]),
+        protocol: &Protocol,
+        percepts: &Percepts,
+    ) -> Option<Answer> {
+        let part = trial.part.as_ref()?;
+        if part.as_str() != question.id.as_str() {
+            return None;
+        }
+        let method = match &trial.stimuli {
+            Stimuli::One { .. } => return None,
+            Stimuli::Pair { .. } => None,
+            Stimuli::Track { track, .. } => Some(protocol.track(track)?.method),
+        };
+        let options = method.map_or(&["first", "second", "tie"][..], Method::answers);
+        let effect = self.effect;
+        let Comparing {
+            stream,
+            noise,
+            lapse_rate,
+        } = &mut self.comparing;
+        // One unit is the median noise: of a force, or a point on the scale of opinions.
+        let strength = |model: &ModelId| match (effect, trial.track()) {
+            (Effect::None, _) => 0.0,
+            (Effect::BuiltIn, Some(track)) => {
+                let key = (track.clone(), model.clone());
+                percepts.distances.get(&key).map_or(0.0, |d| d / NOISE_N)
+            }
+            (Effect::BuiltIn, None) => {
+                let felt = percepts.impression(model);
+                felt.map_or(0.0, |felt| felt.opinion(part.as_str()))
+            }
+        };
+        let felt: Vec<f64> = (models.iter())
+            .map(|model| strength(model) + *noise * stream.normal())
+            .collect();
+        let lapses = stream.unit() < *lapse_rate;
+        let anywhere = usize::try_from(stream.below(2)).unwrap_or(0);
+        let chosen = if lapses {
+            anywhere
+        } else {
+            choose(method, &felt, *noise, options.len())
+        };
+        Some(Answer::Choice(vec![options.get(chosen)?.to_string()]))
+    }
+}
+
+/// The index of the answer.
+fn choose(method: Option<Method>, felt: &[f64], noise: f64, options: usize) -> usize {
+    let largest = || {
+        let order = |a: &usize, b: &usize| felt[*a].total_cmp(&felt[*b]);
+        (0..felt.len()).max_by(order).unwrap_or(0)
+    };
+    // How far an interval is from the two others, which are near each other.
+    let alone = |i: usize| {
+        let others: Vec<f64> = (0..felt.len())
+            .filter(|o| *o != i)
+            .map(|o| felt[o])
+            .collect();
+        let within = others.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+            - others.iter().copied().fold(f64::INFINITY, f64::min);
+        -within
+    };
+    match (method, felt) {
+        (None, [a, b]) if options == 3 && (a - b).abs() < TIE * noise => 2,
+        (Some(Method::SameDifferent), [a, b]) => usize::from((a - b).abs() > DIFFERENT * noise),
+        (Some(Method::Abx), [a, b, x]) => usize::from((x - b).abs() < (x - a).abs()),
+        (Some(Method::OddOneOut), [_, _, _]) => {
+            let order = |a: &usize, b: &usize| alone(*a).total_cmp(&alone(*b));
+            (0..3).max_by(order).unwrap_or(0)
+        }
+        (Some(Method::YesNo), [one]) => usize::from(*one <= YES * noise),
+        _ => largest(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_noise_every_method_finds_the_comparison() {
+        use study_core::protocol::Interval;
+        for method in [
+            Method::TwoIntervals,
+            Method::ThreeIntervals,
+            Method::SameDifferent,
+            Method::Abx,
+            Method::OddOneOut,
+            Method::YesNo,
+        ] {
+            for sequence in method.sequences().iter().chain(method.catch_sequences()) {
+                let felt: Vec<f64> = (sequence.iter())
+                    .map(|i| if *i == Interval::Comparison { 9.0 } else { 0.0 })
+                    .collect();
+                let chosen = choose(Some(method), &felt, 1e-9, method.answers().len());
+                let correct = method.correct(sequence).unwrap();
+                assert_eq!(method.answers()[chosen], correct, "{method:?} {sequence:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pair_is_a_tie_only_where_ties_are_answers() {
+        assert_eq!(choose(None, &[4.0, 4.1], 1.0, 3), 2);
+        assert_eq!(choose(None, &[4.0, 4.1], 1.0, 2), 1);
+        assert_eq!(choose(None, &[5.0, 4.1], 1.0, 3), 0);
+    }
+}
