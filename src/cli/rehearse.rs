@@ -3,6 +3,7 @@
 use super::device_selection::with_manual_samples;
 use super::{Console, Failure, Kind, load};
 use crate::device::faults::FaultPlan;
+use crate::device::firmware::{Wrong, WrongLoads};
 use crate::device::manual::Manual;
 use crate::device::virtual_device::{Options, VirtualDevice};
 use crate::rater::{Effect, Percepts, Rater};
@@ -11,6 +12,8 @@ use crate::runner::clock::{Clock as _, VirtualClock};
 use crate::runner::rehearsal::{first_day, run_one};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use study_base::rng::Stream;
+use study_base::text::ModelId;
 use study_core::outcome::{State, Status};
 use study_core::protocol::{DeviceKind, Seat};
 use study_core::store::{Frozen, SeatKind, StudyFolder};
@@ -32,15 +35,17 @@ pub(super) struct Args {
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "rehearsal")]
     out: PathBuf,
-    /// Let the device fail at random
+    /// Let the device fail at random, and render another force than the one it was sent in
+    /// some of the sessions
     #[arg(long)]
     faults: bool,
     /// Whether ratings depend on the realization
     #[arg(long, value_enum, default_value_t = EffectArg::BuiltIn)]
     effect: EffectArg,
-    /// Telemetry samples per second
-    #[arg(long, value_name = "HZ", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=4000))]
-    telemetry: u32,
+    /// Telemetry samples per second [default: 100, or 1000 with --faults, since slow telemetry
+    /// shows no wrong force]
+    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(1..=4000))]
+    telemetry: Option<u32>,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -87,8 +92,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             VirtualClock::starting_at(first_day() + chrono::Days::new(u64::from(number - 1)));
         let device_seed = seed.wrapping_add(u64::from(number) << 32);
         let mut options = Options::seeded(device_seed);
-        options.device.telemetry_hz = f64::from(args.telemetry);
+        let usual_hz = if args.faults { 1000 } else { 100 };
+        options.device.telemetry_hz = f64::from(args.telemetry.unwrap_or(usual_hz));
         if args.faults {
+            options.device.wrong = wrong_loads(device_seed);
             options.faults = FaultPlan::random(device_seed, FAULT_PROBABILITY);
         }
         let folder_of_study = match study.take() {
@@ -135,6 +142,19 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     console.out(format!(
         "{done} simulated participants, {rated} rated trials in {shown}.\nSimulated: the effects are built in (docs/simulation.md) and are no evidence.\nNext: study analyze {shown}\n"
     ))
+}
+
+/// In every third session the device is wrong for three loads.
+fn wrong_loads(seed: u64) -> Option<WrongLoads> {
+    let mut stream = Stream::new(seed, &["device", "wrong"]);
+    let (chosen, which) = (stream.below(3) == 0, stream.below(Wrong::ALL.len() as u64));
+    // Below a dozen.
+    let from = 1 + stream.below(12) as u32;
+    let (wrong, ..) = Wrong::ALL[usize::try_from(which).ok()?];
+    chosen.then_some(WrongLoads {
+        wrong,
+        loads: [from, from + 2],
+    })
 }
 
 /// Refuses a folder that already holds sessions.

@@ -4,7 +4,7 @@ use super::{Console, Failure, study_folder};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use study_base::text::Untrusted;
-use study_core::outcome::{ParticipantRow, State};
+use study_core::outcome::{ParticipantRow, State, Verdict};
 use study_core::store::{SessionData, StudyFolder, next_row, participants};
 
 /// Arguments of `study status`.
@@ -59,11 +59,36 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {
         out.push_str(&table(rows));
     }
     let _ = writeln!(out, "\n{}", summary(study, &real));
+    if let Some(forces) = forces(sessions) {
+        let _ = writeln!(out, "Force of the playbacks: {forces}");
+    }
     let _ = match next_row(None, sessions) {
         Some(row) => writeln!(out, "Next free row: {row}"),
         None => writeln!(out, "No row is free"),
     };
     out
+}
+
+/// How often each verdict about the force of a playback was given in all sessions, such as
+/// "148 ok, 1 flag"; `None` if none was judged.
+fn forces(sessions: &[SessionData]) -> Option<String> {
+    let judged: Vec<Verdict> = (sessions.iter())
+        .flat_map(|s| s.history.all_attempts())
+        .flat_map(|(_, attempt)| attempt.rendering.iter().map(|r| r.verdict))
+        .collect();
+    let counts: Vec<String> = [
+        Verdict::Ok,
+        Verdict::Unverified,
+        Verdict::TooLittle,
+        Verdict::Flag,
+        Verdict::Fault,
+    ]
+    .into_iter()
+    .map(|verdict| (verdict, judged.iter().filter(|v| **v == verdict).count()))
+    .filter(|(_, n)| *n > 0)
+    .map(|(verdict, n)| format!("{n} {}", verdict.as_str()))
+    .collect();
+    (!counts.is_empty()).then(|| counts.join(", "))
 }
 
 fn table(rows: &[&ParticipantRow]) -> String {

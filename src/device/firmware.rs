@@ -11,6 +11,7 @@
 
 mod body;
 mod flaw;
+mod wrong;
 
 use body::Body;
 pub use flaw::Flaw;
@@ -21,6 +22,8 @@ use study_haptics::plant::{HandParameters, Parameters};
 use study_wire::handler::{Bounds, Drive, Handler, Measured, Out, Profile};
 use study_wire::message::{DeviceState, Fault, Features, Flags, Loaded, Name};
 use study_wire::servo::ServoSettings;
+use wrong::Saboteur;
+pub use wrong::{Wrong, WrongLoads};
 
 /// Largest number of nodes of a table.
 pub const MAX_NODES: usize = 1024;
@@ -57,6 +60,8 @@ pub struct Options {
     pub serial: String,
     /// Planted defect.
     pub flaw: Option<Flaw>,
+    /// Wrong force.
+    pub wrong: Option<WrongLoads>,
 }
 
 impl Default for Options {
@@ -76,6 +81,7 @@ impl Default for Options {
             clock_ms: 0,
             serial: "simulated-1".to_owned(),
             flaw: None,
+            wrong: None,
         }
     }
 }
@@ -96,6 +102,7 @@ pub struct Firmware {
     clock_ms: u32,
     stall: Option<Stall>,
     injector: Option<FlawInjector>,
+    saboteur: Option<Box<Saboteur>>,
     /// Current time of the simulation.
     now: Duration,
     /// Bytes received during a stall.
@@ -129,6 +136,9 @@ impl Firmware {
             injector: options
                 .flaw
                 .map(|flaw| FlawInjector::new(flaw, options.watchdog_ms)),
+            saboteur: options
+                .wrong
+                .map(|how| Box::new(Saboteur::new(how, told(&options)))),
             now: Duration::ZERO,
             unread: Vec::new(),
             sent: Vec::new(),
@@ -168,6 +178,8 @@ impl Firmware {
             self.unread.extend_from_slice(bytes);
             return;
         }
+        let changed = self.saboteur.as_mut().map(|own| own.inbound(bytes));
+        let bytes = changed.as_deref().unwrap_or(bytes);
         let now_ms = self.clock(at);
         match &mut self.injector {
             None => self.handle(bytes, at),
@@ -187,7 +199,10 @@ impl Firmware {
 
     /// Takes the bytes to be sent.
     pub fn take_output(&mut self) -> Vec<u8> {
-        let sent = std::mem::take(&mut self.sent);
+        let mut sent = std::mem::take(&mut self.sent);
+        if let Some(saboteur) = &mut self.saboteur {
+            sent = saboteur.outbound(&sent);
+        }
         match &mut self.injector {
             None => sent,
             Some(injector) => injector.outbound(&sent, self.now),
@@ -295,7 +310,10 @@ impl Firmware {
     }
 
     fn servo(&mut self, at: Duration) {
-        let measured = self.body.measure();
+        let mut measured = self.body.measure();
+        if let Some(saboteur) = &mut self.saboteur {
+            measured.motion = saboteur.motion(measured.motion);
+        }
         let drive = self.with_handler(at, |handler, now_ms, out| {
             handler.servo(measured, now_ms, out)
         });
@@ -314,6 +332,15 @@ impl Firmware {
             };
             self.body.take(range, self.handler.uploads());
         }
+    }
+}
+
+/// The servo that the simulated device tells.
+fn told(options: &Options) -> ServoSettings {
+    ServoSettings {
+        servo_hz: options.servo_hz,
+        least_mass_kg: options.least_mass_kg,
+        ..ServoSettings::default()
     }
 }
 
@@ -342,10 +369,9 @@ fn profile(options: &Options) -> Profile {
             damping_n_s_per_mm: 0.2,
             stroke_mm: [-20.0, 60.0],
         },
-        servo: ServoSettings {
-            servo_hz: options.servo_hz,
-            least_mass_kg: options.least_mass_kg,
-            ..ServoSettings::default()
+        servo: match options.wrong {
+            Some(how) => how.wrong.servo(told(options)),
+            None => told(options),
         },
         rest_mm_s: 5.0,
         rest_s: 0.05,

@@ -8,6 +8,7 @@ mod designs;
 mod playback;
 mod precision;
 mod process;
+mod rendering;
 mod safety;
 mod shipped;
 mod supervision;

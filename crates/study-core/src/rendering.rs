@@ -16,6 +16,7 @@ use crate::protocol::{OnFault, RenderingRules};
 use moments::{Moments, best_lag};
 use predicted::{Predicted, predicted};
 use study_base::text::ModelId;
+use study_wire::predict::Direction;
 use study_wire::servo::{self, ServoSettings};
 
 /// Slower than this the handle rests, mm/s.
@@ -97,7 +98,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     fidelity.rendered_vaf = commanded.vaf();
     fidelity.rendered_gain = commanded.slope();
     fidelity.rendered_bias_n = commanded.bias();
-    fidelity.rendered_error_n = lasting_error(&samples, &forces);
+    fidelity.rendered_error_n = lasting_error(played, &samples, &forces);
     limits(played, &samples, interval_s, &mut fidelity);
     measured(&samples, &mut fidelity);
 
@@ -266,12 +267,17 @@ fn share(part: f64, whole: f64) -> Option<f64> {
 }
 
 /// Which samples are compared: after the ramp, where the motion before is complete, and
-/// where the table's force is below its limit.
+/// where the table's force is below its limit. At rest the rule sign can change its
+/// direction between two samples.
 fn comparable(played: &Played<'_>, samples: &[Sample], forces: &[Predicted]) -> Vec<bool> {
     let from_s = played.servo.ramp_s + AFTER_RAMP_S;
     let limit_n = played.servo.force_n;
+    let known = |s: &Sample| played.what.rule != Direction::Sign || s.v_mm_s.abs() > REST_MM_S;
     (samples.iter().zip(forces))
-        .map(|(s, p)| s.t_s >= from_s && p.settled && p.force_n.abs() < limit_n - ROUNDING_N)
+        .map(|(s, p)| {
+            let free = p.force_n.abs() < limit_n - ROUNDING_N;
+            s.t_s >= from_s && p.settled && free && known(s)
+        })
         .collect()
 }
 
@@ -325,10 +331,13 @@ fn repeated(samples: &[Sample]) -> Option<f64> {
 }
 
 /// The largest mean difference of commanded and expected force over a window, N. Only
-/// motion counts: at rest the direction can change between two samples.
-fn lasting_error(samples: &[Sample], forces: &[Predicted]) -> Option<f64> {
+/// motion counts, as at rest the direction can change between two samples, and the first
+/// quarter of the ramp, where forces are small.
+fn lasting_error(played: &Played<'_>, samples: &[Sample], forces: &[Predicted]) -> Option<f64> {
+    let early_s = 0.25 * played.servo.ramp_s;
     largest_mean(samples, |i| {
-        let known = forces[i].settled && samples[i].v_mm_s.abs() > REST_MM_S;
+        let moves = samples[i].v_mm_s.abs() > REST_MM_S || samples[i].t_s < early_s;
+        let known = forces[i].settled && moves;
         known.then(|| samples[i].force_command_n - forces[i].force_n)
     })
 }

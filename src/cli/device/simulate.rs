@@ -1,7 +1,7 @@
 //! `study device simulate`: a device on a pseudo-terminal.
 
 use crate::cli::{Console, Failure};
-use crate::device::firmware::{Firmware, Flaw, Options};
+use crate::device::firmware::{Firmware, Flaw, Options, Wrong, WrongLoads};
 use crate::device::link::memory::Noise;
 use crate::device::link::pty::{Control, Simulator};
 use std::path::PathBuf;
@@ -35,6 +35,10 @@ pub(in crate::cli) struct Args {
     /// Planted defect, to try out `study device check`
     #[arg(long, value_name = "DEFECT", value_parser = flaw)]
     flaw: Option<Flaw>,
+    /// Wrong force, to try out sessions and `study device check --rendering`; with `@7` from the
+    /// seventh load on, with `@7-9` until the ninth
+    #[arg(long, value_name = "HOW", value_parser = wrong)]
+    wrong: Option<WrongLoads>,
 }
 
 /// Why an argument is rejected.
@@ -42,6 +46,10 @@ pub(in crate::cli) struct Args {
 enum ArgumentError {
     #[error("use one of {names}", names = Flaw::ALL.map(|(_, name, _)| name).join(", "))]
     UnknownFlaw,
+    #[error("use one of {names}", names = wrong_names())]
+    UnknownWrong,
+    #[error("after @ comes the first wrong load, or the first and the last, such as 7-9")]
+    Loads,
     #[error("use one of corrupt, drop, duplicate, reorder, delay")]
     UnknownFault,
     #[error("the fraction of frames has to be between 0 and 1, not {0}")]
@@ -50,6 +58,24 @@ enum ArgumentError {
 
 fn flaw(given: &str) -> Result<Flaw, ArgumentError> {
     Flaw::named(given).ok_or(ArgumentError::UnknownFlaw)
+}
+
+fn wrong_names() -> String {
+    let names: Vec<&str> = Wrong::ALL.iter().map(|(_, name, _)| *name).collect();
+    names.join(", ")
+}
+
+fn wrong(given: &str) -> Result<WrongLoads, ArgumentError> {
+    let (name, loads) = given.split_once('@').unwrap_or((given, "1"));
+    let wrong = Wrong::named(name).ok_or(ArgumentError::UnknownWrong)?;
+    let (from, to) = loads.split_once('-').unwrap_or((loads, ""));
+    let number = |text: &str| text.parse::<u32>().map_err(|_| ArgumentError::Loads);
+    let from = number(from)?;
+    let to = if to.is_empty() { u32::MAX } else { number(to)? };
+    Ok(WrongLoads {
+        wrong,
+        loads: [from, to],
+    })
 }
 
 /// Commands on standard input, one per line.
@@ -123,6 +149,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         watchdog_ms: args.watchdog,
         serial: args.serial.clone(),
         flaw: args.flaw,
+        wrong: args.wrong,
         ..Options::default()
     });
     let failed = |e: crate::device::link::LinkError| Failure::device(e);

@@ -39,8 +39,8 @@ impl<'a> Trouble<'a> {
                      to see why. F10 quits: the session can be resumed later, and no answer \
                      is lost."
                 } else {
-                    "The device produces no force. Check its power and its cable; the \
-                     session continues when it answers again. F10 quits: the session can \
+                    "The device should produce no force: use its emergency switch if it does. Check \
+                     its power and its cable; the session continues when it answers again. F10 quits: the session can \
                      be resumed later, and no answer is lost."
                 })
                 .to_owned(),

@@ -11,6 +11,9 @@ const SETTLING_S: f64 = 0.06;
 /// Only this much of a longer gap is calculated, in addition to the ramp, s.
 const LONGEST_GAP_S: f64 = 0.25;
 
+/// Samples on each side of the second difference of the position.
+const APART: usize = 4;
+
 /// The force at one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Predicted {
@@ -77,8 +80,21 @@ pub(super) fn predicted(
     all
 }
 
-/// Difference of the speed around a sample, m/s².
-pub(super) fn acceleration(samples: &[Sample], i: usize) -> f64 {
+/// Acceleration at a sample, m/s²: the second difference of the position, in which the
+/// filter of the speed has no part; at the ends and beside gaps the difference of the
+/// speed.
+fn acceleration(samples: &[Sample], i: usize) -> f64 {
+    let here = &samples[i];
+    let around = i
+        .checked_sub(APART)
+        .and_then(|before| Some((samples.get(before)?, samples.get(i + APART)?)));
+    if let Some((before, after)) = around {
+        let [past_s, next_s] = [here.t_s - before.t_s, after.t_s - here.t_s];
+        if (past_s - next_s).abs() < 0.1 * past_s && past_s < GAP_S * APART as f64 {
+            let bend_mm = after.x_mm - 2.0 * here.x_mm + before.x_mm;
+            return 1e-3 * bend_mm / (past_s * next_s);
+        }
+    }
     let before = &samples[i.saturating_sub(1)];
     let after = &samples[(i + 1).min(samples.len() - 1)];
     let dt_s = after.t_s - before.t_s;

@@ -1,0 +1,267 @@
+//! The verdict about a playback: the simulated device is right, wrong devices are found.
+
+use crate::support::repository;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::time::Duration;
+use study::cli::load;
+use study::device::firmware::{Wrong, WrongLoads};
+use study::device::link::memory::Noise;
+use study::device::virtual_device::{Options, VirtualDevice};
+use study::device::{Device, Report, Stimulus, rendering_of};
+use study::runner::playback_limits;
+use study_base::limits::Limits;
+use study_base::text::ModelId;
+use study_core::outcome::{Fidelity, Playback, Sample, Verdict};
+use study_core::protocol::RenderingRules;
+use study_core::rendering::{Played, judge};
+use study_haptics::model::{Branch, Realization, Trained};
+use study_haptics::plant::HandParameters;
+use study_wire::predict::{Direction, Lookup};
+use study_wire::servo::ServoSettings;
+
+/// The page that lists the wrong devices, with what a session says of each.
+const PAGE: &str = "docs/wrong-devices.md";
+
+/// The tables of the shipped protocols with the limits of their playback.
+fn shipped() -> Vec<(ModelId, Realization, Limits)> {
+    let mut all = Vec::new();
+    for protocol in ["protocols/turn-signal", "protocols/turn-signal-extended"] {
+        let loaded = load::load(Path::new(&repository(protocol))).unwrap();
+        for (id, table) in loaded.models {
+            let limits = playback_limits(&loaded.protocol, Some(&table));
+            all.push((id, table, limits));
+        }
+    }
+    all
+}
+
+/// A table in which every term, direction and node counts.
+fn mixed(direction: Direction) -> Realization {
+    let nodes: Vec<f64> = (2..=33).map(f64::from).collect();
+    let branch = |friction: f64| Branch {
+        m_kg: vec![0.3; nodes.len()],
+        b_n_s_per_mm: vec![0.02; nodes.len()],
+        k_n_per_mm: vec![0.15; nodes.len()],
+        f0_n: (nodes.iter())
+            .map(|x| 2.5 * ((x - 5.0) / 12.5 * std::f64::consts::TAU).sin() + friction - 2.6)
+            .collect(),
+    };
+    Realization {
+        id: "mixed".to_owned(),
+        provenance: Default::default(),
+        vaf: Default::default(),
+        lookup: Lookup::Linear,
+        direction,
+        trained: Trained {
+            x_mm: [1.5, 33.5],
+            v_mm_s: 138.0,
+        },
+        x_mm: nodes.clone(),
+        positive: branch(1.0),
+        negative: branch(-1.0),
+    }
+}
+
+/// What a playback reports, and what the device says of its servo.
+struct Heard {
+    samples: Vec<Sample>,
+    playback: Option<Playback>,
+    servo: Option<ServoSettings>,
+}
+
+/// Loads, plays for `seconds` and stops, each table in turn; what the last reports.
+fn play(options: Options, tables: &[(&Realization, Limits)], seconds: f64) -> Heard {
+    let mut device = VirtualDevice::new(options);
+    let mut heard = Heard {
+        samples: Vec::new(),
+        playback: None,
+        servo: device.identity().servo,
+    };
+    let mut ms = 0;
+    let mut wait = |device: &mut VirtualDevice, most: u32, done: &dyn Fn(&Report) -> bool| {
+        let mut all = Vec::new();
+        for _ in 0..most {
+            ms += 10;
+            let reports = device.poll(Duration::from_millis(ms));
+            let found = reports.iter().any(done);
+            all.extend(reports);
+            if found {
+                break;
+            }
+        }
+        (all, Duration::from_millis(ms))
+    };
+    for (table, limits) in tables {
+        let (_, now) = wait(&mut device, 1, &|_| false);
+        device
+            .load(&Stimulus::of_table(table), *limits, now)
+            .unwrap();
+        let (reports, now) = wait(&mut device, 500, &|r| *r == Report::Loaded);
+        device
+            .start(now)
+            .unwrap_or_else(|e| panic!("{}: {e}: {reports:?}", table.id));
+        let (mut reports, _) = wait(&mut device, (100.0 * seconds) as u32, &|_| false);
+        let (more, now) = wait(&mut device, 1, &|_| false);
+        reports.extend(more);
+        device.stop(now).unwrap();
+        reports.extend(wait(&mut device, 300, &|r| matches!(r, Report::Stopped(_))).0);
+        heard.samples.clear();
+        heard.playback = None;
+        for report in reports {
+            match report {
+                Report::Telemetry(more) => heard.samples.extend(more),
+                Report::Stopped(playback) => heard.playback = Some(playback),
+                _ => {}
+            }
+        }
+    }
+    heard
+}
+
+/// The verdict as a session gives it.
+fn judged(
+    id: &ModelId,
+    table: &Realization,
+    limits: Limits,
+    heard: &Heard,
+    others: &[(ModelId, Realization)],
+) -> Fidelity {
+    let others: Vec<_> = (others.iter())
+        .map(|(id, table)| (id.clone(), rendering_of(table)))
+        .collect();
+    let played = Played {
+        model: id,
+        what: rendering_of(table),
+        servo: ServoSettings {
+            force_n: limits.force_n.get(),
+            ..heard.servo.unwrap()
+        },
+        servo_told: true,
+        samples: &heard.samples,
+        lost: heard.playback.map_or(0, |p| p.samples_lost),
+        time_ratio: heard.playback.and_then(|p| p.time_ratio),
+        others: &others,
+    };
+    judge(&played, &RenderingRules::default())
+}
+
+/// Every wrong device plays two tables; what a session says of the second.
+#[test]
+fn no_wrong_device_is_ok_where_telemetry_can_show_it() {
+    let (id, before) = (
+        ModelId::new("mixed").unwrap(),
+        ModelId::new("before").unwrap(),
+    );
+    let table = mixed(Direction::Sign);
+    let mut first = mixed(Direction::Sign);
+    first.positive.f0_n.iter_mut().for_each(|f| *f *= -1.0);
+    let limits = Limits::new(9.0, 1000.0).unwrap();
+    let others = [(before, first.clone())];
+    let mut rows = String::new();
+    let mut unseen = Vec::new();
+    for (wrong, name, what) in Wrong::ALL {
+        let mut options = Options::seeded(7);
+        options.device.wrong = Some(WrongLoads {
+            wrong: *wrong,
+            loads: [1, u32::MAX],
+        });
+        let heard = play(options, &[(&first, limits), (&table, limits)], 6.0);
+        let found = judged(&id, &table, limits, &heard, &others);
+        let defects: Vec<&str> = found.defects.iter().map(|d| d.as_str()).collect();
+        let _ = writeln!(
+            rows,
+            "| `{name}` | {what} | {} | {} |",
+            found.verdict.as_str(),
+            defects.join(", "),
+        );
+        if !wrong.is_physical() && !matches!(found.verdict, Verdict::Flag | Verdict::Fault) {
+            unseen.push(format!("{name}: {found:?}"));
+        }
+        assert!(
+            !wrong.is_physical() || found.verdict == Verdict::Ok,
+            "{name}: {found:?}"
+        );
+    }
+    assert_eq!(unseen, Vec::<String>::new());
+    assert!(Wrong::ALL.len() > 50);
+    let path = repository(PAGE);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (head, rest) = text.split_once("|---|---|---|---|\n").unwrap();
+    let tail = &rest[rest.find("\n\n").unwrap()..];
+    let expected = format!("{head}|---|---|---|---|\n{}{tail}", rows.trim_end());
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        std::fs::write(&path, expected).unwrap();
+    } else {
+        assert!(text == expected, "UPDATE_DOCS=1 writes {PAGE}:\n{rows}");
+    }
+}
+
+/// The right device with hands of different vigour, in half of the playbacks with a line
+/// that damages 1e-4 of the bytes and loses frames. `STUDY_PLAYBACKS` repeats the test with
+/// another number.
+#[test]
+fn the_right_device_is_not_accused() {
+    let asked = std::env::var("STUDY_PLAYBACKS").ok();
+    let playbacks: u64 = asked.map_or(120, |n| n.parse().unwrap());
+    let tables = shipped();
+    let all: Vec<(ModelId, Realization)> = (tables.iter())
+        .map(|(id, table, _)| (id.clone(), table.clone()))
+        .collect();
+    let speeds = [
+        [40.0, 200.0],
+        [15.0, 50.0],
+        [150.0, 400.0],
+        [5.0, 15.0],
+        [60.0, 120.0],
+    ];
+    let mut counts: BTreeMap<Verdict, u32> = BTreeMap::new();
+    let mut accused = Vec::new();
+    let (mut least_vaf, mut largest_error_n) = (1.0, 0.0);
+    for n in 0..playbacks {
+        let (id, table, limits) = &tables[n as usize % tables.len()];
+        let mut options = Options::seeded(1000 + n);
+        options.device.hand = HandParameters {
+            speed_mm_s: speeds[(n / tables.len() as u64) as usize % speeds.len()],
+            ..HandParameters::default()
+        };
+        if n % 2 == 1 {
+            options.noise = Noise {
+                // Frames of telemetry have 232 bytes.
+                corrupt: 0.0232,
+                drop: 0.01,
+                ..Noise::default()
+            };
+        }
+        let heard = play(options, &[(table, *limits)], 4.0);
+        if heard.playback.is_none() {
+            // The line lost a playback: no verdict.
+            continue;
+        }
+        let others: Vec<_> = (all.iter())
+            .filter(|(other, own)| other != id && own.positive != table.positive)
+            .cloned()
+            .collect();
+        let found = judged(id, table, *limits, &heard, &others);
+        *counts.entry(found.verdict).or_default() += 1;
+        if found.verdict == Verdict::Ok {
+            least_vaf = f64::min(least_vaf, found.rendered_vaf.unwrap());
+            largest_error_n = f64::max(largest_error_n, found.rendered_error_n.unwrap_or(0.0));
+        }
+        if matches!(found.verdict, Verdict::Flag | Verdict::Fault) {
+            accused.push(format!("{n} {id}: {found:?}"));
+        }
+    }
+    println!("{counts:?}, VAF from {least_vaf:.4}, errors up to {largest_error_n:.3} N");
+    let of = |verdict| counts.get(&verdict).copied().unwrap_or(0);
+    assert_eq!(of(Verdict::Fault), 0, "{accused:#?}");
+    assert!(
+        u64::from(of(Verdict::Flag)) * 500 <= playbacks,
+        "{accused:#?}"
+    );
+    assert!(
+        u64::from(of(Verdict::Ok)) * 10 > playbacks * 6,
+        "{counts:?}"
+    );
+}
