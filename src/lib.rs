@@ -17,11 +17,11 @@
 //! | 2 | `study-core`: schedule, outcome |
 //! | 3 | `study-core`: session, store, analyze; [`device`], [`rater`] |
 //! | 4 | [`runner`], [`report`] |
-//! | 5 | [`tui`], [`plain`] |
+//! | 5 | [`tui`]; [`plain`], [`screen`] |
 //! | 6 | [`cli`] |
 //!
-//! Input and output happen only in `store`, `tui`, `plain`, `runner` (the clock),
-//! `device::{link, process}` and `cli`. Everywhere else time, randomness and identity
+//! Input and output happen only in `store`, `tui`, `plain`, `screen`, `runner` (the
+//! clock), `device::{link, process}` and `cli`. Everywhere else time, randomness and identity
 //! are arguments.
 //!
 //! # Glossary
@@ -51,4 +51,5 @@ pub mod plain;
 pub mod rater;
 pub mod report;
 pub mod runner;
+pub mod screen;
 pub mod tui;

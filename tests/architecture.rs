@@ -93,6 +93,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
         "plain",
         &["runner", "session", "outcome", "protocol", "tui"],
     ),
+    ("screen", &["runner", "session", "protocol", "tui"]),
     (
         "cli",
         &[
@@ -111,6 +112,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
             "report",
             "runner",
             "schedule",
+            "screen",
             "session",
             "stats",
             "store",
@@ -146,6 +148,7 @@ const WITH_IO: &[&str] = &[
     "store",
     "tui",
     "plain",
+    "screen",
     "runner",
     "cli",
     "device/link",

@@ -29,6 +29,10 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
                 "lines only, for a screen reader",
             ),
             (
+                "study run my-study --screen=192.168.1.20",
+                "the participant's side on a tablet",
+            ),
+            (
                 "study run my-study --device simulated",
                 "a pilot on the simulated device",
             ),

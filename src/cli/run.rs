@@ -1,5 +1,6 @@
 //! `study run`: a session in the terminal.
 
+mod page;
 mod unsaved;
 
 use super::console::shell_command;
@@ -8,6 +9,7 @@ use super::{Console, Failure, Kind, load, study_folder};
 use crate::plain::Plain;
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Operator, Runner, Setup};
+use crate::screen::Address;
 use crate::tui::{self, Tui};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -52,6 +54,11 @@ pub(super) struct Args {
     /// Lines only, for screen readers; also with STUDY_PLAIN=1 and in a dumb terminal
     #[arg(long)]
     plain: bool,
+    /// A page of the participant's own, in a browser on this computer or, at an address of
+    /// this computer such as 192.168.1.20, on a tablet
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, require_equals = true,
+          default_missing_value = "127.0.0.1")]
+    screen: Option<Address>,
     /// Do not use the mouse
     #[arg(long)]
     no_mouse: bool,
@@ -119,6 +126,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let address = &args.device.address;
     let plain = args.plain || wants_plain(|name| std::env::var(name).ok());
+    let screen = match args.screen {
+        Some(at) => Some(page::open(at, &loaded.protocol, plain, console)?),
+        None => None,
+    };
     let mut waiting = match plain {
         true => WaitDisplay::in_a_line(console),
         false => WaitDisplay::on_screen(options),
@@ -141,6 +152,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         true => Box::new(Plain::open(args.live).map_err(unusable)?),
         false => Box::new(Tui::open(options).map_err(unusable)?),
     };
+    if let Some(screen) = screen {
+        operator = Box::new(screen.beside(operator));
+    }
     let study = match begun {
         Some(study) => study,
         None => {
@@ -344,6 +358,7 @@ fn resume_command(args: &Args, participant: &str) -> String {
             command.push(flag.to_owned());
         }
     }
+    command.extend(args.screen.map(|at| format!("--screen={at}")));
     shell_command(&command)
 }
 

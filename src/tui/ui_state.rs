@@ -286,7 +286,7 @@ impl Who {
 }
 
 /// Whether two screens are the same page, apart from numbers on it.
-pub(super) fn same_page(a: &Screen, b: &Screen) -> bool {
+pub fn same_page(a: &Screen, b: &Screen) -> bool {
     match (a, b) {
         (
             Screen::Form {

@@ -117,7 +117,9 @@ fn pages(
     let mut played = false;
     for _ in 0..20_000 {
         let view = runner.view();
-        pages.push(picture(&drawn(&mut surface, &view, 80, 24)));
+        // What the participant's own page shows has to be as blind.
+        let own = serde_json::to_string(&study::screen::pages::page(&view)).unwrap();
+        pages.push(picture(&drawn(&mut surface, &view, 80, 24)) + &own);
         match &view.screen {
             Screen::Playing { .. } => {
                 assert_eq!(runner.felt(), Some(first));

@@ -16,6 +16,7 @@ mod memory;
 mod mirror;
 mod plain;
 mod rehearsed;
+mod screen;
 #[path = "../support/mod.rs"]
 mod support;
 mod tui_hostile;

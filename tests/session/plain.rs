@@ -159,7 +159,7 @@ const NOT_COMPARED: [&str; 10] = [
 ];
 
 /// The events of a journal without what differs from session to session.
-fn events(folder: &Path) -> Vec<Value> {
+pub(crate) fn events(folder: &Path) -> Vec<Value> {
     let sessions = folder.join("results/turn-signal/sessions");
     let mut journals = Vec::new();
     find(&sessions, &mut journals);
@@ -177,7 +177,7 @@ fn events(folder: &Path) -> Vec<Value> {
     lines.map(told).collect()
 }
 
-fn find(folder: &Path, journals: &mut Vec<std::path::PathBuf>) {
+pub(crate) fn find(folder: &Path, journals: &mut Vec<std::path::PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
@@ -189,7 +189,7 @@ fn find(folder: &Path, journals: &mut Vec<std::path::PathBuf>) {
 }
 
 /// The paper's study with each realization once.
-fn short(folder: &Path) -> std::path::PathBuf {
+pub(crate) fn short(folder: &Path) -> std::path::PathBuf {
     let protocol = folder.join("paper");
     let once = ("repetitions = 3", "repetitions = 1");
     changed_protocol("turn-signal", &protocol, &[PATIENT, once]);
@@ -225,7 +225,7 @@ fn the_journal_is_that_of_the_full_screen_and_the_lines_are_plain() {
 }
 
 /// The last answer to each question of each trial.
-fn last_answers(events: &[Value]) -> BTreeMap<String, Value> {
+pub(crate) fn last_answers(events: &[Value]) -> BTreeMap<String, Value> {
     let answers = events.iter().filter(|e| e["event"] == "answered");
     let place = |e: &Value| format!("{} {}", e["place"]["trial"]["trial"], e["question"]);
     answers.map(|e| (place(e), e["answer"].clone())).collect()

@@ -132,6 +132,9 @@ phrases! {
     PlainRate "plain-rate" "Press Enter to go on. Esc or Space stops.";
     PlainEnterAlone "plain-enter-alone" "Enter alone";
     PlainType "plain-type" "Type {key}";
+    Saved "saved" "Saved.";
+    PageLost "page-lost" "The connection is lost. Trying again …";
+    PageClosed "page-closed" "This page is closed. Please tell the experimenter.";
 }
 
 /// The shipped languages besides English: BCP 47 tag and file.

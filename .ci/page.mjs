@@ -1,0 +1,250 @@
+// Plays a session on the participant's page in headless Chromium, in three languages, two by
+// touch and one by keys alone, and has axe-core check every page in light and dark for WCAG 2.2 AA.
+//
+//   node .ci/page.mjs STUDY MODULES [PICTURES]
+//
+// STUDY is the program, MODULES a folder in which `npm install puppeteer-core axe-core`
+// was run, PICTURES a folder for pictures of every page at five sizes.
+import { spawn } from "node:child_process";
+import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+
+const [study, modules, pictures] = process.argv.slice(2).map((path) => path && resolve(path));
+const require = createRequire(join(modules, "x.js"));
+const puppeteer = require("puppeteer-core");
+const axe = require("axe-core");
+const chromium = process.env.CHROMIUM ?? ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
+const SIZES = [[375, 667], [667, 375], [768, 1024], [1280, 800], [800, 1280]];
+const RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"];
+
+const TEXTS = {
+  en: {
+    welcome: "Welcome. In this session you feel switches.\n\nTake your time.",
+    prompts: ["How old are you?", "Which of these have you used?", "Your hand", "How firm did it feel?", "How pleasant was it?", "How often do you drive?", "How realistic did it feel?", "Comments"],
+    labels: ["not at all realistic", "very realistic", "soft", "firm", "never", "seldom", "sometimes", "often", "always"],
+    options: ["a gamepad", "a steering wheel with force feedback", "none of these"], unit: "years",
+  },
+  ar: {
+    welcome: "مرحبًا بكم. في هذه الجلسة ستتحسسون مفاتيح.\n\nخذوا وقتكم.",
+    prompts: ["كم عمرك؟", "أي من هذه الأشياء استخدمت؟", "يدك", "ما مدى صلابته؟", "ما مدى راحته؟", "كم مرة تقود السيارة؟", "ما مدى واقعيته؟", "ملاحظات"],
+    labels: ["غير واقعي إطلاقًا", "واقعي جدًا", "لين", "صلب", "أبدًا", "نادرًا", "أحيانًا", "كثيرًا", "دائمًا"],
+    options: ["ذراع تحكم", "عجلة قيادة", "لا شيء مما سبق"], unit: "سنة",
+  },
+  ja: {
+    welcome: "ようこそ。この実験では、スイッチに触れていただきます。\n\nゆっくり進めてください。",
+    prompts: ["年齢を入力してください。", "使ったことがあるものはどれですか。", "利き手", "どのくらい硬く感じましたか。", "どのくらい快適でしたか。", "どのくらい運転しますか。", "どのくらい本物らしく感じましたか。", "ご意見"],
+    labels: ["まったく本物らしくない", "とても本物らしい", "柔らかい", "硬い", "まったくない", "まれに", "ときどき", "よく", "いつも"],
+    options: ["ゲームパッド", "力覚フィードバック付きハンドル", "どれもない"], unit: "歳",
+  },
+};
+
+function protocol(lang) {
+  const { welcome, prompts: p, labels: l, options, unit } = TEXTS[lang];
+  const s = JSON.stringify;
+  const likert = l.slice(4).map((label, at) => `${at + 1} = ${s(label)}`).join(", ");
+  return `format = "study-protocol/1"
+[study]
+id = "page"
+title = "Page"
+seed = 1
+[text]
+lang = "${lang}"
+welcome = ${s(welcome)}
+[consent]
+document = "Information.pdf"
+version = "2"
+[design]
+participants = 2
+repetitions = 1
+order = "blocked"
+breaks = { every = 1, at_least_s = 2 }
+[device]
+kind = "simulated"
+limits = { force_n = 12.0, velocity_mm_s = 1000.0 }
+uncertified = { play = true, force_n = 9.0, reason = "a test" }
+[trial]
+reference_min_s = 2
+[[models]]
+id = "one"
+file = "models/lambda-0.9991.toml"
+[[models]]
+id = "two"
+file = "models/lambda-0.9993.toml"
+[[intake]]
+id = "age"
+kind = "number"
+prompt = ${s(p[0])}
+unit = ${s(unit)}
+min = 18
+max = 99
+[[intake]]
+id = "used"
+kind = "choice"
+prompt = ${s(p[1])}
+options = ${s(options)}
+multiple = true
+[[intake]]
+id = "hand"
+kind = "choice"
+prompt = ${s(p[2])}
+options = ["A", "B"]
+[[questions]]
+id = "realism"
+kind = "rating"
+prompt = ${s(p[6])}
+from = 1
+to = 7
+labels = { 1 = ${s(l[0])}, 7 = ${s(l[1])} }
+[[questions]]
+id = "comment"
+kind = "text"
+prompt = ${s(p[7])}
+[[questions]]
+id = "firm"
+kind = "slider"
+prompt = ${s(p[3])}
+from = 0
+to = 1
+step = 0.05
+labels = { 0 = ${s(l[2])}, 1 = ${s(l[3])} }
+[[questions]]
+id = "pleasant"
+kind = "rating"
+prompt = ${s(p[4])}
+from = 0
+to = 10
+labels = { 0 = ${s(l[2])}, 10 = ${s(l[3])} }
+[[questions]]
+id = "often"
+kind = "rating"
+prompt = ${s(p[5])}
+from = 1
+to = 5
+labels = { ${likert} }
+[analysis]
+primary = "realism"
+`;
+}
+
+const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+let findings = 0;
+const found = (what) => { findings += 1; console.error(`FOUND ${what}`); };
+
+async function check(page, name) {
+  for (const scheme of ["light", "dark"]) {
+    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }, { name: "prefers-reduced-motion", value: "reduce" }]);
+    const { violations } = await page.evaluate((rules) => window.axe.run(document, { runOnly: rules }), RULES);
+    for (const v of violations) found(`${name} (${scheme}): ${v.id}: ${v.help}: ${v.nodes.map((n) => n.html).join(" | ")}`);
+  }
+  await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }, { name: "prefers-reduced-motion", value: "reduce" }]);
+  for (const [width, height] of SIZES) {
+    await page.setViewport({ width, height });
+    // Buttons and boxes are large enough for a finger, and nothing is wider than the page.
+    const small = await page.evaluate(() => {
+      const shown = (n) => n.getClientRects().length;
+      const targets = [...document.querySelectorAll("button, .box, textarea, input[type=text], input[type=range]")].filter(shown);
+      const bad = targets.filter((n) => { const r = n.getBoundingClientRect(); return r.width < 44 || r.height < 44; });
+      const wide = document.documentElement.scrollWidth > innerWidth ? ["the page is wider than the screen"] : [];
+      return bad.map((n) => `${n.outerHTML.slice(0, 80)} ${n.getBoundingClientRect().width}×${n.getBoundingClientRect().height}`).concat(wide);
+    });
+    for (const what of small) found(`${name} at ${width}×${height}: ${what}`);
+    if (pictures) await page.screenshot({ path: join(pictures, `${name}-${width}x${height}.png`) });
+  }
+}
+
+/** Presses Tab until the focus is where it should be. */
+async function tabTo(page, selector) {
+  for (let n = 0; n < 40; n += 1) {
+    if (await page.evaluate((s) => document.activeElement?.matches(s) ?? false, selector)) return;
+    await page.keyboard.press("Tab");
+  }
+}
+
+/** Answers the first question, with a finger or by keys alone. */
+async function enter(page, fields, keyboard) {
+  const first = fields.split(",")[0];
+  const selector = { range: "[type=range]", text: "[type=text]", textarea: "textarea" }[first] ?? ".box input";
+  if (!fields) return;
+  if (keyboard) await tabTo(page, selector);
+  else if (first !== "text") await page.click(first === "range" ? selector : ".box:nth-child(2)");
+  else await page.click(selector);
+  if (first === "text") {
+    await page.keyboard.down("Control"); await page.keyboard.press("a"); await page.keyboard.up("Control");
+    await page.keyboard.type("33");
+  } else if (keyboard) await page.keyboard.press(first === "checkbox" ? "Space" : "ArrowDown");
+}
+
+async function play(lang, browser, keyboard) {
+  const folder = mkdtempSync(join(tmpdir(), "page-"));
+  cpSync("protocols/turn-signal", folder, { recursive: true });
+  writeFileSync(join(folder, "protocol.toml"), protocol(lang));
+  const child = spawn(study, ["run", folder, "--plain", "--screen"], { cwd: folder });
+  let said = "";
+  child.stdout.on("data", (data) => { said += data; });
+  child.stderr.on("data", (data) => { said += data; });
+  const ended = new Promise((done) => child.on("exit", done));
+  child.stdin.write("P01\nx\n");
+  for (let n = 0; n < 200 && !/http:\S+/.test(said); n += 1) await sleep(50);
+  const link = said.match(/http:\S+/)[0];
+  const context = await browser.createBrowserContext();
+  const page = await context.newPage();
+  page.on("console", (m) => { if (m.type() === "error" && !/favicon/.test(m.text() + (m.location().url ?? ""))) found(`${lang}: console: ${m.text()}`); });
+  page.on("pageerror", (e) => found(`${lang}: ${e}`));
+  await page.goto(link);
+  await page.evaluate(axe.source);
+  const seen = new Set();
+  for (let n = 0; n < 400; n += 1) {
+    await sleep(150);
+    const now = await page.evaluate(() => ({
+      title: document.title, fields: [...document.querySelectorAll("[type=range], textarea, [type=text], [type=radio], [type=checkbox]")].map((f) => f.type).join(),
+      stop: !!document.querySelector(".stop"), dialogs: document.querySelectorAll("[aria-expanded]").length,
+      main: document.querySelector(".buttons .main:not(:disabled)")?.textContent ?? null, wait: document.querySelector(".wait")?.textContent ?? "",
+    }));
+    const kind = `${now.title}|${now.fields}|${now.stop}|${now.main}`;
+    if (!seen.has(kind) && (now.main || now.stop || now.wait)) {
+      seen.add(kind);
+      const name = `${lang}-${String(seen.size).padStart(2, "0")}`;
+      await check(page, name);
+      await page.setViewport({ width: 375, height: 667 });
+      await enter(page, now.fields, keyboard);
+      if (now.fields) await check(page, `${name}-chosen`);
+      if (now.dialogs) {
+        await page.click("[aria-expanded]");
+        await check(page, `${name}-dialog`);
+        await page.evaluate(() => [...document.querySelectorAll("button")].at(-1).click());
+      }
+      await sleep(450);
+    } else if (now.fields) {
+      await enter(page, now.fields, keyboard);
+      await sleep(450);
+    }
+    if (keyboard && now.main) {
+      await tabTo(page, ".buttons .main");
+      await page.keyboard.press("Enter");
+    } else if (now.main) await page.click(".buttons .main:not(:disabled)").catch(() => {});
+    const over = await page.evaluate(async () => (await (await fetch("/view?after=0")).json()).over);
+    if (over) {
+      await sleep(300);
+      await check(page, `${lang}-end`);
+      break;
+    }
+  }
+  child.stdin.write("\n");
+  child.stdin.end();
+  const code = await Promise.race([ended, sleep(20000)]);
+  if (code !== 0) found(`${lang}: the session ended with ${code}: ${said}`);
+  const ratings = readFileSync(join(folder, "results/page/ratings.csv"), "utf8");
+  if (ratings.split(",ok,").length !== 3) found(`${lang}: ${ratings}`);
+  await context.close();
+  rmSync(folder, { recursive: true });
+  return seen.size;
+}
+
+if (pictures) mkdirSync(pictures, { recursive: true });
+const browser = await puppeteer.launch({ executablePath: chromium, args: ["--no-sandbox"] });
+for (const lang of Object.keys(TEXTS)) console.log(`${lang}: ${await play(lang, browser, lang === "ja")} pages checked`);
+await browser.close();
+console.log(`findings: ${findings}`);
+process.exit(findings ? 1 : 0);

@@ -1,0 +1,334 @@
+//! The server of the participant's page: its threads, its addresses, its limits.
+
+use super::access::{Access, secret};
+use super::board::{Board, Outcome};
+use super::http::{self, Request, Response};
+use super::pages::Does;
+use super::replies::Reply;
+use super::{Address, ScreenError};
+use maud::{DOCTYPE, html};
+use std::io;
+use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use study_core::protocol::phrases::{Phrase, Words, is_right_to_left};
+
+/// How many connections are served at a time. One more ends the oldest whose request has
+/// not arrived.
+const CONNECTIONS: usize = 24;
+/// How long a request waits for another page.
+const WATCH: Duration = Duration::from_secs(15);
+/// How long a reply waits until it is saved.
+const SAVE: Duration = Duration::from_secs(10);
+/// A reply sooner after its page appeared is a repeated tap, ms.
+const UNREAD_MS: u64 = 250;
+/// Longest key of a reply, bytes.
+const MOST_KEY: usize = 64;
+const STACK: usize = 256 * 1024;
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// A running server; it ends when it is dropped.
+#[derive(Debug)]
+pub(super) struct Server {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+    link: String,
+}
+
+#[derive(Debug)]
+struct Shared {
+    board: Arc<Board>,
+    access: Mutex<Access>,
+    /// The document, which holds nothing of the session.
+    document: String,
+    begun: Instant,
+    open: Mutex<Vec<Connection>>,
+}
+
+/// A connection that is served.
+#[derive(Debug)]
+struct Connection {
+    id: u64,
+    stream: TcpStream,
+    arrived: Arc<AtomicBool>,
+}
+
+impl Server {
+    pub(super) fn open(
+        at: Address,
+        lang: Option<&str>,
+        words: &Words,
+        board: Arc<Board>,
+    ) -> Result<Self, ScreenError> {
+        let failed = |source| ScreenError::Listen {
+            at: at.socket(),
+            source,
+        };
+        let listener = TcpListener::bind(at.socket()).map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        let token = secret()?;
+        let link = format!("http://{address}/#{token}");
+        let shared = Arc::new(Shared {
+            board,
+            access: Mutex::new(Access::new(token, secret()?, hosts(address))),
+            document: document(lang, words),
+            begun: Instant::now(),
+            open: Mutex::default(),
+        });
+        let of_thread = shared.clone();
+        std::thread::Builder::new()
+            .name("page".to_owned())
+            .spawn(move || accept(&listener, &of_thread))
+            .map_err(failed)?;
+        Ok(Self {
+            shared,
+            address,
+            link,
+        })
+    }
+
+    /// The link to the page, with its token.
+    pub(super) fn link(&self) -> &str {
+        &self.link
+    }
+
+    /// Whether a browser has opened the link.
+    pub(super) fn is_open(&self) -> bool {
+        self.shared.access().is_open()
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.shared.board.close();
+        // Wakes the thread that accepts, which then ends.
+        let _ = TcpStream::connect_timeout(&self.address, Duration::from_millis(200));
+    }
+}
+
+/// The names under which the server may be addressed.
+fn hosts(address: SocketAddr) -> Vec<String> {
+    let mut hosts = vec![address.to_string()];
+    if address.ip().is_loopback() {
+        hosts.push(format!("localhost:{}", address.port()));
+    }
+    if address.port() == 80 {
+        let bare = |host: &String| host.trim_end_matches(":80").to_owned();
+        let without: Vec<String> = hosts.iter().map(bare).collect();
+        hosts.extend(without);
+    }
+    hosts
+}
+
+fn document(lang: Option<&str>, words: &Words) -> String {
+    let lang = lang.unwrap_or("en");
+    let dir = match is_right_to_left(lang) {
+        true => "rtl",
+        false => "ltr",
+    };
+    html! {
+        (DOCTYPE)
+        html lang=(lang) dir=(dir) {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (words.get(Phrase::OneMoment)) }
+                link rel="stylesheet" href="/page.css";
+                script src="/page.js" defer {}
+            }
+            body
+                data-lost=(words.get(Phrase::PageLost))
+                data-closed=(words.get(Phrase::PageClosed))
+                data-saving=(words.get(Phrase::Saving))
+                data-saved=(words.get(Phrase::Saved))
+                data-needed=(words.get(Phrase::PlainNeeded))
+            {
+                header { p id="where" {} progress id="bar" hidden aria-hidden="true" {} p id="banner" {} }
+                main id="page" { h1 { (words.get(Phrase::OneMoment)) } }
+                footer { p id="state" role="status" {} }
+                noscript { p { "This page needs JavaScript." } }
+            }
+        }
+    }
+    .into_string()
+}
+
+fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
+    for (id, stream) in (0..).zip(listener.incoming()) {
+        if shared.board.is_closed() {
+            return;
+        }
+        let Ok(stream) = stream else {
+            // Out of descriptors, for example: some connections end soon.
+            std::thread::sleep(Duration::from_millis(50));
+            continue;
+        };
+        let Some(arrived) = shared.admit(id, &stream) else {
+            continue;
+        };
+        let of_thread = shared.clone();
+        let spawned = std::thread::Builder::new()
+            .name("page-request".to_owned())
+            .stack_size(STACK)
+            .spawn(move || {
+                of_thread.serve(stream, &arrived);
+                of_thread.connections().retain(|c| c.id != id);
+            });
+        if spawned.is_err() {
+            shared.connections().retain(|c| c.id != id);
+        }
+    }
+}
+
+impl Shared {
+    fn access(&self) -> MutexGuard<'_, Access> {
+        self.access.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn connections(&self) -> MutexGuard<'_, Vec<Connection>> {
+        self.open.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes room for a connection; `None` if there is none.
+    fn admit(&self, id: u64, stream: &TcpStream) -> Option<Arc<AtomicBool>> {
+        let mut open = self.connections();
+        if open.len() >= CONNECTIONS {
+            let slow = |c: &Connection| !c.arrived.load(Ordering::SeqCst);
+            let oldest = open.iter().position(slow)?;
+            let _ = open.remove(oldest).stream.shutdown(Shutdown::Both);
+        }
+        let arrived = Arc::new(AtomicBool::new(false));
+        open.push(Connection {
+            id,
+            stream: stream.try_clone().ok()?,
+            arrived: arrived.clone(),
+        });
+        Some(arrived)
+    }
+
+    fn serve(&self, mut stream: TcpStream, arrived: &AtomicBool) {
+        // Only a response that leaves late is the consequence.
+        let _ = stream.set_nodelay(true);
+        let request = http::read(&mut stream);
+        arrived.store(true, Ordering::SeqCst);
+        let (response, refused) = match request {
+            Ok(request) => (self.answer(&request), false),
+            Err(status) => (Response::empty(status), true),
+        };
+        // A browser that is gone asks again.
+        if response.send(&mut stream).is_ok() && refused {
+            http::drain(&mut stream);
+        }
+    }
+
+    fn answer(&self, request: &Request) -> Response {
+        let known = {
+            let mut access = self.access();
+            if !access.knows_host(&request.host) {
+                return Response::empty(421);
+            }
+            let known = access.knows_cookie(&request.cookie);
+            // A stop is never held up.
+            let stops = known && request.path == "/reply" && request.body.len() < 256;
+            if !stops && !access.permits(known, self.begun.elapsed()) {
+                return Response::empty(429);
+            }
+            known
+        };
+        match (request.method.as_str(), request.path.as_str()) {
+            ("GET", "/") => Response::body("text/html; charset=utf-8", self.document.as_str()),
+            ("GET", "/page.css") => Response::body("text/css; charset=utf-8", STYLE),
+            ("GET", "/page.js") => Response::body("text/javascript; charset=utf-8", SCRIPT),
+            ("GET", "/view") if known => {
+                let than = request.query.strip_prefix("after=");
+                let than = than.and_then(|n| n.parse().ok()).unwrap_or(0);
+                Response::body("application/json", self.board.newer(than, WATCH))
+            }
+            ("POST", "/open" | "/reply") if !self.is_own(request) => Response::empty(403),
+            ("POST", "/open") if known => Response::empty(200),
+            ("POST", "/open") => self.open(request),
+            ("POST", "/reply") if known => self.reply(request),
+            ("GET", "/view") | ("POST", "/reply") => Response::empty(401),
+            (_, "/" | "/page.css" | "/page.js" | "/view" | "/open" | "/reply") => {
+                Response::empty(405)
+            }
+            _ => Response::empty(404),
+        }
+    }
+
+    /// Whether a request was made by a page of this server: no form of another site can
+    /// send this type.
+    fn is_own(&self, request: &Request) -> bool {
+        let origin = request.origin.as_deref();
+        request.content_type == "application/json"
+            && origin.is_none_or(|origin| self.access().knows_origin(origin))
+    }
+
+    fn open(&self, request: &Request) -> Response {
+        let token = serde_json::from_slice::<String>(&request.body).unwrap_or_default();
+        match self.access().redeem(&token) {
+            Some(cookie) => Response {
+                cookie: Some(cookie.to_owned()),
+                ..Response::empty(200)
+            },
+            None => Response::empty(403),
+        }
+    }
+
+    fn reply(&self, request: &Request) -> Response {
+        let Ok(reply) = serde_json::from_slice::<Reply>(&request.body) else {
+            return Response::empty(400);
+        };
+        if reply.key.is_empty() || reply.key.len() > MOST_KEY {
+            return Response::empty(400);
+        }
+        if reply.does == Does::Stop {
+            self.board.stop();
+            return Response::empty(200);
+        }
+        if reply.shown_ms < UNREAD_MS {
+            return Response::empty(409);
+        }
+        match self.board.reply(reply, SAVE) {
+            Some(Outcome::Saved) => Response::empty(200),
+            Some(Outcome::Stale) => Response::empty(409),
+            Some(Outcome::Refused(why)) => Response {
+                status: 422,
+                ..Response::body("text/plain; charset=utf-8", why)
+            },
+            None => Response::empty(202),
+        }
+    }
+}
+
+/// Where a page may listen.
+///
+/// # Errors
+/// [`ScreenError::Address`].
+pub(super) fn address(text: &str) -> Result<Address, ScreenError> {
+    let wrong = || ScreenError::Address(text.to_owned());
+    let ip = text.trim_start_matches('[').trim_end_matches(']').parse();
+    let socket = match (ip, text.parse::<SocketAddr>()) {
+        (Ok(ip), _) => SocketAddr::new(ip, 0),
+        (_, Ok(socket)) => socket,
+        _ => return Err(wrong()),
+    };
+    let all = |ip: IpAddr| match ip {
+        IpAddr::V4(ip) => ip.is_unspecified() || ip.is_multicast() || ip.is_broadcast(),
+        IpAddr::V6(ip) => ip.is_unspecified() || ip.is_multicast(),
+    };
+    match all(socket.ip().to_canonical()) {
+        true => Err(wrong()),
+        false => Ok(Address(socket)),
+    }
+}
+
+impl From<getrandom::Error> for ScreenError {
+    fn from(error: getrandom::Error) -> Self {
+        Self::Random(io::Error::from(error))
+    }
+}
