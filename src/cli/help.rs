@@ -61,6 +61,10 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
                 "any table with subject,model,rating",
             ),
             (
+                "study analyze trials.csv --task 2ifc",
+                "thresholds from a table of trials",
+            ),
+            (
                 "study analyze results --json",
                 "all values with their identifiers",
             ),
@@ -76,6 +80,23 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             "study check my-study",
             "all errors at once, with line and hint",
         )],
+    ),
+    (
+        "power",
+        &[
+            (
+                "study power my-study --slope 0.5 --closed",
+                "the closed forms, at once",
+            ),
+            (
+                "study power my-study --participants 10,20,40 --out power",
+                "by simulation, with figures",
+            ),
+            (
+                "study power my-study --slurm jobs --studies 100000",
+                "scripts for a cluster",
+            ),
+        ],
     ),
     (
         "schedule",
@@ -136,8 +157,8 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     (
         "new",
         &[(
-            "study new my-study",
-            "a commented protocol as a starting point",
+            "study new my-study --kind questplus",
+            "a commented protocol of a threshold",
         )],
     ),
     (
@@ -205,7 +226,11 @@ pub(super) fn command() -> Command {
     EXAMPLES
         .iter()
         .fold(Cli::command(), |all, (name, examples)| {
-            all.mut_subcommand(name, |command| command.after_help(in_lines(examples)))
+            all.mut_subcommand(name, |command| {
+                let own = command.get_after_help().map(|own| format!("{own}\n\n"));
+                let help = own.unwrap_or_default() + &in_lines(examples);
+                command.after_help(help)
+            })
         })
 }
 

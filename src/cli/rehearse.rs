@@ -13,7 +13,6 @@ use crate::runner::rehearsal::{first_day, run_one};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use study_base::rng::Stream;
-use study_base::text::ModelId;
 use study_core::outcome::{State, Status};
 use study_core::protocol::{DeviceKind, Seat};
 use study_core::store::{Frozen, SeatKind, StudyFolder};

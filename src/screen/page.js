@@ -224,8 +224,8 @@
     const isNew = !page || page.id !== now.id;
     page = now;
     $("where").textContent = now.progress ? now.progress.words : "";
-    $("bar").hidden = !now.progress;
-    if (now.progress) { $("bar").max = now.progress.of; $("bar").value = now.progress.at; }
+    $("bar").hidden = !(now.progress && now.progress.of);
+    if (now.progress && now.progress.of) { $("bar").max = now.progress.of; $("bar").value = now.progress.at; }
     $("banner").textContent = now.banner ?? "";
     if (!isNew) { update(now); return; }
     since = performance.now();

@@ -4,6 +4,7 @@
 //! offers and nothing else: see [`Page::offers`]. Nothing here depends on more than the
 //! view, which identifies no realization.
 
+use crate::tui::views::playing::ordinal;
 use crate::tui::widgets::clock;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
@@ -52,8 +53,8 @@ pub struct Progress {
     pub words: String,
     /// The number of the trial.
     pub at: u32,
-    /// The number of trials.
-    pub of: u32,
+    /// The number of trials, if it is known.
+    pub of: Option<u32>,
 }
 
 /// A question as the page asks it.
@@ -211,20 +212,33 @@ pub fn page(view: &View) -> Option<Page> {
             page.waits(*wait_s, words);
             page.button(Does::Advance, Phrase::Ready, view.can_advance, words);
         }
-        Screen::Loading => {
+        Screen::Loading { interval: None } => {
             page.title = words.get(Phrase::OneMoment).to_owned();
             page.text = words.get(Phrase::Preparing).to_owned();
+        }
+        Screen::Loading {
+            interval: Some((at, _)),
+        } => {
+            page.title = capital(words.get(ordinal(*at)));
+            page.text = words.get(Phrase::OneMoment).to_owned();
         }
         Screen::Playing {
             since_s,
             keep_exploring,
+            interval,
         } => {
             let feel = if by_hand {
                 Phrase::FeelSample
             } else {
                 Phrase::FeelDevice
             };
-            page.title = words.get(feel).to_owned();
+            match interval {
+                Some((at, _)) => {
+                    page.title = capital(words.get(ordinal(*at)));
+                    page.text = words.get(feel).to_owned();
+                }
+                None => page.title = words.get(feel).to_owned(),
+            }
             page.clock = Some(clock(*since_s));
             page.wait = keep_exploring.then(|| words.get(Phrase::KeepExploring).to_owned());
             page.button(Does::Advance, Phrase::Rate, view.can_advance, words);
@@ -263,11 +277,13 @@ impl Page {
         let words = &view.words;
         Self {
             progress: view.progress.map(|p| {
-                let phrase = match p.practice {
-                    true => Phrase::PracticeOf,
-                    false => Phrase::TrialOf,
+                let phrase = match (p.practice, p.total) {
+                    (true, _) => Phrase::PracticeOf,
+                    (false, Some(_)) => Phrase::TrialOf,
+                    (false, None) => Phrase::TrialNumber,
                 };
-                let values = [("n", &p.current as &dyn Display), ("total", &p.total)];
+                let total = p.total.unwrap_or(p.current);
+                let values = [("n", &p.current as &dyn Display), ("total", &total)];
                 Progress {
                     words: capital(&words.fill(phrase, &values)),
                     at: p.current,
@@ -332,7 +348,7 @@ impl Page {
             self.progress = Some(Progress {
                 words: capital(&words.fill(Phrase::PageOf, &values)),
                 at,
-                of,
+                of: Some(of),
             });
         }
         self.questions = questions.iter().map(|q| asked(q, words)).collect();

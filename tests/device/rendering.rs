@@ -61,6 +61,7 @@ fn mixed(direction: Direction) -> Realization {
         x_mm: nodes.clone(),
         positive: branch(1.0),
         negative: branch(-1.0),
+        mechanism: None,
     }
 }
 

@@ -49,7 +49,9 @@ fn enumerate(protocol: &Protocol) -> BTreeSet<String> {
 }
 
 fn text(plan: &[Trial]) -> String {
-    plan.iter().map(|t| t.model().unwrap().as_str()).collect()
+    plan.iter()
+        .map(|t| t.model().expect("a realization").as_str())
+        .collect()
 }
 
 /// The point that chi-square is below with probability `p`.

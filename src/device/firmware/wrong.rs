@@ -478,7 +478,7 @@ impl Saboteur {
             Wrong::NoClamp => changed.command_un = command(2.0 * newtons),
             Wrong::CoarseForce => changed.command_un = command((newtons / 2.0).round() * 2.0),
             Wrong::Noisy => {
-                let up = (t_s / 0.03) as u32 % 2 == 0;
+                let up = ((t_s / 0.03) as u32).is_multiple_of(2);
                 changed.command_un = command(newtons + if up { 1.0 } else { -1.0 });
             }
             Wrong::Fading => changed.command_un = command(newtons * (1.0 - t_s / 6.0).max(0.0)),
@@ -488,7 +488,7 @@ impl Saboteur {
             }
             Wrong::Stale => {
                 if let Some(held) = self.held
-                    && (sample.tick / 4) % 10 != 0
+                    && !(sample.tick / 4).is_multiple_of(10)
                 {
                     changed = TelemetrySample {
                         tick: sample.tick,

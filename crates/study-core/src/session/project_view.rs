@@ -242,8 +242,8 @@ impl Session {
         given
             .filter(|g| self.history.is_current(g.form))
             .filter_map(|g| {
-                let asked = self.questions(g.form).into_iter();
-                let question = asked.cloned().find(|q| q.id == g.question)?;
+                let asked = self.questions(g.form);
+                let question = asked.into_iter().find(|q| q.id == g.question)?.clone();
                 Some(Correctable {
                     form: g.form,
                     title: self.form_title(g.form),
