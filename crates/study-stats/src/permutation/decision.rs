@@ -191,8 +191,9 @@ mod tests {
     fn decisions_are_those_of_the_test() {
         let mut noise = SplitMix64::new(5);
         let (mut rejected, mut apart) = (0, 0);
-        for round in 0..240 {
-            let n = 3 + round % 9;
+        for round in 0..1200 {
+            // Of five numbers, p can be .05 exactly: 6 of 120 orders.
+            let n = if round < 240 { 3 + round % 9 } else { 5 };
             let x: Vec<f64> = (0..n)
                 .map(|i| match round % 3 {
                     0 => i as f64,
@@ -220,7 +221,7 @@ mod tests {
             rejected += u32::from(with == Some(true));
             apart += u32::from(with != without);
         }
-        assert!((40..200).contains(&rejected), "{rejected}");
+        assert!((40..1000).contains(&rejected), "{rejected}");
         assert!(apart > 0);
         assert!(Decision::new(&[1.0; 4], 0.05, true).is_none());
     }
