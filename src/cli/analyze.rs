@@ -1,6 +1,7 @@
 //! `study analyze`
 
 mod grim;
+mod parts;
 mod progress;
 mod report;
 mod trials;
@@ -118,6 +119,18 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         }
         let sessions = study.sessions()?;
         let loaded = study_folder::frozen(study)?;
+        let has_parts = (loaded.protocol.parts.iter())
+            .any(|part| !matches!(part.task, study_core::protocol::parts::Task::Rating(_)));
+        if has_parts && args.question.is_none() && question(&loaded.protocol, None).is_err() {
+            study_folder::warn(
+                study,
+                &study_folder::warnings(study, &sessions, Some(&loaded))?,
+                console,
+            );
+            parts::run(study, &sessions, &loaded.protocol, args, console)?;
+            truncated = truncated.and(study_folder::whole(study, &sessions));
+            continue;
+        }
         let (input, damage) = rayon::join(
             || of_study(study, &sessions, &loaded, args),
             || study_folder::warnings(study, &sessions, Some(&loaded)),
@@ -154,6 +167,9 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let blocked = blocked.then(|| study.check_analysis().err()).flatten();
         let out = out.filter(|_| blocked.is_none());
         show(args, &input, out.as_deref(), console)?;
+        if has_parts && !args.json {
+            parts::run(study, &sessions, &loaded.protocol, args, console)?;
+        }
         if let Some(error) = blocked {
             study_folder::tables_unwritten(&error.into(), console);
         }

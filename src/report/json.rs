@@ -3,6 +3,7 @@
 use super::Source;
 use serde_json::{Map, Value as Json, json};
 use study_core::analyze::findings::{Direction, Estimate};
+use study_core::analyze::psychophysics::PartAnalysis;
 use study_core::analyze::{Analysis, Finding, Value, Values};
 
 /// Name and version of the format.
@@ -69,6 +70,30 @@ pub fn trials(path: &str, task: &str, rows: usize, of: &Values) -> String {
         "rows": rows,
         "values": values,
         "undefined": undefined,
+    });
+    format!("{document:#}\n")
+}
+
+/// The statistics of the parts of a study that are not ratings, `study-parts/1`.
+pub fn parts(path: &str, study: &str, parts: &[PartAnalysis]) -> String {
+    let part = |part: &PartAnalysis| {
+        let (values, undefined) = statistics(&part.values);
+        json!({
+            "part": part.part,
+            "task": part.task,
+            "trials": part.trials,
+            "simulated": part.banner == Some("SIMULATED"),
+            "pilot": part.banner == Some("PILOT"),
+            "values": values,
+            "undefined": undefined,
+        })
+    };
+    let document = json!({
+        "format": "study-parts/1",
+        "tool_version": env!("CARGO_PKG_VERSION"),
+        "path": path,
+        "study": study,
+        "parts": parts.iter().map(part).collect::<Vec<_>>(),
     });
     format!("{document:#}\n")
 }

@@ -10,6 +10,7 @@ mod golden;
 mod mixed;
 mod nist;
 mod odd;
+mod parts;
 mod possible;
 mod properties;
 mod psychophysics;
