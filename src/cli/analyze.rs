@@ -344,7 +344,6 @@ fn of_study(
 
 /// The given question or the primary one, which must have numeric answers.
 fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Failure> {
-    use study_core::protocol::QuestionKind as K;
     let id = match asked {
         None => protocol.analysis.primary.clone(),
         Some(id) => QuestionId::new(id).map_err(Failure::input)?,
@@ -352,12 +351,7 @@ fn question(protocol: &Protocol, asked: Option<&str>) -> Result<QuestionId, Fail
     let numeric: Vec<&str> = protocol
         .questions
         .iter()
-        .filter(|q| {
-            matches!(
-                q.kind,
-                K::Rating { .. } | K::Slider { .. } | K::Number { .. }
-            )
-        })
+        .filter(|q| q.kind.is_number())
         .map(|q| q.id.as_str())
         .collect();
     if numeric.contains(&id.as_str()) {

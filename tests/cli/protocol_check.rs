@@ -489,3 +489,16 @@ fn a_language_that_is_not_shipped_lacks_sentences_and_a_study_can_replace_them()
         "{errors:?}"
     );
 }
+
+#[test]
+fn a_study_of_pairs_has_no_power_of_a_correlation() {
+    let dir = TempDir::new().unwrap();
+    let (code, _, err) = run(dir.path(), &["new", "pairs", "--kind", "pairs"]);
+    assert_eq!(code, 0, "{err}");
+    let (code, out, err) = run(dir.path(), &["check", "pairs"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(!out.contains("power:"), "{out}");
+    let (code, _, err) = run(dir.path(), &["power", "pairs", "--closed"]);
+    assert_eq!(code, 1);
+    assert!(err.contains("`more-real` is no rating"), "{err}");
+}

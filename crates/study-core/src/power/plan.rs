@@ -4,6 +4,7 @@ use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use crate::protocol::power::{PowerLink, PowerPlan, PowerScale};
 use crate::protocol::{Protocol, QuestionKind, Role};
+use study_base::text::QuestionId;
 use study_stats::power::covariate::Spread;
 use thiserror::Error;
 
@@ -25,6 +26,9 @@ pub enum PlanError {
     /// Too few realizations with a VAF.
     #[error("{0} tested realizations have a VAF, but a correlation over them takes three")]
     FewRealizations(usize),
+    /// Thresholds and comparisons.
+    #[error("`{0}` is no rating; the power of thresholds and comparisons is not computed")]
+    NoRatings(QuestionId),
     /// Both ways to state the effect.
     #[error("the slope and rho state the same effect: give one of them")]
     SlopeAndRho,
@@ -98,6 +102,11 @@ impl Plan {
             .filter(|m| m.role == Role::Test && m.duplicate_of.is_none())
             .filter_map(|m| m.vaf)
             .collect();
+        let primary = &protocol.analysis.primary;
+        let asked = protocol.questions.iter().find(|q| q.id == *primary);
+        if asked.is_some_and(|q| !q.kind.is_number()) {
+            return Err(PlanError::NoRatings(primary.clone()));
+        }
         if listed.len() < 3 {
             return Err(PlanError::FewRealizations(listed.len()));
         }

@@ -67,6 +67,16 @@ pub enum QuestionKind {
     Text,
 }
 
+impl QuestionKind {
+    /// Whether its answers are numbers.
+    pub fn is_number(&self) -> bool {
+        match self {
+            Self::Rating { .. } | Self::Slider { .. } | Self::Number { .. } => true,
+            Self::Choice { .. } | Self::Text => false,
+        }
+    }
+}
+
 /// An answer to a question.
 ///
 /// Journals have the names of the variants, which therefore never change. A program
