@@ -69,7 +69,7 @@ fn bar(power: f64, ceiling: f64) -> String {
 fn table(report: &Report, paint: Paint) -> String {
     let plan = &report.plan;
     let simulated = !report.results.is_empty();
-    let heads = ["realiz.", "repet.", "partic."];
+    let heads = ["realiz.", "reps", "partic."];
     let mut out = format!("{:>7} {:>6} {:>7}  ", heads[0], heads[1], heads[2]);
     if simulated {
         out += &format!("{:>7} {:>12} ", "power", "95 % CI");

@@ -203,8 +203,8 @@ fn what_cannot_be_is_refused_with_its_place() {
         ),
         (
             "family = \"damping\"",
-            "family = \"daming\"",
-            "no family `daming`",
+            "family = \"damp\"",
+            "no family `damp`",
         ),
         ("standard = 1.0\n", "", "has no `standard`"),
         ("range = [1.0, 3.0]", "range = [3.0, 1.0]", "does not rise"),
