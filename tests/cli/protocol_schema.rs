@@ -256,7 +256,7 @@ fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
         };
         let found = |text: &str| faults(&schema, &schema, &as_json(text), &file);
         assert_eq!(found(&text), Vec::<String>::new());
-        let broken = text.replacen("prompt =", "pompt =", 1);
+        let broken = text.replacen("prompt =", "prom =", 1);
         assert!(!found(&broken).is_empty());
         assert!(file::parse("p", &broken).protocol.is_none());
     }

@@ -236,7 +236,7 @@ fn levels(family: &FamilyRules, model_bytes: &BTreeMap<ModelId, Vec<u8>>) -> Val
     })
 }
 
-/// Under which id the bytes of a family's file are passed to [`of`]: `id.from`, `id.to`.
+/// Under which id the bytes of a family's file are passed to [`parts`]: `id.from`, `id.to`.
 pub fn family_file(family: &PartId, end: &str) -> Option<ModelId> {
     ModelId::new(format!("{family}.{end}")).ok()
 }

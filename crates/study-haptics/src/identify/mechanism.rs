@@ -1,10 +1,10 @@
 //! The virtual mechanism: identified by minimizing the simulation error of the force.
 //!
 //! Its parameters enter the force through its state, so the problem is nonlinear. It is
-//! solved by Levenberg–Marquardt steps within bounds ([`levenberg`]), with exact
-//! derivatives ([`sensitivity`]), from several starts ([`start`]) that are first fitted to
+//! solved by Levenberg–Marquardt steps within bounds (`levenberg`), with exact
+//! derivatives (`sensitivity`), from several starts (`start`) that are first fitted to
 //! a part of the recordings, in parallel; the two best are then fitted to all of them.
-//! The recorded and the predicted force pass the same zero-phase low-pass ([`objective`]).
+//! The recorded and the predicted force pass the same zero-phase low-pass (`objective`).
 //! Every parameter is bounded so that the mechanism is passive
 //! ([`study_wire::mechanism`]).
 
