@@ -138,12 +138,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let (mut input, damage) = (input?, damage?);
         let counts = &input.analysis.counts;
         if counts.real_rows == 0 && counts.pilots > 0 && !args.include.contains(&Who::Pilot) {
-            let path = study.path().display();
-            return Err(
-                Failure::input(format!("{path}: holds only pilots so far")).hint(format!(
-                    "`study analyze {path} --include pilot` analyzes them"
-                )),
-            );
+            return Err(only_pilots(study));
         }
         // The page contains these warnings; if it is not shown on a terminal, they are
         // also printed to standard error.
@@ -176,6 +171,14 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         truncated = truncated.and(study_folder::whole(study, &sessions));
     }
     truncated
+}
+
+/// Pilots alone are analyzed only on request.
+fn only_pilots(study: &StudyFolder) -> Failure {
+    let path = study.path().display();
+    Failure::input(format!("{path}: holds only pilots so far")).hint(format!(
+        "`study analyze {path} --include pilot` analyzes them"
+    ))
 }
 
 /// An analysis with everything its report needs.

@@ -82,8 +82,8 @@ pub fn parts(path: &str, study: &str, parts: &[PartAnalysis]) -> String {
             "part": part.part,
             "task": part.task,
             "trials": part.trials,
-            "simulated": part.banner == Some("SIMULATED"),
-            "pilot": part.banner == Some("PILOT"),
+            "simulated": part.simulated,
+            "pilot": part.pilot,
             "values": values,
             "undefined": undefined,
         })

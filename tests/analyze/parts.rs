@@ -94,6 +94,22 @@ fn pairs_of_a_study_give_the_abilities_of_their_table() {
     }
     assert_eq!(part["trials"], answers.len());
     assert_eq!(part["values"], of_table(folder.path(), &table, &["pairs"]));
+
+    // Whoever is excluded does not count.
+    let exclude = [
+        "participant",
+        "out/pairs",
+        "SIM001",
+        "--state",
+        "excluded",
+        "--reason",
+        "ill",
+    ];
+    let (code, _, err) = study(&exclude, folder.path());
+    assert_eq!(code, 0, "{err}");
+    let (_, out, _) = study(&["analyze", "out", "--json"], folder.path());
+    let document: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["parts"][0]["trials"], answers.len() / 2);
 }
 
 #[test]

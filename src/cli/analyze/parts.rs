@@ -1,6 +1,6 @@
 //! The parts of a study that are not ratings: thresholds, sensitivities, preferences.
 
-use super::{Args, include};
+use super::{Args, include, only_pilots};
 use crate::cli::{Console, Failure};
 use crate::report::json;
 use crate::report::text::{Page, trials};
@@ -18,13 +18,20 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     let path = study.path().display().to_string();
     let derived = Derived::of(sessions, protocol);
-    let found = parts(protocol, &derived.rows, &derived.intervals, include(args));
+    let (rows, intervals) = (&derived.rows, &derived.intervals);
+    let real = rows.iter().any(|row| !row.pilot && !row.simulated);
+    if !real && rows.iter().any(|row| row.pilot) && !include(args).pilot {
+        return Err(only_pilots(study));
+    }
+    let found = parts(
+        protocol,
+        rows,
+        intervals,
+        &derived.participants,
+        include(args),
+    );
     if found.iter().all(|part| part.trials == 0) {
-        let hint = match derived.rows.iter().any(|row| row.pilot) {
-            true => format!("`study analyze {path} --include pilot` analyzes pilots"),
-            false => "no participant has answered yet".to_owned(),
-        };
-        return Err(Failure::input(format!("{path}: no answers that count")).hint(hint));
+        return Err(Failure::input(format!("{path}: no answers that count")));
     }
     let document = json::parts(&path, &protocol.study.id, &found);
     if let Some(out) = &args.out {
@@ -42,10 +49,12 @@ pub(super) fn run(
         colour: console.colour,
     };
     for part in &found {
-        let banner = part
-            .banner
-            .map(|b| format!("{b}: not of real participants\n"));
-        console.out(banner.unwrap_or_default())?;
+        for (among, words) in [
+            (part.simulated, "SIMULATED participants are included.\n"),
+            (part.pilot, "PILOTS are included.\n"),
+        ] {
+            console.out(if among { words } else { "" })?;
+        }
         let title = format!("{}: {}", protocol.study.title, part.part.as_str());
         let words = trials(&title, part.task, part.trials, &part.values, page);
         console.out(format!("{words}\n"))?;

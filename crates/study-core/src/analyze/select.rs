@@ -50,39 +50,69 @@ impl fmt::Display for Reason {
 /// Why a row does not count; `None` if it does.
 pub(super) type Decision = Option<Arc<Reason>>;
 
+/// Whose rows count: those of real participants alone, unless others are included.
+/// Without any, those of pilots, and without these the simulated ones, under a banner.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Whose {
+    real: bool,
+    /// Real participants or pilots.
+    people: bool,
+    include: Include,
+}
+
+impl Whose {
+    pub(super) fn of(origins: &[Origin], include: Include) -> Self {
+        let real = origins.contains(&Origin::Real);
+        Self {
+            real,
+            people: real || origins.contains(&Origin::Pilot),
+            include,
+        }
+    }
+
+    pub(super) fn counts(self, origin: Origin) -> bool {
+        match origin {
+            Origin::Real => true,
+            Origin::Pilot => !self.real || self.include.pilot,
+            Origin::Simulated => !self.people || self.include.simulated,
+        }
+    }
+}
+
+/// Whether the answers of a participant in this state count.
+pub(super) fn state_counts(state: State, unfinished: Unfinished) -> bool {
+    match state {
+        State::Done => true,
+        State::Unfinished | State::DroppedOut => unfinished == Unfinished::Include,
+        State::Void | State::NoShow | State::Excluded | State::Withdrawn => false,
+    }
+}
+
 /// Decides which rows count; also returns the effect of each exclusion rule.
 ///
-/// Rows of real participants are analyzed alone, unless others are included. Without
-/// any, those of pilots are analyzed, and without these the simulated ones, under a
-/// banner. The exclusion rules are applied to the rows that are left.
+/// The exclusion rules are applied to the rows that are left by [`Whose`] and
+/// [`state_counts`].
 pub(super) fn decide(ratings: &Ratings, rules: &Rules) -> (Vec<Decision>, Vec<Applied>) {
-    let real = ratings.origin.contains(&Origin::Real);
-    // real participants or pilots
-    let people = real || ratings.origin.contains(&Origin::Pilot);
+    let whose = Whose::of(&ratings.origin, rules.include);
     let pilot = Arc::new(Reason::Pilot);
     let simulated = Arc::new(Reason::Simulated);
     let states: Vec<Decision> = (ratings.subjects.iter())
         .map(|subject| {
             let state = subject.state?;
-            match state {
-                State::Done => None,
-                State::Unfinished | State::DroppedOut => match rules.unfinished {
-                    Unfinished::Include => None,
-                    Unfinished::Exclude => Some(Arc::new(Reason::Unfinished)),
-                },
-                State::Void | State::NoShow | State::Excluded | State::Withdrawn => {
-                    Some(Arc::new(Reason::State(state, subject.reason.clone())))
-                }
+            if state_counts(state, rules.unfinished) {
+                return None;
             }
+            Some(Arc::new(match state {
+                State::Unfinished | State::DroppedOut => Reason::Unfinished,
+                _ => Reason::State(state, subject.reason.clone()),
+            }))
         })
         .collect();
     let mut decisions: Vec<Decision> = (0..ratings.len())
         .map(|i| match ratings.origin[i] {
-            Origin::Pilot if real && !rules.include.pilot => Some(Arc::clone(&pilot)),
-            Origin::Simulated if people && !rules.include.simulated => Some(Arc::clone(&simulated)),
-            Origin::Real | Origin::Pilot | Origin::Simulated => {
-                states[ratings.subject[i] as usize].clone()
-            }
+            origin if whose.counts(origin) => states[ratings.subject[i] as usize].clone(),
+            Origin::Simulated => Some(Arc::clone(&simulated)),
+            Origin::Real | Origin::Pilot => Some(Arc::clone(&pilot)),
         })
         .collect();
     let counts: Vec<bool> = decisions.iter().map(Option::is_none).collect();

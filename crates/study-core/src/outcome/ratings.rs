@@ -52,7 +52,8 @@ pub enum Origin {
 }
 
 impl Origin {
-    fn of(simulated: bool, pilot: bool) -> Self {
+    /// From the columns of a row.
+    pub fn of(simulated: bool, pilot: bool) -> Self {
         match (simulated, pilot) {
             (true, _) => Self::Simulated,
             (false, true) => Self::Pilot,

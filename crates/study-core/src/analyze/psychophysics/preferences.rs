@@ -30,6 +30,15 @@ pub struct Preference {
     pub choice: Choice,
 }
 
+/// Whether a pair was presented in both orders, so that the effect of the order can be
+/// estimated.
+pub(super) fn in_both_orders(rows: &[Preference]) -> bool {
+    let orders: BTreeSet<(&str, &str)> = (rows.iter())
+        .map(|row| (row.first.as_str(), row.second.as_str()))
+        .collect();
+    orders.iter().any(|(a, b)| orders.contains(&(*b, *a)))
+}
+
 /// Abilities, their differences, order effect and ties. Items sort by name.
 pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
     let mut values = Values::default();

@@ -1,13 +1,15 @@
 //! The tracks and pairs of a study.
 
-use super::preferences::{Choice, Preference, preferences};
+use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination};
-use crate::analyze::select::Include;
+use crate::analyze::select::{Include, Whose, state_counts};
 use crate::analyze::values::Values;
-use crate::outcome::{IntervalRow, RatingRow, Status};
+use crate::outcome::ratings::Origin;
+use crate::outcome::{IntervalRow, ParticipantRow, RatingRow, Status};
 use crate::protocol::parts::{Compared, Part, Task, TrackRules};
 use crate::protocol::{Answer, Protocol};
-use study_base::text::PartId;
+use std::collections::BTreeSet;
+use study_base::text::{PartId, ParticipantId};
 use study_stats::psychometric::{Core, Support};
 
 /// The statistics of one part of a study.
@@ -19,36 +21,37 @@ pub struct PartAnalysis {
     pub task: &'static str,
     /// Number of trials with an answer that counts.
     pub trials: usize,
-    /// Whose answers they are: `None` for real participants.
-    pub banner: Option<&'static str>,
+    /// Whether answers of pilots are among them.
+    pub pilot: bool,
+    /// Whether answers of simulated participants are among them.
+    pub simulated: bool,
     /// The statistics.
     pub values: Values,
 }
 
-/// The statistics of all parts that are not ratings. Real participants count, with those
-/// that `include` adds; if there are none, simulated ones do, under a banner. Practice and
-/// trials without an answer do not count. Answers are the corrected ones, at the levels
-/// that were presented.
+/// The statistics of all parts that are not ratings. Which participants count is decided
+/// as for ratings, except that exclusion rules are not applied. Practice and trials without
+/// an answer do not count. Answers are the corrected ones, at the levels that were presented.
 pub fn parts(
     protocol: &Protocol,
     rows: &[RatingRow],
     intervals: &[IntervalRow],
+    participants: &[ParticipantRow],
     include: Include,
 ) -> Vec<PartAnalysis> {
-    let real = rows.iter().any(|r| !r.pilot && !r.simulated);
-    let simulated = include.simulated || !real && !include.pilot;
+    let origin = |row: &RatingRow| Origin::of(row.simulated, row.pilot);
+    let origins: Vec<Origin> = rows.iter().map(origin).collect();
+    let whose = Whose::of(&origins, include);
+    let unfinished = protocol.analysis.unfinished;
+    let left_out: BTreeSet<&ParticipantId> = (participants.iter())
+        .filter(|p| !state_counts(p.state, unfinished))
+        .map(|p| &p.participant)
+        .collect();
     let counts = |r: &&RatingRow| {
-        let whose = (!r.pilot || include.pilot) && (!r.simulated || simulated);
-        whose && !r.practice && r.status == Status::Ok
+        let counts = whose.counts(origin(r)) && !left_out.contains(&r.participant);
+        counts && !r.practice && r.status == Status::Ok
     };
     let rows: Vec<&RatingRow> = rows.iter().filter(counts).collect();
-    let banner = if rows.iter().any(|r| r.simulated) {
-        Some("SIMULATED")
-    } else if rows.iter().any(|r| r.pilot) {
-        Some("PILOT")
-    } else {
-        None
-    };
     let one = |part: &Part| {
         let of_part = |r: &&&RatingRow| r.part.as_ref() == Some(&part.id);
         let rows: Vec<&RatingRow> = rows.iter().filter(of_part).copied().collect();
@@ -57,10 +60,7 @@ pub fn parts(
             Task::Pairs(pairs) => {
                 let chosen = |row: &&RatingRow| preference(part, row, intervals);
                 let chosen: Vec<Preference> = rows.iter().filter_map(chosen).collect();
-                let turned =
-                    |p: &Preference, q: &Preference| p.first == q.second && p.second == q.first;
-                let both_orders = (chosen.iter()).any(|p| chosen.iter().any(|q| turned(p, q)));
-                let values = preferences(&chosen, pairs.tie, both_orders);
+                let values = preferences(&chosen, pairs.tie, in_both_orders(&chosen));
                 ("pairs", chosen.len(), values)
             }
             Task::Discrimination { tracks } => {
@@ -80,7 +80,8 @@ pub fn parts(
             part: part.id.clone(),
             task,
             trials,
-            banner,
+            pilot: rows.iter().any(|r| r.pilot),
+            simulated: rows.iter().any(|r| r.simulated),
             values,
         })
     };

@@ -1,6 +1,6 @@
 //! Trials of somebody else's experiment, from a CSV.
 
-use super::preferences::{Choice, Preference, preferences};
+use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination};
 use crate::analyze::values::Values;
@@ -108,12 +108,7 @@ pub fn analyze_table(
         TableKind::Pairs => {
             let pairs = rows.pairs()?;
             let ties = pairs.iter().any(|p| matches!(p.choice, Choice::Tie(_)));
-            let both = |p: &Preference| {
-                pairs
-                    .iter()
-                    .any(|q| q.first == p.second && q.second == p.first)
-            };
-            preferences(&pairs, ties, pairs.iter().any(both))
+            preferences(&pairs, ties, in_both_orders(&pairs))
         }
         TableKind::Magnitude => magnitude(&rows.estimates()?),
         TableKind::Mushra => {
