@@ -100,10 +100,16 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ),
     (
         "schedule",
-        &[(
-            "study schedule my-study --rows 1-10 --csv",
-            "the orders of the first ten participants",
-        )],
+        &[
+            (
+                "study schedule my-study --rows 1-10 --csv",
+                "the orders of the first ten participants",
+            ),
+            (
+                "study schedule my-threshold --answers answers.csv --json",
+                "what the tracks present if they are answered so",
+            ),
+        ],
     ),
     (
         "status",

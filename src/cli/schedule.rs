@@ -1,5 +1,6 @@
 //! `study schedule`: the orders of a protocol and their balance.
 
+mod answers;
 mod parts;
 mod table;
 
@@ -28,6 +29,13 @@ pub(super) struct Args {
     /// part,first,second,track,intervals
     #[arg(long)]
     csv: bool,
+    /// Replay the tracks with the answers of a CSV, [track,]answer[,presented][,easy]: the
+    /// levels proposed and presented, and the estimate after each trial, for one row
+    #[arg(long, value_name = "FILE", conflicts_with = "csv")]
+    answers: Option<PathBuf>,
+    /// Print the replayed tracks as one JSON document
+    #[arg(long, requires = "answers")]
+    json: bool,
     /// Folder of the results; the orders of a started study are not shown
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
@@ -40,14 +48,20 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let loaded = super::load::load(&args.protocol)?;
     let protocol = &loaded.protocol;
-    let rows = args
-        .rows
-        .clone()
-        .unwrap_or(1..=protocol.design.participants.max(1));
+    let rows = match &args.answers {
+        Some(_) => answers::only_row(args.rows.as_ref())?,
+        None => args
+            .rows
+            .clone()
+            .unwrap_or(1..=protocol.design.participants.max(1)),
+    };
     let folder = args.results.join(&protocol.study.id);
     if folder.join(layout::MANIFEST).exists() {
         let study = StudyFolder::open(&folder)?;
         reveal(&study, &rows, args.reveal.as_deref(), console)?;
+    }
+    if let Some(file) = &args.answers {
+        return answers::run(protocol, *rows.start(), file, args.json, console);
     }
     show(protocol, loaded.orders.as_ref(), rows, args.csv, console)
 }
@@ -112,7 +126,7 @@ fn show(
             .map(|row| Ok((row, plan(row)?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         if !protocol.parts.is_empty() {
-            return console.out(parts::render(protocol, &plans));
+            return console.out(parts::render(protocol, &plans, console.width));
         }
         console.out(table::render(
             protocol,

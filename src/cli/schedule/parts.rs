@@ -1,52 +1,241 @@
-//! The trials of a study with parts, as lines. Levels of tracks are not known before the
-//! answers.
+//! The orders of a study with parts, part by part, and their balance. Levels of tracks are
+//! not known before the answers.
 
+use super::table::{Codes, headline, legend, orders, rows_shown, section};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use study_base::text::{Untrusted, counted};
-use study_core::protocol::{Interval, Protocol, Stimuli, Trial};
+use study_base::text::{ModelId, PartId, Untrusted, counted};
+use study_core::procedure::{Rule, Staircase};
+use study_core::protocol::{
+    Interval, IntervalOrder, Pairs, Part, PartsOrder, Protocol, Stimuli, Task, TrackRules, Trial,
+};
 
-/// The text of `study schedule`: a line for each trial of each row.
-pub(super) fn render(protocol: &Protocol, plans: &[(u32, Vec<Trial>)]) -> String {
+/// The orders of some rows.
+type Plans = [(u32, Vec<Trial>)];
+
+/// The text of `study schedule`: the orders of each part, and how balanced they are.
+pub(super) fn render(protocol: &Protocol, plans: &Plans, width: usize) -> String {
     let mut out = format!("{}\n", Untrusted(&protocol.study.title));
-    for (row, plan) in plans {
-        let _ = write!(
-            out,
-            "\nrow {row}, {}",
-            counted(plan.len(), "trial", "trials")
-        );
-        out.push_str(if protocol.is_adaptive() {
-            " at most\n"
-        } else {
-            "\n"
-        });
-        for trial in plan {
-            let part = trial.part.as_ref().map_or("", |part| part.as_str());
-            let practice = if trial.practice { ", practice" } else { "" };
-            let _ = writeln!(
-                out,
-                "{:>5}  {part:<20}  block {:<3}  {}{practice}",
-                trial.trial,
-                trial.block,
-                presented(&trial.stimuli)
-            );
+    let most = if protocol.is_adaptive() {
+        " at most"
+    } else {
+        ""
+    };
+    let trials = plans.iter().map(|(_, plan)| plan.len()).max().unwrap_or(0);
+    let parts = counted(protocol.parts.len(), "part", "parts");
+    let order = match protocol.design.parts_order {
+        PartsOrder::Fixed => "",
+        PartsOrder::Williams => ", in the lines of a Williams design by row",
+    };
+    let trials = counted(trials, "trial", "trials");
+    let _ = writeln!(out, "{parts}{order}, {trials}{most}");
+    if protocol.design.parts_order == PartsOrder::Williams {
+        for (row, plan) in plans {
+            let mut ids: Vec<&str> = plan
+                .iter()
+                .filter_map(|t| Some(t.part.as_ref()?.as_str()))
+                .collect();
+            ids.dedup();
+            let _ = writeln!(out, "row {row}: {}", ids.join(", "));
+        }
+    }
+    for part in &protocol.parts {
+        let own = of_part(&part.id, plans);
+        let _ = writeln!(out, "\nPart {}", part.id);
+        match &part.task {
+            Task::Rating(task) => {
+                let design = protocol.design_of(Some(&part.id));
+                section(&mut out, protocol, &design, &task.models, &own, width);
+            }
+            Task::Pairs(task) => pairs(&mut out, protocol, part, task, &own, width),
+            Task::Discrimination { tracks: ids } => {
+                let rules = ids.iter().filter_map(|id| protocol.track(id));
+                tracks(&mut out, &rules.collect::<Vec<_>>(), &own, width);
+            }
         }
     }
     out
 }
 
-/// What a trial presents, in words.
-fn presented(stimuli: &Stimuli) -> String {
-    match stimuli {
-        Stimuli::One { model } => model.to_string(),
-        Stimuli::Pair { pair: [a, b] } => format!("{a}, then {b}"),
+/// The trials of a part, with blocks and positions that count from 1.
+fn of_part(part: &PartId, plans: &Plans) -> Vec<(u32, Vec<Trial>)> {
+    let own = |(row, plan): &(u32, Vec<Trial>)| {
+        let mut trials: Vec<Trial> = (plan.iter())
+            .filter(|t| t.part.as_ref() == Some(part))
+            .cloned()
+            .collect();
+        let counted = || trials.iter().filter(|t| !t.practice);
+        let block = counted().map(|t| t.block).min().unwrap_or(1) - 1;
+        let position = counted().map(|t| t.position).min().unwrap_or(1) - 1;
+        for trial in trials.iter_mut().filter(|t| !t.practice) {
+            trial.block -= block;
+            trial.position -= position;
+        }
+        (*row, trials)
+    };
+    plans.iter().map(own).collect()
+}
+
+/// The order of pairs, and how often each one comes in both orders.
+fn pairs(
+    out: &mut String,
+    protocol: &Protocol,
+    part: &Part,
+    task: &Pairs,
+    plans: &Plans,
+    width: usize,
+) {
+    let mut models: Vec<ModelId> = Vec::new();
+    for model in task.pairs.iter().flatten() {
+        if !models.contains(model) {
+            models.push(model.clone());
+        }
+    }
+    let codes = Codes::of(&models);
+    let design = protocol.design_of(Some(&part.id));
+    let headline = headline(&design, task.pairs.len(), "pairs");
+    let order = task.interval_order.as_str();
+    let _ = writeln!(out, "{headline}, order of the two {order}");
+    legend(out, protocol, &models, &codes);
+    let named = |[a, b]: &[ModelId; 2]| format!("{}-{}", codes.of_model(a), codes.of_model(b));
+    let code = |trial: &Trial| match &trial.stimuli {
+        Stimuli::Pair { pair } => named(pair),
+        Stimuli::One { .. } | Stimuli::Track { .. } => String::new(),
+    };
+    orders(out, plans, 2 * codes.width() + 1, width, code);
+    let Some(rows) = rows_shown(plans) else {
+        return;
+    };
+    let mut times: BTreeMap<String, u32> = BTreeMap::new();
+    for trial in plans.iter().flat_map(|(_, plan)| plan) {
+        *times.entry(code(trial)).or_default() += 1;
+    }
+    let _ = writeln!(out, "\nOccurrences of each pair in both orders, {rows}");
+    let mut uneven = 0;
+    for [a, b] in &task.pairs {
+        let there = [
+            named(&[a.clone(), b.clone()]),
+            named(&[b.clone(), a.clone()]),
+        ];
+        let [first, second] = there
+            .clone()
+            .map(|pair| times.get(&pair).copied().unwrap_or(0));
+        uneven += u32::from(first != second);
+        let _ = writeln!(out, "  {} {first}   {} {second}", there[0], there[1]);
+    }
+    let words = match (uneven, task.interval_order) {
+        (0, _) => "Order of the two: balanced over these rows.".to_owned(),
+        (n, IntervalOrder::Random) => {
+            format!(
+                "Order of the two: drawn for each trial; {n} of {} pairs are not balanced over these rows.",
+                task.pairs.len()
+            )
+        }
+        (n, IntervalOrder::Balanced) => {
+            format!(
+                "Order of the two: {n} of {} pairs are not balanced over these rows; an even number of repetitions or of rows balances them.",
+                task.pairs.len()
+            )
+        }
+    };
+    let _ = writeln!(out, "\n{words}");
+}
+
+/// The order of tracks and of the intervals of their trials, and how often each sequence
+/// of intervals comes.
+fn tracks(out: &mut String, tracks: &[&TrackRules], plans: &Plans, width: usize) {
+    let names: Vec<String> = (0..tracks.len()).map(track_code).collect();
+    for (name, track) in names.iter().zip(tracks) {
+        let _ = writeln!(
+            out,
+            "{name}  {}: {}, {}",
+            track.id,
+            track.method.as_str(),
+            rule(&track.rule)
+        );
+    }
+    out.push_str("S standard, C comparison, * an easy trial\n\n");
+    let at = |track: &PartId| tracks.iter().position(|t| t.id == *track);
+    let code = |trial: &Trial| match &trial.stimuli {
         Stimuli::Track {
             track,
             easy,
             intervals: all,
         } => {
-            let easy = if *easy { ", easy" } else { "" };
-            format!("{track}: {}{easy}", intervals(all))
+            let name = at(track).map_or("", |at| names[at].as_str());
+            format!("{name}{}{}", intervals(all), if *easy { "*" } else { "" })
         }
+        Stimuli::One { .. } | Stimuli::Pair { .. } => String::new(),
+    };
+    let all = || plans.iter().flat_map(|(_, plan)| plan);
+    let cell = all().map(|trial| code(trial).len()).max().unwrap_or(1);
+    orders(out, plans, cell, width, code);
+    let Some(rows) = rows_shown(plans) else {
+        return;
+    };
+    let _ = writeln!(
+        out,
+        "\nTrials of each track and sequence of intervals at most, {rows}"
+    );
+    for (name, track) in names.iter().zip(tracks) {
+        let mut sequences: BTreeMap<String, u32> = BTreeMap::new();
+        let (mut trials, mut easy_trials, mut catch) = (0, 0, 0);
+        for trial in all() {
+            let Stimuli::Track {
+                track: of,
+                easy,
+                intervals: own,
+            } = &trial.stimuli
+            else {
+                continue;
+            };
+            if *of == track.id {
+                *sequences.entry(intervals(own)).or_default() += 1;
+                trials += 1;
+                easy_trials += u32::from(*easy);
+                catch += u32::from(track.method.is_catch(own));
+            }
+        }
+        let of_each: Vec<String> = sequences.iter().map(|(s, n)| format!("{s} {n}")).collect();
+        let _ = writeln!(
+            out,
+            "  {name}  {trials}: {}; easy {easy_trials}, catch {catch}",
+            of_each.join(", ")
+        );
+    }
+    out.push_str("\nLevels follow from the answers; --answers FILE replays a track.\n");
+}
+
+/// The code of a track: a to z, then numbers.
+fn track_code(at: usize) -> String {
+    let letter = u8::try_from(at).ok().filter(|at| *at < 26);
+    letter.map_or_else(
+        || format!("{}:", at + 1),
+        |at| char::from(b'a' + at).to_string(),
+    )
+}
+
+/// A rule in a few words.
+fn rule(rule: &Rule) -> String {
+    let most = counted(rule.most_trials() as usize, "trial", "trials");
+    match rule {
+        Rule::Staircase(rule) => {
+            let target = Staircase::target(rule)
+                .map_or_else(String::new, |p| format!(" (settles at {:.1} %)", 100.0 * p));
+            format!(
+                "{} up, {} down{target} from {}, {most} at most",
+                rule.up, rule.down, rule.start
+            )
+        }
+        Rule::QuestPlus(rule) if rule.entropy_below.is_some() || rule.sd_below.is_some() => {
+            format!("QUEST+, {most} at most")
+        }
+        Rule::QuestPlus(_) => format!("QUEST+, {most}"),
+        Rule::Constant(rule) => format!(
+            "{} levels × {} repetitions",
+            rule.levels.len(),
+            rule.repetitions
+        ),
     }
 }
 

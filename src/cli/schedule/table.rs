@@ -23,36 +23,38 @@ pub(super) fn render(
     plans: &[(u32, Vec<Trial>)],
     width: usize,
 ) -> String {
+    let mut out = format!("{}\n", Untrusted(&protocol.study.title));
+    section(&mut out, protocol, &protocol.design, models, plans, width);
+    out
+}
+
+/// Orders, counts and summary of realizations under the rules of a `design`.
+pub(super) fn section(
+    out: &mut String,
+    protocol: &Protocol,
+    design: &Design,
+    models: &[ModelId],
+    plans: &[(u32, Vec<Trial>)],
+    width: usize,
+) {
     let codes = Codes::of(models);
     let balance = Balance::of(models, plans.iter().map(|(_, plan)| plan.as_slice()));
-    let mut out = format!(
-        "{}\n{}\n",
-        Untrusted(&protocol.study.title),
-        headline(&protocol.design, models.len())
-    );
-    if codes.are_ids {
-        out.push('\n');
-    } else {
-        legend(&mut out, protocol, models, &codes);
-    }
-    if !protocol.design.practice.is_empty() {
-        let ids: Vec<_> = protocol
-            .design
-            .practice
-            .iter()
-            .map(ModelId::as_str)
-            .collect();
+    let _ = writeln!(out, "{}", headline(design, models.len(), "realizations"));
+    legend(out, protocol, models, &codes);
+    if !design.practice.is_empty() {
+        let ids: Vec<_> = design.practice.iter().map(ModelId::as_str).collect();
         let _ = writeln!(out, "Practice, before every order: {}\n", ids.join(", "));
     }
-    orders(&mut out, plans, &codes, width);
-
-    let rows = match (plans.first(), plans.last()) {
-        (Some((first, _)), Some((last, _))) if first < last => format!("rows {first}–{last}"),
-        (Some((row, _)), _) => format!("row {row}"),
-        _ => return out,
+    let code = |trial: &Trial| {
+        let model = trial.model().map_or("", |model| codes.of_model(model));
+        model.to_owned()
+    };
+    orders(out, plans, codes.width(), width, code);
+    let Some(rows) = rows_shown(plans) else {
+        return;
     };
     if models.len() <= MAX_COUNTED {
-        balance_tables(&mut out, &codes, &balance, &rows, width);
+        balance_tables(out, &codes, &balance, &rows, width);
     } else {
         let _ = writeln!(
             out,
@@ -60,10 +62,18 @@ pub(super) fn render(
         );
     }
     out.push('\n');
-    for line in verdict(&protocol.design, &balance) {
+    for line in verdict(design, &balance) {
         let _ = writeln!(out, "{line}");
     }
-    out
+}
+
+/// Such as `rows 1–4`; `None` if there are none.
+pub(super) fn rows_shown(plans: &[(u32, Vec<Trial>)]) -> Option<String> {
+    let ((first, _), (last, _)) = (plans.first()?, plans.last()?);
+    Some(match first < last {
+        true => format!("rows {first}–{last}"),
+        false => format!("row {first}"),
+    })
 }
 
 /// Counts by place, by position and of carry-over.
@@ -107,14 +117,14 @@ fn balance_tables(out: &mut String, codes: &Codes, balance: &Balance, rows: &str
 }
 
 /// Short codes of the realizations in the tables.
-struct Codes {
+pub(super) struct Codes {
     names: Vec<String>,
     by_id: HashMap<ModelId, usize>,
     are_ids: bool,
 }
 
 impl Codes {
-    fn of(models: &[ModelId]) -> Self {
+    pub(super) fn of(models: &[ModelId]) -> Self {
         let are_ids = models.iter().all(|m| m.as_str().len() <= SHORT);
         let names = match models {
             _ if are_ids => models.iter().map(ToString::to_string).collect(),
@@ -131,24 +141,25 @@ impl Codes {
         }
     }
 
-    fn of_model<'a>(&'a self, model: &'a ModelId) -> &'a str {
+    pub(super) fn of_model<'a>(&'a self, model: &'a ModelId) -> &'a str {
         self.by_id
             .get(model)
             .map_or(model.as_str(), |&i| &self.names[i])
     }
 
-    fn width(&self) -> usize {
+    pub(super) fn width(&self) -> usize {
         self.names.iter().map(String::len).max().unwrap_or(1)
     }
 }
 
-fn headline(design: &Design, models: usize) -> String {
+/// Such as `blocked, 5 realizations × 3 repetitions`.
+pub(super) fn headline(design: &Design, number: usize, of: &str) -> String {
     let order = match &design.order {
         Order::File(path) => format!("orders from {}", Untrusted(path)),
         order => order.as_str().to_owned(),
     };
     let mut line = format!(
-        "{order}, {models} realizations × {} repetitions",
+        "{order}, {number} {of} × {} repetitions",
         design.repetitions
     );
     if let Some(k) = design.max_run {
@@ -160,8 +171,12 @@ fn headline(design: &Design, models: usize) -> String {
     line
 }
 
-fn legend(out: &mut String, protocol: &Protocol, models: &[ModelId], codes: &Codes) {
+/// The codes, where they are not the ids.
+pub(super) fn legend(out: &mut String, protocol: &Protocol, models: &[ModelId], codes: &Codes) {
     out.push('\n');
+    if codes.are_ids {
+        return;
+    }
     for (code, id) in codes.names.iter().zip(models) {
         let role = match protocol.model(id).map(|m| m.role) {
             Some(Role::Test) | None => String::new(),
@@ -172,10 +187,15 @@ fn legend(out: &mut String, protocol: &Protocol, models: &[ModelId], codes: &Cod
     out.push('\n');
 }
 
-/// One line per row, wrapped between trials.
-fn orders(out: &mut String, plans: &[(u32, Vec<Trial>)], codes: &Codes, width: usize) {
+/// One line per row, wrapped between trials; the `code` of a trial has up to `cell` columns.
+pub(super) fn orders(
+    out: &mut String,
+    plans: &[(u32, Vec<Trial>)],
+    cell: usize,
+    width: usize,
+    code: impl Fn(&Trial) -> String,
+) {
     let label = plans.last().map_or(1, |(row, _)| row.to_string().len());
-    let cell = codes.width();
     for (row, plan) in plans {
         let _ = write!(out, "row {row:>label$} ");
         let indent = 5 + label;
@@ -188,7 +208,8 @@ fn orders(out: &mut String, plans: &[(u32, Vec<Trial>)], codes: &Codes, width: u
                 ""
             };
             block = Some(trial.block);
-            let needed = bar.chars().count() + 1 + cell;
+            // With room for a bar at the end of the line.
+            let needed = bar.chars().count() + 1 + cell + 2;
             if column + needed > width && column > indent {
                 let _ = write!(out, "{bar}\n{:indent$}", "");
                 column = indent;
@@ -196,8 +217,7 @@ fn orders(out: &mut String, plans: &[(u32, Vec<Trial>)], codes: &Codes, width: u
                 out.push_str(bar);
                 column += bar.chars().count();
             }
-            let model = trial.model().map_or("", |model| codes.of_model(model));
-            let _ = write!(out, " {model:>cell$}");
+            let _ = write!(out, " {:>cell$}", code(trial));
             column += 1 + cell;
         }
         out.push('\n');
