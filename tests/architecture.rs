@@ -106,6 +106,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
             "plain",
             "plant",
             "power",
+            "procedure",
             "protocol",
             "rater",
             "recording",
