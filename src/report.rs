@@ -12,6 +12,8 @@ pub mod figures;
 pub mod html;
 pub mod identification;
 pub mod json;
+mod part_answers;
+mod part_tables;
 pub mod picture;
 pub mod plot;
 pub mod power;

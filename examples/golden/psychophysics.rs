@@ -211,8 +211,7 @@ fn quest_plus(input: &Settings, text: &str) -> Result<Values, Error> {
     Ok(analysis::quest_plus(
         name,
         &proposed,
-        &entropy,
-        track.entropy(),
+        Some((&entropy, track.entropy())),
         &summary,
     ))
 }

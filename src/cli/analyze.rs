@@ -18,10 +18,11 @@ use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use study_base::text::{QuestionId, Untrusted};
 use study_core::analyze::{self, Analysis, Deviation, Include, Rules, Warning};
+use study_core::outcome::RatingRow;
 use study_core::outcome::ratings::Ratings;
 use study_core::protocol::Protocol;
 use study_core::store::disk::{Disk as _, RealDisk};
-use study_core::store::{Derived, SessionData, StudyFolder};
+use study_core::store::{Derived, StoreError, StudyFolder};
 
 /// Arguments of `study analyze`.
 #[derive(Debug, clap::Args)]
@@ -119,27 +120,35 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         }
         let sessions = study.sessions()?;
         let loaded = study_folder::frozen(study)?;
-        let has_parts = (loaded.protocol.parts.iter())
-            .any(|part| !matches!(part.task, study_core::protocol::parts::Task::Rating(_)));
-        if has_parts && args.question.is_none() && question(&loaded.protocol, None).is_err() {
-            study_folder::warn(
-                study,
-                &study_folder::warnings(study, &sessions, Some(&loaded))?,
-                console,
-            );
-            parts::run(study, &sessions, &loaded.protocol, args, console)?;
+        let derived = Derived::of(&sessions, &loaded.protocol);
+        let is_real = |row: &RatingRow| !row.pilot && !row.simulated;
+        let pilots = derived.rows.iter().any(|row| row.pilot) && !include(args).pilot;
+        if pilots && !derived.rows.iter().any(is_real) {
+            return Err(only_pilots(study));
+        }
+        let place = Place::of(args, study, several);
+        let parts = parts::analyse(&sessions, &derived, &loaded.protocol, args);
+        let unrated = question(&loaded.protocol, args.question.as_deref());
+        if !parts.is_empty() && args.question.is_none() && unrated.is_err() {
+            let damage = study_folder::warnings(study, &sessions, Some(&loaded))?;
+            study_folder::warn(study, &damage, console);
+            let source = source_of(study, &loaded.protocol);
+            let details = Details {
+                parts: parts::reports(&loaded.protocol, &parts),
+                damage,
+                ..report::details(&loaded.protocol, study, &derived, "")
+            };
+            parts::show(&source, &details, &parts, args, place, console)?;
             truncated = truncated.and(study_folder::whole(study, &sessions));
             continue;
         }
         let (input, damage) = rayon::join(
-            || of_study(study, &sessions, &loaded, args),
+            || of_study(study, &derived, &loaded, args),
             || study_folder::warnings(study, &sessions, Some(&loaded)),
         );
         let (mut input, damage) = (input?, damage?);
-        let counts = &input.analysis.counts;
-        if counts.real_rows == 0 && counts.pilots > 0 && !args.include.contains(&Who::Pilot) {
-            return Err(only_pilots(study));
-        }
+        input.details.parts = parts::reports(&loaded.protocol, &parts);
+        input.analysis.parts = parts;
         // The page contains these warnings; if it is not shown on a terminal, they are
         // also printed to standard error.
         if !console.terminal || args.json || args.comments {
@@ -151,6 +160,25 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         });
         // Before all other warnings.
         input.analysis.warnings.splice(0..0, damage);
+        show(args, &input, place.out.as_deref(), console)?;
+        if let Some(error) = place.blocked {
+            study_folder::tables_unwritten(&error.into(), console);
+        }
+        truncated = truncated.and(study_folder::whole(study, &sessions));
+    }
+    truncated
+}
+
+/// Where the analysis of a study is written.
+struct Place {
+    /// The folder; `None` if nothing is written.
+    out: Option<PathBuf>,
+    /// Why its own `analysis/` is not written.
+    blocked: Option<StoreError>,
+}
+
+impl Place {
+    fn of(args: &Args, study: &StudyFolder, several: bool) -> Self {
         let folder = study.path();
         let out = match &args.out {
             Some(out) if several => Some(out.join(folder.file_name().unwrap_or_default())),
@@ -158,19 +186,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             None if args.json => None,
             None => Some(folder.join("analysis")),
         };
-        let blocked = out.is_some() && args.out.is_none();
-        let blocked = blocked.then(|| study.check_analysis().err()).flatten();
-        let out = out.filter(|_| blocked.is_none());
-        show(args, &input, out.as_deref(), console)?;
-        if has_parts && !args.json {
-            parts::run(study, &sessions, &loaded.protocol, args, console)?;
+        let own = out.is_some() && args.out.is_none();
+        let blocked = own.then(|| study.check_analysis().err()).flatten();
+        Self {
+            out: out.filter(|_| blocked.is_none()),
+            blocked,
         }
-        if let Some(error) = blocked {
-            study_folder::tables_unwritten(&error.into(), console);
-        }
-        truncated = truncated.and(study_folder::whole(study, &sessions));
     }
-    truncated
 }
 
 /// Pilots alone are analyzed only on request.
@@ -215,6 +237,7 @@ fn show(
         console.out(comments(analysis, terminal))?;
     } else {
         console.out(page(source, analysis, terminal))?;
+        parts::pages(&source.title, &analysis.parts, console)?;
     }
     match written {
         Some((dir, Ok(()))) => {
@@ -235,12 +258,7 @@ fn write_all(dir: &Path, analysed: &Analysed) -> Result<(), Failure> {
         analysis,
     } = analysed;
     let tables = (csv::tables(source, analysis).into_iter()).chain([wide::file(analysis)]);
-    let mut files: Vec<report::Output> = tables
-        .map(|t| report::Output {
-            name: t.name.to_owned(),
-            content: t.content.into_bytes(),
-        })
-        .collect();
+    let mut files: Vec<report::Output> = tables.map(report::Output::table).collect();
     files.extend(report::files(source, details, analysis, traces)?);
     write_files(dir, &files)?;
     report::clear_figures(dir, &files);
@@ -285,18 +303,26 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
     })
 }
 
+fn source_of(study: &StudyFolder, protocol: &Protocol) -> Source {
+    Source {
+        title: protocol.study.title.clone(),
+        study: Some(protocol.study.id.clone()),
+        protocol_version: Some(study.version()),
+        path: study.path().display().to_string(),
+    }
+}
+
 /// Analyzes a study by the newest version of its protocol. Model files are read too,
 /// because the VAF may be given only there.
 fn of_study(
     study: &StudyFolder,
-    sessions: &[SessionData],
+    derived: &Derived,
     loaded: &Loaded,
     args: &Args,
 ) -> Result<Analysed, Failure> {
     let Loaded {
         protocol, models, ..
     } = loaded;
-    let derived = Derived::of(sessions, protocol);
     let question = question(protocol, args.question.as_deref())?;
     let mut ratings = Ratings::from_rows(&derived.rows, &question);
     ratings.set_states(&derived.participants);
@@ -319,22 +345,12 @@ fn of_study(
         deviations: deviations(study)?,
         ..Rules::of(protocol, question.as_str(), include(args))
     };
-    let source = Source {
-        title: protocol.study.title.clone(),
-        study: Some(protocol.study.id.clone()),
-        protocol_version: Some(study.version()),
-        path: study.path().display().to_string(),
-    };
+    let source = source_of(study, protocol);
     let analysis = progress::analyze(&ratings, &rules);
     let written = !args.json || args.out.is_some();
     Ok(Analysed {
         source,
-        details: report::details(
-            protocol,
-            study,
-            (&derived.rows, &derived.participants),
-            question.as_str(),
-        ),
+        details: report::details(protocol, study, derived, question.as_str()),
         // Telemetry is large: read it only if figures are written.
         traces: if written {
             report::traces(study, &derived.rows, &analysis)

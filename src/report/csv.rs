@@ -1,6 +1,9 @@
 //! The CSV tables of `analysis/` (RFC 4180). Text is stored as typed.
 
+mod parts;
 mod test_table;
+
+pub use parts::part_tables;
 
 use super::Source;
 use study_core::analyze::{Analysis, MAX_PAIRED, Value, group_id, pair_id};
@@ -16,7 +19,7 @@ pub struct TableFile {
 
 /// The CSV tables and `values.json`.
 pub fn tables(source: &Source, analysis: &Analysis) -> Vec<TableFile> {
-    vec![
+    let mut tables = vec![
         table("descriptives.csv", descriptives(analysis)),
         table("tests.csv", test_table::rows(analysis)),
         table("correlation.csv", identified(analysis, &CORRELATION)),
@@ -36,7 +39,11 @@ pub fn tables(source: &Source, analysis: &Analysis) -> Vec<TableFile> {
             name: "values.json",
             content: super::json::document(source, analysis),
         },
-    ]
+    ];
+    if !analysis.parts.is_empty() {
+        tables.extend(part_tables(&analysis.parts));
+    }
+    tables
 }
 
 pub(super) fn table(name: &'static str, rows: Vec<Vec<String>>) -> TableFile {

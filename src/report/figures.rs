@@ -8,10 +8,13 @@
 mod counts;
 mod means;
 mod pairs;
+mod parts;
 mod strips;
 mod subjects;
 mod traces;
 mod vaf;
+
+pub use parts::{PREFIX as PARTS_PREFIX, of_part};
 
 use super::chart::{Axis, Figure, Look, Mark, Panel, for_names};
 use super::picture::POINTS;
@@ -55,7 +58,7 @@ pub struct Trace {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawn {
     /// File name without extension.
-    pub name: &'static str,
+    pub name: String,
     /// Caption. Untrusted.
     pub caption: String,
     /// Version of two columns' width, for paper and screens.
@@ -337,13 +340,13 @@ fn name(m: &RealizationSummary) -> String {
 
 /// A figure in both widths.
 fn drawn(
-    name: &'static str,
+    name: &str,
     caption: String,
     data: Vec<Vec<String>>,
     draw: impl Fn(Canvas) -> Figure,
 ) -> Drawn {
     Drawn {
-        name,
+        name: name.to_owned(),
         caption,
         wide: draw(WIDE),
         narrow: draw(NARROW),

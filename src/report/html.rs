@@ -11,9 +11,12 @@
 mod methods;
 mod notes;
 mod paragraphs;
+mod parts;
 mod statistics;
 mod style;
 mod tables;
+
+pub use parts::PartReport;
 
 use super::Source;
 use super::answers::{answers, conditional};
@@ -21,6 +24,7 @@ use super::figures::Drawn;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use study_base::text::{Untrusted, counted};
 use study_core::analyze::Analysis;
+use study_core::analyze::psychophysics::PartAnalysis;
 
 /// Facts about a study besides its analysis. All text is untrusted.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -57,13 +61,49 @@ pub struct Details {
     pub tools: Vec<String>,
     /// Name and value of each fingerprint of the newest version.
     pub fingerprints: Vec<(String, String)>,
+    /// What the report has of each part that is no rating besides its analysis.
+    pub parts: Vec<PartReport>,
+    /// Damage of the results. Of a study with ratings, it is among their warnings.
+    pub damage: Vec<String>,
     /// Versions of the protocol: number, time, reason.
     pub versions: Vec<(u32, String, String)>,
 }
 
-/// The whole document.
+/// The whole document of ratings, with the other parts of the study.
 pub fn document(source: &Source, details: &Details, a: &Analysis, figures: &[Drawn]) -> String {
     let lang = details.lang.as_deref().filter(|l| is_tag(l));
+    let main = html! {
+        (answers_section(a))
+        (figures_section(figures, 0))
+        (tables::section(a))
+        (paragraphs::section(details, a))
+        (conditional_section(a))
+        (parts::sections(&a.parts, &details.parts, figures.len()))
+        (notes::comments(a, lang))
+        (notes::exclusions(a, source.study.is_some()))
+        (statistics::section(&a.values))
+        (notes::provenance(source, details, Some(&a.question)))
+    };
+    page(
+        source,
+        &head(source, details, a, lang),
+        &main,
+        "values.json",
+    )
+}
+
+/// The whole document of a study without ratings.
+pub fn parts_document(source: &Source, details: &Details, parts: &[PartAnalysis]) -> String {
+    let lang = details.lang.as_deref().filter(|l| is_tag(l));
+    let main = html! {
+        (parts::sections(parts, &details.parts, 0))
+        (notes::provenance(source, details, None))
+    };
+    let head = parts::head(source, details, parts, lang);
+    page(source, &head, &main, "parts.json")
+}
+
+fn page(source: &Source, head: &Markup, main: &Markup, values: &str) -> String {
     let page = html! {
         (DOCTYPE)
         // The report itself is in English; texts of the study carry their own `lang`.
@@ -78,21 +118,11 @@ pub fn document(source: &Source, details: &Details, a: &Analysis, figures: &[Dra
                 style { (PreEscaped(style::CSS)) }
             }
             body {
-                (head(source, details, a, lang))
-                main {
-                    (answers_section(a))
-                    (figures_section(figures))
-                    (tables::section(a))
-                    (paragraphs::section(details, a))
-                    (conditional_section(a))
-                    (notes::comments(a, lang))
-                    (notes::exclusions(a, source.study.is_some()))
-                    (statistics::section(a))
-                    (notes::provenance(source, details, a))
-                }
+                (head)
+                main { (main) }
                 footer {
                     "Written by study " (env!("CARGO_PKG_VERSION"))
-                    ". All numbers are in values.json by identifier, figures and their data in figures/."
+                    ". All numbers are in " (values) " by identifier, figures and their data in figures/."
                 }
             }
         }
@@ -208,21 +238,26 @@ fn conditional_section(a: &Analysis) -> Markup {
     }
 }
 
-fn figures_section(figures: &[Drawn]) -> Markup {
+/// Figures, numbered from the one after `before`.
+fn figures_section(figures: &[Drawn], before: usize) -> Markup {
     html! {
         @if !figures.is_empty() {
             section.figures {
                 h2 { "Figures" }
-                @for (i, f) in figures.iter().enumerate() {
-                    figure {
-                        div.wide { (PreEscaped(f.wide.to_svg())) }
-                        div.narrow { (PreEscaped(f.narrow.to_svg())) }
-                        figcaption {
-                            b { "Figure " (i + 1) ". " } (typeset(&f.caption))
-                            span.file { " figures/" (f.name) ".pdf, .svg, .png, .csv" }
-                        }
-                    }
-                }
+                @for (i, f) in figures.iter().enumerate() { (figure(f, before + i + 1)) }
+            }
+        }
+    }
+}
+
+fn figure(f: &Drawn, number: usize) -> Markup {
+    html! {
+        figure {
+            div.wide { (PreEscaped(f.wide.to_svg())) }
+            div.narrow { (PreEscaped(f.narrow.to_svg())) }
+            figcaption {
+                b { "Figure " (number) ". " } (typeset(&f.caption))
+                span.file { " figures/" (f.name) ".pdf, .svg, .png, .csv" }
             }
         }
     }

@@ -4,7 +4,7 @@ use super::Source;
 use serde_json::{Map, Value as Json, json};
 use study_core::analyze::findings::{Direction, Estimate};
 use study_core::analyze::psychophysics::PartAnalysis;
-use study_core::analyze::{Analysis, Finding, Value, Values};
+use study_core::analyze::{Analysis, Applied, Finding, Value, Values, Warning};
 
 /// Name and version of the format.
 pub const FORMAT: &str = "study-analysis/1";
@@ -13,7 +13,7 @@ fn estimate(e: &Estimate) -> Json {
     json!({"name": e.name, "value": e.value, "ci95": e.ci95.map(|(low, high)| [low, high])})
 }
 
-fn finding(f: &Finding) -> Json {
+fn finding<Q>(f: &Finding<Q>, question: &str) -> Json {
     let test = f.test.as_ref().map(|t| {
         let statistic = t.statistic.as_ref();
         json!({
@@ -27,7 +27,7 @@ fn finding(f: &Finding) -> Json {
         })
     });
     json!({
-        "question": f.question.id(),
+        "question": question,
         "verdict": f.verdict.as_str(),
         "undefined_because": f.reason(),
         "direction": f.direction.map(Direction::as_str),
@@ -74,20 +74,43 @@ pub fn trials(path: &str, task: &str, rows: usize, of: &Values) -> String {
     format!("{document:#}\n")
 }
 
-/// The statistics of the parts of a study that are not ratings, `study-parts/1`.
-pub fn parts(path: &str, study: &str, parts: &[PartAnalysis]) -> String {
-    let part = |part: &PartAnalysis| {
-        let (values, undefined) = statistics(&part.values);
+fn warnings(all: &[Warning]) -> Vec<Json> {
+    let one = |w: &Warning| json!({"code": w.code, "text": w.text});
+    all.iter().map(one).collect()
+}
+
+fn exclusions(all: &[Applied]) -> Vec<Json> {
+    let one = |e: &Applied| {
         json!({
-            "part": part.part,
-            "task": part.task,
-            "trials": part.trials,
-            "simulated": part.simulated,
-            "pilot": part.pilot,
-            "values": values,
-            "undefined": undefined,
+            "rule": e.rule.to_string(),
+            "rows": e.rows,
+            "participants": e.participants,
+            "problem": e.problem,
         })
     };
+    all.iter().map(one).collect()
+}
+
+fn part(part: &PartAnalysis) -> Json {
+    let (values, undefined) = statistics(&part.values);
+    json!({
+        "part": part.part,
+        "task": part.task,
+        "trials": part.trials,
+        "simulated": part.simulated,
+        "pilot": part.pilot,
+        "values": values,
+        "undefined": undefined,
+        "participants": part.participants,
+        "alpha": part.alpha,
+        "findings": part.findings.iter().map(|f| finding(f, &f.question.id())).collect::<Vec<_>>(),
+        "warnings": warnings(&part.warnings),
+        "exclusions": exclusions(&part.exclusions),
+    })
+}
+
+/// The statistics of the parts of a study that are not ratings, `study-parts/1`.
+pub fn parts(path: &str, study: &str, parts: &[PartAnalysis]) -> String {
     let document = json!({
         "format": "study-parts/1",
         "tool_version": env!("CARGO_PKG_VERSION"),
@@ -102,7 +125,7 @@ pub fn parts(path: &str, study: &str, parts: &[PartAnalysis]) -> String {
 pub fn document(source: &Source, analysis: &Analysis) -> String {
     let (values, undefined) = statistics(&analysis.values);
     let c = &analysis.counts;
-    let document = json!({
+    let mut document = json!({
         "format": FORMAT,
         "tool_version": env!("CARGO_PKG_VERSION"),
         "study": {
@@ -115,8 +138,7 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
         "realistic_from": analysis.realistic_from,
         "values": values,
         "undefined": undefined,
-        "warnings": analysis.warnings.iter()
-            .map(|w| json!({"code": w.code, "text": w.text})).collect::<Vec<_>>(),
+        "warnings": warnings(&analysis.warnings),
         "realizations": analysis.realizations.iter()
             .map(|m| json!({
                 "id": m.id,
@@ -125,14 +147,8 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
                 "vaf": m.vaf,
             })).collect::<Vec<_>>(),
         "alpha": analysis.alpha,
-        "findings": analysis.findings.iter().map(finding).collect::<Vec<_>>(),
-        "exclusions": analysis.exclusions.iter()
-            .map(|e| json!({
-                "rule": e.rule.to_string(),
-                "rows": e.rows,
-                "participants": e.participants,
-                "problem": e.problem,
-            })).collect::<Vec<_>>(),
+        "findings": analysis.findings.iter().map(|f| finding(f, &f.question.id())).collect::<Vec<_>>(),
+        "exclusions": exclusions(&analysis.exclusions),
         "deviations": analysis.deviations.iter().map(|d| &d.text).collect::<Vec<_>>(),
         "counts": {
             "rows": c.rows,
@@ -154,5 +170,8 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
             "interim": c.interim(),
         },
     });
+    if !analysis.parts.is_empty() {
+        document["parts"] = analysis.parts.iter().map(part).collect();
+    }
     format!("{document:#}\n")
 }

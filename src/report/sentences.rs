@@ -18,7 +18,7 @@ pub(super) fn verdict(verdict: &Verdict) -> &'static str {
 }
 
 /// The sentence of a finding without a test: `Cannot be determined: …`.
-pub(super) fn undefined(f: &Finding) -> Option<String> {
+pub(super) fn undefined<Q>(f: &Finding<Q>) -> Option<String> {
     Some(format!("{}: {}.", verdict(&f.verdict), f.reason()?))
 }
 
@@ -43,6 +43,9 @@ pub(super) fn test_name(kind: TestKind) -> &'static str {
         TestKind::SlopesDiffer => "slopes of the participants on VAF",
         TestKind::SlopeT => "t test",
         TestKind::Equivalence => "two one-sided t tests",
+        TestKind::OneSampleT => "t test over participants",
+        TestKind::Wald => "z test",
+        TestKind::WaldClustered => "z test, participants as clusters",
     }
 }
 
@@ -66,7 +69,7 @@ fn statistic(s: &Statistic, participants: usize) -> String {
 }
 
 /// The result of the deciding test: `F(2.78, 25.00) = 19.16, p < .001`.
-pub(super) fn result(f: &Finding) -> Option<String> {
+pub(super) fn result<Q>(f: &Finding<Q>) -> Option<String> {
     let test = f.test.as_ref()?;
     Some(tested(test, f.participants))
 }

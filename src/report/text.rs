@@ -14,7 +14,7 @@ use layout::{Grid, Paint, pad, wrap};
 use study_base::text::{Untrusted, counted, cut_middle};
 use study_core::analyze::{Analysis, RealizationSummary, group_id};
 use study_core::outcome::Role;
-pub use trials::trials;
+pub use trials::{part, trials};
 use unicode_width::UnicodeWidthStr as _;
 
 /// The terminal.

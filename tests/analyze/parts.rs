@@ -63,6 +63,61 @@ fn cells(path: &Path, columns: &[&str]) -> Vec<Vec<String>> {
     reader.records().map(|r| row(r.unwrap())).collect()
 }
 
+/// Analyzes a study as a user would: the report, after a look at the files beside it.
+fn report(folder: &Path, study_id: &str, figures: &[&str], tables: &[&str]) -> String {
+    let results = format!("out/{study_id}");
+    let (code, page, err) = study(&["analyze", &results], folder);
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        page.contains("SIMULATED participants are included"),
+        "{page}"
+    );
+    let analysis = folder.join(results).join("analysis");
+    for figure in figures {
+        for ending in ["svg", "png", "pdf", "csv"] {
+            let file = analysis.join(format!("figures/part-1-{figure}.{ending}"));
+            assert!(file.is_file(), "{}", file.display());
+        }
+    }
+    for table in tables
+        .iter()
+        .chain(&["parts.csv", "parts_findings.csv", "parts.json"])
+    {
+        assert!(analysis.join(table).is_file(), "{table}");
+    }
+    let report = fs::read_to_string(analysis.join("report.html")).unwrap();
+    for figure in figures {
+        assert!(report.contains(&format!("figures/part-1-{figure} .pdf").replace(' ', "")));
+    }
+    assert!(
+        report.contains("For the paper")
+            && report.contains("Bradley and Terry (1952)") == (study_id == "pairs")
+    );
+    report
+}
+
+/// The correlation with VAF is that of the points of its figure, and its test is the finding.
+fn agrees_with_vaf(part: &Value, figures: &Path) {
+    let points = cells(
+        &figures.join("part-1-preference-against-vaf.csv"),
+        &["vaf", "ability"],
+    );
+    let columns =
+        [0, 1].map(|c| -> Vec<f64> { points.iter().map(|p| p[c].parse().unwrap()).collect() });
+    let r = study_stats::correlation::pearson(&columns[0], &columns[1]).unwrap();
+    let found = part["values"]["pairs/vaf/pearson/r"].as_f64().unwrap();
+    assert!((r - found).abs() < 1e-12, "{r} {found}");
+    let findings = part["findings"].as_array().unwrap();
+    let of_vaf = findings
+        .iter()
+        .find(|f| f["question"] == "preference-vaf")
+        .unwrap();
+    assert_eq!(of_vaf["test"]["name"], "permutation-exact");
+    // Three realizations have six orders.
+    assert_eq!(of_vaf["caveats"][0]["code"], "too-few");
+    assert_eq!(of_vaf["verdict"], "not shown");
+}
+
 #[test]
 fn pairs_of_a_study_give_the_abilities_of_their_table() {
     let folder = tempfile::tempdir().unwrap();
@@ -93,7 +148,16 @@ fn pairs_of_a_study_give_the_abilities_of_their_table() {
         );
     }
     assert_eq!(part["trials"], answers.len());
-    assert_eq!(part["values"], of_table(folder.path(), &table, &["pairs"]));
+    for (id, value) in of_table(folder.path(), &table, &["pairs"])
+        .as_object()
+        .unwrap()
+    {
+        assert_eq!(part["values"][id], *value, "{id}");
+    }
+    let figures = ["preferences", "preference-against-vaf"];
+    let report = report(folder.path(), "pairs", &figures, &["part_preferences.csv"]);
+    assert!(report.contains("Does VAF predict which is preferred?"));
+    agrees_with_vaf(&part, &results.join("analysis/figures"));
 
     // Whoever is excluded does not count.
     let exclude = [
@@ -130,7 +194,11 @@ fn a_track_of_a_study_gives_the_threshold_of_its_table() {
     let table = of_table(folder.path(), &table, &["2ifc", "--ladder", LADDER.1]);
     let values = part["values"].as_object().unwrap();
     assert!(values.len() > 10);
-    for (id, value) in values {
+    let of_trials = ["psy/", "psy_group/"];
+    for (id, value) in values
+        .iter()
+        .filter(|(id, _)| of_trials.iter().any(|g| id.starts_with(g)))
+    {
         let (a, b) = (value.as_f64(), table[id].as_f64());
         let close = a
             .zip(b)
@@ -141,4 +209,77 @@ fn a_track_of_a_study_gives_the_threshold_of_its_table() {
             table[id]
         );
     }
+    let figures = ["psychometric", "thresholds", "tracks"];
+    report(
+        folder.path(),
+        "questplus",
+        &figures,
+        &["part_thresholds.csv"],
+    );
+    // The track of the figure is the one that was told.
+    let drawn = cells(
+        &results.join("analysis/figures/part-1-tracks.csv"),
+        &["participant", "track", "level", "positive"],
+    );
+    let rows: Vec<&Vec<String>> = drawn.iter().collect();
+    assert_eq!(rows.len(), trials.len());
+    assert!(
+        rows.iter()
+            .zip(&trials)
+            .all(|(a, b)| a[..2] == b[..2] && a[3] == b[3])
+    );
+    let posterior = values
+        .keys()
+        .filter(|id| id.starts_with("track/") && id.ends_with("/mean"));
+    assert!(posterior.count() >= 2);
+}
+
+#[test]
+fn exclusion_rules_apply_to_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, err) = study(&["new", "pairs", "--kind", "pairs"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let file = folder.path().join("pairs/protocol.toml");
+    let protocol = fs::read_to_string(&file).unwrap();
+    let rules = [
+        r#"rule = "strokes-below", strokes = 7"#,
+        r#"rule = "inconsistent", difference = 1"#,
+    ];
+    let rules = rules.map(|rule| format!("{{ {rule} }}")).join(", ");
+    fs::write(&file, format!("{protocol}\nexclude = [{rules}]\n")).unwrap();
+    let rehearse = ["rehearse", "pairs", "--participants", "3", "--out", "out"];
+    let (code, _, err) = study(&rehearse, folder.path());
+    assert_eq!(code, 0, "{err}");
+    let (_, out, err) = study(&["analyze", "out", "--json"], folder.path());
+    let document: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{err}"));
+    let part = &document["parts"][0];
+    // A trial goes by the interval with the fewest strokes.
+    let columns = ["participant", "trial", "attempt", "strokes"];
+    let felt = cells(&folder.path().join("out/pairs/intervals.csv"), &columns);
+    let answers = cells(&folder.path().join("out/pairs/ratings.csv"), &columns[..3]);
+    let below = |answer: &&Vec<String>| {
+        let own = felt.iter().filter(|f| f[..3] == answer[..]);
+        own.map(|f| f[3].parse::<u32>().unwrap()).min().unwrap() < 7
+    };
+    let excluded = answers.iter().filter(below).count();
+    assert!(
+        excluded > 0 && excluded < answers.len(),
+        "{excluded} of {}",
+        answers.len()
+    );
+    assert_eq!(part["exclusions"][0]["rows"], excluded);
+    assert_eq!(part["trials"], answers.len() - excluded);
+    assert_eq!(part["exclusions"][1]["rows"], 0);
+    let problem = part["exclusions"][1]["problem"].as_str().unwrap();
+    assert!(problem.contains("not points of a scale"), "{problem}");
+    let before = |id: &&String| id.starts_with("before_exclusion/pairs/ability/");
+    assert_eq!(
+        part["values"]
+            .as_object()
+            .unwrap()
+            .keys()
+            .filter(before)
+            .count(),
+        3
+    );
 }

@@ -235,6 +235,8 @@ pub struct Analysis {
     pub findings: Vec<Finding>,
     /// The comparisons of pairs of realizations on which the findings rest.
     pub pairs: Vec<Pair>,
+    /// The parts of the study that are not ratings; [`psychophysics::parts`] analyzes them.
+    pub parts: Vec<psychophysics::PartAnalysis>,
 }
 
 impl Analysis {
@@ -323,6 +325,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         design,
         findings,
         pairs,
+        parts: Vec::new(),
         values,
         warnings,
         counts,

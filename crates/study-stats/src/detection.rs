@@ -360,6 +360,8 @@ pub struct SameDifferent {
     pub differencing: Sensitivity,
     /// τ.
     pub tau: f64,
+    /// Φ((zH − zF)/2): ½ by chance, below it if "different" is said of the same.
+    pub share_unbiased: f64,
     /// Independent observations: p = Φ((zH − zF)/2), d′ = 2z((1 + √(2p − 1))/2).
     pub independent: Sensitivity,
     /// Maximum likelihood by differencing: the first with raw rates, because two rates
@@ -410,6 +412,7 @@ pub fn same_different(answers: &Answers, raw: bool) -> Option<SameDifferent> {
                 .map(|(low, high)| (low.max(0.0), high)),
         },
         tau,
+        share_unbiased: rates.unbiased()?,
         independent: through_z(answers, rates, independent)?,
         differencing_ml: answers.raw().and_then(by_differencing).map(|(d, _)| d),
     })

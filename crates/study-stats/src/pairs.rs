@@ -150,6 +150,14 @@ impl Abilities {
         }
     }
 
+    /// The standard error of an ability by the sandwich over participants; `None` with one
+    /// participant.
+    pub fn clustered_se(&self, item: usize) -> Option<f64> {
+        let sandwich = self.clustered.as_ref()?;
+        let unit = ability(item, self.abilities.len(), sandwich.size());
+        Some(quadratic(sandwich, &unit).max(0.0).sqrt())
+    }
+
     /// The rank of each item; 1 is the most preferred.
     pub fn ranks(&self) -> Vec<usize> {
         let above = |a: &f64| self.abilities.iter().filter(|b| *b > a).count();

@@ -3,6 +3,7 @@
 use super::super::{Failure, Kind};
 use crate::report::Source;
 use crate::report::chart::Figure;
+use crate::report::csv::TableFile;
 use crate::report::figures::{self, Drawn, Trace};
 use crate::report::html::{self, Details};
 use crate::report::picture::png::{Painter, PngError};
@@ -17,7 +18,7 @@ use study_core::analyze::Analysis;
 use study_core::outcome::{ParticipantRow, RatingRow, Status};
 use study_core::protocol::columns::SampleColumn;
 use study_core::protocol::{Answer, Order, Protocol, Question, QuestionKind};
-use study_core::store::{StudyFolder, layout};
+use study_core::store::{Derived, StudyFolder, layout};
 use study_stats::describe::mean;
 
 /// Largest number of samples that are read of a playback.
@@ -36,6 +37,15 @@ pub(super) struct Output {
     pub(super) content: Vec<u8>,
 }
 
+impl Output {
+    pub(super) fn table(table: TableFile) -> Self {
+        Self {
+            name: table.name.to_owned(),
+            content: table.content.into_bytes(),
+        }
+    }
+}
+
 /// The report and the figures' files.
 pub(super) fn files(
     source: &Source,
@@ -44,31 +54,38 @@ pub(super) fn files(
     traces: &[Trace],
 ) -> Result<Vec<Output>, Failure> {
     let drawn = figures::all(analysis, traces);
-    let (document, pictures) = rayon::join(
+    let of_parts = details.parts.iter().flat_map(|part| &part.figures);
+    let all: Vec<&Drawn> = drawn.iter().chain(of_parts).collect();
+    let (document, figures) = rayon::join(
         || html::document(source, details, analysis, &drawn),
-        || pictures(&drawn),
+        || figure_files(&all),
     );
+    let figures = figures?;
     let mut files = vec![Output {
         name: "report.html".to_owned(),
         content: document.into_bytes(),
     }];
-    files.extend(pictures.map_err(|e| Failure::new(Kind::Bug, e))?);
-    for figure in drawn {
-        files.push(Output {
-            name: format!("figures/{}.csv", figure.name),
-            content: figure.data.into_bytes(),
-        });
-    }
+    files.extend(figures);
+    Ok(files)
+}
+
+/// The files of figures: pictures and data.
+pub(super) fn figure_files(drawn: &[&Drawn]) -> Result<Vec<Output>, Failure> {
+    let mut files = pictures(drawn).map_err(|e| Failure::new(Kind::Bug, e))?;
+    files.extend(drawn.iter().map(|figure| Output {
+        name: format!("figures/{}.csv", figure.name),
+        content: figure.data.clone().into_bytes(),
+    }));
     Ok(files)
 }
 
 /// SVG, PNG and PDF of each figure, two columns wide and one column wide. Each is drawn
 /// by one thread, so the number of threads changes no byte.
-fn pictures(drawn: &[Drawn]) -> Result<Vec<Output>, PngError> {
+fn pictures(drawn: &[&Drawn]) -> Result<Vec<Output>, PngError> {
     let painter = Painter::default();
     let figures = drawn.iter().flat_map(|d| {
         let column = format!("{}{COLUMN}", d.name);
-        [(d.name.to_owned(), &d.wide), (column, &d.narrow)]
+        [(d.name.clone(), &d.wide), (column, &d.narrow)]
     });
     let figures: Vec<(String, &Figure)> = figures.collect();
     let files = figures.par_iter().with_max_len(1).map(|(name, figure)| {
@@ -93,9 +110,10 @@ fn pictures(drawn: &[Drawn]) -> Result<Vec<Output>, PngError> {
 pub(super) fn details(
     protocol: &Protocol,
     study: &StudyFolder,
-    (rows, participants): (&[RatingRow], &[ParticipantRow]),
+    derived: &Derived,
     question: &str,
 ) -> Details {
+    let (rows, participants) = (&derived.rows, &derived.participants);
     let asked = protocol
         .questions
         .iter()
@@ -156,6 +174,8 @@ pub(super) fn details(
             .filter(|t| !t.is_empty())
             .map(str::to_owned)
             .collect(),
+        parts: Vec::new(),
+        damage: Vec::new(),
         fingerprints: vec![
             ("stimulus".to_owned(), prints.stimulus.clone()),
             ("wording".to_owned(), prints.wording.clone()),
@@ -356,10 +376,12 @@ pub(super) fn clear_figures(dir: &Path, files: &[Output]) {
     };
     for item in items.flatten() {
         let name = format!("figures/{}", item.file_name().to_string_lossy());
-        let ours = figures::NAMES.iter().any(|n| {
-            let rest = name.strip_prefix(&format!("figures/{n}"));
-            let rest = rest.map(|r| r.strip_prefix(COLUMN).unwrap_or(r));
-            matches!(rest, Some(".svg" | ".png" | ".pdf" | ".csv"))
+        let ending = [".svg", ".png", ".pdf", ".csv"];
+        let stem = ending.iter().find_map(|e| name.strip_suffix(e));
+        let stem = stem.and_then(|s| s.strip_prefix("figures/"));
+        let ours = stem.is_some_and(|stem| {
+            let stem = stem.strip_suffix(COLUMN).unwrap_or(stem);
+            figures::NAMES.contains(&stem) || stem.starts_with(figures::PARTS_PREFIX)
         });
         if ours && !files.iter().any(|f| f.name == name) {
             // A remaining outdated figure is no reason to fail.

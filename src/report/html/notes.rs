@@ -199,7 +199,7 @@ fn comments_on_one(a: &Analysis, group: &[Comment], lang: Option<&str>) -> Marku
     }
 }
 
-pub(super) fn provenance(source: &Source, d: &Details, a: &Analysis) -> Markup {
+pub(super) fn provenance(source: &Source, d: &Details, question: Option<&str>) -> Markup {
     html! {
         section {
             h2 { "Provenance" }
@@ -207,7 +207,7 @@ pub(super) fn provenance(source: &Source, d: &Details, a: &Analysis) -> Markup {
                 dt { "analysed with" } dd { "study " (env!("CARGO_PKG_VERSION")) }
                 @if let Some(id) = &source.study { dt { "study" } dd { (safe(id)) } }
                 dt { "read from" } dd { code { (safe(&source.path)) } }
-                dt { "question" } dd { (safe(&a.question)) }
+                @if let Some(question) = question { dt { "question" } dd { (safe(question)) } }
                 @if let Some(seed) = d.seed { dt { "seed" } dd { (seed) } }
                 @if !d.tools.is_empty() { dt { "sessions run with" } dd { "study " (safe(&d.tools.join(", "))) } }
                 @if !d.states.is_empty() {

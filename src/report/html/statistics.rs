@@ -3,7 +3,7 @@
 use super::safe;
 use crate::report::apa;
 use maud::{Markup, html};
-use study_core::analyze::{Analysis, Value};
+use study_core::analyze::{Value, Values};
 
 /// Largest number of statistics that are listed.
 const MAX_LISTED: usize = 2000;
@@ -11,9 +11,19 @@ const MAX_LISTED: usize = 2000;
 /// Largest number of elements that are shown of a list.
 const MAX_LIST: usize = 40;
 
-pub(super) fn section(a: &Analysis) -> Markup {
+pub(super) fn section(values: &Values) -> Markup {
+    html! {
+        section {
+            h2 { "All statistics" }
+            (listing(values, "docs/statistics.md", "values.json"))
+        }
+    }
+}
+
+/// The statistics; `explained` is the document that defines them, `file` has all digits.
+pub(super) fn listing(values: &Values, explained: &str, file: &str) -> Markup {
     let (mut defined, mut undefined) = (Vec::new(), Vec::new());
-    for (id, value) in a.values.iter() {
+    for (id, value) in values.iter() {
         match value {
             Value::Number(x) => defined.push((id, apa::plain(*x))),
             Value::List(x) => defined.push((id, list(x))),
@@ -21,9 +31,7 @@ pub(super) fn section(a: &Analysis) -> Markup {
         }
     }
     html! {
-        section {
-            h2 { "All statistics" }
-            p.note { "Identifiers are explained in docs/statistics.md; values.json has unrounded values." }
+            p.note { "Identifiers are explained in " (explained) "; " (file) " has unrounded values." }
             @if !undefined.is_empty() {
                 details {
                     summary { (undefined.len()) " undefined, with reasons" }
@@ -39,7 +47,7 @@ pub(super) fn section(a: &Analysis) -> Markup {
                             }
                         }
                     }
-                    (rest(undefined.len()))
+                    (rest(undefined.len(), file))
                 }
             }
             details {
@@ -54,9 +62,8 @@ pub(super) fn section(a: &Analysis) -> Markup {
                         }
                     }
                 }
-                (rest(defined.len()))
+                (rest(defined.len(), file))
             }
-        }
     }
 }
 
@@ -66,10 +73,10 @@ fn list(x: &[f64]) -> String {
     format!("{}{more}", shown.join(" "))
 }
 
-fn rest(n: usize) -> Markup {
+fn rest(n: usize, file: &str) -> Markup {
     html! {
         @if n > MAX_LISTED {
-            p.note { (n - MAX_LISTED) " more are in values.json." }
+            p.note { (n - MAX_LISTED) " more are in " (file) "." }
         }
     }
 }

@@ -18,6 +18,7 @@ use super::values::Values;
 use super::warning::Warning;
 
 pub use pairs::Pair;
+pub(super) use vaf::permutation;
 
 /// A question of the study.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -108,7 +109,7 @@ impl Direction {
         }
     }
 
-    fn of(estimate: f64) -> Self {
+    pub(super) fn of(estimate: f64) -> Self {
         if estimate > 0.0 { Self::Up } else { Self::Down }
     }
 }
@@ -146,6 +147,12 @@ pub enum TestKind {
     SlopeT,
     /// Two one-sided t tests.
     Equivalence,
+    /// t test of a mean over participants.
+    OneSampleT,
+    /// An estimate over its standard error.
+    Wald,
+    /// The same, with a standard error over participants as clusters.
+    WaldClustered,
 }
 
 impl TestKind {
@@ -166,6 +173,9 @@ impl TestKind {
             Self::SlopesDiffer => "slopes-differ",
             Self::SlopeT => "slope-t",
             Self::Equivalence => "equivalence",
+            Self::OneSampleT => "one-sample-t",
+            Self::Wald => "wald",
+            Self::WaldClustered => "wald-clustered",
         }
     }
 }
@@ -173,7 +183,7 @@ impl TestKind {
 /// A test statistic.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Statistic {
-    /// `F`, `t`, `χ²` or `r`.
+    /// `F`, `t`, `z`, `χ²` or `r`.
     pub symbol: &'static str,
     /// Its value.
     pub value: f64,
@@ -198,7 +208,7 @@ pub struct Test {
 
 impl Test {
     /// The test of a question that has only one.
-    fn single(kind: TestKind, p: f64, level: f64) -> Self {
+    pub(super) fn single(kind: TestKind, p: f64, level: f64) -> Self {
         Self {
             kind,
             statistic: None,
@@ -208,7 +218,12 @@ impl Test {
         }
     }
 
-    fn with(mut self, symbol: &'static str, value: Option<f64>, df: &[Option<f64>]) -> Self {
+    pub(super) fn with(
+        mut self,
+        symbol: &'static str,
+        value: Option<f64>,
+        df: &[Option<f64>],
+    ) -> Self {
         let df: Option<Vec<f64>> = df.iter().copied().collect();
         self.statistic = value.map(|value| Statistic {
             symbol,
@@ -223,7 +238,7 @@ impl Test {
         self.p < self.level
     }
 
-    fn verdict(&self) -> Verdict {
+    pub(super) fn verdict(&self) -> Verdict {
         if self.is_significant() {
             Verdict::Yes
         } else {
@@ -244,7 +259,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    fn of(name: &'static str, value: f64) -> Option<Self> {
+    pub(super) fn of(name: &'static str, value: f64) -> Option<Self> {
         Some(Self {
             name,
             value,
@@ -255,9 +270,9 @@ impl Estimate {
 
 /// The answer to a question, with what it rests on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Finding {
+pub struct Finding<Q = Question> {
     /// The question.
-    pub question: Question,
+    pub question: Q,
     /// The answer.
     pub verdict: Verdict,
     /// The direction of the effect, where it is shown and has one.
@@ -278,9 +293,9 @@ pub struct Finding {
     pub caveats: Vec<Warning>,
 }
 
-impl Finding {
+impl<Q> Finding<Q> {
     /// A finding without a test.
-    fn undefined(question: Question, why: impl Into<String>, design: Design) -> Self {
+    pub(super) fn undefined(question: Q, why: impl Into<String>, design: Design) -> Self {
         Self {
             question,
             verdict: Verdict::Undefined(why.into()),
@@ -296,7 +311,7 @@ impl Finding {
     }
 
     /// The finding that a test decides.
-    fn decided(question: Question, test: Test, design: Design) -> Self {
+    pub(super) fn decided(question: Q, test: Test, design: Design) -> Self {
         Self {
             verdict: test.verdict(),
             test: Some(test),
@@ -304,7 +319,7 @@ impl Finding {
         }
     }
 
-    fn caveat(&mut self, code: &'static str, text: impl Into<String>) {
+    pub(super) fn caveat(&mut self, code: &'static str, text: impl Into<String>) {
         self.caveats.push(Warning {
             code,
             text: text.into(),

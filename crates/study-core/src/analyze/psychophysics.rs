@@ -4,7 +4,10 @@
 //! defines them.
 
 mod detection;
+mod excluded;
+mod findings;
 mod fits;
+mod over_participants;
 mod preferences;
 mod scales;
 mod study;
@@ -13,10 +16,11 @@ mod tracks;
 mod trials;
 
 pub use detection::{Detection, Task, detection};
+pub use findings::{PartFinding, PartQuestion};
 pub use fits::{FitCell, FitSettings, psychometric};
 pub use preferences::{Choice, Preference, preferences};
 pub use scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
-pub use study::{PartAnalysis, parts};
+pub use study::{LevelData, PartAnalysis, PartData, StudyData, parts};
 pub use table::{TableError, TableKind, analyze_table};
-pub use tracks::{TrackName, quest_plus, staircase, track_order};
+pub use tracks::{TrackData, TrackName, TrackTrial, quest_plus, staircase, track_order};
 pub use trials::{Asked, TrialCount, TrialSettings, discrimination};

@@ -112,8 +112,8 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Correlations over realizations of VAF with a mean rating.
-fn correlations(
+/// Correlations over realizations of VAF with a mean rating or another value of theirs.
+pub(super) fn correlations(
     group: &str,
     x: &[f64],
     y: &[f64],

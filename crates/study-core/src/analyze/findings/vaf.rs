@@ -1,6 +1,7 @@
 //! Does VAF predict the rating?
 
 use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind, Verdict};
+use crate::analyze::values::Values;
 use study_base::apa;
 
 /// The group of statistics that decides: correlations with adjusted means, which are the
@@ -37,17 +38,23 @@ pub(super) fn vaf(facts: &Facts<'_>) -> Option<Finding> {
 }
 
 fn decided(facts: &Facts<'_>) -> Option<Finding> {
-    let of = |what: &str| facts.number(&format!("{DECIDING}/pearson/{what}"));
-    let r = of("r")?;
-    let exact = of("p_exact_two_sided").map(|p| (TestKind::PermutationExact, p));
-    let random = || of("p_monte_carlo_two_sided").map(|p| (TestKind::PermutationMonteCarlo, p));
-    let (kind, p) = exact.or_else(random)?;
-    let test = Test::single(kind, p, facts.rules.alpha).with("r", Some(r), &[]);
+    let test = permutation(facts.values, DECIDING, facts.rules.alpha)?;
+    let r = facts.number(&format!("{DECIDING}/pearson/r"))?;
     let direction = Some(Direction::of(r)).filter(|_| test.is_significant());
     Some(Finding {
         direction,
         ..Finding::decided(Question::Vaf, test, facts.design)
     })
+}
+
+/// The permutation test of the correlation over realizations in a group of statistics.
+pub(in crate::analyze) fn permutation(values: &Values, group: &str, alpha: f64) -> Option<Test> {
+    let of = |what: &str| values.number(&format!("{group}/pearson/{what}"));
+    let r = of("r")?;
+    let exact = of("p_exact_two_sided").map(|p| (TestKind::PermutationExact, p));
+    let random = || of("p_monte_carlo_two_sided").map(|p| (TestKind::PermutationMonteCarlo, p));
+    let (kind, p) = exact.or_else(random)?;
+    Some(Test::single(kind, p, alpha).with("r", Some(r), &[]))
 }
 
 fn caveats(facts: &Facts<'_>, found: &mut Finding) {

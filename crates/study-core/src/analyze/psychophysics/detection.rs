@@ -135,6 +135,7 @@ fn of_abx(prefix: &str, cell: &Detection, values: &mut Values) {
 fn of_same_different(prefix: &str, cell: &Detection, values: &mut Values) {
     let found = same_different(&cell.answers, cell.raw);
     let mut group = values.group(prefix, RATES);
+    group.maybe("share_unbiased", found.map(|f| f.share_unbiased));
     group.maybe("tau_differencing", found.map(|f| f.tau));
     model(&mut group, "differencing", found.map(|f| f.differencing));
     model(&mut group, "independent", found.map(|f| f.independent));

@@ -3,8 +3,14 @@
 use crate::analyze::identifiers::{group_id, pair_id};
 use crate::analyze::values::Values;
 use std::collections::BTreeSet;
+use study_stats::distribution::normal_quantile;
 use study_stats::paired::holm;
-use study_stats::pairs::{Comparison, Link, Model, NoAbilities, abilities};
+use study_stats::pairs::{
+    Comparison, Difference, Link, Model, NoAbilities, abilities, circular_triads,
+};
+
+/// The fewest participants whose clustered standard error is used.
+pub(super) const ENOUGH_CLUSTERS: usize = 10;
 
 /// What was answered to a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,11 +86,21 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
         .err()
         .map_or_else(String::new, |e| reason(e, &items));
     let found = fit.as_ref().ok();
+    // The clustered error, where there are enough participants for one.
+    let enough = people.len() >= ENOUGH_CLUSTERS;
+    let quantile = normal_quantile(0.975).unwrap_or(f64::NAN);
+    let around = |x: f64, se: f64| (x - quantile * se, x + quantile * se);
     for (i, item) in items.iter().enumerate() {
         let mut group = values.group("pairs", why.as_str());
         let id = |name: &str| group_id(name, &[item]);
         group.maybe(&id("ability"), found.map(|f| f.abilities[i]));
         group.maybe(&id("ability_se"), found.map(|f| f.ses[i]));
+        let interval = found.map(|f| {
+            let clustered = f.clustered_se(i).filter(|_| enough);
+            around(f.abilities[i], clustered.unwrap_or(f.ses[i]))
+        });
+        group.maybe(&id("ability_ci95_lo"), interval.map(|e| e.0));
+        group.maybe(&id("ability_ci95_hi"), interval.map(|e| e.1));
     }
     let mut group = values.group("pairs", why.as_str());
     if order {
@@ -118,10 +134,9 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
     let differences: Vec<_> = (pairs.iter())
         .map(|(a, b)| found.map(|f| f.difference(*a, *b)))
         .collect();
-    // The clustered error, where there are enough participants for one.
-    let enough = people.len() >= 10;
+    let deciding = |d: &Difference| d.clustered.filter(|_| enough).unwrap_or(d.effect);
     let p: Vec<Option<f64>> = (differences.iter())
-        .map(|d| d.map(|d| d.clustered.filter(|_| enough).unwrap_or(d.effect).p))
+        .map(|d| d.as_ref().map(|d| deciding(d).p))
         .collect();
     for (((a, b), difference), (p, p_holm)) in
         pairs.iter().zip(&differences).zip(p.iter().zip(holm(&p)))
@@ -129,6 +144,8 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
         let mut group = values.group(pair_id("pairs", items[*a], items[*b]), why.as_str());
         group.maybe("difference", difference.map(|d| d.effect.estimate));
         group.maybe("se", difference.map(|d| d.effect.se));
+        let effect = difference.as_ref().map(deciding);
+        group.interval("ci95", effect.map(|e| around(e.estimate, e.se)));
         group.maybe("preferred", difference.map(|d| d.preferred));
         if people.len() > 1 {
             let clustered = difference.and_then(|d| d.clustered);
@@ -137,7 +154,35 @@ pub fn preferences(rows: &[Preference], ties: bool, order: bool) -> Values {
         group.maybe("p", *p);
         group.maybe("p_holm", p_holm);
     }
+    if items.len() > 2 {
+        triads(&items, &people, &comparisons, &mut values);
+    }
     values
+}
+
+/// How consistent each participant is, by what was preferred more often of each pair.
+fn triads(items: &[&str], people: &[&str], comparisons: &[Comparison], values: &mut Values) {
+    for (cluster, name) in people
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| !name.is_empty())
+    {
+        let mut wins = vec![0.0; items.len() * items.len()];
+        for c in comparisons.iter().filter(|c| c.cluster == cluster) {
+            wins[c.first * items.len() + c.second] += c.first_preferred;
+            wins[c.second * items.len() + c.first] += c.second_preferred;
+        }
+        let more = |a: &usize, b: &usize| wins[a * items.len() + b] > wins[b * items.len() + a];
+        let preferred: Vec<(usize, usize)> = (0..items.len())
+            .flat_map(|a| (0..items.len()).map(move |b| (a, b)))
+            .filter(|(a, b)| more(a, b))
+            .collect();
+        let found = circular_triads(items.len(), &preferred);
+        let why = "a pair was not compared, or neither was preferred more often";
+        let mut group = values.group(group_id("pairs/triads", &[name]), why);
+        group.maybe("circular", found.map(|f| f.circular));
+        group.maybe("consistency", found.map(|f| f.consistency));
+    }
 }
 
 /// The reason with the names of the items.

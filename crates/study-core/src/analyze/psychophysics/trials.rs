@@ -167,8 +167,9 @@ pub fn discrimination(asked: Asked, trials: &[TrialCount], settings: &TrialSetti
 }
 
 /// What counts for the function: catch trials do not.
-fn level(asked: Asked, trial: &TrialCount) -> Option<Level> {
-    let catch = asked == Asked::YesNo && trial.target == Some(1);
+pub(super) fn level(asked: Asked, trial: &TrialCount) -> Option<Level> {
+    let has_catch = matches!(asked, Asked::YesNo | Asked::SameDifferent);
+    let catch = has_catch && trial.target == Some(1);
     let level = trial.level.filter(|_| !catch)?;
     let positive = match (asked, trial.target) {
         // Of a comparison, "greater" is positive, whether or not it is correct.

@@ -1,0 +1,289 @@
+//! The findings of a part that is no rating.
+
+use super::preferences::ENOUGH_CLUSTERS;
+use crate::analyze::design::Design;
+use crate::analyze::findings::{
+    Direction, Estimate, Finding, Pair, Test, TestKind, Verdict, permutation,
+};
+use crate::analyze::identifiers::{group_id, pair_id};
+use crate::analyze::values::Values;
+use study_base::apa;
+
+/// A question about a part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum PartQuestion {
+    /// Is a realization preferred to another?
+    Preferred,
+    /// Does VAF predict which realization is preferred?
+    PreferenceVaf,
+    /// Does the order of the intervals matter?
+    IntervalOrder,
+    /// Are standard and comparison of this condition told apart?
+    ToldApart(String),
+    /// Do thresholds differ between the conditions?
+    Thresholds,
+}
+
+impl PartQuestion {
+    /// The identifier in `--json` and of its statistics, `finding/ID/*`.
+    pub fn id(&self) -> String {
+        match self {
+            Self::Preferred => "preferred".to_owned(),
+            Self::PreferenceVaf => "preference-vaf".to_owned(),
+            Self::IntervalOrder => "interval-order".to_owned(),
+            Self::ToldApart(condition) => group_id("told-apart", &[condition]),
+            Self::Thresholds => "thresholds".to_owned(),
+        }
+    }
+}
+
+/// The answer to a question about a part.
+pub type PartFinding = Finding<PartQuestion>;
+
+/// What findings are made from.
+pub(super) struct PartFacts<'a> {
+    pub(super) values: &'a Values,
+    pub(super) alpha: f64,
+    pub(super) participants: usize,
+}
+
+impl PartFacts<'_> {
+    fn number(&self, id: &str) -> Option<f64> {
+        self.values.number(id)
+    }
+
+    fn design(&self, realizations: usize) -> Design {
+        Design {
+            participants: self.participants,
+            realizations,
+            ..Design::default()
+        }
+    }
+
+    fn undefined(&self, question: PartQuestion, id: &str, realizations: usize) -> PartFinding {
+        let why = self.values.reason(id).unwrap_or("there is no test");
+        Finding::undefined(question, why, self.design(realizations))
+    }
+}
+
+/// The findings of preferences over these items, and their differences.
+pub(super) fn of_preferences(
+    facts: &PartFacts<'_>,
+    items: &[String],
+) -> (Vec<PartFinding>, Vec<Pair>) {
+    let kind = match facts.participants {
+        n if n >= ENOUGH_CLUSTERS => TestKind::WaldClustered,
+        _ => TestKind::Wald,
+    };
+    let of_pair = |a: &str, b: &str| {
+        let id = pair_id("pairs", a, b);
+        pair(facts, &id, (a, b), ("difference", kind, "z"))
+    };
+    let mut pairs = Vec::new();
+    for (i, a) in items.iter().enumerate() {
+        pairs.extend(items[i + 1..].iter().filter_map(|b| of_pair(a, b)));
+    }
+    let mut found = vec![preferred(facts, items, &pairs)];
+    if facts.values.get("pairs/vaf/n_models").is_some() {
+        found.push(with_vaf(facts));
+    }
+    if facts.values.get("pairs/order").is_some() {
+        found.push(interval_order(facts));
+    }
+    (found, pairs)
+}
+
+/// The comparison with the smallest p; yes, if any differs.
+fn preferred(facts: &PartFacts<'_>, items: &[String], pairs: &[Pair]) -> PartFinding {
+    let question = PartQuestion::Preferred;
+    let p = |pair: &&Pair| pair.test.as_ref().map_or(f64::INFINITY, |t| t.p);
+    let clearest = pairs.iter().min_by(|a, b| p(a).total_cmp(&p(b)));
+    let Some((pair, test)) = clearest.and_then(|pair| Some((pair, pair.test.clone()?))) else {
+        let first = items.first().map_or("", String::as_str);
+        return facts.undefined(question, &group_id("pairs/ability", &[first]), items.len());
+    };
+    let mut found = Finding {
+        estimate: Some(pair.difference),
+        ..Finding::decided(question, test, facts.design(items.len()))
+    };
+    let ability = |item: &String| facts.number(&group_id("pairs/ability", &[item]));
+    found.names = items.to_vec();
+    (found.names).sort_by(|a, b| {
+        ability(b)
+            .unwrap_or(0.0)
+            .total_cmp(&ability(a).unwrap_or(0.0))
+    });
+    if facts.participants < ENOUGH_CLUSTERS {
+        found.caveat(
+            "few-clusters",
+            format!(
+                "with fewer than {ENOUGH_CLUSTERS} participants, standard errors take all answers for \
+                 independent: intervals may be too short"
+            ),
+        );
+    }
+    found
+}
+
+fn with_vaf(facts: &PartFacts<'_>) -> PartFinding {
+    const GROUP: &str = "pairs/vaf";
+    let n = facts.number("pairs/vaf/n_models").unwrap_or(0.0) as usize;
+    let Some(test) = permutation(facts.values, GROUP, facts.alpha) else {
+        return facts.undefined(PartQuestion::PreferenceVaf, "pairs/vaf/pearson/r", n);
+    };
+    let r = facts.number("pairs/vaf/pearson/r");
+    let direction = r.map(Direction::of).filter(|_| test.is_significant());
+    let mut found = Finding {
+        direction,
+        estimate: r.map(|value| Estimate {
+            name: "r",
+            value,
+            ci95: facts.values.interval("pairs/vaf/pearson/ci95"),
+        }),
+        ..Finding::decided(PartQuestion::PreferenceVaf, test, facts.design(n))
+    };
+    let least = facts.number("pairs/vaf/pearson/smallest_p_two_sided");
+    if let Some(least) = least.filter(|p| *p >= facts.alpha) {
+        found.caveat(
+            "too-few",
+            format!(
+                "with these {n} realizations no p below {} is possible",
+                apa::bare_p(least)
+            ),
+        );
+    }
+    found
+}
+
+fn interval_order(facts: &PartFacts<'_>) -> PartFinding {
+    let question = PartQuestion::IntervalOrder;
+    let (order, se) = (facts.number("pairs/order"), facts.number("pairs/order_se"));
+    let Some(p) = facts.number("pairs/order_p") else {
+        return facts.undefined(question, "pairs/order_p", 0);
+    };
+    let z = order.zip(se).map(|(order, se)| order / se);
+    let test = Test::single(TestKind::Wald, p, facts.alpha).with("z", z, &[]);
+    Finding {
+        direction: order.map(Direction::of).filter(|_| test.is_significant()),
+        estimate: order.and_then(|value| Estimate::of("order", value)),
+        ..Finding::decided(question, test, facts.design(0))
+    }
+}
+
+/// Whether standard and comparison are told apart, by condition.
+pub(super) fn of_sensitivities(facts: &PartFacts<'_>, conditions: &[&str]) -> Vec<PartFinding> {
+    let one = |condition: &&str| {
+        let question = PartQuestion::ToldApart((*condition).to_owned());
+        let id = |what: &str| format!("{}/{what}", group_id("sdt_group", &[condition]));
+        let n = facts.number(&id("n")).unwrap_or(0.0) as usize;
+        let Some(p) = facts.number(&id("above_chance/p")) else {
+            return facts.undefined(question, &id("above_chance/p"), 0);
+        };
+        let t = facts.number(&id("above_chance/t"));
+        let df = facts.number(&id("above_chance/df"));
+        let test = Test::single(TestKind::OneSampleT, p, facts.alpha).with("t", t, &[df]);
+        let above = facts.number(&id("above_chance/mean")).unwrap_or(0.0) > 0.0;
+        let mut found = Finding {
+            participants: n,
+            estimate: facts.number(&id("d/mean")).map(|value| Estimate {
+                name: "d'",
+                value,
+                ci95: facts.values.interval(&id("d/ci95")),
+            }),
+            ..Finding::decided(question, test, facts.design(0))
+        };
+        // Answers below chance do not show that the two are told apart.
+        if found.is_yes() && !above {
+            found.verdict = Verdict::NotShown;
+            found.caveat(
+                "below-chance",
+                "answers are below chance: are the answers of the track interchanged?",
+            );
+        }
+        found
+    };
+    conditions.iter().map(one).collect()
+}
+
+/// Whether thresholds differ between conditions, and their contrasts.
+pub(super) fn of_thresholds(
+    facts: &PartFacts<'_>,
+    conditions: &[&str],
+) -> (Vec<PartFinding>, Vec<Pair>) {
+    let question = PartQuestion::Thresholds;
+    if facts.values.get("psy_mixed/F").is_none() {
+        return (Vec::new(), Vec::new());
+    }
+    let of_pair = |a: &str, b: &str| {
+        let id = pair_id("psy_mixed", a, b);
+        let ratio = facts.values.get(&format!("{id}/ratio")).is_some();
+        let name = if ratio { "ratio" } else { "difference" };
+        pair(facts, &id, (a, b), (name, TestKind::MixedContrast, "t"))
+    };
+    let mut pairs = Vec::new();
+    for (i, a) in conditions.iter().enumerate() {
+        pairs.extend(conditions[i + 1..].iter().filter_map(|b| of_pair(a, b)));
+    }
+    let of = |what: &str| facts.number(&format!("psy_mixed/{what}"));
+    let found = match of("p") {
+        None => facts.undefined(question, "psy_mixed/p", conditions.len()),
+        Some(p) => {
+            let test = Test::single(TestKind::MixedModel, p, facts.alpha).with(
+                "F",
+                of("F"),
+                &[of("df1"), of("df2")],
+            );
+            Finding {
+                participants: of("n_participants").unwrap_or(0.0) as usize,
+                ..Finding::decided(question, test, facts.design(conditions.len()))
+            }
+        }
+    };
+    (vec![found], pairs)
+}
+
+/// The comparison of two, as statistics have it.
+fn pair(
+    facts: &PartFacts<'_>,
+    id: &str,
+    (a, b): (&str, &str),
+    (name, kind, symbol): (&'static str, TestKind, &'static str),
+) -> Option<Pair> {
+    let get = |what: &str| facts.number(&format!("{id}/{what}"));
+    let test = get("p_holm").map(|p| {
+        let comparisons = facts.values.iter();
+        let of_group = id.split('/').next().unwrap_or_default();
+        let comparisons = comparisons.filter(|(other, _)| {
+            other.starts_with(of_group) && other.contains('|') && other.ends_with("/p_holm")
+        });
+        let se = get("se_clustered").filter(|_| kind == TestKind::WaldClustered);
+        let z = (get("difference").zip(se.or(get("se")))).map(|(d, se)| d / se);
+        Test {
+            comparisons: comparisons.count(),
+            ..Test::single(kind, p, facts.alpha).with(symbol, get("t").or(z), &[get("df")])
+        }
+    });
+    Some(Pair {
+        first: a.to_owned(),
+        second: b.to_owned(),
+        participants: facts.participants,
+        difference: Estimate {
+            name,
+            value: get(name)?,
+            ci95: facts.values.interval(&format!("{id}/ci95")),
+        },
+        dz: None,
+        verdict: match &test {
+            Some(test) => test.verdict(),
+            None => Verdict::Undefined(
+                facts
+                    .values
+                    .reason(&format!("{id}/p"))
+                    .unwrap_or("there is no test")
+                    .to_owned(),
+            ),
+        },
+        test,
+        equivalence: None,
+    })
+}

@@ -1,0 +1,287 @@
+//! What was found of a part that is no rating, in sentences: for the terminal page, the
+//! report and a paper. Names in them are untrusted.
+
+use super::{apa, sentences};
+use study_base::text::counted;
+use study_core::analyze::psychophysics::{PartAnalysis, PartFinding, PartQuestion};
+use study_core::analyze::{Pair, Verdict, group_id};
+
+/// The most pairs that a sentence lists.
+const MAX_LISTED: usize = 12;
+
+/// The answer to a question.
+pub(super) struct Answered {
+    pub(super) question: String,
+    /// The verdict, in one sentence.
+    pub(super) short: String,
+    pub(super) more: Vec<String>,
+}
+
+/// The banner of a part whose answers are not those of real participants.
+pub(super) fn banner(part: &PartAnalysis) -> Option<&'static str> {
+    match (part.simulated, part.pilot) {
+        (true, true) => Some("SIMULATED participants and PILOTS are included."),
+        (true, false) => Some("SIMULATED participants are included."),
+        (false, true) => Some("PILOTS are included."),
+        (false, false) => None,
+    }
+}
+
+/// The answers to all questions.
+pub(super) fn answered(part: &PartAnalysis) -> Vec<Answered> {
+    part.findings.iter().map(|f| answer(part, f)).collect()
+}
+
+fn answer(part: &PartAnalysis, f: &PartFinding) -> Answered {
+    let verdict = sentences::verdict(&f.verdict);
+    let question = match &f.question {
+        PartQuestion::Preferred => "Is a realization preferred to another?".to_owned(),
+        PartQuestion::PreferenceVaf => "Does VAF predict which is preferred?".to_owned(),
+        PartQuestion::IntervalOrder => "Does the order of the intervals matter?".to_owned(),
+        PartQuestion::ToldApart(condition) => {
+            format!("{condition}: are standard and comparison told apart?")
+        }
+        PartQuestion::Thresholds => "Do thresholds differ between the conditions?".to_owned(),
+    };
+    let decided = || format!("{verdict}: {}.", result(part, f));
+    let mut more: Vec<String> = f.caveats.iter().map(sentences::caveat).collect();
+    if matches!(
+        f.question,
+        PartQuestion::Preferred | PartQuestion::Thresholds
+    ) {
+        more.extend(different(part));
+    }
+    Answered {
+        question,
+        short: sentences::undefined(f).unwrap_or_else(decided),
+        more,
+    }
+}
+
+/// What the deciding test says: `r = .93, 95 % CI [.71, .98], p = .008 (permutation test,
+/// exact, 5 realizations)`.
+fn result(part: &PartAnalysis, f: &PartFinding) -> String {
+    let tested = sentences::result(f).unwrap_or_default();
+    let test = f
+        .test
+        .as_ref()
+        .map_or_else(String::new, sentences::corrected);
+    let people = sentences::participants(f.participants);
+    let estimate = |format: fn(f64) -> String| {
+        let e = f.estimate.as_ref();
+        e.map_or_else(String::new, |e| sentences::estimate(e, format))
+    };
+    match &f.question {
+        PartQuestion::Preferred => {
+            let clearest = clearest(part).map_or_else(String::new, |p| {
+                let (first, second) = (&p.first, &p.second);
+                format!(
+                    "{first} over {second} by {}, ",
+                    sentences::estimate(&p.difference, apa::two)
+                )
+            });
+            format!("{clearest}{tested} ({test}, {people})")
+        }
+        PartQuestion::PreferenceVaf => {
+            let n = counted(f.realizations, "realization", "realizations");
+            format!("r = {}, {tested} ({test}, {n})", estimate(apa::r))
+        }
+        PartQuestion::IntervalOrder => {
+            let first = "for what is presented first";
+            format!("{} {first}, {tested} ({test})", estimate(apa::two))
+        }
+        PartQuestion::ToldApart(_) => {
+            format!(
+                "mean d′ {}, {tested} ({test}, {people})",
+                estimate(apa::two)
+            )
+        }
+        PartQuestion::Thresholds => format!("{tested} ({test}, {people})"),
+    }
+}
+
+/// The pair with the smallest p, the higher one first.
+fn clearest(part: &PartAnalysis) -> Option<Pair> {
+    let p = |pair: &&Pair| pair.test.as_ref().map_or(f64::INFINITY, |t| t.p);
+    let pair = part.pairs.iter().min_by(|a, b| p(a).total_cmp(&p(b)))?;
+    Some(upwards(pair))
+}
+
+/// A pair seen from the one with the higher value. Ratios stay as they are.
+fn upwards(pair: &Pair) -> Pair {
+    match pair.difference.value < 0.0 {
+        true => pair.seen_from(&pair.second),
+        false => pair.clone(),
+    }
+}
+
+/// The pairs that differ.
+fn different(part: &PartAnalysis) -> Option<String> {
+    let differ = part.pairs.iter().filter(|p| p.verdict == Verdict::Yes);
+    let differ: Vec<String> = differ.map(|pair| of_pair(&upwards(pair))).collect();
+    let shown = differ.len().min(MAX_LISTED);
+    let more = match differ.len() - shown {
+        0 => String::new(),
+        n => format!("; and {n} more"),
+    };
+    (!differ.is_empty()).then(|| {
+        let n = counted(differ.len(), "pair differs", "pairs differ");
+        format!(
+            "Of {}, {n}: {}{more}.",
+            part.pairs.len(),
+            differ[..shown].join("; ")
+        )
+    })
+}
+
+fn of_pair(pair: &Pair) -> String {
+    let p = pair
+        .test
+        .as_ref()
+        .map_or_else(String::new, |t| format!(", {}", sentences::p(t)));
+    let size = sentences::estimate(&pair.difference, apa::two);
+    let joined = match pair.difference.name {
+        "ratio" => format!("{} / {} = {size}", pair.first, pair.second),
+        _ => format!("{} − {} = {size}", pair.first, pair.second),
+    };
+    format!("{joined}{p}")
+}
+
+/// What limits the part: warnings, and rules that could not be applied.
+pub(super) fn caveats(part: &PartAnalysis) -> Vec<String> {
+    let mut all: Vec<String> = part.warnings.iter().map(sentences::caveat).collect();
+    for rule in &part.exclusions {
+        if rule.rows > 0 {
+            all.push(format!(
+                "The rule {} excludes {} of {}.",
+                rule.rule,
+                counted(rule.rows, "trial", "trials"),
+                counted(rule.participants, "participant", "participants")
+            ));
+        }
+        if let Some(problem) = rule.problem {
+            all.push(format!("The rule {}: {problem}.", rule.rule));
+        }
+    }
+    all
+}
+
+/// The results, for a paper.
+pub(super) fn results(part: &PartAnalysis) -> String {
+    let mut text: Vec<String> = thresholds(part);
+    for f in &part.findings {
+        let Some(test) = &f.test else { continue };
+        let what = result(part, f);
+        let significant = test.is_significant();
+        text.push(match (&f.question, significant) {
+            (PartQuestion::Preferred, true) => {
+                format!("Preferences differed between realizations: {what}.")
+            }
+            (PartQuestion::Preferred, false) => {
+                format!("No difference of preference between realizations was shown: {what}.")
+            }
+            (PartQuestion::PreferenceVaf, true) => {
+                format!("Preference was correlated with VAF, {what}.")
+            }
+            (PartQuestion::PreferenceVaf, false) => {
+                format!("No correlation of preference with VAF was shown, {what}.")
+            }
+            (PartQuestion::IntervalOrder, true) => {
+                format!("The order of the intervals mattered, {what}.")
+            }
+            (PartQuestion::IntervalOrder, false) => {
+                format!("No effect of the order of the intervals was shown, {what}.")
+            }
+            (PartQuestion::ToldApart(c), _) if f.is_yes() => {
+                format!("{c}: standard and comparison were told apart, {what}.")
+            }
+            (PartQuestion::ToldApart(c), _) => {
+                format!(
+                    "{c}: it was not shown that standard and comparison are told apart, {what}."
+                )
+            }
+            (PartQuestion::Thresholds, true) => {
+                format!("Thresholds differed between conditions, {what}.")
+            }
+            (PartQuestion::Thresholds, false) => {
+                format!("No difference of thresholds between conditions was shown, {what}.")
+            }
+        });
+    }
+    let pairs = part
+        .findings
+        .iter()
+        .any(|f| f.is_yes() && f.question == PartQuestion::Thresholds);
+    text.extend(different(part).filter(|_| pairs));
+    text.join(" ")
+}
+
+/// The thresholds of each condition.
+fn thresholds(part: &PartAnalysis) -> Vec<String> {
+    let mut conditions: Vec<&str> = part
+        .data
+        .levels
+        .iter()
+        .map(|l| l.condition.as_str())
+        .collect();
+    conditions.sort_unstable();
+    conditions.dedup();
+    let one = |condition: &&str| {
+        let id = group_id("psy_group", &[condition, "posterior_threshold"]);
+        let get = |what: &str| part.values.number(&format!("{id}/{what}"));
+        let ci = part.values.interval(&format!("{id}/ci95"));
+        let ci = ci.map_or_else(String::new, |ends| {
+            format!(", 95 % CI {}", apa::interval(ends, apa::plain))
+        });
+        Some(format!(
+            "{condition}: the geometric mean of the thresholds was {}{ci} (n = {}).",
+            apa::plain(get("geometric_mean")?),
+            get("n")?
+        ))
+    };
+    conditions.iter().filter_map(one).collect()
+}
+
+/// How the numbers were computed, for a paper.
+pub(super) fn methods(part: &PartAnalysis) -> String {
+    let has = |group: &str| part.values.iter().any(|(id, _)| id.starts_with(group));
+    let mut text = Vec::new();
+    if has("psy/") {
+        text.push(
+            "The psychometric function of each participant and condition was a cumulative normal with \
+             beta-binomial errors; thresholds are posterior means with equal-tailed 95 % intervals \
+             (Schütt et al., 2016), at half the height between guesses and lapses."
+                .to_owned(),
+        );
+    }
+    if has("psy_mixed/") {
+        text.push(
+            "Conditions were compared by a linear mixed model with an intercept for each participant \
+             (REML, Satterthwaite's degrees of freedom), contrasts with Holm's correction."
+                .to_owned(),
+        );
+    }
+    if has("sdt/") {
+        text.push(
+            "Sensitivities d′ are from rates after the log-linear correction (Hautus, 1995)."
+                .to_owned(),
+        );
+    }
+    if has("pairs/ability") {
+        let ties = if has("pairs/tie_log_nu") {
+            ", with ties (Davidson, 1970)"
+        } else {
+            ""
+        };
+        text.push(format!(
+            "Preferences were fitted by the model of Bradley and Terry (1952){ties}, by maximum \
+             likelihood; abilities are logarithms of odds."
+        ));
+    }
+    text.push(format!(
+        "The level of significance is {}, two-sided. The analysis was done with study {}.",
+        sentences::level(part.alpha),
+        env!("CARGO_PKG_VERSION")
+    ));
+    text.join(" ")
+}

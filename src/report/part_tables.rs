@@ -1,0 +1,510 @@
+//! The tables of thresholds, sensitivities and preferences: the same on the terminal, in
+//! the report and as CSV.
+
+use super::apa::{interval_or_dash, name, or_dash, plain, two};
+use super::csv::number;
+use std::collections::BTreeSet;
+use study_base::text::counted;
+use study_core::analyze::{Value, Values};
+
+/// How a number is printed.
+type Format = fn(f64) -> String;
+
+/// A cell, as printed and with all digits.
+pub(super) enum PartCell {
+    /// A name. Untrusted.
+    Name(String),
+    Number(Option<f64>, Format),
+    Interval(Option<(f64, f64)>, Format),
+}
+
+impl PartCell {
+    /// As on the page.
+    pub(super) fn shown(&self) -> String {
+        match self {
+            Self::Name(text) => name(text),
+            Self::Number(x, format) => or_dash(*x, format),
+            Self::Interval(ends, format) => interval_or_dash(*ends, format),
+        }
+    }
+
+    /// As in a CSV file; the ends of an interval have columns of their own.
+    fn exact(&self) -> Vec<String> {
+        match self {
+            Self::Name(text) => vec![text.clone()],
+            Self::Number(x, _) => vec![number(*x)],
+            Self::Interval(ends, _) => {
+                vec![number(ends.map(|e| e.0)), number(ends.map(|e| e.1))]
+            }
+        }
+    }
+}
+
+/// A column: its head on the page, and its name in a CSV file.
+type Column = (&'static str, &'static str);
+
+/// A table; it may have no rows.
+pub(super) struct PartTable {
+    /// Name of its CSV file, without extension.
+    pub(super) file: &'static str,
+    pub(super) caption: &'static str,
+    columns: &'static [Column],
+    pub(super) rows: Vec<Vec<PartCell>>,
+    /// Sentences below it.
+    pub(super) notes: Vec<String>,
+}
+
+impl PartTable {
+    /// The heads on the page.
+    pub(super) fn head(&self) -> Vec<&'static str> {
+        self.columns.iter().map(|c| c.0).collect()
+    }
+
+    /// The columns of the CSV file.
+    pub(super) fn names(&self) -> Vec<String> {
+        let row = self.rows.first();
+        let names = (self.columns.iter().enumerate()).map(|(i, (_, column))| {
+            match row.and_then(|row| row.get(i)) {
+                Some(PartCell::Interval(..)) => {
+                    vec![format!("{column}_lo"), format!("{column}_hi")]
+                }
+                _ => vec![(*column).to_owned()],
+            }
+        });
+        names.flatten().collect()
+    }
+
+    /// The rows of the CSV file.
+    pub(super) fn exact(&self) -> impl Iterator<Item = Vec<String>> + '_ {
+        let rows = self.rows.iter();
+        rows.map(|row| row.iter().flat_map(PartCell::exact).collect())
+    }
+}
+
+/// All tables of these statistics; those without rows are left out.
+pub(super) fn tables(values: &Values) -> Vec<PartTable> {
+    let all = [
+        thresholds,
+        conditions,
+        contrasts,
+        comparisons,
+        sensitivities,
+        abilities,
+        differences,
+        magnitudes,
+        ratings,
+    ];
+    let tables = all.into_iter().map(|table| table(values));
+    tables
+        .filter(|t| !t.rows.is_empty() || !t.notes.is_empty())
+        .collect()
+}
+
+/// The parts of an identifier between `group/` and the statistic, each once.
+fn cells<'a>(values: &'a Values, group: &str, parts: usize) -> BTreeSet<Vec<&'a str>> {
+    let names = values.iter().filter_map(|(id, _)| {
+        let rest = id.strip_prefix(group)?.strip_prefix('/')?;
+        let names: Vec<&str> = rest.split('/').collect();
+        (names.len() > parts).then(|| names[..parts].to_vec())
+    });
+    names.collect()
+}
+
+fn named(text: &str) -> PartCell {
+    PartCell::Name(text.to_owned())
+}
+
+/// Each participant and condition.
+fn thresholds(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "thresholds",
+        caption: "Thresholds",
+        columns: &[
+            ("", "participant"),
+            ("condition", "condition"),
+            ("trials", "n_trials"),
+            ("threshold", "threshold"),
+            ("95 %", "threshold_ci95"),
+            ("width", "width"),
+            ("95 %", "width_ci95"),
+            ("ML", "ml_threshold"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    let mut reasons = Vec::new();
+    for cell in cells(values, "psy", 2) {
+        let id = |statistic: &str| format!("psy/{}/{}/{statistic}", cell[0], cell[1]);
+        let number = |statistic: &str| PartCell::Number(values.number(&id(statistic)), plain);
+        let interval = |statistic: &str| {
+            let ends = values.interval(&id(&format!("posterior/{statistic}/ci95")));
+            PartCell::Interval(ends, plain)
+        };
+        if cell[0] != "pooled" {
+            let trials = values.number(&id("n_trials"));
+            table.rows.push(vec![
+                named(cell[0]),
+                named(cell[1]),
+                PartCell::Number(trials, |n| format!("{n}")),
+                number("posterior/threshold/mean"),
+                interval("threshold"),
+                number("posterior/width/mean"),
+                interval("width"),
+                number("ml/threshold"),
+            ]);
+        }
+        if let Some(why) = values.reason(&id("ml/threshold")) {
+            reasons.push(format!(
+                "{} {}: no maximum of the likelihood: {why}.",
+                name(cell[0]),
+                name(cell[1])
+            ));
+        }
+    }
+    if table.rows.is_empty() {
+        return table;
+    }
+    table.notes.push(
+        "Threshold: the level at which the function without guesses and lapses is ½. Width: from .05 to \
+         .95 of it. Both are posterior means."
+            .to_owned(),
+    );
+    table.notes.extend(reasons);
+    for cell in cells(values, "psy_group", 2) {
+        let id = |statistic: &str| format!("psy_group/{}/{}/{statistic}", cell[0], cell[1]);
+        let Some(mean) = values
+            .number(&id("geometric_mean"))
+            .filter(|_| cell[1] == "posterior_threshold")
+        else {
+            continue;
+        };
+        let n = values.number(&id("n")).unwrap_or_default();
+        table.notes.push(format!(
+            "{}: geometric mean {} {} of {n} participants.",
+            name(cell[0]),
+            plain(mean),
+            interval_or_dash(values.interval(&id("ci95")), plain),
+        ));
+    }
+    table
+}
+
+/// Thresholds of the mixed model, by condition.
+fn conditions(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "conditions",
+        caption: "Thresholds by condition, mixed model",
+        columns: &[("", "condition"), ("mean", "mean"), ("95 %", "mean_ci95")],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    let mut ratios = false;
+    for cell in cells(values, "psy_mixed", 1) {
+        let id = |statistic: &str| format!("psy_mixed/{}/{statistic}", cell[0]);
+        let mean = values.number(&id("geometric_mean"));
+        ratios |= mean.is_some();
+        let Some(mean) = mean.or_else(|| values.number(&id("mean"))) else {
+            continue;
+        };
+        table.rows.push(vec![
+            named(cell[0]),
+            PartCell::Number(Some(mean), plain),
+            PartCell::Interval(values.interval(&id("ci95")), plain),
+        ]);
+    }
+    if !table.rows.is_empty() && ratios {
+        table
+            .notes
+            .push("Geometric means; contrasts are ratios.".to_owned());
+    }
+    if let Some(why) = values.reason("psy_mixed/F") {
+        table
+            .notes
+            .push(format!("No comparison of conditions: {}.", name(why)));
+    }
+    table
+}
+
+/// Contrasts of the mixed model.
+fn contrasts(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "contrasts",
+        caption: "Contrasts of thresholds",
+        columns: &[
+            ("", "conditions"),
+            ("estimate", "estimate"),
+            ("95 %", "estimate_ci95"),
+            ("t", "t"),
+            ("df", "df"),
+            ("p (Holm)", "p_holm"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    for cell in cells(values, "psy_mixed", 1) {
+        let id = |statistic: &str| format!("psy_mixed/{}/{statistic}", cell[0]);
+        let number = |statistic: &str| values.number(&id(statistic));
+        let (ratio, difference) = (number("ratio"), number("difference"));
+        let Some(estimate) = ratio.or(difference) else {
+            continue;
+        };
+        let sign = if ratio.is_some() { " / " } else { " − " };
+        table.rows.push(vec![
+            PartCell::Name(cell[0].replace('|', sign)),
+            PartCell::Number(Some(estimate), plain),
+            PartCell::Interval(values.interval(&id("ci95")), plain),
+            PartCell::Number(number("t"), two),
+            PartCell::Number(number("df"), two),
+            PartCell::Number(number("p_holm"), plain),
+        ]);
+    }
+    table
+}
+
+fn comparisons(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "comparisons",
+        caption: "Comparisons with the standard",
+        columns: &[
+            ("", "participant"),
+            ("condition", "condition"),
+            ("PSE", "pse"),
+            ("95 %", "pse_ci95"),
+            ("constant error", "constant_error"),
+            ("JND", "jnd"),
+            ("Weber fraction", "weber_fraction"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    for cell in cells(values, "psy", 2) {
+        let id = |statistic: &str| format!("psy/{}/{}/{statistic}", cell[0], cell[1]);
+        let number = |statistic: &str| PartCell::Number(values.number(&id(statistic)), plain);
+        if values.number(&id("pse")).is_some() {
+            table.rows.push(vec![
+                named(cell[0]),
+                named(cell[1]),
+                number("pse"),
+                PartCell::Interval(values.interval(&id("pse_ci95")), plain),
+                number("constant_error"),
+                number("jnd"),
+                number("weber_fraction"),
+            ]);
+        }
+    }
+    table
+}
+
+fn sensitivities(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "sensitivities",
+        caption: "Sensitivities",
+        columns: &[
+            ("", "participant"),
+            ("condition", "condition"),
+            ("d′", "d"),
+            ("95 %", "d_ci95"),
+            ("bias", "bias"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    for cell in cells(values, "sdt", 2) {
+        let id = |statistic: &str| format!("sdt/{}/{}/{statistic}", cell[0], cell[1]);
+        let number = |statistic: &str| values.number(&id(statistic));
+        let differencing = values.get(&id("d_differencing")).is_some();
+        let d = if differencing { "d_differencing" } else { "d" };
+        let bias = ["criterion", "interval_bias", "bias"]
+            .iter()
+            .find_map(|b| number(b));
+        table.rows.push(vec![
+            named(cell[0]),
+            named(cell[1]),
+            PartCell::Number(number(d), two),
+            PartCell::Interval(values.interval(&id(&format!("{d}_ci95"))), two),
+            PartCell::Number(bias, two),
+        ]);
+    }
+    for cell in cells(values, "sdt_group", 1) {
+        let id = |statistic: &str| format!("sdt_group/{}/{statistic}", cell[0]);
+        if let Some(mean) = values.number(&id("d/mean")) {
+            table.notes.push(format!(
+                "{}: mean d′ {} {} of {} participants.",
+                name(cell[0]),
+                two(mean),
+                interval_or_dash(values.interval(&id("d/ci95")), two),
+                values.number(&id("n")).unwrap_or_default(),
+            ));
+        }
+    }
+    table
+}
+
+/// Items, the most preferred first.
+fn abilities(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "preferences",
+        caption: "Preferences",
+        columns: &[
+            ("", "realization"),
+            ("ability", "ability"),
+            ("SE", "se"),
+            ("95 %", "ability_ci95"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    let mut items: Vec<(&str, Option<f64>)> = (values.iter())
+        .filter_map(|(id, value)| {
+            let item = id.strip_prefix("pairs/ability/")?;
+            let ability = match value {
+                Value::Number(x) => Some(*x),
+                Value::List(_) | Value::Undefined(_) => None,
+            };
+            Some((item, ability))
+        })
+        .collect();
+    items.sort_by(|a, b| b.1.unwrap_or(f64::MIN).total_cmp(&a.1.unwrap_or(f64::MIN)));
+    if let Some((item, None)) = items.first() {
+        let why = values
+            .reason(&format!("pairs/ability/{item}"))
+            .unwrap_or_default();
+        table.notes.push(format!("No abilities: {}.", name(why)));
+        return table;
+    }
+    for (item, ability) in items {
+        let number = |what: &str| values.number(&format!("pairs/ability_{what}/{item}"));
+        table.rows.push(vec![
+            named(item),
+            PartCell::Number(ability, two),
+            PartCell::Number(number("se"), two),
+            PartCell::Interval(number("ci95_lo").zip(number("ci95_hi")), two),
+        ]);
+    }
+    if let Some(order) = values.number("pairs/order") {
+        let p = or_dash(values.number("pairs/order_p"), plain);
+        table.notes.push(format!(
+            "Order: {} for what is presented first, p = {p}.",
+            two(order)
+        ));
+    }
+    table
+}
+
+/// Differences of abilities.
+fn differences(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "preference_pairs",
+        caption: "Differences of abilities",
+        columns: &[
+            ("", "realizations"),
+            ("difference", "difference"),
+            ("SE", "se"),
+            ("clustered", "se_clustered"),
+            ("preferred", "preferred"),
+            ("p (Holm)", "p_holm"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    for (id, value) in values.iter() {
+        let pair = id
+            .strip_prefix("pairs/")
+            .and_then(|p| p.strip_suffix("/difference"));
+        let (Some(pair), Value::Number(difference)) = (pair, value) else {
+            continue;
+        };
+        let number = |statistic: &str| values.number(&format!("pairs/{pair}/{statistic}"));
+        table.rows.push(vec![
+            PartCell::Name(pair.replace('|', " − ")),
+            PartCell::Number(Some(*difference), two),
+            PartCell::Number(number("se"), two),
+            PartCell::Number(number("se_clustered"), two),
+            PartCell::Number(number("preferred"), two),
+            PartCell::Number(number("p_holm"), plain),
+        ]);
+    }
+    table
+}
+
+fn magnitudes(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "magnitudes",
+        caption: "Estimated magnitudes",
+        columns: &[
+            ("level", "level"),
+            ("geometric mean", "geometric_mean"),
+            ("95 %", "geometric_mean_ci95"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    let mut levels: Vec<&str> = (values.iter())
+        .filter_map(|(id, _)| {
+            id.strip_prefix("magnitude/level/")?
+                .strip_suffix("/geometric_mean")
+        })
+        .collect();
+    let level = |text: &str| text.parse().unwrap_or(f64::MAX);
+    levels.sort_by(|a, b| level(a).total_cmp(&level(b)));
+    for level in levels {
+        let id = format!("magnitude/level/{level}");
+        table.rows.push(vec![
+            named(level),
+            PartCell::Number(values.number(&format!("{id}/geometric_mean")), plain),
+            PartCell::Interval(values.interval(&format!("{id}/ci95")), plain),
+        ]);
+    }
+    if let Some(exponent) = values.number("magnitude/exponent") {
+        let interval = values.interval("magnitude/exponent_over_participants/ci95");
+        let left_out = values.number("magnitude/n_left_out").unwrap_or_default();
+        table.notes.push(format!(
+            "Exponent {} {}, over participants. {} left out, because not above 0.",
+            two(exponent),
+            interval_or_dash(interval, two),
+            counted(left_out as usize, "estimate", "estimates"),
+        ));
+    }
+    table
+}
+
+fn ratings(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "mushra",
+        caption: "Ratings from 0 to 100",
+        columns: &[
+            ("", "condition"),
+            ("median", "median"),
+            ("quartiles", "quartile"),
+            ("mean", "mean"),
+            ("95 %", "mean_ci95_half"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    let of = |statistic: &str| -> Vec<&str> {
+        let suffix = format!("/{statistic}");
+        (values.iter())
+            .filter_map(|(id, _)| id.strip_prefix("mushra/")?.strip_suffix(&suffix))
+            .collect()
+    };
+    for condition in of("median") {
+        let number = |statistic: &str| values.number(&format!("mushra/{condition}/{statistic}"));
+        table.rows.push(vec![
+            named(condition),
+            PartCell::Number(number("median"), plain),
+            PartCell::Interval(number("q1").zip(number("q3")), plain),
+            PartCell::Number(number("mean"), plain),
+            PartCell::Number(number("ci95_half"), |h| format!("± {}", plain(h))),
+        ]);
+    }
+    let screened: Vec<String> = (of("screened").iter())
+        .filter(|p| values.number(&format!("mushra/{p}/screened")) == Some(1.0))
+        .map(|p| name(p))
+        .collect();
+    if !screened.is_empty() {
+        let text = format!("Screened, and not in this table: {}.", screened.join(", "));
+        table.notes.push(text);
+    }
+    table
+}
