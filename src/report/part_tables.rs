@@ -2,7 +2,6 @@
 //! the report and as CSV.
 
 use super::apa::{interval_or_dash, name, or_dash, plain, two};
-use super::csv::number;
 use std::collections::BTreeSet;
 use study_base::text::counted;
 use study_core::analyze::{Value, Values};
@@ -27,28 +26,17 @@ impl PartCell {
             Self::Interval(ends, format) => interval_or_dash(*ends, format),
         }
     }
-
-    /// As in a CSV file; the ends of an interval have columns of their own.
-    fn exact(&self) -> Vec<String> {
-        match self {
-            Self::Name(text) => vec![text.clone()],
-            Self::Number(x, _) => vec![number(*x)],
-            Self::Interval(ends, _) => {
-                vec![number(ends.map(|e| e.0)), number(ends.map(|e| e.1))]
-            }
-        }
-    }
 }
 
 /// A column: its head on the page, and its name in a CSV file.
-type Column = (&'static str, &'static str);
+pub(super) type Column = (&'static str, &'static str);
 
 /// A table; it may have no rows.
 pub(super) struct PartTable {
     /// Name of its CSV file, without extension.
     pub(super) file: &'static str,
     pub(super) caption: &'static str,
-    columns: &'static [Column],
+    pub(super) columns: &'static [Column],
     pub(super) rows: Vec<Vec<PartCell>>,
     /// Sentences below it.
     pub(super) notes: Vec<String>,
@@ -58,26 +46,6 @@ impl PartTable {
     /// The heads on the page.
     pub(super) fn head(&self) -> Vec<&'static str> {
         self.columns.iter().map(|c| c.0).collect()
-    }
-
-    /// The columns of the CSV file.
-    pub(super) fn names(&self) -> Vec<String> {
-        let row = self.rows.first();
-        let names = (self.columns.iter().enumerate()).map(|(i, (_, column))| {
-            match row.and_then(|row| row.get(i)) {
-                Some(PartCell::Interval(..)) => {
-                    vec![format!("{column}_lo"), format!("{column}_hi")]
-                }
-                _ => vec![(*column).to_owned()],
-            }
-        });
-        names.flatten().collect()
-    }
-
-    /// The rows of the CSV file.
-    pub(super) fn exact(&self) -> impl Iterator<Item = Vec<String>> + '_ {
-        let rows = self.rows.iter();
-        rows.map(|row| row.iter().flat_map(PartCell::exact).collect())
     }
 }
 

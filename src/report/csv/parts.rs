@@ -1,7 +1,7 @@
 //! The CSV tables of the parts of a study that are not ratings.
 
-use super::{TableFile, cells, digits, table};
-use crate::report::part_tables::tables;
+use super::{TableFile, cells, digits, number, table};
+use crate::report::part_tables::{PartCell, PartTable, tables};
 use study_core::analyze::Value;
 use study_core::analyze::psychophysics::PartAnalysis;
 
@@ -31,13 +31,17 @@ pub fn part_tables(parts: &[PartAnalysis]) -> Vec<TableFile> {
                 .filter(|t| t.file == kind && !t.rows.is_empty())
             {
                 if rows.is_empty() {
-                    rows.push(["part".to_owned()].into_iter().chain(own.names()).collect());
+                    rows.push(["part".to_owned()].into_iter().chain(names(own)).collect());
                 }
                 let of_part = |row: Vec<String>| {
                     let name = part.part.as_str().to_owned();
                     [name].into_iter().chain(row).collect()
                 };
-                rows.extend(own.exact().map(of_part));
+                rows.extend(
+                    own.rows
+                        .iter()
+                        .map(|row| of_part(row.iter().flat_map(exact).collect())),
+                );
             }
         }
         if !rows.is_empty() {
@@ -45,6 +49,29 @@ pub fn part_tables(parts: &[PartAnalysis]) -> Vec<TableFile> {
         }
     }
     all
+}
+
+/// The columns; the ends of an interval have columns of their own.
+fn names(table: &PartTable) -> Vec<String> {
+    let row = table.rows.first();
+    let names = (table.columns.iter().enumerate()).map(|(i, (_, column))| {
+        match row.and_then(|row| row.get(i)) {
+            Some(PartCell::Interval(..)) => vec![format!("{column}_lo"), format!("{column}_hi")],
+            _ => vec![(*column).to_owned()],
+        }
+    });
+    names.flatten().collect()
+}
+
+/// A cell with all digits.
+fn exact(cell: &PartCell) -> Vec<String> {
+    match cell {
+        PartCell::Name(text) => vec![text.clone()],
+        PartCell::Number(x, _) => vec![number(*x)],
+        PartCell::Interval(ends, _) => {
+            vec![number(ends.map(|e| e.0)), number(ends.map(|e| e.1))]
+        }
+    }
 }
 
 fn statistics(parts: &[PartAnalysis]) -> Vec<Vec<String>> {
@@ -97,13 +124,13 @@ fn findings(parts: &[PartAnalysis]) -> Vec<Vec<String>> {
                 f.question.id(),
                 f.verdict.as_str().to_owned(),
                 test.map_or_else(String::new, |t| t.kind.as_str().to_owned()),
-                super::number(statistic),
-                super::number(test.map(|t| t.p)),
-                super::number(test.map(|t| t.level)),
+                number(statistic),
+                number(test.map(|t| t.p)),
+                number(test.map(|t| t.level)),
                 test.map_or_else(String::new, |t| t.comparisons.to_string()),
-                super::number(f.estimate.map(|e| e.value)),
-                super::number(ci95.map(|e| e.0)),
-                super::number(ci95.map(|e| e.1)),
+                number(f.estimate.map(|e| e.value)),
+                number(ci95.map(|e| e.0)),
+                number(ci95.map(|e| e.1)),
                 f.participants.to_string(),
                 f.realizations.to_string(),
                 f.reason().unwrap_or_default().to_owned(),

@@ -3,7 +3,7 @@
 //! A rule that speaks of points of a scale has no meaning where something is chosen; it
 //! excludes nothing, and says so. Every rule judges the same trials.
 
-use super::study::Intervals;
+use super::part_data::Intervals;
 use crate::analyze::exclude::Applied;
 use crate::outcome::RatingRow;
 use crate::protocol::{Answer, Exclusion, Part};

@@ -3,8 +3,9 @@
 use super::excluded;
 use super::findings::{PartFacts, PartFinding, of_preferences, of_sensitivities, of_thresholds};
 use super::over_participants::{Threshold, Told, mixed, sensitivities};
+use super::part_data::{Found, Intervals, LevelData, PartData, StudyData, chosen};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
-use super::tracks::{TrackData, TrackName, of_session};
+use super::tracks::{TrackName, of_session};
 use super::trials::{Asked, TrialCount, TrialSettings, discrimination, level};
 use crate::analyze::exclude::Applied;
 use crate::analyze::findings::Pair;
@@ -13,30 +14,14 @@ use crate::analyze::select::{Include, Whose, state_counts};
 use crate::analyze::values::Values;
 use crate::analyze::warning::Warning;
 use crate::analyze::{Rules, vaf};
-use crate::outcome::fold::History;
 use crate::outcome::ratings::Origin;
-use crate::outcome::{IntervalRow, ParticipantRow, RatingRow, Status};
+use crate::outcome::{RatingRow, Status};
+use crate::protocol::Protocol;
 use crate::protocol::parts::{Compared, Pairs, Part, Task, TrackRules, Vary};
-use crate::protocol::{Answer, Protocol};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{PartId, ParticipantId};
 use study_stats::describe::is_constant;
 use study_stats::psychometric::{Core, Level, Support, pooled};
-
-/// What a study is analyzed from.
-#[derive(Debug, Clone, Copy)]
-pub struct StudyData<'a> {
-    /// Its protocol, with the VAF of its realizations.
-    pub protocol: &'a Protocol,
-    /// `ratings.csv`.
-    pub rows: &'a [RatingRow],
-    /// `intervals.csv`.
-    pub intervals: &'a [IntervalRow],
-    /// `participants.csv`.
-    pub participants: &'a [ParticipantRow],
-    /// Its sessions, of which the tracks are replayed.
-    pub sessions: &'a [&'a History],
-}
 
 /// The analysis of one part of a study.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,43 +52,6 @@ pub struct PartAnalysis {
     pub alpha: f64,
     /// What its figures draw besides.
     pub data: PartData,
-}
-
-/// The answers of a part by level and trial.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct PartData {
-    /// What the level is, with its unit; `None` without levels or for several families.
-    pub dimension: Option<String>,
-    /// Share of correct answers by guessing, where it follows from the kind of trial.
-    pub guess: Option<f64>,
-    /// Positive answers by level.
-    pub levels: Vec<LevelData>,
-    /// Tracks as they went.
-    pub tracks: Vec<TrackData>,
-    /// VAF of the compared realizations that have one.
-    pub vaf: BTreeMap<String, f64>,
-}
-
-/// Positive answers of one participant in one condition.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LevelData {
-    /// Participant. Untrusted.
-    pub participant: String,
-    /// Condition, as in the identifiers of its statistics.
-    pub condition: String,
-    /// By level, each once.
-    pub levels: Vec<Level>,
-}
-
-/// What is found of a part, before findings.
-struct Found {
-    task: &'static str,
-    trials: usize,
-    values: Values,
-    warnings: Vec<Warning>,
-    data: PartData,
-    /// Items of preferences, conditions of tracks.
-    names: Vec<String>,
 }
 
 /// The analyses of all parts that are not ratings. Which participants count is decided as
@@ -209,44 +157,6 @@ fn without_exclusions(before: &Values, values: &mut Values) {
         for (id, _) in ids {
             values.copy(before, id, format!("before_exclusion/{id}"));
         }
-    }
-}
-
-/// The presentations of each attempt.
-pub(super) struct Intervals<'a>(BTreeMap<Attempted<'a>, Vec<&'a IntervalRow>>);
-
-/// Participant, session, trial and attempt.
-type Attempted<'a> = (&'a ParticipantId, u32, u32, u32);
-
-impl<'a> Intervals<'a> {
-    fn of(rows: &'a [IntervalRow]) -> Self {
-        let mut attempts: BTreeMap<Attempted<'_>, Vec<&IntervalRow>> = BTreeMap::new();
-        for row in rows {
-            let attempt = (&row.participant, row.session, row.trial, row.attempt);
-            attempts.entry(attempt).or_default().push(row);
-        }
-        Self(attempts)
-    }
-
-    /// The presentations of the attempt that counts.
-    fn counted<'b>(&'b self, row: &'b RatingRow) -> &'b [&'b IntervalRow] {
-        let attempt = row.attempt.unwrap_or(0);
-        let place = (&row.participant, row.session, row.trial, attempt);
-        self.0.get(&place).map_or(&[], Vec::as_slice)
-    }
-
-    /// The fewest full strokes in an interval; `None` if those of one are unknown.
-    pub(super) fn strokes(&self, row: &RatingRow) -> Option<u32> {
-        let strokes: Option<Vec<u32>> = self.counted(row).iter().map(|i| i.strokes).collect();
-        strokes?.into_iter().min()
-    }
-}
-
-/// The answer to the part's own question.
-fn chosen<'a>(part: &Part, row: &'a RatingRow) -> Option<&'a str> {
-    match row.answers.get(part.asks.first()?)? {
-        Answer::Choice(chosen) => chosen.first().map(String::as_str),
-        _ => None,
     }
 }
 

@@ -1,0 +1,102 @@
+//! What the parts of a study are analyzed from, and what is found of one.
+
+use super::tracks::TrackData;
+use crate::analyze::values::Values;
+use crate::analyze::warning::Warning;
+use crate::outcome::fold::History;
+use crate::outcome::{IntervalRow, ParticipantRow, RatingRow};
+use crate::protocol::parts::Part;
+use crate::protocol::{Answer, Protocol};
+use std::collections::BTreeMap;
+use study_base::text::ParticipantId;
+use study_stats::psychometric::Level;
+
+/// What a study is analyzed from.
+#[derive(Debug, Clone, Copy)]
+pub struct StudyData<'a> {
+    /// Its protocol, with the VAF of its realizations.
+    pub protocol: &'a Protocol,
+    /// `ratings.csv`.
+    pub rows: &'a [RatingRow],
+    /// `intervals.csv`.
+    pub intervals: &'a [IntervalRow],
+    /// `participants.csv`.
+    pub participants: &'a [ParticipantRow],
+    /// Its sessions, of which the tracks are replayed.
+    pub sessions: &'a [&'a History],
+}
+
+/// The answers of a part by level and trial.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PartData {
+    /// What the level is, with its unit; `None` without levels or for several families.
+    pub dimension: Option<String>,
+    /// Share of correct answers by guessing, where it follows from the kind of trial.
+    pub guess: Option<f64>,
+    /// Positive answers by level.
+    pub levels: Vec<LevelData>,
+    /// Tracks as they went.
+    pub tracks: Vec<TrackData>,
+    /// VAF of the compared realizations that have one.
+    pub vaf: BTreeMap<String, f64>,
+}
+
+/// Positive answers of one participant in one condition.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelData {
+    /// Participant. Untrusted.
+    pub participant: String,
+    /// Condition, as in the identifiers of its statistics.
+    pub condition: String,
+    /// By level, each once.
+    pub levels: Vec<Level>,
+}
+
+/// What is found of a part, before findings.
+pub(super) struct Found {
+    pub(super) task: &'static str,
+    pub(super) trials: usize,
+    pub(super) values: Values,
+    pub(super) warnings: Vec<Warning>,
+    pub(super) data: PartData,
+    /// Items of preferences, conditions of tracks.
+    pub(super) names: Vec<String>,
+}
+
+/// The presentations of each attempt.
+pub(super) struct Intervals<'a>(BTreeMap<Attempted<'a>, Vec<&'a IntervalRow>>);
+
+/// Participant, session, trial and attempt.
+type Attempted<'a> = (&'a ParticipantId, u32, u32, u32);
+
+impl<'a> Intervals<'a> {
+    pub(super) fn of(rows: &'a [IntervalRow]) -> Self {
+        let mut attempts: BTreeMap<Attempted<'_>, Vec<&IntervalRow>> = BTreeMap::new();
+        for row in rows {
+            let attempt = (&row.participant, row.session, row.trial, row.attempt);
+            attempts.entry(attempt).or_default().push(row);
+        }
+        Self(attempts)
+    }
+
+    /// The presentations of the attempt that counts.
+    pub(super) fn counted<'b>(&'b self, row: &'b RatingRow) -> &'b [&'b IntervalRow] {
+        let attempt = row.attempt.unwrap_or(0);
+        let place = (&row.participant, row.session, row.trial, attempt);
+        self.0.get(&place).map_or(&[], Vec::as_slice)
+    }
+
+    /// The fewest full strokes in an interval; `None` if those of one are unknown.
+    pub(super) fn strokes(&self, row: &RatingRow) -> Option<u32> {
+        let strokes: Option<Vec<u32>> = self.counted(row).iter().map(|i| i.strokes).collect();
+        strokes?.into_iter().min()
+    }
+}
+
+/// The answer to the part's own question.
+pub(super) fn chosen<'a>(part: &Part, row: &'a RatingRow) -> Option<&'a str> {
+    match row.answers.get(part.asks.first()?)? {
+        Answer::Choice(chosen) => chosen.first().map(String::as_str),
+        _ => None,
+    }
+}
