@@ -13,7 +13,7 @@ use study_wire::message::{
     Commit, FixedVec, Heartbeat, Hello, Node, Play, Request, TableBegin, TableChunk, UploadCrc,
 };
 use study_wire::predict::{Direction, Lookup, Motion};
-use study_wire::servo::{Rendering, Servo, ServoSettings, ServoState};
+use study_wire::servo::{Law, Rendering, Servo, ServoSettings, ServoState};
 
 fn main() {
     divan::main();
@@ -88,16 +88,33 @@ fn a_study_of_150_playbacks(bencher: Bencher) {
     });
 }
 
+/// The same with the shipped mechanism of 67 values.
+#[divan::bench(sample_count = 100)]
+fn a_thousand_servo_steps_of_a_mechanism(bencher: Bencher) {
+    let path = "protocols/turn-signal-passive/models/mechanism.toml";
+    let text = std::fs::read_to_string(path).expect("the shipped file");
+    let parsed = study_haptics::model::file::parse(path, &text).0;
+    let realization = parsed.expect("a valid file");
+    let what = study::device::rendering_of(&realization);
+    servo_steps(bencher, &what);
+}
+
 /// Time of a thousand servo periods of a playback: table of 32 nodes, moving hand.
 #[divan::bench(sample_count = 100)]
 fn a_thousand_servo_steps(bencher: Bencher) {
     let realization = realization();
     let what = Rendering {
-        table: realization.table(),
-        rule: Direction::Play { delta_mm: 0.5 },
+        law: Law::Table {
+            table: realization.table(),
+            rule: Direction::Play { delta_mm: 0.5 },
+        },
         range_mm: realization.trained.x_mm,
         trained_mm_s: realization.trained.v_mm_s,
     };
+    servo_steps(bencher, &what);
+}
+
+fn servo_steps(bencher: Bencher, what: &Rendering<'_>) {
     let motions: Vec<Motion> = (0..1000)
         .map(|i| {
             let phase = f64::from(i) * 1e-3 * std::f64::consts::TAU;
@@ -113,7 +130,7 @@ fn a_thousand_servo_steps(bencher: Bencher) {
     bencher.bench_local(|| {
         let mut sum = 0.0;
         for motion in &motions {
-            sum += core.step(black_box(&what), black_box(*motion));
+            sum += core.step(black_box(what), black_box(*motion));
         }
         sum
     });

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Reproduces the model files of both protocols, from trajectory to realization:
+# Reproduces the model files of the protocols of the turn signal, from trajectory to realization:
 #
 #     sh protocols/identify.sh
 #
@@ -7,7 +7,7 @@
 # a temporary folder, or to the folder RECORDINGS. Seeds are fixed, so every run gives
 # the same recordings and files, byte for byte. STUDY is the program to run instead of
 # the one that cargo builds, PROTOCOLS the folder for the model files instead of this
-# one. Takes seconds.
+# one. Takes a minute, nearly all of it for the mechanism.
 #
 # tests/identify/shipped.rs compares the shipped files with these.
 set -eu
@@ -51,3 +51,10 @@ identify --lambda 0.9993 --dx 4 --out "$extended"
 identify --lambda 0.9997 --dx 0.5 --id 'practice-lambda-{lambda}-dx-{dx}' --out "$extended"
 identify --method static --dx 1 --id static --out "$extended"
 identify --method spring --out "$extended"
+
+passive=$protocols/turn-signal-passive/models
+identify --lambda 0.9991,0.9993,0.9995,0.9997,0.9999 --dx 1 --id 'lambda-{lambda}' --out "$passive"
+identify --method static --dx 1 --id static --out "$passive"
+identify --method spring --out "$passive"
+identify --method passive --dx 0.5 --id passive --out "$passive"
+identify --method mechanism --dx 0.5 --id mechanism --out "$passive"

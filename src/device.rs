@@ -29,7 +29,7 @@ use std::time::Duration;
 use study_base::limits::Limits;
 use study_core::outcome::{Playback, Sample};
 use study_haptics::model::Realization;
-use study_wire::servo::{self, ServoSettings};
+use study_wire::servo::{self, Law, ServoSettings};
 
 /// Identity and limits of a device.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +44,10 @@ pub struct Identity {
     pub limits: Limits,
     /// The constants of its servo, if it tells them.
     pub servo: Option<ServoSettings>,
+    /// Whether it plays mechanisms, and not only tables.
+    pub mechanisms: bool,
+    /// Largest stiffness of a certified realization, N/mm, if it tells.
+    pub stiffness_n_per_mm: Option<f64>,
 }
 
 /// Why a command was refused immediately.
@@ -80,11 +84,17 @@ pub struct Stimulus<'a> {
     pub allow_uncertified: bool,
 }
 
-/// A table as a servo plays it.
+/// A realization as a servo plays it.
 pub fn rendering_of(table: &Realization) -> servo::Rendering<'_> {
+    let law = match &table.mechanism {
+        Some(mechanism) => Law::Mechanism(mechanism.view()),
+        None => Law::Table {
+            table: table.table(),
+            rule: table.direction,
+        },
+    };
     servo::Rendering {
-        table: table.table(),
-        rule: table.direction,
+        law,
         range_mm: table.trained.x_mm,
         trained_mm_s: table.trained.v_mm_s,
     }

@@ -127,14 +127,15 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("certificate", &["predict"]),
     ("predict", &["real"]),
     ("estimate", &["predict", "real"]),
-    ("message", &["frame", "predict", "real"]),
-    ("servo", &["predict", "real"]),
-    ("mechanism", &["certificate", "predict"]),
+    ("message", &["frame", "mechanism", "predict", "real"]),
+    ("servo", &["mechanism", "predict", "real"]),
+    ("mechanism", &["certificate", "predict", "real"]),
     (
         "handler",
         &[
             "certificate",
             "frame",
+            "mechanism",
             "message",
             "predict",
             "real",

@@ -6,6 +6,7 @@ mod unsaved;
 use super::console::shell_command;
 use super::device_selection::{self, DeviceArgs, WaitDisplay};
 use super::{Console, Failure, Kind, load, study_folder};
+use crate::device::Identity;
 use crate::plain::Plain;
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Operator, Runner, Setup};
@@ -139,6 +140,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let Some(device) = opened? else {
         return console.out("Nothing was recorded.\n");
     };
+    refuse_unrendered(&device.identity(), kind, &loaded)?;
     // A person feels nothing on the simulated device: such data are never real.
     let overridden = kind != loaded.protocol.device.kind;
     let seats = if args.pilot || overridden || device.identity().simulated {
@@ -312,6 +314,48 @@ pub(super) fn refuse_unplayable(kind: DeviceKind, loaded: &load::Loaded) -> Resu
                 .hint(load::PERMIT));
             }
             _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Refuses, before anything is recorded, a study with realizations that the device would
+/// refuse: mechanisms where it plays tables only, and what is stiffer than it renders.
+fn refuse_unrendered(
+    device: &Identity,
+    kind: DeviceKind,
+    loaded: &load::Loaded,
+) -> Result<(), Failure> {
+    if kind == DeviceKind::Manual {
+        return Ok(());
+    }
+    let protocol = &loaded.protocol;
+    let permitted = protocol.device.uncertified.as_ref().is_some_and(|u| u.play);
+    for model in protocol.models.iter().filter(|m| m.device.is_none()) {
+        let Some(table) = loaded.models.get(&model.id) else {
+            continue;
+        };
+        if table.mechanism.is_some() && !device.mechanisms {
+            return Err(Failure::device(format!(
+                "realization `{}` is a mechanism, and the device `{}` plays tables only",
+                model.id, device.id
+            ))
+            .hint("a serial device needs minor version 2 of docs/wire.md, a program `\"mechanisms\": true` in its hello; or take the realization out of the protocol"));
+        }
+        let certificate = table.certificate();
+        // as the device judges it: from minor version 1 on with the direction state
+        let asked = match device.servo {
+            Some(_) => certificate.rendered_n_per_mm(),
+            None => certificate.stiffness_n_per_mm,
+        };
+        if let Some(most) = device.stiffness_n_per_mm.filter(|most| asked > *most)
+            && !permitted
+        {
+            return Err(Failure::device(format!(
+                "realization `{}` has a stiffness of {asked:.1} N/mm, direction state included, and the device `{}` renders at most {most:.1} N/mm",
+                model.id, device.id
+            ))
+            .hint("identify it with a longer --delta or a smaller friction, or permit it: uncertified = { play = true, … }"));
         }
     }
     Ok(())

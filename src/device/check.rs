@@ -6,6 +6,7 @@
 
 mod clauses;
 pub(super) mod exchange;
+mod mechanism;
 mod playing;
 mod uploads;
 

@@ -355,7 +355,10 @@ fn profile(options: &Options) -> Profile {
             telemetry: options.telemetry_hz > 0.0,
             probe: true,
         },
-        features: Features::default(),
+        features: Features {
+            mechanism: true,
+            ..Features::default()
+        },
         watchdog_ms: match options.flaw {
             Some(Flaw::LateWatchdog) => flaw::LATE_MS,
             _ => options.watchdog_ms,
@@ -365,7 +368,7 @@ fn profile(options: &Options) -> Profile {
         bounds: Bounds {
             force_n: options.limits.force_n.get(),
             velocity_mm_s: options.limits.velocity_mm_s.get(),
-            stiffness_n_per_mm: 25.0,
+            stiffness_n_per_mm: 100.0,
             damping_n_s_per_mm: 0.2,
             stroke_mm: [-20.0, 60.0],
         },

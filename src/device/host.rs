@@ -386,11 +386,13 @@ impl Host {
     fn retry_interval(&self, request: &Request) -> Duration {
         let constants = self.identity.and_then(|device| device.constants);
         match (request, constants) {
-            (Request::TableCommit(_) | Request::PathCommit(_), Some(constants)) => RETRY_INTERVAL
-                .max(
-                    Duration::from_millis(u64::from(constants.commit_ms.min(MAX_COMMIT_MS)))
-                        + COMMIT_SLACK,
-                ),
+            (
+                Request::TableCommit(_) | Request::PathCommit(_) | Request::MechanismCommit(_),
+                Some(constants),
+            ) => RETRY_INTERVAL.max(
+                Duration::from_millis(u64::from(constants.commit_ms.min(MAX_COMMIT_MS)))
+                    + COMMIT_SLACK,
+            ),
             _ => RETRY_INTERVAL,
         }
     }
@@ -521,6 +523,8 @@ fn identity(device: &message::Identity) -> Option<Identity> {
         telemetry: device.flags.telemetry,
         limits: Limits::new(device.force_n, device.velocity_mm_s).ok()?,
         servo: device.constants.map(|told| servo(device, &told)),
+        mechanisms: device.constants.is_some_and(|told| told.features.mechanism),
+        stiffness_n_per_mm: Some(device.stiffness_n_per_mm),
     })
 }
 

@@ -76,6 +76,8 @@ impl Device for Manual {
             // No limit in practice, because a sample has no motor.
             limits: Limits::new(1e3, 1e5).expect("positive constants"),
             servo: None,
+            mechanisms: false,
+            stiffness_n_per_mm: None,
         }
     }
 

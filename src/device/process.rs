@@ -15,6 +15,7 @@ mod child;
 mod messages;
 
 use super::host::Arrivals;
+use super::table::TableError;
 use super::{Device, DeviceError, Identity, Report, Stimulus};
 use child::{ChildFailure, Running};
 use messages::{ChildMessage, Hello, MessageError};
@@ -324,6 +325,8 @@ fn identity(hello: Hello) -> Identity {
         telemetry: hello.telemetry,
         limits: hello.limits,
         servo: None,
+        mechanisms: hello.mechanisms,
+        stiffness_n_per_mm: None,
     }
 }
 
@@ -340,6 +343,9 @@ impl Device for ProcessDevice {
     ) -> Result<(), DeviceError> {
         if !matches!(self.phase, Phase::Idle | Phase::Loading | Phase::Loaded) {
             return Err(self.wrong_state("load"));
+        }
+        if what.table.is_some_and(|table| table.mechanism.is_some()) && !self.identity.mechanisms {
+            return Err(DeviceError::Refused(TableError::Mechanism.to_string()));
         }
         self.load += 1;
         self.samples = 0;

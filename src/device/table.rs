@@ -9,8 +9,12 @@ use study_haptics::model::{Branch, Realization};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages have the meanings")]
 pub enum TableError {
-    #[error("it is a mechanism, which devices cannot play yet")]
+    #[error(
+        "it is a mechanism, and this device plays tables only (docs/wire.md 8.7, minor version 2)"
+    )]
     Mechanism,
+    #[error("its mechanism has {0} values; at most 65535 can be sent")]
+    TooManyValues(usize),
     #[error("it has fewer than two nodes")]
     TooFewNodes,
     #[error("it has {0} nodes; at most 65535 can be sent")]
@@ -55,9 +59,6 @@ pub fn check(realization: &Realization) -> Result<(), TableError> {
     let positive = |value: f64| value.is_finite() && value > 0.0;
     if !positive(realization.trained.v_mm_s) {
         return Err(TableError::Speed(realization.trained.v_mm_s));
-    }
-    if realization.mechanism.is_some() {
-        return Err(TableError::Mechanism);
     }
     match realization.direction.delta_mm() {
         Some(delta_mm) if !positive(delta_mm) => Err(TableError::Delta(delta_mm)),

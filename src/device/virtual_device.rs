@@ -229,6 +229,8 @@ impl Device for VirtualDevice {
             telemetry: true,
             limits: firmware::Options::default().limits,
             servo: None,
+            mechanisms: true,
+            stiffness_n_per_mm: None,
         })
     }
 

@@ -16,7 +16,7 @@ use study_base::text::ModelId;
 use study_core::outcome::{Fidelity, Playback, Sample, Verdict};
 use study_core::protocol::RenderingRules;
 use study_core::rendering::{Played, judge};
-use study_haptics::model::{Branch, Realization, Trained};
+use study_haptics::model::{Branch, Mechanism, Realization, Trained};
 use study_haptics::plant::HandParameters;
 use study_wire::predict::{Direction, Lookup};
 use study_wire::servo::ServoSettings;
@@ -27,11 +27,20 @@ const PAGE: &str = "docs/wrong-devices.md";
 /// The tables of the shipped protocols with the limits of their playback.
 fn shipped() -> Vec<(ModelId, Realization, Limits)> {
     let mut all = Vec::new();
-    for protocol in ["protocols/turn-signal", "protocols/turn-signal-extended"] {
+    for protocol in [
+        "protocols/turn-signal",
+        "protocols/turn-signal-extended",
+        "protocols/turn-signal-passive",
+    ] {
         let loaded = load::load(Path::new(&repository(protocol))).unwrap();
         for (id, table) in loaded.models {
             let limits = playback_limits(&loaded.protocol, Some(&table));
-            all.push((id, table, limits));
+            let known = all
+                .iter()
+                .any(|(_, other, _): &(_, Realization, _)| *other == table);
+            if !known {
+                all.push((id, table, limits));
+            }
         }
     }
     all
@@ -196,6 +205,42 @@ fn no_wrong_device_is_ok_where_telemetry_can_show_it() {
         std::fs::write(&path, expected).unwrap();
     } else {
         assert!(text == expected, "UPDATE_DOCS=1 writes {PAGE}:\n{rows}");
+    }
+}
+
+/// A device that plays another mechanism than the one it was sent is found, whichever
+/// part is wrong.
+#[test]
+fn a_wrong_part_of_a_mechanism_is_found() {
+    let found = shipped()
+        .into_iter()
+        .find(|(_, r, _)| r.mechanism.is_some());
+    let (id, right, limits) = found.unwrap();
+    type Change = fn(&mut Mechanism);
+    let parts: [(&str, Change); 7] = [
+        ("detents", |m| m.detent.n.iter_mut().for_each(|n| *n *= 0.7)),
+        ("detents moved", |m| m.detent.first_mm += 2.0),
+        ("friction", |m| {
+            m.friction.n.iter_mut().for_each(|n| *n = 0.0)
+        }),
+        ("backlash", |m| m.scalars.gap_mm *= 3.0),
+        ("masses", |m| m.scalars.follower_kg *= 6.0),
+        ("handle", |m| m.scalars.handle_n += 1.0),
+        ("offset", |m| m.scalars.offset_n += 0.6),
+    ];
+    let said = |played: &Realization| {
+        let heard = play(Options::seeded(5), &[(played, limits)], 5.0);
+        judged(&id, &right, limits, &heard, &[])
+    };
+    assert_eq!(said(&right).verdict, Verdict::Ok);
+    for (part, change) in parts {
+        let mut wrong = right.clone();
+        change(wrong.mechanism.as_mut().unwrap());
+        let found = said(&wrong);
+        assert!(
+            matches!(found.verdict, Verdict::Flag | Verdict::Fault),
+            "{part}: {found:?}"
+        );
     }
 }
 

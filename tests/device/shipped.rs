@@ -15,7 +15,8 @@ use study_haptics::model::{Realization, file};
 const UNCERTIFIED_N: f64 = 9.0;
 
 pub(crate) fn shipped() -> BTreeMap<String, Realization> {
-    ["turn-signal", "turn-signal-extended"]
+    // the same file in two protocols counts once
+    ["turn-signal", "turn-signal-extended", "turn-signal-passive"]
         .iter()
         .flat_map(|protocol| fs::read_dir(format!("protocols/{protocol}/models")).unwrap())
         .map(|entry| {
@@ -55,7 +56,7 @@ fn played(realization: &Realization, options: Options, force_n: f64) -> Result<P
 #[test]
 fn every_shipped_realization_plays_without_faults_and_supplies_little_energy() {
     let shipped = shipped();
-    assert_eq!(shipped.len(), 16);
+    assert_eq!(shipped.len(), 18);
     for (id, realization) in shipped {
         for seed in 0..3 {
             let options = Options::seeded(seed);

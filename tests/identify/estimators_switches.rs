@@ -86,7 +86,8 @@ fn passive_tables_pass_by_construction() {
         let found = training.identify(method, 0.5, Lookup::Linear).unwrap();
         let certificate = found.realization.certificate();
         assert!(certificate.passes(), "switch {switch}: {certificate}");
-        assert!(certificate.rendered_n_per_mm().is_finite());
+        // what the simulated device renders, direction state included
+        assert!(certificate.rendered_n_per_mm() < 100.0, "switch {switch}");
         let passive = vaf::score(&found.realization, &validation).vaf;
         let hat = vaf_of(&training, &validation, Method::Hat(Hat::default()));
         log_ratio += ((1.0 - hat) / (1.0 - passive)).ln() / 10.0;

@@ -12,7 +12,7 @@ use study_haptics::model::{Branch, Provenance, Realization, Trained, file};
 use study_haptics::recording;
 use study_wire::predict::{Direction, Lookup};
 
-const FOLDERS: [&str; 2] = ["turn-signal", "turn-signal-extended"];
+const FOLDERS: [&str; 3] = ["turn-signal", "turn-signal-extended", "turn-signal-passive"];
 const VALIDATION: &str = "validation-1.5hz";
 
 /// File name → text of one protocol's models.
@@ -135,6 +135,20 @@ fn the_extended_realizations_are_spread_in_vaf() {
     assert!(vafs[4] < vafs[7] - 0.05, "{vafs:?}");
     let anchor = shipped("turn-signal-extended")["spring"].vaf[VALIDATION];
     assert!(anchor < 0.1, "{anchor}");
+}
+
+/// The passive two pass without permission, and predict better than any of the paper's.
+#[test]
+fn the_passive_realizations_are_certified_and_predict_best() {
+    let all = shipped("turn-signal-passive");
+    let vaf = |id: &str| all[id].vaf[VALIDATION];
+    for id in ["passive", "mechanism"] {
+        let certificate = all[id].certificate();
+        assert!(certificate.passes(), "{id}: {certificate}");
+        // what the simulated device renders
+        assert!(certificate.rendered_n_per_mm() < 100.0, "{id}");
+    }
+    assert!(vaf("passive") > 0.99 && vaf("mechanism") > 0.9994);
 }
 
 /// Do not change this test or its file: a file that somebody has stays readable.

@@ -137,7 +137,11 @@ fn pages(
     panic!("no second trial:\n{}", pages.last().unwrap())
 }
 
-const PROTOCOLS: [&str; 2] = ["protocols/turn-signal", "protocols/turn-signal-extended"];
+const PROTOCOLS: [&str; 3] = [
+    "protocols/turn-signal",
+    "protocols/turn-signal-extended",
+    "protocols/turn-signal-passive",
+];
 
 fn realizations(name: &str) -> Vec<ModelId> {
     let loaded = load(Path::new(&repository(name))).unwrap();

@@ -42,12 +42,7 @@ fn ratings(path: &Path) -> Vec<Row> {
 
 #[test]
 fn a_session_on_a_child_program_is_real_data_with_telemetry() {
-    if std::process::Command::new("python3")
-        .arg("--version")
-        .output()
-        .is_err()
-    {
-        eprintln!("SKIPPED: python3 is not on this machine");
+    if !has_python() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -71,6 +66,45 @@ fn a_session_on_a_child_program_is_real_data_with_telemetry() {
         .path()
         .join("results/turn-signal/sessions/P01/1/telemetry");
     assert_eq!(fs::read_dir(telemetry).unwrap().count(), 5);
+}
+
+/// A controller that plays tables only is not given a study with a mechanism: nothing is
+/// created.
+#[test]
+fn a_mechanism_on_a_device_for_tables_is_refused_before_the_session() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("protocol");
+    changed_protocol(
+        "turn-signal-passive",
+        &to,
+        &[("\"simulated\"", "\"process\"")],
+    );
+    let command = format!("python3 {}", repository("docs/process_device.py"));
+    let arguments = ["run", to.to_str().unwrap(), "--command", &command];
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 3, "{err}");
+    assert!(
+        err.contains(
+            "realization `mechanism` is a mechanism, and the device `example-1` plays tables only"
+        ),
+        "{err}"
+    );
+    assert!(!folder.path().join("results").exists());
+}
+
+/// Whether there is a Python for the example controller.
+fn has_python() -> bool {
+    let found = std::process::Command::new("python3")
+        .arg("--version")
+        .output()
+        .is_ok();
+    if !found {
+        eprintln!("SKIPPED: python3 is not on this machine");
+    }
+    found
 }
 
 /// While a program has not said hello, the screen shows it, and a key quits. Nothing is

@@ -398,7 +398,7 @@ fn a_table_that_must_not_be_played_is_refused() {
         ),
         (
             "too stiff",
-            |_, n| n[8].positive[3] += 30.0,
+            |_, n| n[8].positive[3] += 110.0,
             Refusal::Limit,
             4,
         ),

@@ -6,14 +6,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::{begin, detents};
+use crate::support::{begin, detents, mechanism, mechanism_requests};
 use std::num::NonZeroU16;
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
 use study_wire::frame::{Decoder, Frame, MAX_BODY};
 use study_wire::message::{
-    Commit, DeviceState, FixedVec, Heartbeat, Hello, PathBegin, PathChunk, Play, Record, Reply,
-    Request, Stop, TableBegin, TableChunk, UploadCrc, kind,
+    Commit, DeviceState, FixedVec, Heartbeat, Hello, MechanismBegin, MechanismChunk, PathBegin,
+    PathChunk, Play, Record, Reply, Request, Stop, TableBegin, TableChunk, UploadCrc, kind,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -93,7 +93,7 @@ impl Fuzz {
         let word = self.below(1 << 32) as u32;
         let small = self.below(40) as u16;
         let clock_ms = self.at.as_millis() as u32;
-        match self.below(20) {
+        match self.below(23) {
             0 => Request::Hello(Hello {
                 nonce: self.nonce + self.below(2) as u32,
                 minor: self.below(3) as u8,
@@ -143,6 +143,23 @@ impl Fuzz {
                 x_nm: FixedVec::of(&[word as i32; 56][..usize::from(small) + 1]),
             }),
             18 => Request::PathCommit(Commit { crc: word }),
+            19 => {
+                let (good, _) = mechanism(4.0, 1.0);
+                Request::MechanismBegin(MechanismBegin {
+                    detents: small,
+                    frictions: small,
+                    range_mm: [self.float(), self.float()],
+                    trained_mm_s: self.float(),
+                    force_n: self.float(),
+                    uncertified_n: Some(self.float()),
+                    ..good
+                })
+            }
+            20 => Request::MechanismChunk(MechanismChunk {
+                first: small,
+                values: FixedVec::of(&[self.float(); 12]),
+            }),
+            21 => Request::MechanismCommit(Commit { crc: self.crc }),
             _ => Request::Record(Record {
                 playback: word,
                 crc: self.crc,
@@ -204,7 +221,7 @@ impl Fuzz {
         self.nonce += 2;
         self.say(Request::Hello(Hello {
             nonce: self.nonce,
-            minor: 1,
+            minor: 2,
         }));
         self.at += Duration::from_millis(100);
         self.say(Request::Rearm);
@@ -249,6 +266,27 @@ impl Fuzz {
         self.say(Request::Play(Play {
             playback: 1,
             crc: self.crc,
+            longest_ms: 60_000,
+            every: NonZeroU16::new(1),
+        }));
+        self.live();
+    }
+
+    /// Starts a playback of a mechanism with a large force.
+    fn play_mechanism(&mut self) {
+        self.open();
+        let (mut begin, values) = mechanism(16.0, 4.0);
+        begin.uncertified_n = Some(9.0);
+        let (requests, crc) = mechanism_requests(begin, &values);
+        self.crc = crc;
+        for request in requests {
+            self.say(request);
+        }
+        self.beat();
+        self.say(Request::MechanismCommit(Commit { crc }));
+        self.say(Request::Play(Play {
+            playback: 1,
+            crc,
             longest_ms: 60_000,
             every: NonZeroU16::new(1),
         }));
@@ -311,6 +349,8 @@ fn random_frames() {
         let i = fuzz.count.frames;
         if i.is_multiple_of(5000) {
             fuzz.record();
+        } else if i.is_multiple_of(3000) {
+            fuzz.play_mechanism();
         } else if i.is_multiple_of(1000) {
             fuzz.play();
         }
@@ -321,7 +361,7 @@ fn random_frames() {
             0 => fuzz.bytes(MAX_BODY as u64),
             // any bytes after a valid header, except that of LIMP
             1 => {
-                let mut body = vec![1, fuzz.below(0x14) as u8, 0, 0];
+                let mut body = vec![1, fuzz.below(0x24) as u8, 0, 0];
                 body.extend(fuzz.bytes(30));
                 if body[1] == kind::LIMP && fuzz.below(50) != 0 {
                     body[1] = kind::PLAY;
@@ -364,6 +404,8 @@ fn mutated_frames() {
     for i in 0..frames() {
         if i.is_multiple_of(5000) {
             fuzz.record();
+        } else if i.is_multiple_of(3000) {
+            fuzz.play_mechanism();
         } else if i.is_multiple_of(1000) {
             fuzz.play();
         }

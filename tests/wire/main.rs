@@ -5,6 +5,7 @@ mod firmware;
 mod firmware_probe;
 mod firmware_states;
 mod fuzz;
+mod mechanism;
 mod minor;
 mod rules;
 mod support;

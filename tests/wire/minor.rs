@@ -4,9 +4,11 @@
 
 use super::support::{Host, ms};
 use std::time::Duration;
-use study::device::Report;
 use study::device::firmware::{Firmware, Options};
 use study::device::host::{Host as StudyHost, HostSettings};
+use study::device::{Report, Stimulus};
+use study_base::limits::Limits;
+use study_haptics::model::file;
 use study_wire::frame::Decoder;
 use study_wire::message::{
     Ack, Constants, DeviceState, Fault, Header, Hello, Identity, MINOR, Refusal, Reply, Request,
@@ -114,6 +116,45 @@ fn a_device_of_minor_version_0_is_asked_again_and_plays() {
     assert!(matches!(host.take_reports()[..], [Report::Ready]));
     assert_eq!(host.device().unwrap().constants, None);
     assert_eq!(host.health().repeats, 0, "it was not waited for");
+}
+
+/// A device of minor version 1 plays tables as ever and is not sent a mechanism.
+#[test]
+fn a_device_of_minor_version_1_gets_no_mechanism() {
+    let mut device = Firmware::new(Options::default());
+    let settings = HostSettings {
+        supervision_timeout: None,
+        ..HostSettings::default()
+    };
+    let mut host = StudyHost::new(7, settings);
+    host.connected(ms(0));
+    let mut decoder = Decoder::new();
+    for byte in host.take_output() {
+        let Some(Ok(body)) = decoder.push(byte) else {
+            continue;
+        };
+        let (header, request) = Request::decode(body).unwrap();
+        // what it reads of the host's HELLO
+        let request = match request {
+            Request::Hello(hello) => Request::Hello(Hello { minor: 1, ..hello }),
+            other => other,
+        };
+        device.receive(request.frame(header.sequence).as_bytes(), ms(0));
+    }
+    host.receive(&device.take_output(), ms(0));
+    assert_eq!(host.device().unwrap().constants.unwrap().minor, 1);
+    assert!(!host.identity().unwrap().mechanisms);
+    let path = "protocols/turn-signal-passive/models/mechanism.toml";
+    let text = std::fs::read_to_string(path).unwrap();
+    let mechanism = file::parse(path, &text).0.unwrap();
+    let limits = Limits::new(12.0, 1000.0).unwrap();
+    let refused = host.load(&Stimulus::of_table(&mechanism), limits, ms(1));
+    let text = refused.unwrap_err().to_string();
+    assert!(
+        text.contains("is a mechanism, and this device plays tables only"),
+        "{text}"
+    );
+    assert!(host.take_output().is_empty(), "nothing was sent");
 }
 
 #[test]

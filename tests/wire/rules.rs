@@ -291,12 +291,12 @@ fn hello_forgets_heartbeats_and_before_it_none_is_fresh() {
 }
 
 /// The change of force over the direction state belongs to the stiffness from minor
-/// version 1 on: 2 × 7 N over 0.5 mm are 28 N/mm, of which the device renders 25.
+/// version 1 on: 2 × 30 N over 0.5 mm are 120 N/mm, of which the device renders 100.
 #[test]
 fn the_stiffness_of_the_direction_state_counts_from_minor_version_1_on() {
     let mut nodes = detents(0.05, 0.02);
     for node in &mut nodes {
-        [node.positive[3], node.negative[3]] = [7.0, -7.0];
+        [node.positive[3], node.negative[3]] = [30.0, -30.0];
     }
     for (minor, expected) in [(0, (Refusal::None, 0)), (1, (Refusal::Limit, 4))] {
         let mut host = Host::opened(Options::default());

@@ -7,9 +7,10 @@ use std::num::NonZeroU16;
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
 use study_wire::frame::Decoder;
+use study_wire::mechanism::Scalars;
 use study_wire::message::{
-    Ack, Commit, FixedVec, Heartbeat, Hello, Node, Outcome, Play, Pulse, Refusal, Reply, Request,
-    Stop, TableBegin, TableChunk, UploadCrc, kind,
+    Ack, Commit, FixedVec, Heartbeat, Hello, MINOR, MechanismBegin, MechanismChunk, Node, Outcome,
+    Play, Pulse, Refusal, Reply, Request, Stop, TableBegin, TableChunk, UploadCrc, kind,
 };
 use study_wire::predict::{Direction, Lookup};
 
@@ -58,7 +59,10 @@ impl Host {
 
     pub(crate) fn open(&mut self, nonce: u32) {
         self.ask(Request::Limp);
-        self.ask(Request::Hello(Hello { nonce, minor: 1 }));
+        self.ask(Request::Hello(Hello {
+            nonce,
+            minor: MINOR,
+        }));
         assert_eq!(self.ack(Request::Rearm).refusal, Refusal::None);
     }
 
@@ -188,6 +192,25 @@ impl Host {
         (self.ack(Request::TableCommit(Commit { crc })), crc)
     }
 
+    /// Uploads a mechanism; the reply to COMMIT or the first refusal, and the CRC.
+    pub(crate) fn upload_mechanism(
+        &mut self,
+        begin: MechanismBegin,
+        values_n: &[f64],
+    ) -> (Ack, u32) {
+        let (requests, crc) = mechanism_requests(begin, values_n);
+        for request in requests {
+            self.beat();
+            let ack = self.ack(request);
+            if ack.refusal != Refusal::None {
+                return (ack, crc);
+            }
+        }
+        self.beat();
+        let commit = Request::MechanismCommit(Commit { crc });
+        (self.ack(commit), crc)
+    }
+
     pub(crate) fn play(&mut self, playback: u32, crc: u32) -> Ack {
         self.beat();
         self.ack(Request::Play(Play {
@@ -212,6 +235,58 @@ impl Host {
         host.live(lasting);
         host
     }
+}
+
+/// MECHANISM_BEGIN and all chunks, and the CRC.
+pub(crate) fn mechanism_requests(begin: MechanismBegin, values_n: &[f64]) -> (Vec<Request>, u32) {
+    let mut crc = UploadCrc::of_mechanism(&begin);
+    values_n.iter().for_each(|value| crc.value_n(*value));
+    let chunks = values_n.chunks(MechanismChunk::MAX_VALUES).enumerate();
+    let chunk = |(i, some)| {
+        Request::MechanismChunk(MechanismChunk {
+            first: (i * MechanismChunk::MAX_VALUES) as u16,
+            values: FixedVec::of(some),
+        })
+    };
+    let begin = [Request::MechanismBegin(begin)].into_iter();
+    (begin.chain(chunks.map(chunk)).collect(), crc.value())
+}
+
+/// A switch of three detents with friction as a mechanism: 65 values of D every 0.5 mm, 9 of
+/// F_c every 4 mm.
+pub(crate) fn mechanism(detent_n: f64, friction_n: f64) -> (MechanismBegin, Vec<f64>) {
+    let begin = MechanismBegin {
+        detents: 65,
+        frictions: 9,
+        detent_mm: [1.5, 0.5],
+        friction_mm: [1.5, 4.0],
+        range_mm: [1.5, 33.5],
+        trained_mm_s: 138.0,
+        force_n: 12.0,
+        velocity_mm_s: 1000.0,
+        uncertified_n: None,
+        scalars: Scalars {
+            handle_kg: 0.1,
+            follower_kg: 0.14,
+            contact_n_per_mm: 12.0,
+            contact_n_s_per_mm: 0.012,
+            gap_mm: 0.8,
+            follower_n_s_per_mm: 0.006,
+            slip_mm: 0.06,
+            stribeck: 0.3,
+            stribeck_mm_s: 8.0,
+            handle_n: 0.25,
+            handle_slip_mm: 0.06,
+            handle_n_s_per_mm: 0.001,
+            offset_n: 0.3,
+        },
+    };
+    let detent = (0..65).map(|i| {
+        let x_mm = 1.5 + 0.5 * f64::from(i);
+        detent_n * libm::sin((x_mm - 5.0) / 12.5 * std::f64::consts::TAU)
+    });
+    let friction = std::iter::repeat_n(friction_n, 9);
+    (begin, detent.chain(friction).collect())
 }
 
 /// A switch of three detents with friction; m in kg, b in N·s/mm.

@@ -15,11 +15,12 @@ use self::requests::requests;
 use std::num::NonZeroU16;
 use study_wire::frame::{Decoder, crc32, is_stream};
 use study_wire::handler::{Bounds, Handler, Measured, Profile};
+use study_wire::mechanism::Scalars;
 use study_wire::message::{
     Ack, Commit, Constants, DeviceState, Event, EventKind, Fault, Features, FixedVec, Flags,
-    Heartbeat, Hello, Identity, Loaded, Name, Node, Outcome, PathBegin, PathChunk, Play, Pulse,
-    Record, Recorded, RecordedPoint, Refusal, Reply, Request, Stop, TableBegin, TableChunk,
-    Telemetry, TelemetrySample, UploadCrc, WireError, fixed, kind,
+    Heartbeat, Hello, Identity, Loaded, MechanismBegin, MechanismChunk, Name, Node, Outcome,
+    PathBegin, PathChunk, Play, Pulse, Record, Recorded, RecordedPoint, Refusal, Reply, Request,
+    Stop, TableBegin, TableChunk, Telemetry, TelemetrySample, UploadCrc, WireError, fixed, kind,
 };
 use study_wire::predict::{Direction, Lookup, Motion};
 use study_wire::servo::ServoSettings;
@@ -28,6 +29,8 @@ use study_wire::servo::ServoSettings;
 const TABLE_CRC: u32 = 0xDDE60A90;
 /// CRC of the three points below.
 const PATH_CRC: u32 = 0xD46CF557;
+/// CRC of the five values below with [`mechanism`].
+const MECHANISM_CRC: u32 = 0xE161DD9F;
 
 struct Golden<M> {
     name: &'static str,
@@ -105,6 +108,36 @@ fn identity() -> Identity {
     }
 }
 
+/// A mechanism of three detent values and two of friction.
+fn mechanism() -> MechanismBegin {
+    MechanismBegin {
+        detents: 3,
+        frictions: 2,
+        detent_mm: [1.5, 16.0],
+        friction_mm: [1.5, 32.0],
+        range_mm: [1.5, 33.5],
+        trained_mm_s: 138.0,
+        force_n: 12.0,
+        velocity_mm_s: 1000.0,
+        uncertified_n: None,
+        scalars: Scalars {
+            handle_kg: 0.1,
+            follower_kg: 0.14,
+            contact_n_per_mm: 12.0,
+            contact_n_s_per_mm: 0.0125,
+            gap_mm: 0.75,
+            follower_n_s_per_mm: 0.005,
+            slip_mm: 0.0625,
+            stribeck: 0.25,
+            stribeck_mm_s: 8.0,
+            handle_n: 0.25,
+            handle_slip_mm: 0.0625,
+            handle_n_s_per_mm: 0.001,
+            offset_n: 0.5,
+        },
+    }
+}
+
 /// The same device to a host of minor version 1.
 fn identity_1() -> Identity {
     Identity {
@@ -112,6 +145,7 @@ fn identity_1() -> Identity {
             minor: 1,
             features: Features {
                 acceleration_from_speed: true,
+                mechanism: false,
             },
             commit_ms: 135,
             acceleration_hz: 20.0,
@@ -230,7 +264,9 @@ fn every_request_has_the_specified_bytes() {
         kinds.push(header.kind);
     }
     kinds.dedup();
-    let all = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0x10, 0x11, 0x12, 0x13];
+    let all = [
+        1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0x10, 0x11, 0x12, 0x13, 0x20, 0x21, 0x22,
+    ];
     assert_eq!(kinds, all, "a message is not in the list");
 }
 
@@ -257,6 +293,11 @@ fn the_crc_of_an_upload_is_that_of_its_consecutive_fields() {
     let mut crc = UploadCrc::of_table(&begin());
     nodes().iter().for_each(|node| crc.node(node));
     assert_eq!(crc.value(), TABLE_CRC);
+    let mut crc = UploadCrc::of_mechanism(&mechanism());
+    for value in [0.0, 4.0, -4.0, 1.25, 1.5] {
+        crc.value_n(value);
+    }
+    assert_eq!(crc.value(), MECHANISM_CRC);
     let mut crc = UploadCrc::of_path(&PathBegin {
         points: 3,
         rate_hz: 1000.0,
@@ -334,7 +375,11 @@ fn invalid_replies_are_rejected() {
         assert_eq!(spoilt, Err(WireError::Field), "{at}");
     }
     // Features that this version does not know are ignored.
-    let later = spoiled(Reply::Identity(identity_1()), 158, &[0xff; 4]);
+    let later = spoiled(
+        Reply::Identity(identity_1()),
+        158,
+        &[0xfd, 0xff, 0xff, 0xff],
+    );
     assert_eq!(later.unwrap().1, Reply::Identity(identity_1()));
     // energy
     let spoilt = spoiled(Reply::Outcome(outcome()), 47, &nan);

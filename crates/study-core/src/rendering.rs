@@ -17,7 +17,7 @@ use moments::{Moments, best_lag};
 use predicted::{Predicted, predicted};
 use study_base::text::ModelId;
 use study_wire::predict::Direction;
-use study_wire::servo::{self, ServoSettings};
+use study_wire::servo::{self, Law, ServoSettings};
 
 /// Slower than this the handle rests, mm/s.
 const REST_MM_S: f64 = 5.0;
@@ -272,7 +272,14 @@ fn share(part: f64, whole: f64) -> Option<f64> {
 fn comparable(played: &Played<'_>, samples: &[Sample], forces: &[Predicted]) -> Vec<bool> {
     let from_s = played.servo.ramp_s + AFTER_RAMP_S;
     let limit_n = played.servo.force_n;
-    let known = |s: &Sample| played.what.rule != Direction::Sign || s.v_mm_s.abs() > REST_MM_S;
+    let by_sign = matches!(
+        played.what.law,
+        Law::Table {
+            rule: Direction::Sign,
+            ..
+        }
+    );
+    let known = |s: &Sample| !by_sign || s.v_mm_s.abs() > REST_MM_S;
     (samples.iter().zip(forces))
         .map(|(s, p)| {
             let free = p.force_n.abs() < limit_n - ROUNDING_N;

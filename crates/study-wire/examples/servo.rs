@@ -4,7 +4,7 @@
 use std::io::Write as _;
 use study_wire::certificate::{Range, certify};
 use study_wire::predict::{BranchView, Direction, Lookup, Motion, TableView};
-use study_wire::servo::{Rendering, Servo, ServoSettings};
+use study_wire::servo::{Law, Rendering, Servo, ServoSettings};
 
 fn main() -> std::io::Result<()> {
     // A spring of 0.2 N/mm about 15 mm, with 0.5 N of friction.
@@ -14,14 +14,15 @@ fn main() -> std::io::Result<()> {
         k_n_per_mm: &[0.2; 3],
         f0_n,
     };
+    let table = TableView {
+        x_mm: &[0.0, 15.0, 30.0],
+        positive: branch(&[-2.5; 3]),
+        negative: branch(&[-3.5; 3]),
+        lookup: Lookup::Linear,
+    };
+    let rule = Direction::Play { delta_mm: 0.5 };
     let rendering = Rendering {
-        table: TableView {
-            x_mm: &[0.0, 15.0, 30.0],
-            positive: branch(&[-2.5; 3]),
-            negative: branch(&[-3.5; 3]),
-            lookup: Lookup::Linear,
-        },
-        rule: Direction::Play { delta_mm: 0.5 },
+        law: Law::Table { table, rule },
         range_mm: [0.0, 30.0],
         trained_mm_s: 100.0,
     };
@@ -30,7 +31,7 @@ fn main() -> std::io::Result<()> {
         v_mm_s: rendering.trained_mm_s,
     };
     let mut out = std::io::stdout().lock();
-    writeln!(out, "{}", certify(&rendering.table, rendering.rule, range))?;
+    writeln!(out, "{}", certify(&table, rule, range))?;
 
     let mut servo = Servo::new(ServoSettings::default());
     servo.start();

@@ -87,7 +87,7 @@ impl Margin {
         }
     }
 
-    fn include(&mut self, value: f64, at_mm: f64) {
+    pub(crate) fn include(&mut self, value: f64, at_mm: f64) {
         // A NaN is kept, so that the condition fails.
         if value < self.value || value.is_nan() {
             *self = Self { value, at_mm };

@@ -11,8 +11,9 @@
 //! The simulated device does the same. `docs/wire.md` is the specification.
 //!
 //! It has no clock and does not panic, whatever bytes it receives. `NODES` is the capacity
-//! for the nodes of a table, 72 bytes each, or 36 in single precision; `POINTS` is the
-//! capacity for the points of a path, 4 bytes each; the rest takes less than 2.5 KiB. All calls must come from one context or exclude each other.
+//! for the nodes of a table and for the values of a mechanism, together 80 bytes each, or 44 in
+//! single precision; `POINTS` is the
+//! capacity for the points of a path, 4 bytes each; the rest takes less than 3.5 KiB. All calls must come from one context or exclude each other.
 //!
 //! Invariants:
 //!
@@ -21,6 +22,7 @@
 //! - Only PLAY and RECORD lead into those states, and only while the host is alive.
 //! - Only REARM at rest leads out of [`DeviceState::Limp`] and [`DeviceState::Fault`].
 
+mod mechanism;
 mod path;
 mod requests;
 mod run;
@@ -30,9 +32,10 @@ use super::frame::{Decoder, Frame, MAX_BODY};
 use super::message::{
     Ack, DeviceState, Event, EventKind, Fault, Features, Flags, Loaded, Name, Refusal, Reply,
 };
-use super::servo::{Rendering, Servo, ServoSettings, ServoState, Trip};
+use super::servo::{Law, Rendering, Servo, ServoSettings, ServoState, Trip};
 use crate::predict::Motion;
 use crate::real::Real;
+use mechanism::MechanismBuffer;
 use path::PathBuffer;
 use run::Run;
 pub use table::Bounds;
@@ -125,6 +128,7 @@ pub struct Handler<const NODES: usize, const POINTS: usize, R = f64> {
     heartbeat: Option<u32>,
     alive: Option<Alive>,
     table: TableBuffer<NODES, R>,
+    mechanism: MechanismBuffer<NODES, R>,
     path: PathBuffer<POINTS>,
     loaded: Loaded,
     /// CRC of what is loaded.
@@ -161,6 +165,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             heartbeat: None,
             alive: None,
             table: TableBuffer::new(),
+            mechanism: MechanismBuffer::new(),
             path: PathBuffer::new(),
             loaded: Loaded::Nothing,
             crc: 0,
@@ -195,10 +200,11 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
         self.loaded
     }
 
-    /// Identified range of the loaded table, mm.
+    /// Identified range of the loaded table or mechanism, mm.
     pub fn range_mm(&self) -> Option<[f64; 2]> {
-        let begin = self.table.begin?;
-        (self.loaded == Loaded::Table).then_some(begin.range_mm)
+        let begun = (self.table.begin.map(|begin| begin.range_mm))
+            .or(self.mechanism.begin.map(|begin| begin.range_mm))?;
+        (self.loaded == Loaded::Table).then_some(begun)
     }
 
     /// The commanded force, N.
@@ -215,11 +221,11 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
         self.limit_n
     }
 
-    /// Received nodes that have not been judged so far. [`Handler::servo`] judges one a
-    /// period while there is no force, and COMMIT the rest. A link of up to 32 bytes a
-    /// period leaves at most those of one chunk.
+    /// Received nodes, or values of a mechanism, that have not been judged so far.
+    /// [`Handler::servo`] judges one a period while there is no force, and COMMIT the rest.
+    /// A link of up to 32 bytes a period leaves at most the nodes of one chunk.
     pub fn unjudged(&self) -> usize {
-        self.table.unjudged()
+        self.table.unjudged() + self.mechanism.unjudged()
     }
 
     /// Processes bytes that the link has received.
@@ -269,6 +275,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
         self.supervise(now_ms, out);
         if !self.state.applies_force() {
             self.table.judge();
+            self.mechanism.judge();
             return Drive::Force(R::ZERO);
         }
         match self.loaded {
@@ -293,14 +300,23 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
     }
 
     fn play(&mut self, measured: Measured<R>, now_ms: u32, out: Out<'_>) -> Drive<R> {
-        let Some(begin) = &self.table.begin else {
+        let what = if let Some(begin) = &self.table.begin {
+            Rendering {
+                law: Law::Table {
+                    table: self.table.view(),
+                    rule: begin.direction,
+                },
+                range_mm: begin.range_mm,
+                trained_mm_s: begin.trained_mm_s,
+            }
+        } else if let (Some(begin), Some(view)) = (&self.mechanism.begin, self.mechanism.view()) {
+            Rendering {
+                law: Law::Mechanism(view),
+                range_mm: begin.range_mm,
+                trained_mm_s: begin.trained_mm_s,
+            }
+        } else {
             return Drive::Force(R::ZERO);
-        };
-        let what = Rendering {
-            table: self.table.view(),
-            rule: begin.direction,
-            range_mm: begin.range_mm,
-            trained_mm_s: begin.trained_mm_s,
         };
         let force_n = self.servo.step(&what, measured.motion);
         if let ServoState::Tripped(trip) = self.servo.state() {
@@ -341,6 +357,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
 
     fn unload(&mut self) {
         self.table.clear();
+        self.mechanism.clear();
         self.path.clear();
         self.loaded = Loaded::Nothing;
         self.crc = 0;
@@ -426,6 +443,7 @@ mod tests {
         },
         features: Features {
             acceleration_from_speed: true,
+            mechanism: true,
         },
         watchdog_ms: 30,
         longest_ms: 600_000,
@@ -450,12 +468,12 @@ mod tests {
     fn a_handler_is_a_constant_of_the_documented_size() {
         assert_eq!(DOUBLE.state(), DeviceState::Boot);
         assert_eq!(SINGLE.held_n(), 0.0);
-        // 72 or 36 bytes a node, and the rest
+        // 80 or 44 bytes a node, and the rest
         let rest = [
-            size_of_val(&DOUBLE) - 72 * 512,
-            size_of_val(&SINGLE) - 36 * 512,
+            size_of_val(&DOUBLE) - 80 * 512,
+            size_of_val(&SINGLE) - 44 * 512,
         ];
-        assert!(rest.iter().all(|rest| *rest < 2560), "{rest:?}");
+        assert!(rest.iter().all(|rest| *rest < 3584), "{rest:?}");
         let probe = size_of::<Handler<2, 1000>>() - size_of::<Handler<2, 0>>();
         assert_eq!(probe, 4000);
     }

@@ -13,7 +13,8 @@
 //! 1. Describe the device with a [`handler::Profile`]: its limits, its servo rate and
 //!    the settings of the [`servo`].
 //! 2. Put a `Handler<NODES, POINTS>`, or `Handler<NODES, POINTS, f32>`, into a `static`:
-//!    [`handler::Handler::new`] is `const`. A table node takes 72 bytes, or 36 in `f32`, a
+//!    [`handler::Handler::new`] is `const`. A table node or value of a
+//!    mechanism takes 80 bytes, or 44 in `f32`, a
 //!    point of a probe's path 4 bytes. `POINTS` is 0 without probe mode.
 //! 3. In the servo's timer interrupt call [`handler::Handler::servo`] with the measured
 //!    motion, apply the returned [`handler::Drive`] to the motor, and pass received

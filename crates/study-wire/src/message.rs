@@ -11,7 +11,8 @@
 mod bytes;
 pub mod code;
 pub mod fixed;
-pub mod probe;
+pub mod mechanism;
+mod probe;
 pub mod reply;
 pub mod stream;
 pub mod table;
@@ -22,6 +23,7 @@ use core::fmt;
 use core::num::NonZeroU16;
 
 pub use code::{DeviceState, EventKind, Fault, Loaded, Refusal};
+pub use mechanism::{MechanismBegin, MechanismChunk};
 pub use probe::{PathBegin, PathChunk};
 pub use reply::{Ack, Constants, Features, Flags, Identity, Name, Outcome, Pulse};
 pub use stream::{Event, Recorded, RecordedPoint, Telemetry, TelemetrySample};
@@ -31,7 +33,9 @@ pub use table::{Node, TableBegin, TableChunk, UploadCrc};
 pub const VERSION: u8 = 1;
 /// The newest minor version that this module implements. Minor versions only add: host
 /// and device use the lower one of both, see [`Hello`] and [`Constants`].
-pub const MINOR: u8 = 1;
+pub const MINOR: u8 = 2;
+/// The minor version that added mechanisms.
+pub const MECHANISM_MINOR: u8 = 2;
 
 /// Why a body is no message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -342,6 +346,12 @@ messages! {
         PathCommit(fields: Commit) = PATH_COMMIT 0x12;
         /// Records along the loaded path.
         Record(fields: Record) = RECORD 0x13;
+        /// Begins the upload of a mechanism; from minor version 2 on, as the next two.
+        MechanismBegin(fields: MechanismBegin) = MECHANISM_BEGIN 0x20;
+        /// Carries values of the mechanism's profiles.
+        MechanismChunk(fields: MechanismChunk) = MECHANISM_CHUNK 0x21;
+        /// Ends the upload of a mechanism.
+        MechanismCommit(fields: Commit) = MECHANISM_COMMIT 0x22;
     }
     /// A message from the device to the host.
     Reply {
@@ -363,6 +373,16 @@ messages! {
 }
 
 impl Request {
+    /// The minor version that added it.
+    pub fn minor(&self) -> u8 {
+        match self {
+            Self::MechanismBegin(_) | Self::MechanismChunk(_) | Self::MechanismCommit(_) => {
+                MECHANISM_MINOR
+            }
+            _ => 0,
+        }
+    }
+
     /// Whether the device executes it only once per sequence number. All other
     /// requests may be sent at any time with any number.
     pub fn sequenced(&self) -> bool {

@@ -11,8 +11,8 @@
 //!    energy that the hand has put in; E < 0 means that the device was active.
 //! 3. Low-pass the acceleration with two poles; a sampled mass is unstable without
 //!    this filter.
-//! 4. Evaluate the table with the realization's direction rule. The speed is
-//!    limited to the trained range and the mass to at least
+//! 4. Evaluate the table with the realization's direction rule, or step the mechanism. A
+//!    table's speed is limited to the trained range, and the mass to at least
 //!    [`ServoSettings::least_mass_kg`].
 //! 5. Beyond the identified range, use the force at its edge and add a spring wall.
 //! 6. Limit the slew rate, 7. apply the ramp, 8. clamp to the force limit.
@@ -26,6 +26,7 @@
 mod low_pass;
 pub mod tally;
 
+use crate::mechanism::{self, MechanismView};
 use crate::predict::{self, Direction, DirectionState, Motion, TableView, clamp};
 use crate::real::Real;
 use low_pass::{DirectForm, LowPass};
@@ -89,13 +90,25 @@ impl ServoSettings {
     }
 }
 
-/// What is played: a table, its direction rule and the identified range.
+/// The force of a realization as a function of the motion.
+#[derive(Debug, Clone, Copy)]
+pub enum Law<'a, R = f64> {
+    /// Parameters by position and direction.
+    Table {
+        /// The parameters.
+        table: TableView<'a, R>,
+        /// How the branches for the two directions are combined.
+        rule: Direction,
+    },
+    /// A mechanism with a state of its own.
+    Mechanism(MechanismView<'a, R>),
+}
+
+/// What is played, and the range in which it was identified.
 #[derive(Debug, Clone, Copy)]
 pub struct Rendering<'a, R = f64> {
-    /// The parameters.
-    pub table: TableView<'a, R>,
-    /// How the branches for the two directions are combined.
-    pub rule: Direction,
+    /// The force.
+    pub law: Law<'a, R>,
     /// Identified range of positions, mm.
     pub range_mm: [f64; 2],
     /// Largest speed in the identification, mm/s.
@@ -136,6 +149,8 @@ pub struct Servo<R = f64> {
     force_filter: DirectForm<R>,
     state: ServoState,
     direction: DirectionState<R>,
+    /// State of a mechanism, from the first period on.
+    mechanism: Option<mechanism::State<R>>,
     forwards: bool,
     /// Slew-limited force before the ramp, N.
     slewed_n: R,
@@ -159,6 +174,7 @@ struct Constants<R> {
     /// Largest change of force in a servo period, N.
     slew_n: R,
     servo_hz: R,
+    period_s: R,
     ramp_s: R,
 }
 
@@ -174,6 +190,7 @@ impl<R: Real> Constants<R> {
         jump_mm: R::ZERO,
         slew_n: R::ZERO,
         servo_hz: R::ZERO,
+        period_s: R::ZERO,
         ramp_s: R::ZERO,
     };
 
@@ -189,6 +206,7 @@ impl<R: Real> Constants<R> {
             jump_mm: R::of(settings.jump_mm),
             slew_n: R::of(settings.slew_n_s / settings.servo_hz),
             servo_hz: R::of(settings.servo_hz),
+            period_s: R::of(1.0 / settings.servo_hz),
             ramp_s: R::of(settings.ramp_s),
         }
     }
@@ -220,6 +238,7 @@ impl<R: Real> Servo<R> {
             force_filter: DirectForm::ZERO,
             state: ServoState::Limp,
             direction: DirectionState::new(),
+            mechanism: None,
             forwards: true,
             slewed_n: R::ZERO,
             held_n: R::ZERO,
@@ -277,7 +296,7 @@ impl<R: Real> Servo<R> {
 
         let constants = self.constants;
         let wanted_n =
-            self.table_n(what, range_mm, motion) + constants.damping_n_s_per_mm * motion.v_mm_s;
+            self.law_n(what, range_mm, motion) + constants.damping_n_s_per_mm * motion.v_mm_s;
         if !wanted_n.is_finite() {
             self.trip(Trip::NotANumber);
             return R::ZERO;
@@ -320,20 +339,37 @@ impl<R: Real> Servo<R> {
         }
     }
 
-    /// The table's force, N: inside the identified range at the actual position,
-    /// outside at the edge plus the wall.
-    fn table_n(&mut self, what: &Rendering<'_, R>, [low, high]: [R; 2], motion: Motion<R>) -> R {
+    /// The force of the realization, N: inside the identified range at the actual
+    /// position, outside at the edge plus the wall.
+    fn law_n(&mut self, what: &Rendering<'_, R>, [low, high]: [R; 2], motion: Motion<R>) -> R {
         let constants = self.constants;
         let a_m_s2 = self.acceleration_filter.step(motion.a_m_s2);
-        let z = self.direction.step(what.rule, motion);
+        let x_mm = motion.x_mm.max(low).min(high);
+        let (z, mut mass_kg, without_mass_n) = match &what.law {
+            Law::Table { table, rule } => {
+                let z = self.direction.step(*rule, motion);
+                let v_mm_s = within(motion.v_mm_s, R::of(what.trained_mm_s));
+                let (mass_kg, force_n) = predict::mass_and_force(table, z, x_mm, v_mm_s);
+                (z, mass_kg, force_n)
+            }
+            Law::Mechanism(mechanism) => {
+                // Its handle stops at the edge.
+                let inside = x_mm == motion.x_mm;
+                let handle = Motion {
+                    x_mm,
+                    v_mm_s: if inside { motion.v_mm_s } else { R::ZERO },
+                    a_m_s2: R::ZERO,
+                };
+                let at_rest = || mechanism::State::at_rest(x_mm);
+                let state = self.mechanism.get_or_insert_with(at_rest);
+                let force_n = state.step(mechanism, handle, constants.period_s);
+                (state.z_handle, mechanism.scalars.handle_kg, force_n)
+            }
+        };
         if (z >= R::ZERO) != self.forwards {
             self.forwards = !self.forwards;
             self.tally.switches += 1;
         }
-
-        let x_mm = motion.x_mm.max(low).min(high);
-        let v_mm_s = within(motion.v_mm_s, R::of(what.trained_mm_s));
-        let (mut mass_kg, without_mass_n) = predict::mass_and_force(&what.table, z, x_mm, v_mm_s);
         if mass_kg < constants.least_mass_kg {
             self.tally.mass_held += 1;
             mass_kg = constants.least_mass_kg;

@@ -24,7 +24,7 @@ extern "C" {
 /* Largest number of nodes of a table. */
 #define STUDY_NODES 512
 /* Memory for one device, bytes, aligned to 8. study_device_size() is the exact size. */
-#define STUDY_DEVICE_SIZE 40960
+#define STUDY_DEVICE_SIZE 45056
 
 /* What the device is. */
 typedef struct StudySettings {

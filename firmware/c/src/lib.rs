@@ -51,7 +51,7 @@ pub extern "C" fn study_device_size() -> usize {
 }
 
 /// `STUDY_DEVICE_SIZE` of the header.
-pub const DEVICE_SIZE: usize = 40_960;
+pub const DEVICE_SIZE: usize = 45_056;
 const _: () = assert!(size_of::<StudyDevice>() <= DEVICE_SIZE);
 
 /// The device at this address, if there is one.

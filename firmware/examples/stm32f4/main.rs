@@ -44,6 +44,7 @@ mod firmware {
         },
         features: Features {
             acceleration_from_speed: true,
+            mechanism: true,
         },
         watchdog_ms: 30,
         longest_ms: 600_000,

@@ -261,11 +261,16 @@ impl<'w> Exchange<'w> {
     /// # Errors
     /// [`CheckFailure`] if the device does not answer, or uses another version.
     pub(crate) fn hello(&mut self) -> Result<Identity, CheckFailure> {
+        self.hello_of(0)
+    }
+
+    /// The same as a host of this minor version.
+    pub(crate) fn hello_of(&mut self, minor: u8) -> Result<Identity, CheckFailure> {
         self.nonce = self.nonce.wrapping_add(1);
         let sent = self.now();
         let request = Request::Hello(Hello {
             nonce: self.nonce,
-            minor: 0,
+            minor,
         });
         let received = self.ask(request)?;
         if let Reply::Ack(ack) = received.reply

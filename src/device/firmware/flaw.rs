@@ -235,7 +235,7 @@ impl FlawInjector {
                 identity.watchdog_ms = self.stated_ms;
             }
             (Flaw::TakesBadTables | Flaw::TakesUncertified, Reply::Ack(ack))
-                if ack.request == kind::TABLE_COMMIT =>
+                if matches!(ack.request, kind::TABLE_COMMIT | kind::MECHANISM_COMMIT) =>
             {
                 let taken: &[Refusal] = if self.flaw == Flaw::TakesUncertified {
                     &[Refusal::Uncertified]

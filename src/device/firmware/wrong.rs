@@ -232,6 +232,10 @@ impl Saboteur {
                 self.crc = UploadCrc::of_table(&begin);
                 Request::TableBegin(begin)
             }
+            Request::MechanismBegin(_) => {
+                self.loads += 1;
+                request
+            }
             Request::TableChunk(chunk) => {
                 // A repeated chunk is answered without being executed.
                 let again = usize::from(chunk.first) < self.nodes.len();

@@ -99,7 +99,7 @@ impl Host {
     fn request_done(&mut self, request: Request, state: DeviceState, at: Duration) {
         match (request, self.stage) {
             (Request::Rearm, _) => self.rearm_retry = None,
-            (Request::TableCommit(_), Stage::Loading { .. }) => {
+            (Request::TableCommit(_) | Request::MechanismCommit(_), Stage::Loading { .. }) => {
                 self.stage = Stage::Loaded { since: at };
                 self.reports.push(Report::Loaded);
             }

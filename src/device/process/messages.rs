@@ -83,6 +83,9 @@ pub(super) struct Hello {
     /// Whether it is simulated, without motor and hand.
     #[serde(default)]
     pub(super) simulated: bool,
+    /// Whether it plays mechanisms, and not only tables.
+    #[serde(default)]
+    pub(super) mechanisms: bool,
     pub(super) limits: Limits,
 }
 
@@ -209,9 +212,12 @@ pub(super) fn command(name: &str, load: u64) -> String {
     line(&json!({"do": name, "load": load}))
 }
 
-/// The command `load` with table and limits.
+/// The command `load` with table or mechanism and limits.
 pub(super) fn load(number: u64, what: &Stimulus<'_>, limits: Limits) -> String {
-    let table = what.table.map(|table| {
+    let mechanism = what
+        .table
+        .and_then(|own| Some((own, own.mechanism.as_ref()?)));
+    let table = what.table.filter(|_| mechanism.is_none()).map(|table| {
         let branch = |b: &study_haptics::model::Branch| {
             json!({
                 "m_kg": b.m_kg, "b_n_s_per_mm": b.b_n_s_per_mm,
@@ -228,11 +234,25 @@ pub(super) fn load(number: u64, what: &Stimulus<'_>, limits: Limits) -> String {
             "negative": branch(&table.negative),
         })
     });
-    line(&json!({
+    let mut command = json!({
         "do": "load", "load": number, "model": what.model, "uncertified": what.allow_uncertified,
         "limits": {"force_n": limits.force_n.get(), "velocity_mm_s": limits.velocity_mm_s.get()},
         "table": table,
-    }))
+    });
+    if let Some((own, mechanism)) = mechanism {
+        let profile = |p: &study_haptics::model::Profile| json!({"first_mm": p.first_mm, "step_mm": p.step_mm, "n": p.n});
+        let mut parameters = json!({
+            "trained": {"x_mm": own.trained.x_mm, "v_mm_s": own.trained.v_mm_s},
+            "detent": profile(&mechanism.detent),
+            "friction": profile(&mechanism.friction),
+        });
+        let scalars = mechanism.scalars.to_array();
+        for (key, value) in study_haptics::model::file::SCALAR_KEYS.iter().zip(scalars) {
+            parameters[*key] = json!(value);
+        }
+        command["mechanism"] = parameters;
+    }
+    line(&command)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::*;
 use study_wire::predict::{BranchView, Direction, Lookup, Motion, TableView};
-use study_wire::servo::{Rendering, Servo};
+use study_wire::servo::{Law, Rendering, Servo};
 
 const HZ: f64 = 4000.0;
 /// Position about which the hand moves, amplitude, mm, and frequency, Hz.
@@ -41,13 +41,15 @@ impl Table {
             f0_n,
         };
         Rendering {
-            table: TableView {
-                x_mm: &self.x_mm,
-                positive: branch(&self.f0_n[0]),
-                negative: branch(&self.f0_n[1]),
-                lookup: Lookup::Linear,
+            law: Law::Table {
+                table: TableView {
+                    x_mm: &self.x_mm,
+                    positive: branch(&self.f0_n[0]),
+                    negative: branch(&self.f0_n[1]),
+                    lookup: Lookup::Linear,
+                },
+                rule: Direction::Sign,
             },
-            rule: Direction::Sign,
             range_mm: [0.0, 30.0],
             trained_mm_s: 200.0,
         }

@@ -97,8 +97,8 @@ fn read_mechanism(mut root: Table<'_, '_>) -> Option<Realization> {
     ))
 }
 
-/// The keys of the scalars, in the order of [`Scalars::to_array`].
-const SCALAR_KEYS: [&str; SCALARS] = [
+/// The keys of a mechanism's scalars, in the order of [`Scalars::to_array`].
+pub const SCALAR_KEYS: [&str; SCALARS] = [
     "handle_kg",
     "follower_kg",
     "contact_n_per_mm",

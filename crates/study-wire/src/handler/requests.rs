@@ -5,8 +5,9 @@ use super::table::{Refused, require};
 use super::{Alive, Handler, LastRequest, Out};
 use crate::frame::crc32;
 use crate::message::{
-    Constants, DeviceState, EventKind, Fault, Header, Heartbeat, Hello, Identity, Loaded, MINOR,
-    Outcome, Play, Pulse, Record, Refusal, Reply, Request, Stop, VERSION, WireError, kind,
+    Constants, DeviceState, EventKind, Fault, Features, Header, Heartbeat, Hello, Identity, Loaded,
+    MECHANISM_MINOR, MINOR, Outcome, Play, Pulse, Record, Refusal, Reply, Request, Stop, VERSION,
+    WireError, kind,
 };
 use crate::real::Real;
 use crate::servo::{Servo, ServoSettings};
@@ -33,7 +34,16 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
             self.answer(header, Ok(()), now_ms, out);
             return self.send_event(out);
         }
-        match Request::decode(body) {
+        // What a later minor version added is unknown on this connection.
+        let known = |(header, request): (Header, Request)| {
+            let mechanism = request.minor() >= MECHANISM_MINOR;
+            let refused = mechanism && !self.profile.features.mechanism;
+            match refused || request.minor() > self.minor {
+                true => Err(WireError::UnknownType(header.kind)),
+                false => Ok((header, request)),
+            }
+        };
+        match Request::decode(body).and_then(known) {
             Ok((header, request)) if request.sequenced() => {
                 self.handle_sequenced(header, &request, crc32(body), now_ms, out);
             }
@@ -103,6 +113,7 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
         match request {
             Request::TableBegin(begin) => {
                 self.may_load()?;
+                self.mechanism.clear();
                 self.table.begin(begin)
             }
             Request::TableChunk(chunk) => {
@@ -115,6 +126,20 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
                 let with_state = self.minor > 0;
                 let bounds = &self.profile.bounds;
                 let validated = self.table.validate(commit.crc, bounds, with_state);
+                self.accept_upload(validated, Loaded::Table, commit.crc, now_ms)
+            }
+            Request::MechanismBegin(begin) => {
+                self.may_load()?;
+                self.table.clear();
+                self.mechanism.begin(begin)
+            }
+            Request::MechanismChunk(chunk) => {
+                self.may_continue()?;
+                self.mechanism.chunk(chunk)
+            }
+            Request::MechanismCommit(commit) => {
+                self.may_continue()?;
+                let validated = self.mechanism.validate(commit.crc, &self.profile.bounds);
                 self.accept_upload(validated, Loaded::Table, commit.crc, now_ms)
             }
             Request::PathBegin(begin) => {
@@ -192,7 +217,9 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
         };
         let velocity_mm_s = match loaded {
             Loaded::Path => self.path.velocity_mm_s(),
-            _ => self.table.begin.map_or(0.0, |begin| begin.velocity_mm_s),
+            _ => (self.table.begin.map(|begin| begin.velocity_mm_s))
+                .or(self.mechanism.begin.map(|begin| begin.velocity_mm_s))
+                .unwrap_or_default(),
         };
         self.servo = Servo::new(ServoSettings {
             force_n: limit_n,
@@ -316,7 +343,10 @@ impl<const NODES: usize, const POINTS: usize, R: Real> Handler<NODES, POINTS, R>
         let servo = &self.profile.servo;
         Constants {
             minor: self.minor,
-            features: self.profile.features,
+            features: Features {
+                mechanism: self.profile.features.mechanism && self.minor >= MECHANISM_MINOR,
+                ..self.profile.features
+            },
             commit_ms: COMMIT_MS,
             acceleration_hz: servo.acceleration_hz,
             least_mass_kg: servo.least_mass_kg,

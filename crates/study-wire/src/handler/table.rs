@@ -215,17 +215,15 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
         require(complete, Refusal::Incomplete, self.len as u32)?;
         require(self.crc() == crc, Refusal::Checksum, self.crc())?;
         self.check_evaluable(&begin)?;
-        check_limits(&begin, bounds)?;
+        let asked = Asked {
+            range_mm: begin.range_mm,
+            force_n: begin.force_n,
+            velocity_mm_s: begin.velocity_mm_s,
+            uncertified_n: begin.uncertified_n,
+        };
+        asked.check_limits(bounds)?;
         while self.judge() {}
-        let certificate = self.certifier.finish();
-        match (
-            check_physics(&certificate, bounds, with_state),
-            begin.uncertified_n,
-        ) {
-            (Ok(()), _) => Ok(begin.force_n),
-            (Err(_), Some(cap_n)) => Ok(cap_n.min(begin.force_n)),
-            (Err(refused), None) => Err(refused),
-        }
+        asked.permit(&self.certifier.finish(), bounds, with_state)
     }
 
     /// Checks that the force is defined at every position.
@@ -237,10 +235,8 @@ impl<const N: usize, R: Real> TableBuffer<N, R> {
         if let Some(node) = self.bad {
             return bad(node);
         }
-        let [low, high] = begin.range_mm;
-        let ordered = low.is_finite() && high.is_finite() && low < high;
         let known = begin.direction.delta_mm().is_none_or(positive);
-        if ordered && known && positive(begin.trained_mm_s) {
+        if ordered(begin.range_mm) && known && positive(begin.trained_mm_s) {
             Ok(())
         } else {
             bad(self.len)
@@ -258,18 +254,46 @@ fn branch<const N: usize, R>(parameters: &[[R; N]; 4], len: usize) -> BranchView
     }
 }
 
-/// Checks that every limit is finite, positive and not above the device's.
-fn check_limits(begin: &TableBegin, bounds: &Bounds) -> Result<(), Refused> {
-    let within = |value: f64, most: f64| positive(value) && value <= most;
-    let cap_fits = begin
-        .uncertified_n
-        .is_none_or(|cap| within(cap, bounds.force_n));
-    let ([low, high], [lowest, highest]) = (begin.range_mm, bounds.stroke_mm);
-    let force = within(begin.force_n, bounds.force_n) && cap_fits;
-    require(force, Refusal::Limit, 1)?;
-    let velocity = within(begin.velocity_mm_s, bounds.velocity_mm_s);
-    require(velocity, Refusal::Limit, 2)?;
-    require(low >= lowest && high <= highest, Refusal::Limit, 3)
+/// The limits that an upload asks for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked {
+    pub(super) range_mm: [f64; 2],
+    pub(super) force_n: f64,
+    pub(super) velocity_mm_s: f64,
+    pub(super) uncertified_n: Option<f64>,
+}
+
+impl Asked {
+    /// Checks that every limit is finite, positive and not above the device's.
+    pub(super) fn check_limits(&self, bounds: &Bounds) -> Result<(), Refused> {
+        let within = |value: f64, most: f64| positive(value) && value <= most;
+        let cap_fits = self
+            .uncertified_n
+            .is_none_or(|cap| within(cap, bounds.force_n));
+        let ([low, high], [lowest, highest]) = (self.range_mm, bounds.stroke_mm);
+        let force = within(self.force_n, bounds.force_n) && cap_fits;
+        require(force, Refusal::Limit, 1)?;
+        let velocity = within(self.velocity_mm_s, bounds.velocity_mm_s);
+        require(velocity, Refusal::Limit, 2)?;
+        require(low >= lowest && high <= highest, Refusal::Limit, 3)
+    }
+
+    /// The force limit with this certificate, N.
+    pub(super) fn permit(
+        &self,
+        certificate: &Certificate,
+        bounds: &Bounds,
+        with_state: bool,
+    ) -> Result<f64, Refused> {
+        match (
+            check_physics(certificate, bounds, with_state),
+            self.uncertified_n,
+        ) {
+            (Ok(()), _) => Ok(self.force_n),
+            (Err(_), Some(cap_n)) => Ok(cap_n.min(self.force_n)),
+            (Err(refused), None) => Err(refused),
+        }
+    }
 }
 
 /// Conditions for playing a table without the explicit permission to play it
@@ -298,7 +322,12 @@ pub(super) fn require(satisfied: bool, refusal: Refusal, detail: u32) -> Result<
     }
 }
 
-fn positive(value: f64) -> bool {
+/// Whether both ends are finite and ascend.
+pub(super) fn ordered([low, high]: [f64; 2]) -> bool {
+    low.is_finite() && high.is_finite() && low < high
+}
+
+pub(super) fn positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 

@@ -43,6 +43,8 @@ pub struct Features {
     /// The acceleration is the difference of the speeds of two servo periods, and not
     /// that of a sensor, so that a host can compute it from TELEMETRY.
     pub acceleration_from_speed: bool,
+    /// It plays mechanisms, from minor version 2 on.
+    pub mechanism: bool,
 }
 
 /// Text of a device: UTF-8, padded with zeros. It is untrusted input.
@@ -227,13 +229,15 @@ impl Field for Features {
     const MAX_LEN: usize = u32::MAX_LEN;
 
     fn write(&self, out: &mut Writer) {
-        u32::from(self.acceleration_from_speed).write(out);
+        let bits = u32::from(self.acceleration_from_speed) | u32::from(self.mechanism) << 1;
+        bits.write(out);
     }
 
     fn read(from: &mut Reader<'_>) -> Result<Self, WireError> {
         let bits = u32::read(from)?;
         Ok(Self {
             acceleration_from_speed: bits & 1 != 0,
+            mechanism: bits & 2 != 0,
         })
     }
 }

@@ -4,6 +4,7 @@
 //! invalid table with its own code.
 
 use super::bytes::{Field, Reader, Writer, fields};
+use super::mechanism::MechanismBegin;
 use super::probe::PathBegin;
 use super::{FixedVec, WireError};
 use crate::frame::RunningCrc;
@@ -118,7 +119,7 @@ impl TableChunk {
     pub const MAX_NODES: usize = 3;
 }
 
-/// Accumulates the CRC of an upload: the fields of BEGIN, then every node or point.
+/// Accumulates the CRC of an upload: the fields of BEGIN, then every node, value or point.
 #[derive(Debug, Clone, Default)]
 pub struct UploadCrc(RunningCrc);
 
@@ -136,6 +137,16 @@ impl UploadCrc {
     /// Starts with PATH_BEGIN.
     pub fn of_path(begin: &PathBegin) -> Self {
         Self::default().with(begin)
+    }
+
+    /// Starts with MECHANISM_BEGIN.
+    pub fn of_mechanism(begin: &MechanismBegin) -> Self {
+        Self::default().with(begin)
+    }
+
+    /// Adds the next value of a mechanism, N.
+    pub fn value_n(&mut self, value: f64) {
+        self.add(&value);
     }
 
     /// Adds the next node of a table.

@@ -15,15 +15,25 @@ fn damper(b_n_s_per_mm: &[f64; 2]) -> Rendering<'_> {
         f0_n: &NONE,
     };
     Rendering {
-        table: TableView {
-            x_mm: &NODES,
-            positive: branch,
-            negative: branch,
-            lookup: Lookup::Linear,
+        law: Law::Table {
+            table: TableView {
+                x_mm: &NODES,
+                positive: branch,
+                negative: branch,
+                lookup: Lookup::Linear,
+            },
+            rule: Direction::Sign,
         },
-        rule: Direction::Sign,
         range_mm: NODES,
         trained_mm_s: 500.0,
+    }
+}
+
+/// The table of a rendering.
+fn table<'a, 'b>(what: &'b mut Rendering<'a>) -> &'b mut TableView<'a> {
+    match &mut what.law {
+        Law::Table { table, .. } => table,
+        Law::Mechanism(_) => panic!("a mechanism"),
     }
 }
 
@@ -187,7 +197,7 @@ fn a_mass_below_the_smallest_is_limited_and_counted() {
         f0_n: &NONE,
     };
     let mut what = damper(&NONE);
-    what.table.positive = branch;
+    table(&mut what).positive = branch;
     let pushed = Motion {
         a_m_s2: 5.0,
         ..motion(15.0, 1.0)
@@ -265,10 +275,10 @@ fn the_speed_is_limited_to_the_trained_one_and_the_position_to_the_range() {
     let stiffness = [0.1; 2];
     let branch = BranchView {
         k_n_per_mm: &stiffness,
-        ..damper(&NONE).table.positive
+        ..table(&mut damper(&NONE)).positive
     };
     let mut spring = damper(&NONE);
-    (spring.table.positive, spring.table.negative) = (branch, branch);
+    (table(&mut spring).positive, table(&mut spring).negative) = (branch, branch);
     // 3 N at the edge, 5 N of wall, and no extrapolated spring
     assert!((settled(&spring, bare(), motion(30.5, 0.0)) - 8.0).abs() < 1e-9);
 }
@@ -289,10 +299,10 @@ fn the_acceleration_is_filtered() {
     let mass = [1.0; 2];
     let branch = BranchView {
         m_kg: &mass,
-        ..damper(&NONE).table.positive
+        ..table(&mut damper(&NONE)).positive
     };
     let mut what = damper(&NONE);
-    (what.table.positive, what.table.negative) = (branch, branch);
+    (table(&mut what).positive, table(&mut what).negative) = (branch, branch);
     let settings = ServoSettings {
         ramp_s: 0.0,
         ..bare()

@@ -51,7 +51,7 @@ impl Sensitive {
         let none = || vec![0.0; parameters];
         Self {
             x_mm: state.x_mm(),
-            y_mm: state.y_mm,
+            y_mm: state.y_mm(),
             w_mm_s: state.w_mm_s,
             z: state.z,
             z_handle: state.z_handle,
