@@ -11,6 +11,7 @@ mod check;
 mod completions;
 mod device;
 mod device_selection;
+mod export;
 mod help;
 mod identify;
 mod new;
@@ -53,6 +54,8 @@ enum Command {
     Check(check::Args),
     /// How many participants, realizations and repetitions? Power of the planned design
     Power(Box<power::Args>),
+    /// Write the data of a study for other programs and for archives
+    Export(export::Args),
     /// Show the presentation orders and their balance
     Schedule(schedule::Args),
     /// Show the state of each participant and the next row
@@ -100,6 +103,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Analyze(args) => analyze::run(&args, console),
         Command::Check(args) => check::run(&args, console),
         Command::Power(args) => power::run(&args, console),
+        Command::Export(args) => export::run(&args, console),
         Command::Schedule(args) => schedule::run(&args, console),
         Command::Status(args) => status::run(&args, console),
         Command::Participant(args) => participant::run(&args, console),

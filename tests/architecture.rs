@@ -55,6 +55,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("rendering", &["protocol", "outcome", "wire"]),
     ("analyze", &["protocol", "procedure", "outcome", "stats"]),
     ("power", &["protocol", "outcome", "analyze", "stats"]),
+    ("export", &["protocol", "outcome", "analyze"]),
     ("model", &["wire"]),
     ("family", &["model", "wire"]),
     ("trajectory", &["wire"]),
@@ -99,6 +100,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
         &[
             "analyze",
             "device",
+            "export",
             "family",
             "identify",
             "model",

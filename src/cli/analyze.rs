@@ -410,7 +410,7 @@ fn deviations(study: &StudyFolder) -> Result<Vec<Deviation>, Failure> {
 }
 
 /// Creates a folder and its parents; only the owner can enter the new ones.
-fn private_folder(path: &Path) -> io::Result<()> {
+pub(super) fn private_folder(path: &Path) -> io::Result<()> {
     for folder in path.ancestors().collect::<Vec<_>>().into_iter().rev() {
         if !folder.as_os_str().is_empty() && !folder.exists() {
             match RealDisk.create_folder(folder) {

@@ -99,6 +99,27 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         ],
     ),
     (
+        "export",
+        &[
+            (
+                "study export results --to bids --out dataset",
+                "for an archive; also psych-ds, frictionless",
+            ),
+            (
+                "study export results --to csv --out tables --sep ; --decimal , --bom",
+                "for a spreadsheet with a decimal comma",
+            ),
+            (
+                "study export results --to r --out r --without-comments",
+                "tables, an R script and a Quarto document",
+            ),
+            (
+                "study export rehearsal --to wide --include simulated --out wide",
+                "one row for each simulated participant",
+            ),
+        ],
+    ),
+    (
         "schedule",
         &[
             (

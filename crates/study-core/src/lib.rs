@@ -3,10 +3,11 @@
 //! A [`protocol`] gives a [`schedule`]; a [`session`] turns inputs into events;
 //! the [`store`] keeps the events; [`rendering`] judges whether a playback had the force
 //! of its table; [`outcome`] folds the events into ratings; [`analyze`] says what the
-//! ratings show. A [`procedure`] chooses the level of the next trial from the answers so
+//! ratings show, and [`export`] writes them down for other programs. A [`procedure`] chooses the level of the next trial from the answers so
 //! far. Only `store` touches files.
 
 pub mod analyze;
+pub mod export;
 pub mod outcome;
 pub mod power;
 pub mod procedure;

@@ -162,6 +162,19 @@ impl RatingColumn {
     }
 }
 
+impl RatingColumn {
+    /// The header of a table of these rows: without optional columns that all leave
+    /// empty.
+    pub fn header_of(protocol: &Protocol, rows: &[RatingRow]) -> Header<Self> {
+        let mut header = Self::header(protocol);
+        header.retain(|(column, name)| {
+            let used = |row: &RatingRow| row.cell(*column, name) != Cell::Empty;
+            !column.column().optional || rows.iter().any(used)
+        });
+        header
+    }
+}
+
 impl AttemptColumn {
     /// The header of `attempts.csv`.
     pub fn header() -> Header<Self> {

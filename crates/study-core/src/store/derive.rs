@@ -6,7 +6,6 @@
 use super::error::{At as _, StoreError};
 use super::sessions::SessionData;
 use super::{StudyFolder, atomic, journal, layout, tables};
-use crate::outcome::cell::{Cell, Row as _};
 use crate::outcome::fold::{attempt_rows, interval_rows};
 use crate::outcome::{AttemptRow, IntervalRow, ParticipantRow, RatingRow, State};
 use crate::protocol::Protocol;
@@ -112,11 +111,7 @@ impl Derived {
 
     /// File name and bytes of each table that the study has.
     pub(super) fn tables(&self, protocol: &Protocol) -> io::Result<Vec<(&'static str, Vec<u8>)>> {
-        let mut header = RatingColumn::header(protocol);
-        header.retain(|(column, name)| {
-            let used = |row: &RatingRow| row.cell(*column, name) != Cell::Empty;
-            !column.column().optional || self.rows.iter().any(used)
-        });
+        let header = RatingColumn::header_of(protocol, &self.rows);
         let ratings = tables::csv(&header, &self.rows)?;
         let attempts = tables::csv(&AttemptColumn::header(), &self.attempts)?;
         let header = ParticipantColumn::header(protocol);

@@ -74,6 +74,11 @@ impl SessionData {
         self.seat?.row().filter(|_| state.keeps_row())
     }
 
+    /// Hash of the last record of its journal; that of an erased one is empty.
+    pub fn last_hash(&self) -> &str {
+        &self.last_hash
+    }
+
     /// Whether the session can be continued.
     pub fn is_unfinished(&self) -> bool {
         self.standing().state == State::Unfinished

@@ -1,0 +1,403 @@
+//! What other programs say of the data sets: the official validators, and R. The tests
+//! are started by `.ci/export`, which gets the validators; what is missing is said.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::studies::{export, files, hostile, japanese, new, real_study, rehearsed};
+use crate::support::{copy_folder, repository};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// An official validator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Validator {
+    Bids,
+    PsychDs,
+    Frictionless,
+}
+
+use Validator::{Bids, Frictionless, PsychDs};
+
+/// Starts a program; `None` if there is none of this name.
+fn started(command: &mut Command) -> Option<Output> {
+    command.output().ok()
+}
+
+impl Validator {
+    fn format(self) -> &'static str {
+        match self {
+            Bids => "bids",
+            PsychDs => "psych-ds",
+            Frictionless => "frictionless",
+        }
+    }
+
+    /// The errors that it finds; `None` if it is not here.
+    fn errors(self, folder: &Path) -> Option<Vec<String>> {
+        let texts = |list: &Value, key: &str| -> Vec<String> {
+            let all = list.as_array().into_iter().flatten();
+            all.map(|e| e[key].as_str().unwrap_or_default().to_owned())
+                .collect()
+        };
+        match self {
+            Bids => {
+                // By default it reads a thousand rows of a table.
+                let options = ["--max-rows", "-1", "--format", "json"];
+                let mut command = Command::new("bids-validator-deno");
+                let told = report(&started(command.args(options).arg(folder))?);
+                let issues = told["issues"]["issues"].as_array().unwrap().clone();
+                let is_error = |i: &Value| i["severity"] == "error";
+                let errors: Vec<Value> = issues.into_iter().filter(is_error).collect();
+                Some(texts(&Value::from(errors), "code"))
+            }
+            Frictionless => {
+                let options = ["validate", "--json", "datapackage.json"];
+                let mut command = Command::new("frictionless");
+                let told = report(&started(command.args(options).current_dir(folder))?);
+                let mut errors = texts(&told["errors"], "type");
+                for task in told["tasks"].as_array().unwrap() {
+                    errors.extend(texts(&task["errors"], "type"));
+                }
+                assert_eq!(told["valid"] == true, errors.is_empty(), "{told}");
+                Some(errors)
+            }
+            PsychDs => {
+                let command = std::env::var_os("PSYCHDS_VALIDATOR")?;
+                // It ends with 0 also if the data set is not valid.
+                let told = report(&started(Command::new(command).arg(folder).arg("--json"))?);
+                let issues = told["issues"].as_array().unwrap().clone();
+                let is_error = |i: &Value| i["severity"] == "error";
+                let errors: Vec<Value> = issues.into_iter().filter(is_error).collect();
+                let errors = texts(&Value::from(errors), "key");
+                assert_eq!(told["valid"] == true, errors.is_empty(), "{told}");
+                Some(errors)
+            }
+        }
+    }
+
+    fn is_here(self) -> bool {
+        let folder = tempfile::tempdir().unwrap();
+        let asked = match self {
+            Bids => started(Command::new("bids-validator-deno").arg("--version")),
+            Frictionless => started(Command::new("frictionless").arg("--version")),
+            PsychDs => std::env::var_os("PSYCHDS_VALIDATOR")
+                .and_then(|c| started(Command::new(c).arg(folder.path()).arg("--json"))),
+        };
+        let here = asked.is_some_and(|o| o.status.success());
+        if !here {
+            eprintln!("SKIPPED: no validator of {}", self.format());
+        }
+        here
+    }
+}
+
+/// The first JSON document of what a program printed.
+fn report(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    let start = text.find('{').unwrap_or_else(|| panic!("{output:?}"));
+    let mut documents = serde_json::Deserializer::from_str(&text[start..]).into_iter();
+    documents.next().unwrap().unwrap()
+}
+
+/// Writes a text in the place of another in a file.
+fn plant(folder: &Path, file: &str, old: &str, new: &str) {
+    let path = folder.join(file);
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(old), "{file} has no {old}");
+    fs::write(path, text.replacen(old, new, 1)).unwrap();
+}
+
+/// The studies that every validator has to accept.
+fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
+    let of = |name: &str| {
+        let folder = home.join(name);
+        fs::create_dir(&folder).unwrap();
+        folder
+    };
+    const SIMULATED: &[&str] = &[
+        "--include",
+        "simulated",
+        "--with-practice",
+        "--with-telemetry",
+    ];
+    let paper = PathBuf::from(repository("protocols/turn-signal"));
+    let extended = PathBuf::from(repository("protocols/turn-signal-extended"));
+    let pairs = of("pairs");
+    let tracks = of("tracks");
+    vec![
+        (rehearsed(&paper, 3, &of("paper"), &[]), SIMULATED),
+        (
+            rehearsed(&extended, 3, &of("extended"), &["--faults"]),
+            SIMULATED,
+        ),
+        (rehearsed(&new("pairs", &pairs), 3, &pairs, &[]), SIMULATED),
+        (rehearsed(&new("2ifc", &tracks), 2, &tracks, &[]), SIMULATED),
+        (
+            real_study(&extended, &["P01", "P02"], &of("real"), |_, _| true),
+            &["--with-telemetry"],
+        ),
+        (japanese(&of("japanese")), &[]),
+        (
+            japanese(&of("redacted")),
+            &["--redact", "ids,times", "--without-comments"],
+        ),
+        // Declined and missing answers, and a comment of everything.
+        (hostile(&of("hostile")), &[]),
+    ]
+}
+
+#[test]
+#[ignore = "needs the validators: .ci/export gets them"]
+fn the_official_validators_accept_every_study() {
+    let home = tempfile::tempdir().unwrap();
+    let here: Vec<Validator> = [Bids, PsychDs, Frictionless]
+        .into_iter()
+        .filter(|v| v.is_here())
+        .collect();
+    for (n, (study, more)) in studies(home.path()).iter().enumerate() {
+        for validator in &here {
+            let format = validator.format();
+            let mut versions = vec![more.to_vec()];
+            if *validator == Frictionless {
+                versions.push([more, &["--profile", "1"][..]].concat());
+            }
+            for (version, more) in versions.iter().enumerate() {
+                let name = format!("{n}-{format}-{version}");
+                let (out, _) = export(study, format, home.path(), &name, more);
+                let errors = validator.errors(&out).unwrap();
+                assert!(
+                    errors.is_empty(),
+                    "{} {format} {more:?}: {errors:?}",
+                    study.display()
+                );
+            }
+        }
+    }
+    eprintln!("accepted by {here:?}");
+}
+
+#[test]
+#[ignore = "needs the validators: .ci/export gets them"]
+fn each_validator_refuses_planted_errors() {
+    let home = tempfile::tempdir().unwrap();
+    let study = hostile(home.path());
+    let beh = "sub-001/beh/sub-001_task-turnsignal_beh.tsv";
+    let psych = "data/study-turnsignal_data.csv";
+    // The file, what stands there, what is planted, and the error.
+    type Planted = (
+        Validator,
+        &'static str,
+        &'static str,
+        &'static str,
+        &'static str,
+    );
+    let errors: [Planted; 14] = [
+        (
+            Bids,
+            beh,
+            "simulated-1\tMiller\t0.1.0\t1\t",
+            "simulated-1\tMiller\t0.1.0\t1\t9",
+            "TSV_VALUE_INCORRECT_TYPE_NONREQUIRED",
+        ),
+        (
+            Bids,
+            beh,
+            "\tTRUE\ttest\t",
+            "\tnobody\ttest\t",
+            "TSV_VALUE_INCORRECT_TYPE_NONREQUIRED",
+        ),
+        (Bids, beh, "n/a", "", "TSV_VALUE_INCORRECT_TYPE_NONREQUIRED"),
+        (
+            Bids,
+            "participants.tsv",
+            "sub-001",
+            "sub-002",
+            "PARTICIPANT_ID_MISMATCH",
+        ),
+        (
+            Bids,
+            "dataset_description.json",
+            "\"Name\"",
+            "\"Title\"",
+            "JSON_KEY_REQUIRED",
+        ),
+        (
+            PsychDs,
+            psych,
+            "study,participant",
+            "study,who",
+            "CSV_COLUMN_MISSING_FROM_METADATA",
+        ),
+        (
+            PsychDs,
+            psych,
+            "study,participant,",
+            "\u{feff}study,participant,",
+            "CSV_COLUMN_MISSING_FROM_METADATA",
+        ),
+        (
+            PsychDs,
+            psych,
+            "turn-signal,001,",
+            "turn-signal,001,x,",
+            "CSV_FORMATTING_ERROR",
+        ),
+        (
+            PsychDs,
+            "dataset_description.json",
+            "\"name\": \"study\"",
+            "\"name\": \"other\"",
+            "CSV_COLUMN_MISSING_FROM_METADATA",
+        ),
+        (
+            Frictionless,
+            "ratings.csv",
+            "simulated-1,Miller,0.1.0,1,",
+            "simulated-1,Miller,0.1.0,1,9",
+            "constraint-error",
+        ),
+        (
+            Frictionless,
+            "ratings.csv",
+            ",TRUE,test,",
+            ",nobody,test,",
+            "constraint-error",
+        ),
+        (
+            Frictionless,
+            "ratings.csv",
+            "turn-signal,001,",
+            "turn-signal,P99,",
+            "foreign-key",
+        ),
+        (
+            Frictionless,
+            "ratings.csv",
+            "turn-signal,001,1,4,2,",
+            "turn-signal,001,1,4,1,",
+            "primary-key",
+        ),
+        (
+            Frictionless,
+            "participants.csv",
+            "done",
+            "gone",
+            "constraint-error",
+        ),
+    ];
+    for validator in [Bids, PsychDs, Frictionless]
+        .into_iter()
+        .filter(|v| v.is_here())
+    {
+        let (good, _) = export(
+            &study,
+            validator.format(),
+            home.path(),
+            validator.format(),
+            &[],
+        );
+        let mut refused = 0;
+        for (n, (_, file, old, new, code)) in errors.iter().filter(|e| e.0 == validator).enumerate()
+        {
+            let bad = home.path().join(format!("{}-{n}", validator.format()));
+            copy_folder(&good, &bad);
+            plant(&bad, file, old, new);
+            let found = validator.errors(&bad).unwrap();
+            assert!(
+                found.iter().any(|f| f == code),
+                "{validator:?} {file} {old} → {new}: {found:?}"
+            );
+            refused += 1;
+        }
+        assert!(refused >= 4, "{validator:?}");
+        eprintln!("{validator:?}: {refused} planted errors refused");
+    }
+}
+
+/// Runs R in a folder; `None` if it or one of its packages is not here.
+fn r(folder: &Path, arguments: &[&str]) -> Option<(bool, String)> {
+    let packages = "q(status = !all(sapply(c('lme4', 'lmerTest', 'ordinal'), requireNamespace, quietly = TRUE)))";
+    let asked = started(Command::new("Rscript").args(["-e", packages]));
+    if !asked.is_some_and(|o| o.status.success()) {
+        eprintln!("SKIPPED: no R with lme4, lmerTest and ordinal");
+        return None;
+    }
+    let output = started(Command::new("Rscript").args(arguments).current_dir(folder)).unwrap();
+    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    Some((output.status.success(), text.into_owned()))
+}
+
+#[test]
+#[ignore = "needs R with lme4, lmerTest and ordinal: .ci/export runs it"]
+fn r_comes_to_the_same_numbers() {
+    let home = tempfile::tempdir().unwrap();
+    for (n, (study, more)) in studies(home.path()).iter().enumerate() {
+        let (out, _) = export(study, "r", home.path(), &format!("r-{n}"), more);
+        let Some((good, said)) = r(&out, &["analysis.R"]) else {
+            return;
+        };
+        assert!(good, "{}: {said}", study.display());
+        let compared = fs::read_to_string(out.join("headline.csv")).unwrap();
+        let numbers = compared
+            .lines()
+            .skip(1)
+            .filter(|l| !l.contains(",,"))
+            .count();
+        assert!(
+            said.contains(&format!("all {numbers} numbers agree")),
+            "{said}"
+        );
+        eprintln!("{}: all {numbers} numbers agree", study.display());
+        // The same from any folder and in a locale without Unicode, and the chunks of the
+        // Quarto document.
+        if n == 7 {
+            let script = out.join("analysis.R");
+            let (good, said) = r(home.path(), &[script.to_str().unwrap()]).unwrap();
+            assert!(good, "{said}");
+            let document = fs::read_to_string(out.join("analysis.qmd")).unwrap();
+            let chunks = document
+                .split("```{r}\n")
+                .skip(1)
+                .map(|c| c.split("```").next().unwrap());
+            fs::write(out.join("chunks.R"), chunks.collect::<String>()).unwrap();
+            let (good, said) = r(&out, &["chunks.R"]).unwrap();
+            assert!(good && said.contains("numbers agree"), "{said}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs R with lme4, lmerTest and ordinal: .ci/export runs it"]
+fn r_refuses_changed_tables_and_other_numbers() {
+    let home = tempfile::tempdir().unwrap();
+    let (good, _) = export(&hostile(home.path()), "r", home.path(), "good", &[]);
+    let before = files(&good);
+    for (n, (file, old, new, why)) in [
+        (
+            "ratings.csv",
+            ",ok,",
+            ",missing,",
+            "was changed after the export",
+        ),
+        (
+            "headline.csv",
+            "corr/pearson/r,",
+            "corr/pearson/r,0.1",
+            "some numbers differ",
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let bad = home.path().join(format!("bad-{n}"));
+        copy_folder(&good, &bad);
+        plant(&bad, file, old, new);
+        let Some((fine, said)) = r(&bad, &["analysis.R"]) else {
+            return;
+        };
+        assert!(!fine && said.contains(why), "{said}");
+    }
+    assert!(before == files(&good), "a run writes nothing");
+}
