@@ -106,8 +106,8 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
                 "for an archive; also psych-ds, frictionless",
             ),
             (
-                "study export results --to csv --out tables --sep ; --decimal , --bom",
-                "for a spreadsheet with a decimal comma",
+                "study export results --to csv --out tables --bom --spreadsheet-safe",
+                "for a spreadsheet",
             ),
             (
                 "study export results --to r --out r --without-comments",

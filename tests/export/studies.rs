@@ -161,9 +161,9 @@ pub(crate) fn hostile(home: &Path) -> PathBuf {
 /// A study in Japanese, with questions before the session.
 pub(crate) fn japanese(home: &Path) -> PathBuf {
     let folder = home.join("japanese");
-    let intake = "[[intake]]\nid = \"age\"\nkind = \"number\"\nprompt = \"年齢\"\nunit = \"歳\"\nmin = 18\n\n\
+    let intake = "\n[[intake]]\nid = \"age\"\nkind = \"number\"\nprompt = \"年齢\"\nunit = \"歳\"\nmin = 18\n\n\
         [[intake]]\nid = \"sex\"\nkind = \"choice\"\nprompt = \"性別\"\noptions = [\"女性\", \"男性\", \"その他\"]\n\n\
-        [[intake]]\nid = \"handedness\"\nkind = \"choice\"\nprompt = \"利き手\"\noptions = [\"左\", \"右\", \"両手\"]\n\n[analysis]";
+        [[intake]]\nid = \"handedness\"\nkind = \"choice\"\nprompt = \"利き手\"\noptions = [\"左\", \"右\", \"両手\"]\n\n[analysis]\n";
     changed_protocol(
         "turn-signal",
         &folder,
@@ -185,7 +185,7 @@ pub(crate) fn japanese(home: &Path) -> PathBuf {
                 "1 = \"全く感じない\", 7 = \"非常に感じる\"",
             ),
             ("prompt = \"Comment\"", "prompt = \"コメント\""),
-            ("[analysis]", intake),
+            ("\n[analysis]\n", intake),
         ],
     );
     real_study(&folder, &["P01", "P02", "P03", "P04"], home, |_, event| {

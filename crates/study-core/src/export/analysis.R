@@ -216,6 +216,7 @@ headline <- read_text("headline.csv")
 compared <- data.frame(id = headline$id, here = unname(value[headline$id]),
                        study = as.numeric(headline$value),
                        tolerance = as.numeric(headline$tolerance))
+if (any(is.na(compared$study) & !is.na(headline$value))) stop("headline.csv has no number")
 compared <- compared[!is.na(compared$study), ]
 compared$difference <- abs(compared$here - compared$study) / pmax(1, abs(compared$study))
 compared$agrees <- !is.na(compared$difference) & compared$difference <= compared$tolerance

@@ -132,7 +132,7 @@ pub(super) fn dictionary(tables: &[&Table<'_>], dialect: &Dialect) -> Vec<u8> {
     let head = [
         "table", "column", "question", "type", "level", "unit", "min", "max", "meaning", "empty_if",
     ];
-    let mut records = vec![head.map(|h| Cow::Borrowed(h)).to_vec()];
+    let mut records = vec![head.map(Cow::Borrowed).to_vec()];
     for table in tables {
         for f in &table.fields {
             let number = |x: Option<f64>| match x {

@@ -17,7 +17,7 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<(), ExportError> {
         job.file(&path, &bytes)?;
         let mut schema = schema(&table.fields, old);
         schema["primaryKey"] = json!(table.key);
-        let foreign: Vec<Json> = (table.refers.iter()).map(|r| foreign_key(r)).collect();
+        let foreign: Vec<Json> = (table.refers.iter()).map(foreign_key).collect();
         if !foreign.is_empty() {
             schema["foreignKeys"] = json!(foreign);
         }

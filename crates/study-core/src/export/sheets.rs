@@ -65,6 +65,9 @@ fn documents(
 /// several, and realization.
 type Group = (Option<String>, Option<u32>, String);
 
+/// The ratings of a group: repetition, participant, rating.
+type Repetitions<'a> = BTreeMap<u32, BTreeMap<&'a ParticipantId, f64>>;
+
 /// One row for each participant: what the table of participants has, then the mean
 /// rating of each realization and each rating.
 fn side_by_side<'a>(job: &Job<'a>) -> Result<Table<'a>, ExportError> {
@@ -101,8 +104,7 @@ fn side_by_side<'a>(job: &Job<'a>) -> Result<Table<'a>, ExportError> {
         .collect();
     let numeric = protocol.questions.iter().filter(|q| q.kind.is_number());
     for question in numeric {
-        let mut ratings: BTreeMap<(usize, Group), BTreeMap<u32, BTreeMap<&ParticipantId, f64>>> =
-            BTreeMap::new();
+        let mut ratings: BTreeMap<(usize, Group), Repetitions<'_>> = BTreeMap::new();
         for row in &rows {
             let own = group(row);
             let place = order.get(own.2.as_str()).copied().unwrap_or(usize::MAX);
