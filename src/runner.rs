@@ -21,12 +21,13 @@ use std::sync::Arc;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::{ModelId, ParticipantId};
-use study_core::outcome::{Event, Fidelity, Playback, Sample};
+use study_core::outcome::{Event, Fidelity, Playback, Sample, Verdict};
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
 use study_core::rendering::{Played, judge};
 use study_core::session::{Effect, Ending, Input, Session, Unsaved, View, input::Claim};
 use study_core::store::{ClaimRequest, Copies, Receipt, SeatKind, StudyFolder};
+use study_haptics::identify::delivery::Delivery;
 use study_haptics::model::Realization;
 use study_wire::servo::ServoSettings;
 
@@ -63,6 +64,9 @@ pub struct Setup {
     pub orders: Option<Arc<FileOrders>>,
     /// Realizations by their id in the protocol, with the levels of families.
     pub models: BTreeMap<ModelId, Realization>,
+    /// What is needed for the VAF of what is delivered, where there is a validation
+    /// recording.
+    pub deliveries: BTreeMap<ModelId, Delivery>,
     /// Fingerprints of the protocol.
     pub fingerprints: Fingerprints,
     /// The folder of the study.
@@ -449,9 +453,14 @@ impl Runner {
             samples: &self.samples,
             lost: playback.samples_lost,
             time_ratio: playback.time_ratio,
+            host_late_s: playback.host_late_ms.map(|[_, most]| 1e-3 * most),
             others: &others,
         };
         let mut fidelity = judge(&played, &protocol.device.rendering);
+        let delivery = self.setup.deliveries.get(model);
+        fidelity.delivered_vaf = delivery
+            .filter(|_| matches!(fidelity.verdict, Verdict::Ok | Verdict::Flag))
+            .and_then(|own| own.vaf(fidelity.felt_gain()?, 1e-3 * fidelity.rendered_delay_ms?));
         if self.only_flags {
             fidelity.only_flag("the study was begun with an earlier release");
         }

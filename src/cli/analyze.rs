@@ -326,6 +326,7 @@ fn of_study(
     let question = question(protocol, args.question.as_deref())?;
     let mut ratings = Ratings::from_rows(&derived.rows, &question);
     ratings.set_states(&derived.participants);
+    ratings.set_failed(&derived.rows, &derived.attempts);
     ratings.set_duplicates(protocol.models.iter().filter_map(|m| {
         let original = m.duplicate_of.as_ref()?;
         Some((m.id.as_str(), original.as_str()))

@@ -18,6 +18,7 @@ use study_haptics::model::Realization;
 
 mod families;
 mod join;
+pub mod recordings;
 
 /// Largest model file and orders file that are read, bytes.
 const MAX_MODEL_BYTES: usize = 16 * 1024 * 1024;

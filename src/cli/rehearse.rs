@@ -13,6 +13,7 @@ use crate::runner::rehearsal::{first_day, run_one};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use study_base::rng::Stream;
+use study_base::text::Untrusted;
 use study_core::outcome::{State, Status};
 use study_core::protocol::{DeviceKind, Seat};
 use study_core::store::{Frozen, SeatKind, StudyFolder};
@@ -76,6 +77,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     refuse_occupied(&study, &folder)?;
 
     let tables = loaded.tables();
+    let (deliveries, said) = load::recordings::deliveries(&loaded)?;
+    for notice in said {
+        console.say(format!("warning: {}", Untrusted(&notice)));
+    }
     let percepts = Percepts::of(&loaded.protocol, &tables);
     let effect = match args.effect {
         EffectArg::BuiltIn => Effect::BuiltIn,
@@ -105,6 +110,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             protocol: protocol.clone(),
             orders: orders.clone(),
             models: tables.clone(),
+            deliveries: deliveries.clone(),
             fingerprints: loaded.fingerprints.clone(),
             study: folder_of_study,
             kind: SeatKind::Simulated,

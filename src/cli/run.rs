@@ -15,7 +15,7 @@ use crate::tui::{self, Tui};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
-use study_base::text::ParticipantId;
+use study_base::text::{ParticipantId, Untrusted};
 use study_core::protocol::DeviceKind;
 use study_core::session::roster::Newcomer;
 use study_core::session::{Config, Ending, MAX_OPERATOR, Roster};
@@ -141,6 +141,10 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         return console.out("Nothing was recorded.\n");
     };
     refuse_unrendered(&device.identity(), kind, &loaded)?;
+    let (deliveries, said) = load::recordings::deliveries(&loaded)?;
+    for notice in said {
+        console.say(format!("warning: {}", Untrusted(&notice)));
+    }
     // A person feels nothing on the simulated device: such data are never real.
     let overridden = kind != loaded.protocol.device.kind;
     let seats = if args.pilot || overridden || device.identity().simulated {
@@ -174,6 +178,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         protocol: protocol.clone(),
         orders: loaded.orders.map(Arc::new),
         models,
+        deliveries,
         fingerprints: loaded.fingerprints,
         study,
         kind: seats,

@@ -62,6 +62,12 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {
     if let Some(forces) = forces(sessions) {
         let _ = writeln!(out, "Force of the playbacks: {forces}");
     }
+    if let Some([p99, most]) = lateness(sessions) {
+        let _ = writeln!(
+            out,
+            "This computer while it played: late by at most {most:.0} ms, 99 % within {p99:.0} ms"
+        );
+    }
     let _ = match next_row(None, sessions) {
         Some(row) => writeln!(out, "Next free row: {row}"),
         None => writeln!(out, "No row is free"),
@@ -89,6 +95,16 @@ fn forces(sessions: &[SessionData]) -> Option<String> {
     .map(|(verdict, n)| format!("{n} {}", verdict.as_str()))
     .collect();
     (!counts.is_empty()).then(|| counts.join(", "))
+}
+
+/// How late the host was in the worst playback of all sessions, ms: 99th percentile and
+/// most.
+fn lateness(sessions: &[SessionData]) -> Option<[f64; 2]> {
+    (sessions.iter())
+        .flat_map(|s| s.history.all_attempts())
+        .flat_map(|(_, attempt)| &attempt.presentations)
+        .filter_map(|p| p.ended?.1.playback.host_late_ms)
+        .reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
 }
 
 fn table(rows: &[&ParticipantRow]) -> String {

@@ -11,12 +11,14 @@
 
 mod arrivals;
 mod clock;
+mod lateness;
 mod replies;
 mod stage;
 pub(super) mod upload;
 
 pub use arrivals::Arrivals;
 pub use clock::DeviceClock;
+pub use lateness::Lateness;
 
 use super::{DeviceError, Identity, Report, Stimulus};
 use stage::Stage;
@@ -108,6 +110,8 @@ pub struct Health {
     pub samples: u64,
     /// Telemetry samples known to be lost.
     pub samples_lost: u64,
+    /// How late the host was, since it began.
+    pub late: Lateness,
 }
 
 /// The host's side of a connection.
@@ -130,6 +134,8 @@ pub struct Host {
     lost: u64,
     /// When the samples of the playback arrived.
     arrivals: Arrivals,
+    /// How late the host was in the playback.
+    late: Lateness,
     /// Strokes and clamps in the last progress report.
     reported: (u32, u32),
     heartbeat_count: u32,
@@ -195,6 +201,12 @@ impl Host {
     /// The user interface polled at this time.
     pub fn keep_alive(&mut self, at: Duration) {
         self.alive_at = Some(self.alive_at.map_or(at, |before| before.max(at)));
+    }
+
+    /// A turn of the loop that serves the link came late by this time.
+    pub fn was_late(&mut self, by: Duration) {
+        self.late.add(by);
+        self.health.late.add(by);
     }
 
     /// Takes the bytes to be written to the port.
@@ -263,6 +275,7 @@ impl Host {
         };
         (self.received, self.lost, self.reported) = (0, 0, (0, 0));
         self.arrivals = Arrivals::default();
+        self.late = Lateness::default();
         self.stage = Stage::Starting;
         self.send(Request::Play(play), at);
         Ok(())

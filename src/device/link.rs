@@ -8,11 +8,13 @@
 //! on a pseudo-terminal.
 
 pub mod memory;
+mod priority;
 #[cfg(unix)]
 pub mod pty;
 
 use super::host::{Health, Host, HostSettings};
 use super::{Device, DeviceError, Identity, Report, Stimulus};
+pub use priority::Priority;
 use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -121,6 +123,8 @@ pub struct DeviceStatus {
     pub health: Health,
     /// Why there is no link or no answer.
     pub failure: Option<String>,
+    /// How the thread that sends heartbeats is scheduled.
+    pub priority: Priority,
 }
 
 impl Shared {
@@ -208,6 +212,7 @@ impl LinkedDevice {
         let handle = std::thread::Builder::new()
             .name("device".to_owned())
             .spawn(move || {
+                worker_shared.status().priority = priority::raise();
                 let mut worker = LinkWorker {
                     host: Host::new(nonce(), settings),
                     shared: worker_shared,
@@ -340,9 +345,12 @@ impl LinkWorker {
                 return self.close();
             }
             self.run_commands();
+            let began = self.shared.now();
             let alive_at = Duration::from_nanos(self.shared.alive_ns.load(Ordering::Relaxed));
             self.host.keep_alive(alive_at);
             self.transfer();
+            let took = self.shared.now().saturating_sub(began);
+            self.host.was_late(took.saturating_sub(POLL_INTERVAL));
             self.update_status();
             for report in self.host.take_reports() {
                 if let Report::Lost(why) = &report {

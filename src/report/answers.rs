@@ -48,6 +48,7 @@ pub(super) fn answers(a: &Analysis) -> Vec<Answer> {
     let all = [
         target::target(a),
         vaf::predicts(a),
+        vaf::delivered(a),
         vaf::covariates(a),
         pairs::best_two(a),
         differ(a),

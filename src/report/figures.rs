@@ -9,6 +9,7 @@ mod counts;
 mod means;
 mod pairs;
 mod parts;
+mod rendering;
 mod strips;
 mod subjects;
 mod traces;
@@ -27,7 +28,7 @@ use study_stats::describe::mean;
 pub const MAX_DRAWN: usize = 60;
 
 /// File names of all figures, without extension.
-pub const NAMES: [&str; 10] = [
+pub const NAMES: [&str; 11] = [
     "fig10-means",
     // Of earlier versions: now below fig10-means.
     "fig11-rating-and-vaf",
@@ -38,6 +39,7 @@ pub const NAMES: [&str; 10] = [
     "histograms",
     "subject-lines",
     "order",
+    "rendering",
     "telemetry",
 ];
 
@@ -116,6 +118,7 @@ pub fn all(a: &Analysis, traces: &[Trace]) -> Vec<Drawn> {
         counts::histograms(&scene).or_else(|| strips::strips(&scene)),
         subjects::lines(&scene),
         subjects::order(&scene),
+        rendering::rendering(&scene),
         traces::traces(&scene, traces),
     ]
     .into_iter()

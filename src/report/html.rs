@@ -12,6 +12,7 @@ mod methods;
 mod notes;
 mod paragraphs;
 mod parts;
+mod rendering;
 mod statistics;
 mod style;
 mod tables;
@@ -76,6 +77,7 @@ pub fn document(source: &Source, details: &Details, a: &Analysis, figures: &[Dra
         (answers_section(a))
         (figures_section(figures, 0))
         (tables::section(a))
+        (rendering::section(a))
         (paragraphs::section(details, a))
         (conditional_section(a))
         (parts::sections(&a.parts, &details.parts, figures.len()))

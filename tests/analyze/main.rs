@@ -14,6 +14,7 @@ mod parts;
 mod possible;
 mod properties;
 mod psychophysics;
+mod rendering;
 mod report_answers;
 mod report_figures;
 mod report_html;

@@ -64,8 +64,8 @@ fn row(who: &str, model: &str, repetition: u32, rating: i64) -> RatingRow {
         level: None,
         correct: None,
         replays: None,
-        rendering: None,
-        rendered_vaf: None,
+        fidelity: None,
+        host_late_ms: None,
     }
 }
 

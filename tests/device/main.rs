@@ -15,3 +15,4 @@ mod supervision;
 #[path = "../support/mod.rs"]
 mod support;
 mod target;
+mod turning;

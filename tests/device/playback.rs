@@ -472,3 +472,25 @@ proptest! {
         }
     }
 }
+
+/// The end of a playback is asked for again where the line loses long messages, and the
+/// device does not go limp meanwhile.
+#[test]
+fn a_lost_report_of_the_end_is_asked_for_again() {
+    for seed in 0..20 {
+        let mut options = Options::seeded(seed);
+        options.noise.drop_telemetry = 0.3;
+        let mut device = VirtualDevice::new(options);
+        let table = ordinary();
+        device
+            .load(&Stimulus::of_table(&table), limits(12.0), ms(0))
+            .unwrap();
+        let loaded = device.poll(ms(3000));
+        assert!(loaded.contains(&Report::Loaded), "{seed}: {loaded:?}");
+        device.start(ms(3000)).unwrap();
+        let mut reports = device.poll(ms(4000));
+        device.stop(ms(4000)).unwrap();
+        reports.extend(device.poll(ms(6000)));
+        assert!(stopped(&reports).samples > 0, "{seed}");
+    }
+}

@@ -311,6 +311,7 @@ fn a_faulty_line_is_safe_and_usable() {
         reorder: share,
         delay: share,
         extra_delay: ms(25),
+        ..Noise::default()
     };
     let mut ended = 0;
     for seed in 0..12 {

@@ -168,6 +168,7 @@ fn session(falls_silent: bool) -> (Vec<Load>, Vec<serde_json::Value>) {
         rows: None,
         device_kind: DeviceKind::Simulated,
         device: Box::new(device),
+        deliveries: Default::default(),
         device_check: None,
         clock: Box::new(clock.clone()),
         threaded: false,

@@ -101,6 +101,7 @@ fn pages(
         rows: None,
         device_kind: study_core::protocol::DeviceKind::Simulated,
         device: Box::new(VirtualDevice::new(options)),
+        deliveries: Default::default(),
         device_check: None,
         clock: Box::new(clock.clone()),
         threaded: false,

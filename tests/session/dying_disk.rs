@@ -90,6 +90,7 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
         rows: None,
         device_kind: DeviceKind::Manual,
         device: Box::new(Manual::default()),
+        deliveries: Default::default(),
         device_check: None,
         clock: Box::new(clock.clone()),
         threaded: false,

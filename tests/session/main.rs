@@ -23,6 +23,7 @@ mod tui_hostile;
 mod tui_keys;
 mod tui_pictures;
 mod tui_terminal;
+mod turning;
 mod unsaved;
 mod views;
 #[path = "../support/world.rs"]

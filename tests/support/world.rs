@@ -199,6 +199,7 @@ pub fn ended(trial: u32, attempt: u32) -> Event {
             samples: 3250,
             samples_lost: 0,
             time_ratio: None,
+            host_late_ms: None,
         },
         stopped: false,
         telemetry: None,

@@ -32,6 +32,7 @@ mod pairs;
 pub mod psychophysics;
 mod range;
 mod reference;
+mod rendering;
 mod select;
 mod subjects;
 mod vaf;
@@ -52,6 +53,7 @@ pub use select::{Counts, Include, Reason};
 pub use values::{Value, Values};
 pub use warning::Warning;
 
+pub use crate::outcome::ratings::Felt;
 use crate::outcome::ratings::{Practice, Ratings};
 use crate::protocol::{Protocol, Role, Unfinished};
 use adjusted::Adjusted;
@@ -187,6 +189,8 @@ pub struct RowDecision {
     pub rating: Option<f64>,
     /// The VAF, if there is one.
     pub vaf: Option<f64>,
+    /// What was felt, if it is known.
+    pub felt: Option<Felt>,
     /// Why the row is excluded; `None` if it is included.
     pub excluded: Option<Arc<Reason>>,
 }
@@ -352,7 +356,7 @@ struct Inputs<'a> {
 type Group = fn(&Inputs<'_>, &mut Values);
 
 /// Independent groups of statistics, the slowest ones first.
-const GROUPS: [Group; 14] = [
+const GROUPS: [Group; 15] = [
     |i, values| order::order(i.cells, values),
     |i, values| vaf::against_vaf(i.cells, i.adjusted, i.rules, values),
     |i, values| ordinal::ordinal(i.cells, values),
@@ -367,6 +371,7 @@ const GROUPS: [Group; 14] = [
     |i, values| pairs::pairs(i.cells, i.adjusted, i.rules, values),
     |i, values| disagreement::disagreement(i.cells, values),
     |i, values| checks::checks(i.cells, i.rules, values),
+    |i, values| rendering::rendering(i.cells, i.adjusted, i.rules, values),
 ];
 
 /// All statistics. Each group runs on one thread, so the number of threads changes
@@ -409,6 +414,7 @@ fn row_decisions(ratings: &Ratings, decisions: &[select::Decision]) -> Vec<RowDe
             trial_index: ratings.trial_index[i],
             rating: ratings.rating[i],
             vaf: ratings.vaf[i],
+            felt: ratings.felt(i).copied(),
             excluded,
         })
         .collect()

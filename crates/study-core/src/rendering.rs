@@ -43,9 +43,14 @@ const LONGEST_DELAY_S: f64 = 0.06;
 const ROUNDING_N: f64 = 0.01;
 /// A measured force exceeds its limit if it does so by this factor and this force, N.
 const MEASURED_EXCESS: (f64, f64) = (1.1, 0.5);
+/// Two tables whose forces differ by less, rms, are not told apart, N: what a person just
+/// notices.
+const DISTINCT_N: f64 = 0.1;
 /// Largest error of the speed, and of the time of the samples.
 const SPEED_ERROR: f64 = 0.1;
 const TIME_ERROR: f64 = 0.05;
+/// A host that was later than this does not judge the clock of the device, s.
+const HOST_LATE_S: f64 = 0.03;
 /// Largest share of moving samples that repeat the one before.
 const MOST_REPEATED: f64 = 0.2;
 
@@ -66,6 +71,8 @@ pub struct Played<'a> {
     pub lost: u64,
     /// Time of the samples over time of the host.
     pub time_ratio: Option<f64>,
+    /// How late the host was at most, s; `None` if that was not measured.
+    pub host_late_s: Option<f64>,
     /// The other tables of the study.
     pub others: &'a [(ModelId, servo::Rendering<'a>)],
 }
@@ -117,6 +124,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
             || repeated(&samples).is_some_and(|share| share > MOST_REPEATED)
             || unexplained_gaps(&samples, played.lost, interval_s),
         enough: too_little.is_none(),
+        host_in_time: played.host_late_s.is_none_or(|late| late < HOST_LATE_S),
     };
     fidelity.defects = defects(&fidelity, &found, rules);
     settle(&mut fidelity, played, rules, too_little);
@@ -130,6 +138,7 @@ struct Found {
     other: bool,
     disordered: bool,
     enough: bool,
+    host_in_time: bool,
 }
 
 /// The defects, in the order of their declaration. Several defects of the same force
@@ -146,7 +155,7 @@ fn defects(fidelity: &Fidelity, found: &Found, rules: &RenderingRules) -> Vec<De
     let reversed = found.enough
         && fidelity.rendered_gain.is_some_and(|g| g < -0.2)
         && found.correlation.is_some_and(|r| r < -0.5);
-    if poor && found.other {
+    if found.enough && found.other {
         all.push(Defect::OtherTable);
     } else if reversed {
         all.push(Defect::Sign);
@@ -184,10 +193,8 @@ fn defects(fidelity: &Fidelity, found: &Found, rules: &RenderingRules) -> Vec<De
     {
         all.push(Defect::Speed);
     }
-    if fidelity
-        .time_ratio
-        .is_some_and(|ratio| (ratio - 1.0).abs() > TIME_ERROR)
-    {
+    let off = |ratio: f64| (ratio - 1.0).abs() > TIME_ERROR;
+    if found.host_in_time && fidelity.time_ratio.is_some_and(off) {
         all.push(Defect::Clock);
     }
     if found.disordered {
@@ -465,6 +472,7 @@ fn nearest<'a>(
         model: played.model,
         explains: false,
     };
+    let distinct = own > DISTINCT_N * DISTINCT_N;
     let mut least = own;
     for (model, what) in played.others {
         if let Some((far, vaf)) = score(what)
@@ -473,7 +481,7 @@ fn nearest<'a>(
             least = far;
             best = Nearest {
                 model,
-                explains: far < 0.25 * own && vaf.is_some_and(|vaf| vaf > 0.95),
+                explains: distinct && far < 0.25 * own && vaf.is_some_and(|vaf| vaf > 0.95),
             };
         }
     }

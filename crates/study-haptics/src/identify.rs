@@ -27,6 +27,7 @@
 mod banded;
 pub mod baseline;
 pub mod constrained;
+pub mod delivery;
 pub mod ewls;
 pub mod grid;
 mod hat;

@@ -6,8 +6,11 @@ use std::time::Duration;
 /// Shortest playback of which the times are compared, s.
 const LEAST_S: f64 = 2.0;
 
-/// When samples arrived. Messages can be late, never early: the least delay at the
-/// beginning and at the end counts.
+/// Distance of the messages that are compared, s.
+const APART_S: f64 = 0.5;
+
+/// When samples arrived. A message can be late and a simulated device can pause: the median
+/// over all pairs of messages that are half a second apart counts.
 #[derive(Debug, Clone, Default)]
 pub struct Arrivals {
     /// Host time and time of the sample, s.
@@ -22,17 +25,22 @@ impl Arrivals {
 
     /// Time of the samples over time of the host; `None` for a short playback.
     pub fn time_ratio(&self) -> Option<f64> {
-        let third = self.all.len() / 3;
-        let (first, last) = (self.all.get(..third)?, self.all.get(2 * third..)?);
-        let earliest = |part: &[(f64, f64)]| {
-            part.iter()
-                .copied()
-                .min_by(|a, b| f64::total_cmp(&(a.0 - a.1), &(b.0 - b.1)))
-        };
-        let (from, to) = (earliest(first)?, earliest(last)?);
-        let (host_s, device_s) = (to.0 - from.0, to.1 - from.1);
-        (self.all.last()?.0 - self.all.first()?.0 >= LEAST_S && host_s > 0.0)
-            .then(|| device_s / host_s)
+        let lasted_s = self.all.last()?.0 - self.all.first()?.0;
+        let mut later = self.all.iter();
+        let mut to = later.next();
+        let mut ratios = Vec::new();
+        for from in &self.all {
+            while let Some((host_s, _)) = to
+                && host_s - from.0 < APART_S
+            {
+                to = later.next();
+            }
+            let Some((host_s, device_s)) = to else { break };
+            ratios.push((device_s - from.1) / (host_s - from.0));
+        }
+        let middle = ratios.len() / 2;
+        (lasted_s >= LEAST_S && !ratios.is_empty())
+            .then(|| *ratios.select_nth_unstable_by(middle, f64::total_cmp).1)
             .filter(|ratio| ratio.is_finite())
     }
 }
@@ -40,6 +48,21 @@ impl Arrivals {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A simulated device on a busy computer stands still now and then.
+    #[test]
+    fn pauses_do_not_change_the_ratio_of_the_clocks() {
+        let mut arrivals = Arrivals::default();
+        let mut paused_ms = 0;
+        for i in 0..600 {
+            if [100, 101, 280, 450].contains(&i) {
+                paused_ms += 300;
+            }
+            arrivals.add(Duration::from_millis(10 * i + paused_ms), 0.01 * i as f64);
+        }
+        let found = arrivals.time_ratio().unwrap();
+        assert!((found - 1.0).abs() < 1e-9, "{found}");
+    }
 
     /// Ten seconds of a clock with this ratio; every seventh message is late by `late_ms`.
     fn ratio(of: f64, late_ms: u64) -> Option<f64> {

@@ -211,6 +211,7 @@ impl Host {
             samples: self.received,
             samples_lost,
             time_ratio: self.arrivals.time_ratio(),
+            host_late_ms: self.late.ms(),
         }));
         self.make_idle(at);
     }

@@ -51,6 +51,9 @@ impl Stage {
                 | Self::Starting
                 | Self::Playing { .. }
                 | Self::Stopping { .. }
+                // The table stays loaded. If STATE or its answer is lost on the line, it is
+                // asked for again, and the device must not go limp before.
+                | Self::AwaitingOutcome
         )
     }
 

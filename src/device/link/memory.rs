@@ -22,7 +22,14 @@ pub struct Noise {
     pub delay: f64,
     /// Additional latency of a delayed piece.
     pub extra_delay: Duration,
+    /// Fraction of the bytes in which a bit is flipped: longer pieces suffer more.
+    pub byte_errors: f64,
+    /// A piece that is longer than any but telemetry is lost.
+    pub drop_telemetry: f64,
 }
+
+/// Only telemetry and uploads have longer pieces, and a lost upload is repeated.
+const LONG_PIECE: usize = 100;
 
 /// One direction of a line.
 #[derive(Debug)]
@@ -64,7 +71,12 @@ impl Line {
         }
         let mut due = at + self.latency;
         let n = self.noise;
-        let fractions = [n.corrupt, n.drop, n.duplicate, n.reorder, n.delay];
+        let whole = (1.0 - n.corrupt) * (1.0 - n.byte_errors).powf(bytes.len() as f64);
+        let drop = match bytes.len() {
+            0..=LONG_PIECE => n.drop,
+            _ => 1.0 - (1.0 - n.drop) * (1.0 - n.drop_telemetry),
+        };
+        let fractions = [1.0 - whole, drop, n.duplicate, n.reorder, n.delay];
         if fractions.iter().all(|fraction| *fraction <= 0.0) {
             self.queue.push_back((due, bytes));
             return;

@@ -126,6 +126,7 @@ impl From<PlaybackOutcome> for Playback {
             samples: 0,
             samples_lost: 0,
             time_ratio: None,
+            host_late_ms: None,
         }
     }
 }

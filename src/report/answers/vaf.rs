@@ -96,6 +96,37 @@ pub(super) fn predicts(a: &Analysis) -> Option<Answer> {
     Some(answer)
 }
 
+/// Whether the VAF of what was delivered predicts the rating. Without a validation
+/// recording nobody asks; the section on the force has the reason.
+pub(super) fn delivered(a: &Analysis) -> Option<Answer> {
+    let f = a
+        .finding(&Question::Delivered)
+        .filter(|f| f.realizations > 0)?;
+    let question = format!(
+        "Does the VAF of what was delivered predict {}?",
+        sentences::asked(a)
+    );
+    let n = f.realizations;
+    let mut answer = Answer::of(&question, f, |verdict| {
+        let r = f
+            .estimate
+            .map_or_else(String::new, |e| sentences::estimate(&e, apa::r));
+        let result = f
+            .test
+            .as_ref()
+            .map_or_else(String::new, sentences::corrected);
+        let p = sentences::result(f).unwrap_or_default();
+        format!("{verdict}: over these {n} realizations r = {r}, {p} ({result}).")
+    });
+    if let Some(r) = a.values.number("corr_adjusted/pearson/r") {
+        answer.main.push(format!(
+            "With the VAF of the identification the same means correlate at r = {}.",
+            apa::r(r)
+        ));
+    }
+    Some(answer)
+}
+
 /// The number of points and the p that it allows.
 fn points(a: &Analysis, n: usize) -> Option<String> {
     let smallest = a

@@ -207,6 +207,13 @@ pub(super) fn rule_in_words(rule: Exclusion) -> String {
             "participants whose mean ratings of a realization and its hidden duplicate differ by more \
              than {difference} on average"
         ),
+        Exclusion::WrongForce => {
+            "trials in which the force was not that of the realization's table".to_owned()
+        }
+        Exclusion::UnverifiedForce => {
+            "trials in which the force was not shown to be that of the realization's table"
+                .to_owned()
+        }
     }
 }
 

@@ -145,6 +145,24 @@ fn sentence(a: &Analysis, f: &Finding) -> Option<String> {
             ),
         },
         Question::Vaf => vaf(a, f),
+        Question::Delivered => {
+            let what = match (&f.verdict, f.direction) {
+                (Verdict::Yes, Some(Direction::Up)) => {
+                    "Realizations of which more was delivered (a higher delivered VAF) were rated higher"
+                }
+                (Verdict::Yes, _) => {
+                    "Realizations of which more was delivered (a higher delivered VAF) were rated lower"
+                }
+                _ => "A relation with the delivered VAF was not shown",
+            };
+            let r = f
+                .estimate
+                .map_or_else(String::new, |e| sentences::estimate(&e, apa::r));
+            format!(
+                "{what}, r({}) = {r}, {result} ({name}).",
+                f.realizations.saturating_sub(2)
+            )
+        }
         Question::Memory => {
             let p = f.test.as_ref().map_or_else(String::new, sentences::p);
             let r = f.estimate.map_or_else(String::new, |e| apa::r(e.value));
@@ -240,6 +258,10 @@ fn sentence(a: &Analysis, f: &Finding) -> Option<String> {
 fn subject(a: &Analysis, f: &Finding) -> Option<String> {
     Some(match &f.question {
         Question::Vaf => format!("Whether VAF predicts {}", sentences::asked(a)),
+        Question::Delivered if f.realizations == 0 => return None,
+        Question::Delivered => {
+            format!("Whether the delivered VAF predicts {}", sentences::asked(a))
+        }
         Question::Memory => "Whether the memory matters".to_owned(),
         Question::Best => {
             "Whether the best-rated realization differs from the second best".to_owned()

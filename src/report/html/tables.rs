@@ -14,7 +14,7 @@ pub(super) const MAX_ROWS: usize = 200;
 const MAX_WHOLE: usize = 15;
 
 /// A table on the page.
-struct HtmlTable {
+pub(super) struct HtmlTable {
     caption: String,
     head: Vec<String>,
     /// The cells of each row, and whether it is in italics.
@@ -24,7 +24,7 @@ struct HtmlTable {
 }
 
 impl HtmlTable {
-    fn new(caption: &str, head: &[&str]) -> Self {
+    pub(super) fn new(caption: &str, head: &[&str]) -> Self {
         Self {
             caption: caption.to_owned(),
             head: head.iter().map(|h| (*h).to_owned()).collect(),
@@ -33,7 +33,7 @@ impl HtmlTable {
         }
     }
 
-    fn row(&mut self, cells: Vec<String>) {
+    pub(super) fn row(&mut self, cells: Vec<String>) {
         self.styled_row(false, cells);
     }
 
@@ -45,7 +45,7 @@ impl HtmlTable {
         }
     }
 
-    fn render(&self) -> Markup {
+    pub(super) fn render(&self) -> Markup {
         html! {
             @if !self.rows.is_empty() {
                 div.scroll.whole[self.rows.len() <= MAX_WHOLE] tabindex="0" role="region" aria-label=(self.caption) {

@@ -5,6 +5,7 @@
 //! that several exclude: the first.
 
 use super::Rules;
+use crate::outcome::Verdict;
 use crate::outcome::ratings::Ratings;
 use crate::protocol::{Exclusion, Role};
 use std::collections::{BTreeSet, HashMap};
@@ -34,8 +35,7 @@ pub(super) fn apply(
         .collect();
     let excluded_by: Vec<Option<usize>> = (counts.iter().enumerate())
         .map(|(i, counts)| {
-            let subject = ratings.subject[i] as usize;
-            let excludes = |j: &Judgement| j.excludes(subject, ratings.strokes[i]);
+            let excludes = |j: &Judgement| j.excludes(ratings, i);
             judged.iter().position(excludes).filter(|_| *counts)
         })
         .collect();
@@ -61,15 +61,19 @@ struct Judgement {
     subjects: Vec<bool>,
     /// Rows with fewer strokes are excluded.
     strokes: Option<f64>,
+    /// Rows whose force was judged so are excluded.
+    force: Option<fn(Verdict) -> bool>,
     problem: Option<&'static str>,
 }
 
 impl Judgement {
-    fn excludes(&self, subject: usize, strokes: Option<u32>) -> bool {
-        self.subjects.get(subject) == Some(&true)
-            || strokes
-                .zip(self.strokes)
-                .is_some_and(|(n, least)| f64::from(n) < least)
+    fn excludes(&self, ratings: &Ratings, row: usize) -> bool {
+        let subject = ratings.subject[row] as usize;
+        let few =
+            (ratings.strokes[row].zip(self.strokes)).is_some_and(|(n, least)| f64::from(n) < least);
+        let wrong = (ratings.felt(row).zip(self.force))
+            .is_some_and(|(felt, excluded)| excluded(felt.verdict));
+        self.subjects.get(subject) == Some(&true) || few || wrong
     }
 
     fn of(subjects: Vec<bool>) -> Self {
@@ -90,7 +94,11 @@ impl Judgement {
 /// What one rule excludes of the rows in `counts`: participants ([`Judgement::of`]) or
 /// single rows (a field of [`Judgement`]).
 fn judge(ratings: &Ratings, rules: &Rules, rule: Exclusion, counts: &[bool]) -> Judgement {
-    if !matches!(rule, Exclusion::StrokesBelow(_)) && !rules.primary {
+    let of_trials = matches!(
+        rule,
+        Exclusion::StrokesBelow(_) | Exclusion::WrongForce | Exclusion::UnverifiedForce
+    );
+    if !of_trials && !rules.primary {
         return Judgement::none("it applies to the primary question, which this is not");
     }
     let rows = (0..ratings.len()).filter(|&i| counts[i]);
@@ -125,6 +133,18 @@ fn judge(ratings: &Ratings, rules: &Rules, rule: Exclusion, counts: &[bool]) -> 
                 strokes: Some(least),
                 problem: unknown
                     .then_some("the strokes of some trials are unknown; these trials stay"),
+                ..Judgement::default()
+            }
+        }
+        Exclusion::WrongForce | Exclusion::UnverifiedForce => {
+            let unknown = rows.clone().any(|i| ratings.felt(i).is_none());
+            Judgement {
+                force: Some(match rule {
+                    Exclusion::WrongForce => |v| matches!(v, Verdict::Flag | Verdict::Fault),
+                    _ => |v| v != Verdict::Ok,
+                }),
+                problem: unknown
+                    .then_some("the force of some trials was not judged; these trials stay"),
                 ..Judgement::default()
             }
         }

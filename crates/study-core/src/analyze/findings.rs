@@ -25,6 +25,8 @@ pub(super) use vaf::permutation;
 pub enum Question {
     /// Does VAF predict the rating?
     Vaf,
+    /// Does the VAF of what was delivered predict the rating?
+    Delivered,
     /// Does the memory of the identification (the forgetting factor) matter?
     Memory,
     /// Does the realization with the highest mean differ from the second?
@@ -52,6 +54,7 @@ impl Question {
     pub fn id(&self) -> String {
         match self {
             Self::Vaf => "vaf".to_owned(),
+            Self::Delivered => "delivered".to_owned(),
             Self::Memory => "memory".to_owned(),
             Self::Best => "best".to_owned(),
             Self::Differ => "differ".to_owned(),
@@ -375,6 +378,7 @@ pub(super) fn findings(
     };
     let mut found = others::against_references(&facts);
     found.extend(vaf::vaf(&facts));
+    found.extend(vaf::delivered(&facts));
     found.extend(others::memory(&facts));
     found.extend(pairs::best(&facts));
     found.extend(differ::differ(&facts));

@@ -44,7 +44,7 @@ pub(super) fn against_vaf(
     let table = cells.table(&models);
     let by_model = cells.subject_means();
     let raw = |m: usize| mean(&by_model[m]);
-    Points::of(cells, &models, raw).correlate("corr", rules, values);
+    Points::of(cells, &models, |m| cells.vaf[m], raw).correlate("corr", rules, values);
     if adjusted.design.is_complete() {
         values.copy_group("corr/", "corr_adjusted/");
     } else {
@@ -79,9 +79,43 @@ fn adjusted_points<'a>(
     adjusted: &Adjusted,
     models: &[usize],
 ) -> Result<Points<'a>, LmmError> {
+    let of = adjusted_mean(adjusted)?;
+    Ok(Points::of(cells, models, |m| cells.vaf[m], of))
+}
+
+fn adjusted_mean(adjusted: &Adjusted) -> Result<impl Fn(usize) -> Option<f64>, LmmError> {
     let means = adjusted.means.as_ref().map_err(|why| *why)?;
-    let of = |m: usize| Some(means[adjusted.models.binary_search(&m).ok()?]);
-    Ok(Points::of(cells, models, of))
+    Ok(|m: usize| Some(means[adjusted.models.binary_search(&m).ok()?]))
+}
+
+/// `corr_delivered/*`: the correlation of the ratings with the delivered VAF of each
+/// realization.
+pub(super) fn against_delivered(
+    cells: &Cells<'_>,
+    adjusted: &Adjusted,
+    delivered: &[Option<f64>],
+    rules: &Rules,
+    values: &mut Values,
+) {
+    let mut models = cells.tested();
+    models.retain(|&m| delivered[m].is_some());
+    let by_model = cells.subject_means();
+    let points = if adjusted.design.is_complete() {
+        Ok(Points::of(
+            cells,
+            &models,
+            |m| delivered[m],
+            |m| mean(&by_model[m]),
+        ))
+    } else {
+        adjusted_mean(adjusted).map(|of| Points::of(cells, &models, |m| delivered[m], of))
+    };
+    match points {
+        Ok(p) => pearson_of("corr_delivered", &p.vaf, &p.means, rules, values),
+        Err(why) => values
+            .group("corr_delivered/pearson", why.to_string())
+            .none(&["r", "p_t"]),
+    }
 }
 
 /// The realizations as points.
@@ -94,10 +128,15 @@ struct Points<'a> {
 
 impl<'a> Points<'a> {
     /// The realizations with a VAF and a mean.
-    fn of(cells: &'a Cells<'_>, models: &[usize], mean: impl Fn(usize) -> Option<f64>) -> Self {
+    fn of(
+        cells: &'a Cells<'_>,
+        models: &[usize],
+        vaf: impl Fn(usize) -> Option<f64>,
+        mean: impl Fn(usize) -> Option<f64>,
+    ) -> Self {
         let mut points = Self::default();
         for &m in models {
-            if let (Some(vaf), Some(mean)) = (cells.vaf[m], mean(m)) {
+            if let (Some(vaf), Some(mean)) = (vaf(m), mean(m)) {
                 points.vaf.push(vaf);
                 points.means.push(mean);
                 points.names.push(cells.model_name(m));

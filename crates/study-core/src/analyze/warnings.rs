@@ -46,6 +46,19 @@ pub(super) fn warnings(
     } else if others > 0 {
         warn("mixed", format!("the analysis includes {}", who(counts)));
     }
+    let of = |what: &str| values.number(&format!("rendering/{what}"));
+    if let (Some(ok), Some(wrong)) = (of("n_ok"), of("n_flag").zip(of("n_fault")))
+        && wrong.0 + wrong.1 > 0.0
+    {
+        let wrong = wrong.0 + wrong.1;
+        warn(
+            "wrong-force",
+            format!(
+                "in {wrong} of {} judged trials that count the force was not that of the realization's table",
+                ok + wrong
+            ),
+        );
+    }
     if counts.interim() {
         let planned = counts.planned.unwrap_or(0);
         warn(

@@ -201,16 +201,24 @@ impl ParticipantColumn {
     }
 }
 
-/// Which field of a row is in which column. A column without a field does not compile,
-/// and a field without a column is an unused variable.
+/// Which field of a row is in which column, and which part of an optional field. A column
+/// without a field does not compile, and a field without a column is an unused variable.
 macro_rules! row {
-    ($row:ident: $columns:ident { $($column:ident: $field:ident,)* }) => {
+    ($row:ident: $columns:ident {
+        $($column:ident: $field:ident,)*
+        $(..$whole:ident { $($part_column:ident: $part:ident,)* })?
+    }) => {
         impl Row for $row {
             type Column = $columns;
 
             fn cell(&self, column: $columns, name: &str) -> Cell<'_> {
-                let Self { $($field),* } = self;
-                match column { $($columns::$column => Field::cell($field, name)),* }
+                let Self { $($field,)* $($whole)? } = self;
+                match column {
+                    $($columns::$column => Field::cell($field, name),)*
+                    $($($columns::$part_column => {
+                        $whole.as_ref().map_or(Cell::Empty, |all| Field::cell(&all.$part, name))
+                    })*)?
+                }
             }
         }
     };
@@ -260,8 +268,16 @@ row! {
         Level: level,
         Correct: correct,
         Replays: replays,
-        Rendering: rendering,
-        RenderedVaf: rendered_vaf,
+        HostLateMs: host_late_ms,
+        ..fidelity {
+            Rendering: verdict,
+            RenderedVaf: rendered_vaf,
+            DeliveredVaf: delivered_vaf,
+            RenderedGain: rendered_gain,
+            RenderedBiasN: rendered_bias_n,
+            RenderedDelayMs: rendered_delay_ms,
+            RenderedErrorN: rendered_error_n,
+        }
     }
 }
 
@@ -285,8 +301,30 @@ row! {
         Replays: replays,
         ExplorationS: exploration_s,
         Strokes: strokes,
-        Rendering: rendering,
-        RenderedVaf: rendered_vaf,
+        HostLateMs: host_late_ms,
+        ..fidelity {
+            Rendering: verdict,
+            RenderedVaf: rendered_vaf,
+            DeliveredVaf: delivered_vaf,
+            RenderedGain: rendered_gain,
+            RenderedBiasN: rendered_bias_n,
+            RenderedDelayMs: rendered_delay_ms,
+            RenderedErrorN: rendered_error_n,
+            MaxForceN: max_force_n,
+            OverLimitN: over_limit_n,
+            MeasuredVaf: measured_vaf,
+            MeasuredGain: measured_gain,
+            MeasuredBiasN: measured_bias_n,
+            MeasuredErrorN: measured_error_n,
+            NearestModel: nearest_model,
+            LostShare: lost_share,
+            TimeRatio: time_ratio,
+            SpeedGain: speed_gain,
+            TravelMm: travel_mm,
+            RangeShare: range_share,
+            TopSpeedMmS: top_speed_mm_s,
+            MotionShare: motion_share,
+        }
     }
 }
 

@@ -158,6 +158,10 @@ pub struct Playback {
     /// Time of the samples over time of the host, if both are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_ratio: Option<f64>,
+    /// How late the host's thread for the device was, ms: 99th percentile and most; `None`
+    /// if that was not measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub host_late_ms: Option<[f64; 2]>,
 }
 
 /// JSON has no NaN: it is written as null, which must not make a line unreadable.

@@ -135,6 +135,10 @@ pub struct Fidelity {
     /// Share of the time in which the handle moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion_share: Option<f64>,
+    /// VAF of what was delivered: of the table's force on the validation recording, with the
+    /// gain and the delay of this playback.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delivered_vaf: Option<f64>,
 }
 
 impl Fidelity {
@@ -144,6 +148,12 @@ impl Fidelity {
             because: Some(because.to_owned()),
             ..Self::default()
         }
+    }
+
+    /// Slope of the force that was felt on that of the table: of the measured force where
+    /// there is a sensor, else of the commanded one.
+    pub fn felt_gain(&self) -> Option<f64> {
+        Some(self.rendered_gain? * self.measured_gain.unwrap_or(1.0))
     }
 
     /// Makes a fault a flag, and says why.

@@ -239,9 +239,7 @@ impl History {
                         playback: *playback,
                         stopped: *stopped,
                     };
-                    attempt.rendering.extend(rendering.as_deref().cloned());
-                    let judged = rendering.as_deref().map(|r| (r.verdict, r.rendered_vaf));
-                    attempt.interval_ended(interval.unwrap_or(1), ended, judged, at);
+                    attempt.interval_ended(interval.unwrap_or(1), ended, rendering.as_deref(), at);
                 }
             }
             Event::Replayed { trial, attempt } => {

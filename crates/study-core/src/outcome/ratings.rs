@@ -11,13 +11,14 @@ mod read;
 
 pub use error::RatingsError;
 
-use super::event::State;
-use super::rows::{ParticipantRow, RatingRow, Status};
+use super::event::{Failure, State};
+use super::fidelity::{Fidelity, Verdict};
+use super::rows::{AttemptEvent, AttemptRow, ParticipantRow, RatingRow, Status};
 use crate::protocol::{Answer, Role};
 use build::{Builder, Row};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use study_base::text::QuestionId;
+use study_base::text::{ParticipantId, QuestionId};
 
 /// A realization that was rated.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,7 +85,36 @@ pub struct Comment {
     pub text: String,
 }
 
-/// Ratings by column. All columns have the same length.
+/// What was felt in a trial, compared with the table of its realization.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Felt {
+    /// Whether the force was that of the table.
+    pub verdict: Verdict,
+    /// VAF of the commanded force.
+    pub rendered_vaf: Option<f64>,
+    /// Slope of the commanded force.
+    pub gain: Option<f64>,
+    /// VAF of what was delivered, for the validation recording.
+    pub delivered_vaf: Option<f64>,
+    /// Attempts at the trial that failed because of the force; 0 where the table of
+    /// attempts was not read.
+    pub failed: u32,
+}
+
+impl Felt {
+    fn of(fidelity: &Fidelity) -> Self {
+        let finite = |x: Option<f64>| x.filter(|x| x.is_finite());
+        Self {
+            verdict: fidelity.verdict,
+            rendered_vaf: finite(fidelity.rendered_vaf),
+            gain: finite(fidelity.rendered_gain),
+            delivered_vaf: finite(fidelity.delivered_vaf),
+            failed: 0,
+        }
+    }
+}
+
+/// Ratings by column. All columns have the same length, except `felt`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Ratings {
     /// The question whose answers are the ratings.
@@ -117,6 +147,9 @@ pub struct Ratings {
     pub strokes: Vec<Option<u32>>,
     /// Row of the source, from 1; for a file without its header.
     pub source_row: Vec<u32>,
+    /// What was felt; shorter than the others if the last rows do not say, empty if none
+    /// does.
+    pub felt: Vec<Option<Felt>>,
     /// Texts that were answered or remarked in trials.
     pub comments: Vec<Comment>,
     /// Practice rows, which are not in the columns.
@@ -211,6 +244,7 @@ impl Ratings {
                 attempt: r.attempt,
                 strokes: r.strokes,
                 source_row: u32::try_from(i + 1).unwrap_or(u32::MAX),
+                felt: r.fidelity.as_ref().map(Felt::of),
             };
             if r.practice {
                 builder.practice(r.participant.as_str(), rated.as_str(), row);
@@ -259,6 +293,32 @@ impl Ratings {
         }
     }
 
+    /// Counts the attempts that failed because of the force. `rows` are those that the
+    /// ratings were made of.
+    pub fn set_failed(&mut self, rows: &[RatingRow], attempts: &[AttemptRow]) {
+        let mut failed: BTreeMap<(&ParticipantId, u32, u32), u32> = BTreeMap::new();
+        for attempt in attempts {
+            if let (AttemptEvent::Failure, Some(Failure::Rendering), Some(trial)) =
+                (attempt.what, attempt.failure, attempt.trial)
+            {
+                let of = (&attempt.participant, attempt.session, trial);
+                *failed.entry(of).or_default() += 1;
+            }
+        }
+        for (felt, source) in self.felt.iter_mut().zip(&self.source_row) {
+            let row = rows.get(*source as usize - 1);
+            if let (Some(felt), Some(row)) = (felt, row) {
+                let of = (&row.participant, row.session, row.trial);
+                felt.failed = failed.get(&of).copied().unwrap_or(0);
+            }
+        }
+    }
+
+    /// What was felt in a row, if it is known.
+    pub fn felt(&self, row: usize) -> Option<&Felt> {
+        self.felt.get(row)?.as_ref()
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.rating.len()
@@ -297,6 +357,10 @@ impl Ratings {
             attempt: pick(&rows, &self.attempt),
             strokes: pick(&rows, &self.strokes),
             source_row: pick(&rows, &self.source_row),
+            felt: match self.felt.is_empty() {
+                true => Vec::new(),
+                false => rows.iter().map(|&i| self.felt(i).copied()).collect(),
+            },
             comments: self
                 .comments
                 .iter()

@@ -2,7 +2,7 @@
 //! which `protocol::columns` declares.
 
 use super::event::{Author, Event, Failure, State};
-use super::fidelity::Verdict;
+use super::fidelity::Fidelity;
 use crate::protocol::{Answer, DeviceKind, Role};
 use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
@@ -72,8 +72,9 @@ pub struct RatingRow {
     pub level: Option<f64>,
     pub correct: Option<bool>,
     pub replays: Option<u32>,
-    pub rendering: Option<Verdict>,
-    pub rendered_vaf: Option<f64>,
+    /// Of several playbacks the worst.
+    pub fidelity: Option<Fidelity>,
+    pub host_late_ms: Option<f64>,
 }
 
 /// One row of `intervals.csv`: a presentation.
@@ -98,8 +99,8 @@ pub struct IntervalRow {
     pub replays: u32,
     pub exploration_s: Option<f64>,
     pub strokes: Option<u32>,
-    pub rendering: Option<Verdict>,
-    pub rendered_vaf: Option<f64>,
+    pub fidelity: Option<Fidelity>,
+    pub host_late_ms: Option<f64>,
 }
 
 study_base::named! {

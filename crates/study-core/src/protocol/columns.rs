@@ -283,6 +283,27 @@ table! {
             "rendered_vaf",
             "share of the variance of the table's force for the reported motion that the device commanded",
         ).empty("not known, or the force did not vary").optional(),
+        DeliveredVaf: number(
+            "delivered_vaf",
+            "VAF of what was delivered: of the table's force on the validation recording, with the gain \
+             and the delay of the playback",
+        ).empty("not judged, or there is no validation recording with the protocol").optional(),
+        RenderedGain: number("rendered_gain", "slope of the commanded on the table's force")
+            .empty("not known, or the force did not vary").optional(),
+        RenderedBiasN: number("rendered_bias_n", "mean of the commanded minus the table's force")
+            .unit("N").empty("not known").optional(),
+        RenderedDelayMs: number(
+            "rendered_delay_ms",
+            "how much later than the table's force the commanded force was",
+        ).unit("ms").empty("not known, or the two hardly correlate").optional(),
+        RenderedErrorN: number(
+            "rendered_error_n",
+            "largest difference of commanded and table's force that lasted 20 ms",
+        ).unit("N").empty("not known").optional(),
+        HostLateMs: number(
+            "host_late_ms",
+            "how late this computer's thread for the device was at most during the playback",
+        ).unit("ms").empty("not measured").optional(),
     }
 }
 
@@ -316,8 +337,42 @@ table! {
         Strokes: RatingColumn::Strokes.column(),
         Rendering: RatingColumn::Rendering.column(),
         RenderedVaf: RatingColumn::RenderedVaf.column(),
+        DeliveredVaf: RatingColumn::DeliveredVaf.column(),
+        RenderedGain: RatingColumn::RenderedGain.column(),
+        RenderedBiasN: RatingColumn::RenderedBiasN.column(),
+        RenderedDelayMs: RatingColumn::RenderedDelayMs.column(),
+        RenderedErrorN: RatingColumn::RenderedErrorN.column(),
+        MaxForceN: number("max_force_n", "largest commanded or measured force").unit("N")
+            .empty("no samples"),
+        OverLimitN: number("over_limit_n", "by how much the force passed its limit").unit("N")
+            .empty("it did not"),
+        MeasuredVaf: number("measured_vaf", "share of the variance of the commanded force that was measured")
+            .empty(NO_SENSOR),
+        MeasuredGain: number("measured_gain", "slope of the measured on the commanded force")
+            .empty(NO_SENSOR),
+        MeasuredBiasN: number("measured_bias_n", "mean of the measured minus the commanded force")
+            .unit("N").empty(NO_SENSOR),
+        MeasuredErrorN: number("measured_error_n", "mean size of the measured minus the commanded force")
+            .unit("N").empty(NO_SENSOR),
+        NearestModel: text("nearest_model", "realization that explains the commanded force best")
+            .empty("not judged"),
+        LostShare: number("lost_share", "share of the samples that was lost").empty("no samples"),
+        TimeRatio: number("time_ratio", "time of the samples over time of this computer")
+            .empty("not known"),
+        SpeedGain: number("speed_gain", "slope of the reported speed on the change of the reported position")
+            .empty("the handle hardly moved"),
+        TravelMm: number("travel_mm", "distance over which the handle was moved").unit("mm")
+            .empty("no samples"),
+        RangeShare: number("range_share", "share of the identified range that was visited")
+            .empty("no samples"),
+        TopSpeedMmS: number("top_speed_mm_s", "largest speed").unit("mm/s").empty("no samples"),
+        MotionShare: number("motion_share", "share of the time in which the handle moved")
+            .empty("no samples"),
+        HostLateMs: RatingColumn::HostLateMs.column(),
     }
 }
+
+const NO_SENSOR: &str = "the device has no force sensor, or the force did not vary";
 
 const OUTSIDE_TRIALS: &str = "the event belongs to no trial";
 
@@ -495,6 +550,7 @@ mod tests {
     fn a_name_ends_in_its_unit() {
         let units = [
             ("_mm", "mm"),
+            ("_ms", "ms"),
             ("_mm_s", "mm/s"),
             ("_per_s", "1/s"),
             ("_s", "s"),

@@ -18,6 +18,10 @@ pub enum Exclusion {
     /// Participants whose mean distance between a realization and its hidden
     /// duplicate exceeds this, in points of the primary scale.
     Inconsistent(f64),
+    /// Trials whose force was not that of the table (`flag` or `fault`).
+    WrongForce,
+    /// Trials whose force was not shown to be that of the table (all but `ok`).
+    UnverifiedForce,
 }
 
 impl Exclusion {
@@ -31,6 +35,8 @@ impl Exclusion {
             }
             Self::StrokesBelow(strokes) => ("strokes-below", Some(("strokes", strokes))),
             Self::Inconsistent(difference) => ("inconsistent", Some(("difference", difference))),
+            Self::WrongForce => ("wrong-force", None),
+            Self::UnverifiedForce => ("unverified-force", None),
         }
     }
 }
@@ -71,6 +77,14 @@ mod tests {
         assert_eq!(
             json(Exclusion::Inconsistent(1.5)),
             r#"{"rule":"inconsistent","parameters":{"difference":1.5}}"#
+        );
+        assert_eq!(
+            json(Exclusion::WrongForce),
+            r#"{"rule":"wrong-force","parameters":{}}"#
+        );
+        assert_eq!(
+            json(Exclusion::UnverifiedForce),
+            r#"{"rule":"unverified-force","parameters":{}}"#
         );
     }
 }

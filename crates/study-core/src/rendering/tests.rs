@@ -121,6 +121,7 @@ fn verdict(
         samples,
         lost: 0,
         time_ratio: Some(1.0),
+        host_late_s: None,
         others: &others,
     };
     let mut rules = RenderingRules::default();

@@ -26,8 +26,8 @@ mod tests {
     use crate::outcome::cell::{Cell, Header, Row};
     use crate::outcome::ratings::Ratings;
     use crate::outcome::{
-        AttemptEvent, AttemptRow, Author, Failure, IntervalRow, ParticipantRow, RatingRow, State,
-        Status, Verdict,
+        AttemptEvent, AttemptRow, Author, Failure, Fidelity, IntervalRow, ParticipantRow,
+        RatingRow, State, Status, Verdict,
     };
     use crate::protocol::columns::{
         AttemptColumn, Column, IntervalColumn, Kind, ParticipantColumn, RatingColumn, Repeats,
@@ -57,6 +57,23 @@ mod tests {
 
         fn number(&mut self) -> f64 {
             f64::from(self.whole()) / 7.0 - 1e8
+        }
+
+        fn fidelity(&mut self) -> Fidelity {
+            let verdicts = [
+                Verdict::Ok,
+                Verdict::Unverified,
+                Verdict::TooLittle,
+                Verdict::Flag,
+                Verdict::Fault,
+            ];
+            Fidelity {
+                verdict: self.of(&verdicts),
+                rendered_vaf: self.maybe(Self::number),
+                delivered_vaf: self.maybe(Self::number),
+                nearest_model: self.maybe(Self::model),
+                ..Fidelity::default()
+            }
         }
 
         fn flag(&mut self) -> bool {
@@ -167,16 +184,8 @@ mod tests {
             level: d.maybe(Draws::number),
             correct: d.maybe(Draws::flag),
             replays: d.maybe(Draws::whole),
-            rendering: d.maybe(|d| {
-                d.of(&[
-                    Verdict::Ok,
-                    Verdict::Unverified,
-                    Verdict::TooLittle,
-                    Verdict::Flag,
-                    Verdict::Fault,
-                ])
-            }),
-            rendered_vaf: d.maybe(Draws::number),
+            fidelity: d.maybe(Draws::fidelity),
+            host_late_ms: d.maybe(Draws::number),
         }
     }
 
@@ -202,16 +211,8 @@ mod tests {
             replays: d.whole(),
             exploration_s: d.maybe(Draws::number),
             strokes: d.maybe(Draws::whole),
-            rendering: d.maybe(|d| {
-                d.of(&[
-                    Verdict::Ok,
-                    Verdict::Unverified,
-                    Verdict::TooLittle,
-                    Verdict::Flag,
-                    Verdict::Fault,
-                ])
-            }),
-            rendered_vaf: d.maybe(Draws::number),
+            fidelity: d.maybe(Draws::fidelity),
+            host_late_ms: d.maybe(Draws::number),
         }
     }
 

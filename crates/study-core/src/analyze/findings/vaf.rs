@@ -18,32 +18,57 @@ pub(super) fn vaf(facts: &Facts<'_>) -> Option<Finding> {
     if n == 0 {
         return None;
     }
-    let of = |what: &str| facts.number(&format!("{DECIDING}/{what}"));
-    let found = decided(facts).unwrap_or_else(|| {
-        let reason = |id: &str| facts.values.reason(&format!("{DECIDING}/pearson/{id}"));
-        let why = reason("r").unwrap_or("the permutation test is undefined");
-        Finding::undefined(Question::Vaf, why, facts.design)
-    });
-    let mut found = Finding {
-        realizations: n,
-        ..found
-    };
-    found.estimate = of("pearson/r").map(|value| Estimate {
-        name: "r",
-        value,
-        ci95: facts.values.interval(&format!("{DECIDING}/pearson/ci95")),
-    });
+    let mut found = correlation(facts, Question::Vaf, DECIDING, n);
     caveats(facts, &mut found);
     Some(found)
 }
 
-fn decided(facts: &Facts<'_>) -> Option<Finding> {
-    let test = permutation(facts.values, DECIDING, facts.rules.alpha)?;
-    let r = facts.number(&format!("{DECIDING}/pearson/r"))?;
+/// The finding about a correlation over `n` realizations, from the statistics of a group.
+fn correlation(facts: &Facts<'_>, question: Question, group: &str, n: usize) -> Finding {
+    let id = |what: &str| format!("{group}/pearson/{what}");
+    let found = decided(facts, question.clone(), group).unwrap_or_else(|| {
+        let why = facts.values.reason(&id("r"));
+        let why = why.unwrap_or("the permutation test is undefined");
+        Finding::undefined(question, why, facts.design)
+    });
+    Finding {
+        realizations: n,
+        estimate: facts.number(&id("r")).map(|value| Estimate {
+            name: "r",
+            value,
+            ci95: facts.values.interval(&id("ci95")),
+        }),
+        ..found
+    }
+}
+
+/// Does the delivered VAF predict the rating? Asked where playbacks were judged.
+pub(super) fn delivered(facts: &Facts<'_>) -> Option<Finding> {
+    const GROUP: &str = "corr_delivered";
+    let n = facts.number(&format!("{GROUP}/n_models"));
+    if n.is_none() && facts.values.get(&format!("{GROUP}/pearson/r")).is_none() {
+        return None;
+    }
+    let n = n.unwrap_or(0.0) as usize;
+    if n == 0 {
+        let why = super::super::rendering::NO_RECORDING;
+        return Some(Finding {
+            realizations: n,
+            ..Finding::undefined(Question::Delivered, why, facts.design)
+        });
+    }
+    let mut found = correlation(facts, Question::Delivered, GROUP, n);
+    too_few(facts, GROUP, &mut found);
+    Some(found)
+}
+
+fn decided(facts: &Facts<'_>, question: Question, group: &str) -> Option<Finding> {
+    let test = permutation(facts.values, group, facts.rules.alpha)?;
+    let r = facts.number(&format!("{group}/pearson/r"))?;
     let direction = Some(Direction::of(r)).filter(|_| test.is_significant());
     Some(Finding {
         direction,
-        ..Finding::decided(Question::Vaf, test, facts.design)
+        ..Finding::decided(question, test, facts.design)
     })
 }
 
@@ -55,6 +80,21 @@ pub(in crate::analyze) fn permutation(values: &Values, group: &str, alpha: f64) 
     let random = || of("p_monte_carlo_two_sided").map(|p| (TestKind::PermutationMonteCarlo, p));
     let (kind, p) = exact.or_else(random)?;
     Some(Test::single(kind, p, alpha).with("r", Some(r), &[]))
+}
+
+/// Says so if no order of the realizations gives a small p.
+fn too_few(facts: &Facts<'_>, group: &str, found: &mut Finding) {
+    let least = facts.number(&format!("{group}/pearson/smallest_p_two_sided"));
+    if let Some(least) = least.filter(|p| *p >= facts.rules.alpha) {
+        found.caveat(
+            "too-few",
+            format!(
+                "with these {} realizations no p below {} is possible",
+                found.realizations,
+                apa::bare_p(least)
+            ),
+        );
+    }
 }
 
 fn caveats(facts: &Facts<'_>, found: &mut Finding) {
@@ -74,18 +114,8 @@ fn caveats(facts: &Facts<'_>, found: &mut Finding) {
             ),
         );
     }
+    too_few(facts, DECIDING, found);
     let of = |what: &str| facts.number(&format!("{DECIDING}/pearson/{what}"));
-    let least = of("smallest_p_two_sided");
-    if let Some(least) = least.filter(|p| *p >= alpha) {
-        found.caveat(
-            "too-few",
-            format!(
-                "with these {} realizations no p below {} is possible",
-                found.realizations,
-                apa::bare_p(least)
-            ),
-        );
-    }
     if let (
         Some(Estimate {
             ci95: Some((low, high)),

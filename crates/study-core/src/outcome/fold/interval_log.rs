@@ -58,7 +58,9 @@ fn row(
         replays: presentation.replays,
         exploration_s: playback.map(|p| p.exploration_s).filter(|s| s.is_finite()),
         strokes: playback.filter(|p| p.samples > 0).map(|p| p.strokes),
-        rendering: presentation.judged.map(|(verdict, _)| verdict),
-        rendered_vaf: presentation.judged.and_then(|(_, vaf)| vaf),
+        fidelity: presentation
+            .judged
+            .and_then(|i| attempt.rendering.get(i).cloned()),
+        host_late_ms: playback.and_then(|p| Some(p.host_late_ms?[1])),
     }
 }

@@ -125,8 +125,8 @@ impl History {
                 .map(|level| level.presented),
             correct: correct(trial, track, part, &given),
             replays: shown.map(|a| a.replays),
-            rendering: worst.map(|w| w.verdict),
-            rendered_vaf: worst.and_then(|w| w.rendered_vaf),
+            fidelity: worst.cloned(),
+            host_late_ms: played.and_then(|p| Some(p.host_late_ms?[1])),
             answers: answers(given.into_iter()),
         }
     }

@@ -1,7 +1,7 @@
 //! The history of one trial: its attempts.
 
 use crate::outcome::event::{Moment, Playback, TrackLevel};
-use crate::outcome::fidelity::{Fidelity, Verdict};
+use crate::outcome::fidelity::Fidelity;
 use crate::protocol::Answer;
 use study_base::text::ModelId;
 
@@ -94,8 +94,8 @@ pub struct Presentation {
     pub ended: Option<(Moment, Ended)>,
     /// From the end of the presentation before it in the attempt, s.
     pub gap_s: Option<f64>,
-    /// Whether the force was that of the table, and the rendered VAF, if it was judged.
-    pub judged: Option<(Verdict, Option<f64>)>,
+    /// Which entry of [`Attempt::rendering`] judges it, if one does.
+    pub judged: Option<usize>,
 }
 
 /// The start of an attempt.
@@ -149,6 +149,10 @@ impl Ended {
                 samples_lost: a.samples_lost + b.samples_lost,
                 // That of each is in `intervals.csv`'s verdict; a mean would hide one.
                 time_ratio: None,
+                host_late_ms: match (a.host_late_ms, b.host_late_ms) {
+                    (Some(a), Some(b)) => Some([a[0].max(b[0]), a[1].max(b[1])]),
+                    (one, other) => one.or(other),
+                },
             },
             stopped: self.stopped || next.stopped,
         }
@@ -195,10 +199,14 @@ impl Attempt {
         &mut self,
         interval: u32,
         ended: Ended,
-        judged: Option<(Verdict, Option<f64>)>,
+        judged: Option<&Fidelity>,
         at: Moment,
     ) {
         let replays = self.replays;
+        let judged = judged.map(|found| {
+            self.rendering.push(found.clone());
+            self.rendering.len() - 1
+        });
         let open =
             (self.presentations.last_mut()).filter(|p| p.interval == interval && p.ended.is_none());
         match open {

@@ -1,7 +1,7 @@
 //! From rows to columns: names get an index when they first occur, and are sorted at
 //! the end.
 
-use super::{Comment, IndexedPracticeRow, Origin, Practice, Ratings, Realization, Subject};
+use super::{Comment, Felt, IndexedPracticeRow, Origin, Practice, Ratings, Realization, Subject};
 use crate::outcome::rows::Status;
 use crate::protocol::Role;
 use std::collections::{BTreeMap, HashMap};
@@ -23,6 +23,7 @@ pub(super) struct Row {
     pub(super) attempt: Option<u32>,
     pub(super) strokes: Option<u32>,
     pub(super) source_row: u32,
+    pub(super) felt: Option<Felt>,
 }
 
 impl Row {
@@ -193,6 +194,10 @@ impl Builder {
             self.unnumbered.push(self.len());
         }
         let r = &mut self.ratings;
+        if row.felt.is_some() {
+            r.felt.resize(r.rating.len(), None);
+            r.felt.push(row.felt);
+        }
         r.subject.push(row.subject);
         r.model.push(row.model);
         r.repetition.push(row.repetition.unwrap_or(0));

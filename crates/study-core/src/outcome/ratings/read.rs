@@ -2,7 +2,7 @@
 //! `ratings.csv`.
 
 use super::error::RatingsError;
-use super::{Builder, Origin, Ratings, Row};
+use super::{Builder, Felt, Origin, Ratings, Row};
 use crate::outcome::rows::Status;
 use crate::protocol::Role;
 use crate::protocol::columns::{self, Kind, RatingColumn as C, UsedColumn as Foreign};
@@ -179,6 +179,9 @@ struct Positions {
     covariates: Vec<usize>,
     /// The track of a trial, in a study with parts.
     track: Option<usize>,
+    rendering: Option<usize>,
+    /// Numbers beside it: rendered VAF, gain, delivered VAF.
+    rendered: [Option<usize>; 3],
     near_misses: Vec<(String, &'static str)>,
 }
 
@@ -238,6 +241,8 @@ impl Positions {
                 texts: Vec::new(),
                 covariates: MEMORY.iter().filter_map(|c| find(c)).collect(),
                 track: None,
+                rendering: None,
+                rendered: [None; 3],
             });
         };
         // A repeated column fills the space between its neighbours.
@@ -279,6 +284,8 @@ impl Positions {
             texts: texts.chain(own(C::Remarks)).collect(),
             covariates: repeated(C::Covariates).collect(),
             track: own(C::Track),
+            rendering: own(C::Rendering),
+            rendered: [C::RenderedVaf, C::RenderedGain, C::DeliveredVaf].map(own),
         })
     }
 
@@ -309,6 +316,7 @@ impl Positions {
             attempt: line.whole(self.attempt)?,
             strokes: line.whole(self.strokes)?,
             source_row: number,
+            felt: self.felt(line)?,
         };
         if let Some(at) = self.status {
             row.status = line.level(at, C::Status)?;
@@ -348,6 +356,21 @@ impl Positions {
         }
         builder.push(row);
         Ok(())
+    }
+
+    /// What was felt, where the table says so.
+    fn felt(&self, line: &Line<'_>) -> Result<Option<Felt>, RatingsError> {
+        let Some(at) = (self.rendering).filter(|&at| !line.text(at).is_empty()) else {
+            return Ok(None);
+        };
+        let [rendered_vaf, gain, delivered_vaf] = self.rendered;
+        Ok(Some(Felt {
+            verdict: line.level(at, C::Rendering)?,
+            rendered_vaf: line.number(rendered_vaf)?,
+            gain: line.number(gain)?,
+            delivered_vaf: line.number(delivered_vaf)?,
+            failed: 0,
+        }))
     }
 
     /// Those that are numbers.

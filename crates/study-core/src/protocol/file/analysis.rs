@@ -40,7 +40,7 @@ static SHAPES: [Shape; RULES.len()] = shapes(&RULES);
 
 /// The exclusion rules. A new one is declared here and in [`Exclusion`], and judged
 /// in `analyze/exclude.rs`; CONTRIBUTING.md lists the other places.
-const RULES: [Variant<Exclusion>; 4] = [
+const RULES: [Variant<Exclusion>; 6] = [
     Variant::new(
         "constant-rater",
         "Excludes participants with two or more primary ratings that are all equal.",
@@ -77,6 +77,18 @@ const RULES: [Variant<Exclusion>; 4] = [
             "difference": Kind::ANY_NUMBER, "1.5", required;
         },
         |section| section.number("difference").map(Exclusion::Inconsistent),
+    ),
+    Variant::new(
+        "wrong-force",
+        "Excludes trials in which the force was not that of the table (`rendering` is `flag` or `fault`).",
+        &[],
+        |_| Some(Exclusion::WrongForce),
+    ),
+    Variant::new(
+        "unverified-force",
+        "Excludes trials in which the force was not shown to be that of the table (`rendering` is not `ok`).",
+        &[],
+        |_| Some(Exclusion::UnverifiedForce),
     ),
 ];
 

@@ -1,0 +1,138 @@
+//! A whole session with a device that turns wrong in its midst.
+
+use crate::support::{repository, study};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use study::cli::load;
+use study::device::firmware::{Wrong, WrongLoads};
+use study::device::virtual_device::{Options, VirtualDevice};
+use study::rater::{Effect, Percepts, Rater};
+use study::runner::Setup;
+use study::runner::clock::{Clock as _, VirtualClock};
+use study::runner::rehearsal::{first_day, run_one};
+use study_core::outcome::{AttemptRow, Failure, RatingRow, Status, Verdict};
+use study_core::protocol::DeviceKind;
+use study_core::store::{Derived, Frozen, SeatKind, StudyFolder};
+
+/// The results folder and the tables of a rehearsal of the study of the paper on a device that is wrong at some loads.
+fn rehearsed(home: &Path, wrong: Wrong, loads: [u32; 2]) -> (PathBuf, Derived) {
+    let loaded = load::load(Path::new(&repository("protocols/turn-signal"))).unwrap();
+    let clock = VirtualClock::starting_at(first_day());
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let opened = StudyFolder::open_or_create(home, &frozen, clock.now()).unwrap();
+    let folder = opened.path().to_owned();
+    let mut options = Options::seeded(11);
+    options.device.wrong = Some(WrongLoads { wrong, loads });
+    let percepts = Percepts::of(&loaded.protocol, &loaded.models);
+    let protocol = Arc::new(loaded.protocol);
+    let setup = Setup {
+        protocol: protocol.clone(),
+        orders: None,
+        models: loaded.models,
+        fingerprints: loaded.fingerprints,
+        study: opened,
+        kind: SeatKind::Simulated,
+        rows: None,
+        device_kind: DeviceKind::Simulated,
+        device: Box::new(VirtualDevice::new(options)),
+        deliveries: Default::default(),
+        device_check: None,
+        clock: Box::new(clock.clone()),
+        threaded: false,
+    };
+    let mut rater = Rater::new(3, 1, Effect::BuiltIn);
+    run_one(setup, "SIM001", &clock, &mut rater, &percepts).unwrap();
+    (
+        folder.clone(),
+        StudyFolder::open(&folder)
+            .unwrap()
+            .refresh(&protocol)
+            .unwrap(),
+    )
+}
+
+fn verdict(row: &RatingRow) -> Option<Verdict> {
+    row.fidelity.as_ref().map(|found| found.verdict)
+}
+
+fn failed(derived: &Derived) -> Vec<&AttemptRow> {
+    derived
+        .attempts
+        .iter()
+        .filter(|a| a.failure.is_some())
+        .collect()
+}
+
+fn status(folder: &Path) -> String {
+    let (code, out, err) = study(&["status", folder.to_str().unwrap()], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    out
+}
+
+/// The table of another trial instead of its own, although the two hardly differ: the
+/// attempt fails, its trial comes again, and the files say so.
+#[test]
+fn another_table_in_the_seventh_trial_fails_the_attempt() {
+    let home = tempfile::tempdir().unwrap();
+    let (folder, derived) = rehearsed(home.path(), Wrong::FirstTable, [7, 7]);
+    let failed = failed(&derived);
+    let [failed] = &failed[..] else {
+        panic!("{failed:?}");
+    };
+    assert_eq!(failed.trial, Some(7));
+    assert_eq!(failed.failure, Some(Failure::Rendering));
+    assert_eq!(failed.text, "other-table");
+    assert_eq!(derived.rows.len(), 15);
+    for row in &derived.rows {
+        assert_eq!((row.status, verdict(row)), (Status::Ok, Some(Verdict::Ok)));
+        assert_eq!(row.attempt, Some(if row.trial == 7 { 2 } else { 1 }));
+        let felt = row.fidelity.as_ref().unwrap();
+        assert!(felt.rendered_vaf.unwrap() > 0.99, "{row:?}");
+    }
+    let said = "Force of the playbacks: 15 ok, 1 fault\n";
+    let status = status(&folder);
+    assert!(status.contains(said), "{status}");
+}
+
+/// Half of the force: the trial is rated and marked.
+#[test]
+fn half_of_the_force_from_the_seventh_trial_on_marks_the_trials() {
+    let home = tempfile::tempdir().unwrap();
+    let (folder, derived) = rehearsed(home.path(), Wrong::HalfForce, [7, u32::MAX]);
+    assert_eq!(failed(&derived).len(), 0);
+    for row in &derived.rows {
+        let expected = if row.trial < 7 {
+            Verdict::Ok
+        } else {
+            Verdict::Flag
+        };
+        assert_eq!((row.status, verdict(row)), (Status::Ok, Some(expected)));
+    }
+    let said = "Force of the playbacks: 6 ok, 9 flag\n";
+    let status = status(&folder);
+    assert!(status.contains(said), "{status}");
+}
+
+/// A reversed force drives the handle away: the device trips before anything is judged.
+#[test]
+fn a_reversed_force_trips_the_device() {
+    let home = tempfile::tempdir().unwrap();
+    let (_, derived) = rehearsed(home.path(), Wrong::Reversed, [7, 7]);
+    let failed = failed(&derived);
+    let [failed] = &failed[..] else {
+        panic!("{failed:?}");
+    };
+    assert_eq!((failed.trial, failed.attempt), (Some(7), Some(1)));
+    let why = failed.failure.unwrap();
+    assert!(
+        matches!(why, Failure::DeviceFault | Failure::Rendering),
+        "{why:?}"
+    );
+    for row in &derived.rows {
+        assert_eq!((row.status, verdict(row)), (Status::Ok, Some(Verdict::Ok)));
+    }
+}
