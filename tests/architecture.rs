@@ -69,6 +69,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
             "session",
             "device",
             "store",
+            "identify",
             "outcome",
             "protocol",
             "rendering",

@@ -137,6 +137,8 @@ fn the_schema_and_the_reader_know_the_same_keys() {
             "hidden-reference-below",
             "inconsistent",
             "strokes-below",
+            "unverified-force",
+            "wrong-force",
         ])
     );
     for (pointer, head) in places {

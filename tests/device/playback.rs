@@ -477,9 +477,9 @@ proptest! {
 /// device does not go limp meanwhile.
 #[test]
 fn a_lost_report_of_the_end_is_asked_for_again() {
-    for seed in 0..20 {
+    for seed in 0..30 {
         let mut options = Options::seeded(seed);
-        options.noise.drop_telemetry = 0.3;
+        options.noise.drop_telemetry = 0.12;
         let mut device = VirtualDevice::new(options);
         let table = ordinary();
         device

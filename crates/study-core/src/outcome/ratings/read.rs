@@ -1,12 +1,14 @@
 //! Ratings from a CSV: a foreign table with one row for each rating, or a study's
 //! `ratings.csv`.
 
+mod line;
+
 use super::error::RatingsError;
 use super::{Builder, Felt, Origin, Ratings, Row};
 use crate::outcome::rows::Status;
 use crate::protocol::Role;
-use crate::protocol::columns::{self, Kind, RatingColumn as C, UsedColumn as Foreign};
-use serde::de::{DeserializeOwned, IntoDeserializer as _};
+use crate::protocol::columns::{self, RatingColumn as C, UsedColumn as Foreign};
+use line::Line;
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
@@ -390,77 +392,6 @@ fn near_miss<'h>(wanted: &str, header: &'h [String]) -> Option<&'h str> {
 
 /// Columns of a foreign table that give the memory of a realization.
 const MEMORY: [&str; 2] = ["lambda", "memory_mm"];
-
-/// A line of a table.
-struct Line<'a> {
-    name: &'a str,
-    header: &'a [String],
-    record: &'a csv::StringRecord,
-    line: u64,
-}
-
-impl Line<'_> {
-    fn text(&self, at: usize) -> &str {
-        self.record[at].trim()
-    }
-
-    fn error(&self, at: usize, wanted: impl Into<String>) -> RatingsError {
-        RatingsError::Field {
-            name: self.name.to_owned(),
-            line: self.line,
-            column: self.header[at].clone(),
-            field: self.record[at].to_owned(),
-            wanted: wanted.into(),
-        }
-    }
-
-    /// A finite number; `None` without a column, and for `NA`, `NaN` and empty fields.
-    fn number(&self, at: Option<usize>) -> Result<Option<f64>, RatingsError> {
-        let missing = |text: &str| {
-            ["", "na", "nan"]
-                .iter()
-                .any(|m| text.eq_ignore_ascii_case(m))
-        };
-        let Some(at) = at.filter(|&at| !missing(self.text(at))) else {
-            return Ok(None);
-        };
-        match self.text(at).parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(Some(number)),
-            _ => Err(self.error(at, "a finite number")),
-        }
-    }
-
-    /// A whole number from 0; `None` without a column and for empty fields.
-    fn whole(&self, at: Option<usize>) -> Result<Option<u32>, RatingsError> {
-        let Some(at) = at.filter(|&at| !self.text(at).is_empty()) else {
-            return Ok(None);
-        };
-        let number = self.text(at).parse().map(Some);
-        number.map_err(|_| self.error(at, "a whole number from 0"))
-    }
-
-    /// `false` without a column and for empty fields.
-    fn flag(&self, at: Option<usize>) -> Result<bool, RatingsError> {
-        match at.map(|at| (at, self.text(at))) {
-            Some((_, "true")) => Ok(true),
-            Some((_, "false" | "")) | None => Ok(false),
-            Some((at, _)) => Err(self.error(at, "`true` or `false`")),
-        }
-    }
-
-    /// One of the words that a column has.
-    fn level<T: DeserializeOwned>(&self, at: usize, column: C) -> Result<T, RatingsError> {
-        let read: Result<T, serde::de::value::Error> =
-            T::deserialize(self.text(at).into_deserializer());
-        read.map_err(|_| {
-            let words: Vec<&str> = match column.column().kind {
-                Kind::Level(levels) => levels.iter().map(|(word, _)| *word).collect(),
-                _ => Vec::new(),
-            };
-            self.error(at, format!("one of {}", words.join(", ")))
-        })
-    }
-}
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,81 @@
+//! One line of a table.
+
+use super::super::error::RatingsError;
+use super::C;
+use crate::protocol::columns::Kind;
+use serde::de::{DeserializeOwned, IntoDeserializer as _};
+
+/// A line of a table.
+pub(super) struct Line<'a> {
+    pub(super) name: &'a str,
+    pub(super) header: &'a [String],
+    pub(super) record: &'a csv::StringRecord,
+    pub(super) line: u64,
+}
+
+impl Line<'_> {
+    pub(super) fn text(&self, at: usize) -> &str {
+        self.record[at].trim()
+    }
+
+    pub(super) fn error(&self, at: usize, wanted: impl Into<String>) -> RatingsError {
+        RatingsError::Field {
+            name: self.name.to_owned(),
+            line: self.line,
+            column: self.header[at].clone(),
+            field: self.record[at].to_owned(),
+            wanted: wanted.into(),
+        }
+    }
+
+    /// A finite number; `None` without a column, and for `NA`, `NaN` and empty fields.
+    pub(super) fn number(&self, at: Option<usize>) -> Result<Option<f64>, RatingsError> {
+        let missing = |text: &str| {
+            ["", "na", "nan"]
+                .iter()
+                .any(|m| text.eq_ignore_ascii_case(m))
+        };
+        let Some(at) = at.filter(|&at| !missing(self.text(at))) else {
+            return Ok(None);
+        };
+        match self.text(at).parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(Some(number)),
+            _ => Err(self.error(at, "a finite number")),
+        }
+    }
+
+    /// A whole number from 0; `None` without a column and for empty fields.
+    pub(super) fn whole(&self, at: Option<usize>) -> Result<Option<u32>, RatingsError> {
+        let Some(at) = at.filter(|&at| !self.text(at).is_empty()) else {
+            return Ok(None);
+        };
+        let number = self.text(at).parse().map(Some);
+        number.map_err(|_| self.error(at, "a whole number from 0"))
+    }
+
+    /// `false` without a column and for empty fields.
+    pub(super) fn flag(&self, at: Option<usize>) -> Result<bool, RatingsError> {
+        match at.map(|at| (at, self.text(at))) {
+            Some((_, "true")) => Ok(true),
+            Some((_, "false" | "")) | None => Ok(false),
+            Some((at, _)) => Err(self.error(at, "`true` or `false`")),
+        }
+    }
+
+    /// One of the words that a column has.
+    pub(super) fn level<T: DeserializeOwned>(
+        &self,
+        at: usize,
+        column: C,
+    ) -> Result<T, RatingsError> {
+        let read: Result<T, serde::de::value::Error> =
+            T::deserialize(self.text(at).into_deserializer());
+        read.map_err(|_| {
+            let words: Vec<&str> = match column.column().kind {
+                Kind::Level(levels) => levels.iter().map(|(word, _)| *word).collect(),
+                _ => Vec::new(),
+            };
+            self.error(at, format!("one of {}", words.join(", ")))
+        })
+    }
+}
