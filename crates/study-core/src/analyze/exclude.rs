@@ -10,6 +10,19 @@ use crate::outcome::ratings::Ratings;
 use crate::protocol::{Exclusion, Role};
 use std::collections::{BTreeSet, HashMap};
 
+/// Why a rule about the force leaves some trials.
+pub(super) const UNJUDGED: &str = "the force of some trials was not judged; these trials stay";
+
+/// Whether the rule `wrong-force` excludes a trial.
+pub(super) fn is_wrong(verdict: Verdict) -> bool {
+    matches!(verdict, Verdict::Flag | Verdict::Fault)
+}
+
+/// Whether the rule `unverified-force` excludes a trial.
+pub(super) fn is_unverified(verdict: Verdict) -> bool {
+    verdict != Verdict::Ok
+}
+
 /// The effect of a rule.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Applied {
@@ -140,11 +153,10 @@ fn judge(ratings: &Ratings, rules: &Rules, rule: Exclusion, counts: &[bool]) -> 
             let unknown = rows.clone().any(|i| ratings.felt(i).is_none());
             Judgement {
                 force: Some(match rule {
-                    Exclusion::WrongForce => |v| matches!(v, Verdict::Flag | Verdict::Fault),
-                    _ => |v| v != Verdict::Ok,
+                    Exclusion::WrongForce => is_wrong,
+                    _ => is_unverified,
                 }),
-                problem: unknown
-                    .then_some("the force of some trials was not judged; these trials stay"),
+                problem: unknown.then_some(UNJUDGED),
                 ..Judgement::default()
             }
         }

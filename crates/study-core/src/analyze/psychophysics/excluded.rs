@@ -4,8 +4,8 @@
 //! excludes nothing, and says so. Every rule judges the same trials.
 
 use super::part_data::Intervals;
-use crate::analyze::exclude::Applied;
-use crate::outcome::RatingRow;
+use crate::analyze::exclude::{Applied, UNJUDGED, is_unverified, is_wrong};
+use crate::outcome::{RatingRow, Verdict};
 use crate::protocol::{Answer, Exclusion, Part};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::ParticipantId;
@@ -15,6 +15,8 @@ enum Judged<'a> {
     Participants(BTreeSet<&'a ParticipantId>),
     /// Trials with fewer strokes in an interval, and whether those of a trial are unknown.
     Strokes(f64),
+    /// Trials whose worst playback was judged so.
+    Force(fn(Verdict) -> bool),
     Nothing(&'static str),
 }
 
@@ -35,6 +37,8 @@ pub(super) fn apply(
         let judged = match rule {
             Exclusion::ConstantRater => Judged::Participants(constant(part, rows)),
             Exclusion::StrokesBelow(least) => Judged::Strokes(*least),
+            Exclusion::WrongForce => Judged::Force(is_wrong),
+            Exclusion::UnverifiedForce => Judged::Force(is_unverified),
             Exclusion::HiddenReferenceBelow(_) | Exclusion::Inconsistent(_) => {
                 Judged::Nothing(NO_POINTS)
             }
@@ -44,6 +48,9 @@ pub(super) fn apply(
             Judged::Strokes(least) => intervals
                 .strokes(row)
                 .is_some_and(|n| f64::from(n) < *least),
+            Judged::Force(excludes) => {
+                (row.fidelity.as_ref()).is_some_and(|worst| excludes(worst.verdict))
+            }
             Judged::Nothing(_) => false,
         };
         match &judged {
@@ -51,7 +58,10 @@ pub(super) fn apply(
             Judged::Strokes(_) if rows.iter().any(|r| intervals.strokes(r).is_none()) => {
                 problem = Some("the strokes of some trials are unknown; these trials stay");
             }
-            Judged::Strokes(_) | Judged::Participants(_) => {}
+            Judged::Force(_) if rows.iter().any(|r| r.fidelity.is_none()) => {
+                problem = Some(UNJUDGED);
+            }
+            Judged::Strokes(_) | Judged::Force(_) | Judged::Participants(_) => {}
         }
         let gone: Vec<usize> = (0..rows.len())
             .filter(|&i| stays[i] && excludes(rows[i]))
