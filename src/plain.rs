@@ -16,6 +16,7 @@ use dialogue::Dialogue;
 use input::{Lines, Typed};
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
+use study_core::outcome::Channel;
 use study_core::session::{Input, View};
 
 /// An Enter alone within this time after a new page is a repeated or held key.
@@ -93,6 +94,10 @@ impl Plain {
 }
 
 impl Operator for Plain {
+    fn channel(&self) -> Option<Channel> {
+        Some(Channel::Plain)
+    }
+
     fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
         if let Some(signal) = self.input.take_signal() {
             return Ok(vec![Input::Abort(format!("the program received {signal}"))]);

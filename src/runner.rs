@@ -21,11 +21,11 @@ use std::sync::Arc;
 use std::time::Duration;
 use study_base::limits::Limits;
 use study_base::text::{ModelId, ParticipantId};
-use study_core::outcome::{Event, Fidelity, Playback, Sample, Verdict};
+use study_core::outcome::{Channel, Event, Fidelity, Playback, Sample, Verdict};
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
 use study_core::rendering::{Played, judge};
-use study_core::session::{Effect, Ending, Input, Session, Unsaved, View, input::Claim};
+use study_core::session::{Effect, Ending, Input, Screen, Session, Unsaved, View, input::Claim};
 use study_core::store::{ClaimRequest, Copies, Receipt, SeatKind, StudyFolder};
 use study_haptics::identify::delivery::Delivery;
 use study_haptics::model::Realization;
@@ -35,8 +35,8 @@ use study_wire::servo::ServoSettings;
 const IDLE: Duration = Duration::from_millis(100);
 /// Longest wait during playback.
 const PLAYING: Duration = Duration::from_millis(20);
-/// Longest wait while an event is being saved.
-const SAVING: Duration = Duration::from_millis(2);
+/// Longest wait while an event is being saved, or the device is about to start or stop.
+const SOON: Duration = Duration::from_millis(2);
 /// Samples of a playback that are judged: ten minutes at 1 kHz.
 const MOST_SAMPLES: usize = 600_000;
 /// A playback is lost if a device with telemetry reports nothing for this time.
@@ -49,12 +49,30 @@ pub trait Operator {
     /// [`OperatorError`] if the operator can no longer see or type; the session then
     /// ends as after a quit.
     fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError>;
+
+    /// How the inputs that were returned last were entered; `None` if not by a person.
+    fn channel(&self) -> Option<Channel> {
+        None
+    }
 }
 
 /// The reason why the operator is gone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct OperatorError(pub String);
+
+/// Until the device has to stop by itself; without such a time, for ever.
+fn exposure_left(view: &View) -> Duration {
+    match &view.screen {
+        Screen::Playing {
+            since_s, exposure, ..
+        } => {
+            let left = exposure.left_s(*since_s).unwrap_or(f64::INFINITY);
+            Duration::try_from_secs_f64(left).unwrap_or(Duration::MAX)
+        }
+        _ => Duration::MAX,
+    }
+}
 
 /// Everything that a session needs.
 pub struct Setup {
@@ -167,16 +185,18 @@ impl Runner {
     pub fn run(&mut self, operator: &mut dyn Operator) -> Ended {
         loop {
             let view = self.view();
-            let timeout = if !view.line.all_saved {
-                SAVING
+            let changes = matches!(view.screen, Screen::Loading { .. } | Screen::Stopping);
+            let timeout = if changes || !view.line.all_saved {
+                SOON
             } else if view.armed {
-                PLAYING
+                PLAYING.min(exposure_left(&view))
             } else {
                 IDLE
             };
             let inputs = operator
                 .next(&view, timeout)
                 .unwrap_or_else(|gone| vec![Input::Abort(gone.0)]);
+            self.session.set_channel(operator.channel());
             if let Some(ended) = self.step(inputs) {
                 return ended;
             }

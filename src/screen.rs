@@ -22,6 +22,7 @@ use server::Server;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use study_core::outcome::Channel;
 use study_core::protocol::phrases::Words;
 use study_core::session::{Input, View};
 
@@ -167,6 +168,7 @@ impl Screen {
         Both {
             screen: self,
             terminal,
+            by_page: false,
         }
     }
 
@@ -234,7 +236,7 @@ impl Screen {
                 None
             }
             Ok(input) => {
-                let leaves = matches!(input, Input::Answer(_) | Input::Consent(_));
+                let leaves = matches!(input, Input::Answer(_) | Input::Consent(_) | Input::Back);
                 self.pending = Some(Pending {
                     key: reply.key,
                     leaves: leaves.then(|| view.screen.clone()),
@@ -249,9 +251,18 @@ impl Screen {
 pub struct Both {
     screen: Screen,
     terminal: Box<dyn Operator>,
+    /// Whether the last input was that of the page.
+    by_page: bool,
 }
 
 impl Operator for Both {
+    fn channel(&self) -> Option<Channel> {
+        match self.by_page {
+            true => Some(Channel::Page),
+            false => self.terminal.channel(),
+        }
+    }
+
     fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
         let until = Instant::now() + timeout;
         self.screen.show(view);
@@ -261,7 +272,9 @@ impl Operator for Both {
             seen.notice = Some("the participant's page has no connection".to_owned());
         }
         loop {
+            self.by_page = false;
             if let Some(input) = self.screen.input(view) {
+                self.by_page = true;
                 return Ok(vec![input]);
             }
             let left = until.saturating_duration_since(Instant::now());

@@ -29,6 +29,7 @@ use crate::runner::{Operator, OperatorError};
 use crossterm::event::{Event, MouseEventKind};
 use pace::Pace;
 use std::time::{Duration, Instant};
+use study_core::outcome::Channel;
 use study_core::session::{Input, Screen, View};
 use terminal::Terminal;
 pub(crate) use terminal::{Signals, survive_file_size_limit};
@@ -163,6 +164,10 @@ impl Tui {
 }
 
 impl Operator for Tui {
+    fn channel(&self) -> Option<Channel> {
+        Some(Channel::Terminal)
+    }
+
     fn next(&mut self, view: &View, timeout: Duration) -> Result<Vec<Input>, OperatorError> {
         let until = Instant::now() + timeout;
         self.suspend_if_asked(view)?;

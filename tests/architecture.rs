@@ -95,7 +95,10 @@ const IMPORTS: &[(&str, &[&str])] = &[
         "plain",
         &["runner", "session", "outcome", "protocol", "tui"],
     ),
-    ("screen", &["runner", "session", "protocol", "tui"]),
+    (
+        "screen",
+        &["runner", "session", "outcome", "protocol", "tui"],
+    ),
     (
         "cli",
         &[

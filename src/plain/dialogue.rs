@@ -2,6 +2,7 @@
 
 use super::answers;
 use super::pages::{self, Page};
+use crate::tui::views::prose::Stopped;
 use study_base::text::{QuestionId, Untrusted};
 use study_core::outcome::{Author, Choice};
 use study_core::protocol::Answer;
@@ -10,20 +11,18 @@ use study_core::session::view::{Correctable, DeviceState, Mirror, Telemetry};
 use study_core::session::{Input, Roster, Screen, View};
 
 /// What the lines that begin with a slash do, in the order of the help.
-const COMMANDS: [(&str, &str); 10] = [
-    ("/stop", "stops the device at once"),
-    ("/remark TEXT", "keeps a remark of the experimenter"),
-    ("/says TEXT", "keeps a remark of the participant"),
-    ("/correct", "changes an earlier answer, with a reason"),
-    ("/decline REASON", "declines the question"),
-    ("/bad REASON", "marks the trial as bad; it is repeated"),
-    ("/pause", "pauses"),
-    ("/again", "says the page again"),
-    (
-        "/replay",
-        "lets a trial be felt again, where that is possible",
-    ),
-    ("/quit", "leaves; the session can be resumed"),
+const COMMANDS: [(&str, Phrase); 11] = [
+    ("/stop", Phrase::CommandStop),
+    ("/back", Phrase::CommandBack),
+    ("/replay", Phrase::CommandReplay),
+    ("/again", Phrase::CommandAgain),
+    ("/decline REASON", Phrase::CommandDecline),
+    ("/says TEXT", Phrase::CommandSays),
+    ("/pause", Phrase::CommandPause),
+    ("/quit", Phrase::CommandQuit),
+    ("/remark TEXT", Phrase::CommandRemark),
+    ("/correct", Phrase::CommandCorrect),
+    ("/bad REASON", Phrase::CommandBad),
 ];
 
 /// Inputs, or what to say instead.
@@ -185,7 +184,7 @@ impl Dialogue {
         let mut lines = Vec::new();
         if !self.begun {
             self.begun = true;
-            lines.push("Type /help at any time for the list of commands.".to_owned());
+            lines.push(view.words.get(Phrase::PlainHelp).to_owned());
         }
         if !self.banner
             && let Some(banner) = pages::banner(view)
@@ -206,12 +205,12 @@ impl Dialogue {
         let line = &view.line;
         if line.all_saved && line.trials_saved > self.saved {
             self.saved = line.trials_saved;
-            let both = match line.mirror {
-                Some(Mirror::InStep) => " in both places",
-                _ => "",
+            let saved = &[("n", &self.saved as &dyn std::fmt::Display)];
+            let phrase = match line.mirror {
+                Some(Mirror::InStep) => Phrase::PlainSavedBoth,
+                _ => Phrase::PlainSaved,
             };
-            let plural = if self.saved == 1 { "" } else { "s" };
-            lines.push(format!("Saved{both}: {} trial{plural}.", self.saved));
+            lines.push(view.words.fill(phrase, saved));
         }
         if self.mirror != line.mirror {
             self.mirror = line.mirror;
@@ -300,29 +299,36 @@ impl Dialogue {
             }
             "/pause" => Ok(vec![Input::Pause]),
             "/replay" if view.can_replay => Ok(vec![Input::PlayAgain]),
-            "/replay" => say("This cannot be felt again."),
+            "/replay" => say(view.words.get(Phrase::PlainNoReplay)),
+            "/back" if self.at > 0 => {
+                self.at -= 1;
+                self.entered.truncate(self.at);
+                Ok(Vec::new())
+            }
+            "/back" if view.can_go_back => Ok(vec![Input::Back]),
+            "/back" => say(view.words.get(Phrase::PlainNoBack)),
             "/again" => {
                 self.repeat();
                 Ok(Vec::new())
             }
-            "/quit" => self.sure(
-                "Leave the session? It can be resumed later.",
-                vec![Input::Quit],
-            ),
+            "/quit" => self.sure(view.words.get(Phrase::PlainLeave), vec![Input::Quit], view),
             "/help" => Err(COMMANDS
                 .iter()
-                .map(|(c, what)| format!("{c}: {what}."))
+                .map(|(c, what)| format!("{c}: {}.", view.words.get(*what)))
                 .collect()),
-            other => say(&format!(
-                "{} is no command. Type /help for a list. An answer that begins with a slash needs two.",
-                Untrusted(other)
-            )),
+            other => {
+                let command = &[("command", &Untrusted(other) as &dyn std::fmt::Display)];
+                say(&view.words.fill(Phrase::PlainNoCommand, command))
+            }
         }
     }
 
-    fn sure(&mut self, question: &str, inputs: Vec<Input>) -> Reply {
+    fn sure(&mut self, question: &str, inputs: Vec<Input>, view: &View) -> Reply {
         self.asking = Some(Asking::Sure(inputs));
-        say(&format!("{question} Type y or n."))
+        say(&format!(
+            "{question} {}",
+            view.words.get(Phrase::PlainYesNo)
+        ))
     }
 
     fn answer(&mut self, line: &str, view: &View) -> Reply {
@@ -343,6 +349,7 @@ impl Dialogue {
                 "d" => self.sure(
                     "Does the participant drop out?",
                     vec![Input::Resume(Choice::DropOut)],
+                    view,
                 ),
                 _ => say("Type b, c or d."),
             },
@@ -363,20 +370,29 @@ impl Dialogue {
             Screen::Stopped { can_rate } => match key.as_str() {
                 "" => Ok(vec![Input::PlayAgain]),
                 "r" if *can_rate => Ok(vec![Input::RateStopped]),
-                _ => say("Press Enter to feel it again."),
+                _ => {
+                    let again = view.words.get(Stopped::of(view).again);
+                    let enter = view.words.get(Phrase::PlainEnterAlone);
+                    say(&format!("{enter}: {again}."))
+                }
             },
             Screen::SaveTrouble { .. } => Ok(vec![Input::RetrySave]),
-            Screen::Form { questions, .. } => {
+            Screen::Form {
+                form, questions, ..
+            } => {
                 let Some(question) = questions.get(self.at) else {
                     return Ok(Vec::new());
                 };
-                let answer =
-                    answers::read(question, line, &view.words).map_err(|what| vec![what])?;
+                let given = view.given(*form, &question.id);
+                let answer = match given {
+                    Some(given) if key.is_empty() => Some(given.clone()),
+                    _ => answers::read(question, line, &view.words).map_err(|what| vec![what])?,
+                };
                 self.entered
                     .extend(answer.map(|answer| (question.id.clone(), answer)));
                 self.next_question(view)
             }
-            _ if !key.is_empty() => say("Nothing is asked here. Type /help for what can be typed."),
+            _ if !key.is_empty() => say(view.words.get(Phrase::PlainNotAsked)),
             _ if view.can_advance => Ok(vec![Input::Advance]),
             _ => Ok(Vec::new()),
         }
@@ -431,7 +447,7 @@ impl Dialogue {
                 }
                 _ => {
                     self.asking = Some(Asking::Sure(inputs));
-                    say("Type y or n.")
+                    say(view.words.get(Phrase::PlainYesNo))
                 }
             },
             _ if typed.is_empty() => {

@@ -3,11 +3,13 @@
 use super::answers;
 use crate::tui::theme::{Colour, Theme};
 use crate::tui::views::playing::ordinal;
-use crate::tui::views::prose::prose;
+use crate::tui::views::prose::{attending, prose};
 use crate::tui::views::trouble::Trouble;
+use crate::tui::widgets::clock;
 use std::fmt::Display;
+use study_core::outcome::FormId;
 use study_core::protocol::phrases::{Phrase, Words};
-use study_core::protocol::{DeviceKind, Entry, Question};
+use study_core::protocol::{Entry, Question};
 use study_core::session::view::Banner;
 use study_core::session::{Screen, View};
 
@@ -37,13 +39,15 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
         Screen::Who { claiming: true, .. } => page.lines.push("One moment.".to_owned()),
         Screen::Who { .. } => {}
         Screen::Form {
+            form,
             questions,
             to_experimenter,
             ..
-        } => page.form(view, questions, at, *to_experimenter),
+        } => page.form(view, (*form, questions, at), *to_experimenter),
         Screen::Playing {
             keep_exploring,
             interval,
+            exposure,
             ..
         } => {
             if let Some((at, of)) = interval {
@@ -51,14 +55,18 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
                 page.lines.push(format!("{which} ({at} / {of})"));
             }
             page.lines.push(
-                match view.device {
-                    DeviceKind::Manual => words.get(Phrase::FeelSample),
-                    _ => words.get(Phrase::PlainPlays),
+                match attending(view).0 {
+                    Phrase::FeelDevice => words.get(Phrase::PlainPlays),
+                    other => words.get(other),
                 }
                 .to_owned(),
             );
+            // Said once; a countdown would never end to be read.
+            let left = exposure.max_s.map(|max_s| clock(max_s.ceil()));
+            let left = left.map(|time| words.fill(Phrase::TimeLeft, &[("time", &time)]));
+            page.wait = left.map(|left| capital(&left));
             page.prompt = match (keep_exploring, keys) {
-                (true, _) => words.get(Phrase::KeepExploring),
+                (true, _) => words.get(attending(view).1),
                 (false, true) => words.get(Phrase::PlainRate),
                 (false, false) => words.get(Phrase::PlainContinue),
             }
@@ -110,7 +118,12 @@ impl Page {
         (&self.top, &self.lines) == (&other.top, &other.lines)
     }
 
-    fn form(&mut self, view: &View, questions: &[Question], at: usize, to_experimenter: bool) {
+    fn form(
+        &mut self,
+        view: &View,
+        (form, questions, at): (FormId, &[Question], usize),
+        to_experimenter: bool,
+    ) {
         let Some(question) = questions.get(at) else {
             return;
         };
@@ -121,7 +134,16 @@ impl Page {
         }
         let (lines, prompt) = answers::ask(question, &view.words);
         self.lines.extend(lines);
+        if let Some(given) = view.given(form, &question.id) {
+            let answer = answers::in_words(given);
+            let kept = view.words.fill(Phrase::PlainKept, &[("answer", &answer)]);
+            self.lines.push(kept);
+        }
         self.prompt = prompt;
+        if view.can_go_back || at > 0 {
+            let back = view.words.get(Phrase::CommandBack);
+            self.prompt.push_str(&format!(" /back: {back}."));
+        }
         if view.can_replay {
             let again = view.words.get(Phrase::FeelAgain);
             self.prompt.push_str(&format!(" /replay: {again}."));
@@ -169,7 +191,7 @@ impl Page {
                 choices.collect::<Vec<_>>().join(" ")
             }
             Screen::Message { .. } => view.words.get(Phrase::PlainContinue).to_owned(),
-            Screen::Paused { .. } => "Press Enter to continue, or type /quit.".to_owned(),
+            Screen::Paused { .. } => view.words.get(Phrase::PlainUnpause).to_owned(),
             Screen::End { .. } => view.words.get(Phrase::PlainClose).to_owned(),
             Screen::Reference { .. } | Screen::Break { .. } if view.can_advance => {
                 view.words.get(Phrase::PlainReady).to_owned()

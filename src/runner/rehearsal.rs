@@ -173,13 +173,19 @@ impl Plan {
                 pass(wait_s + GLANCE_S);
                 vec![Input::Advance]
             }
-            Screen::Playing { keep_exploring, .. } => {
+            Screen::Playing {
+                since_s,
+                keep_exploring,
+                exposure,
+                ..
+            } => {
                 // In small steps, so that telemetry arrives as in a real session.
                 const PIECE_S: f64 = 0.25;
                 let left = self
                     .exploring_s
                     .get_or_insert_with(|| rater.exploration_s());
-                pass(PIECE_S.min(left.max(0.02)));
+                let until = exposure.left_s(*since_s).unwrap_or(PIECE_S);
+                pass(PIECE_S.min(left.max(0.02)).min(until));
                 *left -= PIECE_S;
                 if *left <= 0.0 && !keep_exploring {
                     vec![Input::Advance]

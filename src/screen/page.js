@@ -114,6 +114,8 @@
       make("span", { textContent: first[1] ? `${first[0]} – ${first[1]}` : "" }),
       make("span", { textContent: last[1] ? `${last[0]} – ${last[1]}` : "" }));
     if (ends) ends.setAttribute("aria-hidden", "true");
+    row.dir = page.scales;
+    if (ends) ends.dir = page.scales;
     const node = make("fieldset", {}, make("legend", {}, heading), row, ends);
     return [node, () => node.querySelector("input:checked")?.value ?? "",
       (value) => { const box = [...node.querySelectorAll("input")].find((i) => i.value === value); if (box) box.checked = true; }];
@@ -132,7 +134,7 @@
   }
 
   function slider(ask, n, heading) {
-    const { from, to, step, ends } = ask.field;
+    const { from, to, step, ends, labels } = ask.field;
     const input = make("input", { type: "range", id: `q${n}`, className: "slide unset" });
     Object.assign(input, { min: from, max: to, step });
     input.value = (from + to) / 2;
@@ -151,8 +153,18 @@
     input.addEventListener("keydown", (e) => {
       if (!set && e.key.startsWith("Arrow")) { e.preventDefault(); mark(); }
     });
+    input.dir = page.scales;
+    const below = make("p", { className: "ends", dir: page.scales },
+      make("span", { dir: "auto", textContent: ends[0] }), make("span", { dir: "auto", textContent: ends[1] }));
+    // Labels between the ends, at their numbers: the thumb keeps half its width from the ends.
+    const between = make("div", { className: "ticks", dir: page.scales });
+    for (const [at, label] of labels) {
+      const tick = make("span", { dir: "auto", textContent: `${at}: ${label}` });
+      tick.style.setProperty("--at", (at - from) / (to - from));
+      between.append(tick);
+    }
     const node = make("div", {}, make("label", { className: "ask", htmlFor: `q${n}` }, heading), input,
-      make("p", { className: "ends" }, make("span", { textContent: ends[0] }), make("span", { textContent: ends[1] })), shown);
+      labels.length ? between : null, below, shown);
     return [node, () => (set ? input.value : ""), (value) => { if (value !== "") { input.value = value; mark(); } }];
   }
 
@@ -182,13 +194,16 @@
       return { id: ask.id, read, fill };
     });
     const key = JSON.stringify([now.questions, now.progress]);
+    now.questions.forEach((ask, n) => { if (ask.given !== null) fields[n].fill(ask.given); });
     if (draft && draft.key === key) for (const f of fields) f.fill(draft.values[f.id]);
     const keep = () => { draft = { key, values: answers() }; };
     for (const kind of ["input", "change", "pointerup", "keyup"]) node.addEventListener(kind, keep);
     const problem = make("p", { className: "problem", id: "problem" });
     problem.setAttribute("role", "alert");
     const save = now.buttons.find((b) => b.does === "answer");
-    node.append(problem, make("div", { className: "buttons" }, make("button", { type: "submit", className: "main", textContent: save.label })));
+    const row = make("div", { className: "buttons" }, make("button", { type: "submit", className: "main", textContent: save.label }));
+    for (const b of now.buttons) if (b !== save) row.append(button(b.does, b.label, ""));
+    node.append(problem, row);
     node.addEventListener("submit", (e) => { e.preventDefault(); send("answer", { answers: answers() }); });
     return node;
   }

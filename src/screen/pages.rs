@@ -5,12 +5,13 @@
 //! view, which identifies no realization.
 
 use crate::tui::views::playing::ordinal;
+use crate::tui::views::prose::{Stopped, attending};
 use crate::tui::widgets::clock;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 use study_base::text::Untrusted;
 use study_core::protocol::phrases::{Phrase, Words};
-use study_core::protocol::{DeviceKind, Question, QuestionKind};
+use study_core::protocol::{Answer, Question, QuestionKind};
 use study_core::session::view::Banner;
 use study_core::session::{Screen, View};
 
@@ -42,6 +43,8 @@ pub struct Page {
     pub decline: Option<Dialog>,
     /// Words of the dialog that refuses consent.
     pub refuse: Option<Dialog>,
+    /// On which side scales begin.
+    pub scales: &'static str,
     /// Whether nothing follows.
     pub over: bool,
 }
@@ -70,6 +73,34 @@ pub struct Asked {
     pub hint: String,
     /// How it is answered.
     pub field: Field,
+    /// The answer that was given before a step back.
+    pub given: Option<Given>,
+}
+
+/// An answer as a page has it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Given {
+    /// A number or a text, as typed.
+    Typed(String),
+    /// Indices of the chosen options.
+    Chosen(Vec<usize>),
+}
+
+impl Given {
+    /// An answer to a question; `None` for one that the page cannot show.
+    fn of(question: &Question, answer: &Answer) -> Option<Self> {
+        Some(match (&question.kind, answer) {
+            (QuestionKind::Choice { options, .. }, Answer::Choice(chosen)) => {
+                let at = |option| options.iter().position(|o| o == option);
+                Self::Chosen(chosen.iter().filter_map(at).collect())
+            }
+            (_, Answer::Rating(n)) => Self::Typed(n.to_string()),
+            (_, Answer::Number(n)) => Self::Typed(n.to_string()),
+            (_, Answer::Text(text)) => Self::Typed(text.clone()),
+            _ => return None,
+        })
+    }
 }
 
 /// How a question is answered.
@@ -89,8 +120,10 @@ pub enum Field {
         to: f64,
         /// How far a key moves it.
         step: f64,
-        /// Labels of the two ends.
+        /// The two ends in words.
         ends: [String; 2],
+        /// Labels of numbers between them.
+        labels: Vec<(f64, String)>,
     },
     /// One or several of a list; the answer is their indices.
     Choice {
@@ -133,6 +166,10 @@ pub enum Does {
     Refuse,
     /// Plays again after a stop.
     PlayAgain,
+    /// Plays again before an answer.
+    Replay,
+    /// Goes back to the questions before.
+    Back,
     /// Rates after a stop.
     RateStopped,
     /// Declines the first question.
@@ -157,7 +194,6 @@ pub struct Dialog {
 /// The participant's page of a view; `None` while the last page stays.
 pub fn page(view: &View) -> Option<Page> {
     let words = &view.words;
-    let by_hand = view.device == DeviceKind::Manual;
     let mut page = Page::new(view);
     match &view.screen {
         // Too short to be read.
@@ -201,8 +237,20 @@ pub fn page(view: &View) -> Option<Page> {
             page: at,
             pages,
             to_experimenter: false,
-            form: _,
-        } => page.form(questions, (*at, *pages), words),
+            form,
+        } => {
+            page.form(questions, (*at, *pages), words);
+            for (asked, question) in page.questions.iter_mut().zip(questions) {
+                let given = view.given(*form, &question.id);
+                asked.given = given.and_then(|given| Given::of(question, given));
+            }
+            if view.can_replay {
+                page.button(Does::Replay, Stopped::of(view).again, true, words);
+            }
+            if view.can_go_back {
+                page.button(Does::Back, Phrase::Back, true, words);
+            }
+        }
         Screen::Reference { prompt, wait_s } => {
             page.title = safe(prompt);
             page.text = match *wait_s > 0.0 {
@@ -225,13 +273,10 @@ pub fn page(view: &View) -> Option<Page> {
         Screen::Playing {
             since_s,
             keep_exploring,
+            exposure,
             interval,
         } => {
-            let feel = if by_hand {
-                Phrase::FeelSample
-            } else {
-                Phrase::FeelDevice
-            };
+            let (feel, more) = attending(view);
             match interval {
                 Some((at, _)) => {
                     page.title = capital(words.get(ordinal(*at)));
@@ -239,21 +284,21 @@ pub fn page(view: &View) -> Option<Page> {
                 }
                 None => page.title = words.get(feel).to_owned(),
             }
-            page.clock = Some(clock(*since_s));
-            page.wait = keep_exploring.then(|| words.get(Phrase::KeepExploring).to_owned());
+            page.clock = Some(match exposure.left_s(*since_s) {
+                None => clock(*since_s),
+                Some(left_s) => words.fill(Phrase::TimeLeft, &[("time", &clock(left_s.ceil()))]),
+            });
+            page.wait = keep_exploring.then(|| words.get(more).to_owned());
             page.button(Does::Advance, Phrase::Rate, view.can_advance, words);
         }
         Screen::Stopping => page.title = words.get(Phrase::Stopping).to_owned(),
         Screen::Stopped { can_rate } => {
-            let (stopped, then, again) = match by_hand {
-                true => (Phrase::StoppedSample, Phrase::LetGo, Phrase::FeelAgain),
-                false => (Phrase::StoppedDevice, Phrase::NoForce, Phrase::PlayAgain),
-            };
-            page.title = words.get(stopped).to_owned();
-            page.text = words.get(then).to_owned();
-            page.button(Does::PlayAgain, again, true, words);
+            let stopped = Stopped::of(view);
+            page.title = words.get(stopped.title).to_owned();
+            page.text = words.get(stopped.body).to_owned();
+            page.button(Does::PlayAgain, stopped.again, true, words);
             if *can_rate {
-                page.button(Does::RateStopped, Phrase::RateFelt, true, words);
+                page.button(Does::RateStopped, stopped.rate, true, words);
             }
         }
         Screen::Break { text, wait_s } => {
@@ -304,6 +349,11 @@ impl Page {
             stop: view.armed.then(|| capital(words.get(Phrase::Stop))),
             decline: None,
             refuse: None,
+            scales: if words.scales_from_right() {
+                "rtl"
+            } else {
+                "ltr"
+            },
             over: false,
         }
     }
@@ -398,6 +448,10 @@ fn asked(question: &Question, words: &Words) -> Asked {
                 to: *to,
                 step: *step,
                 ends: [end(from), end(to)],
+                labels: (labels.iter())
+                    .filter_map(|(n, label)| Some((n.parse().ok()?, safe(label))))
+                    .filter(|(n, _)| n > from && n < to)
+                    .collect(),
             }
         }
         QuestionKind::Choice { options, multiple } => Field::Choice {
@@ -418,6 +472,7 @@ fn asked(question: &Question, words: &Words) -> Asked {
         optional: (!question.required).then(|| words.get(Phrase::Optional).to_owned()),
         hint,
         field,
+        given: None,
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the page sends, and the input that it means on the page that is shown.
 
-use super::pages::{Does, Page, range};
+use super::pages::{Does, Given, Page, range};
 use crate::tui::editor::Editor;
 use crate::tui::ui_state::field;
 use serde::Deserialize;
@@ -29,16 +29,6 @@ pub struct Reply {
     pub reason: String,
 }
 
-/// An answer as the page sends it.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(untagged)]
-pub enum Given {
-    /// A number or a text, as typed.
-    Typed(String),
-    /// Indices of the chosen options.
-    Chosen(Vec<usize>),
-}
-
 /// The input that a reply means on the page of a view.
 ///
 /// # Errors
@@ -51,7 +41,8 @@ pub fn input(reply: &Reply, page: &Page, view: &View) -> Result<Input, String> {
         Does::Advance => Input::Advance,
         Does::Agree => Input::Consent(true),
         Does::Refuse => Input::Consent(false),
-        Does::PlayAgain => Input::PlayAgain,
+        Does::PlayAgain | Does::Replay => Input::PlayAgain,
+        Does::Back => Input::Back,
         Does::RateStopped => Input::RateStopped,
         Does::Stop => Input::Stop,
         Does::Answer | Does::Decline => {

@@ -85,6 +85,11 @@ impl Theme {
         self.tint(63, Color::Cyan).add_modifier(Modifier::BOLD)
     }
 
+    /// The inside of a chosen answer.
+    pub fn filled(self) -> Style {
+        self.chosen().add_modifier(Modifier::REVERSED)
+    }
+
     /// The outline of an answer that can be chosen.
     pub fn outline(self) -> Style {
         self.quiet()
@@ -141,13 +146,14 @@ impl Theme {
 mod tests {
     use super::*;
 
-    fn styles(theme: Theme) -> [Style; 13] {
+    fn styles(theme: Theme) -> [Style; 14] {
         [
             theme.text(),
             theme.strong(),
             theme.quiet(),
             theme.key(),
             theme.chosen(),
+            theme.filled(),
             theme.outline(),
             theme.focus(),
             theme.playing(),

@@ -148,10 +148,14 @@ impl UiState {
                 ..
             } => {
                 let ids = questions.iter().map(|q| q.id.clone()).collect();
-                let key = (*form, *page, ids);
+                let form_id = *form;
+                let key = (form_id, *page, ids);
                 if self.form.as_ref().is_none_or(|(old, _)| *old != key) {
                     let form = Form {
-                        fields: questions.iter().map(Field::new).collect(),
+                        fields: questions
+                            .iter()
+                            .map(|q| Field::with(q, view.given(form_id, &q.id)))
+                            .collect(),
                         focus: 0,
                     };
                     self.form = Some((key, form));

@@ -145,6 +145,73 @@ pub fn dialog(buf: &mut Buffer, area: Rect, title: &str, theme: Theme) -> Rect {
     }
 }
 
+/// A character of [`big`] in half blocks.
+fn glyph(c: char) -> [&'static str; 3] {
+    match c {
+        '0' => ["█▀█", "█ █", "▀▀▀"],
+        '1' => ["▄█ ", " █ ", "▀▀▀"],
+        '2' => ["▀▀█", "█▀▀", "▀▀▀"],
+        '3' => ["▀▀█", " ▀█", "▀▀▀"],
+        '4' => ["█ █", "▀▀█", "  ▀"],
+        '5' => ["█▀▀", "▀▀█", "▀▀▀"],
+        '6' => ["█▀▀", "█▀█", "▀▀▀"],
+        '7' => ["▀▀█", "  █", "  ▀"],
+        '8' => ["█▀█", "█▀█", "▀▀▀"],
+        '9' => ["█▀█", "▀▀█", "▀▀▀"],
+        ':' => ["▄", "▄", " "],
+        '.' => [" ", " ", "▀"],
+        _ => ["   ", "▀▀▀", "   "],
+    }
+}
+
+/// Height of [`big`] text, in rows.
+pub const BIG_ROWS: u16 = 3;
+
+/// Whether a text can be drawn by [`big`] in a width: a number or a time.
+pub fn fits_big(text: &str, width: u16) -> bool {
+    let drawn = |c: char| matches!(c, '0'..='9' | ':' | '.' | '-' | '−');
+    let columns = text.chars().map(|c| glyph(c)[0].chars().count() + 1);
+    text.chars().all(drawn) && columns.sum::<usize>() <= usize::from(width) + 1
+}
+
+/// Draws a number or a time in three rows of half blocks, in the middle of an area.
+pub fn big(buf: &mut Buffer, area: Rect, text: &str, style: Style) {
+    let top = area.height.saturating_sub(BIG_ROWS) / 2;
+    for i in 0..BIG_ROWS {
+        let line: Vec<&str> = text.chars().map(|c| glyph(c)[usize::from(i)]).collect();
+        let line = styled(line.join(" "), style);
+        centre(buf, row(area, top + i), &line);
+    }
+}
+
+/// Draws a bar that is filled from the left, or from the right.
+pub fn bar(buf: &mut Buffer, area: Rect, part: f64, from_right: bool, theme: Theme) {
+    let area = area.intersection(buf.area);
+    let filled = (part.clamp(0.0, 1.0) * f64::from(area.width)).round() as u16;
+    for x in 0..area.width {
+        let at = if from_right { area.width - 1 - x } else { x };
+        let (symbol, style) = if at < filled {
+            ("━", theme.chosen())
+        } else {
+            ("─", theme.outline())
+        };
+        buf.set_string(area.x + x, area.y, symbol, style);
+    }
+}
+
+/// The cap of a key: its name and action in a box.
+pub fn cap(buf: &mut Buffer, area: Rect, (key, what): (&str, &str), border: Style, theme: Theme) {
+    frame(buf, area, false, border);
+    let line = Line::from(vec![
+        Span::styled(
+            key.to_owned(),
+            border.add_modifier(ratatui::style::Modifier::BOLD),
+        ),
+        Span::styled(format!(": {what}"), theme.text()),
+    ]);
+    centre(buf, row(area, area.height / 2), &line);
+}
+
 /// A text field: a bar at its left, thick if it has the focus, and the text.
 #[derive(Debug)]
 pub struct TextField<'a> {

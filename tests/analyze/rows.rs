@@ -66,6 +66,7 @@ fn row(who: &str, model: &str, repetition: u32, rating: i64) -> RatingRow {
         replays: None,
         fidelity: None,
         host_late_ms: None,
+        input_channel: None,
     }
 }
 

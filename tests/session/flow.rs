@@ -5,6 +5,7 @@
 mod agreement;
 mod blinding;
 mod device;
+mod exposure;
 mod forms;
 mod parts;
 mod random;

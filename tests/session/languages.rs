@@ -28,6 +28,7 @@ fn pages_of_a_session(words: &Arc<Words>) -> Vec<(&'static str, View)> {
             Screen::Playing {
                 since_s: 4.0,
                 keep_exploring: true,
+                exposure: Default::default(),
                 interval: None,
             },
         ),

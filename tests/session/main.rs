@@ -8,6 +8,7 @@ mod by_keys;
 mod designs;
 mod devices;
 mod dying_disk;
+mod exposure;
 mod flow;
 mod kill;
 mod languages;

@@ -145,7 +145,7 @@ impl Lines {
 }
 
 /// Times, checksums, and what the device measured.
-const NOT_COMPARED: [&str; 10] = [
+const NOT_COMPARED: [&str; 11] = [
     "crc",
     "prev",
     "seq",
@@ -156,6 +156,7 @@ const NOT_COMPARED: [&str; 10] = [
     "telemetry",
     "reference_s",
     "response_s",
+    "channel",
 ];
 
 /// The events of a journal without what differs from session to session.
@@ -207,7 +208,7 @@ fn the_journal_is_that_of_the_full_screen_and_the_lines_are_plain() {
     let end = plain.play(None);
     assert!(end.starts_with("The session is finished"), "{}", plain.seen);
     plain.is_plain();
-    assert!(plain.seen.contains("Saved: 5 trials."), "{}", plain.seen);
+    assert!(plain.seen.contains("Trials saved: 5."), "{}", plain.seen);
 
     let screen = tempfile::tempdir().unwrap();
     let arguments = ["run", path, "--operator", "lw"];
@@ -245,10 +246,10 @@ fn lines_can_remark_correct_stop_pause_quit_and_resume() {
     plain.types("\u{1b}");
     plain.asked(&["Enter alone: play it again."]);
     plain.types("/remark motor hums\n/bad somebody came in\n");
-    plain.play(Some("Saved: 2 trials"));
+    plain.play(Some("Trials saved: 2."));
     plain.types("/correct\n");
     plain.asked(&["Type the number of the answer to correct"]);
-    plain.types("2\n");
+    plain.types("1\n");
     plain.asked(&["Type a number from 1 to 7"]);
     plain.types("9\n");
     plain.asked(&["That is not an answer here."]);

@@ -88,6 +88,7 @@ fn playing() -> Screen {
     Screen::Playing {
         since_s: 3.0,
         keep_exploring: false,
+        exposure: Default::default(),
         interval: None,
     }
 }
@@ -276,7 +277,6 @@ fn an_earlier_answer_is_corrected_with_a_reason() {
     assert!(desk.look().contains("That is already the answer."));
     desk.types("6");
     desk.enter();
-    assert_eq!(desk.enter(), []);
     desk.types("typed wrong");
     let want = Input::Correct {
         form: FormId::Trial {
@@ -289,6 +289,60 @@ fn an_earlier_answer_is_corrected_with_a_reason() {
         by: Author::Experimenter,
     };
     assert_eq!(desk.enter(), [want]);
+}
+
+#[test]
+fn a_slip_is_mended_with_four_keys() {
+    let mut desk = Desk::with(rate());
+    desk.press(KeyCode::F(3));
+    assert_eq!(desk.types("6"), []);
+    assert_eq!(desk.enter(), []);
+    assert!(desk.look().contains("trial 6: 3  →  6"), "{}", desk.look());
+    let sent = desk.enter();
+    assert!(
+        matches!(
+            &sent[..],
+            [Input::Correct {
+                answer: Answer::Rating(6),
+                reason,
+                ..
+            }] if reason == "a slip of the key"
+        ),
+        "{sent:?}"
+    );
+}
+
+#[test]
+fn shift_tab_goes_back_to_the_question_before_with_its_answer() {
+    let mut view = view(Screen::Form {
+        form: FormId::Trial {
+            trial: 6,
+            attempt: 1,
+        },
+        questions: vec![realism(), comment()],
+        page: 1,
+        pages: 2,
+        to_experimenter: false,
+    });
+    // It holds what was answered before, and sends it as it is.
+    let mut desk = Desk::at(view.clone());
+    let sent = answers(vec![
+        ("realism", Answer::Rating(3)),
+        (
+            "comment",
+            Answer::Text("crisp, but the middle detent comes late".to_owned()),
+        ),
+    ]);
+    assert_eq!(desk.enter(), sent);
+    assert_eq!(desk.press(KeyCode::BackTab), []);
+    assert!(!desk.look().contains("Shift-Tab"));
+    view.can_go_back = true;
+    let mut desk = Desk::at(view);
+    assert!(desk.look().contains("Shift-Tab: back"), "{}", desk.look());
+    assert_eq!(desk.press(KeyCode::BackTab), [Input::Back]);
+    desk.press(KeyCode::Tab);
+    assert_eq!(desk.press(KeyCode::BackTab), [], "to the rating first");
+    assert_eq!(desk.press(KeyCode::BackTab), [Input::Back]);
 }
 
 #[test]
@@ -386,6 +440,7 @@ fn enter_advances_only_when_the_session_allows_it() {
     let mut desk = Desk::with(Screen::Playing {
         since_s: 1.0,
         keep_exploring: true,
+        exposure: Default::default(),
         interval: None,
     });
     assert_eq!(desk.enter(), []);
@@ -529,8 +584,9 @@ fn the_screen_shows_nothing_but_the_view_during_playback() {
     // Every word on the screen is fixed or comes from the view.
     let mut desk = Desk::with(playing());
     desk.view.line.device = DeviceState::Running(Telemetry::Arrives);
-    let known = "trial 7 of 15 Feel the device. ● playing 0:03 Enter: rate · Esc: stop \
-                 S03 · lw running · 12:41 · saved ✓ 6 of 6 ? help";
+    let known = "trial 7 of 15 Feel the device. ● playing Enter: rate · Esc: stop \
+                 S03 · lw running · 12:41 · saved ✓ 6 of 6 ? help \
+                 █▀█ █ ▀▀▀ ▄ ▀▀█ ▀█";
     let known: Vec<&str> = known.split_whitespace().collect();
     for word in desk.look().split_whitespace() {
         assert!(known.contains(&word), "{word}");

@@ -57,6 +57,7 @@ fn a_smaller_terminal_says_what_is_needed() {
     let playing = view(Screen::Playing {
         since_s: 1.0,
         keep_exploring: false,
+        exposure: Default::default(),
         interval: None,
     });
     insta::assert_snapshot!("small_40x10", fresh(&playing, 40, 10));
@@ -113,6 +114,7 @@ fn the_arrival_of_telemetry_is_shown_on_request() {
     let mut playing = view(Screen::Playing {
         since_s: 14.0,
         keep_exploring: false,
+        exposure: Default::default(),
         interval: None,
     });
     for (telemetry, words) in [

@@ -42,6 +42,7 @@ fn child_operates_a_terminal() {
                 Screen::Playing {
                     since_s: 1.0,
                     keep_exploring: false,
+                    exposure: Default::default(),
                     interval: None,
                 }
             });

@@ -134,6 +134,8 @@ pub(crate) fn view(screen: Screen) -> View {
     };
     View {
         can_replay: false,
+        can_go_back: false,
+        force: true,
         progress: before.then_some(Progress {
             practice: false,
             current: 7,
@@ -294,6 +296,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             view(Screen::Playing {
                 since_s: 14.3,
                 keep_exploring: false,
+                exposure: Default::default(),
                 interval: None,
             }),
         ),
@@ -302,6 +305,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             pilot(Screen::Playing {
                 since_s: 3.0,
                 keep_exploring: true,
+                exposure: Default::default(),
                 interval: None,
             }),
         ),
@@ -311,6 +315,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
                 Screen::Playing {
                     since_s: 14.3,
                     keep_exploring: false,
+                    exposure: Default::default(),
                     interval: None,
                 },
                 DeviceState::Felt,

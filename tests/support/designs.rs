@@ -51,6 +51,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             reference: None,
             reference_min_s: 0.0,
             minimum_strokes: 0,
+            exposure: Default::default(),
         },
         models: (b'A'..=b'Z')
             .chain(b'a'..=b'z')

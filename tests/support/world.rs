@@ -167,6 +167,7 @@ pub fn answered(trial: u32, attempt: u32, id: &str, answer: Answer) -> Event {
         form: FormId::Trial { trial, attempt },
         question: question(id),
         answer,
+        channel: None,
     }
 }
 
@@ -231,6 +232,7 @@ pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
         form: FormId::Intake,
         question: question("age"),
         answer: Answer::Text("41".to_owned()),
+        channel: None,
     };
     let mut events = vec![started(id, number, seat), intake, Event::InstructionsRead];
     let play = |events: &mut Vec<Event>, trial, attempt, position, id| {
@@ -275,6 +277,7 @@ pub fn session(id: &str, number: u32, seat: Seat) -> Vec<Event> {
         to: Answer::Rating(5),
         reason: "slip".to_owned(),
         by: Author::Experimenter,
+        channel: None,
     });
     play(&mut events, 1, 2, 3, "B");
     events.push(answered(1, 2, "realism", Answer::Rating(4)));

@@ -126,12 +126,29 @@ pub struct Text {
     /// [`Phrase`](phrases::Phrase); `words` in the file.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub words: BTreeMap<String, String>,
+    /// On which side scales begin; by default that of the language.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale_direction: Option<ScaleDirection>,
+}
+
+words! {
+    /// On which side a scale begins.
+    ScaleDirection {
+        /// Its smallest number is on the left.
+        LeftToRight = "ltr",
+        /// Its smallest number is on the right.
+        RightToLeft = "rtl",
+    }
 }
 
 impl Text {
     /// The fixed sentences of the study.
     pub fn phrases(&self) -> phrases::Words {
-        phrases::Words::new(self.lang.as_deref(), &self.words)
+        let words = phrases::Words::new(self.lang.as_deref(), &self.words);
+        match self.scale_direction {
+            None => words,
+            Some(direction) => words.with_scales(direction),
+        }
     }
 }
 
@@ -320,6 +337,8 @@ pub struct TrialRules {
     pub reference_min_s: f64,
     /// Full strokes before the questions open.
     pub minimum_strokes: u32,
+    /// How long a realization is felt; of a part that does not say it, too.
+    pub exposure: Exposure,
 }
 
 /// One of `[[models]]`: a realization.

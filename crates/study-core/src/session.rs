@@ -44,7 +44,7 @@ pub use unsaved::Unsaved;
 pub use view::{Screen, View};
 
 use crate::outcome::fold::History;
-use crate::outcome::{Event, Fidelity, Moment};
+use crate::outcome::{Channel, Event, Fidelity, Moment};
 use crate::protocol::phrases::Words;
 use crate::protocol::{DeviceKind, FileOrders, Protocol, Seat, Trial};
 use phase::{DeviceProblem, Phase};
@@ -96,6 +96,8 @@ pub struct Session {
     running: Vec<tracks::Running>,
     /// Whether the last answer was correct, until the participant is told.
     feedback: Option<bool>,
+    /// How the inputs are entered.
+    channel: Option<Channel>,
     notice: Option<String>,
     mirror: Option<view::Mirror>,
     /// When the session's folder was claimed.
@@ -143,6 +145,7 @@ impl Session {
             parts_shown: BTreeSet::new(),
             running: Vec::new(),
             feedback: None,
+            channel: None,
             notice: None,
             mirror: None,
             opened: None,
@@ -165,6 +168,11 @@ impl Session {
         self.dispatch(input, at);
         self.track_overlay(at);
         std::mem::take(&mut self.out)
+    }
+
+    /// How the next inputs are entered; `None` if not by a person.
+    pub fn set_channel(&mut self, channel: Option<Channel>) {
+        self.channel = channel;
     }
 
     /// The realization being felt or rated. For the simulated rater only: it must
@@ -236,6 +244,7 @@ impl Session {
             Input::MarkBad { reason } => self.mark_bad(reason, at),
             Input::PlayAgain => self.play_again(at),
             Input::RateStopped => self.rate_stopped(at),
+            Input::Back => self.back(),
             Input::Pause => self.pause(at),
         }
     }

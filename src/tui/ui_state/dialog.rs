@@ -10,6 +10,9 @@ use study_core::protocol::phrases::Words;
 use study_core::session::view::{Correctable, View};
 use study_core::session::{Input, Screen};
 
+/// The reason of a correction if none is typed.
+pub const SLIP: &str = "a slip of the key";
+
 /// A dialog.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Dialog {
@@ -245,6 +248,16 @@ impl Correct {
                         self.step = Step::Answer(field);
                         self.cursor
                     }
+                    // The new answer can be typed at once.
+                    Key::Char('0'..='9' | '-') => {
+                        let mut field = Field::correcting(&item.question, &item.answer);
+                        if field.is_text() {
+                            return DialogResult::Open(Handled::No);
+                        }
+                        let handled = field.key(&item.question, key, words);
+                        self.step = Step::Answer(field);
+                        return DialogResult::Open(handled);
+                    }
                     _ => return DialogResult::Open(Handled::No),
                 };
                 DialogResult::Open(Handled::Yes)
@@ -269,9 +282,14 @@ impl Correct {
                 key => DialogResult::Open(field.key(&item.question, key, words)),
             },
             Step::Reason { answer, by, reason } => match key {
-                Key::Enter if reason.is_blank() => missing("Type a reason first, or press Esc."),
+                Key::Enter if reason.is_blank() && answer.is_none() => {
+                    missing("Type a reason first, or press Esc.")
+                }
                 Key::Enter => {
-                    let reason = reason.text().to_owned();
+                    let reason = match reason.is_blank() {
+                        true => SLIP.to_owned(),
+                        false => reason.text().to_owned(),
+                    };
                     let declined = Answer::Declined {
                         reason: reason.clone(),
                     };

@@ -60,6 +60,34 @@ impl Field {
         }
     }
 
+    /// A field that holds the answer that was given before.
+    pub fn with(question: &Question, given: Option<&Answer>) -> Self {
+        let typed = String::new();
+        match (&question.kind, given) {
+            (QuestionKind::Rating { .. }, Some(Answer::Rating(n))) => Self::Rating {
+                chosen: Some(*n),
+                typed,
+            },
+            (QuestionKind::Slider { .. }, Some(Answer::Number(n))) => Self::Slider {
+                value: Some(*n),
+                typed,
+            },
+            (QuestionKind::Choice { options, .. }, Some(Answer::Choice(chosen))) => {
+                let at = |option| options.iter().position(|o| o == option);
+                let marked: BTreeSet<usize> = chosen.iter().filter_map(at).collect();
+                Self::Choice {
+                    cursor: marked.first().copied(),
+                    marked,
+                }
+            }
+            (QuestionKind::Number { .. }, Some(Answer::Number(n))) => {
+                Self::Number(Editor::line(&n.to_string()))
+            }
+            (QuestionKind::Text, Some(Answer::Text(text))) => Self::Text(Editor::new(text)),
+            _ => Self::new(question),
+        }
+    }
+
     /// A field for the correction of `old`: a text field starts with it, others are empty.
     pub fn correcting(question: &Question, old: &Answer) -> Self {
         match (&question.kind, old) {
@@ -116,6 +144,12 @@ impl Field {
 
     /// Handles a key.
     pub fn key(&mut self, question: &Question, key: Key, words: &Words) -> Handled {
+        let on_scale = matches!(self, Self::Rating { .. } | Self::Slider { .. });
+        let key = match key {
+            Key::Left if on_scale && words.scales_from_right() => Key::Right,
+            Key::Right if on_scale && words.scales_from_right() => Key::Left,
+            key => key,
+        };
         match (self, &question.kind) {
             (Self::Rating { chosen, typed }, QuestionKind::Rating { from, to, .. }) => {
                 rating(chosen, typed, (*from, *to), key, words)
@@ -124,7 +158,7 @@ impl Field {
                 slider(value, typed, (*from, *to, *step), key, words)
             }
             (Self::Choice { cursor, marked }, QuestionKind::Choice { options, multiple }) => {
-                choice(cursor, marked, options.len(), *multiple, key)
+                choice(cursor, marked, (options.len(), *multiple), key, words)
             }
             (Self::Number(editor), _) => match key {
                 Key::Char(c) if !matches!(c, '0'..='9' | '.' | ',' | '-' | '+' | 'e' | 'E') => {
@@ -341,9 +375,9 @@ fn on_grid(value: f64, from: f64, to: f64, step: f64) -> f64 {
 fn choice(
     cursor: &mut Option<usize>,
     marked: &mut BTreeSet<usize>,
-    count: usize,
-    multiple: bool,
+    (count, multiple): (usize, bool),
     key: Key,
+    words: &Words,
 ) -> Handled {
     let last = count.saturating_sub(1);
     let at = match key {
@@ -355,7 +389,7 @@ fn choice(
         Key::End => last,
         Key::Char(' ' | 'x') => {
             let Some(at) = *cursor else {
-                return Handled::Notice("Select an entry first, with ↑ and ↓.".to_owned());
+                return Handled::Notice(words.get(Phrase::SelectFirst).to_owned());
             };
             mark(marked, at, multiple);
             return Handled::Yes;
@@ -363,7 +397,7 @@ fn choice(
         Key::Char(c @ '1'..='9') => {
             let at = c as usize - '1' as usize;
             if at >= count {
-                return Handled::Notice(format!("The list has {count} entries."));
+                return Handled::Notice(words.fill(Phrase::ListHas, &[("total", &count)]));
             }
             *cursor = Some(at);
             mark(marked, at, multiple);
@@ -393,183 +427,4 @@ fn mark(marked: &mut BTreeSet<usize>, at: usize, multiple: bool) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeMap;
-    use study_base::text::QuestionId;
-
-    fn question(kind: QuestionKind) -> Question {
-        Question {
-            id: QuestionId::new("q").unwrap(),
-            prompt: String::new(),
-            kind,
-            required: true,
-        }
-    }
-
-    fn scale(from: i64, to: i64) -> Question {
-        question(QuestionKind::Rating {
-            from,
-            to,
-            labels: BTreeMap::new(),
-        })
-    }
-
-    fn after(question: &Question, keys: &[Key]) -> Option<f64> {
-        let mut field = Field::new(question);
-        for key in keys {
-            field.key(question, *key, &Words::default());
-        }
-        let answer = field.answer(question, &Words::default()).ok().flatten();
-        answer.and_then(|a| a.number())
-    }
-
-    fn digits(text: &str) -> Vec<Key> {
-        text.chars().map(Key::Char).collect()
-    }
-
-    #[test]
-    fn a_digit_chooses_and_another_one_chooses_anew() {
-        assert_eq!(after(&scale(1, 7), &digits("5")), Some(5.0));
-        assert_eq!(after(&scale(1, 7), &digits("53")), Some(3.0));
-        assert_eq!(after(&scale(1, 7), &digits("58")), Some(5.0));
-        assert_eq!(after(&scale(1, 7), &digits("0")), None);
-    }
-
-    #[test]
-    fn numbers_of_several_digits_are_typed() {
-        assert_eq!(after(&scale(1, 10), &digits("1")), Some(1.0));
-        assert_eq!(after(&scale(1, 10), &digits("10")), Some(10.0));
-        assert_eq!(after(&scale(1, 10), &digits("15")), Some(5.0));
-        assert_eq!(after(&scale(0, 100), &digits("37")), Some(37.0));
-        assert_eq!(after(&scale(-3, 3), &digits("-2")), Some(-2.0));
-        assert_eq!(after(&scale(1000, 2000), &digits("1500")), Some(1500.0));
-        assert_eq!(after(&scale(-120, -100), &digits("-115")), Some(-115.0));
-        assert_eq!(after(&scale(0, 10), &digits("0")), Some(0.0));
-    }
-
-    #[test]
-    fn backspace_takes_the_last_digit_back_and_then_the_choice() {
-        let keys = |text: &str| -> Vec<Key> {
-            let key = |c| {
-                if c == '<' {
-                    Key::Backspace
-                } else {
-                    Key::Char(c)
-                }
-            };
-            text.chars().map(key).collect()
-        };
-        let percent = scale(0, 100);
-        assert_eq!(after(&percent, &keys("57<")), Some(5.0));
-        assert_eq!(after(&percent, &keys("57<8")), Some(58.0));
-        assert_eq!(after(&percent, &keys("57<<")), None);
-        assert_eq!(after(&scale(1, 7), &keys("5<")), None);
-        let slider = question(QuestionKind::Slider {
-            from: 0.0,
-            to: 100.0,
-            step: 1.0,
-            labels: BTreeMap::new(),
-        });
-        assert_eq!(after(&slider, &keys("57<")), Some(5.0));
-        assert_eq!(after(&slider, &keys("5<")), None);
-    }
-
-    #[test]
-    fn arrows_start_at_an_end_and_stay_on_the_scale() {
-        let scale = scale(1, 7);
-        assert_eq!(after(&scale, &[Key::Right]), Some(1.0));
-        assert_eq!(after(&scale, &[Key::Left]), Some(7.0));
-        assert_eq!(after(&scale, &[Key::End, Key::Right]), Some(7.0));
-        assert_eq!(after(&scale, &[Key::Home, Key::Left]), Some(1.0));
-    }
-
-    #[test]
-    fn extreme_scales_do_not_overflow() {
-        let scale = scale(i64::MIN, i64::MAX);
-        assert!(after(&scale, &digits("-9")).is_some());
-        assert_eq!(
-            after(&scale, &[Key::End, Key::Right]),
-            Some(i64::MAX as f64)
-        );
-    }
-
-    #[test]
-    fn a_slider_has_no_mark_until_it_is_moved() {
-        let slider = question(QuestionKind::Slider {
-            from: 0.0,
-            to: 1.0,
-            step: 0.1,
-            labels: BTreeMap::new(),
-        });
-        assert_eq!(after(&slider, &[]), None);
-        assert_eq!(after(&slider, &[Key::Right]), Some(0.5));
-        assert_eq!(
-            after(&slider, &[Key::Home, Key::Right, Key::Right, Key::Right]),
-            Some(0.3)
-        );
-        assert_eq!(after(&slider, &digits("0.75")), Some(0.75));
-        assert_eq!(after(&slider, &digits("2")), None);
-    }
-
-    #[test]
-    fn one_or_several_of_a_list() {
-        let options: Vec<String> = ["a", "b", "c"].map(str::to_owned).to_vec();
-        for (multiple, keys, want) in [
-            (false, vec![Key::Down, Key::Down], vec!["b"]),
-            (false, digits("31"), vec!["a"]),
-            (
-                true,
-                vec![Key::Down, Key::Char(' '), Key::End, Key::Char('x')],
-                vec!["a", "c"],
-            ),
-            (true, digits("323"), vec!["b"]),
-        ] {
-            let question = question(QuestionKind::Choice {
-                options: options.clone(),
-                multiple,
-            });
-            let mut field = Field::new(&question);
-            for key in keys {
-                field.key(&question, key, &Words::default());
-            }
-            let want = want.into_iter().map(str::to_owned).collect();
-            assert_eq!(
-                field.answer(&question, &Words::default()),
-                Ok(Some(Answer::Choice(want)))
-            );
-        }
-    }
-
-    #[test]
-    fn a_number_may_have_a_comma_and_must_be_in_range() {
-        let number = question(QuestionKind::Number {
-            unit: None,
-            min: Some(0.0),
-            max: Some(120.0),
-        });
-        assert_eq!(after(&number, &digits("12,5")), Some(12.5));
-        let mut field = Field::new(&number);
-        for key in digits("121") {
-            field.key(&number, key, &Words::default());
-        }
-        assert_eq!(
-            field.answer(&number, &Words::default()),
-            Err("Type a number from 0 to 120.".to_owned())
-        );
-        // Letters are no part of a number: "nan" and "inf" cannot be typed.
-        assert_eq!(
-            field.key(&number, Key::Char('n'), &Words::default()),
-            Handled::No
-        );
-    }
-
-    #[test]
-    fn an_empty_optional_text_is_no_answer() {
-        let mut text = question(QuestionKind::Text);
-        text.required = false;
-        let mut field = Field::new(&text);
-        field.key(&text, Key::Char(' '), &Words::default());
-        assert_eq!(field.answer(&text, &Words::default()), Ok(None));
-    }
-}
+mod tests;

@@ -158,7 +158,7 @@ impl UiState {
                 true => vec![Input::PlayAgain],
                 false => Vec::new(),
             },
-            Screen::Form { questions, .. } => self.press_form(key, questions, &view.words),
+            Screen::Form { questions, .. } => self.press_form(key, questions, view),
             Screen::Message { .. } | Screen::End { .. } | Screen::Break { .. } => {
                 self.press_reading(key, view)
             }
@@ -210,7 +210,8 @@ impl UiState {
         Vec::new()
     }
 
-    fn press_form(&mut self, key: Key, questions: &[Question], words: &Words) -> Vec<Input> {
+    fn press_form(&mut self, key: Key, questions: &[Question], view: &View) -> Vec<Input> {
+        let words = &view.words;
         let Some((_, form)) = &mut self.form else {
             return Vec::new();
         };
@@ -218,6 +219,7 @@ impl UiState {
         match key {
             Key::Enter => return self.submit(questions, None, words),
             Key::Tab => form.focus = (form.focus + 1) % count,
+            Key::BackTab if view.can_go_back && form.focus == 0 => return vec![Input::Back],
             Key::BackTab => form.focus = (form.focus + count - 1) % count,
             key => {
                 let at = form.focus;
@@ -226,6 +228,9 @@ impl UiState {
                     return Vec::new();
                 };
                 match field.key(question, key, words) {
+                    Handled::No if key == Key::PageUp && view.can_go_back => {
+                        return vec![Input::Back];
+                    }
                     Handled::No if key == Key::Down => form.focus = (at + 1).min(count - 1),
                     Handled::No if key == Key::Up => form.focus = at.saturating_sub(1),
                     handled => self.show_notice(handled),

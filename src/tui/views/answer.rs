@@ -1,16 +1,16 @@
 //! The field in which a question of any kind is answered.
 
 use super::choice::List;
-use super::scale::{self, Boxes, TRACK_ROWS, Track};
+use super::scale::{self, Boxes, Track};
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Target;
 use crate::tui::ui_state::field::{self, Field};
-use crate::tui::widgets::{TextField, left, middle, row, styled};
+use crate::tui::widgets::{TextField, fits_big, left, middle, row, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget;
-use std::collections::BTreeMap;
+use study_core::protocol::phrases::Words;
 use study_core::protocol::{Question, QuestionKind};
 
 /// The field of a question.
@@ -26,6 +26,8 @@ pub struct AnswerField<'a> {
     pub tall: u16,
     /// Whether it is centred; else left-aligned.
     pub centred: bool,
+    /// The sentences of the study, which know the direction of its scales.
+    pub words: &'a Words,
     /// The styles.
     pub theme: Theme,
 }
@@ -42,6 +44,7 @@ impl<'a> AnswerField<'a> {
                     labels,
                     chosen: *chosen,
                     tall: self.tall,
+                    from_right: self.words.scales_from_right(),
                     theme: self.theme,
                 })
             }
@@ -50,33 +53,36 @@ impl<'a> AnswerField<'a> {
     }
 
     fn track(&self) -> Option<Track<'a>> {
-        match (&self.question.kind, self.field) {
+        let (from, to, value, labels) = match (&self.question.kind, self.field) {
             (QuestionKind::Rating { from, to, labels }, Field::Rating { chosen, .. }) => {
-                let label = |n| labels.get(n).map_or("", String::as_str);
-                Some(Track {
-                    from: *from as f64,
-                    to: *to as f64,
-                    low: label(from),
-                    high: label(to),
-                    value: chosen.map(|n| n as f64),
-                    theme: self.theme,
-                })
+                let labels = labels.iter().map(|(n, label)| (*n as f64, label.as_str()));
+                let value = chosen.map(|n| n as f64);
+                (*from as f64, *to as f64, value, labels.collect())
             }
             (
                 QuestionKind::Slider {
                     from, to, labels, ..
                 },
                 Field::Slider { value, .. },
-            ) => Some(Track {
-                from: *from,
-                to: *to,
-                low: end_label(labels, *from),
-                high: end_label(labels, *to),
-                value: *value,
-                theme: self.theme,
-            }),
-            _ => None,
-        }
+            ) => {
+                let labels = labels.iter().filter_map(|(n, label)| {
+                    let at = n.trim().parse().ok().filter(|n: &f64| n.is_finite())?;
+                    Some((at, label.as_str()))
+                });
+                (*from, *to, *value, labels.collect::<Vec<_>>())
+            }
+            _ => return None,
+        };
+        let shown = value.unwrap_or(from).to_string().replace('-', "−");
+        Some(Track {
+            from,
+            to,
+            labels,
+            value,
+            large: self.tall >= 5 && fits_big(&shown, 40),
+            from_right: self.words.scales_from_right(),
+            theme: self.theme,
+        })
     }
 
     fn list(&self) -> Option<List<'a>> {
@@ -109,10 +115,10 @@ impl<'a> AnswerField<'a> {
     pub fn edges(&self, area: Rect) -> Option<Rect> {
         let at = Rect { height: 3, ..area };
         let places = self.boxes(area.width)?.places(at);
-        let (first, last) = (places.first()?.1, places.last()?.1);
+        let all = places.iter().map(|(_, place)| *place).reduce(Rect::union)?;
         Some(Rect {
-            x: first.x,
-            width: last.right() - first.x,
+            x: all.x,
+            width: all.width,
             ..area
         })
     }
@@ -122,7 +128,7 @@ impl<'a> AnswerField<'a> {
         let rows = if let Some(boxes) = self.boxes(columns) {
             self.tall + boxes.caption_rows(columns)
         } else if let Some(track) = self.track() {
-            TRACK_ROWS + track.caption_rows(columns)
+            track.rows() + track.caption_rows(columns)
         } else if let Some(list) = self.list() {
             list.rows(self.inner(Rect::new(0, 0, columns, 1)).width)
         } else if self.field.is_text() {
@@ -164,7 +170,7 @@ impl<'a> AnswerField<'a> {
             return hit.map(|(n, _)| Target::Number(at, n as f64));
         }
         if let Some(track) = self.track() {
-            let near = Track::line(area);
+            let near = track.line(area);
             let hit = place.y <= near.y + 1 && place.x >= near.x && place.x < near.right();
             return hit.then(|| Target::Number(at, track.value_at(area, place.x)));
         }
@@ -216,12 +222,4 @@ impl Widget for &AnswerField<'_> {
             text.render(self.inner(area), buf);
         }
     }
-}
-
-/// The label at an end of a slider. The keys of `labels` are the ends as text.
-fn end_label(labels: &BTreeMap<String, String>, end: f64) -> &str {
-    let found = labels
-        .iter()
-        .find(|(key, _)| key.trim().parse::<f64>().is_ok_and(|n| n == end));
-    found.map_or("", |(_, label)| label.as_str())
 }

@@ -2,7 +2,7 @@
 
 use super::answer::AnswerField;
 use crate::tui::theme::Theme;
-use crate::tui::ui_state::dialog::{Confirm, Correct, Dialog, Step};
+use crate::tui::ui_state::dialog::{Confirm, Correct, Dialog, SLIP, Step};
 use crate::tui::widgets::{TextField, dialog, hints, left, left_all, middle, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
@@ -29,12 +29,14 @@ pub struct DialogView<'a> {
 }
 
 /// The keys listed by the help dialog: key, alternative, action.
-pub const KEYS: [(&str, &str, &str); 13] = [
+pub const KEYS: [(&str, &str, &str); 15] = [
     ("Enter", "", "continue, confirm, save"),
     ("Esc", "", "stop the device, always; close a dialog"),
     ("Space", "", "stop the device while it is loaded or playing"),
     ("1–9  ← →  mouse", "", "choose"),
     ("Tab", "", "switch between rating and comment"),
+    ("Shift-Tab", "PgUp", "back to the question before"),
+    ("F7", "Ctrl-F", "feel it again, where that is possible"),
     ("Alt-Enter", "Ctrl-J", "new line in a text"),
     ("F2", "Ctrl-R", "add a remark, at any time"),
     ("F3", "Ctrl-E", "correct an earlier answer"),
@@ -131,6 +133,7 @@ impl DialogView<'_> {
             focused: true,
             tall: 3,
             centred: true,
+            words: self.words,
             theme: self.theme,
         };
         Some((answer, rows(inside, 6, inside.height.saturating_sub(8))))
@@ -219,15 +222,21 @@ impl DialogView<'_> {
                 };
                 let answer =
                     answer_words(&item.answer, usize::from(inside.width).saturating_sub(34));
+                // The title stands once for the answers of a form.
+                let before = i.checked_sub(1).and_then(|b| correct.items.get(b));
+                let title = match before {
+                    Some(before) if before.form == item.form && i > first => "",
+                    _ => &item.title,
+                };
                 let words = format!(
                     "{} {:<11} {:<18} {answer}",
                     if here { "›" } else { " " },
-                    wrap::one_line(&item.title, 11),
+                    wrap::one_line(title, 11),
                     wrap::one_line(item.question.id.as_str(), 18),
                 );
                 left(buf, row(inside, y), &styled(words, style));
             }
-            let keys = [("↑ ↓", "select"), ("Enter", "correct")];
+            let keys = [("↑ ↓", "select"), ("0–9", "answer"), ("Enter", "correct")];
             self.keys(buf, inside, &keys);
             return;
         }
@@ -252,9 +261,13 @@ impl DialogView<'_> {
         ]);
         left(buf, row(inside, 2), &line);
         match &correct.step {
-            Step::Reason { by, .. } => {
+            Step::Reason { by, answer, .. } => {
                 left(buf, row(inside, 3), &self.by(*by));
-                let why = styled("Why? Both answers are kept.", quiet);
+                let default = match answer {
+                    Some(_) => format!(" Enter alone: {SLIP}."),
+                    None => String::new(),
+                };
+                let why = styled(format!("Why? Both answers are kept.{default}"), quiet);
                 left(buf, row(inside, 4), &why);
                 let keys = [("Enter", "correct"), ("Tab", "author")];
                 self.keys(buf, inside, &keys);

@@ -54,6 +54,7 @@ impl FormView<'_> {
             focused: self.focused && self.form.focus == at,
             tall,
             centred: !self.compact(),
+            words: &self.view.words,
             theme: self.theme,
         })
     }
@@ -181,7 +182,10 @@ impl FormView<'_> {
             Some(QuestionKind::Rating { from, to, .. }) => {
                 keys.push((format!("{from}–{to}").replace('-', "−"), Phrase::Choose));
             }
-            Some(QuestionKind::Slider { .. }) => keys.push(("← →".to_owned(), Phrase::Move)),
+            Some(QuestionKind::Slider { .. }) => {
+                keys.push(("← →".to_owned(), Phrase::Move));
+                keys.push(("0–9".to_owned(), Phrase::Choose));
+            }
             Some(QuestionKind::Choice { multiple: true, .. }) => {
                 keys.push(("↑ ↓".to_owned(), Phrase::Move));
                 keys.push(("Space".to_owned(), Phrase::Mark));
@@ -207,6 +211,9 @@ impl FormView<'_> {
                 other
             };
             keys.push(("Tab".to_owned(), other));
+        }
+        if self.view.can_go_back && at == 0 {
+            keys.push(("Shift-Tab".to_owned(), Phrase::Back));
         }
         if self.view.can_replay {
             keys.push(("F7".to_owned(), Phrase::FeelAgain));

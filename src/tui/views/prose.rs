@@ -46,11 +46,8 @@ pub fn prose(view: &View) -> Option<Prose> {
     };
     let words = &view.words;
     let by_hand = view.device == DeviceKind::Manual;
-    let again = if by_hand {
-        words.get(Phrase::FeelAgain)
-    } else {
-        words.get(Phrase::PlayAgain)
-    };
+    let stopped = Stopped::of(view);
+    let again = words.get(stopped.again);
     let ready: &[_] = if view.can_advance {
         &[("Enter", Phrase::Ready)]
     } else {
@@ -146,25 +143,12 @@ pub fn prose(view: &View) -> Option<Prose> {
             ..Prose::default()
         },
         Screen::Stopped { can_rate } => Prose {
-            title: format!(
-                "■  {}",
-                words.get(if by_hand {
-                    Phrase::StoppedSample
-                } else {
-                    Phrase::StoppedDevice
-                })
-            ),
-            body: words
-                .get(if by_hand {
-                    Phrase::LetGo
-                } else {
-                    Phrase::NoForce
-                })
-                .to_owned(),
+            title: format!("■  {}", words.get(stopped.title)),
+            body: words.get(stopped.body).to_owned(),
             choices: if *can_rate {
                 vec![
                     ("Enter", again.to_owned(), ""),
-                    ("r", words.get(Phrase::RateFelt).to_owned(), ""),
+                    ("r", words.get(stopped.rate).to_owned(), ""),
                 ]
             } else {
                 vec![("Enter", again.to_owned(), "")]
@@ -190,7 +174,7 @@ pub fn prose(view: &View) -> Option<Prose> {
         Screen::Paused { since_s } => Prose {
             title: words.get(Phrase::Paused).to_owned(),
             body: words.fill(
-                if by_hand {
+                if by_hand || !view.force {
                     Phrase::PausedFor
                 } else {
                     Phrase::PausedNoForce
@@ -212,6 +196,61 @@ pub fn prose(view: &View) -> Option<Prose> {
         | Screen::DeviceTrouble { .. }
         | Screen::SaveTrouble { .. } => return None,
     })
+}
+
+/// The sentences of a stopped trial, by what was presented.
+#[derive(Debug, Clone, Copy)]
+pub struct Stopped {
+    /// What is stopped.
+    pub title: Phrase,
+    /// What that means.
+    pub body: Phrase,
+    /// Present it again.
+    pub again: Phrase,
+    /// Rate it.
+    pub rate: Phrase,
+}
+
+impl Stopped {
+    /// Those of a view.
+    pub fn of(view: &View) -> Self {
+        let (title, body, again, rate) = match (view.device, view.force) {
+            (DeviceKind::Manual, _) => (
+                Phrase::StoppedSample,
+                Phrase::LetGo,
+                Phrase::FeelAgain,
+                Phrase::RateFelt,
+            ),
+            (_, true) => (
+                Phrase::StoppedDevice,
+                Phrase::NoForce,
+                Phrase::PlayAgain,
+                Phrase::RateFelt,
+            ),
+            (_, false) => (
+                Phrase::StoppedSample,
+                Phrase::NotLost,
+                Phrase::PlayAgain,
+                Phrase::RateIt,
+            ),
+        };
+        Self {
+            title,
+            body,
+            again,
+            rate,
+        }
+    }
+}
+
+/// What the participant does while it plays: the sentence, and, where more is needed, how
+/// to go on.
+pub fn attending(view: &View) -> (Phrase, Phrase) {
+    match (view.device, view.force) {
+        (DeviceKind::Manual, _) => (Phrase::FeelSample, Phrase::Longer),
+        (_, true) => (Phrase::FeelDevice, Phrase::KeepExploring),
+        (_, false) => (Phrase::Attend, Phrase::Longer),
+    }
 }
 
 fn ago(gap_h: f64) -> String {

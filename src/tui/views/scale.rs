@@ -1,10 +1,10 @@
 //! Scales: numbers in boxes, or a line with a marker.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{cells, centre, frame, left, right, row, rows, styled};
+use crate::tui::widgets::{BIG_ROWS, big, cells, centre, frame, left, right, row, rows, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
+use ratatui::layout::{Margin, Rect};
 use ratatui::widgets::Widget;
 use std::collections::BTreeMap;
 
@@ -29,6 +29,8 @@ pub struct Boxes<'a> {
     pub chosen: Option<i64>,
     /// Height of a box, in rows.
     pub tall: u16,
+    /// Whether the smallest number is on the right.
+    pub from_right: bool,
     /// The styles.
     pub theme: Theme,
 }
@@ -72,63 +74,124 @@ impl Boxes<'_> {
         let height = self.tall.min(area.height);
         (self.from..=self.to)
             .zip(0u16..)
-            .map(|(n, i)| (n, Rect::new(start + i * (wide + gap), area.y, wide, height)))
+            .map(|(n, i)| {
+                let place = Rect::new(start + i * (wide + gap), area.y, wide, height);
+                match self.from_right {
+                    true => (n, mirrored(place, area)),
+                    false => (n, place),
+                }
+            })
             .collect()
     }
 
-    /// The number, columns and lines of each label.
-    fn captions(&self, area: Rect) -> Vec<(i64, Rect, Vec<String>)> {
+    /// The labels below the boxes.
+    fn captions(&self, area: Rect) -> Vec<Caption> {
         let places = self.places(area);
-        let below = self.tall.min(area.height);
-        let of = |n: i64| places.iter().find(|(m, _)| *m == n).map(|(_, r)| *r);
-        let labelled: Vec<(i64, Rect)> = self
-            .labels
-            .iter()
-            .filter(|(_, label)| !label.trim().is_empty())
-            .filter_map(|(n, _)| Some((*n, of(*n)?)))
-            .collect();
-        let (Some(first), Some(last)) = (places.first(), places.last()) else {
-            return Vec::new();
-        };
-        let centre_of = |r: Rect| r.x + r.width / 2;
-        let mut captions = Vec::new();
-        for (i, (n, place)) in labelled.iter().enumerate() {
-            // A label may extend halfway to the next one.
-            let lower = match i.checked_sub(1).and_then(|j| labelled.get(j)) {
-                Some((_, before)) => u16::midpoint(centre_of(*before), centre_of(*place)) + 1,
-                None => first.1.x,
-            };
-            let upper = match labelled.get(i + 1) {
-                Some((_, after)) => u16::midpoint(centre_of(*place), centre_of(*after)),
-                None => last.1.right(),
-            };
-            let (x, end) = if *n == self.from {
-                (place.x, upper.min(place.x + 24).max(place.x + 1))
-            } else if *n == self.to {
-                (lower.max(place.right().saturating_sub(24)), place.right())
-            } else {
-                let half = (centre_of(*place) - lower)
-                    .min(upper.saturating_sub(centre_of(*place)))
-                    .min(12);
-                (centre_of(*place) - half, centre_of(*place) + half + 1)
-            };
-            let columns = Rect::new(x, area.y + below, end.saturating_sub(x).max(1), 0);
-            let label = self.labels.get(n).map_or("", String::as_str);
-            let lines = wrap::paragraph(label, usize::from(columns.width), 4);
-            captions.push((*n, columns, lines));
-        }
-        captions
+        let label = |(n, place): &(i64, Rect)| Some((*place, self.labels.get(n)?.as_str()));
+        let mut labelled: Vec<(Rect, &str)> = places.iter().filter_map(label).collect();
+        labelled.sort_by_key(|(place, _)| place.x);
+        captions(&labelled, covering(&places), 24)
     }
 
     /// Height of the labels in rows, for a width in columns.
     pub fn caption_rows(&self, columns: u16) -> u16 {
         let area = Rect::new(0, 0, columns, 3);
-        let most = self
-            .captions(area)
-            .into_iter()
-            .map(|(_, _, l)| l.len())
-            .max();
-        u16::try_from(most.unwrap_or(0)).unwrap_or(4)
+        caption_rows(&self.captions(area))
+    }
+}
+
+/// The area from the first place to the last.
+fn covering<T>(places: &[(T, Rect)]) -> Rect {
+    let all = places.iter().map(|(_, place)| *place);
+    all.reduce(Rect::union).unwrap_or_default()
+}
+
+/// A label below a scale.
+#[derive(Debug)]
+struct Caption {
+    /// Where its first line is.
+    place: Rect,
+    /// Which side of its place it keeps to.
+    side: Side,
+    lines: Vec<String>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Side {
+    Left,
+    Middle,
+    Right,
+}
+
+/// The labels of these places, from left to right: those at the ends of `all` keep to its
+/// edges, and each may extend halfway to the next one, `widest` columns at most.
+fn captions(labelled: &[(Rect, &str)], all: Rect, widest: u16) -> Vec<Caption> {
+    let labelled: Vec<&(Rect, &str)> = (labelled.iter())
+        .filter(|(_, label)| !label.trim().is_empty())
+        .collect();
+    let centre_of = |r: Rect| r.x + r.width / 2;
+    let caption = |(i, (place, label)): (usize, &&(Rect, &str))| {
+        let centre = centre_of(*place);
+        let lower = match i.checked_sub(1).and_then(|j| labelled.get(j)) {
+            Some((before, _)) => u16::midpoint(centre_of(*before), centre) + 1,
+            None => all.x,
+        };
+        let upper = match labelled.get(i + 1) {
+            Some((after, _)) => u16::midpoint(centre, centre_of(*after)),
+            None => all.right(),
+        };
+        let (side, x, end) = if place.x == all.x {
+            (Side::Left, place.x, upper.min(place.x + widest))
+        } else if place.right() == all.right() {
+            let x = lower.max(place.right().saturating_sub(widest));
+            (Side::Right, x, place.right())
+        } else {
+            let half = (centre - lower)
+                .min(upper.saturating_sub(centre))
+                .min(widest / 2);
+            (Side::Middle, centre - half, centre + half + 1)
+        };
+        let width = end.saturating_sub(x).max(1);
+        Caption {
+            place: Rect::new(x, all.y, width, 1),
+            side,
+            lines: wrap::paragraph(label, usize::from(width), 4),
+        }
+    };
+    labelled.iter().enumerate().map(caption).collect()
+}
+
+fn caption_rows(captions: &[Caption]) -> u16 {
+    let most = captions.iter().map(|c| c.lines.len()).max();
+    u16::try_from(most.unwrap_or(0)).unwrap_or(4)
+}
+
+/// Draws captions from a row of an area on.
+fn draw_captions(captions: &[Caption], area: Rect, from: u16, theme: Theme, buf: &mut Buffer) {
+    for caption in captions {
+        for (i, line) in (0u16..).zip(&caption.lines) {
+            let below = row(area, from + i);
+            let place = Rect {
+                y: below.y,
+                height: below.height,
+                ..caption.place
+            };
+            let line = styled(line.as_str(), theme.text());
+            match caption.side {
+                _ if below.is_empty() => {}
+                Side::Left => left(buf, place, &line),
+                Side::Middle => centre(buf, place, &line),
+                Side::Right => right(buf, place, &line),
+            }
+        }
+    }
+}
+
+/// A place on the other side of an area.
+fn mirrored(place: Rect, area: Rect) -> Rect {
+    Rect {
+        x: area.x + area.right() - place.right(),
+        ..place
     }
 }
 
@@ -136,13 +199,16 @@ impl Widget for &Boxes<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         for (n, place) in self.places(area) {
             let chosen = self.chosen == Some(n);
-            let (border, text) = if chosen {
-                (self.theme.chosen(), self.theme.chosen())
-            } else {
-                (self.theme.outline(), self.theme.strong())
+            let (border, text) = match self.chosen {
+                Some(_) if chosen => (self.theme.chosen(), self.theme.filled()),
+                Some(_) => (self.theme.outline(), self.theme.quiet()),
+                None => (self.theme.outline(), self.theme.strong()),
             };
             frame(buf, place, chosen, border);
-            let inside = rows(place, 1, place.height.saturating_sub(2));
+            let inside = place.inner(Margin::new(1, 1));
+            if chosen {
+                buf.set_style(inside.intersection(buf.area), text);
+            }
             if inside.height >= 5 && place.width >= 11 {
                 big(buf, inside, &number(n), text);
             } else {
@@ -150,75 +216,43 @@ impl Widget for &Boxes<'_> {
                 centre(buf, row(inside, inside.height / 2), &label);
             }
         }
-        for (n, columns, lines) in self.captions(area) {
-            for (i, line) in (0u16..).zip(&lines) {
-                let at = Rect::new(columns.x, columns.y + i, columns.width, 1);
-                if at.y >= area.bottom() {
-                    break;
-                }
-                let line = styled(line.as_str(), self.theme.text());
-                if n == self.from {
-                    left(buf, at, &line);
-                } else if n == self.to {
-                    right(buf, at, &line);
-                } else {
-                    centre(buf, at, &line);
-                }
-            }
-        }
-    }
-}
-
-/// A digit of three by three half blocks.
-fn glyph(c: char) -> [&'static str; 3] {
-    match c {
-        '0' => ["█▀█", "█ █", "▀▀▀"],
-        '1' => ["▄█ ", " █ ", "▀▀▀"],
-        '2' => ["▀▀█", "█▀▀", "▀▀▀"],
-        '3' => ["▀▀█", " ▀█", "▀▀▀"],
-        '4' => ["█ █", "▀▀█", "  ▀"],
-        '5' => ["█▀▀", "▀▀█", "▀▀▀"],
-        '6' => ["█▀▀", "█▀█", "▀▀▀"],
-        '7' => ["▀▀█", "  █", "  ▀"],
-        '8' => ["█▀█", "█▀█", "▀▀▀"],
-        '9' => ["█▀█", "▀▀█", "▀▀▀"],
-        _ => ["   ", "▀▀▀", "   "],
-    }
-}
-
-fn big(buf: &mut Buffer, area: Rect, text: &str, style: ratatui::style::Style) {
-    let top = area.height.saturating_sub(3) / 2;
-    for i in 0..3u16 {
-        let line: Vec<&str> = text.chars().map(|c| glyph(c)[usize::from(i)]).collect();
-        let line = styled(line.join(" "), style);
-        centre(buf, row(area, top + i), &line);
+        let below = self.tall.min(area.height);
+        draw_captions(&self.captions(area), area, below, self.theme, buf);
     }
 }
 
 /// A scale drawn as a line, with a marker at the value.
 #[derive(Debug)]
 pub struct Track<'a> {
-    /// Left end.
+    /// Smallest number.
     pub from: f64,
-    /// Right end.
+    /// Largest number.
     pub to: f64,
-    /// Label of the left end.
-    pub low: &'a str,
-    /// Label of the right end.
-    pub high: &'a str,
+    /// Labels of some numbers.
+    pub labels: Vec<(f64, &'a str)>,
     /// The value.
     pub value: Option<f64>,
+    /// Whether the value is drawn large.
+    pub large: bool,
+    /// Whether the smallest number is on the right.
+    pub from_right: bool,
     /// The styles.
     pub theme: Theme,
 }
 
-/// Height of a track without its labels, in rows: value, line, ends.
-pub const TRACK_ROWS: u16 = 3;
-
 impl Track<'_> {
+    /// Height without the labels, in rows: value, line, numbers.
+    pub fn rows(&self) -> u16 {
+        self.value_rows() + 2
+    }
+
+    fn value_rows(&self) -> u16 {
+        if self.large { BIG_ROWS + 1 } else { 1 }
+    }
+
     /// The area of the line itself.
-    pub fn line(area: Rect) -> Rect {
-        let all = row(area, 1);
+    pub fn line(&self, area: Rect) -> Rect {
+        let all = row(area, self.value_rows());
         let margin = (all.width / 12).min(6);
         Rect {
             x: all.x + margin,
@@ -229,94 +263,104 @@ impl Track<'_> {
 
     /// The value at a column.
     pub fn value_at(&self, area: Rect, x: u16) -> f64 {
-        let line = Self::line(area);
+        let line = self.line(area);
         let steps = f64::from(line.width.saturating_sub(1).max(1));
         let part = f64::from(x.saturating_sub(line.x)) / steps;
-        self.from + part.clamp(0.0, 1.0) * (self.to - self.from)
+        let part = part.clamp(0.0, 1.0);
+        let part = if self.from_right { 1.0 - part } else { part };
+        self.from + part * (self.to - self.from)
+    }
+
+    /// The column of a value.
+    fn place_of(&self, line: Rect, value: f64) -> Rect {
+        let part = ((value - self.from) / (self.to - self.from)).clamp(0.0, 1.0);
+        let part = if part.is_nan() { 0.0 } else { part };
+        let column = (part * f64::from(line.width.saturating_sub(1))).round() as u16;
+        let place = Rect {
+            x: line.x + column,
+            width: 1,
+            ..line
+        };
+        match self.from_right {
+            true => mirrored(place, line),
+            false => place,
+        }
     }
 
     /// Height of the labels, in rows.
     pub fn caption_rows(&self, columns: u16) -> u16 {
-        let (low, high) = self.captions(columns);
-        u16::try_from(low.len().max(high.len())).unwrap_or(4)
+        caption_rows(&self.captions(Rect::new(0, 0, columns, 20)))
     }
 
-    fn captions(&self, columns: u16) -> (Vec<String>, Vec<String>) {
-        let half = usize::from(columns / 2).saturating_sub(2).clamp(1, 30);
-        let lines = |text: &str| {
-            if text.trim().is_empty() {
-                Vec::new()
-            } else {
-                wrap::paragraph(text, half, 4)
-            }
+    fn captions(&self, area: Rect) -> Vec<Caption> {
+        let line = self.line(area);
+        let labels = self.labels.iter();
+        let mut places: Vec<(Rect, &str)> = labels
+            .map(|(at, label)| (self.place_of(line, *at), *label))
+            .collect();
+        places.sort_by_key(|(place, _)| place.x);
+        captions(&places, line, 30)
+    }
+
+    /// The value above the line, large or at the marker.
+    fn draw_value(&self, area: Rect, mark: Rect, value: f64, buf: &mut Buffer) {
+        let text = value.to_string().replace('-', "−");
+        if self.large {
+            return big(buf, rows(area, 0, BIG_ROWS), &text, self.theme.chosen());
+        }
+        let text = styled(text, self.theme.chosen());
+        let wide = cells(&text);
+        let start = (mark.x.saturating_sub(wide / 2))
+            .clamp(area.x, area.right().saturating_sub(wide).max(area.x));
+        let above = Rect {
+            x: start,
+            width: area.right() - start,
+            ..row(area, 0)
         };
-        (lines(self.low), lines(self.high))
+        left(buf, above, &text);
     }
 }
 
 impl Widget for &Track<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let line = Track::line(area);
+        let line = self.line(area);
         if line.is_empty() {
             return;
         }
         let dashes = "─".repeat(usize::from(line.width.saturating_sub(2)));
         let track = styled(format!("├{dashes}┤"), self.theme.outline());
         left(buf, line, &track);
-        if let Some(value) = self.value.filter(|v| v.is_finite()) {
-            let part = ((value - self.from) / (self.to - self.from)).clamp(0.0, 1.0);
-            let part = if part.is_nan() { 0.0 } else { part };
-            let column = (part * f64::from(line.width.saturating_sub(1))).round() as u16;
-            let x = line.x + column;
-            let mark = styled("●", self.theme.chosen());
-            left(
-                buf,
-                Rect {
-                    x,
-                    width: 1,
-                    ..line
-                },
-                &mark,
-            );
-            let text = styled(value.to_string().replace('-', "−"), self.theme.chosen());
-            let wide = cells(&text);
-            let start = x
-                .saturating_sub(wide / 2)
-                .clamp(area.x, area.right().saturating_sub(wide).max(area.x));
-            let above = Rect {
-                x: start,
-                width: area.right() - start,
-                ..row(area, 0)
-            };
-            left(buf, above, &text);
+        let inner = |at: &f64| *at > self.from && *at < self.to;
+        for (at, _) in self.labels.iter().filter(|(at, _)| inner(at)) {
+            let tick = styled("┼", self.theme.outline());
+            left(buf, self.place_of(line, *at), &tick);
         }
-        let ends = Rect {
+        if let Some(value) = self.value.filter(|v| v.is_finite()) {
+            let mark = self.place_of(line, value);
+            let begin = self.place_of(line, self.from);
+            let (low, high) = (begin.x.min(mark.x), begin.x.max(mark.x));
+            for x in low..=high {
+                let cell = Rect { x, ..mark };
+                left(buf, cell, &styled("━", self.theme.chosen()));
+            }
+            left(buf, mark, &styled("●", self.theme.chosen()));
+            self.draw_value(area, mark, value, buf);
+        }
+        let numbers = Rect {
             x: line.x,
             width: line.width,
-            ..row(area, 2)
+            ..row(area, self.value_rows() + 1)
         };
         let end = |n: f64| {
             let text = n.to_string().replace('-', "−");
             styled(wrap::one_line(&text, 12), self.theme.strong())
         };
-        left(buf, ends, &end(self.from));
-        right(buf, ends, &end(self.to));
-        let (low, high) = self.captions(area.width);
-        for (side, lines) in [(false, low), (true, high)] {
-            for (i, text) in (0u16..).zip(&lines) {
-                let at = row(area, TRACK_ROWS + i);
-                let at = Rect {
-                    x: line.x,
-                    width: line.width.min(at.width),
-                    ..at
-                };
-                let text = styled(text.as_str(), self.theme.text());
-                if side {
-                    right(buf, at, &text);
-                } else {
-                    left(buf, at, &text);
-                }
-            }
-        }
+        let (on_left, on_right) = match self.from_right {
+            true => (self.to, self.from),
+            false => (self.from, self.to),
+        };
+        left(buf, numbers, &end(on_left));
+        right(buf, numbers, &end(on_right));
+        draw_captions(&self.captions(area), area, self.rows(), self.theme, buf);
     }
 }

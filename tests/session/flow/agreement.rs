@@ -149,6 +149,7 @@ impl<'a> Expected<'a> {
                 form,
                 question,
                 answer: last,
+                ..
             }
             | Event::Corrected {
                 form,

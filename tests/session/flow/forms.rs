@@ -136,6 +136,7 @@ fn an_earlier_answer_is_corrected_with_a_reason_and_both_are_kept() {
             to: Answer::Rating(7),
             reason: "misheard".to_owned(),
             by: Author::Experimenter,
+            channel: None,
         }
     );
     assert_eq!(screen(&rig), "Reference", "it interrupts nothing");

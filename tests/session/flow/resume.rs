@@ -57,6 +57,7 @@ fn answers(journal: &[Entry]) -> Vec<(FormId, String, Answer)> {
                 form,
                 question,
                 answer,
+                ..
             } => Some((*form, question.to_string(), answer.clone())),
             _ => None,
         })

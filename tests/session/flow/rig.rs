@@ -303,6 +303,7 @@ impl Rig {
                 form: p,
                 question: q,
                 answer,
+                ..
             } if *p == form && q == question => Some(answer.clone()),
             _ => None,
         })

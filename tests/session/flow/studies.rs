@@ -67,6 +67,7 @@ pub(crate) fn rich() -> Protocol {
         end: some("Goodbye."),
         lang: some("en"),
         words: Default::default(),
+        scale_direction: None,
     };
     protocol.consent = Some(Consent {
         document: "Information sheet".to_owned(),

@@ -1,7 +1,7 @@
 //! The cells of a row, and the header of each table of a study.
 
 use super::rows::{AttemptEvent, AttemptRow, IntervalRow, ParticipantRow, RatingRow};
-use super::{Author, Failure, Sample, State, Status, Verdict};
+use super::{Author, Channel, Failure, Sample, State, Status, Verdict};
 use crate::protocol::columns::{
     AttemptColumn, Column, IntervalColumn, ParticipantColumn, RatingColumn, Repeats, SampleColumn,
 };
@@ -93,6 +93,7 @@ fields! {
     Failure: |failure, _| Cell::text(failure.as_str());
     Verdict: |verdict, _| Cell::text(verdict.as_str());
     Author: |author, _| Cell::text(author.as_str());
+    Channel: |channel, _| Cell::text(channel.as_str());
     Answer: |answer, _| match answer {
         Answer::Rating(n) => Cell::Whole((*n).into()),
         Answer::Number(x) => Cell::Number(*x),
@@ -128,7 +129,7 @@ fn header<C: Copy>(all: &[C], declaration: fn(C) -> Column, repeated: &Repeated<
         Repeats::Covariate => repeated.covariates.clone(),
     };
     (all.iter())
-        .filter(|c| declaration(**c).is_in(repeated.has_parts))
+        .filter(|c| declaration(**c).is_in(repeated.has_parts, repeated.has_replays))
         .flat_map(|c| {
             names(declaration(*c))
                 .into_iter()
@@ -143,6 +144,8 @@ struct Repeated<'a> {
     covariates: Vec<&'a str>,
     /// Whether the study has parts.
     has_parts: bool,
+    /// Whether its trials can be felt again.
+    has_replays: bool,
 }
 
 impl RatingColumn {
@@ -157,6 +160,7 @@ impl RatingColumn {
             questions: protocol.questions.iter().map(|q| q.id.as_str()).collect(),
             covariates: covariates.into_iter().collect(),
             has_parts: !protocol.parts.is_empty(),
+            has_replays: protocol.trial.exposure.replays > 0,
         };
         header(Self::ALL, Self::column, &repeated)
     }
@@ -269,6 +273,7 @@ row! {
         Correct: correct,
         Replays: replays,
         HostLateMs: host_late_ms,
+        InputChannel: input_channel,
         ..fidelity {
             Rendering: verdict,
             RenderedVaf: rendered_vaf,
@@ -345,6 +350,7 @@ row! {
         By: by,
         Text: text,
         At: at,
+        InputChannel: input_channel,
     }
 }
 

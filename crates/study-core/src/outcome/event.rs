@@ -52,6 +52,20 @@ named! {
     }
 }
 
+named! {
+    /// How an answer was entered.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    Channel {
+        /// By keys, in the terminal.
+        Terminal = "terminal",
+        /// In typed lines.
+        Plain = "plain",
+        /// On the participant's page.
+        Page = "page",
+    }
+}
+
 /// The form in which a question is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -265,6 +279,9 @@ pub enum Event {
         form: FormId,
         question: QuestionId,
         answer: Answer,
+        /// How it was entered; not in journals of earlier releases.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        channel: Option<Channel>,
     },
     /// An earlier answer was changed.
     Corrected {
@@ -278,6 +295,9 @@ pub enum Event {
         reason: String,
         /// Who corrected it.
         by: Author,
+        /// How it was entered; not in journals of earlier releases.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        channel: Option<Channel>,
     },
     /// A realization was requested from the device.
     AttemptStarted {

@@ -27,7 +27,7 @@ pub use attempt_log::attempt_rows;
 pub use interval_log::interval_rows;
 pub use trial::{Attempt, AttemptStart, Completion, Ended, Presentation, Sitting};
 
-use super::event::{Choice, Entry, Event, Failure, FormId, Moment, Start, State};
+use super::event::{Channel, Choice, Entry, Event, Failure, FormId, Moment, Start, State};
 use crate::protocol::{Answer, Trial};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{PartId, QuestionId};
@@ -103,6 +103,8 @@ pub struct GivenAnswer {
     pub answered_at: Option<Moment>,
     /// Whether it was corrected.
     pub corrected: bool,
+    /// How it was entered last, if that is known.
+    pub channel: Option<Channel>,
 }
 
 /// An attempt under way: before, during or after its playback, not yet rated.
@@ -188,10 +190,15 @@ impl History {
                 form,
                 question,
                 answer,
-            } => self.answered(*form, question, answer, at),
+                channel,
+            } => self.answered(*form, question, (answer, *channel), at),
             Event::Corrected {
-                form, question, to, ..
-            } => self.given(*form, question, to).corrected = true,
+                form,
+                question,
+                to,
+                channel,
+                ..
+            } => self.given(*form, question, (to, *channel)).corrected = true,
             Event::AttemptStarted {
                 trial,
                 attempt,
@@ -415,7 +422,13 @@ impl History {
         }
     }
 
-    fn answered(&mut self, form: FormId, question: &QuestionId, answer: &Answer, at: Moment) {
+    fn answered(
+        &mut self,
+        form: FormId,
+        question: &QuestionId,
+        answer: (&Answer, Option<Channel>),
+        at: Moment,
+    ) {
         self.given(form, question, answer).answered_at = Some(at);
         let is_open = self.open().is_some_and(|o| o.form() == form);
         if let Some(open) = self.open_mut().filter(|_| is_open)
@@ -426,7 +439,12 @@ impl History {
     }
 
     /// Sets an answer.
-    fn given(&mut self, form: FormId, question: &QuestionId, answer: &Answer) -> &mut GivenAnswer {
+    fn given(
+        &mut self,
+        form: FormId,
+        question: &QuestionId,
+        (answer, channel): (&Answer, Option<Channel>),
+    ) -> &mut GivenAnswer {
         let known = self
             .answers
             .iter()
@@ -439,10 +457,12 @@ impl History {
                 answer: answer.clone(),
                 answered_at: None,
                 corrected: false,
+                channel,
             });
         }
         let given = &mut self.answers[index];
         given.answer = answer.clone();
+        given.channel = channel;
         given
     }
 

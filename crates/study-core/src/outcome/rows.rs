@@ -1,7 +1,7 @@
 //! The rows of the derived tables. Their fields are the columns of the same name,
 //! which `protocol::columns` declares.
 
-use super::event::{Author, Event, Failure, State};
+use super::event::{Author, Channel, Event, Failure, State};
 use super::fidelity::Fidelity;
 use crate::protocol::{Answer, DeviceKind, Role};
 use chrono::{DateTime, FixedOffset};
@@ -75,6 +75,7 @@ pub struct RatingRow {
     /// Of several playbacks the worst.
     pub fidelity: Option<Fidelity>,
     pub host_late_ms: Option<f64>,
+    pub input_channel: Option<Channel>,
 }
 
 /// One row of `intervals.csv`: a presentation.
@@ -156,6 +157,7 @@ pub struct AttemptRow {
     pub by: Option<Author>,
     pub text: String,
     pub at: DateTime<FixedOffset>,
+    pub input_channel: Option<Channel>,
 }
 
 /// One row of `participants.csv`.

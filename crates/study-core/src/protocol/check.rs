@@ -57,6 +57,14 @@ fn language(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
     let Some(lang) = &protocol.text.lang else {
         return;
     };
+    if phrases::is_right_to_left(lang) && protocol.text.scale_direction.is_none() {
+        let what = "scales begin on the right, in the terminal and on the participant's page";
+        faults.push(
+            Fault::warning(what)
+                .at(spans.get("text.lang").cloned())
+                .hint("say so, scale_direction = \"rtl\" in [text], or let them begin on the left: \"ltr\""),
+        );
+    }
     if phrases::is_shipped(lang) {
         return;
     }

@@ -63,6 +63,8 @@ pub enum Studies {
     All,
     /// Those with parts.
     WithParts,
+    /// Those with parts, or whose trials can be felt again.
+    WithReplays,
 }
 
 impl Column {
@@ -104,9 +106,18 @@ impl Column {
         self
     }
 
-    /// Whether a study has it.
-    pub fn is_in(&self, has_parts: bool) -> bool {
-        has_parts || self.study == Studies::All
+    const fn with_replays(mut self) -> Self {
+        self.study = Studies::WithReplays;
+        self
+    }
+
+    /// Whether a study has it: one with parts, or one whose trials can be felt again.
+    pub fn is_in(&self, has_parts: bool, has_replays: bool) -> bool {
+        match self.study {
+            Studies::All => true,
+            Studies::WithParts => has_parts,
+            Studies::WithReplays => has_parts || has_replays,
+        }
     }
 
     /// Whether another column of its table may not have this name, in any case.
@@ -150,6 +161,16 @@ const PROTOCOL_VERSION: Column = whole(
     "protocol_version",
     "version of the protocol that the session started with",
 );
+const INPUT_CHANNEL: Column = level(
+    "input_channel",
+    &[
+        ("terminal", "the keys of the terminal"),
+        ("plain", "typed lines"),
+        ("page", "the participant's page"),
+    ],
+    "how the answer was entered",
+)
+.optional();
 const NEVER_PRESENTED: &str = "the trial was never presented";
 const NO_TELEMETRY: &str = "no playback ended, or the device sent no telemetry";
 
@@ -269,8 +290,8 @@ table! {
             .empty("the trial has no family, or was never presented").with_parts(),
         Correct: flag("correct", "whether the answer is correct, after corrections")
             .empty("no answer is correct or wrong, or it was not answered").with_parts(),
-        Replays: whole("replays", "how often all intervals were felt again before the answer")
-            .empty(NEVER_PRESENTED).with_parts(),
+        Replays: whole("replays", "how often the trial was felt again before the answer")
+            .empty(NEVER_PRESENTED).with_replays(),
         Rendering: level("rendering", &[
             ("ok", "the force was that of the table"),
             ("unverified", "the device reports no samples, or plays no table"),
@@ -304,6 +325,7 @@ table! {
             "host_late_ms",
             "how late this computer's thread for the device was at most during the playback",
         ).unit("ms").empty("not measured").optional(),
+        InputChannel: INPUT_CHANNEL.empty("not answered, or not by a person"),
     }
 }
 
@@ -419,6 +441,7 @@ table! {
         ], "who corrected or remarked").empty("the event is neither a correction nor a remark"),
         Text: text("text", "reason, remark or detail").empty("none was given"),
         At: time("at", "when it happened"),
+        InputChannel: INPUT_CHANNEL.empty("no person answered or corrected anything"),
     }
 }
 
@@ -490,7 +513,8 @@ table! {
 /// case.
 pub fn is_ratings_column(name: &str) -> bool {
     let all = RatingColumn::ALL.iter().map(|c| c.column());
-    all.filter(|c| c.is_in(false)).any(|c| c.reserves(name))
+    all.filter(|c| c.is_in(false, false))
+        .any(|c| c.reserves(name))
 }
 
 /// The same for a study with parts.
@@ -502,7 +526,9 @@ pub fn is_parts_column(name: &str) -> bool {
 /// without may have the name of one of their columns, but not of all, one after the other.
 pub fn are_of_parts(header: &[String]) -> bool {
     let all = RatingColumn::ALL.iter().map(|c| c.column());
-    let own: Vec<&str> = all.filter(|c| !c.is_in(false)).map(|c| c.name).collect();
+    let own: Vec<&str> = (all.filter(|c| !c.is_in(false, false)))
+        .map(|c| c.name)
+        .collect();
     header.windows(own.len()).any(|w| w == own)
 }
 

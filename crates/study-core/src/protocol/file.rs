@@ -249,6 +249,7 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         design: design.as_ref(),
         device: device.as_ref(),
         minimum_strokes: trial.as_ref().map_or(0, |t| t.minimum_strokes),
+        exposure: trial.as_ref().map(|t| t.exposure).unwrap_or_default(),
         models: models.collect(),
         questions,
         setup,

@@ -11,7 +11,7 @@
 //! * stimulus: study id and seed; the design without the planned number of
 //!   participants (more of them change no order); device kind, limits,
 //!   `uncertified`; each realization's id, role, device, `duplicate_of` and the
-//!   SHA-256 of its file; minimum strokes and duration of the reference; id,
+//!   SHA-256 of its file; minimum strokes, exposure, duration of the reference; id,
 //!   scale and `required` of the questions after a trial; the orders file; parts
 //!   without their texts, tracks, and families with the SHA-256 of their files.
 //! * wording: title, authors and the like; all texts, prompts and labels; consent;
@@ -114,6 +114,7 @@ pub fn parts(
         reference,
         reference_min_s,
         minimum_strokes,
+        exposure,
     } = trial;
     let order = match order {
         Order::File(_) => json!("file"),
@@ -150,6 +151,10 @@ pub fn parts(
         "models": stimuli,
         "questions": questions.iter().map(scale).collect::<Vec<_>>(),
     });
+    // Absent from the fingerprints of protocols without it.
+    if *exposure != super::Exposure::default() {
+        stimulus["trial"]["exposure"] = json!(exposure);
+    }
     // A study without parts has the fingerprint that it had before there were any.
     if !parts.is_empty() {
         stimulus["parts_order"] = json!(parts_order);

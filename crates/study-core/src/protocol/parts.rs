@@ -98,6 +98,13 @@ pub struct Exposure {
     pub replays: u32,
 }
 
+impl Exposure {
+    /// The time until the device stops by itself, s; `None` if it does not.
+    pub fn left_s(&self, felt_s: f64) -> Option<f64> {
+        Some((self.max_s? - felt_s).max(0.0))
+    }
+}
+
 /// One of `[[families]]`: one dimension of the stimulus.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FamilyRules {

@@ -4,6 +4,7 @@
 //! protocol chooses a language by `[text] lang` and may replace single sentences by key
 //! in `[text.words]`. What only the experimenter reads is English.
 
+use super::ScaleDirection;
 use std::collections::BTreeMap;
 
 /// Declares the sentences: variant, key, English.
@@ -133,6 +134,37 @@ phrases! {
     PlainEnterAlone "plain-enter-alone" "Enter alone";
     PlainType "plain-type" "Type {key}";
     Saved "saved" "Saved.";
+    PracticeEnd "practice-end" "The practice is over. From now on, every answer counts.";
+    TimeLeft "time-left" "{time} left";
+    DoneOf "done-of" "{n} of {total} done";
+    Attend "attend" "Please attend to what is played.";
+    Longer "longer" "A little longer, please.";
+    NotLost "not-lost" "This trial is not lost.";
+    RateIt "rate-it" "rate it";
+    SelectFirst "select-first" "Select an entry first, with ↑ and ↓.";
+    ListHas "list-has" "The list has {total} entries.";
+    PlainKept "plain-kept" "Your answer so far: {answer}. Enter alone keeps it.";
+    PlainHelp "plain-help" "Type /help at any time for the list of commands.";
+    PlainSaved "plain-saved" "Trials saved: {n}.";
+    PlainSavedBoth "plain-saved-both" "Trials saved in both places: {n}.";
+    PlainYesNo "plain-yes-no" "Type y or n.";
+    PlainNotAsked "plain-not-asked" "Nothing is asked here. Type /help for what can be typed.";
+    PlainNoCommand "plain-no-command" "{command} is no command. Type /help for a list. An answer that begins with a slash needs two.";
+    PlainLeave "plain-leave" "Leave the session? It can be resumed later.";
+    PlainUnpause "plain-unpause" "Press Enter to continue, or type /quit.";
+    PlainNoReplay "plain-no-replay" "This cannot be presented again.";
+    PlainNoBack "plain-no-back" "There is no question before this one.";
+    CommandStop "command-stop" "stops the device at once";
+    CommandRemark "command-remark" "keeps a remark of the experimenter";
+    CommandSays "command-says" "keeps a remark of the participant";
+    CommandCorrect "command-correct" "changes an earlier answer, with a reason";
+    CommandDecline "command-decline" "declines the question";
+    CommandBad "command-bad" "marks the trial as bad; it is repeated";
+    CommandPause "command-pause" "pauses";
+    CommandAgain "command-again" "says the page again";
+    CommandReplay "command-replay" "presents the trial again, where that is possible";
+    CommandBack "command-back" "goes back to the question before";
+    CommandQuit "command-quit" "leaves; the session can be resumed";
     PageLost "page-lost" "The connection is lost. Trying again …";
     PageClosed "page-closed" "This page is closed. Please tell the experimenter.";
 }
@@ -152,6 +184,7 @@ const SHIPPED: [(&str, &str); 6] = [
 pub struct Words {
     /// What is not English.
     other: BTreeMap<&'static str, String>,
+    scales_from_right: bool,
 }
 
 impl Words {
@@ -166,7 +199,22 @@ impl Words {
                 other.insert(key, text.clone());
             }
         }
-        Self { other }
+        Self {
+            other,
+            scales_from_right: lang.is_some_and(is_right_to_left),
+        }
+    }
+
+    /// The same, with scales in this direction.
+    #[must_use]
+    pub fn with_scales(mut self, direction: ScaleDirection) -> Self {
+        self.scales_from_right = direction == ScaleDirection::RightToLeft;
+        self
+    }
+
+    /// Whether the smallest number of a scale is on its right.
+    pub fn scales_from_right(&self) -> bool {
+        self.scales_from_right
     }
 
     /// A sentence.

@@ -44,7 +44,7 @@ pub enum QuestionKind {
         to: f64,
         /// How far one key press moves it.
         step: f64,
-        /// Labels of the two ends, by the end as text.
+        /// Labels of some numbers, by the number as text.
         labels: BTreeMap<String, String>,
     },
     /// One or several of a list.

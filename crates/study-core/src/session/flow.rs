@@ -4,6 +4,7 @@ use super::Session;
 use super::phase::{Form, Phase};
 use super::view::MessageKind;
 use crate::outcome::{Author, Event, FormId, Moment};
+use crate::protocol::phrases::Phrase;
 use crate::protocol::{Entry, Trial};
 
 /// A form or message that appears once in a session.
@@ -68,7 +69,7 @@ impl Session {
     }
 
     /// Who enters the participant's answers.
-    fn entered_by(&self) -> Author {
+    pub(super) fn entered_by(&self) -> Author {
         match self.protocol.session.entry {
             Entry::Participant => Author::Participant,
             Entry::Experimenter => Author::Experimenter,
@@ -186,7 +187,7 @@ impl Session {
             MessageKind::Practice => text.practice.as_deref().filter(|_| self.has_practice()),
             MessageKind::PracticeOver => self
                 .has_practice()
-                .then_some("The practice is over. From now on, every answer counts."),
+                .then(|| self.words.get(Phrase::PracticeEnd)),
         }
     }
 

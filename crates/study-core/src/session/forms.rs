@@ -8,6 +8,9 @@ use crate::protocol::question::MAX_TEXT_BYTES;
 use crate::protocol::{Answer, AnswerError, Question, QuestionKind, Stimuli};
 use study_base::text::QuestionId;
 
+/// The reason of a correction that is made on a page to which somebody went back.
+const STEP_BACK: &str = "step back";
+
 /// Why an input was not accepted; shown to the operator.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(super) enum InputRefused {
@@ -62,23 +65,20 @@ impl Session {
             .iter()
             .rposition(|q| self.history.answer(form, &q.id).is_some())
             .map_or(0, |last| last + 1);
-        let mut left = pages(&questions);
-        let total = left.len();
-        let mut index = 0;
-        for page in &mut left {
-            page.retain(|_| {
-                index += 1;
-                index > reached
-            });
-        }
-        left.retain(|page| !page.is_empty());
-        if left.is_empty() {
+        if reached == questions.len() {
             return false;
         }
+        let mut pages = pages(&questions);
+        let (mut page, mut answered) = (0, reached);
+        while answered >= pages[page].len() {
+            answered -= pages[page].len();
+            page += 1;
+        }
+        pages[page].drain(..answered);
         self.phase = Phase::Form(Form {
             id: form,
-            pages: left,
-            total,
+            pages,
+            at: page,
             opened: at,
             overlaid_s: 0.0,
         });
@@ -100,30 +100,73 @@ impl Session {
         let Phase::Form(open) = &self.phase else {
             return;
         };
-        let Some(page) = open.pages.first() else {
+        let Some(page) = open.pages.get(open.at) else {
             return;
         };
-        match check(page, answers) {
+        let checked = check(page, answers).and_then(|answers| {
+            let kept = |q: &Question| self.history.answer(open.id, &q.id).is_some();
+            let missing = |q: &&Question| answers.iter().all(|(id, _)| *id != q.id);
+            match page.iter().filter(missing).any(kept) {
+                true => Err(InputRefused::AnswerMissing),
+                false => Ok(answers),
+            }
+        });
+        match checked {
             Err(why) => self.notify(why.to_string()),
             Ok(answers) => {
                 let form = open.id;
                 for (question, answer) in answers {
-                    let answered = Event::Answered {
-                        form,
-                        question,
-                        answer,
-                    };
-                    self.record(answered, at);
+                    self.enter(form, question, answer, at);
                 }
                 self.turn_page(at);
             }
         }
     }
 
+    /// Records an answer to a form on the screen. After a step back it may replace an
+    /// earlier one.
+    fn enter(&mut self, form: FormId, question: QuestionId, answer: Answer, at: Moment) {
+        let channel = self.channel;
+        let event = match self.history.answer(form, &question) {
+            Some(before) if *before == answer => return,
+            Some(before) => Event::Corrected {
+                form,
+                question,
+                from: Some(before.clone()),
+                to: answer,
+                reason: STEP_BACK.to_owned(),
+                by: match form {
+                    FormId::Setup => Author::Experimenter,
+                    _ => self.entered_by(),
+                },
+                channel,
+            },
+            None => Event::Answered {
+                form,
+                question,
+                answer,
+                channel,
+            },
+        };
+        self.record(event, at);
+    }
+
+    /// Shows the page before the one on the screen, with its answers.
+    pub(super) fn back(&mut self) {
+        if let Phase::Form(open) = &mut self.phase {
+            open.at = open.at.saturating_sub(1);
+        }
+    }
+
+    /// Whether a page comes before the one on the screen.
+    pub(super) fn can_go_back(&self) -> bool {
+        matches!(&self.phase, Phase::Form(open) if open.at > 0)
+    }
+
     fn turn_page(&mut self, at: Moment) {
         if let Phase::Form(open) = &mut self.phase {
-            open.pages.remove(0);
-            if open.pages.is_empty() {
+            open.at += 1;
+            if open.at == open.pages.len() {
                 let form = open.id;
                 let spent_s = at.seconds_since(&open.opened) - open.overlaid_s;
                 self.complete(form, spent_s.max(0.0), at);
@@ -192,6 +235,7 @@ impl Session {
                     to: answer,
                     reason,
                     by,
+                    channel: self.channel,
                 };
                 self.record(corrected, at);
             }

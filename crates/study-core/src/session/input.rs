@@ -29,6 +29,8 @@ pub enum Input {
     /// Optional questions may be absent: a text or choice then counts as left empty.
     /// If one answer is not accepted, none is recorded.
     Answer(Vec<(QuestionId, Answer)>),
+    /// Show the page of questions before the one on the screen.
+    Back,
     /// A remark, at any time.
     Remark {
         /// Who enters it.

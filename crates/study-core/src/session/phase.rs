@@ -130,10 +130,10 @@ impl Phase {
 #[derive(Debug)]
 pub(super) struct Form {
     pub(super) id: FormId,
-    /// The pages still to be answered; the first is on the screen.
+    /// Its pages.
     pub(super) pages: Vec<Vec<Question>>,
-    /// Number of pages of the whole form.
-    pub(super) total: usize,
+    /// Which of them is on the screen, from 0.
+    pub(super) at: usize,
     /// When the form was opened.
     pub(super) opened: Moment,
     /// Time under an overlay since then, s.

@@ -7,6 +7,7 @@ use super::view::{
     Banner, Correctable, DeviceState, MessageKind, Progress, Screen, StatusLine, Telemetry, View,
 };
 use super::{Ending, Session};
+use crate::outcome::fold::GivenAnswer;
 use crate::outcome::{FormId, Moment};
 use crate::protocol::phrases::Phrase;
 use crate::protocol::{DeviceKind, Seat, TrackRules};
@@ -34,6 +35,8 @@ impl Session {
                 None => Vec::new(),
             },
             can_replay: self.can_replay(),
+            can_go_back: self.can_go_back(),
+            force: self.presents_force(),
             can_advance: can_advance(&screen),
             words: self.words.clone(),
             screen,
@@ -112,6 +115,7 @@ impl Session {
             Phase::Playing { since, strokes, .. } => Screen::Playing {
                 since_s: at.seconds_since(since),
                 keep_exploring: self.too_little(at.seconds_since(since), *strokes),
+                exposure: self.exposure(),
                 interval: self.interval_of(),
             },
             Phase::Stopping { .. } => Screen::Stopping,
@@ -231,6 +235,15 @@ impl Session {
         own.or(claimed).unwrap_or(self.protocol.device.kind)
     }
 
+    /// Whether the study plays tables of force. A program of the laboratory may present
+    /// sounds or pictures, which have none.
+    fn presents_force(&self) -> bool {
+        let protocol = &self.protocol;
+        self.current_device() != DeviceKind::Process
+            || protocol.models.iter().any(|m| m.file.is_some())
+            || !protocol.families.is_empty()
+    }
+
     /// A device problem does not hide a form; it is shown as a notice while it lasts.
     fn problem_in_form(&self) -> Option<String> {
         let problem = self.device_problem.as_ref().filter(|_| self.in_form())?;
@@ -239,19 +252,28 @@ impl Session {
 
     fn correctable(&self) -> Vec<Correctable> {
         let given = self.history.answers.iter().rev();
-        given
-            .filter(|g| self.history.is_current(g.form))
-            .filter_map(|g| {
-                let asked = self.questions(g.form);
-                let question = asked.into_iter().find(|q| q.id == g.question)?.clone();
-                Some(Correctable {
-                    form: g.form,
-                    title: self.form_title(g.form),
-                    question,
-                    answer: g.answer.clone(),
-                })
-            })
-            .collect()
+        let mut forms: Vec<(FormId, Vec<&GivenAnswer>)> = Vec::new();
+        for answer in given.filter(|g| self.history.is_current(g.form)) {
+            // Those of one form are together, but for what a resumed form was asked later.
+            match forms.iter_mut().rfind(|(form, _)| *form == answer.form) {
+                Some((_, answers)) => answers.push(answer),
+                None => forms.push((answer.form, vec![answer])),
+            }
+        }
+        let mut items = Vec::new();
+        for (form, answers) in forms {
+            let title = self.form_title(form);
+            for question in self.questions(form) {
+                let given = answers.iter().find(|g| g.question == question.id);
+                items.extend(given.map(|given| Correctable {
+                    form,
+                    title: title.clone(),
+                    question: question.clone(),
+                    answer: given.answer.clone(),
+                }));
+            }
+        }
+        items
     }
 
     pub(super) fn form_title(&self, form: FormId) -> String {
@@ -329,12 +351,11 @@ fn number(n: usize) -> u32 {
 }
 
 fn form_screen(form: &Form) -> Screen {
-    let page = form.total - form.pages.len() + 1;
     Screen::Form {
         form: form.id,
-        questions: form.pages.first().cloned().unwrap_or_default(),
-        page: number(page),
-        pages: number(form.total),
+        questions: form.pages.get(form.at).cloned().unwrap_or_default(),
+        page: number(form.at + 1),
+        pages: number(form.pages.len()),
         to_experimenter: form.id == FormId::Setup,
     }
 }

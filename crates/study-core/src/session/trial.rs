@@ -2,6 +2,7 @@
 
 use super::phase::Phase;
 use super::{Effect, Session};
+use crate::outcome::fold::{Ended, Presentation};
 use crate::outcome::{Event, Failure, Fidelity, Moment, Playback, Verdict};
 use crate::protocol::{DeviceKind, Exposure, Trial};
 
@@ -228,9 +229,9 @@ impl Session {
             return self.proceed(at);
         };
         if open.attempt.interval().is_some() {
-            let last = open.attempt.presentations.last().and_then(|p| p.ended);
-            let least = self.minimum_strokes(open.trial);
-            if last.is_some_and(|(_, e)| !e.stopped && e.playback.strokes >= least) {
+            let last = open.attempt.presentations.last();
+            let on = |(_, ended): (Moment, Ended)| !ended.stopped;
+            if last.is_some_and(|p| p.ended.is_some_and(on) && self.suffices(p)) {
                 self.load_interval(at);
             } else {
                 self.phase = Phase::Stopped;
@@ -246,14 +247,21 @@ impl Session {
         }
     }
 
-    /// Whether the attempt under way has a confirmed end and enough strokes.
+    /// Whether the attempt under way has a confirmed end and enough of it was felt.
     pub(super) fn can_rate(&self) -> bool {
-        let Some(open) = self.history.open() else {
-            return false;
+        self.history.open().is_some_and(|open| {
+            let mut ended = open.attempt.presentations.iter();
+            open.attempt.ended.is_some() && ended.all(|p| self.suffices(p))
+        })
+    }
+
+    /// Whether a presentation of the attempt under way was felt long enough and with enough
+    /// strokes. One without an end is none.
+    fn suffices(&self, presentation: &Presentation) -> bool {
+        let (Some((_, ended)), Some(felt_s)) = (presentation.ended, presentation.felt_s()) else {
+            return true;
         };
-        let least = self.minimum_strokes(open.trial);
-        let mut ended = open.attempt.presentations.iter().filter_map(|p| p.ended);
-        open.attempt.ended.is_some() && ended.all(|(_, e)| e.playback.strokes >= least)
+        !self.too_little(felt_s, ended.playback.strokes)
     }
 
     /// Strokes required before a rating; 0 where they are not counted.
@@ -276,7 +284,7 @@ impl Session {
             .history
             .open()
             .and_then(|open| self.part_of(open.trial));
-        part.map(|part| part.exposure).unwrap_or_default()
+        part.map_or(self.protocol.trial.exposure, |part| part.exposure)
     }
 
     /// Whether the sample is mounted by a person, so that no deadline applies.

@@ -52,6 +52,7 @@ impl Session {
                 form,
                 question,
                 answer,
+                ..
             } => format!("{}: {question} = {}", self.form_title(*form), words(answer)),
             Event::Corrected {
                 form, question, to, ..

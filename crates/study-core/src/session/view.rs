@@ -3,7 +3,7 @@
 use super::roster::Roster;
 use crate::outcome::FormId;
 use crate::protocol::phrases::Words;
-use crate::protocol::{Answer, DeviceKind, Entry, Question};
+use crate::protocol::{Answer, DeviceKind, Entry, Exposure, Question};
 use std::sync::Arc;
 use study_base::text::QuestionId;
 
@@ -25,7 +25,8 @@ pub struct View {
     pub notice: Option<String>,
     /// Who enters the participant's answers.
     pub entry: Entry,
-    /// Earlier answers that can be corrected, newest first.
+    /// Earlier answers that can be corrected: the newest form first, in each the questions
+    /// in their order.
     pub correctable: Vec<Correctable>,
     /// The trial that can be marked as bad now, such as "trial 7".
     pub can_mark_bad: Option<String>,
@@ -37,10 +38,24 @@ pub struct View {
     /// Whether all intervals of the trial can be felt again:
     /// [`PlayAgain`](super::Input::PlayAgain).
     pub can_replay: bool,
+    /// Whether there is an earlier page of questions: [`Back`](super::Input::Back).
+    pub can_go_back: bool,
+    /// Whether what is presented is a force; else a program of the laboratory presents
+    /// something else.
+    pub force: bool,
     /// Whether Enter has an effect now.
     pub can_advance: bool,
     /// The fixed sentences that a participant reads.
     pub words: Arc<Words>,
+}
+
+impl View {
+    /// The present answer to a question of a form, if it was answered.
+    pub fn given(&self, form: FormId, question: &QuestionId) -> Option<&Answer> {
+        let mut earlier = self.correctable.iter();
+        let found = earlier.find(|c| c.form == form && c.question.id == *question);
+        found.map(|c| &c.answer)
+    }
 }
 
 /// The participant's progress.
@@ -205,6 +220,8 @@ pub enum Screen {
         since_s: f64,
         /// Whether more exploration is required before Enter works.
         keep_exploring: bool,
+        /// How long it is felt.
+        exposure: Exposure,
         /// The interval, from 1, and their number, if there are several.
         interval: Option<(u32, u32)>,
     },

@@ -26,7 +26,7 @@ mod tests {
     use crate::outcome::cell::{Cell, Header, Row};
     use crate::outcome::ratings::Ratings;
     use crate::outcome::{
-        AttemptEvent, AttemptRow, Author, Failure, Fidelity, IntervalRow, ParticipantRow,
+        AttemptEvent, AttemptRow, Author, Channel, Failure, Fidelity, IntervalRow, ParticipantRow,
         RatingRow, State, Status, Verdict,
     };
     use crate::protocol::columns::{
@@ -186,6 +186,7 @@ mod tests {
             replays: d.maybe(Draws::whole),
             fidelity: d.maybe(Draws::fidelity),
             host_late_ms: d.maybe(Draws::number),
+            input_channel: d.maybe(|d| d.of(&[Channel::Terminal, Channel::Plain, Channel::Page])),
         }
     }
 
@@ -252,6 +253,7 @@ mod tests {
             by: d.maybe(|d| d.of(&[Author::Participant, Author::Experimenter])),
             text: d.text(),
             at: d.time(),
+            input_channel: d.maybe(|d| d.of(&[Channel::Terminal, Channel::Plain, Channel::Page])),
         }
     }
 

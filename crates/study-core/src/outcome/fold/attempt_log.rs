@@ -42,6 +42,7 @@ pub fn attempt_rows(
             by: None,
             text: String::new(),
             at: entry.at.wall,
+            input_channel: None,
         };
         match &entry.event {
             Event::AttemptStarted {
@@ -59,7 +60,9 @@ pub fn attempt_rows(
                 form,
                 question,
                 answer,
+                channel,
             } => {
+                row.input_channel = *channel;
                 (row.trial, row.attempt) = trial_of(*form);
                 row.question = Some(question.clone());
                 row.text = declined_reason(answer);
@@ -72,7 +75,9 @@ pub fn attempt_rows(
                 to,
                 reason,
                 by,
+                channel,
             } => {
+                row.input_channel = *channel;
                 (row.trial, row.attempt) = trial_of(*form);
                 row.question = Some(question.clone());
                 (row.from, row.to) = (from.clone(), Some(to.clone()));

@@ -127,6 +127,7 @@ impl History {
             replays: shown.map(|a| a.replays),
             fidelity: worst.cloned(),
             host_late_ms: played.and_then(|p| Some(p.host_late_ms?[1])),
+            input_channel: primary.and_then(|g| g.channel),
             answers: answers(given.into_iter()),
         }
     }

@@ -98,6 +98,7 @@ fn rate(trial: u32, attempt: u32, rating: i64) -> Event {
         form: FormId::Trial { trial, attempt },
         question: QuestionId::new("realism").unwrap(),
         answer: Answer::Rating(rating),
+        channel: None,
     }
 }
 

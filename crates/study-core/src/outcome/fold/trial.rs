@@ -98,6 +98,18 @@ pub struct Presentation {
     pub judged: Option<usize>,
 }
 
+impl Presentation {
+    /// From its confirmed start to its confirmed end, by the clock of the host, s.
+    pub fn felt_s(&self) -> Option<f64> {
+        let (at, ended) = self.ended?;
+        let reported = ended.playback.exploration_s;
+        Some(
+            self.started
+                .map_or(reported, |from| at.seconds_since(&from)),
+        )
+    }
+}
+
 /// The start of an attempt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttemptStart {

@@ -209,7 +209,7 @@ impl Positions {
         };
         let has_parts = columns::are_of_parts(header);
         let own = |column: C| {
-            let declared = column.column().is_in(has_parts);
+            let declared = column.column().is_in(has_parts, false);
             find(column.name()).filter(|_| declared)
         };
         let (Some(subject), Some(_)) = (own(C::Participant), own(C::PlannedPosition)) else {

@@ -5,7 +5,9 @@ use super::Named;
 use super::models::PartialModel;
 use super::questions::PartialQuestion;
 use crate::protocol::columns::{is_participants_column, is_parts_column, is_ratings_column};
-use crate::protocol::{AnalysisRules, Design, DeviceKind, DeviceRules, Order, QuestionKind, Role};
+use crate::protocol::{
+    AnalysisRules, Design, DeviceKind, DeviceRules, Exposure, Order, QuestionKind, Role,
+};
 use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
 use study_base::text::{ModelId, QuestionId, Untrusted};
@@ -16,6 +18,7 @@ pub(super) struct Sections<'a> {
     pub(super) design: Option<&'a Design>,
     pub(super) device: Option<&'a DeviceRules>,
     pub(super) minimum_strokes: u32,
+    pub(super) exposure: Exposure,
     pub(super) models: Vec<PartialModel>,
     pub(super) questions: Vec<PartialQuestion>,
     pub(super) setup: Vec<PartialQuestion>,
@@ -229,7 +232,7 @@ impl Sections<'_> {
     fn columns(&self, document: &Document<'_>) {
         let mut taken: Vec<String> = Vec::new();
         let (fixed_once, participants) = (is_participants_column, "participants.csv");
-        let fixed_in_ratings = match self.has_parts {
+        let fixed_in_ratings = match self.has_parts || self.exposure.replays > 0 {
             true => is_parts_column,
             false => is_ratings_column,
         };

@@ -1,9 +1,10 @@
 //! `[study]`, `[text]`, `[consent]`, `[session]` and `[trial]`.
 
+use super::parts::{EXPOSURE, exposure};
 use super::section::Section;
 use crate::protocol::keys::{Id, Key, Kind, Words as _, keys};
 use crate::protocol::phrases::{Phrase, placeholders};
-use crate::protocol::{Consent, Entry, SessionRules, Study, Text, TrialRules};
+use crate::protocol::{Consent, Entry, ScaleDirection, SessionRules, Study, Text, TrialRules};
 use std::collections::BTreeMap;
 use study_base::diagnostic::{Fault, did_you_mean};
 use study_base::text::Untrusted;
@@ -48,6 +49,8 @@ pub(super) const TEXT: &[Key] = keys! {
     /// Single sentences instead of the fixed ones, by key. The JSON Schema lists the keys;
     /// words in braces, such as `{n}`, are replaced by numbers and have to stay.
     "words": Kind::Sentences, r#"{ rate = "go on", trial-of = "switch {n} of {total}" }"#;
+    /// On which side scales begin, in the terminal and on the participant's page.
+    "scale_direction": Kind::Word(ScaleDirection::WORDS), r#""ltr""#, derived("`rtl` for languages that are written from right to left, else `ltr`");
 };
 
 pub(super) const CONSENT: &[Key] = keys! {
@@ -75,6 +78,9 @@ pub(super) const TRIAL: &[Key] = keys! {
     /// Full strokes, counted from telemetry, before the questions of a trial open. A
     /// device without telemetry, such as a sample mounted by hand, cannot count them.
     "minimum_strokes": Kind::Whole(0, u32::MAX as i64), "2", default("0");
+    /// How long a realization is felt. Enter goes on after the least time; a trial that was
+    /// felt for less cannot be answered.
+    "exposure": Kind::Table(EXPOSURE), "{ min_s = 3, max_s = 20, replays = 1 }";
 };
 
 pub(super) fn study(mut section: Section<'_, '_>) -> Option<Study> {
@@ -112,6 +118,7 @@ pub(super) fn text(mut section: Section<'_, '_>) -> Text {
         end: section.text("end"),
         lang: section.text("lang"),
         words: words(&mut section),
+        scale_direction: section.word("scale_direction"),
     }
 }
 
@@ -163,5 +170,6 @@ pub(super) fn trial(mut section: Section<'_, '_>) -> Option<TrialRules> {
         reference: section.text("reference"),
         reference_min_s: section.number("reference_min_s")?,
         minimum_strokes: section.whole("minimum_strokes")?,
+        exposure: section.section("exposure").and_then(exposure)?,
     })
 }

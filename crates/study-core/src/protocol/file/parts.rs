@@ -20,17 +20,17 @@ pub(super) static PARTS: Variants = Variants {
         /// one.
         "questions": Kind::Ids(Id::Question), r#"["realism"]"#, derived("in a rating part all questions that no other part names, else none");
         /// How long each interval is felt.
-        "exposure": Kind::Table(EXPOSURE), "{ min_s = 2, max_s = 8 }";
+        "exposure": Kind::Table(EXPOSURE), "{ min_s = 2, max_s = 8 }", derived("that of `[trial]`");
     },
     shapes: &SHAPES,
 };
 
-const EXPOSURE: &[Key] = keys! {
-    /// The least time that an interval is felt.
+pub(super) const EXPOSURE: &[Key] = keys! {
+    /// The least time that a realization, or an interval of several, is felt.
     "min_s": Kind::not_negative("s"), "2", default("0");
-    /// The device stops by itself after this time.
+    /// The device stops by itself after this time. The time left is shown.
     "max_s": Kind::positive("s"), "8";
-    /// How often all intervals of a trial can be felt again before it is answered.
+    /// How often a trial can be felt again before it is answered.
     "replays": Kind::Whole(0, 100), "1", default("0");
 };
 
@@ -110,7 +110,8 @@ pub(super) struct RawPart {
     pub(super) id: Option<PartId>,
     pub(super) text: Option<String>,
     pub(super) questions: Option<Vec<QuestionId>>,
-    pub(super) exposure: Option<Exposure>,
+    /// `None` inside: that of `[trial]`.
+    pub(super) exposure: Option<Option<Exposure>>,
     pub(super) task: Option<RawTask>,
 }
 
@@ -153,13 +154,16 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Vec<RawPart> {
             id: section.part_id("id"),
             text: section.text("text"),
             questions: section.ids("questions"),
-            exposure: section.section("exposure").and_then(exposure),
+            exposure: match section.value("exposure") {
+                None => Some(None),
+                Some(_) => section.section("exposure").and_then(exposure).map(Some),
+            },
             task: kind.and_then(|kind| (kind.read)(&mut section)),
         })
         .collect()
 }
 
-fn exposure(mut section: Section<'_, '_>) -> Option<Exposure> {
+pub(super) fn exposure(mut section: Section<'_, '_>) -> Option<Exposure> {
     let (min_s, max_s) = (section.number("min_s"), section.number("max_s"));
     let replays = section.whole("replays");
     if let (Some(min), Some(max)) = (min_s, max_s)

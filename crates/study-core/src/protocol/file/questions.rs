@@ -53,8 +53,8 @@ const KINDS: [Variant<QuestionKind>; 5] = [
             "to": Kind::ANY_NUMBER, "100", required;
             /// How far one key press moves the slider.
             "step": Kind::positive(""), "5", derived("a hundredth of the scale");
-            /// Texts at the two ends.
-            "labels": Kind::NumberLabels, r#"{ 0 = "not at all", 100 = "completely" }"#;
+            /// Texts at some of the numbers.
+            "labels": Kind::NumberLabels, r#"{ 0 = "not at all", 50 = "half", 100 = "completely" }"#;
         },
         slider,
     ),
@@ -192,11 +192,11 @@ fn slider(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
     let mut labels = BTreeMap::new();
     for (key, label) in section.entries("labels") {
         match key.parse::<f64>() {
-            Ok(at) if at == from || at == to => {
+            Ok(at) if (from..=to).contains(&at) => {
                 labels.insert(at.to_string(), text(&label)?);
             }
             _ => label.fault(Fault::error(format!(
-                "a slider has labels at its ends, {from} and {to}, not at `{}`",
+                "a label belongs to a number from {from} to {to}, not to `{}`",
                 Untrusted(&key)
             ))),
         }

@@ -169,6 +169,7 @@ impl Raw {
     fn part(&self, raw: &RawPart, looked: &Looked<'_>) -> Option<Part> {
         let path = &raw.path;
         let (id, exposure) = (raw.id.clone()?, raw.exposure?);
+        let exposure = exposure.unwrap_or(looked.sections.exposure);
         let mut asks = Vec::new();
         let (task, gap_s) = match raw.task.as_ref()? {
             RawTask::Rating { presentations } => {
