@@ -170,12 +170,7 @@ impl RatingColumn {
     /// The header of a table of these rows: without optional columns that all leave
     /// empty.
     pub fn header_of(protocol: &Protocol, rows: &[RatingRow]) -> Header<Self> {
-        let mut header = Self::header(protocol);
-        header.retain(|(column, name)| {
-            let used = |row: &RatingRow| row.cell(*column, name) != Cell::Empty;
-            !column.column().optional || rows.iter().any(used)
-        });
-        header
+        used(Self::header(protocol), Self::column, rows)
     }
 }
 
@@ -184,6 +179,24 @@ impl AttemptColumn {
     pub fn header() -> Header<Self> {
         header(Self::ALL, Self::column, &Repeated::default())
     }
+
+    /// That of a table of these rows: without optional columns that all leave empty.
+    pub fn header_of(rows: &[AttemptRow]) -> Header<Self> {
+        used(Self::header(), Self::column, rows)
+    }
+}
+
+/// A header without optional columns that are empty in every row.
+fn used<R: Row>(
+    mut header: Header<R::Column>,
+    declaration: fn(R::Column) -> Column,
+    rows: &[R],
+) -> Header<R::Column> {
+    header.retain(|(column, name)| {
+        let used = |row: &R| row.cell(*column, name) != Cell::Empty;
+        !declaration(*column).optional || rows.iter().any(used)
+    });
+    header
 }
 
 impl IntervalColumn {

@@ -113,7 +113,8 @@ impl Derived {
     pub(super) fn tables(&self, protocol: &Protocol) -> io::Result<Vec<(&'static str, Vec<u8>)>> {
         let header = RatingColumn::header_of(protocol, &self.rows);
         let ratings = tables::csv(&header, &self.rows)?;
-        let attempts = tables::csv(&AttemptColumn::header(), &self.attempts)?;
+        let header = AttemptColumn::header_of(&self.attempts);
+        let attempts = tables::csv(&header, &self.attempts)?;
         let header = ParticipantColumn::header(protocol);
         let participants = tables::csv(&header, &self.participants)?;
         let mut tables = vec![

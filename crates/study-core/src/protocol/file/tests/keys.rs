@@ -349,7 +349,7 @@ fn bad_values(kind: Kind) -> Vec<Value> {
         Kind::Word(_) => parsed(&["1", "\"zzzzzzzz\"", "\"\""]),
         Kind::WordOrTable(..) => parsed(&["1", "\"zzzzzzzz\"", "{}"]),
         Kind::WholeLabels => parsed(&["1", "{ x = \"a\" }", "{ 1 = \"\" }", "{ 1 = 2 }"]),
-        Kind::NumberLabels => parsed(&["1", "{ x = \"a\" }", "{ 0 = \"\" }", "{ 50 = \"a\" }"]),
+        Kind::NumberLabels => parsed(&["1", "{ x = \"a\" }", "{ 0 = \"\" }", "{ 5000 = \"a\" }"]),
         Kind::Numbers => parsed(&["1", "{ a = \"1\" }", "{ a = nan }", "{ \"a b\" = 1 }"]),
         Kind::Sentences => parsed(&[
             "1",
