@@ -140,6 +140,7 @@ pub(crate) fn hostile(home: &Path) -> PathBuf {
             form: FormId::Trial { trial, .. },
             question,
             answer,
+            ..
         } = event
         {
             match (question.as_str(), *trial, who) {
