@@ -80,6 +80,7 @@ fn a_fixed_exposure_is_exact_to_twenty_milliseconds() {
         protocol: Arc::new(loaded.protocol),
         orders: None,
         models: loaded.models,
+        deliveries: Default::default(),
         fingerprints: loaded.fingerprints,
         study: study.clone(),
         kind: SeatKind::Real,
