@@ -17,7 +17,7 @@ use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use study_base::text::{QuestionId, Untrusted};
-use study_core::analyze::{self, Analysis, Deviation, Include, Rules, Warning};
+use study_core::analyze::{self, Analysis, Better, Deviation, Include, Rules, Warning};
 use study_core::outcome::RatingRow;
 use study_core::outcome::ratings::Ratings;
 use study_core::protocol::Protocol;
@@ -35,7 +35,7 @@ pub(super) struct Args {
         long,
         num_args = 1..,
         value_name = "KEY=VALUE",
-        conflicts_with_all = ["results", "out", "question", "scale", "include", "comments"]
+        conflicts_with_all = ["results", "out", "question", "scale", "direction", "include", "comments"]
     )]
     possible: Vec<String>,
     /// Print the results as one JSON document with unrounded numbers
@@ -50,6 +50,14 @@ pub(super) struct Args {
     /// The scale of the ratings in a CSV, such as 1..7; ratings outside it are reported
     #[arg(long, value_name = "LOW..HIGH", value_parser = parse_scale, allow_hyphen_values = true)]
     scale: Option<(f64, f64)>,
+    /// Which ratings of a CSV are better
+    #[arg(
+        long,
+        value_name = "WHICH",
+        default_value = "higher",
+        hide_default_value = true
+    )]
+    direction: Direction,
     /// Also include these sessions
     #[arg(long, value_name = "WHO", value_delimiter = ',')]
     include: Vec<Who>,
@@ -64,6 +72,24 @@ pub(super) struct Args {
 enum Who {
     Pilot,
     Simulated,
+}
+
+/// Which ratings are better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Direction {
+    /// Higher ratings, unless said otherwise
+    Higher,
+    /// Lower ratings
+    Lower,
+}
+
+impl From<Direction> for Better {
+    fn from(given: Direction) -> Self {
+        match given {
+            Direction::Higher => Self::Higher,
+            Direction::Lower => Self::Lower,
+        }
+    }
 }
 
 /// A text that is no scale.
@@ -101,6 +127,11 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if args.scale.is_some() {
         return Err(Failure::input(
             "--scale is for a CSV: a protocol states its scale",
+        ));
+    }
+    if args.direction == Direction::Lower {
+        return Err(Failure::input(
+            "--direction is for a CSV: in a study higher ratings are better",
         ));
     }
     let studies = study_folder::studies(results)?;
@@ -283,6 +314,7 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
     let rules = Rules {
         include: include(args),
         scale: args.scale,
+        better: args.direction.into(),
         ..Rules::default()
     };
     let title = path.file_name().unwrap_or_default().to_string_lossy();

@@ -7,6 +7,7 @@ use crate::tui::views::prose::{attending, prose};
 use crate::tui::views::trouble::Trouble;
 use crate::tui::widgets::clock;
 use std::fmt::Display;
+use study_base::text::sentence;
 use study_core::outcome::FormId;
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Entry, Question};
@@ -51,7 +52,7 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
             ..
         } => {
             if let Some((at, of)) = interval {
-                let which = capital(words.get(ordinal(*at)));
+                let which = sentence(words.get(ordinal(*at)));
                 page.lines.push(format!("{which} ({at} / {of})"));
             }
             page.lines.push(
@@ -64,7 +65,7 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
             // Said once; a countdown would never end to be read.
             let left = exposure.max_s.map(|max_s| clock(max_s.ceil()));
             let left = left.map(|time| words.fill(Phrase::TimeLeft, &[("time", &time)]));
-            page.wait = left.map(|left| capital(&left));
+            page.wait = left.map(|left| sentence(&left));
             page.prompt = match (keep_exploring, keys) {
                 (true, _) => words.get(attending(view).1),
                 (false, true) => words.get(Phrase::PlainRate),
@@ -90,13 +91,13 @@ fn top(view: &View) -> Vec<String> {
         };
         let total = progress.total.unwrap_or(progress.current);
         let values = [number, ("total", &total as &dyn Display)];
-        parts.push(capital(&view.words.fill(phrase, &values)));
+        parts.push(sentence(&view.words.fill(phrase, &values)));
     }
     if let Screen::Form { page, pages, .. } = &view.screen
         && *pages > 1
     {
         let values = [("n", page as &dyn Display), ("total", pages)];
-        parts.push(capital(&view.words.fill(Phrase::PageOf, &values)));
+        parts.push(sentence(&view.words.fill(Phrase::PageOf, &values)));
     }
     match parts.is_empty() {
         true => Vec::new(),
@@ -206,11 +207,4 @@ fn typed(key: &str, words: &Words) -> String {
         "Enter" => words.get(Phrase::PlainEnterAlone).to_owned(),
         key => words.fill(Phrase::PlainType, &[("key", &key)]),
     }
-}
-
-/// As a sentence of its own.
-fn capital(words: &str) -> String {
-    let mut letters = words.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string());
-    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }

@@ -9,6 +9,7 @@ mod vaf;
 pub(super) use conditional::conditional;
 
 use super::{apa, sentences};
+use study_base::text::sentence;
 use study_core::analyze::{Analysis, Finding, Question};
 
 /// The answer to a question. Names in it are untrusted.
@@ -133,10 +134,7 @@ fn variance(a: &Analysis) -> Option<Answer> {
     let all: Vec<String> = (shares.iter())
         .map(|(name, share)| format!("{name} {}", apa::percent(*share)))
         .collect();
-    let mut answer = Answer::new(
-        "Variance components",
-        format!("{}.", apa::capital(&all.join(", "))),
-    );
+    let mut answer = Answer::new("Variance components", sentence(&all.join(", ")));
     answer.more.push(
         "The share of the realizations is the least precise: it rests on as many values as there \
          are realizations."

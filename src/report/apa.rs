@@ -52,15 +52,6 @@ pub(super) fn count(n: usize) -> String {
     word.map_or_else(|| n.to_string(), |w| (*w).to_owned())
 }
 
-/// With a capital first letter.
-pub(super) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next();
-    first.map_or_else(String::new, |c| {
-        c.to_uppercase().to_string() + letters.as_str()
-    })
-}
-
 /// A name from the data, escaped and of at most 60 columns.
 pub(super) fn name(text: &str) -> String {
     cut_middle(&Untrusted(text).to_string(), 60)

@@ -25,6 +25,7 @@ pub(in crate::report) use frame::{for_names, widest};
 pub use look::{Dash, Look, PALETTE, Shape, ramp};
 
 use super::picture::Picture;
+use std::sync::OnceLock;
 use study_base::text::{Untrusted, cut_middle};
 
 /// Size of tick labels and notes, px: 8 pt on paper.
@@ -51,6 +52,8 @@ pub struct Figure {
     pub columns: usize,
     /// Panels, row by row.
     pub panels: Vec<Panel>,
+    /// Drawn once, for the report and for all files.
+    picture: OnceLock<Picture>,
 }
 
 /// Axes and the marks on them.
@@ -183,12 +186,14 @@ impl Figure {
             height,
             columns: 1,
             panels: Vec::new(),
+            picture: OnceLock::new(),
         }
     }
 
     /// Adds a panel.
     #[must_use]
     pub fn with(mut self, panel: Panel) -> Self {
+        self.picture.take();
         self.panels.push(panel);
         self
     }
@@ -199,16 +204,18 @@ impl Figure {
             .all(|(panel, frame)| labels::places(panel, &frame).iter().all(|p| p.is_free))
     }
 
-    /// The picture.
-    pub fn picture(&self) -> Picture {
-        let mut out = Picture::new(&self.id, &self.title, self.width, self.height);
-        if let Some(note) = &self.note {
-            out.set_note(note);
-        }
-        for (panel, frame) in self.panels.iter().zip(frame::frames(self)) {
-            draw::panel(&mut out, panel, &frame);
-        }
-        out
+    /// The picture, drawn at the first call: the figure is complete then.
+    pub fn picture(&self) -> &Picture {
+        self.picture.get_or_init(|| {
+            let mut out = Picture::new(&self.id, &self.title, self.width, self.height);
+            if let Some(note) = &self.note {
+                out.set_note(note);
+            }
+            for (panel, frame) in self.panels.iter().zip(frame::frames(self)) {
+                draw::panel(&mut out, panel, &frame);
+            }
+            out
+        })
     }
 
     /// The SVG document, which can also be embedded in HTML.

@@ -321,9 +321,11 @@ impl Along {
     }
 }
 
-/// Height for realizations that stand at the left, px.
+/// Height for realizations that stand at the left, px: of many, two figures fit below each
+/// other on a page.
 fn rows_height(n: usize) -> f64 {
-    17.0 * n.max(4) as f64
+    let each = if n > 16 { 14.5 } else { 17.0 };
+    each * n.max(4) as f64
 }
 
 /// An offset between −0.5 and 0.5 that spreads marks of the same value: equal for equal

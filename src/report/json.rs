@@ -147,6 +147,7 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
                 "vaf": m.vaf,
             })).collect::<Vec<_>>(),
         "alpha": analysis.alpha,
+        "better": analysis.better.as_str(),
         "findings": analysis.findings.iter().map(|f| finding(f, &f.question.id())).collect::<Vec<_>>(),
         "exclusions": exclusions(&analysis.exclusions),
         "deviations": analysis.deviations.iter().map(|d| &d.text).collect::<Vec<_>>(),

@@ -2,7 +2,7 @@
 //! report and its paragraphs. Names in them are untrusted.
 
 use super::apa;
-use study_base::text::counted;
+use study_base::text::{capital, counted, sentence};
 use study_core::analyze::findings::{Direction, Estimate, Statistic};
 use study_core::analyze::{
     Analysis, Finding, Pair, PreregisteredRule, Test, TestKind, Verdict, Warning,
@@ -103,7 +103,7 @@ pub(super) fn estimate(e: &Estimate, format: impl Fn(f64) -> String) -> String {
 
 /// A caveat or warning as a sentence.
 pub(super) fn caveat(w: &Warning) -> String {
-    format!("{}.", apa::capital(&w.text))
+    sentence(&w.text)
 }
 
 /// `, 95 % CI [a, b]`, or nothing if the interval is undefined.
@@ -226,7 +226,7 @@ pub(super) fn ties(a: &Analysis) -> Vec<String> {
     }
     let vaf = a.tied_vaf();
     if vaf > 1 {
-        let n = apa::capital(&apa::count(vaf));
+        let n = capital(&apa::count(vaf));
         found.push(format!(
             "{n} realizations share a VAF with another: {limit}"
         ));
@@ -234,7 +234,7 @@ pub(super) fn ties(a: &Analysis) -> Vec<String> {
     let means = a.tied_means();
     if means > 1 {
         let n = a.values.number("corr_adjusted/n_models").unwrap_or(0.0);
-        let tied = apa::capital(&apa::count(means));
+        let tied = capital(&apa::count(means));
         found.push(format!("{tied} of the {n} means are tied: {limit}"));
     }
     found

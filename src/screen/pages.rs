@@ -9,7 +9,7 @@ use crate::tui::views::prose::{Stopped, attending};
 use crate::tui::widgets::clock;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
-use study_base::text::Untrusted;
+use study_base::text::{Untrusted, capital};
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Answer, Question, QuestionKind};
 use study_core::session::view::Banner;
@@ -491,11 +491,4 @@ fn safe(text: &str) -> String {
     let lines = text.trim_end().lines();
     let lines: Vec<String> = lines.map(|line| Untrusted(line).to_string()).collect();
     lines.join("\n")
-}
-
-/// With a capital letter, as on a button.
-fn capital(words: &str) -> String {
-    let mut letters = words.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string());
-    format!("{}{}", first.unwrap_or_default(), letters.as_str())
 }

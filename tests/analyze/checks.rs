@@ -95,6 +95,48 @@ fn equivalence_of_pairs_and_of_the_effect_of_vaf_is_that_of_r() {
     assert_eq!(a.values.get("equivalence/vaf/p"), None);
 }
 
+/// pnorm() of both one-sided tests of atanh(cor(means, vaf)), se 1/sqrt(n − 3).
+#[test]
+fn equivalence_of_the_correlation_is_that_of_r() {
+    let at = |margin: f64| Rules {
+        equivalence_r: Some(margin),
+        ..Rules::default()
+    };
+    let a = analyzed(&table(), &at(0.95));
+    near(&a, "equivalence/r/margin", 0.95, 1e-15);
+    near(&a, "equivalence/r/p", 0.301_258_063_506_466, 1e-9);
+    near(&a, "equivalence/r/ci90_lo", -0.321_983_462_772_709, 1e-9);
+    near(&a, "equivalence/r/ci90_hi", 0.994_599_449_696_057, 1e-9);
+    let p = "equivalence/r/p";
+    near(
+        &analyzed(&table(), &at(0.5)),
+        p,
+        0.776_877_198_813_847,
+        1e-9,
+    );
+    assert_eq!(analyzed(&table(), &Rules::default()).values.get(p), None);
+    // Forty realizations without a trend.
+    let csv: String = (0..6)
+        .flat_map(|s| {
+            (0..40).map(move |m| format!("s{s},m{m:02},{},.{}\n", 1 + (m * 9 + s) % 7, 50 + m))
+        })
+        .collect();
+    let csv = format!("subject,model,rating,vaf\n{csv}");
+    let said = |margin| {
+        let a = analyzed(&csv, &at(margin));
+        let vaf = a.finding(&Question::Vaf).unwrap();
+        assert_eq!(vaf.verdict, Verdict::NotShown);
+        let caveat = vaf.caveats.iter().find(|c| c.code == "equivalent-r");
+        caveat.map(|c| c.text.clone())
+    };
+    assert!(
+        said(0.5)
+            .unwrap()
+            .starts_with("the correlation is within ± .50 (")
+    );
+    assert_eq!(said(0.2), None);
+}
+
 #[test]
 fn slopes_of_participants_drift_and_residuals_are_those_of_r() {
     let a = analyzed(&table(), &Rules::default());

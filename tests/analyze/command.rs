@@ -162,6 +162,28 @@ fn numbers_that_cannot_be_and_columns_that_are_not_read_are_reported() {
 }
 
 #[test]
+fn the_better_end_of_the_scale_can_be_stated() {
+    let best = |args: &[&str]| {
+        let text = out(study().arg("analyze").args(args).arg(set("sim_paper")));
+        let (_, rest) = text.split_once("The best-rated realization is ").unwrap();
+        rest.split(',').next().unwrap().to_owned()
+    };
+    assert_eq!(best(&["--direction", "higher"]), best(&[]));
+    assert_ne!(best(&["--direction", "lower"]), best(&[]));
+    let json = out(study().args(["analyze", "--json", "--direction=lower", &set("sim_paper")]));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["better"], "lower");
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/results/turn-signal-example");
+    for (args, code) in [
+        (["--direction", "lower", example], 1),
+        (["--direction", "down", example], 2),
+    ] {
+        let mut command = study();
+        command.arg("analyze").args(args).assert().code(code);
+    }
+}
+
+#[test]
 fn a_second_analysis_leaves_what_is_right_and_repairs_what_is_not() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join("out").join(name);

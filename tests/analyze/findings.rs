@@ -11,7 +11,7 @@ use study::report::text::{Page, page};
 use study_base::rng::Stream;
 use study_core::analyze::findings::Direction;
 use study_core::analyze::{
-    Analysis, Finding, Include, Question, Rules, TestKind, Verdict, analyze,
+    Analysis, Finding, Include, Question, Rules, TestKind, Verdict, all_findings, analyze,
 };
 use study_core::outcome::ratings::Ratings;
 
@@ -378,10 +378,11 @@ fn the_level_of_significance_is_that_of_the_protocol() {
         .unwrap()
         .p;
     assert!((0.0001..0.045).contains(&p), "{p}");
-    // Between three and four decimals of p, so that the printed p has to show the side.
-    for alpha in [p * 0.9999, p * 1.0001] {
+    // Between three and four decimals of p, so that the printed p has to show the side;
+    // and exactly p.
+    for alpha in [p * 0.9999, p, p * 1.0001] {
         let a = at(alpha);
-        let verdict = if p < alpha {
+        let verdict = if p <= alpha {
             Verdict::Yes
         } else {
             Verdict::NotShown
@@ -389,7 +390,7 @@ fn the_level_of_significance_is_that_of_the_protocol() {
         assert_eq!(finding(&a, Question::Differ).verdict, verdict);
         let printed = Printed::of(&a);
         let shown = p_of(&sentence(&printed.terminal, "Do the realizations differ? ").unwrap());
-        assert_eq!(shown.unwrap() < alpha, p < alpha, "{}", printed.terminal);
+        assert_eq!(shown.unwrap() <= alpha, p <= alpha, "{}", printed.terminal);
     }
     let page = Printed::of(&at(0.01)).html;
     assert!(
@@ -399,6 +400,35 @@ fn the_level_of_significance_is_that_of_the_protocol() {
     assert!(!page.contains("The level of significance is .05"), "{page}");
     // Two realizations: ε is 1 by definition.
     assert!(!page.contains("ε = "), "{page}");
+}
+
+/// With five realizations, the sixth largest |r| of all 120 orders has p = 6/120.
+#[test]
+fn a_p_that_is_the_level_is_a_yes() {
+    const MEANS: [f64; 5] = [2.0, 3.0, 4.0, 6.5, 5.5];
+    const VAF: [f64; 5] = [0.70, 0.74, 0.80, 0.88, 0.95];
+    let rows: Vec<_> = (0..6)
+        .flat_map(|s| (0..5).map(move |m| (s, m, 1, MEANS[m] + [-0.5, 0.5][(s + m % 2) % 2])))
+        .collect();
+    let a = analysis_of(&rating_table(&rows, |m| Some(VAF[m])));
+    let found = finding(&a, Question::Vaf);
+    assert_eq!(found.test.as_ref().unwrap().p, 0.05);
+    assert_eq!(found.verdict, Verdict::Yes);
+    assert_eq!(found.direction, Some(Direction::Up));
+    let printed = Printed::of(&a);
+    let (answers, results) = printed.sections();
+    for text in [&printed.terminal, answers] {
+        let said = sentence(text, "Does VAF predict the rating? ").unwrap();
+        assert!(
+            said.starts_with("Yes") && said.contains("p = .05"),
+            "{said}"
+        );
+        assert!(!said.contains("p = .050"), "{said}");
+    }
+    assert!(
+        results.contains("with a higher VAF were rated"),
+        "{results}"
+    );
 }
 
 #[test]
@@ -697,7 +727,7 @@ fn check_design(seed: u64) {
             );
             if let (Some(p), true) = (p_of(&sentence), verdict != "undefined") {
                 assert_eq!(
-                    p < 0.05,
+                    p <= 0.05,
                     verdict == "yes",
                     "design {seed}: {id}: {sentence}"
                 );
@@ -726,6 +756,26 @@ fn check_design(seed: u64) {
             );
         }
     }
+}
+
+/// Calibration uses the findings without the rest of the analysis.
+#[test]
+fn findings_alone_are_those_of_the_analysis() {
+    (0..200u64).into_par_iter().for_each(|seed| {
+        let csv = random_design(seed);
+        let ratings = Ratings::read_csv("a.csv", csv.as_bytes(), None).unwrap();
+        let whole = analyze(&ratings, &Rules::default());
+        let (findings, _) = all_findings(&ratings, &Rules::default());
+        let decided = |all: &[Finding]| -> Vec<_> {
+            let one = |f: &Finding| (f.question.clone(), f.verdict.clone(), f.test.clone());
+            all.iter().map(one).collect()
+        };
+        assert_eq!(
+            decided(&findings),
+            decided(&whole.findings),
+            "design {seed}"
+        );
+    });
 }
 
 #[test]

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use study::report::html::Details;
 use study::report::text::{Page, comments, page};
 use study::report::{Source, csv, figures, html, json};
-use study_core::analyze::{Analysis, Rules, Value, analyze};
+use study_core::analyze::{Analysis, Better, Finding, Pair, Question, Rules, Value, analyze};
 use study_core::outcome::ratings::Ratings;
 
 fn source() -> Source {
@@ -285,6 +285,66 @@ fn a_scale_turned_round_turns_the_correlation_round() {
     }
     let p = "corr/pearson/p_exact_two_sided";
     assert_eq!(a.values.number(p), b.values.number(p));
+}
+
+/// Where lower ratings are better, the findings are those of the mirrored ratings.
+#[test]
+fn lower_ratings_are_better_where_they_are_said_to_be() {
+    // With twelve realizations only the pairs with the best-rated one are listed.
+    let twelve: String = (0..6)
+        .flat_map(|s| {
+            (0..12).map(move |m| format!("S{s},m{m},1,{},.{}\n", 1 + (m * 5 + s) % 7, 70 + m))
+        })
+        .collect();
+    for csv in [
+        SMALL.to_owned(),
+        format!("subject,model,repetition,rating,vaf\n{twelve}"),
+    ] {
+        let lower = Ratings::read_csv("a.csv", csv.as_bytes(), None).unwrap();
+        let lower = analyze(
+            &lower,
+            &Rules {
+                better: Better::Lower,
+                ..Rules::default()
+            },
+        );
+        let mirrored = changed(&csv, |x| 8.0 - x, str::to_owned);
+        let mirrored = Ratings::read_csv("a.csv", mirrored.as_bytes(), None).unwrap();
+        let mirrored = analyze(&mirrored, &Rules::default());
+        let names = |a: &Analysis| {
+            a.ranked()
+                .iter()
+                .map(|r| r.1.to_owned())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(names(&lower), names(&mirrored));
+        assert_eq!(lower.findings.len(), mirrored.findings.len());
+        for (f, g) in lower.findings.iter().zip(&mirrored.findings) {
+            assert_eq!((&f.verdict, &f.question), (&g.verdict, &g.question));
+            if f.question == Question::Best {
+                assert_eq!(f.names, g.names);
+                let size = |f: &Finding| f.estimate.unwrap().value;
+                assert!((size(f) + size(g)).abs() < 1e-12);
+            }
+        }
+        let pairs = |a: &Analysis| {
+            let pair = |p: &Pair| (p.first.clone(), p.second.clone());
+            a.pairs.iter().map(pair).collect::<Vec<_>>()
+        };
+        assert_eq!(pairs(&lower), pairs(&mirrored));
+        let wide = Page {
+            width: 100,
+            colour: false,
+        };
+        let text = page(&source(), &lower, wide);
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let report = html::document(&source(), &Details::default(), &lower, &[]);
+        for text in [&text, &report] {
+            assert!(!text.contains("highest"), "{text}");
+            assert!(text.contains("of which lower ratings are better"), "{text}");
+        }
+        assert!(report.contains("Lower ratings are better."), "{report}");
+    }
 }
 
 #[test]

@@ -250,7 +250,7 @@ fn the_terminal_shows_the_crossed_slope_the_critical_r_and_order_effects() {
             get("lmm_vaf_crossed/slope") / 100.0
         ),
         format!(
-            "requires |r| > {}",
+            "requires |r| ≥ {}",
             format!("{:.3}", get("corr/pearson/critical_r")).trim_start_matches('0')
         ),
         "Do order and learning matter?".to_owned(),

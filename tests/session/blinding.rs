@@ -186,6 +186,16 @@ fn pages_and_their_durations_do_not_tell_realizations_apart() {
     }
 }
 
+/// The participant's page can play no sound and shake no tablet. (Every session in a terminal
+/// that the tests play is watched for the bell, see `Terminal::shown`.)
+#[test]
+fn the_page_of_the_participant_makes_no_sound() {
+    let script = include_str!("../../src/screen/page.js").to_lowercase();
+    for sound in ["audio", "oscillator", "vibrate", "speech", "<video"] {
+        assert!(!script.contains(sound), "{sound}");
+    }
+}
+
 /// Where strokes are required, only how long the hand must keep exploring may depend on
 /// what it feels.
 #[test]

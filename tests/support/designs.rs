@@ -71,6 +71,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             vaf: None,
             realistic_from: None,
             equivalence_margin: None,
+            equivalence_r: None,
             unfinished: Unfinished::Include,
             exclude: Vec::new(),
             alpha: None,

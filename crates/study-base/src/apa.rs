@@ -40,7 +40,8 @@ pub fn p(x: f64) -> String {
 ///
 /// Three decimals; what is below .001 or above .999 is printed as a bound, so that no p
 /// reads as 0 or 1. It has more decimals where three would not show on which side of the
-/// level it lies: .0496 at the level .05, not .050.
+/// level it lies: .0496 at the level .05, not .050. A p that is the level is printed as the
+/// level: .05.
 pub fn p_beside(x: f64, level: f64) -> String {
     if x < 0.001 && (level >= 0.001 || x == 0.0) {
         return "< .001".to_owned();
@@ -48,9 +49,12 @@ pub fn p_beside(x: f64, level: f64) -> String {
     if x > 0.999 {
         return "> .999".to_owned();
     }
+    if x == level {
+        return format!("= {}", share(x, level.to_string().len() - 2));
+    }
     let on_its_side = |decimals: &usize| {
         let shown = format!("{x:.decimals$}").parse::<f64>();
-        shown.is_ok_and(|shown| shown > 0.0 && (shown < level) == (x < level))
+        shown.is_ok_and(|shown| shown > 0.0 && shown != level && (shown < level) == (x < level))
     };
     let decimals = (3..=15).find(on_its_side).unwrap_or(15);
     format!("= {}", share(x, decimals))
@@ -97,7 +101,8 @@ mod tests {
             (0.001_49, "= .001"),
             (1.0 / 120.0, "= .008"),
             (0.0417, "= .042"),
-            (0.05, "= .050"),
+            (0.05, "= .05"),
+            (0.049_98, "= .04998"),
             (0.994_9, "= .995"),
             (0.995, "= .995"),
             (0.998_9, "= .999"),
@@ -108,7 +113,7 @@ mod tests {
             (1.0, "> .999"),
             (0.0496, "= .0496"),
             (0.049_999_6, "= .0499996"),
-            (0.0504, "= .050"),
+            (0.0504, "= .0504"),
         ] {
             assert_eq!(p(x), shown, "{x}");
             assert_eq!(bare_p(x), shown.trim_start_matches("= "), "{x}");
@@ -121,6 +126,8 @@ mod tests {
         assert_eq!(p_beside(0.0098, 0.01), "= .0098");
         assert_eq!(p_beside(0.0004, 0.0005), "= .0004");
         assert_eq!(p_beside(0.0004, 0.001), "< .001");
+        assert_eq!(p_beside(0.025, 0.025), "= .025");
+        assert_eq!(p_beside(0.01, 0.01), "= .01");
     }
 
     #[test]

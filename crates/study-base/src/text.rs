@@ -40,6 +40,18 @@ pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
+/// With a capital first letter.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    format!("{}{}", first.unwrap_or_default(), letters.as_str())
+}
+
+/// With a capital first letter and a full stop.
+pub fn sentence(text: &str) -> String {
+    format!("{}.", capital(text))
+}
+
 /// The terminal columns of a text, grapheme by grapheme, as terminals count them.
 fn columns_of(text: &str) -> usize {
     text.graphemes(true).map(|g| g.width()).sum()
@@ -236,6 +248,15 @@ mod tests {
         let hostile = "a\u{1b}[2Jb\u{9b}c\u{202e}d\n=1";
         let shown = Untrusted(hostile).to_string();
         assert_eq!(shown, "a\\u{1b}[2Jb\\u{9b}c\\u{202e}d\\n=1");
+    }
+
+    #[test]
+    fn sentences_begin_with_a_capital_letter() {
+        assert_eq!(
+            ["", "über uns", "χ", "7 a"].map(capital),
+            ["", "Über uns", "Χ", "7 a"]
+        );
+        assert_eq!(sentence("ßa b"), "SSa b.");
     }
 
     #[test]

@@ -10,6 +10,7 @@
 //! participants. Tests over participants hold for these realizations only.
 
 mod adjusted;
+mod better;
 mod cells;
 mod checks;
 mod deciding;
@@ -42,7 +43,8 @@ mod warning;
 mod warnings;
 
 pub use crate::protocol::{ALPHA, Exclusion};
-pub use deciding::{Deciding, deciding};
+pub use better::Better;
+pub use deciding::{Deciding, all_findings, deciding};
 pub use design::Design;
 pub use deviation::{Deviation, PreregisteredRule, deviations};
 pub use effects::MAX_PAIRED;
@@ -85,12 +87,16 @@ pub struct Rules {
     /// Equivalence margin for differences between realizations and from a hidden reference,
     /// and for the effect of VAF, in rating points.
     pub equivalence_margin: Option<f64>,
+    /// Equivalence margin for the correlation with VAF.
+    pub equivalence_r: Option<f64>,
     /// Changes to these rules after the study began.
     pub deviations: Vec<Deviation>,
     /// Level of significance of every test, two-sided.
     pub alpha: f64,
     /// What the ratings measure, as a noun; `None` if the study does not say.
     pub construct: Option<String>,
+    /// Which ratings are better.
+    pub better: Better,
 }
 
 impl Default for Rules {
@@ -105,9 +111,11 @@ impl Default for Rules {
             primary: true,
             exclude: Vec::new(),
             equivalence_margin: None,
+            equivalence_r: None,
             deviations: Vec::new(),
             alpha: ALPHA,
             construct: None,
+            better: Better::default(),
         }
     }
 }
@@ -138,9 +146,11 @@ impl Rules {
             primary,
             exclude: protocol.analysis.exclude.clone(),
             equivalence_margin: protocol.analysis.equivalence_margin.filter(|_| primary),
+            equivalence_r: protocol.analysis.equivalence_r.filter(|_| primary),
             deviations: Vec::new(),
             alpha: protocol.analysis.alpha(),
             construct: protocol.analysis.construct.clone().filter(|_| primary),
+            better: Better::default(),
         }
     }
 }
@@ -231,6 +241,8 @@ pub struct Analysis {
     pub alpha: f64,
     /// What the ratings measure, as a noun. Untrusted.
     pub construct: Option<String>,
+    /// Which ratings are better.
+    pub better: Better,
     /// Names of the covariates of the realizations. Untrusted.
     pub covariates: Vec<String>,
     /// Who rated which realizations.
@@ -325,6 +337,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         equivalence_margin: rules.equivalence_margin,
         alpha: rules.alpha,
         construct: rules.construct.clone(),
+        better: rules.better,
         covariates: memory::covariates(&used),
         design,
         findings,

@@ -392,6 +392,10 @@ pub struct AnalysisRules {
     /// primary scale, above 0. Not part of the fingerprint if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equivalence_margin: Option<f64>,
+    /// Margin of the equivalence test of the correlation with VAF, between 0 and 1. Not
+    /// part of the fingerprint if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equivalence_r: Option<f64>,
     /// Whether unfinished sessions are analyzed.
     pub unfinished: Unfinished,
     /// Exclusion rules stated before the data.

@@ -66,16 +66,28 @@ pub fn fisher_interval(r: f64, weight: f64) -> Option<(f64, f64)> {
     Some(((z - half).tanh(), (z + half).tanh()))
 }
 
-/// p of the test that a correlation lies within ±`margin`: the larger one of two
-/// one-sided tests by Fisher's z (Goertzen & Cribbie 2010). `weight` is n − 3 for a plain
-/// correlation. `None` for |r| = 1 or unless `weight` > 0 and 0 < `margin` < 1.
-pub fn p_equivalence(r: f64, weight: f64, margin: f64) -> Option<f64> {
+/// A test that a correlation is small.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Equivalence {
+    /// The larger p of the two one-sided tests.
+    pub p: f64,
+    /// 90 % interval, which lies within the margin where p < .05.
+    pub ci90: (f64, f64),
+}
+
+/// Tests that a correlation lies within ±`margin` by two one-sided tests of Fisher's z
+/// (Goertzen & Cribbie 2010). `weight` is n − 3 for a plain correlation. `None` for |r| = 1
+/// or unless `weight` > 0 and 0 < `margin` < 1.
+pub fn equivalence(r: f64, weight: f64, margin: f64) -> Option<Equivalence> {
     if !(r.abs() < 1.0 && weight > 0.0 && margin > 0.0 && margin < 1.0) {
         return None;
     }
-    Some(normal_upper(
-        (margin.atanh() - r.abs().atanh()) * weight.sqrt(),
-    ))
+    let half = normal_quantile(0.95)? / weight.sqrt();
+    let z = r.atanh();
+    Some(Equivalence {
+        p: normal_upper((margin.atanh() - z.abs()) * weight.sqrt()),
+        ci90: ((z - half).tanh(), (z + half).tanh()),
+    })
 }
 
 /// A repeated-measures correlation.
@@ -148,9 +160,13 @@ mod tests {
     /// By hand: (0.4 − 0.1)·√25 = 1.5, and P(Z > 1.5) = .0668072.
     #[test]
     fn a_small_correlation_is_within_the_margin() {
-        let p = p_equivalence(-0.1f64.tanh(), 25.0, 0.4f64.tanh()).unwrap();
-        assert!((p - 0.066_807_2).abs() < 1e-7, "{p}");
-        assert_eq!(p_equivalence(0.1, 0.0, 0.5), None);
+        let e = equivalence(-0.1f64.tanh(), 25.0, 0.4f64.tanh()).unwrap();
+        assert!((e.p - 0.066_807_2).abs() < 1e-7, "{e:?}");
+        let (low, high) = e.ci90;
+        // −0.1 ± 1.644854/5.
+        assert!((low.atanh() + 0.428_970_7).abs() < 1e-7, "{e:?}");
+        assert!((high.atanh() - 0.228_970_7).abs() < 1e-7, "{e:?}");
+        assert_eq!(equivalence(0.1, 0.0, 0.5), None);
     }
 
     #[test]

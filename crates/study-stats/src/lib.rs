@@ -19,6 +19,7 @@
 //! | Which is preferred, in pairs? | [`pairs`] |
 //! | How do estimated magnitudes grow? | [`magnitude`] |
 //! | Who is screened in a MUSHRA test? | [`mushra`] |
+//! | Does a test reject at its level? | [`level`] |
 //! | Can a printed mean and standard deviation be right? | [`grim`] |
 //! | Tail probabilities, quantiles, ranks | [`distribution`], [`rank`] |
 //!
@@ -54,6 +55,7 @@ pub mod disagreement;
 pub mod distribution;
 pub mod friedman;
 pub mod grim;
+pub mod level;
 pub mod lmm;
 pub mod magnitude;
 mod matrix;

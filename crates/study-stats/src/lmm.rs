@@ -53,6 +53,17 @@ pub struct RandomEffects {
     pub cell: bool,
 }
 
+impl RandomEffects {
+    /// Intercepts of realizations and, if a cell has two ratings, of cells.
+    pub fn crossed(table: &LmmData) -> Self {
+        Self {
+            slope: false,
+            realization: true,
+            cell: table.repeats(),
+        }
+    }
+}
+
 /// Why there is no fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LmmError {

@@ -94,7 +94,7 @@ fn pictures(drawn: &[&Drawn]) -> Result<Vec<Output>, PngError> {
             name: format!("figures/{name}.{ending}"),
             content,
         };
-        painter.png(&picture).map(|png| {
+        painter.png(picture).map(|png| {
             [
                 named("svg", picture.to_svg().into_bytes()),
                 named("png", png),

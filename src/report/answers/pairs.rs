@@ -1,4 +1,4 @@
-//! Pairs of realizations: the two with the highest means, and all that differ.
+//! Pairs of realizations: the two best-rated, and all that differ.
 
 use super::Answer;
 use crate::report::{apa, sentences};
@@ -8,7 +8,7 @@ use study_core::analyze::{Analysis, MAX_PAIRED, Question, Test};
 /// Pairs that are listed.
 const MAX_LISTED: usize = 10;
 
-/// Whether the realization with the highest mean differs from the second.
+/// Whether the best-rated realization differs from the second best.
 pub(super) fn best_two(a: &Analysis) -> Option<Answer> {
     let f = a.finding(&Question::Best)?;
     let ranked = a.ranked();
@@ -16,7 +16,7 @@ pub(super) fn best_two(a: &Analysis) -> Option<Answer> {
         let found = ranked.iter().find(|r| r.1 == name);
         found.map_or_else(String::new, |r| apa::two(r.0))
     };
-    let what = sentences::mean(a);
+    let (most, what) = (a.better.most(), sentences::mean(a));
     let both = match &f.names[..] {
         [first, second] => format!(
             "{first} ({what} {}) and {second} ({what} {})",
@@ -29,7 +29,7 @@ pub(super) fn best_two(a: &Analysis) -> Option<Answer> {
     let mut answer = Answer::of(question, f, |verdict| {
         let Some(test) = &f.test else {
             let (all, mean) = (apa::listing(&f.names), mean(&f.names[0]));
-            return format!("{verdict}: {all} share the highest {what}, {mean}.");
+            return format!("{verdict}: {all} share the {most} {what}, {mean}.");
         };
         let alone = match a.design.realizations {
             2 => "",
@@ -63,8 +63,9 @@ pub(super) fn which(a: &Analysis) -> Option<Answer> {
     let all = match a.design.realizations {
         k if k <= MAX_PAIRED => counted(a.pairs.len(), "pair", "pairs"),
         _ => format!(
-            "{} with the highest {}",
+            "{} with the {} {}",
             counted(a.pairs.len(), "pair", "pairs"),
+            a.better.most(),
             sentences::mean(a)
         ),
     };
@@ -97,8 +98,9 @@ pub(super) fn which(a: &Analysis) -> Option<Answer> {
     }
     if a.design.realizations > MAX_PAIRED && !a.pairs.is_empty() {
         answer.more.push(format!(
-            "Above {MAX_PAIRED} realizations only the one with the highest {} is compared with each \
+            "Above {MAX_PAIRED} realizations only the one with the {} {} is compared with each \
              other one; the correction counts all pairs.",
+            a.better.most(),
             sentences::mean(a)
         ));
     }

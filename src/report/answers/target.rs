@@ -1,26 +1,30 @@
-//! Whether the realizations feel like the target: the highest mean, its share of realistic
+//! Whether the realizations feel like the target: the best mean, its share of realistic
 //! ratings, references and hidden duplicates.
 
 use super::Answer;
 use crate::report::{apa, sentences};
-use study_core::analyze::{Analysis, Finding, PreregisteredRule, Question, Verdict, group_id};
+use study_base::text::capital;
+use study_core::analyze::{
+    Analysis, Better, Finding, PreregisteredRule, Question, Verdict, group_id,
+};
 use study_core::outcome::Role;
 
 /// Realizations whose shares are listed.
 const MAX_SHARES: usize = 12;
 
-/// The realization with the highest mean, and how it compares with the target.
+/// The best-rated realization, and how it compares with the target.
 pub(super) fn target(a: &Analysis) -> Option<Answer> {
     let ranked = a.ranked();
     let (mean, best) = *ranked.first()?;
     let equals = ranked.iter().filter(|r| (r.0 - mean).abs() < 1e-10).count();
     let what = sentences::mean(a);
+    let most = a.better.most();
     let subject = match (ranked.len(), equals) {
         (1, _) => format!("The only realization is {best}"),
         (_, 1) => format!("The best-rated realization is {best}"),
         _ => format!(
-            "{} realizations share the highest {what}; one of them is {best}",
-            apa::capital(&apa::count(equals))
+            "{} realizations share the {most} {what}; one of them is {best}",
+            capital(&apa::count(equals))
         ),
     };
     let scale = a.scale.map_or_else(String::new, |(from, to)| {
@@ -38,12 +42,16 @@ pub(super) fn target(a: &Analysis) -> Option<Answer> {
         "Do the realizations feel like the target?".to_owned()
     } else {
         match &a.construct {
-            Some(construct) => format!("Which realization is rated highest in {construct}?"),
-            None => "Which realization is rated highest?".to_owned(),
+            Some(construct) => format!("Which realization is rated {most} in {construct}?"),
+            None => format!("Which realization is rated {most}?"),
         }
     };
+    let lower = match a.better {
+        Better::Higher => "",
+        Better::Lower => ", of which lower ratings are better",
+    };
     let short = format!(
-        "{subject}, {what} {}{ci}{scale}{realistic}.",
+        "{subject}, {what} {}{ci}{scale}{lower}{realistic}.",
         apa::two(mean)
     );
     let mut answer = Answer::new(&question, short);

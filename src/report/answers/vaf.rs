@@ -147,7 +147,7 @@ fn points(a: &Analysis, n: usize) -> Option<String> {
     let critical = a.values.number("corr_adjusted/pearson/critical_r");
     let level = sentences::level(a.alpha);
     let critical = critical.map_or_else(String::new, |r| {
-        format!("; in a t test, p < {level} requires |r| > {}", apa::r(r))
+        format!("; in a t test, p ≤ {level} requires |r| ≥ {}", apa::r(r))
     });
     Some(format!(
         "VAF varies only between realizations, so the correlation rests on {n} points, whatever the \

@@ -47,9 +47,10 @@ pub(super) fn forest(scene: &Scene<'_>) -> Option<Drawn> {
     }
     let tested = scene.models.iter().filter(|m| m.tested).count();
     let which = if pairs.len() == tested * (tested - 1) / 2 {
-        "all pairs of realizations"
+        "all pairs of realizations".to_owned()
     } else {
-        "the realization with the highest mean and each other one"
+        let most = scene.a.better.most();
+        format!("the realization with the {most} mean and each other one")
     };
     let caption = format!(
         "Differences of mean {} between {which}, with 95 % intervals that are not corrected for \

@@ -74,9 +74,12 @@ pub(super) fn strips(scene: &Scene<'_>) -> Option<Drawn> {
             [(j - 0.4, median), (j + 0.4, median), (f64::NAN, f64::NAN)]
         })
         .collect();
+    let of = match scene.asked.as_str() {
+        "rating" => String::new(),
+        asked => format!(" of {asked}"),
+    };
     let caption = format!(
-        "All ratings of {} by realization, in the order of {}; lines: medians.{}",
-        scene.asked,
+        "All ratings{of} by realization, in the order of {}; lines: medians.{}",
         scene.order(),
         if scene.a.counts.rated > dots.len() {
             " Where a realization has many ratings, some are left out evenly."
@@ -84,7 +87,7 @@ pub(super) fn strips(scene: &Scene<'_>) -> Option<Drawn> {
             ""
         }
     );
-    let title = format!("Ratings of {} by realization", scene.asked);
+    let title = format!("Ratings{of} by realization");
     Some(drawn("strips", caption, data, |c: Canvas| {
         let across = scene.across(c);
         let names = Axis::of_names(&scene.realizations(), &scene.names());

@@ -3,13 +3,18 @@
 
 use super::Details;
 use crate::report::{apa, sentences};
-use study_base::text::counted;
-use study_core::analyze::{Analysis, Exclusion, PreregisteredRule, Question, TestKind, Value};
+use study_base::text::{capital, counted};
+use study_core::analyze::{
+    Analysis, Better, Exclusion, PreregisteredRule, Question, TestKind, Value,
+};
 use study_stats::permutation::DRAWS;
 
 /// The paragraph.
 pub(super) fn paragraph(d: &Details, a: &Analysis) -> String {
     let mut text = design(d, a);
+    if a.better == Better::Lower {
+        text.push("Lower ratings are better.".to_owned());
+    }
     text.extend(exclusions(a));
     text.extend(tests(a));
     text.extend(complete_only(a));
@@ -356,9 +361,10 @@ fn tests(a: &Analysis) -> Vec<String> {
             0 | 1 => format!("The pair was compared by {how}{wilcoxon}."),
             n => format!(
                 "Pairs were compared by {how} with Holm's correction over all {n} pairs{wilcoxon}. \
-                 The two highest means were also compared by themselves, two-sided and without a \
+                 The two {} means were also compared by themselves, two-sided and without a \
                  correction, which keeps the level for the claim that one is the best (Gutmann & \
-                 Maymin, 1987; Hung & Fithian, 2019)."
+                 Maymin, 1987; Hung & Fithian, 2019).",
+                a.better.most()
             ),
         });
     }
@@ -382,7 +388,7 @@ fn tests(a: &Analysis) -> Vec<String> {
     if !iccs.is_empty() {
         text.push(format!(
             "{} (Shrout and Fleiss), with F intervals.",
-            apa::capital(&iccs.join(", "))
+            capital(&iccs.join(", "))
         ));
     }
     if any("reference/", "/p_tost") {
@@ -393,6 +399,16 @@ fn tests(a: &Analysis) -> Vec<String> {
         };
         text.push(format!(
             "Equivalence with the reference was tested by two one-sided t tests with {margin}."
+        ));
+    }
+    if let (Some(margin), true) = (
+        a.values.number("equivalence/r/margin"),
+        defined("equivalence/r/p"),
+    ) {
+        text.push(format!(
+            "Whether the correlation with VAF lies within ± {} was tested by two one-sided tests of Fisher's \
+             z (Goertzen & Cribbie, 2010).",
+            apa::share(margin, 2)
         ));
     }
     text

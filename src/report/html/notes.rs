@@ -5,7 +5,7 @@ use super::tables::MAX_ROWS;
 use super::{Details, lines, safe};
 use crate::report::{Source, apa};
 use maud::{Markup, html};
-use study_base::text::counted;
+use study_base::text::{counted, sentence};
 use study_core::analyze::{Analysis, Comment, PreregisteredRule, Warning};
 
 /// Warnings that are banners at the top.
@@ -22,28 +22,24 @@ pub(super) fn banners(a: &Analysis) -> Markup {
     };
     html! {
         @for w in a.warnings.iter().filter(|w| AT_THE_TOP.contains(&w.code)) {
-            div.banner role="note" { b { (title(w.code)) } (sentence(w)) }
+            div.banner role="note" { b { (title(w.code)) } (noted(w)) }
         }
         @let others: Vec<_> = a.warnings.iter().filter(|w| !AT_THE_TOP.contains(&w.code)).collect();
         @if !others.is_empty() {
             details open {
                 summary { (counted(others.len(), "caveat", "caveats")) }
-                ul { @for w in others { li { (sentence(w)) } } }
+                ul { @for w in others { li { (noted(w)) } } }
             }
         }
     }
 }
 
 /// With a capital letter, unless it starts with a path, and a full stop.
-fn sentence(w: &Warning) -> String {
+fn noted(w: &Warning) -> String {
     let text = safe(&w.text);
-    let mut letters = text.chars();
-    let first = letters.next();
-    match first {
-        Some(c) if w.code != "damaged-results" => {
-            format!("{}{}.", c.to_uppercase(), letters.as_str())
-        }
-        _ => format!("{text}."),
+    match w.code {
+        "damaged-results" => format!("{text}."),
+        _ => sentence(&text),
     }
 }
 

@@ -140,8 +140,9 @@ fn sentence(a: &Analysis, f: &Finding) -> Option<String> {
                 )
             }
             all => format!(
-                "A best-rated realization was not shown: {} share the highest mean.",
-                apa::listing(all)
+                "A best-rated realization was not shown: {} share the {} mean.",
+                apa::listing(all),
+                a.better.most()
             ),
         },
         Question::Vaf => vaf(a, f),

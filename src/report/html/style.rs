@@ -68,6 +68,7 @@ footer { margin-top: 3rem; font-size: .85rem; border-top: 1px solid #bbb; paddin
   .comments h2, .comments > .note { column-span: all; }
   .banner, .warning { padding: 1.5mm 3mm; margin: 2mm 0; }
   .scroll { overflow: visible; margin: 2.5mm 0; }
+  .whole { display: inline-block; vertical-align: top; margin-right: 8mm; }
   .apart { background: #fff; margin-top: 5mm; }
   .figures { columns: 2; column-gap: 5mm; }
   .wide { display: none; }

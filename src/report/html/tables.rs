@@ -90,10 +90,10 @@ pub(super) fn section(a: &Analysis) -> Markup {
             @for table in against_references(a) { (table.render()) }
             (repeats(a).render())
             (shares(a).render())
+            (agreement(a).render())
             @if !answers::variance_shares(a).is_empty() {
                 p.note { "Shares are rounded to whole per cent, so their sum can be 99 or 101." }
             }
-            (agreement(a).render())
             (glossary(a))
             (with_and_without(a).render())
             (subjects(a))
@@ -152,16 +152,10 @@ fn role(m: &RealizationSummary) -> String {
 fn realizations(a: &Analysis) -> HtmlTable {
     let v = &a.values;
     let share = a.realistic_from.map(|f| format!("≥ {f}"));
-    let mut head = vec![
-        "realization",
-        "role",
-        "VAF",
-        "n",
-        "mean",
-        "SD",
-        "median",
-        "95 % CI",
-    ];
+    let has_vaf = a.realizations.iter().any(|m| m.vaf.is_some());
+    let mut head = vec!["realization", "role"];
+    head.extend(has_vaf.then_some("VAF"));
+    head.extend(["n", "mean", "SD", "median", "95 % CI"]);
     let adjusted = !a.design.is_complete();
     head.extend(adjusted.then_some("adjusted mean"));
     head.extend(share.as_deref());
@@ -173,16 +167,15 @@ fn realizations(a: &Analysis) -> HtmlTable {
     for m in listed {
         let get = |what: &str| a.described(&m.id, what);
         let ci = v.interval(&format!("{}/subject_mean/ci95", group_id("desc", &[&m.id])));
-        let mut row = vec![
-            apa::name(&m.id),
-            role(m),
-            apa::or_dash(m.vaf, |v| apa::share(v, digits)),
+        let mut row = vec![apa::name(&m.id), role(m)];
+        row.extend(has_vaf.then(|| apa::or_dash(m.vaf, |v| apa::share(v, digits))));
+        row.extend([
             show(get("n"), 0),
             show(get("mean"), 3),
             show(get("sd"), 3),
             show(get("median"), 1),
             apa::interval_or_dash(ci, apa::two),
-        ];
+        ]);
         if adjusted {
             row.push(show(a.about("adjusted", &[&m.id], "mean"), 3));
         }

@@ -3,6 +3,7 @@
 use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::Key;
 use std::collections::BTreeSet;
+use study_base::text::sentence;
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Answer, AnswerError, Question, QuestionKind};
 
@@ -233,12 +234,6 @@ fn in_words(why: AnswerError, words: &Words) -> String {
         _ => None,
     };
     words.unwrap_or_else(|| sentence(&why.to_string()))
-}
-
-fn sentence(why: &str) -> String {
-    let mut letters = why.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string());
-    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }
 
 fn rating(

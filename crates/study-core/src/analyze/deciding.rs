@@ -1,12 +1,11 @@
-//! Does VAF predict the rating? The verdict and the tests beside it, without the other
-//! statistics of an analysis: for thousands of simulated studies.
+//! Verdicts without the other statistics of an analysis: for thousands of simulated studies.
 
-use super::adjusted::Adjusted;
+use super::adjusted::{self, Adjusted};
 use super::cells::Cells;
 use super::design::Design;
 use super::findings::{self, Finding};
 use super::values::Values;
-use super::{Rules, mixed, select, vaf};
+use super::{Rules, disagreement, effects, memory, mixed, order, pairs, reference, select, vaf};
 use crate::outcome::ratings::Ratings;
 
 /// What [`super::analyze`] says about VAF.
@@ -32,4 +31,26 @@ pub fn deciding(ratings: &Ratings, rules: &Rules) -> Deciding {
         finding: findings::of_vaf(&cells, Design::of(&cells), rules, &values),
         values,
     }
+}
+
+/// The findings of [`super::analyze`], with the statistics that decide them; effect sizes
+/// and caveats may be missing.
+pub fn all_findings(ratings: &Ratings, rules: &Rules) -> (Vec<Finding>, Values) {
+    let (decisions, _) = select::decide(ratings, rules);
+    let used = super::rows(ratings, |i| decisions[i].is_none());
+    let cells = Cells::of(&used);
+    let adjusted = Adjusted::of(&cells);
+    let mut values = Values::default();
+    order::order(&cells, &mut values);
+    vaf::raw(&cells, rules, &mut values);
+    vaf::deciding(&cells, &adjusted, rules, &mut values);
+    effects::ranks_and_anova(&cells, &mut values);
+    mixed::only_crossed(&cells, &mut values);
+    reference::reference(&cells, rules, &mut values);
+    adjusted::adjusted(&cells, &adjusted, &mut values);
+    pairs::pairs(&cells, &adjusted, rules, &mut values);
+    disagreement::disagreement(&cells, &mut values);
+    memory::memory(&cells, &mut values);
+    let (findings, _) = findings::findings(&cells, Design::of(&cells), rules, &mut values);
+    (findings, values)
 }

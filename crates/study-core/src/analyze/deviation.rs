@@ -36,6 +36,7 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
         vaf,
         realistic_from,
         equivalence_margin,
+        equivalence_r,
         unfinished,
         exclude,
         alpha,
@@ -74,6 +75,12 @@ pub fn deviations(before: &Protocol, after: &Protocol) -> Vec<Deviation> {
         &[PreregisteredRule::Margin],
         shown(&b.equivalence_margin),
         shown(equivalence_margin),
+    );
+    compare(
+        "equivalence_r",
+        &[PreregisteredRule::Margin],
+        shown(&b.equivalence_r),
+        shown(equivalence_r),
     );
     compare(
         "unfinished",
@@ -177,6 +184,10 @@ mod tests {
         );
         assert_eq!(
             of(&|p| p.analysis.equivalence_margin = Some(0.25)),
+            [PreregisteredRule::Margin]
+        );
+        assert_eq!(
+            of(&|p| p.analysis.equivalence_r = Some(0.5)),
             [PreregisteredRule::Margin]
         );
         assert_eq!(of(&|p| p.analysis.vaf = Some("other".to_owned())), []);

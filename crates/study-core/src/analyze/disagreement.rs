@@ -1,11 +1,9 @@
-//! Whether participants differ in how they rate the realizations: `disagreement/*`,
-//! `slope_variance/*`.
+//! Whether participants differ in how they rate the realizations: `disagreement/*`.
 
 use super::cells::{Cell, Cells};
 use super::values::Values;
-use study_stats::describe::mean;
 use study_stats::disagreement::{Disagreement, disagreement as interaction, slopes_differ};
-use study_stats::lmm::{CellSummary, FixedEffects, LmmData, slope_variance as estimated};
+use study_stats::lmm::CellSummary;
 use study_stats::regression::slope;
 
 pub(super) fn disagreement(cells: &Cells<'_>, values: &mut Values) {
@@ -22,7 +20,6 @@ pub(super) fn disagreement(cells: &Cells<'_>, values: &mut Values) {
         "too few participants or realizations, or more than 200 realizations"
     };
     put("interaction", interaction(&own), why, values);
-    slope_variance(cells, &own, values);
     let with_vaf: Vec<usize> = (models.iter().copied())
         .filter(|&m| cells.vaf[m].is_some())
         .collect();
@@ -45,44 +42,6 @@ pub(super) fn disagreement(cells: &Cells<'_>, values: &mut Values) {
         "n_falling",
         slopes.iter().filter(|b| **b < 0.0).count() as f64,
     );
-}
-
-/// Most cells for which the variance of the slopes is estimated: its matrices grow with
-/// them.
-const MAX_CELLS: usize = 1000;
-
-/// The variance of the participants' slopes on VAF, with random realizations.
-fn slope_variance(cells: &Cells<'_>, own: &[CellSummary], values: &mut Values) {
-    let with_vaf: Vec<CellSummary> = (own.iter())
-        .filter_map(|c| {
-            Some(CellSummary {
-                x: cells.vaf[c.realization]?,
-                ..*c
-            })
-        })
-        .collect();
-    let x: Vec<f64> = with_vaf.iter().map(|c| c.x).collect();
-    let centre = mean(&x).unwrap_or(0.0);
-    let found = if with_vaf.is_empty() {
-        Err("no test realization has a VAF".to_owned())
-    } else if with_vaf.len() > MAX_CELLS {
-        Err(format!("more than {MAX_CELLS} cells"))
-    } else {
-        LmmData::new(&with_vaf, FixedEffects::Covariate { centre })
-            .and_then(|table| estimated(&table))
-            .map_err(|error| error.to_string())
-    };
-    let why = found.as_ref().err().cloned();
-    let why = why.unwrap_or_else(|| "the likelihood is too flat for degrees of freedom".to_owned());
-    let found = found.ok();
-    let mut g = values.group("slope_variance", why);
-    g.maybe("variance", found.map(|f| f.variance));
-    g.maybe("sd", found.map(|f| f.variance.sqrt()));
-    g.maybe("chi2", found.map(|f| f.chi2));
-    g.maybe("p", found.and_then(|f| f.p));
-    g.maybe("slope", found.map(|f| f.slope.estimate));
-    g.maybe("slope_se", found.map(|f| f.slope.se));
-    g.interval("slope_ci95", found.and_then(|f| f.slope.ci95));
 }
 
 fn put(name: &str, found: Option<Disagreement>, why: &str, values: &mut Values) {

@@ -15,7 +15,9 @@ use super::cells::Cells;
 use super::design::Design;
 use super::identifiers::group_id;
 use super::values::Values;
+use super::verdicts;
 use super::warning::Warning;
+use study_stats::level;
 
 pub use pairs::Pair;
 pub(super) use vaf::permutation;
@@ -29,7 +31,7 @@ pub enum Question {
     Delivered,
     /// Does the memory of the identification (the forgetting factor) matter?
     Memory,
-    /// Does the realization with the highest mean differ from the second?
+    /// Does the best-rated realization differ from the second best?
     Best,
     /// Do the realizations differ?
     Differ,
@@ -41,7 +43,7 @@ pub enum Question {
     Order,
     /// Does a rating depend on the one before it?
     CarryOver,
-    /// Does the realization with the highest mean differ from this reference?
+    /// Does the best-rated realization differ from this reference?
     Reference(String),
     /// Is it equivalent to this reference, within the stated margin?
     Equivalence(String),
@@ -238,7 +240,7 @@ impl Test {
 
     /// Whether it is significant.
     pub fn is_significant(&self) -> bool {
-        self.p < self.level
+        level::rejects(self.p, self.level)
     }
 
     pub(super) fn verdict(&self) -> Verdict {
@@ -350,7 +352,7 @@ struct Facts<'a> {
     rules: &'a Rules,
     values: &'a Values,
     pairs: Vec<Pair>,
-    /// Adjusted mean and name of the tested realizations, highest first.
+    /// Adjusted mean and name of the tested realizations, best first.
     ranked: Vec<(f64, &'a str)>,
 }
 
@@ -374,7 +376,11 @@ pub(super) fn findings(
         rules,
         values,
         pairs: pairs::all(cells, rules, values),
-        ranked: others::ranked(cells, values),
+        ranked: verdicts::ranked(
+            cells.tested().into_iter().map(|m| cells.model_name(m)),
+            values,
+            rules.better,
+        ),
     };
     let mut found = others::against_references(&facts);
     found.extend(vaf::vaf(&facts));

@@ -8,6 +8,7 @@ use super::design::Design;
 use super::identifiers::group_id;
 use super::values::Values;
 use study_stats::anova::one_way;
+use study_stats::correlation::equivalence;
 use study_stats::distribution::t_quantile;
 use study_stats::paired::equivalence_of;
 use study_stats::power::{detectable_correlation, detectable_difference};
@@ -24,6 +25,9 @@ pub(super) fn headline(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     sensitivity(Design::of(cells), rules.alpha, values);
     if let Some(margin) = rules.equivalence_margin {
         little_effect_of_vaf(cells, margin, values);
+    }
+    if let Some(margin) = rules.equivalence_r {
+        little_correlation(margin, values);
     }
 }
 
@@ -50,6 +54,20 @@ fn little_effect_of_vaf(cells: &Cells<'_>, margin: f64, values: &mut Values) {
     g.maybe("effect", found.map(|(effect, _)| effect));
     g.maybe("p", found.map(|(_, tests)| tests.p));
     g.interval("ci90", found.map(|(_, tests)| tests.ci90));
+}
+
+/// Whether the correlation with VAF is within ± the margin, by Fisher's z.
+fn little_correlation(margin: f64, values: &mut Values) {
+    let n = values.number("corr_adjusted/n_models").unwrap_or(0.0);
+    let r = values.number("corr_adjusted/pearson/r");
+    let found = r.and_then(|r| equivalence(r, n - 3.0, margin));
+    let mut g = values.group(
+        "equivalence/r",
+        "there is no correlation, it is ±1, or it rests on fewer than four realizations",
+    );
+    g.put("margin", margin);
+    g.maybe("p", found.map(|e| e.p));
+    g.interval("ci90", found.map(|e| e.ci90));
 }
 
 /// The smallest effects that the design finds with a power of 80 %.

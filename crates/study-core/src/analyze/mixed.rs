@@ -1,5 +1,5 @@
 //! Linear mixed models: `lmm_model`, `lmm_vaf`, `lmm_vaf_slope`,
-//! `lmm_vaf_crossed`, `lmm_crossed`, `lmm_variance`. All over the tested
+//! `lmm_vaf_crossed`, `slope_variance`, `lmm_crossed`, `lmm_variance`. All over the tested
 //! realizations, including subjects who did not rate all of them.
 //!
 //! Of the models with VAF only `lmm_vaf_crossed` generalizes to other realizations:
@@ -12,7 +12,7 @@ use study_stats::describe::{mean, sum_of_squares};
 use study_stats::distribution::chi2_upper;
 use study_stats::lmm::{
     CellSummary, ContrastT, Criterion, FixedEffects, LmmData, LmmError, LmmFit, RandomEffects, fit,
-    kenward_roger,
+    kenward_roger, slope_variance as variance_of_slopes,
 };
 use thiserror::Error;
 
@@ -28,6 +28,10 @@ struct Data {
     has_vaf: bool,
     /// Whether a cell with a VAF has two ratings.
     repeats: bool,
+    /// The number of cells with a VAF.
+    cells: usize,
+    /// Whether all tested realizations have a VAF: then `all` is `vaf_null`.
+    all_have_vaf: bool,
     /// The slope on VAF with fixed effects of the subjects.
     within_subjects: Option<f64>,
     /// Mean VAF over realizations, or over rows if each row has its own; 0 without VAF.
@@ -55,7 +59,15 @@ enum NotFitted {
 
 /// Only `lmm_vaf_crossed`.
 pub(super) fn only_crossed(cells: &Cells<'_>, values: &mut Values) {
-    vaf_crossed(cells, &Data::of(cells), values);
+    let data = Data::of(cells);
+    let null = crossed_without_vaf(&data);
+    vaf_crossed(
+        cells,
+        &data,
+        crossed_with_vaf(&data).as_ref(),
+        &null,
+        values,
+    );
 }
 
 pub(super) fn mixed(cells: &Cells<'_>, values: &mut Values) {
@@ -63,9 +75,12 @@ pub(super) fn mixed(cells: &Cells<'_>, values: &mut Values) {
     model(cells, &data, values);
     vaf(cells, &data, values);
     vaf_slope(cells, &data, values);
-    vaf_crossed(cells, &data, values);
-    crossed(cells, &data, values);
-    variance(&data, values);
+    let fitted = crossed_with_vaf(&data);
+    let null = crossed_without_vaf(&data);
+    vaf_crossed(cells, &data, fitted.as_ref(), &null, values);
+    slope_variance(&data, fitted.as_ref(), values);
+    crossed(cells, &data, &null, values);
+    variance(&data, &null, values);
     share_of_vaf(values);
 }
 
@@ -121,7 +136,8 @@ impl Data {
         };
         let vaf_null = LmmData::new(&with_vaf, FixedEffects::Intercept);
         // If every realization has a VAF, the ratings are the same.
-        let all = if all.len() == with_vaf.len() && !by_row {
+        let all_have_vaf = all.len() == with_vaf.len() && !by_row;
+        let all = if all_have_vaf {
             vaf_null.clone()
         } else {
             LmmData::new(&all, FixedEffects::Intercept)
@@ -133,6 +149,8 @@ impl Data {
             all,
             has_vaf: !with_vaf.is_empty(),
             repeats: with_vaf.iter().any(|c| c.n > 1),
+            cells: with_vaf.len(),
+            all_have_vaf,
             within_subjects: within_subjects(&with_vaf),
             centre,
             by_row: by_row && !with_vaf.is_empty(),
@@ -360,22 +378,33 @@ fn vaf_slope(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     }
 }
 
-fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
+/// rating ~ VAF + (1 | subject) + (1 | realization) [+ (1 | cell)], by REML.
+fn crossed_with_vaf(data: &Data) -> Result<LmmFit<'_>, NotFitted> {
+    if data.by_row {
+        return Err(NotFitted::VafByRow);
+    }
+    let fitted = given(&data.vaf)
+        .and_then(|table| fit(table, RandomEffects::crossed(table), Criterion::Reml));
+    fitted.map_err(|error| data.reason(error))
+}
+
+/// The same without VAF, over the same ratings.
+fn crossed_without_vaf(data: &Data) -> Result<LmmFit<'_>, LmmError> {
+    let table = given(&data.vaf_null)?;
+    fit(table, RandomEffects::crossed(table), Criterion::Reml)
+}
+
+fn vaf_crossed(
+    cells: &Cells<'_>,
+    data: &Data,
+    fitted: Result<&LmmFit<'_>, &NotFitted>,
+    null: &Result<LmmFit<'_>, LmmError>,
+    values: &mut Values,
+) {
     let cell = data.repeats;
-    let found = (|| {
-        if data.by_row {
-            return Err(NotFitted::VafByRow);
-        }
-        let why = |e| data.reason(e);
-        let table = given(&data.vaf).map_err(why)?;
-        let random = RandomEffects {
-            realization: true,
-            cell,
-            ..RandomEffects::default()
-        };
-        let reml = fit(table, random, Criterion::Reml).map_err(why)?;
+    let found = fitted.map(|reml| {
         let mut g = values.group("lmm_vaf_crossed", NO_DF);
-        coefficients(&mut g, &reml, -data.centre, cells.offset);
+        coefficients(&mut g, reml, -data.centre, cells.offset);
         let v = reml.variances;
         g.put("var_subject", v.intercept);
         g.put("var_model", v.realization);
@@ -385,13 +414,11 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
         }
         // The share of VAF is relative to the same model without it: other terms would
         // attribute the interaction to VAF.
-        let without = given(&data.vaf_null).and_then(|t| fit(t, random, Criterion::Reml));
-        match without {
-            Ok(without) => g.put("var_model_without_vaf", without.variances.realization),
+        match null {
+            Ok(null) => g.put("var_model_without_vaf", null.variances.realization),
             Err(error) => g.put_or("var_model_without_vaf", None, &error.to_string()),
         }
-        Ok(())
-    })();
+    });
     if let Err(why) = found {
         let mut g = values.group("lmm_vaf_crossed", why.to_string());
         g.none(&COVARIATE);
@@ -407,13 +434,54 @@ fn vaf_crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
     }
 }
 
-fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
+/// Most cells for which the variance of the slopes is estimated: its matrices grow with
+/// them.
+const MAX_CELLS: usize = 1000;
+
+/// The variance of the participants' slopes on VAF, beside the model without it.
+fn slope_variance(data: &Data, without: Result<&LmmFit<'_>, &NotFitted>, values: &mut Values) {
+    let found = match without {
+        Err(why) => Err(why.to_string()),
+        Ok(_) if data.cells > MAX_CELLS => Err(format!("more than {MAX_CELLS} cells")),
+        Ok(without) => variance_of_slopes(without).map_err(|error| data.reason(error).to_string()),
+    };
+    let why = found.as_ref().err().cloned();
+    let found = found.ok();
+    let mut g = values.group("slope_variance", why.unwrap_or_else(|| NO_DF.to_owned()));
+    g.maybe("variance", found.map(|f| f.variance));
+    g.maybe("sd", found.map(|f| f.variance.sqrt()));
+    g.maybe("chi2", found.map(|f| f.chi2));
+    g.maybe("p", found.and_then(|f| f.p));
+    g.maybe("slope", found.map(|f| f.slope.estimate));
+    g.maybe("slope_se", found.map(|f| f.slope.se));
+    g.interval("slope_ci95", found.and_then(|f| f.slope.ci95));
+}
+
+/// A model of all ratings, unless it is `null`: then it is not fitted again.
+fn of_all<'a>(
+    data: &'a Data,
+    random: RandomEffects,
+    null: &Result<LmmFit<'a>, LmmError>,
+) -> Result<LmmFit<'a>, LmmError> {
+    let table = given(&data.all)?;
+    if data.all_have_vaf && random == RandomEffects::crossed(table) {
+        return null.clone();
+    }
+    fit(table, random, Criterion::Reml)
+}
+
+fn crossed<'a>(
+    cells: &Cells<'_>,
+    data: &'a Data,
+    null: &Result<LmmFit<'a>, LmmError>,
+    values: &mut Values,
+) {
     let found = (|| {
         let random = RandomEffects {
             realization: true,
             ..RandomEffects::default()
         };
-        let reml = fit(given(&data.all)?, random, Criterion::Reml)?;
+        let reml = of_all(data, random, null)?;
         let mean = reml.t_test(&[1.0]);
         let mut g = values.group("lmm_crossed", NO_DF);
         g.put("reml_deviance", reml.deviance);
@@ -437,17 +505,14 @@ fn crossed(cells: &Cells<'_>, data: &Data, values: &mut Values) {
 }
 
 /// Variance components: ~ 1 + (1|subject) + (1|model) + (1|subject:model).
-fn variance(data: &Data, values: &mut Values) {
+fn variance<'a>(data: &'a Data, null: &Result<LmmFit<'a>, LmmError>, values: &mut Values) {
     let random = RandomEffects {
         realization: true,
         cell: true,
         ..RandomEffects::default()
     };
-    let components = |table: &Result<LmmData, LmmError>| -> Result<_, LmmError> {
-        Ok(fit(given(table)?, random, Criterion::Reml)?.variances)
-    };
     let names = ["subject", "model", "subject_model", "error"];
-    match components(&data.all) {
+    match of_all(data, random, null).map(|fit| fit.variances) {
         Ok(v) => {
             let parts = [v.intercept, v.realization, v.cell, v.error];
             let total: f64 = parts.iter().sum();

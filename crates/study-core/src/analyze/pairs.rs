@@ -3,16 +3,16 @@
 //! The paired t test of cell means over the participants who rated everything; where
 //! they are too few, contrasts of the mixed model of all cells. Holm's correction is
 //! over all pairs. Up to [`MAX_PAIRED`] realizations every pair is given, above the
-//! realization with the highest mean against each other one; the correction counts
-//! the pairs that are not given, because the highest mean is chosen by the ratings. With a
+//! best-rated realization against each other one; the correction counts the pairs that are
+//! not given, because the best is chosen by the ratings. With a
 //! preregistered margin each pair is also tested for equivalence.
 
-use super::Rules;
 use super::adjusted::{Adjusted, MAX_COMPARED};
 use super::cells::Cells;
 use super::effects::MAX_PAIRED;
 use super::identifiers::pair_id;
 use super::values::Values;
+use super::{Better, Rules};
 use study_stats::describe::{mean, sd};
 use study_stats::lmm::ContrastT;
 use study_stats::paired::{Equivalence, equivalence_of, holm, one_sample};
@@ -62,7 +62,8 @@ pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules, value
     let tost: Vec<Option<Equivalence>> = found.iter().map(tost).collect();
     let tost_holm = holm(&tost.iter().map(|e| e.map(|e| e.p)).collect::<Vec<_>>());
     let compared = p_holm.iter().flatten().count();
-    let best = (k > MAX_PAIRED).then(|| highest(adjusted.means.as_deref().unwrap_or_default()));
+    let means = adjusted.means.as_deref().unwrap_or_default();
+    let best = (k > MAX_PAIRED).then(|| first_best(means, rules.better));
     values.group("pair", "").put("n_compared", compared as f64);
     for (i, (d, p_holm)) in found.iter().zip(p_holm).enumerate() {
         if best.is_some_and(|best| best != Some(d.first) && best != Some(d.second)) {
@@ -88,9 +89,9 @@ pub(super) fn pairs(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules, value
     }
 }
 
-/// The position of the first highest mean.
-fn highest(means: &[f64]) -> Option<usize> {
-    (0..means.len()).reduce(|best, i| if means[i] > means[best] { i } else { best })
+/// The position of the first best mean.
+fn first_best(means: &[f64], better: Better) -> Option<usize> {
+    (0..means.len()).min_by(|&i, &j| better.best_first(means[i], means[j]))
 }
 
 /// Paired t tests over the participants who rated everything.

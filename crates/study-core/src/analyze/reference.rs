@@ -8,7 +8,8 @@ use super::exclude;
 use super::identifiers::group_id;
 use super::values::Values;
 use crate::protocol::Role;
-use study_stats::describe::{mean, rounded};
+use study_stats::describe::{is_constant, mean, rounded};
+use study_stats::level::rejects;
 use study_stats::paired::{equivalence, holm, one_sample};
 
 pub(super) fn reference(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
@@ -29,7 +30,7 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
     let found: Vec<(usize, Vec<f64>)> = (tests.iter())
         .map(|&t| {
             let pair = cells.table(&[t, r]);
-            (t, pair.rows.iter().map(|p| rounded(p[0] - p[1])).collect())
+            (t, differences(&pair.rows))
         })
         .collect();
     let p: Vec<Option<f64>> = (found.iter())
@@ -65,16 +66,23 @@ fn contrasts(cells: &Cells<'_>, r: usize, tests: &[usize], rules: &Rules, values
         g.interval("ci90", e.map(|e| e.ci90));
         g.maybe(
             "equivalent",
-            e.map(|e| f64::from(u8::from(e.p < rules.alpha))),
+            e.map(|e| f64::from(u8::from(rejects(e.p, rules.alpha)))),
         );
     }
+}
+
+/// First minus second of each row; equal numbers if they differ by rounding only.
+fn differences(rows: &[Vec<f64>]) -> Vec<f64> {
+    let exact: Vec<f64> = rows.iter().map(|r| r[0] - r[1]).collect();
+    let equal: Vec<f64> = exact.iter().map(|d| rounded(*d)).collect();
+    if is_constant(&equal) { equal } else { exact }
 }
 
 /// Hidden duplicate minus original, over subjects.
 fn duplicates(cells: &Cells<'_>, values: &mut Values) {
     for (d, o) in exclude::pairs(cells.ratings) {
         let pair = cells.table(&[d, o]);
-        let differences: Vec<f64> = pair.rows.iter().map(|r| rounded(r[0] - r[1])).collect();
+        let differences = differences(&pair.rows);
         let sizes: Vec<f64> = differences.iter().map(|v| v.abs()).collect();
         let test = one_sample(&differences);
         let id = group_id("duplicate", &[cells.model_name(d)]);

@@ -61,6 +61,15 @@ pub(super) fn against_vaf(
     within(cells, &models, values);
 }
 
+/// Of `corr/*` what is compared with the finding.
+pub(super) fn raw(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
+    let mut models = cells.tested();
+    models.retain(|&m| cells.vaf[m].is_some());
+    let by_model = cells.subject_means();
+    let p = Points::of(cells, &models, |m| cells.vaf[m], |m| mean(&by_model[m]));
+    pearson_of("corr", &p.vaf, &p.means, rules, values);
+}
+
 /// Of `corr_adjusted/*` what the finding rests on.
 pub(super) fn deciding(cells: &Cells<'_>, adjusted: &Adjusted, rules: &Rules, values: &mut Values) {
     let mut models = cells.tested();

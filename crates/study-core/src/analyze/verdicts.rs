@@ -2,7 +2,7 @@
 
 use super::identifiers::group_id;
 use super::values::Values;
-use super::{Analysis, Finding, Pair, Question, RealizationSummary};
+use super::{Analysis, Better, Finding, Pair, Question, RealizationSummary};
 
 /// Whether the realizations were identified with a known forgetting factor.
 pub(super) fn has_memory(values: &Values) -> bool {
@@ -19,6 +19,18 @@ fn tied(mut numbers: Vec<f64>) -> usize {
     numbers.sort_by(f64::total_cmp);
     let groups = numbers.chunk_by(|x, y| is_close(*x, *y));
     groups.map(<[f64]>::len).filter(|n| *n > 1).sum()
+}
+
+/// Adjusted mean and name of realizations, the best first, equal ones by name.
+pub(super) fn ranked<'a>(
+    names: impl Iterator<Item = &'a str>,
+    values: &Values,
+    better: Better,
+) -> Vec<(f64, &'a str)> {
+    let mean = |name: &str| values.number(&format!("{}/mean", group_id("adjusted", &[name])));
+    let mut ranked: Vec<(f64, &str)> = names.filter_map(|name| Some((mean(name)?, name))).collect();
+    ranked.sort_by(|x, y| better.best_first(x.0, y.0).then(x.1.cmp(y.1)));
+    ranked
 }
 
 impl Analysis {
@@ -52,16 +64,15 @@ impl Analysis {
         self.findings.iter().find(|f| f.question == *question)
     }
 
-    /// The mean on which verdicts rest and the name of the tested realizations, highest mean
+    /// The mean on which verdicts rest and the name of the tested realizations, the best
     /// first, equal ones by name: the adjusted mean if cells are missing, else the mean over
     /// participants.
     pub fn ranked(&self) -> Vec<(f64, &str)> {
-        let names = self.tested().map(|m| m.id.as_str());
-        let mut ranked: Vec<(f64, &str)> = names
-            .filter_map(|id| Some((self.about("adjusted", &[id], "mean")?, id)))
-            .collect();
-        ranked.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(y.1)));
-        ranked
+        ranked(
+            self.tested().map(|m| m.id.as_str()),
+            &self.values,
+            self.better,
+        )
     }
 
     /// The comparison of two realizations, the first minus the second.

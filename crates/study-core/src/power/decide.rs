@@ -12,6 +12,7 @@ use study_stats::clm::{CategoryCount, CategoryCounts, Predictor};
 use study_stats::clmm::clmm_crossed;
 use study_stats::distribution::t_quantile;
 use study_stats::friedman::friedman;
+use study_stats::level;
 use study_stats::lmm::balanced_slope;
 use study_stats::permutation::Decision;
 
@@ -33,18 +34,12 @@ pub(super) struct Outcome {
 pub(super) struct Judge<'a> {
     settings: &'a Settings,
     cell: Cell,
-    /// The permutation test and the verdict that rests on it, prepared for the VAF that all
-    /// studies share.
-    permutation: [Option<Decision>; 2],
+    /// The permutation test, prepared for the VAF that all studies share.
+    permutation: Option<Decision>,
     /// Critical t by degrees of freedom, which are whole numbers in closed forms.
     critical: HashMap<u64, f64>,
     /// Cell means of the study.
     means: Vec<f64>,
-}
-
-/// The permutation test rejects for p ≤ α, the verdict of the analysis for p < α.
-fn permutation(settings: &Settings, test: Test, vaf: &[f64]) -> Option<Decision> {
-    Decision::new(vaf, settings.alpha, test == Test::Permutation)
 }
 
 const UNDEFINED: &str = "no variation, or too few participants or realizations";
@@ -56,8 +51,7 @@ impl<'a> Judge<'a> {
         Self {
             settings,
             cell,
-            permutation: [Test::Permutation, Test::Verdict]
-                .map(|test| permutation(settings, test, &vaf)),
+            permutation: Decision::new(&vaf, settings.alpha),
             critical: HashMap::new(),
             means: Vec::new(),
         }
@@ -109,10 +103,10 @@ impl<'a> Judge<'a> {
                 Test::Pearson => line.map(|l| l.slope.abs() > critical * l.se),
                 Test::Permutation | Test::Verdict => {
                     let own = (settings.assumptions.vaf == Vaf::Drawn)
-                        .then(|| permutation(settings, *test, &study.vaf))
+                        .then(|| Decision::new(&study.vaf, settings.alpha))
                         .flatten();
-                    let shared = &self.permutation[usize::from(*test == Test::Verdict)];
-                    let decision = own.as_ref().or(shared.as_ref()).filter(|_| line.is_some());
+                    let shared = self.permutation.as_ref();
+                    let decision = own.as_ref().or(shared).filter(|_| line.is_some());
                     decision.and_then(|d| d.rejects(&columns, &mut draws()))
                 }
                 Test::Crossed => crossed.map(|c| c.estimate.abs() > self.critical(c.df) * c.se),
@@ -139,7 +133,7 @@ impl<'a> Judge<'a> {
         };
         let Deciding { finding, values } = analyze::deciding(&ratings, &rules);
         let alpha = self.settings.alpha;
-        let below = |id: &str| Some(values.number(id)? <= alpha);
+        let below = |id: &str| Some(level::rejects(values.number(id)?, alpha));
         let of = |what: &str| values.number(&format!("lmm_vaf_crossed/{what}"));
         let mut tests = Vec::new();
         for test in &self.settings.tests {

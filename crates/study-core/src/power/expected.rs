@@ -1,6 +1,7 @@
 //! What is known without simulation, and the search for the smallest design.
 
 use super::{Cell, CellResult, Link, Scale, Settings, Vaf};
+use study_stats::level;
 use study_stats::permutation;
 use study_stats::power::covariate::{Design, Expected, Spread, Values};
 
@@ -54,7 +55,7 @@ pub fn floor(vaf: &[f64], alpha: f64) -> Option<Floor> {
     let smallest_p = permutation::floor(vaf)?;
     Some(Floor {
         smallest_p,
-        can_reject: smallest_p <= alpha,
+        can_reject: level::rejects(smallest_p, alpha),
     })
 }
 
@@ -77,7 +78,7 @@ pub enum Reach {
     Ceiling(f64),
     /// None up to the largest number that is considered, although the ceiling is higher.
     Limit(usize),
-    /// The permutation test has no p below the level.
+    /// The permutation test has no p at or below the level.
     NoSmallP(f64),
 }
 

@@ -10,7 +10,7 @@ words! {
         Verdict = "verdict",
         /// Pearson's r over realizations, t test.
         Pearson = "pearson",
-        /// The permutation test of Pearson's r, p at most α. (The verdict wants p below α.)
+        /// The permutation test of Pearson's r, on which the verdict rests.
         Permutation = "permutation",
         /// The slope of the crossed mixed model.
         Crossed = "crossed",

@@ -228,6 +228,11 @@ impl LmmData {
         }
     }
 
+    /// Whether a cell has two ratings.
+    pub(super) fn repeats(&self) -> bool {
+        self.n > self.cells as f64
+    }
+
     /// Number of fixed effects p.
     pub(super) fn columns(&self) -> usize {
         match self.fixed {

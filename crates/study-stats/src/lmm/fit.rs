@@ -93,7 +93,7 @@ fn identified(table: &LmmData, random: RandomEffects) -> Result<(), LmmError> {
     if random.slope && !table.x_within {
         return Err(LmmError::NoSlope);
     }
-    if random.cell && table.n <= table.cells as f64 {
+    if random.cell && !table.repeats() {
         return Err(LmmError::NoRepetition);
     }
     // The residual with every random effect taken as a fixed one: for large γ the

@@ -1,6 +1,5 @@
 //! Whether subjects differ in their slope on the covariate.
 
-use super::data::LmmData;
 use super::fit::{Criterion, LmmFit, fit};
 use super::satterthwaite::ContrastT;
 use super::{LmmError, RandomEffects};
@@ -24,25 +23,21 @@ pub struct SlopeVariance {
 /// Estimates and tests the variance in y ~ x + (1 + x | subject) + (1 | realization)
 /// [+ (1 | cell) if a cell has two ratings], by REML. Without the random realizations, and
 /// the cells, differences between realizations that x does not explain would be taken
-/// for differences between slopes.
+/// for differences between slopes. `without` is the same model without the slopes, fitted
+/// by REML.
 ///
 /// # Errors
-/// If the table has no covariate that varies within subjects, or a model has no fit.
-pub fn slope_variance(table: &LmmData) -> Result<SlopeVariance, LmmError> {
-    let without = RandomEffects {
-        slope: false,
-        realization: true,
-        cell: table.n > table.cells as f64,
-    };
-    let with = RandomEffects {
-        slope: true,
-        ..without
-    };
+/// If the table has no covariate that varies within subjects, or the model has no fit.
+pub fn slope_variance(without: &LmmFit<'_>) -> Result<SlopeVariance, LmmError> {
+    let table = without.table;
     if table.columns() != 2 {
         return Err(LmmError::ConstantCovariate);
     }
-    let reml = |random| -> Result<LmmFit<'_>, LmmError> { fit(table, random, Criterion::Reml) };
-    let (with, without) = (reml(with)?, reml(without)?);
+    let random = RandomEffects {
+        slope: true,
+        ..RandomEffects::crossed(table)
+    };
+    let with = fit(table, random, Criterion::Reml)?;
     let chi2 = (without.deviance - with.deviance).max(0.0);
     let p = chi2_upper(chi2, 1.0).zip(chi2_upper(chi2, 2.0));
     Ok(SlopeVariance {

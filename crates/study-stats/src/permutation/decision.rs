@@ -7,6 +7,7 @@
 
 use super::super::describe::{is_constant, mean, sorted, sum_of_squares};
 use super::{DRAWS, MAX_EXACT, TIE, enumerate_orders};
+use crate::level;
 use crate::random::RandomSource;
 
 /// Decides at one level for one x.
@@ -23,9 +24,9 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// Prepares decisions of [`super::test`]: p ≤ `alpha`, which keeps the level, or, unless
-    /// `inclusive`, p < `alpha`. `None` for fewer than three x or if they do not vary.
-    pub fn new(x: &[f64], alpha: f64, inclusive: bool) -> Option<Self> {
+    /// Prepares decisions of [`super::test`] at the level `alpha`. `None` for fewer than
+    /// three x or if they do not vary.
+    pub fn new(x: &[f64], alpha: f64) -> Option<Self> {
         let x = standardized(x)?;
         let exact = x.len() <= MAX_EXACT;
         let all = if exact {
@@ -35,10 +36,7 @@ impl Decision {
         };
         // The smallest count whose share is too large; the observed order counts too.
         let from = (alpha * all as f64) as u64;
-        let too_many = |count: &u64| {
-            let p = *count as f64 / all as f64;
-            p > alpha || (p >= alpha && !inclusive)
-        };
+        let too_many = |count: &u64| !level::rejects(*count as f64 / all as f64, alpha);
         let near = from.saturating_sub(1)..=from + 1;
         let limit = near.into_iter().find(too_many).unwrap_or(from + 2);
         let mut found = Self {
@@ -190,7 +188,7 @@ mod tests {
     #[test]
     fn decisions_are_those_of_the_test() {
         let mut noise = SplitMix64::new(5);
-        let (mut rejected, mut apart) = (0, 0);
+        let (mut rejected, mut met) = (0, 0);
         for round in 0..1200 {
             // Of five numbers, p can be .05 exactly: 6 of 120 orders.
             let n = if round < 240 { 3 + round % 9 } else { 5 };
@@ -211,18 +209,14 @@ mod tests {
             let alpha = [0.05, 0.01, 0.25][round / 9 % 3];
             let seeded = || SplitMix64::new(round as u64);
             let whole = test(Statistic::Pearson, &x, &y, &mut seeded());
-            let decided = |inclusive| {
-                let decision = Decision::new(&x, alpha, inclusive).unwrap();
-                decision.rejects(&y, &mut seeded())
-            };
-            let (with, without) = (decided(true), decided(false));
-            assert_eq!(with, whole.map(|t| t.two_sided <= alpha), "{x:?} {y:?}");
-            assert_eq!(without, whole.map(|t| t.two_sided < alpha), "{x:?} {y:?}");
-            rejected += u32::from(with == Some(true));
-            apart += u32::from(with != without);
+            let decision = Decision::new(&x, alpha).unwrap();
+            let decided = decision.rejects(&y, &mut seeded());
+            assert_eq!(decided, whole.map(|t| t.two_sided <= alpha), "{x:?} {y:?}");
+            rejected += u32::from(decided == Some(true));
+            met += u32::from(whole.is_some_and(|t| t.two_sided == alpha));
         }
         assert!((40..1000).contains(&rejected), "{rejected}");
-        assert!(apart > 0);
-        assert!(Decision::new(&[1.0; 4], 0.05, true).is_none());
+        assert!(met > 0);
+        assert!(Decision::new(&[1.0; 4], 0.05).is_none());
     }
 }

@@ -4,6 +4,7 @@ use super::{Estimate, Facts, Finding, Question, Test, TestKind};
 use crate::analyze::effects::MAX_COLUMNS;
 use study_base::apa;
 use study_base::text::counted;
+use study_stats::level::rejects;
 
 /// The tests that can decide, chosen by the design.
 fn chosen(facts: &Facts<'_>) -> TestKind {
@@ -91,7 +92,7 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
         );
     }
     if let Some(least) = smallest_friedman(d.complete, d.realizations)
-        .filter(|p| used == TestKind::FriedmanExact && *p >= facts.rules.alpha)
+        .filter(|p| used == TestKind::FriedmanExact && !rejects(*p, facts.rules.alpha))
     {
         found.caveat(
             "too-few",
@@ -107,7 +108,7 @@ pub(super) fn differ(facts: &Facts<'_>) -> Option<Finding> {
 
 /// The smallest exact p of Friedman's test for two participants: both rank alike, 1/k!.
 fn smallest_friedman(participants: usize, k: usize) -> Option<f64> {
-    (participants == 2).then(|| (2..=k).fold(1.0, |p, i| p / i as f64))
+    (participants == 2).then(|| 1.0 / (2..=k).map(|i| i as f64).product::<f64>())
 }
 
 fn test(facts: &Facts<'_>, kind: TestKind) -> Option<Test> {

@@ -1,26 +1,11 @@
-//! Memory, order, references, hidden duplicates; and the ranking.
+//! Memory, order, references and hidden duplicates.
 
 use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind, Verdict};
-use crate::analyze::cells::Cells;
 use crate::analyze::exclude;
 use crate::analyze::identifiers::group_id;
-use crate::analyze::values::Values;
 use crate::protocol::Role;
 use study_base::apa;
-
-/// Adjusted mean and name of the tested realizations, the highest mean first, equal
-/// ones by name.
-pub(super) fn ranked<'a>(cells: &'a Cells<'_>, values: &Values) -> Vec<(f64, &'a str)> {
-    let mut ranked: Vec<(f64, &str)> = (cells.tested().iter())
-        .filter_map(|&m| {
-            let name = cells.model_name(m);
-            let id = group_id("adjusted", &[name]);
-            Some((values.number(&format!("{id}/mean"))?, name))
-        })
-        .collect();
-    ranked.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(y.1)));
-    ranked
-}
+use study_stats::level::rejects;
 
 /// Whether the memory matters: a linear and a quadratic term, each at half the level.
 pub(super) fn memory(facts: &Facts<'_>) -> Option<Finding> {
@@ -146,7 +131,7 @@ pub(super) fn order(facts: &Facts<'_>) -> Option<Finding> {
         let (Some(slope), Some(p)) = (get("slope"), get("p_holm")) else {
             continue;
         };
-        if p < facts.rules.alpha {
+        if rejects(p, facts.rules.alpha) {
             let shown = apa::number(slope, 3);
             let p = apa::p_beside(p, facts.rules.alpha);
             found.caveat(
@@ -177,7 +162,7 @@ pub(super) fn carry_over(facts: &Facts<'_>) -> Option<Finding> {
     })
 }
 
-/// The realization with the highest mean against each reference, anchor and physical
+/// The best-rated realization against each reference, anchor and physical
 /// sample: a difference, and equivalence within the stated margin.
 pub(super) fn against_references(facts: &Facts<'_>) -> Vec<Finding> {
     let Some(&(_, best)) = facts.ranked.first() else {

@@ -1,5 +1,5 @@
-//! Pairs of realizations: which of them differ, and does the highest mean differ from
-//! the second?
+//! Pairs of realizations: which of them differ, and does the best-rated differ from the
+//! second best?
 
 use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind, Verdict};
 use crate::analyze::Rules;
@@ -145,7 +145,7 @@ fn not_compared(facts: &Facts<'_>, pair: Option<&Pair>) -> String {
     }
 }
 
-/// Whether the realization with the highest mean differs from the second: two-sided, and
+/// Whether the best-rated realization differs from the second best: two-sided, and
 /// not corrected for the number of realizations. Of the realizations that are really the
 /// highest, equal ones included, none is then taken for the only one in more than a share
 /// α of studies (Gutmann & Maymin 1987, Ann. Stat. 15, 456–461; Hung & Fithian 2019, Ann.

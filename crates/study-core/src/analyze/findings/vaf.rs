@@ -3,6 +3,7 @@
 use super::{Direction, Estimate, Facts, Finding, Question, Test, TestKind, Verdict};
 use crate::analyze::values::Values;
 use study_base::apa;
+use study_stats::level::rejects;
 
 /// The group of statistics that decides: correlations with adjusted means, which are the
 /// means over participants if no cell is missing.
@@ -85,7 +86,7 @@ pub(in crate::analyze) fn permutation(values: &Values, group: &str, alpha: f64) 
 /// Says so if no order of the realizations gives a small p.
 fn too_few(facts: &Facts<'_>, group: &str, found: &mut Finding) {
     let least = facts.number(&format!("{group}/pearson/smallest_p_two_sided"));
-    if let Some(least) = least.filter(|p| *p >= facts.rules.alpha) {
+    if let Some(least) = least.filter(|p| !rejects(*p, facts.rules.alpha)) {
         found.caveat(
             "too-few",
             format!(
@@ -103,13 +104,28 @@ fn caveats(facts: &Facts<'_>, found: &mut Finding) {
         facts.number("equivalence/vaf/p"),
         facts.number("equivalence/vaf/margin"),
         &found.verdict,
-    ) && p < alpha
+    ) && rejects(p, alpha)
     {
         found.caveat(
             "equivalent",
             format!(
                 "from the lowest to the highest VAF the rating changes by less than {margin} points \
                  (two one-sided t tests, p {})",
+                apa::p_beside(p, alpha)
+            ),
+        );
+    }
+    if let (Some(p), Some(margin), Verdict::NotShown) = (
+        facts.number("equivalence/r/p"),
+        facts.number("equivalence/r/margin"),
+        &found.verdict,
+    ) && rejects(p, alpha)
+    {
+        found.caveat(
+            "equivalent-r",
+            format!(
+                "the correlation is within ± {} (two one-sided tests by Fisher's z, p {})",
+                apa::share(margin, 2),
                 apa::p_beside(p, alpha)
             ),
         );
@@ -137,7 +153,7 @@ fn caveats(facts: &Facts<'_>, found: &mut Finding) {
     let raw_p = raw_p.iter().find_map(|id| facts.number(id));
     if let (Some(raw), Some(r), Some(raw_p), Some(test), false) =
         (raw, of("r"), raw_p, &found.test, facts.design.is_complete())
-        && (raw * r < 0.0 || (raw_p < alpha) != test.is_significant())
+        && (raw * r < 0.0 || rejects(raw_p, alpha) != test.is_significant())
     {
         found.caveat(
             "raw-and-adjusted",

@@ -17,6 +17,9 @@ pub(super) const ANALYSIS: &[Key] = keys! {
     /// The margin of the tests of equivalence, between realizations, against a hidden
     /// reference and of the effect of VAF: smaller differences count as none.
     "equivalence_margin": Kind::positive("points of the primary scale"), "0.5";
+    /// The margin of the test that the correlation with VAF is none: smaller correlations,
+    /// of either sign, count as none.
+    "equivalence_r": Kind::Number((Bound::Excluded(0.0), Bound::Excluded(1.0)), ""), "0.5";
     /// Whether the ratings of unfinished sessions and of drop-outs are analyzed.
     "unfinished": Kind::Word(Unfinished::WORDS), r#""exclude""#, default(r#""include""#);
     /// Exclusion rules stated before the data. Every rule judges the rows that count
@@ -97,6 +100,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
     let vaf = section.text("vaf");
     let realistic_from = section.number("realistic_from");
     let equivalence_margin = section.number("equivalence_margin");
+    let equivalence_r = section.number("equivalence_r");
     let unfinished = section.word("unfinished");
     let alpha = section.number("alpha");
     let construct = section.text("construct");
@@ -108,6 +112,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<AnalysisRules> {
         vaf,
         realistic_from,
         equivalence_margin,
+        equivalence_r,
         unfinished: unfinished?,
         exclude,
         alpha,
