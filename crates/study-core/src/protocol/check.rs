@@ -38,6 +38,7 @@ pub type Spans = BTreeMap<String, Range<usize>>;
 pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<Fault> {
     let mut faults = Vec::new();
     language(protocol, spans, &mut faults);
+    birth_dates(protocol, spans, &mut faults);
     if parts::is_about_realizations(protocol) {
         realizations(protocol, spans, &mut faults);
         vaf(protocol, spans, unread, &mut faults);
@@ -88,6 +89,24 @@ fn language(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
             missing.join(", ")
         )),
     );
+}
+
+/// Questions that ask for a date of birth, which identifies a person.
+fn birth_dates(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    const WORDS: [&str; 6] = ["birth", "geburt", "naissance", "nacimiento", "生年", "出生"];
+    for (i, question) in protocol.intake.iter().enumerate() {
+        let asked = format!("{} {}", question.id, question.prompt).to_lowercase();
+        if WORDS.iter().any(|word| asked.contains(word)) {
+            faults.push(
+                Fault::warning(format!(
+                    "the question `{}` seems to ask for a date of birth, which identifies a person",
+                    question.id
+                ))
+                .at(spans.get(&format!("intake[{i}].prompt")).cloned())
+                .hint("ask for the age in years"),
+            );
+        }
+    }
 }
 
 /// Trials of a session, practice included, unless an orders file has fewer; with staircases
@@ -422,6 +441,21 @@ mod tests {
         assert_eq!(messages(&protocol), ["`A` is practised and then tested"]);
         protocol.models[1].role = Role::Practice;
         assert!(messages(&protocol).contains(&"`B` is never played".to_owned()));
+    }
+
+    #[test]
+    fn a_date_of_birth_gives_a_warning() {
+        let about_birth = |prompt: &str| {
+            let mut protocol = example::protocol(8, 1);
+            let mut question = protocol.questions[0].clone();
+            prompt.clone_into(&mut question.prompt);
+            protocol.intake.push(question);
+            messages(&protocol)
+                .iter()
+                .any(|m| m.contains("date of birth"))
+        };
+        assert!(about_birth("Date of birth") && about_birth("生年月日"));
+        assert!(!about_birth("How old are you?"));
     }
 
     #[test]
