@@ -186,9 +186,10 @@ if (enough) {
 #' ## Ordinal mixed model
 #'
 #' The ratings as ordered categories. `clmm` needs the standardized VAF: with the raw one
-#' its standard errors are off by up to 1 %.
+#' its standard errors are off by up to 1 %, and at least three participants.
 
-if (enough && all(with_vaf$rating == round(with_vaf$rating))) {
+three <- enough && nlevels(droplevels(with_vaf$participant)) > 2
+if (three && all(with_vaf$rating == round(with_vaf$rating))) {
   with_vaf$ordered <- ordered(with_vaf$rating)
   ordinal_fit <- clmm(ordered ~ vaf_z + (1 | participant) + (1 | model), data = with_vaf)
   without <- clmm(ordered ~ 1 + (1 | participant) + (1 | model), data = with_vaf)
@@ -213,6 +214,10 @@ if (enough && all(with_vaf$rating == round(with_vaf$rating))) {
 #' `study` is not compared.
 
 headline <- read_text("headline.csv")
+if (has_ratings && !three) {
+  cat("fewer than three participants: the ordinal model is not compared\n")
+  headline <- headline[!startsWith(headline$id, "clmm_"), ]
+}
 compared <- data.frame(id = headline$id, here = unname(value[headline$id]),
                        study = as.numeric(headline$value),
                        tolerance = as.numeric(headline$tolerance))
