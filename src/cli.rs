@@ -17,6 +17,7 @@ mod identify;
 mod new;
 mod participant;
 mod power;
+mod preregister;
 mod record;
 mod rehearse;
 mod run;
@@ -56,6 +57,8 @@ enum Command {
     Power(Box<power::Args>),
     /// Write the data of a study for other programs and for archives
     Export(export::Args),
+    /// Write a preregistration: design, rules, deciding tests and power before the first session
+    Preregister(preregister::Args),
     /// Show the presentation orders and their balance
     Schedule(schedule::Args),
     /// Show the state of each participant and the next row
@@ -104,6 +107,7 @@ pub fn run(cli: Cli, console: &mut Console) -> Result<(), Failure> {
         Command::Check(args) => check::run(&args, console),
         Command::Power(args) => power::run(&args, console),
         Command::Export(args) => export::run(&args, console),
+        Command::Preregister(args) => preregister::run(&args, console),
         Command::Schedule(args) => schedule::run(&args, console),
         Command::Status(args) => status::run(&args, console),
         Command::Participant(args) => participant::run(&args, console),

@@ -209,6 +209,7 @@ fn simulated(case: &Value) -> Option<Value> {
         },
         pilot: None,
         listed,
+        margin: None,
         tests: vec![Test::Pearson, Test::Permutation, Test::Crossed],
         alpha: number("alpha")?,
         seed: 2007,

@@ -2,6 +2,8 @@
 
 mod grim;
 mod parts;
+mod pool;
+mod preregistration;
 mod progress;
 mod report;
 mod trials;
@@ -29,7 +31,10 @@ use study_core::store::{Derived, StoreError, StudyFolder};
 pub(super) struct Args {
     /// A results folder, one study in it, or a CSV: subject,model,rating[,repetition][,vaf][,trial_index][,role]
     #[arg(required_unless_present = "possible")]
-    results: Option<PathBuf>,
+    results: Vec<PathBuf>,
+    /// One analysis of several sites, with site as a factor: --pool SITE-A SITE-B
+    #[arg(long, conflicts_with_all = ["scale", "task"])]
+    pool: bool,
     /// Check a published mean and SD (GRIM/GRIMMER): mean=4.800 sd=0.997 n=30 scale=1..7 [each=3]
     #[arg(
         long,
@@ -108,8 +113,17 @@ fn parse_scale(given: &str) -> Result<(f64, f64), ScaleError> {
 
 /// Runs `study analyze`.
 pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
-    let Some(results) = &args.results else {
-        return grim::run(&args.possible, args.json, console);
+    if args.pool {
+        let input = pool::analysed(&args.results, args, console)?;
+        return show(args, &input, args.out.as_deref(), console);
+    }
+    let results = match &args.results[..] {
+        [] => return grim::run(&args.possible, args.json, console),
+        [one] => one,
+        [..] => {
+            return Err(Failure::usage("only one of RESULTS is analyzed at a time")
+                .hint("--pool analyzes several sites of a study together"));
+        }
     };
     if let Some(task) = &args.trials.task {
         if !results.is_file() {
@@ -180,6 +194,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         let (mut input, damage) = (input?, damage?);
         input.details.parts = parts::reports(&loaded.protocol, &parts);
         input.analysis.parts = parts;
+        preregistration::add(study, &sessions, &loaded, &mut input)?;
         // The page contains these warnings; if it is not shown on a terminal, they are
         // also printed to standard error.
         if !console.terminal || args.json || args.comments {
@@ -323,6 +338,7 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
         study: None,
         protocol_version: None,
         path: name,
+        ..Source::default()
     };
     Ok(Analysed {
         source,
@@ -335,12 +351,14 @@ fn of_csv(path: &Path, args: &Args) -> Result<Analysed, Failure> {
     })
 }
 
+/// The study for the head of its report.
 fn source_of(study: &StudyFolder, protocol: &Protocol) -> Source {
     Source {
         title: protocol.study.title.clone(),
         study: Some(protocol.study.id.clone()),
         protocol_version: Some(study.version()),
         path: study.path().display().to_string(),
+        ..Source::default()
     }
 }
 
@@ -352,28 +370,9 @@ fn of_study(
     loaded: &Loaded,
     args: &Args,
 ) -> Result<Analysed, Failure> {
-    let Loaded {
-        protocol, models, ..
-    } = loaded;
+    let protocol = &loaded.protocol;
     let question = question(protocol, args.question.as_deref())?;
-    let mut ratings = Ratings::from_rows(&derived.rows, &question);
-    ratings.set_states(&derived.participants);
-    ratings.set_failed(&derived.rows, &derived.attempts);
-    ratings.set_duplicates(protocol.models.iter().filter_map(|m| {
-        let original = m.duplicate_of.as_ref()?;
-        Some((m.id.as_str(), original.as_str()))
-    }));
-    for (id, model) in models {
-        let covariates = [
-            ("memory_mm", model.provenance.memory_mm),
-            ("lambda", model.provenance.lambda),
-        ];
-        for (name, value) in covariates {
-            if let Some(value) = value {
-                ratings.add_covariate(id.as_str(), name, value);
-            }
-        }
-    }
+    let ratings = ratings(loaded, derived, &question);
     let rules = Rules {
         deviations: deviations(study)?,
         ..Rules::of(protocol, question.as_str(), include(args))
@@ -392,6 +391,38 @@ fn of_study(
         },
         analysis,
     })
+}
+
+/// The answers to a question, with what the protocol and the model files say of the
+/// realizations.
+fn ratings(loaded: &Loaded, derived: &Derived, question: &QuestionId) -> Ratings {
+    let mut ratings = Ratings::from_rows(&derived.rows, question);
+    ratings.set_states(&derived.participants);
+    ratings.set_failed(&derived.rows, &derived.attempts);
+    describe_realizations(&mut ratings, loaded);
+    ratings
+}
+
+/// Hidden duplicates, and covariates from the model files.
+pub(in crate::cli) fn describe_realizations(ratings: &mut Ratings, loaded: &Loaded) {
+    let Loaded {
+        protocol, models, ..
+    } = loaded;
+    ratings.set_duplicates(protocol.models.iter().filter_map(|m| {
+        let original = m.duplicate_of.as_ref()?;
+        Some((m.id.as_str(), original.as_str()))
+    }));
+    for (id, model) in models {
+        let covariates = [
+            ("memory_mm", model.provenance.memory_mm),
+            ("lambda", model.provenance.lambda),
+        ];
+        for (name, value) in covariates {
+            if let Some(value) = value {
+                ratings.add_covariate(id.as_str(), name, value);
+            }
+        }
+    }
 }
 
 /// The given question or the primary one, which must have numeric answers.

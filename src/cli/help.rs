@@ -57,6 +57,10 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
                 "pilots as well, under a banner",
             ),
             (
+                "study analyze --pool utah bern --out pooled",
+                "two sites of a study, with site as a factor",
+            ),
+            (
                 "study analyze ratings.csv --out report",
                 "any table with subject,model,rating",
             ),
@@ -116,6 +120,19 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             (
                 "study export rehearsal --to wide --include simulated --out wide",
                 "one row for each simulated participant",
+            ),
+        ],
+    ),
+    (
+        "preregister",
+        &[
+            (
+                "study preregister my-study",
+                "preregistration.md and .json beside the protocol",
+            ),
+            (
+                "study preregister my-study --participants 20 --date 2026-03-01",
+                "another number of participants, a stated day",
             ),
         ],
     ),

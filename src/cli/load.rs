@@ -10,6 +10,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use study_base::diagnostic::{Fault, Findings};
 use study_base::text::ModelId;
+use study_core::preregister;
 use study_core::protocol::file::{self, Named, Parsed};
 use study_core::protocol::fingerprint::{self, Fingerprints, Parts, family_file};
 use study_core::protocol::{FileOrders, Order, Protocol, check};
@@ -194,6 +195,10 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
     let parts = fingerprint::parts(&protocol, &others.bytes_by_model(), orders.as_ref());
     let models = others.realizations();
     files.extend(others.take_bytes());
+    // Frozen with the protocol; nothing else depends on it.
+    if let Ok(bytes) = read_capped(&folder.join(preregister::FILE), file::MAX_FILE_BYTES) {
+        files.push((preregister::FILE.to_owned(), bytes));
+    }
     let all = others.findings(findings);
     if all.iter().any(Findings::has_errors) {
         return (None, all);

@@ -8,10 +8,11 @@ use super::{Console, Failure, load};
 use crate::report::picture::png::Painter;
 use crate::report::power::{Report, document, figure, head, results};
 use crate::report::text::Page;
+use indicatif::ProgressBar;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
-use study_core::power::{Cell, CellResult, Chunk, Plan, merge, run_chunk};
+use study_core::power::{Cell, CellResult, Chunk, Plan, enough, merge, run_chunk};
 
 /// Arguments of `study power`.
 #[derive(Debug, clap::Args)]
@@ -58,20 +59,39 @@ pub(super) struct Args {
 }
 
 /// A cell and one of its chunks.
-type Unit = (Cell, u64);
+pub(super) type Unit = (Cell, u64);
 
 /// All units of work, in order.
 fn units(plan: &Plan) -> Vec<Unit> {
+    units_of(plan, &plan.cells())
+}
+
+/// The units of some cells.
+pub(super) fn units_of(plan: &Plan, cells: &[Cell]) -> Vec<Unit> {
     let chunks = plan.settings.chunks();
-    let cells = plan.cells().into_iter();
-    cells
+    (cells.iter().copied())
         .flat_map(|cell| (0..chunks).map(move |chunk| (cell, chunk)))
         .collect()
 }
 
 /// Runs units on all threads, with a progress bar; the results are in their order.
-fn simulate(plan: &Plan, units: &[Unit], threads: Option<u16>) -> Result<Vec<Chunk>, Failure> {
+pub(super) fn simulate(
+    plan: &Plan,
+    units: &[Unit],
+    threads: Option<u16>,
+) -> Result<Vec<Chunk>, Failure> {
     let bar = super::console::progress(units.len() as u64, "thousand studies");
+    let found = simulate_with(plan, units, threads, &bar);
+    bar.finish_and_clear();
+    found
+}
+
+fn simulate_with(
+    plan: &Plan,
+    units: &[Unit],
+    threads: Option<u16>,
+    bar: &ProgressBar,
+) -> Result<Vec<Chunk>, Failure> {
     let work = || {
         (units.par_iter().with_max_len(1))
             .map(|(cell, chunk)| {
@@ -89,6 +109,36 @@ fn simulate(plan: &Plan, units: &[Unit], threads: Option<u16>) -> Result<Vec<Chu
             .map_err(Failure::input)?
             .install(work),
     };
+    Ok(found)
+}
+
+/// Simulates all cells, each until its interval is narrow enough or it has all its studies.
+/// The chunks of a unit that was not needed are missing. One chunk of each open cell is done
+/// at a time, so that threads decide nothing.
+fn simulate_until(
+    plan: &Plan,
+    units: &[Unit],
+    within: f64,
+    threads: Option<u16>,
+) -> Result<Vec<Option<Chunk>>, Failure> {
+    let bar = super::console::progress(units.len() as u64, "thousand studies");
+    let mut found: Vec<Option<Chunk>> = vec![None; units.len()];
+    for index in 0..plan.settings.chunks() {
+        let mut places = Vec::new();
+        let mut start = 0;
+        for same in units.chunk_by(|a, b| a.0 == b.0) {
+            let done = found[start..start + same.len()].iter().flatten();
+            if !enough(done, within).1 {
+                places.push(start + index as usize);
+            }
+            start += same.len();
+        }
+        let open: Vec<Unit> = places.iter().map(|at| units[*at]).collect();
+        let chunks = simulate_with(plan, &open, threads, &bar)?;
+        for (at, chunk) in places.into_iter().zip(chunks) {
+            found[at] = Some(chunk);
+        }
+    }
     bar.finish_and_clear();
     Ok(found)
 }
@@ -99,7 +149,10 @@ fn merged(plan: &Plan, units: &[Unit], chunks: &[Option<Chunk>]) -> Vec<CellResu
     let mut start = 0;
     for same in units.chunk_by(|a, b| a.0 == b.0) {
         let own = chunks[start..start + same.len()].iter().flatten();
-        found.extend(merge(&plan.settings, same[0].0, own));
+        let needed = plan
+            .within
+            .map_or(usize::MAX, |within| enough(own.clone(), within).0);
+        found.extend(merge(&plan.settings, same[0].0, own.take(needed)));
         start += same.len();
     }
     found
@@ -149,8 +202,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         report.missing_units = chunks.iter().filter(|c| c.is_none()).count();
         report.results = merged(&report.plan, &units, &chunks);
     } else if !args.closed {
-        let chunks = simulate(&report.plan, &units, args.threads)?;
-        let chunks: Vec<Option<Chunk>> = chunks.into_iter().map(Some).collect();
+        let chunks: Vec<Option<Chunk>> = match report.plan.within {
+            Some(within) => simulate_until(&report.plan, &units, within, args.threads)?,
+            None => {
+                let chunks = simulate(&report.plan, &units, args.threads)?;
+                chunks.into_iter().map(Some).collect()
+            }
+        };
         report.results = merged(&report.plan, &units, &chunks);
     }
     if let Some(out) = &args.out {
@@ -185,7 +243,7 @@ fn write(out: &Path, report: &Report) -> Result<(), Failure> {
 }
 
 /// Writes a file under another name first.
-fn replace(path: &Path, content: &[u8]) -> Result<(), Failure> {
+pub(super) fn replace(path: &Path, content: &[u8]) -> Result<(), Failure> {
     let part = path.with_extension(format!("{}.part", std::process::id()));
     let written = std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path));
     written.map_err(|e| {

@@ -3,6 +3,7 @@
 
 mod conditional;
 mod pairs;
+mod sites;
 mod target;
 mod vaf;
 
@@ -61,6 +62,7 @@ pub(super) fn answers(a: &Analysis) -> Vec<Answer> {
     ];
     let mut answers: Vec<Answer> = all.into_iter().flatten().collect();
     answers.extend(target::repeats(a));
+    answers.extend(sites::sites(a));
     answers
 }
 

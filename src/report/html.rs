@@ -23,6 +23,8 @@ use super::Source;
 use super::answers::{answers, conditional};
 use super::figures::Drawn;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+pub(super) use methods::rule_in_words as exclusion;
+pub(super) use paragraphs::declared_test;
 use study_base::text::{Untrusted, counted};
 use study_core::analyze::Analysis;
 use study_core::analyze::psychophysics::PartAnalysis;
@@ -78,6 +80,7 @@ pub fn document(source: &Source, details: &Details, a: &Analysis, figures: &[Dra
         (figures_section(figures, 0))
         (tables::section(a))
         (rendering::section(a))
+        (tables::sites(&source.sites))
         (paragraphs::section(details, a))
         (conditional_section(a))
         (parts::sections(&a.parts, &details.parts, figures.len()))

@@ -174,5 +174,11 @@ pub fn document(source: &Source, analysis: &Analysis) -> String {
     if !analysis.parts.is_empty() {
         document["parts"] = analysis.parts.iter().map(part).collect();
     }
+    if let Some(comparison) = &source.preregistration {
+        document["preregistration"] = super::comparison::json(comparison);
+    }
+    if !source.sites.is_empty() {
+        document["sites"] = super::sites::json(&source.sites);
+    }
     format!("{document:#}\n")
 }

@@ -8,7 +8,8 @@ mod page;
 mod paragraph;
 
 pub use figure::figure;
-pub use json::document;
+pub use json::{document, own_design};
+pub(super) use page::sensitivity_sentences;
 pub use page::{head, results};
 pub use paragraph::paragraph;
 
@@ -56,7 +57,7 @@ impl Report {
         power::smallest(
             &plan.settings,
             &self.results,
-            &plan.shapes(),
+            &plan.proposed(),
             &plan.targets,
             most,
         )
@@ -165,6 +166,19 @@ impl Report {
                 "the protocol's exclusion rules are not simulated; state their loss as dropout"
                     .to_owned(),
             );
+        }
+        if let Some(most) = plan.max_session_min {
+            for shape in plan.shapes() {
+                if let Some(minutes) = plan.too_long(shape) {
+                    found.push(format!(
+                        "{} realizations × {} repetitions take about {} min, more than {most}: not \
+                         proposed",
+                        shape.0,
+                        shape.1,
+                        apa::number(minutes, 0)
+                    ));
+                }
+            }
         }
         if let Some(pilot) = &settings.pilot {
             found.push(format!(

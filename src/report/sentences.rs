@@ -46,6 +46,10 @@ pub(super) fn test_name(kind: TestKind) -> &'static str {
         TestKind::OneSampleT => "t test over participants",
         TestKind::Wald => "z test",
         TestKind::WaldClustered => "z test, participants as clusters",
+        TestKind::BetweenWithin => {
+            "analysis of variance between and within participants, Greenhouse–Geisser correction"
+        }
+        TestKind::BetweenSites => "analysis of variance between sites",
     }
 }
 

@@ -58,8 +58,28 @@ pub fn page(source: &Source, a: &Analysis, page: Page) -> String {
         out += &paint.warn("No rating is included: there is nothing to analyse.\n\n");
     }
     out += &all_answers(a, width, paint);
+    if let Some(comparison) = &source.preregistration {
+        let sentence = super::comparison::sentence(comparison);
+        out += &paint.strong("Preregistration");
+        out.push('\n');
+        out += &wrap(&Untrusted(&sentence).to_string(), width, "  ", "  ");
+        out.push('\n');
+    }
+    if !source.sites.is_empty() {
+        out += &paint.strong("Sites and their devices");
+        out.push('\n');
+        for site in super::sites::sentences(&source.sites) {
+            out += &wrap(&Untrusted(&site).to_string(), width, "  ", "    ");
+        }
+        out.push('\n');
+    }
     // The head and the answers contain these.
-    let shown = ["no-participants", "few-realizations", "raw-and-adjusted"];
+    let shown = [
+        "no-participants",
+        "few-realizations",
+        "raw-and-adjusted",
+        "preregistration",
+    ];
     let warnings = a.warnings.iter().filter(|w| !shown.contains(&w.code));
     for w in warnings.clone() {
         let text = wrap(&Untrusted(&w.text).to_string(), width, "! ", "  ");

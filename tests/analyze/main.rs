@@ -11,6 +11,7 @@ mod mixed;
 mod nist;
 mod odd;
 mod parts;
+mod pool;
 mod possible;
 mod properties;
 mod psychophysics;

@@ -18,6 +18,7 @@ fn shown(a: &Analysis) -> String {
         study: None,
         protocol_version: None,
         path: "a.csv".to_owned(),
+        ..Source::default()
     };
     let form = Page {
         width: 100,

@@ -15,6 +15,7 @@ fn source() -> Source {
         study: None,
         protocol_version: None,
         path: "a.csv".to_owned(),
+        ..Source::default()
     }
 }
 

@@ -23,6 +23,7 @@ fn source(title: &str) -> Source {
         study: Some("a-study".to_owned()),
         protocol_version: Some(1),
         path: "results/a-study".to_owned(),
+        ..Source::default()
     }
 }
 

@@ -18,6 +18,7 @@ pub fn source() -> Source {
         study: None,
         protocol_version: None,
         path: "data.csv".to_owned(),
+        ..Source::default()
     }
 }
 

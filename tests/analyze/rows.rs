@@ -112,6 +112,7 @@ fn source() -> Source {
         study: Some("example".to_owned()),
         protocol_version: Some(1),
         path: "results/example".to_owned(),
+        ..Source::default()
     }
 }
 

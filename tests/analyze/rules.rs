@@ -130,6 +130,7 @@ fn every_row_states_whether_it_is_included_and_why_not() {
         study: None,
         protocol_version: None,
         path: "r.csv".to_owned(),
+        ..Source::default()
     };
     let files = csv::tables(&source, &a);
     let used = files.iter().find(|f| f.name == "ratings_used.csv").unwrap();
@@ -261,6 +262,7 @@ fn excluded_participants_count_as_finished_and_make_no_interim_analysis() {
         study: None,
         protocol_version: None,
         path: "r.csv".to_owned(),
+        ..Source::default()
     };
     let width = study::report::text::Page {
         width: 100,

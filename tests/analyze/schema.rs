@@ -26,13 +26,18 @@ const KEYWORDS: [&str; 14] = [
     "minimum",
 ];
 
-fn schema() -> Value {
+pub(crate) fn schema() -> Value {
     let text = fs::read_to_string(Path::new(ROOT).join("docs/study-analysis-1.schema.json"));
     serde_json::from_str(&text.unwrap()).unwrap()
 }
 
 /// The first place at which a document differs from a schema.
-fn check(root: &Value, schema: &Value, value: &Value, place: &str) -> Result<(), String> {
+pub(crate) fn check(
+    root: &Value,
+    schema: &Value,
+    value: &Value,
+    place: &str,
+) -> Result<(), String> {
     let fail = |why: String| Err(format!("{place}: {why}"));
     if let Some(wanted) = schema.as_bool() {
         return if wanted {

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod power;
+mod preregister;
 mod protocol_check;
 mod protocol_docs;
 mod protocol_schema;

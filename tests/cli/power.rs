@@ -350,3 +350,101 @@ fn files_and_a_hostile_title() {
     let written = fs::read_to_string(folder.path().join("figures/power.json")).unwrap();
     assert!(!written.contains('\u{1b}'));
 }
+
+/// Early stops are decided at fixed places: threads and parts change no byte, and a design
+/// with a clear power has fewer studies.
+#[test]
+fn a_narrow_interval_ends_a_design_whoever_simulates_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let more = [
+        "--within",
+        "0.016",
+        "--slope",
+        "1.5",
+        "--sd",
+        "realization=0.4",
+    ];
+    let own = [&SMALL[..6], &["--studies", "6000"], &more[..]].concat();
+    let whole = good(&[&own[..], &["--json", "--threads", "1"]].concat(), dir);
+    assert_eq!(
+        good(&[&own[..], &["--json", "--threads", "2"]].concat(), dir),
+        whole
+    );
+    for shard in ["0", "1", "2"] {
+        let part = ["--shards", "3", "--shard", shard, "--out", "parts"];
+        assert_eq!(power(&[&own[..], &part].concat(), dir).0, 0);
+    }
+    let merged = good(&[&own[..], &["--merge", "parts", "--json"]].concat(), dir);
+    assert_eq!(merged, whole);
+    let json: Value = serde_json::from_str(&whole).unwrap();
+    for cell in json["cells"].as_array().unwrap() {
+        let test = &cell["tests"]["verdict"];
+        let number = |key: &str| test[key].as_f64().unwrap();
+        let half = (number("high") - number("low")) / 2.0;
+        let studies = number("studies");
+        assert!(half <= 0.016 || studies == 6000.0, "{cell}");
+        assert!(studies < 6000.0 && studies % 1000.0 == 0.0, "{cell}");
+    }
+    // Without the flag: all studies.
+    let all = good(&[&own[..8], &["--json"]].concat(), dir);
+    let all: Value = serde_json::from_str(&all).unwrap();
+    assert_eq!(all["cells"][0]["tests"]["verdict"]["studies"], 6000);
+}
+
+#[test]
+fn long_sessions_are_not_proposed() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let of = |most: &str| -> Value {
+        let own = [
+            "--closed",
+            "--json",
+            "--realizations",
+            "5,12",
+            "--rho",
+            "0.95",
+        ];
+        let out = good(&[&own[..], &["--max-session-min", most]].concat(), dir);
+        serde_json::from_str(&out).unwrap()
+    };
+    let proposed = |json: &Value| json["smallest"].as_array().unwrap().len();
+    let (short, long) = (of("8"), of("1000"));
+    assert!(proposed(&short) < proposed(&long));
+    assert!(
+        short["warnings"].to_string().contains("not proposed"),
+        "{short}"
+    );
+    assert!(!long["warnings"].to_string().contains("not proposed"));
+}
+
+#[test]
+fn equivalence_needs_the_margin_of_the_analysis() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let tests = [
+        "--tests",
+        "equivalence",
+        "--slope",
+        "0",
+        "--studies",
+        "1000",
+    ];
+    let (code, _, err) = power(&tests, dir);
+    assert_eq!(code, 1);
+    assert!(err.contains("equivalence_margin"), "{err}");
+    let margin = [("primary = ", "equivalence_margin = 2.0\nprimary = ")];
+    changed_protocol("turn-signal", &dir.join("p"), &margin);
+    let own = [&["power", "p", "--json"][..], &SMALL[..6], &tests].concat();
+    let (code, out, err) = study(&own, dir);
+    assert_eq!(code, 0, "{err}");
+    let json: Value = serde_json::from_str(&out).unwrap();
+    let cells = json["cells"].as_array().unwrap();
+    let power = |n: u64| {
+        let cell = |c: &&Value| c["participants"] == n && c["repetitions"] == 3;
+        let cell = cells.iter().find(cell).unwrap();
+        cell["tests"]["equivalence"]["power"].as_f64().unwrap()
+    };
+    assert!(power(10) > 0.2, "{}", power(10));
+    assert_eq!(cells[0]["tests"]["equivalence"]["type_s"], Value::Null);
+}

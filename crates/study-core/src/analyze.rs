@@ -35,6 +35,7 @@ mod range;
 mod reference;
 mod rendering;
 mod select;
+mod sites;
 mod subjects;
 mod vaf;
 mod values;
@@ -245,6 +246,8 @@ pub struct Analysis {
     pub better: Better,
     /// Names of the covariates of the realizations. Untrusted.
     pub covariates: Vec<String>,
+    /// Names of the sites; empty if there is only one. Untrusted.
+    pub sites: Vec<String>,
     /// Who rated which realizations.
     pub design: Design,
     /// The answers to the questions of the study, in the order of a report.
@@ -339,6 +342,7 @@ pub fn analyze_with_progress(ratings: &Ratings, rules: &Rules, progress: &Progre
         construct: rules.construct.clone(),
         better: rules.better,
         covariates: memory::covariates(&used),
+        sites: ratings.sites.clone(),
         design,
         findings,
         pairs,
@@ -369,7 +373,7 @@ struct Inputs<'a> {
 type Group = fn(&Inputs<'_>, &mut Values);
 
 /// Independent groups of statistics, the slowest ones first.
-const GROUPS: [Group; 15] = [
+const GROUPS: [Group; 16] = [
     |i, values| order::order(i.cells, values),
     |i, values| vaf::against_vaf(i.cells, i.adjusted, i.rules, values),
     |i, values| ordinal::ordinal(i.cells, values),
@@ -385,6 +389,7 @@ const GROUPS: [Group; 15] = [
     |i, values| disagreement::disagreement(i.cells, values),
     |i, values| checks::checks(i.cells, i.rules, values),
     |i, values| rendering::rendering(i.cells, i.adjusted, i.rules, values),
+    |i, values| sites::sites(i.cells, i.rules, values),
 ];
 
 /// All statistics. Each group runs on one thread, so the number of threads changes

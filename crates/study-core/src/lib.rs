@@ -10,6 +10,7 @@ pub mod analyze;
 pub mod export;
 pub mod outcome;
 pub mod power;
+pub mod preregister;
 pub mod procedure;
 pub mod protocol;
 pub mod rendering;

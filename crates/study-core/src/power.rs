@@ -20,7 +20,7 @@ mod tally;
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
 pub use pilot::{Parameters, Pilot, PilotError};
 pub use plan::{Overrides, Plan, PlanError};
-pub use tally::{CellResult, Chunk, Tally, TestResult, merge, run_chunk};
+pub use tally::{CellResult, Chunk, Tally, TestResult, enough, merge, run_chunk};
 
 pub use crate::protocol::power::{PowerLink as Link, PowerTest as Test, PowerVaf as Vaf};
 
@@ -111,6 +111,8 @@ pub struct Settings {
     pub tests: Vec<Test>,
     /// Level of significance, two-sided.
     pub alpha: f64,
+    /// Equivalence margin of the analysis, in rating points.
+    pub margin: Option<f64>,
     /// Seed of all numbers.
     pub seed: u64,
     /// Studies of each cell.

@@ -123,7 +123,7 @@ fn ratio(a: f64, b: f64) -> Option<f64> {
 }
 
 /// q = k − 1 orthonormal contrasts: the j-th compares the first j columns with the next.
-fn helmert(k: usize) -> Vec<Vec<f64>> {
+pub(super) fn helmert(k: usize) -> Vec<Vec<f64>> {
     (1..k)
         .map(|j| {
             let scale = 1.0 / ((j * (j + 1)) as f64).sqrt();
@@ -136,7 +136,7 @@ fn helmert(k: usize) -> Vec<Vec<f64>> {
 }
 
 /// The contrast of the mean, of norm 1.
-fn unit(k: usize) -> Vec<f64> {
+pub(super) fn unit(k: usize) -> Vec<f64> {
     vec![1.0 / (k as f64).sqrt(); k]
 }
 
@@ -185,12 +185,7 @@ fn effect(rows: &[&[f64]], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect
         None
     };
     let covariance = defined.then(|| covariance(&y));
-    let eps_gg = covariance.as_ref().and_then(|s| {
-        let size = s.size();
-        let squares = |i: usize| (0..size).map(|j| s.get(i, j) * s.get(i, j)).sum::<f64>();
-        let (trace, squares) = (trace(s), (0..size).map(squares).sum::<f64>());
-        finite(trace * trace / (q * squares))
-    });
+    let eps_gg = covariance.as_ref().and_then(greenhouse_geisser);
     let eps_hf = eps_gg.and_then(|e| {
         let denominator = q * (n - 1.0 - q * e);
         (denominator > 0.0).then(|| (n * q * e - 2.0) / denominator)
@@ -217,7 +212,7 @@ fn effect(rows: &[&[f64]], contrasts: &[Vec<f64>], with_mauchly: bool) -> Effect
 }
 
 /// Covariance matrix of centred columns.
-fn covariance(y: &[Vec<f64>]) -> SymmetricMatrix {
+pub(super) fn covariance(y: &[Vec<f64>]) -> SymmetricMatrix {
     let q = y.first().map_or(0, Vec::len);
     let df = y.len() as f64 - 1.0;
     let mut s = SymmetricMatrix::zero(q);
@@ -229,6 +224,14 @@ fn covariance(y: &[Vec<f64>]) -> SymmetricMatrix {
         }
     }
     s
+}
+
+/// Greenhouse & Geisser's ε of a covariance matrix of contrasts.
+pub(super) fn greenhouse_geisser(s: &SymmetricMatrix) -> Option<f64> {
+    let size = s.size();
+    let squares = |i: usize| (0..size).map(|j| s.get(i, j) * s.get(i, j)).sum::<f64>();
+    let (trace, squares) = (trace(s), (0..size).map(squares).sum::<f64>());
+    finite(trace * trace / (size as f64 * squares))
 }
 
 fn trace(s: &SymmetricMatrix) -> f64 {

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | Means, standard deviations, quantiles | [`describe`] |
 //! | Do the realizations differ? | [`anova`], [`friedman`] (rank test), [`lmm`] (unbalanced data), [`clm`] and [`clmm`] (ordered categories) |
+//! | Do groups of subjects differ, or does a difference depend on the group? | [`between`] |
 //! | Do the ratings follow a given order? | [`friedman::page`] |
 //! | Which pairs differ? Are they equivalent? | [`paired`] |
 //! | Are the ratings correlated with a covariate? | [`correlation`], [`permutation`] (exact p), [`bootstrap`] (interval), [`bayes`] |
@@ -44,6 +45,7 @@
 pub mod agreement;
 pub mod anova;
 pub mod bayes;
+pub mod between;
 pub mod bootstrap;
 pub mod carry_over;
 pub mod clm;

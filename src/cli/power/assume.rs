@@ -53,10 +53,16 @@ pub(super) struct Assume {
     /// Simulated studies of each design
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(100..=10_000_000))]
     studies: Option<u64>,
+    /// Simulate a design no further once the interval of its power is ± this
+    #[arg(long, value_name = "HALF", value_parser = target)]
+    within: Option<f64>,
+    /// Propose no design whose sessions are longer
+    #[arg(long, value_name = "MIN", value_parser = positive)]
+    max_session_min: Option<f64>,
     /// Power that is wanted
     #[arg(long, value_name = "P,…", value_delimiter = ',', value_parser = target)]
     targets: Vec<f64>,
-    /// verdict, pearson, permutation, crossed, friedman, clmm; the first one decides
+    /// verdict, pearson, permutation, crossed, friedman, clmm, equivalence; the first one decides
     #[arg(long, value_name = "TEST,…", value_delimiter = ',', value_parser = test)]
     tests: Vec<Test>,
     /// Seed of the simulated studies (default: that of the study)
@@ -105,6 +111,10 @@ fn finite(text: &str) -> Result<f64, FlagError> {
 
 fn not_negative(text: &str) -> Result<f64, FlagError> {
     number(text, |x| x >= 0.0, "give a number, 0 or more")
+}
+
+fn positive(text: &str) -> Result<f64, FlagError> {
+    number(text, |x| x > 0.0, "give a number above 0")
 }
 
 fn share(text: &str) -> Result<f64, FlagError> {
@@ -171,7 +181,7 @@ fn vaf(text: &str) -> Result<Vaf, FlagError> {
 fn test(text: &str) -> Result<Test, FlagError> {
     let found = Test::ALL.into_iter().find(|t| t.as_str() == text);
     found.ok_or(FlagError(
-        "write verdict, pearson, permutation, crossed, friedman or clmm",
+        "write verdict, pearson, permutation, crossed, friedman, clmm or equivalence",
     ))
 }
 
@@ -202,6 +212,8 @@ pub(super) fn plan(
         vaf: given.vaf,
         dropout: given.dropout,
         missing: given.missing,
+        within: given.within,
+        max_session_min: given.max_session_min,
         participants: given.participants.clone(),
         realizations: given.realizations.clone(),
         repetitions: given.repetitions.clone(),
@@ -220,6 +232,7 @@ pub(super) fn plan(
     Plan::of(protocol, &overrides).map_err(|error| {
         let hint = match error {
             PlanError::FewRealizations(_) => "add realizations with a VAF to [[models]]",
+            PlanError::NoMargin => "equivalence_margin states which difference is negligible",
             _ => "the assumptions are flags, or keys of [power] in the protocol",
         };
         Failure::input(&error).hint(hint)

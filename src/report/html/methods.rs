@@ -199,7 +199,7 @@ fn ratings(d: &Details, a: &Analysis) -> String {
 }
 
 /// An exclusion rule as a noun phrase.
-pub(super) fn rule_in_words(rule: Exclusion) -> String {
+pub(in crate::report) fn rule_in_words(rule: Exclusion) -> String {
     match rule {
         Exclusion::ConstantRater => "participants whose ratings never change".to_owned(),
         Exclusion::HiddenReferenceBelow(rating) => {
@@ -389,6 +389,16 @@ fn tests(a: &Analysis) -> Vec<String> {
         text.push(format!(
             "{} (Shrout and Fleiss), with F intervals.",
             capital(&iccs.join(", "))
+        ));
+    }
+    if !a.sites.is_empty() {
+        text.push(format!(
+            "Participants of {} (site as a factor between participants) were analysed together. Whether \
+             the differences between realizations depend on the site was tested by the interaction in \
+             an analysis of variance between and within participants with the Greenhouse–Geisser \
+             correction; means and slopes on VAF of the participants were compared by analyses of \
+             variance between sites.",
+            apa::listing(&a.sites)
         ));
     }
     if any("reference/", "/p_tost") {

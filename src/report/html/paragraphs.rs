@@ -252,7 +252,52 @@ fn sentence(a: &Analysis, f: &Finding) -> Option<String> {
                  {result} ({name})."
             )
         }
+        Question::SiteRealizations => match yes {
+            true => format!(
+                "The differences between realizations depended on the site, {result} ({name})."
+            ),
+            false => format!(
+                "A dependence of the differences between realizations on the site was not shown, \
+                 {result} ({name})."
+            ),
+        },
+        Question::SiteVaf => match yes {
+            true => format!(
+                "The effect of VAF depended on the site, {result} ({name} of the participants' slopes)."
+            ),
+            false => format!(
+                "A dependence of the effect of VAF on the site was not shown, {result} ({name} of the \
+                 participants' slopes)."
+            ),
+        },
+        Question::SiteLevel => match yes {
+            true => format!("The sites differed in their mean rating, {result} ({name})."),
+            false => format!(
+                "A difference of the sites in their mean rating was not shown, {result} ({name})."
+            ),
+        },
     })
+}
+
+/// What a finding is about and the test that decides it, for a preregistration.
+pub(in crate::report) fn declared_test(a: &Analysis, f: &Finding) -> Option<(String, String)> {
+    let test = f.test.as_ref()?;
+    let what = match &f.question {
+        // Which realizations these are is not known before.
+        Question::Reference(name) => {
+            format!("Whether the best-rated realization differs from {name}")
+        }
+        Question::Equivalence(name) => {
+            format!("Whether the best-rated realization is equivalent to {name}")
+        }
+        _ => subject(a, f)?,
+    };
+    let name = match &f.question {
+        Question::Memory => "t tests of a linear and a quadratic term, each".to_owned(),
+        _ => format!("{},", sentences::corrected(test)),
+    };
+    let level = sentences::level(test.level);
+    Some((what, format!("{name} level {level}")))
 }
 
 /// What an undefined finding is about.
@@ -277,6 +322,11 @@ fn subject(a: &Analysis, f: &Finding) -> Option<String> {
             format!("Whether {} is equivalent to {name}", f.names.first()?)
         }
         Question::Repeat(name) => format!("Whether {name} differs from its original"),
+        Question::SiteRealizations => {
+            "Whether the differences between realizations depend on the site".to_owned()
+        }
+        Question::SiteVaf => "Whether the effect of VAF depends on the site".to_owned(),
+        Question::SiteLevel => "Whether the sites differ in their mean rating".to_owned(),
     })
 }
 

@@ -1,7 +1,7 @@
 //! The main tables.
 
 use super::safe;
-use crate::report::{answers, apa, sentences};
+use crate::report::{Site, answers, apa, sentences, sites};
 use maud::{Markup, html};
 use study_base::text::counted;
 use study_core::analyze::{Analysis, RealizationSummary, group_id, pair_id};
@@ -63,6 +63,48 @@ impl HtmlTable {
                     p.note { (self.omitted) " more rows are in the CSV file." }
                 }
             }
+        }
+    }
+}
+
+/// The sites of a pooled analysis with their devices.
+pub(super) fn sites(all: &[Site]) -> Markup {
+    let mut table = HtmlTable::new(
+        "Sites and their devices",
+        &[
+            "site",
+            "participants",
+            "sessions",
+            "device",
+            "commissioning test",
+        ],
+    );
+    for site in all {
+        let about = |device: String, check: String| {
+            vec![
+                site.name.clone(),
+                site.participants.to_string(),
+                sites::days(site).trim_start_matches(", ").to_owned(),
+                device,
+                check,
+            ]
+        };
+        if site.devices.is_empty() {
+            table.row(about("not recorded".to_owned(), String::new()));
+        }
+        for d in &site.devices {
+            let device = format!(
+                "{} {}: {}",
+                d.kind,
+                d.id,
+                counted(d.sessions, "session", "sessions")
+            );
+            table.row(about(device, sites::check(d)));
+        }
+    }
+    html! {
+        @if !all.is_empty() {
+            section { h2 { "Sites" } (table.render()) }
         }
     }
 }

@@ -31,6 +31,16 @@ pub fn document(report: &Report) -> Value {
     document
 }
 
+/// What is known of the study's own design, for its preregistration.
+pub fn own_design(report: &Report) -> Value {
+    json!({
+        "assumptions": assumptions(report),
+        "design": cell(report, &report.plan.own),
+        "sensitivity": sensitivity(report),
+        "warnings": report.warnings(),
+    })
+}
+
 fn assumptions(report: &Report) -> Value {
     let (plan, settings) = (&report.plan, &report.plan.settings);
     let a = &settings.assumptions;
@@ -70,6 +80,9 @@ fn assumptions(report: &Report) -> Value {
         "tests": settings.tests.iter().map(|t| t.as_str()).collect::<Vec<_>>(),
         "targets": plan.targets,
         "studies": settings.studies,
+        "within": plan.within,
+        "max_session_min": plan.max_session_min,
+        "equivalence_margin": settings.margin,
         "seed": settings.seed,
         "defaults": plan.defaults,
         "pilot": settings.pilot.as_ref().map(|p| json!({
@@ -110,6 +123,7 @@ fn cell(report: &Report, of: &Cell) -> Value {
         "participants": of.participants,
         "realizations": of.realizations,
         "repetitions": of.repetitions,
+        "session_min": report.plan.pace.minutes(of.realizations, of.repetitions),
         "tests": tests,
         "closed": report.closed(of).map(|e| json!({
             "ncp": e.ncp, "df": e.df, "power": e.power, "ceiling": e.ceiling, "size": e.size,

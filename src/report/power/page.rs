@@ -129,8 +129,12 @@ fn table(report: &Report, paint: Paint) -> String {
         out = out.trim_end().to_owned() + "\n";
     }
     let what = if simulated {
+        let until = plan.within.map_or_else(
+            || "studies each".to_owned(),
+            |within| format!("studies at most, until the interval is ± {within}"),
+        );
         format!(
-            "* this protocol. Power of {} in {} studies each; closed: Pearson's t. ┆ the ceiling.",
+            "* this protocol. Power of {} in {} {until}; closed: Pearson's t. ┆ the ceiling.",
             deciding(plan),
             plan.settings.studies
         )
@@ -184,6 +188,24 @@ fn smallest(report: &Report, width: usize, paint: Paint) -> String {
     out
 }
 
+/// The smallest effects that the study's own design finds.
+pub(in crate::report) fn sensitivity_sentences(report: &Report) -> Vec<String> {
+    let (plan, settings) = (&report.plan, &report.plan.settings);
+    let world = closed_design(settings, &plan.own);
+    let one = |target: &f64| {
+        let slope = world.detectable_slope(*target, settings.alpha)?;
+        let rho = detectable_correlation(plan.own.realizations, *target, settings.alpha)?;
+        Some(format!(
+            "finds with {}: a slope of {} points per SD of VAF, a correlation of {} with the \
+             observed means",
+            percent(*target),
+            apa::number(slope, 2),
+            apa::r(rho)
+        ))
+    };
+    plan.targets.iter().filter_map(one).collect()
+}
+
 fn own(report: &Report, width: usize, paint: Paint) -> String {
     let (plan, settings) = (&report.plan, &report.plan.settings);
     let mut out = format!(
@@ -191,19 +213,8 @@ fn own(report: &Report, width: usize, paint: Paint) -> String {
         paint.strong(&format!("This protocol: {}", design(&plan.own)))
     );
     let world = closed_design(settings, &plan.own);
-    for target in &plan.targets {
-        let slope = world.detectable_slope(*target, settings.alpha);
-        let rho = detectable_correlation(plan.own.realizations, *target, settings.alpha);
-        if let (Some(slope), Some(rho)) = (slope, rho) {
-            let line = format!(
-                "finds with {}: a slope of {} points per SD of VAF, a correlation of {} with the \
-                 observed means",
-                percent(*target),
-                apa::number(slope, 2),
-                apa::r(rho)
-            );
-            out += &wrap(&line, width, "  ", "    ");
-        }
+    for line in sensitivity_sentences(report) {
+        out += &wrap(&line, width, "  ", "    ");
     }
     let endless = study_stats::power::covariate::Design {
         subjects: None,

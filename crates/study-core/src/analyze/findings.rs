@@ -8,6 +8,7 @@
 mod differ;
 mod others;
 mod pairs;
+mod sites;
 mod vaf;
 
 use super::Rules;
@@ -49,6 +50,12 @@ pub enum Question {
     Equivalence(String),
     /// Does this hidden duplicate differ from its original?
     Repeat(String),
+    /// Do the differences between realizations depend on the site?
+    SiteRealizations,
+    /// Does the effect of VAF depend on the site?
+    SiteVaf,
+    /// Do the sites differ in their mean rating?
+    SiteLevel,
 }
 
 impl Question {
@@ -67,6 +74,9 @@ impl Question {
             Self::Reference(name) => group_id("reference", &[name]),
             Self::Equivalence(name) => group_id("equivalence", &[name]),
             Self::Repeat(name) => group_id("repeat", &[name]),
+            Self::SiteRealizations => "site-realizations".to_owned(),
+            Self::SiteVaf => "site-vaf".to_owned(),
+            Self::SiteLevel => "site-level".to_owned(),
         }
     }
 }
@@ -158,6 +168,10 @@ pub enum TestKind {
     Wald,
     /// The same, with a standard error over participants as clusters.
     WaldClustered,
+    /// F of the interaction of site and realization, with the Greenhouse–Geisser correction.
+    BetweenWithin,
+    /// F of the differences between sites in one number of each participant.
+    BetweenSites,
 }
 
 impl TestKind {
@@ -181,6 +195,8 @@ impl TestKind {
             Self::OneSampleT => "one-sample-t",
             Self::Wald => "wald",
             Self::WaldClustered => "wald-clustered",
+            Self::BetweenWithin => "between-within",
+            Self::BetweenSites => "between-sites",
         }
     }
 }
@@ -394,6 +410,7 @@ pub(super) fn findings(
     found.extend(others::carry_over(&facts));
     others::disagreement_as_caveat(&mut found);
     found.extend(others::repeats(&facts));
+    found.extend(sites::sites(&facts));
     let pairs = facts.pairs;
     for finding in &found {
         put(finding, values);

@@ -7,6 +7,7 @@
 
 mod build;
 mod error;
+mod pooled;
 mod read;
 
 pub use error::RatingsError;
@@ -72,6 +73,8 @@ pub struct Subject {
     pub state: Option<State>,
     /// Why the state was set; may be empty.
     pub reason: String,
+    /// Index into [`Ratings::sites`], in a study of several sites.
+    pub site: Option<u32>,
 }
 
 /// A text that was answered or remarked in a trial.
@@ -154,6 +157,8 @@ pub struct Ratings {
     pub comments: Vec<Comment>,
     /// Practice rows, which are not in the columns.
     pub practice: Arc<Practice>,
+    /// Names of the sites that the subjects are from; empty if there is only one. Untrusted.
+    pub sites: Vec<String>,
     /// Columns of a foreign table that were not read although their names differ from
     /// optional ones only in case, and these. The first is untrusted.
     pub near_misses: Vec<(String, &'static str)>,
@@ -370,6 +375,7 @@ impl Ratings {
                 })
                 .collect(),
             practice: Arc::clone(&self.practice),
+            sites: self.sites.clone(),
             near_misses: self.near_misses.clone(),
             subjects,
             models,

@@ -14,6 +14,7 @@ use study_stats::distribution::t_quantile;
 use study_stats::friedman::friedman;
 use study_stats::level;
 use study_stats::lmm::balanced_slope;
+use study_stats::paired::equivalence_of;
 use study_stats::permutation::Decision;
 
 /// What one study shows.
@@ -112,6 +113,9 @@ impl<'a> Judge<'a> {
                 Test::Crossed => crossed.map(|c| c.estimate.abs() > self.critical(c.df) * c.se),
                 Test::Friedman => self.friedman(study),
                 Test::Clmm => self.ordinal(study),
+                Test::Equivalence => {
+                    crossed.and_then(|c| self.is_equivalent(x, c.estimate, c.se, c.df))
+                }
             };
             tests.push(decided.ok_or(UNDEFINED));
         }
@@ -121,6 +125,15 @@ impl<'a> Judge<'a> {
             half_width: line.map(|l| critical * l.se),
             boundary: crossed.is_some_and(|c| c.df > q as f64 - 2.0),
         }
+    }
+
+    /// Whether the change of the rating from the lowest to the highest x lies within the
+    /// margin, by the slope on x.
+    fn is_equivalent(&self, x: &[f64], slope: f64, se: f64, df: f64) -> Option<bool> {
+        let ends = |f: fn(f64, f64) -> f64| x.iter().copied().reduce(f);
+        let range = ends(f64::max)? - ends(f64::min)?;
+        let tests = equivalence_of(slope * range, se * range, df, self.settings.margin?)?;
+        Some(tests.p < self.settings.alpha)
     }
 
     /// A study with missing trials.
@@ -151,6 +164,13 @@ impl<'a> Judge<'a> {
                 Test::Crossed => (below("lmm_vaf_crossed/slope_satterthwaite_p"), NOT_FITTED),
                 Test::Friedman => (self.friedman(study), UNDEFINED),
                 Test::Clmm => (self.ordinal(study), NOT_FITTED),
+                Test::Equivalence => {
+                    let slope = of("slope").zip(of("slope_se"));
+                    let slope = slope.zip(of("slope_satterthwaite_df"));
+                    let decided =
+                        slope.and_then(|((b, se), df)| self.is_equivalent(&study.vaf, b, se, df));
+                    (decided, NOT_FITTED)
+                }
             };
             tests.push(decided.ok_or(why));
         }
@@ -175,6 +195,7 @@ impl<'a> Judge<'a> {
                 id: format!("{i:06}"),
                 state: None,
                 reason: String::new(),
+                site: None,
             })
             .collect();
         made.models = (0..q)
@@ -309,6 +330,7 @@ mod tests {
             listed: vec![0.7672, 0.7851, 0.7904, 0.7798, 0.7425],
             tests: Test::ALL[..4].to_vec(),
             alpha,
+            margin: Some(1.5),
             seed: 1,
             studies: 1,
         }
@@ -380,6 +402,43 @@ mod tests {
             own.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
         });
         squares.sum()
+    }
+
+    /// Equivalence is that of the analysis, with missing trials and without.
+    #[test]
+    fn equivalence_is_that_of_the_analysis() {
+        let mut settings = settings(Scale::Continuous, Vaf::Listed, 0.05);
+        settings.assumptions.slope = 0.0;
+        settings.tests = vec![Test::Equivalence];
+        let cell = Cell {
+            realizations: 5,
+            repetitions: 3,
+            participants: 12,
+        };
+        let rules = Rules {
+            equivalence_margin: settings.margin,
+            ..Rules::default()
+        };
+        let (mut yes, mut no) = (0, 0);
+        for k in 0..60u32 {
+            settings.assumptions.missing = [0.0, 0.1][k as usize % 2];
+            let mut draws = Draws(Stream::new(u64::from(k), &["equivalence"]));
+            let mut study = Drawn::new(&cell, &settings);
+            study.draw(&cell, &settings.assumptions, &mut draws);
+            let mut judge = Judge::new(&settings, cell);
+            let found = judge.decide(&study, &|| Draws(Stream::new(1, &[])));
+            let analysis = analyze::analyze(&judge.ratings(&study), &rules);
+            let p = analysis.values.number("equivalence/vaf/p").unwrap();
+            assert_eq!(found.tests, [Ok(p < 0.05)], "{k}: {p}");
+            yes += u32::from(p < 0.05);
+            no += u32::from(p >= 0.05);
+        }
+        assert!(yes > 10 && no > 10, "{yes} {no}");
+        settings.margin = None;
+        let cell_study = Drawn::new(&cell, &settings);
+        let mut judge = Judge::new(&settings, cell);
+        let found = judge.decide(&cell_study, &|| Draws(Stream::new(1, &[])));
+        assert!(found.tests[0].is_err());
     }
 
     /// With missing trials the verdict is that of the whole analysis.

@@ -3,7 +3,7 @@
 use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use crate::protocol::power::{PowerLink, PowerPlan, PowerScale};
-use crate::protocol::{Protocol, QuestionKind, Role};
+use crate::protocol::{Protocol, QuestionKind, Role, check};
 use study_base::text::QuestionId;
 use study_stats::power::covariate::Spread;
 use thiserror::Error;
@@ -54,6 +54,9 @@ pub enum PlanError {
     /// A pilot for latent logits.
     #[error("the estimates of a pilot are rating points, not logits: use another scale")]
     PilotLogit,
+    /// Equivalence without a margin.
+    #[error("the test `equivalence` needs equivalence_margin in [analysis]")]
+    NoMargin,
 }
 
 /// What flags state; later than `[power]`.
@@ -82,6 +85,44 @@ pub struct Plan {
     pub defaults: Vec<String>,
     /// Exclusion rules of the protocol, which are not simulated.
     pub exclusions: usize,
+    /// Half-width of the interval of the power at which a cell has enough studies.
+    pub within: Option<f64>,
+    /// The longest session, min.
+    pub max_session_min: Option<f64>,
+    /// What is known of the duration of a session.
+    pub pace: Pace,
+}
+
+/// The duration of a session, from the estimate of `study check`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// What does not depend on the number of trials, min.
+    fixed: f64,
+    /// A repetition of one realization, min.
+    trial: f64,
+    /// Realizations that are presented besides those of a cell.
+    others: usize,
+}
+
+impl Pace {
+    fn of(protocol: &Protocol, tested: usize) -> Self {
+        let repetitions = protocol.design.repetitions;
+        let presented = protocol.scheduled_models().count();
+        let mut longer = protocol.clone();
+        longer.design.repetitions = repetitions + 1;
+        let minutes = check::minutes(protocol);
+        let repetition = check::minutes(&longer) - minutes;
+        Self {
+            fixed: minutes - repetition * f64::from(repetitions),
+            trial: repetition / presented.max(1) as f64,
+            others: presented.saturating_sub(tested),
+        }
+    }
+
+    /// A session of a cell, min.
+    pub fn minutes(&self, realizations: usize, repetitions: usize) -> f64 {
+        self.fixed + self.trial * ((realizations + self.others) * repetitions) as f64
+    }
 }
 
 impl Plan {
@@ -226,6 +267,11 @@ impl Plan {
             });
             tests
         };
+        let tests = list(|p| &p.tests);
+        let margin = protocol.analysis.equivalence_margin;
+        if tests.contains(&Test::Equivalence) && margin.is_none() {
+            return Err(PlanError::NoMargin);
+        }
         let targets = [&over.targets, &base.targets]
             .into_iter()
             .find(|t| !t.is_empty());
@@ -246,8 +292,9 @@ impl Plan {
                 },
                 pilot: flags.pilot.clone(),
                 listed,
-                tests: list(|p| &p.tests),
+                tests,
                 alpha: protocol.analysis.alpha.unwrap_or(ALPHA),
+                margin,
                 seed: flags.seed.unwrap_or(protocol.study.seed),
                 studies: over.studies.or(base.studies).unwrap_or(STUDIES),
             },
@@ -256,6 +303,9 @@ impl Plan {
             targets,
             defaults,
             exclusions: protocol.analysis.exclude.len(),
+            within: over.within.or(base.within),
+            max_session_min: over.max_session_min.or(base.max_session_min),
+            pace: Pace::of(protocol, own.realizations),
         })
     }
 
@@ -263,7 +313,12 @@ impl Plan {
     pub fn digest(&self, version: &str) -> String {
         use sha2::{Digest as _, Sha256};
         // Numbers are printed as the shortest text that reads back the same.
-        let text = format!("{version} {:?} {:?}", self.settings, self.cells());
+        let text = format!(
+            "{version} {:?} {:?} {:?}",
+            self.settings,
+            self.cells(),
+            self.within
+        );
         let digest = Sha256::digest(text.as_bytes());
         digest.iter().map(|byte| format!("{byte:02x}")).collect()
     }
@@ -274,6 +329,20 @@ impl Plan {
             .map(|c| (c.realizations, c.repetitions))
             .collect();
         shapes.dedup();
+        shapes
+    }
+
+    /// The minutes of a session with so many realizations and repetitions, if these are more
+    /// than are allowed.
+    pub fn too_long(&self, (realizations, repetitions): (usize, usize)) -> Option<f64> {
+        let minutes = self.pace.minutes(realizations, repetitions);
+        (self.max_session_min).and_then(|most| (minutes > most).then_some(minutes))
+    }
+
+    /// The shapes of designs that can be proposed.
+    pub fn proposed(&self) -> Vec<(usize, usize)> {
+        let mut shapes = self.shapes();
+        shapes.retain(|shape| self.too_long(*shape).is_none());
         shapes
     }
 
@@ -291,7 +360,7 @@ impl Plan {
         let most = self.most_participants();
         cells.extend(super::candidates(
             &self.settings,
-            &self.shapes(),
+            &self.proposed(),
             &self.targets,
             most,
         ));

@@ -82,6 +82,23 @@ pub fn run_chunk(settings: &Settings, cell: &Cell, index: u64) -> Chunk {
     chunk
 }
 
+/// How many chunks of a cell, in order, are enough for an interval of the first test's power
+/// of ± `within`; all of them if none are. It does not depend on how the chunks were made.
+pub fn enough<'c>(chunks: impl IntoIterator<Item = &'c Chunk>, within: f64) -> (usize, bool) {
+    let (mut rejected, mut studies, mut number) = (0, 0, 0);
+    for chunk in chunks {
+        number += 1;
+        studies += chunk.studies;
+        rejected += chunk.tests.first().map_or(0, |t| t.rejected);
+        if let Some((low, high)) = clopper_pearson(rejected, studies, 0.95)
+            && high - low <= 2.0 * within
+        {
+            return (number, true);
+        }
+    }
+    (number, false)
+}
+
 /// The power of a test in a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestResult {
@@ -159,8 +176,10 @@ pub fn merge<'c>(
     let has_slope = settings.assumptions.slope != 0.0 || settings.pilot.is_some();
     let result = |(test, tally): (&Test, Tally)| {
         let power = tally.rejected as f64 / n as f64;
+        // Equivalence claims no sign and no size.
+        let claims = has_slope && *test != Test::Equivalence;
         let among = |sum: f64| {
-            let some = tally.rejected > 0 && has_slope;
+            let some = tally.rejected > 0 && claims;
             some.then(|| sum / tally.rejected as f64)
         };
         Some(TestResult {
@@ -219,6 +238,7 @@ mod tests {
             listed: listed.to_vec(),
             tests: vec![Test::Pearson, Test::Permutation, Test::Crossed],
             alpha: 0.05,
+            margin: None,
             seed: 2007,
             studies: 4000,
         }
@@ -393,6 +413,30 @@ mod tests {
         let text = serde_json::to_string(&run_chunk(&all, &cell, 0)).unwrap();
         let read: Chunk = serde_json::from_str(&text).unwrap();
         assert_eq!(read, run_chunk(&all, &cell, 0));
+    }
+
+    /// Fewer studies where the power is clear, and never depending on what comes later.
+    #[test]
+    fn enough_studies_are_a_prefix() {
+        let mut settings = settings(0.5, 0.3, Scale::Continuous, &PAPER);
+        let chunks = |settings: &Settings, participants| -> Vec<Chunk> {
+            let cell = Cell {
+                realizations: 5,
+                repetitions: 3,
+                participants,
+            };
+            (0..settings.chunks())
+                .map(|i| run_chunk(settings, &cell, i))
+                .collect()
+        };
+        let middle = chunks(&settings, 10);
+        let (n, reached) = enough(&middle, 0.02);
+        assert!(reached && n == 3, "{n}");
+        assert_eq!(enough(&middle[..3], 0.02), (3, true));
+        assert_eq!(enough(&middle[..2], 0.02), (2, false));
+        assert_eq!(enough(&middle, 0.001), (4, false));
+        settings.assumptions.slope = 3.0;
+        assert_eq!(enough(&chunks(&settings, 40), 0.02), (1, true));
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub struct Fingerprints {
 }
 
 /// What the three fingerprints are made of, as JSON.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parts {
     /// What cannot change while a study runs.
     pub stimulus: Value,
@@ -51,11 +51,10 @@ pub struct Parts {
 impl Parts {
     /// The fingerprints.
     pub fn fingerprints(&self) -> Fingerprints {
-        let of = |part| hex(canonical(part).as_bytes());
         Fingerprints {
-            stimulus: of(&self.stimulus),
-            wording: of(&self.wording),
-            analysis: of(&self.analysis),
+            stimulus: digest(&self.stimulus),
+            wording: digest(&self.wording),
+            analysis: digest(&self.analysis),
         }
     }
 }
@@ -281,6 +280,11 @@ fn words(question: &Question) -> Value {
         }
     };
     json!({ "id": question.id, "prompt": question.prompt, "labels": labels })
+}
+
+/// SHA-256 of the canonical text of a value, in hexadecimal.
+pub fn digest(value: &Value) -> String {
+    hex(canonical(value).as_bytes())
 }
 
 fn hex(bytes: &[u8]) -> String {

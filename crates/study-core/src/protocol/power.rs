@@ -18,18 +18,22 @@ words! {
         Friedman = "friedman",
         /// The slope of the crossed ordinal model, by its likelihood ratio.
         Clmm = "clmm",
+        /// The effect of VAF lies within the equivalence margin of the analysis (two one-sided
+        /// tests of the slope of the crossed mixed model).
+        Equivalence = "equivalence",
     }
 }
 
 impl PowerTest {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Verdict,
         Self::Pearson,
         Self::Permutation,
         Self::Crossed,
         Self::Friedman,
         Self::Clmm,
+        Self::Equivalence,
     ];
 }
 
@@ -113,6 +117,10 @@ pub struct PowerPlan {
     pub dropout: Option<f64>,
     /// Share of trials without a rating.
     pub missing: Option<f64>,
+    /// Half-width of the interval of the power at which a design has enough studies.
+    pub within: Option<f64>,
+    /// The longest session, min.
+    pub max_session_min: Option<f64>,
     /// Numbers of participants to compare.
     pub participants: Vec<u32>,
     /// Numbers of realizations to compare.

@@ -153,6 +153,7 @@ impl Builder {
                 id: id.to_owned(),
                 state: None,
                 reason: String::new(),
+                site: None,
             });
         }
         at
@@ -250,7 +251,7 @@ impl Builder {
 }
 
 /// Sorts by name; returns the new index of each item.
-fn sort<T: Clone>(items: &mut Vec<T>, name: impl Fn(&T) -> &str) -> Vec<u32> {
+pub(super) fn sort<T: Clone>(items: &mut Vec<T>, name: impl Fn(&T) -> &str) -> Vec<u32> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     order.sort_by(|&a, &b| name(&items[a]).cmp(name(&items[b])));
     let mut new_index = vec![0; items.len()];

@@ -14,8 +14,8 @@ pub(super) const POWER: &[Key] = keys! {
     /// The power that is wanted.
     "targets": Kind::NumberList, "[0.8, 0.9]";
     /// The tests whose power is simulated: `verdict`, `pearson`, `permutation`, `crossed`,
-    /// `friedman`, `clmm`. The first one decides about designs. Without it: the verdict of
-    /// the analysis.
+    /// `friedman`, `clmm`, `equivalence`. The first one decides about designs. Without it: the
+    /// verdict of the analysis.
     "tests": Kind::Texts(1), r#"["verdict", "crossed"]"#;
     /// Rating points per standard deviation of VAF (with the number of realizations as the
     /// denominator).
@@ -38,6 +38,11 @@ pub(super) const POWER: &[Key] = keys! {
     "dropout": SHARE, "0.1";
     /// The share of trials without a rating.
     "missing": SHARE, "0.02";
+    /// A design is simulated no further once the interval of its power is ± this, checked
+    /// after each thousand studies. Without it: all `studies`.
+    "within": Kind::Number((Bound::Excluded(0.0), Bound::Excluded(1.0)), ""), "0.02";
+    /// Designs with longer sessions are not proposed.
+    "max_session_min": Kind::positive("min"), "45";
     /// The designs that are compared.
     "grid": Kind::Table(GRID), "{ participants = [10, 20, 40] }";
 };
@@ -104,6 +109,8 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<PowerPlan> {
         vaf: section.word("vaf"),
         dropout: section.number("dropout"),
         missing: section.number("missing"),
+        within: section.number("within"),
+        max_session_min: section.number("max_session_min"),
         ..PowerPlan::default()
     };
     if let Some(mut sd) = section.section("sd") {

@@ -1,0 +1,241 @@
+//! Several sites: `site/NAME/*`, `site_mean/NAME/REALIZATION/*` and what differs between
+//! them, `site_level/*`, `site_realizations/*`, `site_vaf/*`.
+//!
+//! A site is a factor between participants. Its level is compared by the participants'
+//! means, its pattern by the interaction of site and realization in the analysis of variance
+//! between and within participants, its effect of VAF by the participants' slopes. All three
+//! rest on the participants who rated every tested realization.
+
+use super::Rules;
+use super::cells::{Cells, CompleteTable};
+use super::draws::Draws;
+use super::identifiers::group_id;
+use super::values::Values;
+use study_stats::between::{self, Between};
+use study_stats::correlation::pearson;
+use study_stats::describe::{is_constant, mean, sd};
+use study_stats::paired::one_sample;
+use study_stats::permutation::{self, Statistic};
+use study_stats::regression::slope;
+
+/// Why a comparison of sites is undefined.
+const FEW: &str =
+    "a site has nobody who rated every realization, or no site has two, or nothing varies";
+
+const FEW_VAF: &str =
+    "fewer than three realizations with a VAF, all have the same, or one was not rated there";
+
+pub(super) fn sites(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
+    let names = &cells.ratings.sites;
+    if names.is_empty() {
+        return;
+    }
+    let models = cells.tested();
+    let table = cells.table(&models);
+    let groups: Vec<Vec<&[f64]>> = (0..names.len())
+        .map(|site| of_site(cells, &table, site).collect())
+        .collect();
+    for (site, name) in names.iter().enumerate() {
+        describe(cells, site, name, groups[site].len(), values);
+    }
+    let level = between::levels(&groups);
+    tested("site_level", level.as_ref(), values);
+    let means = |site: usize| -> Vec<f64> {
+        let rows = groups[site].iter();
+        rows.filter_map(|row| mean(row)).collect()
+    };
+    difference("site_level", names.len(), means, values);
+    let profiles = between::profiles(&groups);
+    tested("site_realizations", profiles.as_ref(), values);
+    let mut g = values.group("site_realizations", FEW);
+    g.maybe("eps_gg", profiles.as_ref().and_then(|e| e.eps_gg));
+    g.maybe("p_gg", profiles.as_ref().and_then(|e| e.p_gg));
+    vaf(cells, &models, rules, values);
+}
+
+/// The complete participants of a site.
+fn of_site<'t>(
+    cells: &'t Cells<'_>,
+    table: &'t CompleteTable,
+    site: usize,
+) -> impl Iterator<Item = &'t [f64]> {
+    let rows = table.subjects.iter().zip(&table.rows);
+    rows.filter(move |(s, _)| cells.ratings.subjects[**s].site == Some(site as u32))
+        .map(|(_, row)| row.as_slice())
+}
+
+/// Participants and means of a site.
+fn describe(cells: &Cells<'_>, site: usize, name: &str, complete: usize, values: &mut Values) {
+    let subjects = &cells.ratings.subjects;
+    let own = |s: usize| subjects[s].site == Some(site as u32);
+    let models = cells.tested();
+    let mut of_participants = Vec::new();
+    let mut of_realizations = vec![Vec::new(); models.len()];
+    for cells in cells.cells.chunk_by(|a, b| a.subject == b.subject) {
+        let mut means = Vec::new();
+        for cell in cells.iter().filter(|c| own(c.subject)) {
+            if let Ok(j) = models.binary_search(&cell.model) {
+                means.push(cell.mean);
+                of_realizations[j].push(cell.mean);
+            }
+        }
+        of_participants.extend(mean(&means));
+    }
+    let back = |mean: f64| mean + cells.offset;
+    let test = one_sample(&of_participants);
+    let mut g = values.group(group_id("site", &[name]), "fewer than two participants");
+    g.put("n", of_participants.len() as f64);
+    g.put("n_complete", complete as f64);
+    g.put_or("mean", mean(&of_participants).map(back), "no participants");
+    g.maybe("sd", sd(&of_participants));
+    let ci = test.map(|t| (back(t.ci95.0), back(t.ci95.1)));
+    g.interval("ci95", ci);
+    for (m, means) in models.iter().zip(&of_realizations) {
+        let id = group_id("site_mean", &[name, cells.model_name(*m)]);
+        let mut g = values.group(id, "fewer than two participants");
+        g.put("n", means.len() as f64);
+        g.put_or("mean", mean(means).map(back), "nobody rated it there");
+        g.maybe("sd", sd(means));
+        let ci = one_sample(means).map(|t| (back(t.ci95.0), back(t.ci95.1)));
+        g.interval("ci95", ci);
+    }
+}
+
+/// VAF: the correlation over realizations and the participants' slopes of each site, and
+/// whether the slopes differ.
+fn vaf(cells: &Cells<'_>, models: &[usize], rules: &Rules, values: &mut Values) {
+    let names = &cells.ratings.sites;
+    let with: Vec<usize> = (models.iter().copied())
+        .filter(|&m| cells.vaf[m].is_some())
+        .collect();
+    let x: Vec<f64> = with.iter().filter_map(|&m| cells.vaf[m]).collect();
+    let enough = x.len() >= 3 && !is_constant(&x);
+    let table = cells.table(&with);
+    let slopes = |site: usize| -> Vec<f64> {
+        let rows = of_site(cells, &table, site);
+        rows.filter_map(|row| slope(&x, row).filter(|_| enough))
+            .collect()
+    };
+    for (site, name) in names.iter().enumerate() {
+        let get = |m: &usize| {
+            let id = group_id("site_mean", &[name, cells.model_name(*m)]);
+            values.number(&format!("{id}/mean"))
+        };
+        let means: Option<Vec<f64>> = with.iter().map(get).collect();
+        let means = means.filter(|_| enough);
+        let r = means.as_ref().and_then(|y| pearson(&x, y));
+        let test = means.as_ref().and_then(|y| {
+            let mut draws = Draws::new(rules.seed, "permutation");
+            permutation::test(Statistic::Pearson, &x, y, &mut draws)
+        });
+        let own = one_sample(&slopes(site));
+        let mut g = values.group(group_id("site_vaf", &[name]), FEW_VAF);
+        g.maybe("r", r);
+        g.maybe("p_two_sided", test.map(|t| t.two_sided));
+        g.maybe("slope", own.map(|t| t.mean));
+        g.interval("slope_ci95", own.map(|t| t.ci95));
+    }
+    let groups: Vec<Vec<f64>> = (0..names.len()).map(&slopes).collect();
+    let test = between::one_way(&groups).filter(|_| enough);
+    tested("site_vaf", test.as_ref(), values);
+    difference("site_vaf", names.len(), slopes, values);
+}
+
+fn tested(group: &str, test: Option<&Between>, values: &mut Values) {
+    let mut g = values.group(group, FEW);
+    g.maybe("F", test.and_then(|t| t.f));
+    g.maybe("df1", test.map(|t| t.df1));
+    g.maybe("df2", test.map(|t| t.df2));
+    g.maybe("p", test.and_then(|t| t.p));
+    g.maybe("pes", test.and_then(Between::pes));
+}
+
+/// First of two sites minus the second, in one number of each participant.
+fn difference(group: &str, sites: usize, of: impl Fn(usize) -> Vec<f64>, values: &mut Values) {
+    let found = match sites {
+        2 => between::difference(&of(0), &of(1)),
+        _ => None,
+    };
+    let mut g = values.group(group, "there are not two sites with a variance");
+    g.maybe("difference", found.map(|d| d.0));
+    g.interval("difference_ci95", found.map(|d| d.1));
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::analyze::{Question, Rules, analyze};
+    use crate::outcome::ratings::Ratings;
+
+    /// A site whose participants rated three realizations with VAF .6, .75, .8.
+    fn site(rows: &[[f64; 3]]) -> Ratings {
+        let mut csv = "subject,model,repetition,rating,vaf\n".to_owned();
+        for (i, row) in rows.iter().enumerate() {
+            for (j, rating) in row.iter().enumerate() {
+                let vaf = [0.6, 0.75, 0.8][j];
+                csv += &format!("P{i},m{j},1,{rating},{vaf}\n");
+            }
+        }
+        Ratings::read_csv("site.csv", csv.as_bytes(), None).unwrap()
+    }
+
+    /// R 4.2.2: anova(lm(Y ~ site), lm(Y ~ 1), X = ~1, test = "Spherical"),
+    /// anova(lm(rowMeans(Y) ~ site)), anova(lm(slope ~ site)), t.test(…, var.equal = TRUE).
+    #[test]
+    fn comparisons_of_sites_agree_with_r() {
+        let utah = site(&[
+            [4.0, 5.0, 6.5],
+            [3.0, 5.0, 5.5],
+            [5.0, 4.5, 7.0],
+            [2.0, 4.0, 6.0],
+        ]);
+        let bern = site(&[[3.0, 4.0, 4.0], [5.0, 4.5, 5.5], [4.0, 5.5, 3.5]]);
+        let pooled = Ratings::pooled(&[("utah".to_owned(), utah), ("bern".to_owned(), bern)]);
+        let a = analyze(&pooled, &Rules::default());
+        let close = |id: &str, expected: f64, tolerance: f64| {
+            let found = a.values.number(id).unwrap_or_else(|| panic!("{id}"));
+            assert!((found - expected).abs() < tolerance, "{id}: {found}");
+        };
+        close("site_realizations/F", 5.096_670_247_038_9, 1e-9);
+        close("site_realizations/p_gg", 0.037_547_846_785_019, 1e-9);
+        close("site_level/F", 0.802_742_149_491_37, 1e-9);
+        close("site_level/p", 0.411_330_370_273_09, 1e-9);
+        close("site_level/difference_ci95_lo", -0.856_663_915_798_74, 1e-9);
+        close("site_vaf/F", 10.346_94, 5e-6);
+        close("site_vaf/p", 0.023_553, 5e-7);
+        close("site_vaf/difference", 10.0, 1e-9);
+        close("site_vaf/difference_ci95_lo", 2.008_551_689_653_8, 1e-9);
+        close("site_vaf/utah/slope", 12.307_692_307_692_3, 1e-9);
+        close("site_mean/bern/m1/mean", 14.0 / 3.0, 1e-12);
+        close("site/bern/n", 3.0, 1e-12);
+        let yes = |question| a.finding(&question).unwrap().is_yes();
+        assert!(yes(Question::SiteRealizations) && yes(Question::SiteVaf));
+        assert!(!yes(Question::SiteLevel));
+        // What the sites have in common rests on all seven.
+        assert_eq!(a.finding(&Question::Differ).unwrap().participants, 7);
+    }
+
+    /// Without a factor there is nothing about sites; a site of one participant still has
+    /// the variance of the other.
+    #[test]
+    fn few_participants_have_a_reason() {
+        let one = || site(&[[4.0, 5.0, 6.5]]);
+        let alone = analyze(&one(), &Rules::default());
+        assert!(alone.finding(&Question::SiteLevel).is_none());
+        assert!(alone.values.iter().all(|(id, _)| !id.starts_with("site")));
+        let of = |a: Ratings, b: Ratings| {
+            let pooled = Ratings::pooled(&[("a".to_owned(), a), ("b".to_owned(), b)]);
+            analyze(&pooled, &Rules::default())
+        };
+        let both = of(one(), one());
+        let found = both.finding(&Question::SiteRealizations).unwrap();
+        assert!(found.reason().is_some() && found.test.is_none());
+        let three = of(one(), site(&[[3.0, 4.0, 4.0], [5.0, 4.5, 5.5]]));
+        assert!(
+            three
+                .finding(&Question::SiteRealizations)
+                .unwrap()
+                .test
+                .is_some()
+        );
+    }
+}

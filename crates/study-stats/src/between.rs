@@ -1,0 +1,223 @@
+//! Groups of subjects who rated the same realizations: the analysis of variance between and
+//! within subjects.
+//!
+//! As in [`super::anova`], an effect is tested by contrasts y = C·(row of the subject). With
+//! the group means ȳg and the mean ȳ of all, SS = Σ ng·|ȳg − ȳ|² and its error is
+//! Σ|y − ȳg|². The contrasts decide what is compared: the means of the subjects, their
+//! profiles over the realizations, or their slopes.
+
+use super::anova::{covariance, greenhouse_geisser, helmert, unit};
+use super::distribution::{f_upper, t_quantile};
+use super::matrix::dot;
+use super::{finite, rectangular};
+
+/// A test of differences between groups; q is the number of contrasts, N of the subjects, G
+/// of the groups.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Between {
+    /// Sum of squares between the groups.
+    pub ss: f64,
+    /// Sum of squares within them.
+    pub ss_error: f64,
+    /// Degrees of freedom: q(G − 1).
+    pub df1: f64,
+    /// Degrees of freedom of the error: q(N − G).
+    pub df2: f64,
+    /// F; `None` if nothing varies within the groups.
+    pub f: Option<f64>,
+    /// p of F, assuming sphericity.
+    pub p: Option<f64>,
+    /// Greenhouse & Geisser's (1959) ε from the covariance within groups.
+    pub eps_gg: Option<f64>,
+    /// p of F with both degrees of freedom multiplied by `eps_gg`.
+    pub p_gg: Option<f64>,
+}
+
+impl Between {
+    /// Partial η² = SS/(SS + error); `None` for 0/0.
+    pub fn pes(&self) -> Option<f64> {
+        finite(self.ss / (self.ss + self.ss_error))
+    }
+}
+
+/// Do the means of the subjects differ between groups of rows?
+pub fn levels<R: AsRef<[f64]>>(groups: &[Vec<R>]) -> Option<Between> {
+    let k = groups.first()?.first()?.as_ref().len();
+    between(groups, &[unit(k)])
+}
+
+/// Do the differences between the columns depend on the group? The interaction of groups
+/// and columns.
+pub fn profiles<R: AsRef<[f64]>>(groups: &[Vec<R>]) -> Option<Between> {
+    let k = groups.first()?.first()?.as_ref().len();
+    between(groups, &helmert(k))
+}
+
+/// Does one number of each subject differ between groups?
+pub fn one_way(groups: &[Vec<f64>]) -> Option<Between> {
+    let rows: Vec<Vec<[f64; 1]>> = (groups.iter())
+        .map(|group| group.iter().map(|x| [*x]).collect())
+        .collect();
+    between(&rows, &[vec![1.0]])
+}
+
+/// `None` for fewer than two groups, an empty one, or no subject more than groups.
+fn between<R: AsRef<[f64]>>(groups: &[Vec<R>], contrasts: &[Vec<f64>]) -> Option<Between> {
+    let rows: Vec<&R> = groups.iter().flatten().collect();
+    let rows = rectangular(&rows)?;
+    let (n, g, q) = (rows.len(), groups.len(), contrasts.len());
+    if g < 2 || n <= g || q == 0 || groups.iter().any(Vec::is_empty) {
+        return None;
+    }
+    let mut y: Vec<Vec<f64>> = (rows.iter())
+        .map(|row| contrasts.iter().map(|c| dot(c, row)).collect())
+        .collect();
+    let mean = |y: &[Vec<f64>], j: usize| y.iter().map(|v| v[j]).sum::<f64>() / y.len() as f64;
+    let all: Vec<f64> = (0..q).map(|j| mean(&y, j)).collect();
+    let (mut ss, mut start) = (0.0, 0);
+    for group in groups {
+        let own = &mut y[start..start + group.len()];
+        start += group.len();
+        for (j, all) in all.iter().enumerate() {
+            let mean = mean(own, j);
+            ss += own.len() as f64 * (mean - all).powi(2);
+            for v in own.iter_mut() {
+                v[j] -= mean;
+            }
+        }
+    }
+    let ss_error: f64 = y.iter().map(|v| dot(v, v)).sum();
+    let size: f64 = rows.iter().map(|r| dot(r, r)).sum();
+    let (df1, df2) = ((q * (g - 1)) as f64, (q * (n - g)) as f64);
+    // A smaller error is due to rounding.
+    let defined = ss_error > 1e-24 * size && ss_error.is_finite();
+    let f = finite((ss / df1) / (ss_error / df2)).filter(|_| defined);
+    // ε does not depend on what the sums are divided by.
+    let eps_gg = defined
+        .then(|| greenhouse_geisser(&covariance(&y)))
+        .flatten();
+    let corrected = f.zip(eps_gg);
+    Some(Between {
+        ss,
+        ss_error,
+        df1,
+        df2,
+        f,
+        p: f.and_then(|f| f_upper(f, df1, df2)),
+        eps_gg,
+        p_gg: corrected.and_then(|(f, e)| f_upper(f, df1 * e, df2 * e)),
+    })
+}
+
+/// The difference of the means of two groups with its 95 % interval, by the variance within
+/// both (Student). `None` without such a variance.
+pub fn difference(a: &[f64], b: &[f64]) -> Option<(f64, (f64, f64))> {
+    let test = one_way(&[a.to_vec(), b.to_vec()])?;
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let difference = mean(a) - mean(b);
+    let variance = test.ss_error / test.df2;
+    let se = (variance * (1.0 / a.len() as f64 + 1.0 / b.len() as f64)).sqrt();
+    let half = t_quantile(0.975, test.df2)? * se;
+    test.f
+        .map(|_| (difference, (difference - half, difference + half)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn is_close(found: Option<f64>, expected: f64) {
+        let found = found.unwrap();
+        assert!(
+            (found - expected).abs() < 1e-9 * expected.abs(),
+            "{found} {expected}"
+        );
+    }
+
+    fn two_groups() -> Vec<Vec<[f64; 3]>> {
+        vec![
+            vec![
+                [4.0, 5.0, 6.5],
+                [3.0, 5.0, 5.5],
+                [5.0, 4.5, 7.0],
+                [2.0, 4.0, 6.0],
+            ],
+            vec![[3.0, 4.0, 4.0], [5.0, 4.5, 5.5], [4.0, 5.5, 3.5]],
+        ]
+    }
+
+    /// R 4.2.2: anova(lm(Y ~ site), lm(Y ~ 1), X = ~1, test = "Spherical"), and
+    /// aov(y ~ r * site + Error(s/r)).
+    #[test]
+    fn profiles_of_unequal_groups_agree_with_r() {
+        let found = profiles(&two_groups()).unwrap();
+        is_close(Some(found.ss), 5.648_809_523_8);
+        is_close(Some(found.ss_error), 5.541_666_666_7);
+        assert_eq!((found.df1, found.df2), (2.0, 10.0));
+        is_close(found.f, 5.096_670_247_038_9);
+        is_close(found.p, 0.029_782_363_404_656);
+        is_close(found.p_gg, 0.037_547_846_785_019);
+        let eps = found.eps_gg.unwrap();
+        assert!((eps - 0.8698).abs() < 5e-5, "{eps}");
+    }
+
+    /// The same functions of R, for three groups and four columns.
+    #[test]
+    fn profiles_of_three_groups_agree_with_r() {
+        let groups = vec![
+            vec![
+                [3.2, 3.2, 5.5, 5.2],
+                [5.4, 2.9, 4.7, 5.5],
+                [2.7, 3.8, 4.8, 5.0],
+                [4.1, 2.9, 3.7, 3.0],
+            ],
+            vec![
+                [5.7, 3.9, 5.4, 2.0],
+                [3.4, 3.4, 5.5, 2.2],
+                [3.5, 1.8, 3.3, 3.9],
+            ],
+            vec![
+                [3.4, 4.2, 3.1, 5.6],
+                [3.7, 3.7, 4.3, 3.2],
+                [4.1, 4.9, 5.1, 3.9],
+                [5.2, 4.9, 6.2, 5.9],
+            ],
+        ];
+        let found = profiles(&groups).unwrap();
+        assert_eq!((found.df1, found.df2), (6.0, 24.0));
+        is_close(found.f, 1.615_302_492_365_4);
+        is_close(found.p, 0.186_174_727_951_18);
+        is_close(found.p_gg, 0.210_373_591_166_6);
+    }
+
+    /// R 4.2.2: anova(lm(rowMeans(Y) ~ site)), t.test(…, var.equal = TRUE).
+    #[test]
+    fn means_and_slopes_of_subjects_agree_with_r() {
+        let groups = two_groups();
+        let found = levels(&groups).unwrap();
+        is_close(found.f, 0.802_742_149_491_37);
+        is_close(found.p, 0.411_330_370_273_09);
+        let means: Vec<Vec<f64>> = (groups.iter())
+            .map(|g| g.iter().map(|r| r.iter().sum::<f64>() / 3.0).collect())
+            .collect();
+        is_close(one_way(&means).unwrap().f, 0.802_742_149_491_37);
+        let (difference, ends) = difference(&means[0], &means[1]).unwrap();
+        is_close(Some(difference), 4.791_666_666_666_7 - 4.333_333_333_333_3);
+        is_close(Some(ends.0), -0.856_663_915_798_74);
+        is_close(Some(ends.1), 1.773_330_582_465_41);
+    }
+
+    #[test]
+    fn without_variance_within_groups_there_is_no_test() {
+        let alike = vec![vec![[1.0, 2.0]; 3], vec![[1.0, 4.0]; 3]];
+        let found = profiles(&alike).unwrap();
+        assert_eq!((found.f, found.p, found.p_gg), (None, None, None));
+        assert_eq!(profiles(&alike[..1]), None);
+        assert_eq!(
+            levels(&[vec![[1.0]], vec![[2.0]]]),
+            None,
+            "as many groups as subjects"
+        );
+        assert_eq!(difference(&[1.0], &[2.0]), None);
+    }
+}

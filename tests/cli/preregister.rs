@@ -1,0 +1,140 @@
+//! `study preregister`, and what the report says of it.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::support::{changed_protocol, study};
+use serde_json::Value as Json;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+const DATED: [&str; 4] = ["--date", "2026-03-01", "--studies", "200"];
+
+/// A protocol of six participants, in the folder `p`.
+fn protocol() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let six = [("participants = 10", "participants = 6")];
+    changed_protocol("turn-signal", &folder.path().join("p"), &six);
+    folder
+}
+
+fn preregister(folder: &Path, more: &[&str]) -> (i32, String, String) {
+    study(&[&["preregister", "p"], &DATED[..], more].concat(), folder)
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    fs::read_to_string(folder.join(name)).unwrap()
+}
+
+#[test]
+fn the_document_is_reproducible_and_not_replaced() {
+    let folder = protocol();
+    let at = folder.path();
+    let (code, hash, said) = preregister(at, &[]);
+    assert_eq!(code, 0, "{said}");
+    let (text, facts) = (
+        read(at, "p/preregistration.md"),
+        read(at, "p/preregistration.json"),
+    );
+    let json: Json = serde_json::from_str(&facts).unwrap();
+    assert_eq!(json["format"], "study-preregistration/1");
+    assert_eq!(json["sha256"], hash.trim());
+    assert!(text.contains(hash.trim()));
+    for part in [
+        "# Preregistration: Realism of identified turn-signal switch models",
+        "6 participants, 3 repetitions of each realization.",
+        "seed 2007",
+        "`realism`: “How realistic did it feel?” (rating from 1 to 7, primary)",
+        "No exclusion rule.",
+        "α = .05",
+        "Whether the realizations differ: repeated-measures analysis of variance, \
+         Greenhouse–Geisser correction, level .05.",
+        "permutation test, exact, level .05",
+        "In 200 simulated studies",
+        "With 5 realizations, VAF and the true mean ratings have to correlate at .885",
+        "This design finds with 80 %",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    // Again the same bytes, and nothing is replaced by something else.
+    assert_eq!(preregister(at, &[]).1, hash);
+    assert_eq!(read(at, "p/preregistration.json"), facts);
+    let (code, _, said) = preregister(at, &["--participants", "20"]);
+    assert_eq!(
+        (code, said.contains("another document")),
+        (1, true),
+        "{said}"
+    );
+    assert_eq!(read(at, "p/preregistration.md"), text);
+    let (code, other, said) = preregister(at, &["--participants", "20", "--out", "other"]);
+    assert_eq!(code, 0, "{said}");
+    assert_ne!(other, hash);
+    assert!(read(at, "other/preregistration.md").contains("20 participants"));
+}
+
+/// The document is frozen with the protocol, and every form of the report compares.
+#[test]
+fn the_report_compares_the_study_with_its_document() {
+    let folder = protocol();
+    let at = folder.path();
+    let run = |arguments: &[&str]| {
+        let (code, out, said) = study(arguments, at);
+        assert_eq!(code, 0, "{arguments:?}: {said}");
+        out
+    };
+    assert_eq!(preregister(at, &[]).0, 0);
+    run(&["rehearse", "p", "--participants", "6", "--out", "results"]);
+    run(&["verify", "results"]);
+    let terminal = run(&["analyze", "results"]);
+    assert!(
+        terminal.contains("Preregistered on 2026-03-01"),
+        "{terminal}"
+    );
+    assert!(terminal.contains("the study matches it"), "{terminal}");
+    let json: Json = serde_json::from_str(&run(&["analyze", "results", "--json"])).unwrap();
+    assert_eq!(json["preregistration"]["matches"], true);
+    assert_eq!(
+        json["preregistration"]["first_session"],
+        Json::Null,
+        "only simulated"
+    );
+    let page = "results/turn-signal/analysis/report.html";
+    assert!(read(at, page).contains("the study matches it"));
+
+    // Another level and a new rule, later: named everywhere, and no longer a match.
+    let text = read(at, "p/protocol.toml").replace("primary = ", "alpha = 0.01\nprimary = ");
+    let text = text + "\n[[analysis.exclude]]\nrule = \"constant-rater\"\n";
+    fs::write(at.join("p/protocol.toml"), text).unwrap();
+    run(&["amend", "results", "p", "--reason", "stricter"]);
+    let terminal = run(&["analyze", "results"]);
+    assert!(terminal.contains("the study deviates:"), "{terminal}");
+    let json: Json = serde_json::from_str(&run(&["analyze", "results", "--json"])).unwrap();
+    assert_eq!(json["preregistration"]["matches"], false);
+    let deviations = json["preregistration"]["deviations"].to_string();
+    for part in [
+        "alpha: none → 0.01",
+        "constant-rater",
+        "`vaf`: p is held against 0.01",
+    ] {
+        assert!(deviations.contains(part), "{part}: {deviations}");
+    }
+    let warnings = json["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|w| w["code"] == "preregistration"));
+    let html = read(at, page);
+    assert!(html.contains("the study deviates") && !html.contains("the study matches"));
+}
+
+/// A protocol that was changed after the document, before the first session.
+#[test]
+fn a_changed_protocol_is_noticed() {
+    let folder = protocol();
+    let at = folder.path();
+    assert_eq!(preregister(at, &[]).0, 0);
+    let text = read(at, "p/protocol.toml").replace("repetitions = 3", "repetitions = 2");
+    fs::write(at.join("p/protocol.toml"), text).unwrap();
+    let run = |arguments: &[&str]| study(arguments, at).1;
+    run(&["rehearse", "p", "--participants", "1", "--out", "results"]);
+    let said = run(&["analyze", "results", "--json"]);
+    assert!(said.contains("design.repetitions: 3 → 2"), "{said}");
+    assert!(said.contains("\"matches\": false"));
+}
