@@ -3,7 +3,7 @@
 use super::html::{declared_test, exclusion};
 use super::{apa, sentences};
 use serde_json::json;
-use study_base::text::{Untrusted, counted};
+use study_base::text::{Untrusted, capital, counted};
 use study_core::analyze::Analysis;
 use study_core::preregister::Preregistration;
 use study_core::protocol::{Order, Protocol, Question, QuestionKind, Role, Unfinished};
@@ -181,11 +181,6 @@ pub fn power(report: &super::power::Report) -> Vec<String> {
     let mut lines = vec![report.ceiling_sentence(), super::power::paragraph(report)];
     let finds = super::power::sensitivity_sentences(report).into_iter();
     lines.extend(finds.map(|line| format!("This design {line}.")));
-    lines.extend(
-        report
-            .warnings()
-            .iter()
-            .map(|w| format!("{}.", apa::capital(w))),
-    );
+    lines.extend(report.warnings().iter().map(|w| format!("{}.", capital(w))));
     lines
 }
