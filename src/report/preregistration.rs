@@ -50,7 +50,7 @@ pub fn markdown(c: &Content<'_>) -> String {
     list(&mut out, "Questions", &questions(p));
     list(&mut out, "Exclusions", &exclusions(p));
     let mut tests = vec![format!(
-        "Level of significance α = {}, two-sided: an answer is yes for p below its level. Nothing else \
+        "Level of significance α = {}, two-sided: an answer is yes for p at or below its level. Nothing else \
          decides.",
         sentences::level(p.analysis.alpha())
     )];
