@@ -130,6 +130,7 @@ fn journal(folder: &Path, mirror: Option<&Path>) -> Vec<Duration> {
         participant: ParticipantId::new("P01").unwrap(),
         kind: SeatKind::Real,
         rows: None,
+        plan: study_core::store::Plan::default(),
     };
     let mut claimed = opened.unwrap().claim(&request).unwrap();
     let mut journal = claimed.folder.journal().unwrap();

@@ -20,13 +20,13 @@ use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
 use study_base::limits::Limits;
-use study_base::text::{ModelId, ParticipantId};
+use study_base::text::{ModelId, PartId, ParticipantId};
 use study_core::outcome::{Channel, Event, Fidelity, Playback, Sample, Verdict};
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::{DeviceKind, FileOrders, ModelEntry, Protocol, Trial};
 use study_core::rendering::{Played, judge};
 use study_core::session::{Effect, Ending, Input, Screen, Session, Unsaved, View, input::Claim};
-use study_core::store::{ClaimRequest, Copies, Receipt, SeatKind, StudyFolder};
+use study_core::store::{ClaimRequest, Copies, Plan, Receipt, SeatKind, StudyFolder};
 use study_haptics::identify::delivery::Delivery;
 use study_haptics::model::Realization;
 use study_wire::servo::ServoSettings;
@@ -93,6 +93,8 @@ pub struct Setup {
     pub kind: SeatKind,
     /// The rows that may be assigned; `None`: all.
     pub rows: Option<RangeInclusive<u32>>,
+    /// The group that the experimenter gives to a new participant.
+    pub group: Option<PartId>,
     /// The kind of `device`.
     pub device_kind: DeviceKind,
     /// The playback device.
@@ -310,13 +312,14 @@ impl Runner {
     }
 
     fn claim(&mut self, participant: ParticipantId) -> Input {
+        let now = self.setup.clock.now().wall;
         let request = ClaimRequest {
             participant: participant.clone(),
             kind: self.setup.kind,
             rows: self.setup.rows.clone(),
+            plan: Plan::of(&self.setup.protocol, self.setup.group.clone(), now),
         };
-        let claimed = self.setup.study.claim(&request);
-        let opened = claimed.and_then(|mut claimed| {
+        let opened = self.setup.study.claim(&request).and_then(|mut claimed| {
             let journal = claimed.folder.journal()?;
             Ok((claimed, journal))
         });
@@ -326,8 +329,7 @@ impl Runner {
                 None => error.to_string(),
             }),
             Ok((claimed, journal)) => {
-                let saver = Saver::new(claimed.folder, journal, self.setup.threaded);
-                self.saver = Some(saver);
+                self.saver = Some(Saver::new(claimed.folder, journal, self.setup.threaded));
                 let identity = self.setup.device.identity();
                 Input::Claimed(Box::new(Claim {
                     participant,
@@ -340,6 +342,7 @@ impl Runner {
                     device_id: identity.id,
                     device_check: self.setup.device_check.clone(),
                     device_telemetry: identity.telemetry,
+                    assigned: claimed.assigned,
                     notices: claimed.notices,
                 }))
             }

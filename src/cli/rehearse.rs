@@ -12,10 +12,11 @@ use crate::runner::clock::{Clock as _, VirtualClock};
 use crate::runner::rehearsal::{first_day, run_one};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 use study_base::rng::Stream;
 use study_base::text::Untrusted;
 use study_core::outcome::{State, Status};
-use study_core::protocol::{DeviceKind, Seat};
+use study_core::protocol::{DeviceKind, Seat, SessionPlan};
 use study_core::store::{Frozen, SeatKind, StudyFolder};
 
 /// Probability of a fault in a playback with `--faults`.
@@ -92,42 +93,50 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let mut study = Some(study);
     let progress = super::console::progress(u64::from(args.participants), "participants");
     for number in 1..=args.participants {
-        let clock =
-            VirtualClock::starting_at(first_day() + chrono::Days::new(u64::from(number - 1)));
-        let device_seed = seed.wrapping_add(u64::from(number) << 32);
-        let mut options = Options::seeded(device_seed);
-        let usual_hz = if args.faults { 1000 } else { 100 };
-        options.device.telemetry_hz = f64::from(args.telemetry.unwrap_or(usual_hz));
-        if args.faults {
-            options.device.wrong = wrong_loads(device_seed);
-            options.faults = FaultPlan::random(device_seed, FAULT_PROBABILITY);
-        }
-        let folder_of_study = match study.take() {
-            Some(first) => first,
-            None => StudyFolder::open(&folder)?,
-        };
-        let setup = Setup {
-            protocol: protocol.clone(),
-            orders: orders.clone(),
-            models: tables.clone(),
-            deliveries: deliveries.clone(),
-            fingerprints: loaded.fingerprints.clone(),
-            study: folder_of_study,
-            kind: SeatKind::Simulated,
-            rows: None,
-            device_kind: kind,
-            device: match kind {
-                DeviceKind::Manual => Box::new(Manual::default()),
-                _ => with_manual_samples(Box::new(VirtualDevice::new(options)), &protocol),
-            },
-            device_check: None,
-            clock: Box::new(clock.clone()),
-            threaded: false,
-        };
+        let day = u64::from(number - 1);
+        let clock = VirtualClock::starting_at(first_day() + chrono::Days::new(day));
         let mut rater = Rater::new(seed, number, effect);
         let id = format!("SIM{number:03}");
-        run_one(setup, &id, &clock, &mut rater, &percepts)
-            .map_err(|e| Failure::new(Kind::Results, e))?;
+        for planned in 0..protocol.planned_sessions() {
+            if let Some(session) = protocol.sessions.get(planned).filter(|_| planned > 0) {
+                clock.advance(gap(session));
+            }
+            let device_seed = seed
+                .wrapping_add(u64::from(number) << 32)
+                .wrapping_add((planned as u64) << 48);
+            let mut options = Options::seeded(device_seed);
+            let usual_hz = if args.faults { 1000 } else { 100 };
+            options.device.telemetry_hz = f64::from(args.telemetry.unwrap_or(usual_hz));
+            if args.faults {
+                options.device.wrong = wrong_loads(device_seed);
+                options.faults = FaultPlan::random(device_seed, FAULT_PROBABILITY);
+            }
+            let folder_of_study = match study.take() {
+                Some(first) => first,
+                None => StudyFolder::open(&folder)?,
+            };
+            let setup = Setup {
+                protocol: protocol.clone(),
+                orders: orders.clone(),
+                models: tables.clone(),
+                deliveries: deliveries.clone(),
+                fingerprints: loaded.fingerprints.clone(),
+                study: folder_of_study,
+                kind: SeatKind::Simulated,
+                rows: None,
+                group: None,
+                device_kind: kind,
+                device: match kind {
+                    DeviceKind::Manual => Box::new(Manual::default()),
+                    _ => with_manual_samples(Box::new(VirtualDevice::new(options)), &protocol),
+                },
+                device_check: None,
+                clock: Box::new(clock.clone()),
+                threaded: false,
+            };
+            run_one(setup, &id, &clock, &mut rater, &percepts)
+                .map_err(|e| Failure::new(Kind::Results, e))?;
+        }
         progress.inc(1);
     }
     progress.finish_and_clear();
@@ -147,6 +156,16 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     console.out(format!(
         "{done} simulated participants, {rated} rated trials in {shown}.\nSimulated: the effects are built in (docs/simulation.md) and are no evidence.\nNext: study analyze {shown}\n"
     ))
+}
+
+/// The time that a simulated participant stays away before a session: halfway between the
+/// least and the largest gap, or a day more than the least.
+fn gap(session: &SessionPlan) -> Duration {
+    let hours = match session.max_gap_h {
+        Some(most) => f64::midpoint(session.min_gap_h, most),
+        None => session.min_gap_h + 24.0,
+    };
+    Duration::from_secs_f64(3600.0 * hours)
 }
 
 /// In every third session the device is wrong for three loads.

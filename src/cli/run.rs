@@ -15,12 +15,13 @@ use crate::tui::{self, Tui};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
-use study_base::text::{ParticipantId, Untrusted};
+use study_base::text::{PartId, ParticipantId, Untrusted};
 use study_core::protocol::DeviceKind;
 use study_core::session::roster::Newcomer;
 use study_core::session::{Config, Ending, MAX_OPERATOR, Roster};
 use study_core::store::{
-    Copies, Frozen, SeatKind, SessionData, StoreError, StudyFolder, layout, next_row, participants,
+    Copies, Frozen, Plan, SeatKind, SessionData, StoreError, StudyFolder, layout, next_row,
+    next_session, participants,
 };
 
 /// Arguments of `study run`.
@@ -42,6 +43,9 @@ pub(super) struct Args {
     /// Rows that may be assigned, such as 1-40: give each of two rigs its own range
     #[arg(long, value_name = "A-B", value_parser = super::schedule::parse_rows)]
     rows: Option<RangeInclusive<u32>>,
+    /// Group of a new participant, where the protocol says that the experimenter gives it
+    #[arg(long, value_name = "ID")]
+    group: Option<PartId>,
     /// Folder for the results of all studies
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
@@ -183,6 +187,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         study,
         kind: seats,
         rows: args.rows.clone(),
+        group: args.group.clone(),
         device_kind: kind,
         device_check: device_selection::commissioned(&device.identity().id, console),
         device,
@@ -192,7 +197,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     let config = Config {
         participant: args.participant.clone().unwrap_or_default(),
         operator: args.operator.clone().unwrap_or_default(),
-        roster: Some(Arc::new(roster(&known, seats, args.rows.as_ref()))),
+        roster: Some(Arc::new(roster(
+            &known,
+            seats,
+            args.rows.as_ref(),
+            &Plan::of(&protocol, args.group.clone(), at.wall),
+        ))),
         auto_identify: false,
     };
     let study = setup.study.clone();
@@ -238,12 +248,26 @@ fn protocol_here() -> Result<PathBuf, Failure> {
 }
 
 /// The participants so far, and what a new one becomes.
-fn roster(sessions: &[SessionData], kind: SeatKind, rows: Option<&RangeInclusive<u32>>) -> Roster {
+fn roster(
+    sessions: &[SessionData],
+    kind: SeatKind,
+    rows: Option<&RangeInclusive<u32>>,
+    plan: &Plan,
+) -> Roster {
     let newcomer = match kind {
         SeatKind::Real => next_row(rows, sessions).map_or(Newcomer::NoRow, Newcomer::Row),
         SeatKind::Pilot | SeatKind::Simulated => Newcomer::Pilot,
     };
-    Roster::new(&participants(sessions), newcomer)
+    let mut roster = Roster::new(&participants(sessions), newcomer);
+    let of_one = sessions.chunk_by(|a, b| a.participant == b.participant);
+    for own in of_one.filter(|_| !plan.sessions.is_empty()) {
+        let own: Vec<&SessionData> = own.iter().collect();
+        let next = next_session(&own, plan);
+        if let Some(words) = next.of_finished(plan.sessions.len()) {
+            roster.comes_again(&own[0].participant, words);
+        }
+    }
+    roster
 }
 
 /// Says which of results folder and mirror was left behind.
@@ -394,6 +418,10 @@ fn resume_command(args: &Args, participant: &str) -> String {
     option("mirror", args.mirror.as_deref().map(path));
     option("operator", args.operator.clone());
     option(
+        "group",
+        args.group.as_ref().map(|group| group.as_str().to_owned()),
+    );
+    option(
         "participant",
         Some(participant.to_owned()).filter(|p| !p.is_empty()),
     );
@@ -522,7 +550,9 @@ mod tests {
         sessions[0].seat = Some(Seat::Row(1));
         sessions[1].history.standing.state = State::Unfinished;
         sessions[2].history.standing.state = State::DroppedOut;
-        let of = |kind, rows: Option<RangeInclusive<u32>>| roster(&sessions, kind, rows.as_ref());
+        let of = |kind, rows: Option<RangeInclusive<u32>>| {
+            roster(&sessions, kind, rows.as_ref(), &Plan::default())
+        };
         let all = of(SeatKind::Real, None);
         assert_eq!(all.who("nobody-yet").unwrap(), "new, row 2");
         assert_eq!(

@@ -7,7 +7,8 @@ mod table;
 use super::{Console, Failure, Kind, study_folder};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
-use study_core::protocol::{FileOrders, Protocol, Seat, Stimuli, Trial};
+use study_base::text::PartId;
+use study_core::protocol::{Assign, Assigned, FileOrders, Groups, Protocol, Seat, Stimuli, Trial};
 use study_core::schedule::{Planner, ScheduleError};
 use study_core::store::{StudyFolder, layout};
 
@@ -33,6 +34,12 @@ pub(super) struct Args {
     /// levels proposed and presented, and the estimate after each trial, for one row
     #[arg(long, value_name = "FILE", conflicts_with = "csv")]
     answers: Option<PathBuf>,
+    /// The planned session, of [[sessions]] [default: the first one]
+    #[arg(long, value_name = "ID")]
+    session: Option<PartId>,
+    /// The group, where the experimenter gives it; else it follows from the row
+    #[arg(long, value_name = "ID")]
+    group: Option<PartId>,
     /// Print the replayed tracks as one JSON document
     #[arg(long, requires = "answers")]
     json: bool,
@@ -63,7 +70,93 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     if let Some(file) = &args.answers {
         return answers::run(protocol, *rows.start(), file, args.json, console);
     }
-    show(protocol, loaded.orders.as_ref(), rows, args.csv, console)
+    let wanted = (args.group.as_ref(), args.session.as_ref());
+    let planners = Planners::of(wanted, protocol, loaded.orders.as_ref())?;
+    show(protocol, &planners, rows, args.csv, console)
+}
+
+/// Makes the orders of each group.
+struct Planners {
+    of: Vec<(Option<PartId>, Planner)>,
+    seed: u64,
+    groups: Option<Groups>,
+    given: Option<PartId>,
+}
+
+impl Planners {
+    /// Of a group, where the experimenter gives it, and of a session, the first by default.
+    fn of(
+        (given, session): (Option<&PartId>, Option<&PartId>),
+        protocol: &Protocol,
+        orders: Option<&FileOrders>,
+    ) -> Result<Self, Failure> {
+        let list = protocol.groups.as_ref().map_or(&[][..], |g| &g.list);
+        let known: Vec<&PartId> = list.iter().map(|g| &g.id).collect();
+        let by_experimenter = protocol
+            .groups
+            .as_ref()
+            .is_some_and(|g| g.assign == Assign::Given);
+        match given {
+            Some(given) if !by_experimenter || !known.contains(&given) => {
+                let what = format!(
+                    "--group {given}: there is no such group that is given by the experimenter"
+                );
+                return Err(Failure::input(what));
+            }
+            None if by_experimenter => {
+                let names: Vec<&str> = known.iter().map(|id| id.as_str()).collect();
+                let hint = format!("--group, one of {}", names.join(", "));
+                return Err(
+                    Failure::input("the experimenter gives the groups of this study").hint(hint),
+                );
+            }
+            _ => {}
+        }
+        let session = match session {
+            None => protocol.sessions.first().map(|s| s.id.clone()),
+            Some(id) if protocol.sessions.iter().any(|s| s.id == *id) => Some(id.clone()),
+            Some(id) => return Err(Failure::input(format!("there is no session `{id}`"))),
+        };
+        let groups: Vec<Option<PartId>> = match &known[..] {
+            [] => vec![None],
+            known => known.iter().map(|id| Some((*id).clone())).collect(),
+        };
+        let planner = |group: Option<PartId>| {
+            let assigned = Assigned {
+                group: group.clone(),
+                session_id: session.clone(),
+                gap_h: None,
+            };
+            let planner = Planner::new(&protocol.of(&assigned), orders).map_err(infeasible)?;
+            Ok((group, planner))
+        };
+        Ok(Self {
+            of: groups
+                .into_iter()
+                .map(planner)
+                .collect::<Result<_, Failure>>()?,
+            seed: protocol.study.seed,
+            groups: protocol.groups.clone(),
+            given: given.cloned(),
+        })
+    }
+
+    fn group(&self, row: u32) -> Option<PartId> {
+        let by_row = || {
+            self.groups
+                .as_ref()?
+                .of_seat(self.seed, Seat::Row(row))
+                .cloned()
+        };
+        self.given.clone().or_else(by_row)
+    }
+
+    fn plan(&self, row: u32) -> Result<Vec<Trial>, Failure> {
+        let group = self.group(row);
+        let planner = self.of.iter().find(|(id, _)| *id == group);
+        let (_, planner) = planner.unwrap_or(&self.of[0]);
+        planner.plan(Seat::Row(row)).map_err(infeasible)
+    }
 }
 
 /// Refuses to show the orders of a started study without a reason: an experimenter
@@ -98,7 +191,7 @@ fn reveal(
 /// Prints the orders of some rows.
 fn show(
     protocol: &Protocol,
-    orders: Option<&FileOrders>,
+    planners: &Planners,
     rows: RangeInclusive<u32>,
     as_csv: bool,
     console: &mut Console,
@@ -109,28 +202,37 @@ fn show(
             format!("at most {MAX_ROWS} rows can be shown at once"),
         ));
     }
-    let planner = Planner::new(protocol, orders).map_err(infeasible)?;
-    let plan = |row| planner.plan(Seat::Row(row)).map_err(infeasible);
     if as_csv {
         let rows: Vec<u32> = rows.collect();
         for (i, chunk) in rows.chunks(CHUNK).enumerate() {
             let plans = chunk
                 .iter()
-                .map(|&row| Ok((row, plan(row)?)))
+                .map(|&row| Ok((row, planners.plan(row)?)))
                 .collect::<Result<Vec<_>, Failure>>()?;
             console.out(csv(i == 0, &plans)?)?;
         }
         Ok(())
     } else {
+        if planners.groups.is_some() {
+            let of_row = |row| {
+                let group = planners.group(row);
+                format!(
+                    "row {row} {}",
+                    group.map_or_else(String::new, |g| g.to_string())
+                )
+            };
+            let all: Vec<String> = rows.clone().map(of_row).collect();
+            console.out(format!("Groups: {}\n", all.join(", ")))?;
+        }
         let plans = rows
-            .map(|row| Ok((row, plan(row)?)))
+            .map(|row| Ok((row, planners.plan(row)?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         if !protocol.parts.is_empty() {
             return console.out(parts::render(protocol, &plans, console.width));
         }
         console.out(table::render(
             protocol,
-            planner.models(),
+            planners.of[0].1.models(),
             &plans,
             console.width,
         ))
@@ -264,7 +366,8 @@ mod tests {
     fn shown(p: &Protocol, rows: RangeInclusive<u32>, csv: bool) -> Result<String, Failure> {
         let out = Shared::default();
         let mut console = Console::to(out.clone(), Vec::new());
-        show(p, None, rows, csv, &mut console)?;
+        let planners = Planners::of((None, None), p, None)?;
+        show(p, &planners, rows, csv, &mut console)?;
         let bytes = out.0.borrow().clone();
         Ok(String::from_utf8(bytes).unwrap())
     }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use study_base::text::Untrusted;
 use study_core::outcome::{ParticipantRow, State, Verdict};
-use study_core::store::{SessionData, StudyFolder, next_row, participants};
+use study_core::store::{Plan, SessionData, StudyFolder, next_row, next_session, participants};
 
 /// Arguments of `study status`.
 #[derive(Debug, clap::Args)]
@@ -68,10 +68,36 @@ fn of_study(study: &StudyFolder, sessions: &[SessionData]) -> String {
             "This computer while it played: late by at most {most:.0} ms, 99 % within {p99:.0} ms"
         );
     }
+    out.push_str(&again(study, sessions));
     let _ = match next_row(None, sessions) {
         Some(row) => writeln!(out, "Next free row: {row}"),
         None => writeln!(out, "No row is free"),
     };
+    out
+}
+
+/// Who comes again, and from when on, in a study of repeated sessions; their groups.
+fn again(study: &StudyFolder, sessions: &[SessionData]) -> String {
+    let mut out = String::new();
+    let Ok(loaded) = study_folder::frozen(study) else {
+        return out;
+    };
+    let protocol = &loaded.protocol;
+    let now = chrono::Local::now().fixed_offset();
+    let plan = Plan::of(protocol, None, now);
+    let of_one = sessions.chunk_by(|a, b| a.participant == b.participant);
+    for own in of_one.filter(|_| !plan.sessions.is_empty()) {
+        let who = &own[0].participant;
+        let own: Vec<&SessionData> = own.iter().collect();
+        if let Some(words) = next_session(&own, &plan).of_finished(plan.sessions.len()) {
+            let _ = writeln!(out, "{who}: {words}");
+        }
+    }
+    for group in protocol.groups.iter().flat_map(|groups| &groups.list) {
+        let own = participants(sessions);
+        let own = own.iter().filter(|p| p.group.as_ref() == Some(&group.id));
+        let _ = writeln!(out, "Group {}: {}", group.id, own.count());
+    }
     out
 }
 
@@ -129,7 +155,10 @@ fn table(rows: &[&ParticipantRow]) -> String {
         lines.push([
             row.participant.to_string(),
             row.row.map_or_else(String::new, |r| r.to_string()),
-            row.session.to_string(),
+            match &row.session_id {
+                Some(id) => format!("{} {id}", row.session),
+                None => row.session.to_string(),
+            },
             state,
             format!("{}/{}", row.trials_done, row.trials_planned),
             row.started_at.map_or_else(String::new, |at| {

@@ -42,9 +42,14 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Answered {
             format!("{condition}: are standard and comparison told apart?")
         }
         PartQuestion::Thresholds => "Do thresholds differ between the conditions?".to_owned(),
+        PartQuestion::Groups => "Do the groups differ?".to_owned(),
+        PartQuestion::Sessions => "Do the sessions differ?".to_owned(),
     };
     let decided = || format!("{verdict}: {}.", result(part, f));
     let mut more: Vec<String> = f.caveats.iter().map(sentences::caveat).collect();
+    if f.question == PartQuestion::Sessions {
+        more.extend(retest(part));
+    }
     if matches!(
         f.question,
         PartQuestion::Preferred | PartQuestion::Thresholds
@@ -97,6 +102,12 @@ fn result(part: &PartAnalysis, f: &PartFinding) -> String {
             )
         }
         PartQuestion::Thresholds => format!("{tested} ({test}, {people})"),
+        PartQuestion::Groups | PartQuestion::Sessions => {
+            let size = f.estimate.as_ref().map_or_else(String::new, |e| {
+                format!("{} {}, ", e.name, sentences::estimate(e, apa::two))
+            });
+            format!("{size}{tested} ({test}, {people})")
+        }
     }
 }
 
@@ -200,6 +211,14 @@ pub(super) fn results(part: &PartAnalysis) -> String {
                     "{c}: it was not shown that standard and comparison are told apart, {what}."
                 )
             }
+            (PartQuestion::Groups, true) => format!("The groups differed, {what}."),
+            (PartQuestion::Groups, false) => {
+                format!("No difference between the groups was shown, {what}.")
+            }
+            (PartQuestion::Sessions, true) => format!("The sessions differed, {what}."),
+            (PartQuestion::Sessions, false) => {
+                format!("No difference between the sessions was shown, {what}.")
+            }
             (PartQuestion::Thresholds, true) => {
                 format!("Thresholds differed between conditions, {what}.")
             }
@@ -208,12 +227,32 @@ pub(super) fn results(part: &PartAnalysis) -> String {
             }
         });
     }
+    text.extend(retest(part));
     let pairs = part
         .findings
         .iter()
         .any(|f| f.is_yes() && f.question == PartQuestion::Thresholds);
     text.extend(different(part).filter(|_| pairs));
     text.join(" ")
+}
+
+/// How alike the sessions are.
+fn retest(part: &PartAnalysis) -> Option<String> {
+    let icc = |name: &str| {
+        let id = format!("retest/icc_{name}");
+        let ci = part.values.interval(&format!("{id}_ci95"));
+        let ci = ci.map_or_else(String::new, |e| {
+            format!(", 95 % CI {}", apa::interval(e, apa::two))
+        });
+        Some(format!("{}{ci}", apa::two(part.values.number(&id)?)))
+    };
+    Some(format!(
+        "Test–retest reliability over {} participants: ICC(A,1) = {} (agreement), ICC(C,1) = {} \
+         (consistency).",
+        part.values.number("retest/n")?,
+        icc("agreement")?,
+        icc("consistency")?
+    ))
 }
 
 /// The thresholds of each condition.
@@ -264,6 +303,20 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
     if has("sdt/") {
         text.push(
             "Sensitivities d′ are from rates after the log-linear correction (Hautus, 1995)."
+                .to_owned(),
+        );
+    }
+    if has("groups/") {
+        text.push(
+            "Groups were compared by Welch's analysis of variance of one mean for each participant, over what \
+             all groups have."
+                .to_owned(),
+        );
+    }
+    if has("sessions/") {
+        text.push(
+            "Sessions were compared by a linear mixed model with an intercept for each participant; intraclass \
+             correlations are those of single sessions (Shrout & Fleiss, 1979)."
                 .to_owned(),
         );
     }

@@ -61,6 +61,8 @@ pub(super) fn tables(values: &Values) -> Vec<PartTable> {
         differences,
         magnitudes,
         ratings,
+        groups,
+        group_pairs,
     ];
     let tables = all.into_iter().map(|table| table(values));
     tables
@@ -225,6 +227,88 @@ fn contrasts(values: &Values) -> PartTable {
             PartCell::Number(number("df"), two),
             PartCell::Number(number("p_holm"), plain),
         ]);
+    }
+    table
+}
+
+/// Means of groups and of sessions.
+fn groups(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "groups",
+        caption: "Groups and sessions",
+        columns: &[
+            ("", "name"),
+            ("n", "n"),
+            ("mean", "mean"),
+            ("SD", "sd"),
+            ("95 %", "mean_ci95"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    for kind in ["groups", "sessions"] {
+        for cell in cells(values, kind, 1)
+            .iter()
+            .filter(|cell| !cell[0].contains('|'))
+        {
+            let number =
+                |statistic: &str| values.number(&format!("{kind}/{}/{statistic}", cell[0]));
+            let Some(mean) = number("geometric_mean").or_else(|| number("mean")) else {
+                continue;
+            };
+            table.rows.push(vec![
+                named(cell[0]),
+                PartCell::Number(number("n"), |n| format!("{n}")),
+                PartCell::Number(Some(mean), plain),
+                PartCell::Number(number("geometric_sd").or_else(|| number("sd")), plain),
+                PartCell::Interval(values.interval(&format!("{kind}/{}/ci95", cell[0])), plain),
+            ]);
+        }
+        if let Some(why) = values.reason(&format!("{kind}/F")) {
+            table
+                .notes
+                .push(format!("No comparison of {kind}: {}.", name(why)));
+        }
+    }
+    table
+}
+
+/// Contrasts of groups and of sessions.
+fn group_pairs(values: &Values) -> PartTable {
+    let mut table = PartTable {
+        file: "group_pairs",
+        caption: "Contrasts of groups and sessions",
+        columns: &[
+            ("", "names"),
+            ("estimate", "estimate"),
+            ("95 %", "estimate_ci95"),
+            ("t", "t"),
+            ("df", "df"),
+            ("p (Holm)", "p_holm"),
+            ("g", "hedges_g"),
+        ],
+        rows: Vec::new(),
+        notes: Vec::new(),
+    };
+    for kind in ["groups", "sessions"] {
+        for cell in cells(values, kind, 1) {
+            let number =
+                |statistic: &str| values.number(&format!("{kind}/{}/{statistic}", cell[0]));
+            let (ratio, difference) = (number("ratio"), number("difference"));
+            let Some(estimate) = ratio.or(difference) else {
+                continue;
+            };
+            let sign = if ratio.is_some() { " / " } else { " − " };
+            table.rows.push(vec![
+                PartCell::Name(cell[0].replace('|', sign)),
+                PartCell::Number(Some(estimate), plain),
+                PartCell::Interval(values.interval(&format!("{kind}/{}/ci95", cell[0])), plain),
+                PartCell::Number(number("t"), two),
+                PartCell::Number(number("df"), two),
+                PartCell::Number(number("p_holm"), plain),
+                PartCell::Number(number("hedges_g"), two),
+            ]);
+        }
     }
     table
 }

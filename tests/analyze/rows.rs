@@ -67,6 +67,8 @@ fn row(who: &str, model: &str, repetition: u32, rating: i64) -> RatingRow {
         fidelity: None,
         host_late_ms: None,
         input_channel: None,
+        group: None,
+        session_id: None,
     }
 }
 
@@ -86,6 +88,9 @@ fn participant(who: &str, state: State, reason: &str) -> ParticipantRow {
         trials_planned: 3,
         started_at: DateTime::parse_from_rfc3339("2026-11-20T10:00:00+01:00").ok(),
         answers: BTreeMap::new(),
+        group: None,
+        session_id: None,
+        gap_h: None,
     }
 }
 

@@ -166,6 +166,7 @@ fn session(falls_silent: bool) -> (Vec<Load>, Vec<serde_json::Value>) {
         study,
         kind: SeatKind::Simulated,
         rows: None,
+        group: None,
         device_kind: DeviceKind::Simulated,
         device: Box::new(device),
         deliveries: Default::default(),

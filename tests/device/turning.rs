@@ -37,6 +37,7 @@ fn rehearsed(home: &Path, wrong: Wrong, loads: [u32; 2]) -> (PathBuf, Derived) {
         study: opened,
         kind: SeatKind::Simulated,
         rows: None,
+        group: None,
         device_kind: DeviceKind::Simulated,
         device: Box::new(VirtualDevice::new(options)),
         deliveries: Default::default(),

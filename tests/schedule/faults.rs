@@ -172,6 +172,7 @@ impl Run {
             device_id: "simulated-1".to_owned(),
             device_check: None,
             device_telemetry: true,
+            assigned: study_core::protocol::Assigned::default(),
             notices: Vec::new(),
         }
     }

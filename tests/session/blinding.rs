@@ -99,6 +99,7 @@ fn pages(
         study,
         kind: SeatKind::Real,
         rows: None,
+        group: None,
         device_kind: study_core::protocol::DeviceKind::Simulated,
         device: Box::new(VirtualDevice::new(options)),
         deliveries: Default::default(),

@@ -88,6 +88,7 @@ fn session(from: usize, leave: &Input) -> Option<Session> {
         study,
         kind: SeatKind::Real,
         rows: None,
+        group: None,
         device_kind: DeviceKind::Manual,
         device: Box::new(Manual::default()),
         deliveries: Default::default(),

@@ -85,6 +85,7 @@ fn a_fixed_exposure_is_exact_to_twenty_milliseconds() {
         study: study.clone(),
         kind: SeatKind::Real,
         rows: None,
+        group: None,
         device_kind: DeviceKind::Simulated,
         device: Box::new(VirtualDevice::new(options)),
         device_check: None,

@@ -10,6 +10,7 @@ mod devices;
 mod dying_disk;
 mod exposure;
 mod flow;
+mod groups;
 mod kill;
 mod languages;
 #[path = "../store/memory.rs"]

@@ -8,6 +8,7 @@ mod designs;
 mod dictionary;
 mod example_study;
 mod folder;
+mod groups;
 mod heads;
 mod journal;
 mod memory;

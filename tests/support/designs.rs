@@ -63,6 +63,8 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         parts: Vec::new(),
         families: Vec::new(),
         tracks: Vec::new(),
+        groups: None,
+        sessions: Vec::new(),
         intake: Vec::new(),
         outro: Vec::new(),
         power: Default::default(),

@@ -7,7 +7,7 @@ use study_base::text::{ModelId, ParticipantId, QuestionId};
 use study_core::outcome::{Author, Event, Failure, FormId, Moment, Playback, Start};
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::*;
-use study_core::store::{ClaimRequest, Frozen, SeatKind};
+use study_core::store::{ClaimRequest, Frozen, Plan, SeatKind};
 
 pub fn model(id: &str) -> ModelId {
     ModelId::new(id).unwrap()
@@ -122,6 +122,7 @@ pub fn request(id: &str, kind: SeatKind) -> ClaimRequest {
         participant: participant(id),
         kind,
         rows: None,
+        plan: Plan::default(),
     }
 }
 
@@ -159,6 +160,7 @@ pub fn started(id: &str, session: u32, seat: Seat) -> Event {
         protocol_version: 1,
         fingerprints: fingerprints(),
         schedule: schedule(),
+        assigned: Assigned::default(),
     }))
 }
 

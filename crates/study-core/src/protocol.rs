@@ -14,6 +14,7 @@ pub mod example;
 mod exclusion;
 pub mod file;
 pub mod fingerprint;
+pub mod groups;
 pub mod keys;
 pub mod parts;
 pub mod phrases;
@@ -23,6 +24,7 @@ pub mod question;
 pub mod schema;
 
 pub use exclusion::Exclusion;
+pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use parts::{
     Compared, Exposure, FamilyRules, Interval, IntervalOrder, Method, Pairs, Part, Presentations,
     Task, TrackRules, Vary,
@@ -38,7 +40,7 @@ use study_base::text::{ModelId, QuestionId};
 
 /// The file format, with its version, of a protocol without parts.
 pub const FORMAT: &str = "study-protocol/1";
-/// The format that `[[parts]]`, `[[families]]` and `[[tracks]]` need.
+/// The format that `[[parts]]`, `[[families]]`, `[[tracks]]`, `[groups]` and `[[sessions]]` need.
 pub const FORMAT_2: &str = "study-protocol/2";
 
 /// A whole study file.
@@ -79,6 +81,12 @@ pub struct Protocol {
     /// `[[tracks]]`
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tracks: Vec<TrackRules>,
+    /// `[groups]`
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub groups: Option<Groups>,
+    /// `[[sessions]]`; without any, a participant comes once.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<SessionPlan>,
     /// `[power]`; in no fingerprint.
     #[serde(skip)]
     pub power: power::PowerPlan,

@@ -14,6 +14,7 @@
 //! | Do the raters agree? | [`agreement`], [`disagreement`] (interaction of subject and realization) |
 //! | Does a rating depend on the one before? | [`carry_over`] |
 //! | How large an effect would be found? How many subjects and realizations does it take? | [`power`] |
+//! | Do independent groups differ? | [`welch`] (variances of their own) |
 //! | How large is a share of trials? | [`proportion`] |
 //! | At which level is a stimulus felt? | [`psychometric`] |
 //! | How well are two stimuli told apart? | [`detection`] |
@@ -73,6 +74,7 @@ pub mod random;
 pub mod rank;
 pub mod regression;
 pub mod two_way_slope;
+pub mod welch;
 
 /// The number, unless it is infinite or NaN.
 pub(crate) fn finite(x: f64) -> Option<f64> {

@@ -4,7 +4,7 @@ use super::OtherFiles;
 use study_base::diagnostic::{Fault, Findings, Severity, did_you_mean};
 use study_base::text::Untrusted;
 use study_core::protocol::check::Spans;
-use study_core::protocol::{DeviceKind, FileOrders, Order, Protocol, Role};
+use study_core::protocol::{Assigned, DeviceKind, FileOrders, Order, Protocol, Role};
 use study_core::schedule::balance::balances;
 use study_core::schedule::{Planner, ScheduleError};
 
@@ -159,7 +159,12 @@ pub(super) fn orders(
     findings: &mut Findings,
 ) {
     let participants = protocol.design.participants;
-    let tried = Planner::new(protocol, orders).and_then(|planner| planner.verify(participants));
+    let own = |assigned: &Assigned| {
+        let planner = Planner::new(&protocol.of(assigned), orders);
+        planner.and_then(|planner| planner.verify(participants))
+    };
+    // Each group in each session has orders of its own.
+    let tried = protocol.assignments().iter().try_for_each(own);
     if let Err(error) = tried {
         let place = keys(&error, protocol)
             .iter()

@@ -73,7 +73,9 @@ fn of_part(part: &PartId, plans: &Plans) -> Vec<(u32, Vec<Trial>)> {
         }
         (*row, trials)
     };
-    plans.iter().map(own).collect()
+    // A group can be without it.
+    let all = plans.iter().map(own);
+    all.filter(|(_, trials)| !trials.is_empty()).collect()
 }
 
 /// The order of pairs, and how often each one comes in both orders.

@@ -12,7 +12,9 @@ pub fn part_tables(parts: &[PartAnalysis]) -> Vec<TableFile> {
         table("parts.csv", statistics(parts)),
         table("parts_findings.csv", findings(parts)),
     ];
-    const FILES: [(&str, &str); 9] = [
+    const FILES: [(&str, &str); 11] = [
+        ("groups", "part_groups.csv"),
+        ("group_pairs", "part_group_pairs.csv"),
         ("thresholds", "part_thresholds.csv"),
         ("conditions", "part_conditions.csv"),
         ("contrasts", "part_contrasts.csv"),

@@ -172,6 +172,8 @@ pub enum TestKind {
     BetweenWithin,
     /// F of the differences between sites in one number of each participant.
     BetweenSites,
+    /// Welch's analysis of variance between groups of participants.
+    Welch,
 }
 
 impl TestKind {
@@ -197,6 +199,7 @@ impl TestKind {
             Self::WaldClustered => "wald-clustered",
             Self::BetweenWithin => "between-within",
             Self::BetweenSites => "between-sites",
+            Self::Welch => "welch",
         }
     }
 }

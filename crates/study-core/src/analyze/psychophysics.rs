@@ -3,7 +3,9 @@
 //! answered and returns statistics by identifier; `docs/statistics-psychophysics.md`
 //! defines them.
 
+mod again;
 mod detection;
+mod discriminations;
 mod excluded;
 mod findings;
 mod fits;

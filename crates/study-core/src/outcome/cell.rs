@@ -212,9 +212,15 @@ impl ParticipantColumn {
         let forms = [&protocol.setup, &protocol.intake, &protocol.outro];
         let repeated = Repeated {
             questions: forms.into_iter().flatten().map(|q| q.id.as_str()).collect(),
+            has_parts: !protocol.parts.is_empty(),
             ..Repeated::default()
         };
         header(Self::ALL, Self::column, &repeated)
+    }
+
+    /// That of a table of these rows: without optional columns that all leave empty.
+    pub fn header_of(protocol: &Protocol, rows: &[ParticipantRow]) -> Header<Self> {
+        used(Self::header(protocol), Self::column, rows)
     }
 }
 
@@ -287,6 +293,8 @@ row! {
         Replays: replays,
         HostLateMs: host_late_ms,
         InputChannel: input_channel,
+        Group: group,
+        SessionId: session_id,
         ..fidelity {
             Rendering: verdict,
             RenderedVaf: rendered_vaf,
@@ -383,6 +391,9 @@ row! {
         TrialsPlanned: trials_planned,
         StartedAt: started_at,
         Questions: answers,
+        Group: group,
+        SessionId: session_id,
+        GapH: gap_h,
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::fidelity::Fidelity;
 use crate::protocol::fingerprint::Fingerprints;
-use crate::protocol::{Answer, DeviceKind, Seat, Trial};
+use crate::protocol::{Answer, Assigned, DeviceKind, Seat, Trial};
 use chrono::{DateTime, FixedOffset};
 use serde::{Deserialize, Serialize};
 use study_base::named;
@@ -231,6 +231,9 @@ pub struct Start {
     pub fingerprints: Fingerprints,
     /// Every planned trial, in order.
     pub schedule: Vec<Trial>,
+    /// Group and planned session, in a study that has them.
+    #[serde(flatten)]
+    pub assigned: Assigned,
 }
 
 /// Something that happened in a session.

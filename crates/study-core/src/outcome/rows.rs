@@ -76,6 +76,8 @@ pub struct RatingRow {
     pub fidelity: Option<Fidelity>,
     pub host_late_ms: Option<f64>,
     pub input_channel: Option<Channel>,
+    pub group: Option<PartId>,
+    pub session_id: Option<PartId>,
 }
 
 /// One row of `intervals.csv`: a presentation.
@@ -178,4 +180,7 @@ pub struct ParticipantRow {
     pub trials_planned: u32,
     pub started_at: Option<DateTime<FixedOffset>>,
     pub answers: BTreeMap<QuestionId, Answer>,
+    pub group: Option<PartId>,
+    pub session_id: Option<PartId>,
+    pub gap_h: Option<f64>,
 }

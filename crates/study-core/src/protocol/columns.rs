@@ -326,6 +326,10 @@ table! {
             "how late this computer's thread for the device was at most during the playback",
         ).unit("ms").empty("not measured").optional(),
         InputChannel: INPUT_CHANNEL.empty("not answered, or not by a person"),
+        Group: text("group", "group of the participant").empty("the study has no groups")
+            .optional().with_parts(),
+        SessionId: text("session_id", "planned session, of `[[sessions]]`")
+            .empty("a participant comes once").optional().with_parts(),
     }
 }
 
@@ -478,6 +482,10 @@ table! {
             "one for each question",
             "last answer to a question of setup, intake or outro",
         ).empty("declined, not answered, withdrawn or erased").repeats(Repeats::Question),
+        Group: RatingColumn::Group.column(),
+        SessionId: RatingColumn::SessionId.column(),
+        GapH: number("gap_h", "time since the session before the last one").unit("h")
+            .empty("there is none before it").optional().with_parts(),
     }
 }
 
@@ -526,82 +534,22 @@ pub fn is_parts_column(name: &str) -> bool {
 /// without may have the name of one of their columns, but not of all, one after the other.
 pub fn are_of_parts(header: &[String]) -> bool {
     let all = RatingColumn::ALL.iter().map(|c| c.column());
-    let own: Vec<&str> = (all.filter(|c| !c.is_in(false, false)))
-        .map(|c| c.name)
-        .collect();
+    let own = all.filter(|c| !c.is_in(false, false) && !c.optional);
+    let own: Vec<&str> = own.map(|c| c.name).collect();
     header.windows(own.len()).any(|w| w == own)
 }
 
-/// Whether `participants.csv` has a fixed column of this name, in any case.
+/// Whether `participants.csv` of a study without parts has a fixed column of this name, in
+/// any case.
 pub fn is_participants_column(name: &str) -> bool {
+    let all = ParticipantColumn::ALL.iter().map(|c| c.column());
+    (all.filter(|c| c.is_in(false, false))).any(|c| c.reserves(name))
+}
+
+/// The same for a study with parts.
+pub fn is_participants_column_of_parts(name: &str) -> bool {
     (ParticipantColumn::ALL.iter()).any(|c| c.column().reserves(name))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The declarations of every table.
-    fn tables() -> [Vec<Column>; 6] {
-        [
-            IntervalColumn::ALL.iter().map(|c| c.column()).collect(),
-            RatingColumn::ALL.iter().map(|c| c.column()).collect(),
-            AttemptColumn::ALL.iter().map(|c| c.column()).collect(),
-            ParticipantColumn::ALL.iter().map(|c| c.column()).collect(),
-            SampleColumn::ALL.iter().map(|c| c.column()).collect(),
-            UsedColumn::ALL.iter().map(|c| c.column()).collect(),
-        ]
-    }
-
-    #[test]
-    fn every_column_has_a_name_of_its_own_and_a_meaning() {
-        for columns in tables() {
-            for (i, column) in columns.iter().enumerate() {
-                let name = column.name;
-                assert!(!column.meaning.is_empty(), "{name}");
-                assert!(column.empty.is_none_or(|when| !when.is_empty()), "{name}");
-                assert!(columns[..i].iter().all(|c| c.name != name), "{name}");
-                if let Kind::Level(levels) = column.kind {
-                    assert!(levels.len() > 1, "{name}");
-                    assert!(
-                        levels.iter().all(|(l, m)| !l.is_empty() && !m.is_empty()),
-                        "{name}"
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_name_ends_in_its_unit() {
-        let units = [
-            ("_mm", "mm"),
-            ("_ms", "ms"),
-            ("_mm_s", "mm/s"),
-            ("_per_s", "1/s"),
-            ("_s", "s"),
-            ("_j", "J"),
-            ("_n", "N"),
-        ];
-        for column in tables().concat() {
-            let of_name = units.iter().find(|(end, _)| {
-                let longer = |other: &str| other.len() > end.len() && column.name.ends_with(other);
-                column.name.ends_with(end) && !units.iter().any(|(other, _)| longer(other))
-            });
-            assert_eq!(
-                column.unit,
-                of_name.map(|(_, unit)| *unit),
-                "{}",
-                column.name
-            );
-        }
-    }
-
-    #[test]
-    fn names_of_fixed_columns_are_reserved_in_any_case() {
-        assert!(is_ratings_column("Status") && is_ratings_column("vaf"));
-        assert!(is_participants_column("reason") && !is_participants_column("vaf"));
-        assert!(is_parts_column("Level") && !is_ratings_column("level"));
-        assert!(!is_ratings_column("realism") && !is_ratings_column("one for each question"));
-    }
-}
+mod tests;

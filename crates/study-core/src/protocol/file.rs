@@ -14,6 +14,7 @@ mod design;
 mod device;
 mod families;
 mod general;
+mod groups;
 mod models;
 mod orders;
 mod parts;
@@ -65,6 +66,12 @@ pub const ROOT: &[Key] = keys! {
     "families": Kind::Tables(families::FAMILIES), "";
     /// Tracks of the parts of kind `discrimination`. Needs the format `study-protocol/2`.
     "tracks": Kind::Tables(tracks::TRACKS), "";
+    /// Groups of participants: each belongs to one for good. Needs the format
+    /// `study-protocol/2` and `[[parts]]`.
+    "groups": Kind::Table(groups::GROUPS), "";
+    /// Repeated sessions, in their order: the same participant comes again. Without any, a
+    /// participant comes once. Needs the format `study-protocol/2` and `[[parts]]`.
+    "sessions": Kind::Tables(groups::SESSIONS), "";
     /// Asked after each trial; at least one.
     "questions": Kind::Variants(&questions::QUESTIONS), "", derived("required, unless every part has an answer of its own");
     /// Asked of the experimenter before the first trial.
@@ -90,7 +97,7 @@ const FORMATS: &[Word] = &[
 ];
 
 /// Sections that need [`FORMAT_2`].
-const OF_FORMAT_2: [&str; 3] = ["parts", "families", "tracks"];
+const OF_FORMAT_2: [&str; 5] = ["parts", "families", "tracks", "groups", "sessions"];
 
 /// Largest protocol file that is read, bytes.
 pub const MAX_FILE_BYTES: usize = 1024 * 1024;
@@ -189,8 +196,12 @@ fn format_is_known(document: &Document<'_>, broken: bool) -> bool {
     if format == FORMAT {
         for name in OF_FORMAT_2 {
             if let Some(value) = root.value(name) {
+                let name = match name {
+                    "groups" => "[groups]".to_owned(),
+                    name => format!("[[{name}]]"),
+                };
                 value.fault(
-                    Fault::error(format!("[[{name}]] needs the format `{FORMAT_2}`"))
+                    Fault::error(format!("{name} needs the format `{FORMAT_2}`"))
                         .hint(format!("write format = \"{FORMAT_2}\" in the first line")),
                 );
             }
@@ -231,6 +242,9 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
             .map(tracks::read)
             .collect(),
     };
+    let groups = root.section("groups").map(groups::groups);
+    let sessions = root.sections("sessions").into_iter().map(groups::session);
+    let sessions: Option<Vec<_>> = sessions.collect();
     let has_parts = !raw.parts.is_empty();
     let design = (root.section("design")).and_then(|section| design::read(section, has_parts));
     let session = root.section("session").and_then(general::session);
@@ -264,6 +278,10 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         sections.agree(document);
     }
     let resolved = raw.resolve(&sections, document, broken);
+    if let (Some(sessions), Some(parts), false) = (&sessions, &resolved.parts, broken) {
+        let known = groups.as_ref().and_then(Option::as_ref);
+        groups::agree(known, sessions, parts, document);
+    }
     sections.fill_duplicates();
     let Sections {
         models,
@@ -291,6 +309,11 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         parts: resolved.parts?,
         families: resolved.families?,
         tracks: resolved.tracks?,
+        groups: match groups {
+            None => None,
+            Some(groups) => Some(groups?),
+        },
+        sessions: sessions?,
         power: power?,
     })
 }

@@ -13,7 +13,7 @@
 //!   `uncertified`; each realization's id, role, device, `duplicate_of` and the
 //!   SHA-256 of its file; minimum strokes, exposure, duration of the reference; id,
 //!   scale and `required` of the questions after a trial; the orders file; parts
-//!   without their texts, tracks, and families with the SHA-256 of their files.
+//!   without their texts, tracks, groups, repeated sessions, and families with the SHA-256 of their files.
 //! * wording: title, authors and the like; all texts, prompts and labels; consent;
 //!   questions asked once (setup, intake, outro); who types, and when a session
 //!   can be resumed.
@@ -84,6 +84,8 @@ pub fn parts(
         parts,
         families,
         tracks,
+        groups,
+        sessions,
         // It changes no session and no result.
         power: _,
     } = protocol;
@@ -160,6 +162,13 @@ pub fn parts(
         stimulus["parts"] = parts.iter().map(trials).collect();
         stimulus["families"] = families.iter().map(|f| levels(f, model_bytes)).collect();
         stimulus["tracks"] = json!(tracks);
+    }
+    // Absent from the fingerprints of protocols without them.
+    if groups.is_some() {
+        stimulus["groups"] = json!(groups);
+    }
+    if !sessions.is_empty() {
+        stimulus["sessions"] = json!(sessions);
     }
     let mut wording = json!({
         "study": {

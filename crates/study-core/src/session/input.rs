@@ -2,7 +2,7 @@
 
 use crate::outcome::{Author, Choice, Entry, Event, Fidelity, FormId, Playback};
 use crate::protocol::fingerprint::Fingerprints;
-use crate::protocol::{Answer, DeviceKind, Seat};
+use crate::protocol::{Answer, Assigned, DeviceKind, Seat};
 use study_base::text::{ModelId, ParticipantId, QuestionId};
 
 /// An input from the operator, the device or the store.
@@ -145,6 +145,8 @@ pub struct Claim {
     pub device_check: Option<String>,
     /// Whether the device reports telemetry.
     pub device_telemetry: bool,
+    /// Group and planned session of a new session.
+    pub assigned: Assigned,
     /// Messages to the operator, such as a repaired journal.
     pub notices: Vec<String>,
 }

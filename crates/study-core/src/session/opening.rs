@@ -4,7 +4,9 @@ use super::phase::Phase;
 use super::{Claim, ClaimFacts, Effect, Session};
 use crate::outcome::fold::History;
 use crate::outcome::{Choice, Entry, Event, Failure, Moment, Start, State};
+use crate::protocol::Assigned;
 use crate::schedule;
+use std::sync::Arc;
 use study_base::text::{ParticipantId, counted};
 
 /// Longest operator code, in characters.
@@ -65,6 +67,7 @@ impl Session {
     }
 
     fn start(&mut self, claim: Claim, at: Moment) {
+        self.take_part(&claim.assigned);
         let planned = schedule::plan(&self.protocol, self.orders.as_deref(), claim.seat);
         match planned {
             Err(why) => {
@@ -84,6 +87,7 @@ impl Session {
                     protocol_version: claim.protocol_version,
                     fingerprints: claim.fingerprints,
                     schedule,
+                    assigned: claim.assigned,
                 };
                 self.record(Event::SessionStarted(Box::new(start)), at);
                 self.phase = Phase::Saving;
@@ -93,12 +97,14 @@ impl Session {
 
     fn resume_from(&mut self, entries: &[Entry], at: Moment) {
         self.history = History::of(entries);
-        if self.history.start().is_none() {
+        let Some(start) = self.history.start() else {
             self.history = History::default();
             return self.claim_refused(
                 "the start of this session is missing from its journal; run `study verify`",
             );
-        }
+        };
+        let assigned = start.assigned.clone();
+        self.take_part(&assigned);
         if self.history.over() {
             self.phase = Phase::End;
             return;
@@ -108,6 +114,13 @@ impl Session {
             self.phase = Phase::ResumeChoice { gap_s };
         } else {
             self.reopen(gap_s, None, at);
+        }
+    }
+
+    /// From now on, the protocol is that of this group and planned session.
+    fn take_part(&mut self, assigned: &Assigned) {
+        if *assigned != Assigned::default() {
+            self.protocol = Arc::new(self.protocol.of(assigned));
         }
     }
 

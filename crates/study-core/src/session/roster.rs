@@ -8,6 +8,8 @@ use study_base::text::ParticipantId;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Roster {
     known: BTreeMap<ParticipantId, Known>,
+    /// What is said of participants who have finished a session and come again.
+    again: BTreeMap<ParticipantId, String>,
     newcomer: Newcomer,
 }
 
@@ -44,8 +46,14 @@ impl Roster {
         });
         Self {
             known: known.collect(),
+            again: BTreeMap::new(),
             newcomer,
         }
+    }
+
+    /// Says of a participant who has finished a session when the next one is.
+    pub fn comes_again(&mut self, participant: &ParticipantId, words: String) {
+        self.again.insert(participant.clone(), words);
     }
 
     /// Who a typed id is; `None` if it is no id.
@@ -68,7 +76,10 @@ impl Roster {
             }) => format!("unfinished, {done} of {planned} trials saved"),
             Some(Known {
                 state: State::Done, ..
-            }) => "finished".to_owned(),
+            }) => match self.again.get(&id) {
+                Some(words) => words.clone(),
+                None => "finished".to_owned(),
+            },
             None
             | Some(Known {
                 state: State::Void, ..

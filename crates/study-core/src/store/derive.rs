@@ -10,7 +10,9 @@ use crate::outcome::fold::{attempt_rows, interval_rows};
 use crate::outcome::{AttemptRow, IntervalRow, ParticipantRow, RatingRow, State};
 use crate::protocol::Protocol;
 use crate::protocol::columns::{AttemptColumn, IntervalColumn, ParticipantColumn, RatingColumn};
+use std::collections::BTreeSet;
 use std::io;
+use study_base::text::ParticipantId;
 
 /// Every row of a study.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -87,8 +89,14 @@ impl Derived {
             participants: participants(sessions),
             ..Self::default()
         };
+        // Whoever withdraws in a later session withdraws all.
+        let withdrawn: BTreeSet<&ParticipantId> = (sessions.iter())
+            .filter(|s| s.standing().state == State::Withdrawn)
+            .map(|s| &s.participant)
+            .collect();
         for session in sessions {
-            if !matches!(session.standing().state, State::Void | State::Withdrawn) {
+            let withdrawn = withdrawn.contains(&session.participant);
+            if session.standing().state != State::Void && !withdrawn {
                 derived.rows.extend(session.history.rating_rows(protocol));
                 if !protocol.parts.is_empty() {
                     derived
@@ -96,7 +104,7 @@ impl Derived {
                         .extend(interval_rows(&session.history, protocol));
                 }
             }
-            if session.standing().state != State::Withdrawn {
+            if !withdrawn {
                 let rows = attempt_rows(
                     &session.history,
                     &session.participant,
@@ -115,7 +123,7 @@ impl Derived {
         let ratings = tables::csv(&header, &self.rows)?;
         let header = AttemptColumn::header_of(&self.attempts);
         let attempts = tables::csv(&header, &self.attempts)?;
-        let header = ParticipantColumn::header(protocol);
+        let header = ParticipantColumn::header_of(protocol, &self.participants);
         let participants = tables::csv(&header, &self.participants)?;
         let mut tables = vec![
             (layout::RATINGS, ratings),
@@ -150,7 +158,16 @@ pub fn participants(sessions: &[SessionData]) -> Vec<ParticipantRow> {
             row.answers.clear();
         }
         match rows.last_mut() {
-            Some(last) if last.participant == row.participant => *last = row,
+            Some(last) if last.participant == row.participant => {
+                // What is asked once was asked in the first session.
+                if !matches!(row.state, State::Withdrawn | State::Void) && !row.erased {
+                    let earlier = std::mem::take(&mut last.answers);
+                    for (question, answer) in earlier {
+                        row.answers.entry(question).or_insert(answer);
+                    }
+                }
+                *last = row;
+            }
             _ => rows.push(row),
         }
     }

@@ -4,7 +4,7 @@ use super::disk::{ItemKind, NotAFile};
 use crate::outcome::State;
 use std::io;
 use std::path::{Path, PathBuf};
-use study_base::text::{ParticipantId, Untrusted};
+use study_base::text::{PartId, ParticipantId, Untrusted};
 
 /// An error of a results folder.
 #[derive(Debug, thiserror::Error)]
@@ -106,6 +106,34 @@ pub enum StoreError {
         path: PathBuf,
         /// The newest version.
         version: u32,
+    },
+    /// The next session of a participant is not yet planned.
+    #[error("{participant}: session {session} is planned from {} on", when(*.from))]
+    TooEarly {
+        /// Participant.
+        participant: ParticipantId,
+        /// The next session.
+        session: PartId,
+        /// When the gap is over.
+        from: chrono::DateTime<chrono::FixedOffset>,
+    },
+    /// The participant belongs to another group.
+    #[error("{participant} belongs to group {had}")]
+    OtherGroup {
+        /// Participant.
+        participant: ParticipantId,
+        /// The group.
+        had: PartId,
+    },
+    /// A group that cannot be given, or none where one is needed.
+    #[error("{}", group_refused(.given.as_ref(), .known, *.by_experimenter))]
+    Group {
+        /// The group that was given.
+        given: Option<PartId>,
+        /// The groups of the protocol.
+        known: String,
+        /// Whether the experimenter gives the groups.
+        by_experimenter: bool,
     },
     /// Another process amended the study after it was opened.
     #[error("{}: the protocol was amended in the meantime, to version {version}", .path.display())]
@@ -235,6 +263,22 @@ pub enum StoreError {
     },
 }
 
+/// A time for people.
+pub fn when(at: chrono::DateTime<chrono::FixedOffset>) -> String {
+    at.format("%Y-%m-%d %H:%M").to_string()
+}
+
+fn group_refused(given: Option<&PartId>, known: &str, by_experimenter: bool) -> String {
+    match given {
+        None => format!("a new participant needs one of the groups {known}"),
+        Some(given) if by_experimenter => {
+            format!("there is no group {given}; the groups are {known}")
+        }
+        Some(_) if known.is_empty() => "the study has no groups".to_owned(),
+        Some(_) => "groups follow from the row in this study".to_owned(),
+    }
+}
+
 impl StoreError {
     /// What to do next, if the message does not say it.
     pub fn hint(&self) -> Option<String> {
@@ -269,6 +313,10 @@ impl StoreError {
                     .to_owned()
             }
             Self::AmendedMeanwhile { .. } => "start again with the amended protocol".to_owned(),
+            Self::TooEarly { .. } => "the participant can come again then; the gap is in the protocol, [[sessions]]".to_owned(),
+            Self::OtherGroup { .. } => "leave out --group: a participant stays in one group".to_owned(),
+            Self::Group { by_experimenter: true, .. } => "say which with --group".to_owned(),
+            Self::Group { .. } => "leave out --group".to_owned(),
             Self::Finished { .. } => "use a new id for each participant".to_owned(),
             Self::InState { state, .. } if *state == State::NoShow => {
                 "if they came after all, set the state to void first".to_owned()
@@ -306,6 +354,9 @@ impl StoreError {
                 | Self::OtherKind { .. }
                 | Self::Collides { .. }
                 | Self::NoRow { .. }
+                | Self::TooEarly { .. }
+                | Self::OtherGroup { .. }
+                | Self::Group { .. }
                 | Self::Unknown { .. }
                 | Self::StateRefused { .. }
                 | Self::OutsideFolder { .. }

@@ -9,12 +9,13 @@ use super::error::{At as _, StoreError};
 use super::journal::{self, Journal};
 use super::journal_record::{Claim, Record};
 use super::manifest::Manifest;
+use super::plan::{self, Next, Plan, done, next_session};
 use super::session_lock::{RESERVE_BYTES, SessionLock};
-use super::sessions::SessionData;
+use super::sessions::{SessionData, deciding};
 use super::{SessionFolder, StudyFolder, atomic, layout};
 use crate::outcome::fold::Standing;
 use crate::outcome::{Entry, State};
-use crate::protocol::Seat;
+use crate::protocol::{Assigned, Seat};
 use std::collections::BTreeSet;
 use std::io;
 use std::ops::RangeInclusive;
@@ -57,7 +58,7 @@ impl SeatKind {
 }
 
 /// A request for a session.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ClaimRequest {
     /// Participant.
     pub participant: ParticipantId,
@@ -65,6 +66,8 @@ pub struct ClaimRequest {
     pub kind: SeatKind,
     /// Rows available to this rig; all if `None`.
     pub rows: Option<RangeInclusive<u32>>,
+    /// What the protocol says of groups and repeated sessions.
+    pub plan: Plan,
 }
 
 /// A session claimed by this process.
@@ -78,6 +81,8 @@ pub struct Claimed {
     pub entries: Vec<Entry>,
     /// Version of the protocol that it started with; the newest for a new session.
     pub protocol_version: u32,
+    /// Group and planned session of a new session.
+    pub assigned: Assigned,
     /// Folder of the session.
     pub folder: SessionFolder,
     /// Messages to the operator.
@@ -110,7 +115,17 @@ impl StudyFolder {
             .filter(|s| s.participant == request.participant)
             .collect();
         let number = self.session_to_claim(request, &own)?;
-        let mut notices = Vec::new();
+        let next = next_session(&own, &request.plan);
+        let mut notices: Vec<String> = next.notice().into_iter().collect();
+        if let (Next::TooEarly { session, from, .. }, SeatKind::Real) = (&next, request.kind) {
+            return Err(StoreError::TooEarly {
+                participant: request.participant.clone(),
+                session: session.clone(),
+                from: *from,
+            });
+        }
+        let simulated = request.kind == SeatKind::Simulated;
+        let group = plan::group(&request.plan, (&request.participant, simulated), &own)?;
         self.probe(&mut notices)?;
 
         let folder = layout::session(&self.path, &request.participant, number);
@@ -128,8 +143,12 @@ impl StudyFolder {
         let replay = &recovered.replay;
         check_standing(request, number, &replay.history.standing)?;
         let is_new = replay.records == 0;
+        let kept = own.iter().filter(|s| s.is_done()).find_map(|s| s.seat);
         let seat = match is_new {
-            true => next_seat(request, &all)?,
+            true => match kept {
+                Some(seat) => seat,
+                None => next_seat(request, &all)?,
+            },
             false => replay.seat().ok_or_else(|| StoreError::Damaged {
                 path: folder.clone(),
                 what: "claim and first event are damaged, so its row of the schedule is unknown"
@@ -137,6 +156,11 @@ impl StudyFolder {
             })?,
         };
         check_kind(request, seat)?;
+        // A claim may be all that there is of a session.
+        let assigned = match replay.history.start().is_none() {
+            true => next.assigned(group.or_else(|| request.plan.group_of(seat))),
+            false => Assigned::default(),
+        };
         let protocol_version = replay
             .history
             .start()
@@ -153,6 +177,7 @@ impl StudyFolder {
             seat,
             entries,
             protocol_version,
+            assigned,
             folder: SessionFolder::new(lock, journal),
             notices,
         })
@@ -209,6 +234,9 @@ impl StudyFolder {
         // A no-show whose state was written incompletely cannot be continued.
         let empty = last.claimed && last.seat.is_none() && last.entries.is_empty();
         if standing.state == State::Void || (empty && last.damage.is_empty()) {
+            return Ok(last.session + 1);
+        }
+        if standing.state == State::Done && done(own) < request.plan.sessions.len() {
             return Ok(last.session + 1);
         }
         check_standing(request, last.session, &standing)?;
@@ -367,7 +395,9 @@ fn next_seat(request: &ClaimRequest, all: &[SessionData]) -> Result<Seat, StoreE
 /// The row that the next participant would get, from all sessions of a study: the lowest
 /// that no participant keeps, of a range or of all.
 pub fn next_row(rows: Option<&RangeInclusive<u32>>, sessions: &[SessionData]) -> Option<u32> {
-    let held: BTreeSet<u32> = sessions.iter().filter_map(SessionData::held_row).collect();
+    let held: BTreeSet<u32> = deciding(sessions)
+        .filter_map(SessionData::held_row)
+        .collect();
     let (from, to) = rows.map_or((1, u32::MAX), |rows| (*rows.start(), *rows.end()));
     (from.max(1)..=to).find(|row| !held.contains(row))
 }

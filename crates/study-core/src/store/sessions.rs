@@ -79,10 +79,22 @@ impl SessionData {
         &self.last_hash
     }
 
+    /// Whether all its trials are done.
+    pub fn is_done(&self) -> bool {
+        self.standing().state == State::Done
+    }
+
     /// Whether the session can be continued.
     pub fn is_unfinished(&self) -> bool {
         self.standing().state == State::Unfinished
     }
+}
+
+/// The session of each participant that decides on the row: the last one that is not void.
+pub(super) fn deciding(sessions: &[SessionData]) -> impl Iterator<Item = &SessionData> {
+    let of_one = sessions.chunk_by(|a, b| a.participant == b.participant);
+    let not_void = |s: &&SessionData| s.standing().state != State::Void;
+    of_one.filter_map(move |own| own.iter().rev().find(not_void))
 }
 
 impl StudyFolder {

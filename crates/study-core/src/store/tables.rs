@@ -102,6 +102,10 @@ mod tests {
             ParticipantId::new(self.of(&["P01", "P02", "SIM001"])).unwrap()
         }
 
+        fn part(&mut self) -> PartId {
+            PartId::new(self.of(&["a", "day-2"])).unwrap()
+        }
+
         fn model(&mut self) -> ModelId {
             ModelId::new(self.of(&["A", "B", "lambda-0.9991"])).unwrap()
         }
@@ -187,6 +191,8 @@ mod tests {
             fidelity: d.maybe(Draws::fidelity),
             host_late_ms: d.maybe(Draws::number),
             input_channel: d.maybe(|d| d.of(&[Channel::Terminal, Channel::Plain, Channel::Page])),
+            group: d.maybe(Draws::part),
+            session_id: d.maybe(Draws::part),
         }
     }
 
@@ -282,6 +288,9 @@ mod tests {
             trials_planned: d.whole(),
             started_at: d.maybe(Draws::time),
             answers: BTreeMap::from([(question("hand"), Answer::Text(d.text()))]),
+            group: d.maybe(Draws::part),
+            session_id: d.maybe(Draws::part),
+            gap_h: d.maybe(Draws::number),
         }
     }
 

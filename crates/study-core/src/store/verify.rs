@@ -10,9 +10,9 @@ use super::ledger::SeatKind;
 use super::manifest::{CHECKSUM, Manifest};
 use super::receipt::Receipt;
 use super::replay::DamageKind;
-use super::sessions::SessionData;
+use super::sessions::{SessionData, deciding};
 use super::{StudyFolder, layout};
-use crate::outcome::{Event, State};
+use crate::outcome::Event;
 use crate::protocol::{Protocol, Seat};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{ParticipantId, Untrusted, counted};
@@ -352,13 +352,13 @@ fn is_torn(damage: &super::Damage) -> bool {
 /// Finds participants who have the same row or number.
 fn verify_rows(sessions: &[SessionData], found: &mut Vec<Finding>) {
     let mut holders: BTreeMap<Seat, BTreeSet<&ParticipantId>> = BTreeMap::new();
-    for session in sessions {
+    for session in deciding(sessions) {
         let Some(seat) = session.seat else {
             continue;
         };
         let keeps = session.standing().state.keeps_row();
         let is_real = SeatKind::of(seat) == SeatKind::Real;
-        if keeps || (!is_real && session.standing().state != State::Void) {
+        if keeps || !is_real {
             holders
                 .entry(seat)
                 .or_default()

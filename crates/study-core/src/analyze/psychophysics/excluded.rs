@@ -1,14 +1,15 @@
-//! The preregistered exclusion rules, applied to the trials of a part that is no rating.
+//! The preregistered exclusion rules, applied to the trials of a part.
 //!
 //! A rule that speaks of points of a scale has no meaning where something is chosen; it
 //! excludes nothing, and says so. Every rule judges the same trials.
 
-use super::part_data::Intervals;
+use super::part_data::{Intervals, asked};
 use crate::analyze::exclude::{Applied, UNJUDGED, is_unverified, is_wrong};
 use crate::outcome::{RatingRow, Verdict};
-use crate::protocol::{Answer, Exclusion, Part};
+use crate::protocol::{Answer, Exclusion, Part, Protocol, Role};
 use std::collections::{BTreeMap, BTreeSet};
-use study_base::text::ParticipantId;
+use study_base::text::{ModelId, ParticipantId};
+use study_stats::describe::{mean, rounded};
 
 /// Whom or what a rule excludes.
 enum Judged<'a> {
@@ -26,7 +27,7 @@ const NO_POINTS: &str = "the answers of this part are choices, not points of a s
 /// counted for the first.
 pub(super) fn apply(
     rules: &[Exclusion],
-    part: &Part,
+    (protocol, part): (&Protocol, &Part),
     rows: &[&RatingRow],
     intervals: &Intervals<'_>,
 ) -> (Vec<bool>, Vec<Applied>) {
@@ -35,12 +36,42 @@ pub(super) fn apply(
     for rule in rules {
         let mut problem = None;
         let judged = match rule {
-            Exclusion::ConstantRater => Judged::Participants(constant(part, rows)),
+            Exclusion::ConstantRater => Judged::Participants(constant(protocol, part, rows)),
             Exclusion::StrokesBelow(least) => Judged::Strokes(*least),
             Exclusion::WrongForce => Judged::Force(is_wrong),
             Exclusion::UnverifiedForce => Judged::Force(is_unverified),
-            Exclusion::HiddenReferenceBelow(_) | Exclusion::Inconsistent(_) => {
+            Exclusion::HiddenReferenceBelow(_) | Exclusion::Inconsistent(_)
+                if !rows.iter().any(|row| rating(protocol, part, row).is_some()) =>
+            {
                 Judged::Nothing(NO_POINTS)
+            }
+            Exclusion::HiddenReferenceBelow(least) => {
+                let is_reference = |row: &&&RatingRow| row.role == Role::HiddenReference;
+                let own = rows.iter().filter(is_reference);
+                let means = means(
+                    own.filter_map(|row| Some((&row.participant, rating(protocol, part, row)?))),
+                );
+                match means.is_empty() {
+                    true => Judged::Nothing("the part has no hidden reference"),
+                    false => Judged::Participants(
+                        means
+                            .into_iter()
+                            .filter(|(_, m)| m < least)
+                            .map(|(who, _)| who)
+                            .collect(),
+                    ),
+                }
+            }
+            Exclusion::Inconsistent(most) => {
+                let distances = distances(protocol, part, rows);
+                match distances.is_empty() {
+                    true => Judged::Nothing("the part has no hidden duplicate"),
+                    false => Judged::Participants(
+                        (distances.into_iter().filter(|(_, d)| rounded(*d) > *most))
+                            .map(|(who, _)| who)
+                            .collect(),
+                    ),
+                }
             }
         };
         let excludes = |row: &RatingRow| match &judged {
@@ -80,11 +111,55 @@ pub(super) fn apply(
     (stays, applied)
 }
 
+/// The number that was given to the question of a part.
+fn rating(protocol: &Protocol, part: &Part, row: &RatingRow) -> Option<f64> {
+    row.answers.get(asked(protocol, part)?)?.number()
+}
+
+/// The mean of each key's numbers.
+fn means<K: Ord>(numbers: impl Iterator<Item = (K, f64)>) -> BTreeMap<K, f64> {
+    let mut all: BTreeMap<K, Vec<f64>> = BTreeMap::new();
+    for (key, number) in numbers {
+        all.entry(key).or_default().push(number);
+    }
+    let mean_of = |(key, x): (K, Vec<f64>)| Some((key, mean(&x)?));
+    all.into_iter().filter_map(mean_of).collect()
+}
+
+/// The mean distance of each participant between realizations and their hidden duplicates.
+fn distances<'a>(
+    protocol: &Protocol,
+    part: &Part,
+    rows: &[&'a RatingRow],
+) -> BTreeMap<&'a ParticipantId, f64> {
+    let cells = means(rows.iter().filter_map(|row| {
+        let model = row.model.as_ref()?;
+        Some(((&row.participant, model), rating(protocol, part, row)?))
+    }));
+    let duplicates = protocol
+        .models
+        .iter()
+        .filter_map(|m| Some((&m.id, m.duplicate_of.as_ref()?)));
+    let duplicates: Vec<_> = duplicates.collect();
+    let people: BTreeSet<&ParticipantId> = cells.keys().map(|(who, _)| *who).collect();
+    means(people.into_iter().flat_map(|who| {
+        let far = |(a, b): &(&ModelId, &ModelId)| {
+            Some((cells.get(&(who, *a))? - cells.get(&(who, *b))?).abs())
+        };
+        let all: Vec<f64> = duplicates.iter().filter_map(far).collect();
+        all.into_iter().map(move |d| (who, d))
+    }))
+}
+
 /// Participants with two trials or more who gave the same answer in all of them.
-fn constant<'a>(part: &Part, rows: &[&'a RatingRow]) -> BTreeSet<&'a ParticipantId> {
+fn constant<'a>(
+    protocol: &Protocol,
+    part: &Part,
+    rows: &[&'a RatingRow],
+) -> BTreeSet<&'a ParticipantId> {
     let mut given: BTreeMap<&ParticipantId, Vec<&Answer>> = BTreeMap::new();
     for row in rows {
-        let answer = part.asks.first().and_then(|id| row.answers.get(id));
+        let answer = asked(protocol, part).and_then(|id| row.answers.get(id));
         given.entry(&row.participant).or_default().extend(answer);
     }
     let same = |answers: &[&Answer]| answers.len() > 1 && answers.iter().all(|a| a == &answers[0]);

@@ -22,6 +22,10 @@ pub enum PartQuestion {
     ToldApart(String),
     /// Do thresholds differ between the conditions?
     Thresholds,
+    /// Do the groups differ?
+    Groups,
+    /// Do the sessions differ?
+    Sessions,
 }
 
 impl PartQuestion {
@@ -33,6 +37,8 @@ impl PartQuestion {
             Self::IntervalOrder => "interval-order".to_owned(),
             Self::ToldApart(condition) => group_id("told-apart", &[condition]),
             Self::Thresholds => "thresholds".to_owned(),
+            Self::Groups => "groups".to_owned(),
+            Self::Sessions => "sessions".to_owned(),
         }
     }
 }
@@ -240,6 +246,50 @@ pub(super) fn of_thresholds(
         }
     };
     (vec![found], pairs)
+}
+
+/// Whether groups and sessions differ, where a study has them.
+pub(super) fn of_groups_and_sessions(facts: &PartFacts<'_>) -> Vec<PartFinding> {
+    let one = |(question, group, kind): (PartQuestion, &str, TestKind)| {
+        let id = |what: &str| format!("{group}/{what}");
+        facts.values.get(&id("F"))?;
+        let Some(p) = facts.number(&id("p")) else {
+            return Some(facts.undefined(question, &id("p"), 0));
+        };
+        let df = [facts.number(&id("df1")), facts.number(&id("df2"))];
+        let test = Test::single(kind, p, facts.alpha).with("F", facts.number(&id("F")), &df);
+        Some(Finding {
+            estimate: only_pair(facts, group),
+            ..Finding::decided(question, test, facts.design(0))
+        })
+    };
+    let questions = [
+        (PartQuestion::Groups, "groups", TestKind::Welch),
+        (PartQuestion::Sessions, "sessions", TestKind::MixedModel),
+    ];
+    questions.into_iter().filter_map(one).collect()
+}
+
+/// The contrast of two groups or sessions, where there are no more.
+fn only_pair(facts: &PartFacts<'_>, group: &str) -> Option<Estimate> {
+    let mut found = ["ratio", "difference"].into_iter().flat_map(|name| {
+        let end = format!("/{name}");
+        let start = format!("{group}/");
+        let all = facts.values.iter();
+        let of_pair = move |(id, _): (&'_ str, _)| {
+            let pair = id.strip_prefix(&start)?.strip_suffix(&end)?;
+            pair.contains('|').then(|| (name, format!("{start}{pair}")))
+        };
+        all.filter_map(of_pair).collect::<Vec<_>>()
+    });
+    let (name, id) = found.next()?;
+    let alone = found.next().is_none();
+    let value = facts.number(&format!("{id}/{name}")).filter(|_| alone)?;
+    Some(Estimate {
+        name,
+        value,
+        ci95: facts.values.interval(&format!("{id}/ci95")),
+    })
 }
 
 /// The comparison of two, as statistics have it.

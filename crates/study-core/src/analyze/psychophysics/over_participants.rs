@@ -9,8 +9,8 @@ use study_stats::paired::{holm, one_sample};
 
 /// The sensitivity of one participant in one condition.
 #[derive(Debug, Clone)]
-pub(super) struct Told<'a> {
-    pub(super) condition: &'a str,
+pub(super) struct Told {
+    pub(super) condition: String,
     /// d′.
     pub(super) d: f64,
     /// What is 0 by chance, and can fall below: d′ itself or, where d′ is never below 0,
@@ -19,10 +19,10 @@ pub(super) struct Told<'a> {
 }
 
 /// Means over participants of each condition; t tests that they tell it from chance.
-pub(super) fn sensitivities(told: &[Told<'_>], values: &mut Values) {
-    let mut conditions: BTreeMap<&str, Vec<&Told<'_>>> = BTreeMap::new();
+pub(super) fn sensitivities(told: &[Told], values: &mut Values) {
+    let mut conditions: BTreeMap<&str, Vec<&Told>> = BTreeMap::new();
     for one in told {
-        conditions.entry(one.condition).or_default().push(one);
+        conditions.entry(&one.condition).or_default().push(one);
     }
     for (condition, told) in conditions {
         let prefix = group_id("sdt_group", &[condition]);
@@ -57,10 +57,10 @@ pub(super) struct Threshold<'a> {
     pub(super) value: f64,
 }
 
-/// The mixed model threshold ~ condition + (1 | participant) by REML, with Satterthwaite's
+/// The mixed model in `group`, threshold ~ condition + (1 | participant) by REML, with Satterthwaite's
 /// degrees of freedom: of natural logarithms, so that differences are ratios, unless the
 /// levels have no ratios, as those of a blend. Nothing with one condition.
-pub(super) fn mixed(thresholds: &[Threshold<'_>], ratios: bool, values: &mut Values) {
+pub(super) fn mixed(group: &str, thresholds: &[Threshold<'_>], ratios: bool, values: &mut Values) {
     let names = |of: fn(&Threshold<'_>) -> String| -> Vec<String> {
         let mut names: Vec<String> = thresholds.iter().map(of).collect();
         names.sort();
@@ -98,7 +98,8 @@ pub(super) fn mixed(thresholds: &[Threshold<'_>], ratios: bool, values: &mut Val
         false => ("mean", "difference"),
     };
     let effect = fit.as_ref().and_then(|f| f.effect);
-    let mut group = values.group("psy_mixed", why.as_str());
+    let name = group;
+    let mut group = values.group(name, why.as_str());
     group.maybe("F", effect.map(|e| e.f));
     group.maybe("df1", effect.map(|e| e.df1));
     group.maybe("df2", effect.and_then(|e| e.df2));
@@ -109,7 +110,7 @@ pub(super) fn mixed(thresholds: &[Threshold<'_>], ratios: bool, values: &mut Val
     group.put("n_participants", people.len() as f64);
     for (i, condition) in conditions.iter().enumerate() {
         let found = fit.as_ref().map(|f| f.means[i]);
-        let mut group = values.group(group_id("psy_mixed", &[condition]), why.as_str());
+        let mut group = values.group(group_id(name, &[condition]), why.as_str());
         group.maybe(mean, found.map(|m| shown(m.estimate)));
         group.interval("ci95", found.and_then(|m| m.ci95).map(both));
     }
@@ -122,7 +123,7 @@ pub(super) fn mixed(thresholds: &[Threshold<'_>], ratios: bool, values: &mut Val
         .collect();
     for ((k, (a, b)), p_holm) in pairs.iter().enumerate().zip(holm(&p)) {
         let contrast = found(k);
-        let prefix = pair_id("psy_mixed", &conditions[*a], &conditions[*b]);
+        let prefix = pair_id(name, &conditions[*a], &conditions[*b]);
         let mut group = values.group(prefix, why.as_str());
         group.maybe(difference, contrast.map(|c| shown(c.estimate)));
         group.interval("ci95", contrast.and_then(|c| c.ci95).map(both));
@@ -162,7 +163,7 @@ mod tests {
             value,
         });
         let mut values = Values::default();
-        mixed(&thresholds, ratios, &mut values);
+        mixed("psy_mixed", &thresholds, ratios, &mut values);
         values
     }
 
@@ -221,7 +222,7 @@ mod tests {
         });
         thresholds.extend(other);
         let mut values = Values::default();
-        mixed(&thresholds, true, &mut values);
+        mixed("psy_mixed", &thresholds, true, &mut values);
         assert_eq!(
             values.reason("psy_mixed/F"),
             Some("a threshold is not above 0")
@@ -236,7 +237,7 @@ mod tests {
     fn chance_is_tested_by_what_can_fall_below_it() {
         // d′ is never below 0, so that its mean is above 0 by chance, too.
         let told = [0.04, -0.06, 0.05, -0.03].map(|above_chance: f64| Told {
-            condition: "c",
+            condition: "c".to_owned(),
             d: above_chance.max(0.0) * 10.0,
             above_chance,
         });

@@ -5,10 +5,10 @@ use crate::analyze::values::Values;
 use crate::analyze::warning::Warning;
 use crate::outcome::fold::History;
 use crate::outcome::{IntervalRow, ParticipantRow, RatingRow};
-use crate::protocol::parts::Part;
+use crate::protocol::parts::{Part, Task};
 use crate::protocol::{Answer, Protocol};
 use std::collections::BTreeMap;
-use study_base::text::ParticipantId;
+use study_base::text::{PartId, ParticipantId, QuestionId};
 use study_stats::psychometric::Level;
 
 /// What a study is analyzed from.
@@ -98,5 +98,42 @@ pub(super) fn chosen<'a>(part: &Part, row: &'a RatingRow) -> Option<&'a str> {
     match row.answers.get(part.asks.first()?)? {
         Answer::Choice(chosen) => chosen.first().map(String::as_str),
         _ => None,
+    }
+}
+
+/// The question that a part is about: the first, which is its own, but of ratings the
+/// primary one, if they ask it.
+pub(super) fn asked<'a>(protocol: &Protocol, part: &'a Part) -> Option<&'a QuestionId> {
+    let is_rating = matches!(part.task, Task::Rating(_));
+    let is_primary = |id: &&QuestionId| is_rating && **id == protocol.analysis.primary;
+    let primary = part.asks.iter().find(is_primary);
+    primary.or_else(|| part.asks.first())
+}
+
+/// The group of each participant who has one.
+pub(super) fn groups(rows: &[&RatingRow]) -> BTreeMap<String, String> {
+    let of_row = |row: &&RatingRow| {
+        let group = row.group.as_ref()?.as_str().to_owned();
+        Some((row.participant.as_str().to_owned(), group))
+    };
+    rows.iter().filter_map(of_row).collect()
+}
+
+/// The sessions that have a part, if there are several; else only `None`.
+pub(super) fn sessions_of<'a>(protocol: &'a Protocol, part: &Part) -> Vec<Option<&'a PartId>> {
+    let has = |s: &&crate::protocol::SessionPlan| {
+        s.parts
+            .as_ref()
+            .is_none_or(|parts| parts.contains(&part.id))
+    };
+    let sessions: Vec<_> = protocol
+        .sessions
+        .iter()
+        .filter(has)
+        .map(|s| Some(&s.id))
+        .collect();
+    match sessions.len() {
+        0 | 1 => vec![None],
+        _ => sessions,
     }
 }

@@ -1,12 +1,13 @@
 //! The tracks and pairs of a study.
 
+use super::again::{Measured, again};
+use super::discriminations::of_tracks;
 use super::excluded;
-use super::findings::{PartFacts, PartFinding, of_preferences, of_sensitivities, of_thresholds};
-use super::over_participants::{Threshold, Told, mixed, sensitivities};
-use super::part_data::{Found, Intervals, LevelData, PartData, StudyData, chosen};
+use super::findings::{
+    PartFacts, PartFinding, of_groups_and_sessions, of_preferences, of_sensitivities, of_thresholds,
+};
+use super::part_data::{Found, Intervals, PartData, StudyData, asked, chosen, groups, sessions_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
-use super::tracks::{TrackName, of_session};
-use super::trials::{Asked, TrialCount, TrialSettings, discrimination, level};
 use crate::analyze::exclude::Applied;
 use crate::analyze::findings::Pair;
 use crate::analyze::identifiers::group_id;
@@ -16,12 +17,11 @@ use crate::analyze::warning::Warning;
 use crate::analyze::{Rules, vaf};
 use crate::outcome::ratings::Origin;
 use crate::outcome::{RatingRow, Status};
-use crate::protocol::Protocol;
-use crate::protocol::parts::{Compared, Pairs, Part, Task, TrackRules, Vary};
+use crate::protocol::parts::{Pairs, Part, Presentations, Task, TrackRules};
+use crate::protocol::{Answer, Role};
 use std::collections::{BTreeMap, BTreeSet};
-use study_base::text::{PartId, ParticipantId};
-use study_stats::describe::is_constant;
-use study_stats::psychometric::{Core, Level, Support, pooled};
+use study_base::text::{ModelId, PartId, ParticipantId};
+use study_stats::describe::{is_constant, mean};
 
 /// The analysis of one part of a study.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +54,8 @@ pub struct PartAnalysis {
     pub data: PartData,
 }
 
-/// The analyses of all parts that are not ratings. Which participants count is decided as
+/// The analyses of all parts that are not ratings, and of what ratings say of groups and
+/// sessions. Which participants count is decided as
 /// for ratings. Practice and trials without an answer do not count, nor do those that an
 /// exclusion rule excludes. Answers are the corrected ones, at the levels that were
 /// presented.
@@ -78,7 +79,8 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
     let one = |part: &Part| {
         let of_part = |r: &&&RatingRow| r.part.as_ref() == Some(&part.id);
         let all: Vec<&RatingRow> = rows.iter().filter(of_part).copied().collect();
-        let (stays, exclusions) = excluded::apply(&rules.exclude, part, &all, &intervals);
+        let (stays, exclusions) =
+            excluded::apply(&rules.exclude, (protocol, part), &all, &intervals);
         let kept = all.iter().zip(&stays).filter(|(_, stays)| **stays);
         let rows: Vec<&RatingRow> = kept.map(|(row, _)| *row).collect();
         let found = |rows: &[&RatingRow]| of_part_task(study, part, rows, &intervals, &rules);
@@ -105,6 +107,16 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
         };
         let told: Vec<&str> = names.iter().filter(told).copied().collect();
         findings.extend(of_sensitivities(&facts, &told));
+        findings.extend(of_groups_and_sessions(&facts));
+        let compared = !matches!(part.task, Task::Pairs(_));
+        if !compared && (protocol.groups.is_some() || sessions_of(protocol, part).len() > 1) {
+            own.warnings.push(Warning {
+                code: "groups-not-compared",
+                text: "groups and sessions are not compared in a part of pairs: its abilities are those of \
+                       all participants together"
+                    .to_owned(),
+            });
+        }
         Some(PartAnalysis {
             part: part.id.clone(),
             task: own.task,
@@ -133,7 +145,7 @@ fn of_part_task(
     rules: &Rules,
 ) -> Option<Found> {
     match &part.task {
-        Task::Rating(_) => None,
+        Task::Rating(own) => of_ratings(study, part, own, rows),
         Task::Pairs(pairs) => Some(of_pairs(study, part, pairs, rows, intervals, rules)),
         Task::Discrimination { tracks } => {
             let protocol = study.protocol;
@@ -144,6 +156,63 @@ fn of_part_task(
     }
 }
 
+/// What a rating part says of groups and sessions, in a study that has them. All else about
+/// ratings is in their own analysis.
+fn of_ratings(
+    study: &StudyData<'_>,
+    part: &Part,
+    own: &Presentations,
+    rows: &[&RatingRow],
+) -> Option<Found> {
+    let protocol = study.protocol;
+    if protocol.groups.is_none() && protocol.sessions.is_empty() {
+        return None;
+    }
+    let tested = |id: &ModelId| {
+        let model = protocol.model(id);
+        model.is_some_and(|m| m.role == Role::Test && m.duplicate_of.is_none())
+    };
+    let asked = asked(protocol, part)?;
+    let mut cells: BTreeMap<(&ParticipantId, Option<&PartId>, &ModelId), Vec<f64>> =
+        BTreeMap::new();
+    for row in rows {
+        let model = row
+            .model
+            .as_ref()
+            .filter(|id| own.models.contains(id) && tested(id));
+        let rating = row.answers.get(asked).and_then(Answer::number);
+        if let (Some(model), Some(rating)) = (model, rating) {
+            let cell = (&row.participant, row.session_id.as_ref(), model);
+            cells.entry(cell).or_default().push(rating);
+        }
+    }
+    let sessions = sessions_of(protocol, part);
+    let several = sessions.len() > 1;
+    let groups = groups(rows);
+    let measured: Vec<Measured> = (cells.iter())
+        .filter_map(|((participant, session, model), ratings)| {
+            Some(Measured {
+                participant: participant.as_str().to_owned(),
+                group: groups.get(participant.as_str()).cloned(),
+                session: session.filter(|_| several).map(|s| s.as_str().to_owned()),
+                condition: model.as_str().to_owned(),
+                value: mean(ratings)?,
+            })
+        })
+        .collect();
+    let mut values = Values::default();
+    let ids: Vec<&str> = sessions.iter().flatten().map(|s| s.as_str()).collect();
+    again(&measured, &ids, false, &mut values);
+    Some(Found {
+        task: "rating",
+        trials: rows.len(),
+        values,
+        warnings: Vec::new(),
+        data: PartData::default(),
+        names: Vec::new(),
+    })
+}
+
 /// Adds what depends on the exclusions, as it would be without them.
 fn without_exclusions(before: &Values, values: &mut Values) {
     for group in [
@@ -152,6 +221,9 @@ fn without_exclusions(before: &Values, values: &mut Values) {
         "psy_group/",
         "psy_mixed/",
         "sdt_group/",
+        "groups/",
+        "sessions/",
+        "retest/",
     ] {
         let ids = before.iter().filter(|(id, _)| id.starts_with(group));
         for (id, _) in ids {
@@ -230,184 +302,4 @@ fn preference(part: &Part, row: &RatingRow, intervals: &Intervals<'_>) -> Option
             _ => Choice::Tie(1.0),
         },
     })
-}
-
-/// Each track is fitted by itself; the priors refer to the range of its own ladder.
-fn of_tracks(
-    study: &StudyData<'_>,
-    part: &Part,
-    tracks: &[&TrackRules],
-    rows: &[&RatingRow],
-) -> Option<Found> {
-    let protocol = study.protocol;
-    let methods: BTreeSet<&str> = tracks.iter().map(|t| t.method.as_str()).collect();
-    let (mut values, mut trials, mut task) = (Values::default(), 0, "discrimination");
-    let (mut told, mut thresholds) = (Vec::new(), Vec::new());
-    let (mut warnings, mut data) = (Vec::new(), PartData::default());
-    for rules in tracks {
-        let (asked, name) = *Asked::NAMES.iter().find(|n| n.1 == rules.method.as_str())?;
-        if methods.len() == 1 {
-            (task, data.guess) = (name, rules.method.guess_rate());
-        }
-        let of_track = |row: &&&RatingRow| row.track.as_ref() == Some(&rules.id);
-        let own = rows.iter().filter(of_track);
-        let counts: Vec<TrialCount> = own.filter_map(|row| trial(part, asked, row)).collect();
-        trials += counts.len();
-        let found = discrimination(asked, &counts, &settings(protocol, rules));
-        let condition = rules.id.as_str();
-        let mut people: Vec<&str> = counts.iter().map(|c| c.participant.as_str()).collect();
-        people.sort_unstable();
-        people.dedup();
-        for participant in &people {
-            let id = |group: &str, what: &str| {
-                format!("{}/{what}", group_id(group, &[participant, condition]))
-            };
-            if let Some(value) = found.number(&id("psy", "posterior/threshold/mean")) {
-                let participant = (*participant).to_owned();
-                thresholds.push((participant, condition, value));
-            }
-            if let Some((d, above_chance)) = sensitivity(asked, rules, &found, &id) {
-                told.push(Told {
-                    condition,
-                    d,
-                    above_chance,
-                });
-            }
-            data.levels
-                .extend(levels(asked, participant, condition, &counts));
-        }
-        values.extend(found);
-        // Whoever does not count has no track either.
-        for history in study.sessions {
-            let Some(start) = history.start() else {
-                continue;
-            };
-            let participant = start.participant.as_str();
-            if people.binary_search(&participant).is_ok() {
-                let name = TrackName {
-                    participant,
-                    track: condition,
-                };
-                let to = (&mut values, &mut warnings);
-                data.tracks
-                    .extend(of_session(protocol, rules, history, name, to));
-            }
-        }
-    }
-    sensitivities(&told, &mut values);
-    let families = tracks.iter().filter_map(|t| protocol.family(t.family()?));
-    let families: Vec<_> = families.collect();
-    let ratios = families.iter().all(|f| f.vary != Vary::Blend);
-    let thresholds: Vec<Threshold<'_>> = (thresholds.iter())
-        .map(|(participant, condition, value)| Threshold {
-            participant,
-            condition,
-            value: *value,
-        })
-        .collect();
-    mixed(&thresholds, ratios, &mut values);
-    if let Some(first) = families.first()
-        && families.iter().all(|f| f.id == first.id)
-    {
-        let unit = first
-            .unit
-            .as_ref()
-            .map_or_else(String::new, |u| format!(" ({u})"));
-        data.dimension = Some(format!("{}{unit}", first.id));
-    }
-    Some(Found {
-        task,
-        trials,
-        values,
-        warnings,
-        data,
-        names: tracks.iter().map(|t| t.id.as_str().to_owned()).collect(),
-    })
-}
-
-/// d′ and what is 0 by chance.
-fn sensitivity(
-    asked: Asked,
-    rules: &TrackRules,
-    values: &Values,
-    id: &impl Fn(&str, &str) -> String,
-) -> Option<(f64, f64)> {
-    let get = |what: &str| values.number(&id("sdt", what));
-    match asked {
-        Asked::TwoIntervals | Asked::YesNo => Some((get("d")?, get("d")?)),
-        Asked::ThreeIntervals | Asked::OddOneOut => {
-            // Without a d′, if all answers are correct.
-            Some((
-                get("d")?,
-                get("share_correct")? - rules.method.guess_rate()?,
-            ))
-        }
-        Asked::Abx | Asked::SameDifferent => {
-            Some((get("d_differencing")?, get("share_unbiased")? - 0.5))
-        }
-        Asked::Comparison => None,
-    }
-}
-
-/// The answers of a participant by level, without catch trials; `None` without levels.
-fn levels(
-    asked: Asked,
-    participant: &str,
-    condition: &str,
-    counts: &[TrialCount],
-) -> Option<LevelData> {
-    let own = counts.iter().filter(|c| c.participant == participant);
-    let levels: Vec<Level> = own.filter_map(|trial| level(asked, trial)).collect();
-    (!levels.is_empty()).then(|| LevelData {
-        participant: participant.to_owned(),
-        condition: condition.to_owned(),
-        levels: pooled(&levels),
-    })
-}
-
-fn trial(part: &Part, asked: Asked, row: &RatingRow) -> Option<TrialCount> {
-    let correct = row.correct?;
-    let given = chosen(part, row)?;
-    let words = asked.answers();
-    let given = words.iter().position(|word| *word == given)?;
-    // Of two answers, the one that was not given is correct if the given one is wrong; of
-    // three, the sensitivities need only whether it is.
-    let target = match (correct, words.len()) {
-        (true, _) => Some(given),
-        (false, 2) => Some(1 - given),
-        (false, count) => Some((given + 1) % count),
-    };
-    Some(TrialCount {
-        participant: row.participant.as_str().to_owned(),
-        condition: row.track.as_ref()?.as_str().to_owned(),
-        level: row.level,
-        target,
-        positive: f64::from(u8::from(correct)),
-        trials: 1.0,
-    })
-}
-
-/// How the functions of a track are fitted: the priors refer to the range of the ladder,
-/// since an adaptive track stays near the threshold.
-fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings {
-    let family = match &track.compared {
-        Compared::Levels { family, .. } => protocol.family(family),
-        Compared::Models { .. } => None,
-    };
-    let support = |levels: &[f64]| {
-        let steps = levels.windows(2).map(|pair| pair[1] - pair[0]);
-        Some(Support {
-            low: *levels.first()?,
-            high: *levels.last()?,
-            least: steps.fold(f64::INFINITY, f64::min),
-        })
-    };
-    TrialSettings {
-        core: Core::Norm,
-        lambda: 0.02,
-        standard: None,
-        support: family.and_then(|f| support(f.ladder.levels())),
-        repeats: 0,
-        seed: protocol.study.seed,
-    }
 }

@@ -61,8 +61,8 @@ pub(super) fn of_session(
     (values, warnings): (&mut Values, &mut Vec<Warning>),
 ) -> Option<TrackData> {
     let recorded = history.recorded(rules);
-    let seat = history.start()?.seat;
-    let mut track = protocol.start(rules, seat).ok()?;
+    let start = history.start()?;
+    let mut track = protocol.of(&start.assigned).start(rules, start.seat).ok()?;
     for one in &recorded {
         track.answer(&one.answer);
     }

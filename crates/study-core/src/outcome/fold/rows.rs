@@ -39,6 +39,9 @@ impl History {
             trials_planned: self.planned_total(false),
             started_at: self.started_at().map(|at| at.wall),
             answers: answers(self.answers.iter().filter(|g| !is_rating(g))),
+            group: start.and_then(|s| s.assigned.group.clone()),
+            session_id: start.and_then(|s| s.assigned.session_id.clone()),
+            gap_h: start.and_then(|s| s.assigned.gap_h),
         }
     }
 
@@ -129,6 +132,8 @@ impl History {
             host_late_ms: played.and_then(|p| Some(p.host_late_ms?[1])),
             input_channel: primary.and_then(|g| g.channel),
             answers: answers(given.into_iter()),
+            group: start.assigned.group.clone(),
+            session_id: start.assigned.session_id.clone(),
         }
     }
 

@@ -43,6 +43,7 @@ fn journal(events: Vec<Event>) -> Vec<Entry> {
             analysis: String::new(),
         },
         schedule: ["A", "B", "C"].into_iter().zip(1..).map(trial).collect(),
+        assigned: crate::protocol::Assigned::default(),
     }));
     std::iter::once(start)
         .chain(events)

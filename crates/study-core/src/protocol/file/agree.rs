@@ -4,7 +4,9 @@
 use super::Named;
 use super::models::PartialModel;
 use super::questions::PartialQuestion;
-use crate::protocol::columns::{is_participants_column, is_parts_column, is_ratings_column};
+use crate::protocol::columns::{
+    is_participants_column, is_participants_column_of_parts, is_parts_column, is_ratings_column,
+};
 use crate::protocol::{
     AnalysisRules, Design, DeviceKind, DeviceRules, Exposure, Order, QuestionKind, Role,
 };
@@ -231,7 +233,11 @@ impl Sections<'_> {
     /// `participants.csv` for those that are asked once.
     fn columns(&self, document: &Document<'_>) {
         let mut taken: Vec<String> = Vec::new();
-        let (fixed_once, participants) = (is_participants_column, "participants.csv");
+        let fixed_once: fn(&str) -> bool = match self.has_parts {
+            true => is_participants_column_of_parts,
+            false => is_participants_column,
+        };
+        let participants = "participants.csv";
         let fixed_in_ratings = match self.has_parts || self.exposure.replays > 0 {
             true => is_parts_column,
             false => is_ratings_column,

@@ -16,6 +16,7 @@ pub(super) fn verify_tracks(
     let Some(start) = session.history.start() else {
         return;
     };
+    let protocol = &protocol.of(&start.assigned);
     for rules in &protocol.tracks {
         let recorded = session.history.recorded(rules);
         let what = match protocol.start(rules, start.seat) {

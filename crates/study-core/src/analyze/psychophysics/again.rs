@@ -1,0 +1,310 @@
+//! Groups and repeated sessions: `groups/…`, `sessions/…`, `retest/…`.
+//!
+//! Each participant has one number for each condition and session: a mean rating, a
+//! threshold or a sensitivity. Groups are compared over what all of them have, sessions
+//! over what all sessions have.
+
+use super::over_participants::{Threshold, mixed};
+use crate::analyze::identifiers::{group_id, pair_id};
+use crate::analyze::values::Values;
+use std::collections::{BTreeMap, BTreeSet};
+use study_stats::agreement::icc;
+use study_stats::describe::{mean, sd};
+use study_stats::paired::holm;
+use study_stats::welch;
+
+/// A number of one participant in one condition and session.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Measured {
+    pub(super) participant: String,
+    pub(super) group: Option<String>,
+    pub(super) session: Option<String>,
+    pub(super) condition: String,
+    pub(super) value: f64,
+}
+
+/// Condition and session.
+type Cell<'a> = (&'a str, Option<&'a str>);
+
+/// The statistics of groups and sessions; of `ratios` over natural logarithms. Sessions are
+/// in the order of the protocol.
+pub(super) fn again(measured: &[Measured], sessions: &[&str], ratios: bool, values: &mut Values) {
+    let logs: Vec<Measured> = (measured.iter())
+        .map(|m| Measured {
+            value: if ratios { libm::log(m.value) } else { m.value },
+            ..m.clone()
+        })
+        .collect();
+    let usable = logs.iter().all(|m| m.value.is_finite());
+    if logs.iter().any(|m| m.group.is_some()) {
+        between_groups(&logs, ratios, usable, values);
+    }
+    if sessions.len() > 1 {
+        between_sessions(&logs, sessions, ratios, usable, values);
+    }
+}
+
+const NOT_POSITIVE: &str = "a threshold is not above 0";
+
+/// The mean of each participant over these cells; only of those who have all of them.
+fn means<'a>(measured: &'a [Measured], cells: &BTreeSet<Cell<'_>>) -> BTreeMap<&'a str, f64> {
+    let mut own: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for m in measured {
+        if cells.contains(&(m.condition.as_str(), m.session.as_deref())) {
+            own.entry(&m.participant).or_default().push(m.value);
+        }
+    }
+    let complete = own.into_iter().filter(|(_, x)| x.len() == cells.len());
+    complete
+        .filter_map(|(who, x)| Some((who, mean(&x)?)))
+        .collect()
+}
+
+fn between_groups(measured: &[Measured], ratios: bool, usable: bool, values: &mut Values) {
+    let shown = |x: f64| if ratios { libm::exp(x) } else { x };
+    let names: BTreeSet<&str> = measured.iter().filter_map(|m| m.group.as_deref()).collect();
+    // What somebody of every group has.
+    let has = |group: &str| -> BTreeSet<Cell<'_>> {
+        let own = measured
+            .iter()
+            .filter(|m| m.group.as_deref() == Some(group));
+        own.map(|m| (m.condition.as_str(), m.session.as_deref()))
+            .collect()
+    };
+    let common = names
+        .iter()
+        .map(|g| has(g))
+        .reduce(|a, b| &a & &b)
+        .unwrap_or_default();
+    let group_of: BTreeMap<&str, &str> = (measured.iter())
+        .filter_map(|m| Some((m.participant.as_str(), m.group.as_deref()?)))
+        .collect();
+    let mut groups: BTreeMap<&str, Vec<f64>> = names.iter().map(|g| (*g, Vec::new())).collect();
+    if usable && !common.is_empty() {
+        for (who, value) in means(measured, &common) {
+            if let Some(own) = group_of.get(who).and_then(|g| groups.get_mut(g)) {
+                own.push(value);
+            }
+        }
+    }
+    let x: Vec<&Vec<f64>> = groups.values().collect();
+    let test = welch::one_way(&x);
+    let why = if !usable {
+        NOT_POSITIVE
+    } else if names.len() < 2 {
+        "there is only one group"
+    } else if common.is_empty() {
+        "the groups have no condition in common"
+    } else {
+        "a group has fewer than two participants, or they are all alike"
+    };
+    let mut all = values.group("groups", why);
+    all.put("n_cells", common.len() as f64);
+    all.maybe("F", test.map(|t| t.f));
+    all.maybe("df1", test.map(|t| t.df1));
+    all.maybe("df2", test.map(|t| t.df2));
+    all.maybe("p", test.and_then(|t| t.p));
+    let (centre, difference) = match ratios {
+        true => ("geometric_mean", "ratio"),
+        false => ("mean", "difference"),
+    };
+    for (name, x) in &groups {
+        let mut group = values.group(group_id("groups", &[name]), why);
+        group.put("n", x.len() as f64);
+        group.maybe(centre, mean(x).map(shown));
+        group.maybe(if ratios { "geometric_sd" } else { "sd" }, sd(x).map(shown));
+    }
+    let list: Vec<(&str, &Vec<f64>)> = groups.iter().map(|(name, x)| (*name, x)).collect();
+    let pairs: Vec<(usize, usize)> = (0..list.len())
+        .flat_map(|a| (a + 1..list.len()).map(move |b| (a, b)))
+        .collect();
+    let found: Vec<_> = (pairs.iter())
+        .map(|(a, b)| welch::difference(list[*a].1, list[*b].1))
+        .collect();
+    let p: Vec<Option<f64>> = found.iter().map(|d| d.and_then(|d| d.p)).collect();
+    for (((a, b), found), (p, p_holm)) in pairs.iter().zip(&found).zip(p.iter().zip(holm(&p))) {
+        let mut group = values.group(pair_id("groups", list[*a].0, list[*b].0), why);
+        group.maybe(difference, found.map(|d| shown(d.difference)));
+        group.interval("ci95", found.map(|d| (shown(d.ci95.0), shown(d.ci95.1))));
+        group.maybe("t", found.map(|d| d.t));
+        group.maybe("df", found.map(|d| d.df));
+        group.maybe("p", *p);
+        group.maybe("p_holm", p_holm);
+        group.maybe("hedges_g", found.and_then(|d| d.hedges_g));
+    }
+}
+
+fn between_sessions(
+    measured: &[Measured],
+    sessions: &[&str],
+    ratios: bool,
+    usable: bool,
+    values: &mut Values,
+) {
+    // Conditions that every session has; of each participant those of that participant's group.
+    let mut own: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, f64>>> = BTreeMap::new();
+    for m in measured {
+        if let Some(session) = m.session.as_deref() {
+            let by_session = own.entry(&m.participant).or_default();
+            by_session
+                .entry(session)
+                .or_default()
+                .insert(&m.condition, m.value);
+        }
+    }
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    let mut cells: Vec<(&str, &str, f64)> = Vec::new();
+    for (who, by_session) in &own {
+        let conditions = by_session
+            .values()
+            .map(|c| c.keys().copied().collect::<BTreeSet<_>>());
+        let common = conditions.reduce(|a, b| &a & &b).unwrap_or_default();
+        let value = |session: &&str| {
+            let found = by_session.get(session)?;
+            let all: Vec<f64> = common
+                .iter()
+                .filter_map(|c| found.get(c).copied())
+                .collect();
+            mean(&all)
+        };
+        let by: Vec<Option<f64>> = sessions.iter().map(value).collect();
+        let known = sessions.iter().zip(&by);
+        cells.extend(known.filter_map(|(session, x)| Some((*who, *session, (*x)?))));
+        rows.extend(by.into_iter().collect::<Option<Vec<f64>>>());
+    }
+    let of_cells: Vec<Threshold<'_>> = (cells.iter())
+        .map(|(participant, condition, value)| Threshold {
+            participant,
+            condition,
+            value: if ratios { libm::exp(*value) } else { *value },
+        })
+        .collect();
+    if usable {
+        mixed("sessions", &of_cells, ratios, values);
+    }
+    let found = icc(&rows).filter(|_| usable);
+    let why = if usable {
+        "fewer than two participants have been to all sessions"
+    } else {
+        NOT_POSITIVE
+    };
+    for (name, found) in [
+        ("agreement", found.as_ref().and_then(|f| f.icc2)),
+        ("consistency", found.as_ref().and_then(|f| f.icc3)),
+    ] {
+        let mut group = values.group("retest", why);
+        group.maybe(&format!("icc_{name}"), found.map(|c| c.value));
+        let ci95 = found
+            .and_then(|c| c.ci95)
+            .and_then(|(low, high)| low.zip(high));
+        group.interval(&format!("icc_{name}_ci95"), ci95);
+    }
+    let mut group = values.group("retest", why);
+    group.put("n", rows.len() as f64);
+    let sem = found.as_ref().map(|f| f.ms_error.max(0.0).sqrt());
+    group.maybe("sem", sem);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(rows: &[(&str, &str, &str, f64)]) -> Vec<Measured> {
+        let one = |(participant, group, session, value): &(&str, &str, &str, f64)| Measured {
+            participant: (*participant).to_owned(),
+            group: Some((*group).to_owned()),
+            session: Some((*session).to_owned()),
+            condition: "c".to_owned(),
+            value: *value,
+        };
+        rows.iter().map(one).collect()
+    }
+
+    const ROWS: [(&str, &str, &str, f64); 12] = [
+        ("A", "x", "one", 2.0),
+        ("A", "x", "two", 3.0),
+        ("B", "x", "one", 4.0),
+        ("B", "x", "two", 4.5),
+        ("C", "x", "one", 3.0),
+        ("C", "x", "two", 4.0),
+        ("D", "y", "one", 5.0),
+        ("D", "y", "two", 5.5),
+        ("E", "y", "one", 6.0),
+        ("E", "y", "two", 7.5),
+        ("F", "y", "one", 4.0),
+        ("F", "y", "two", 5.0),
+    ];
+
+    const REFERENCE: [(&str, f64); 16] = [
+        ("groups/F", 6.25),
+        ("groups/df2", 3.7467216185837),
+        ("groups/p", 0.070979117624854),
+        ("groups/x/mean", 3.4166666666667),
+        ("groups/x/sd", 0.87797114607106),
+        ("groups/x|y/t", -2.5),
+        ("groups/x|y/ci95_lo", -4.46004597747841),
+        ("groups/x|y/p_holm", 0.070979117624854),
+        ("sessions/F", 35.58823529),
+        ("sessions/df2", 5.0),
+        ("sessions/p", 0.0018942471146),
+        ("sessions/one|two/difference", -0.91666666666667),
+        ("sessions/one|two/ci95_hi", -0.52167344142069),
+        ("retest/icc_agreement", 0.81421647819063),
+        ("retest/icc_consistency", 0.96737044145873),
+        ("retest/sem", 0.26614532371119),
+    ];
+
+    /// R 4.2.2: t.test of the participants' means; paired t.test of the sessions and
+    /// lmer(v ~ s + (1|p)); ICC(2,1) and ICC(3,1) from anova(lm(v ~ p + s)).
+    #[test]
+    fn groups_and_sessions_are_those_of_r() {
+        let mut values = Values::default();
+        again(&measured(&ROWS), &["one", "two"], false, &mut values);
+        for (id, expected) in REFERENCE {
+            let found = values.number(id).unwrap_or(f64::NAN);
+            assert!(
+                (found / expected - 1.0).abs() < 1e-6,
+                "{id}: {found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn groups_are_compared_over_what_all_of_them_have() {
+        let mut rows = measured(&ROWS);
+        // A condition of one group only would shift its mean.
+        rows.extend(measured(&ROWS[..6]).into_iter().map(|m| Measured {
+            condition: "only-x".to_owned(),
+            value: 100.0,
+            ..m
+        }));
+        let (mut with, mut without) = (Values::default(), Values::default());
+        again(&rows, &[], false, &mut with);
+        again(&measured(&ROWS), &[], false, &mut without);
+        for id in [
+            "groups/F",
+            "groups/p",
+            "groups/x/mean",
+            "groups/x|y/difference",
+        ] {
+            assert!(without.number(id).is_some(), "{id}");
+            assert_eq!(with.number(id), without.number(id), "{id}");
+        }
+    }
+
+    #[test]
+    fn thresholds_are_compared_as_ratios() {
+        let mut values = Values::default();
+        again(&measured(&ROWS), &["one", "two"], true, &mut values);
+        let number = |id: &str| values.number(id).unwrap();
+        let ratio = number("groups/x/geometric_mean") / number("groups/y/geometric_mean");
+        assert!((number("groups/x|y/ratio") - ratio).abs() < 1e-12);
+        assert!(number("sessions/one|two/ratio") < 1.0);
+        let mut rows = measured(&ROWS);
+        rows[0].value = 0.0;
+        let mut values = Values::default();
+        again(&rows, &["one", "two"], true, &mut values);
+        assert_eq!(values.reason("groups/p"), Some(NOT_POSITIVE));
+        assert_eq!(values.reason("retest/icc_agreement"), Some(NOT_POSITIVE));
+    }
+}

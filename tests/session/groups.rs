@@ -1,0 +1,242 @@
+//! Two groups in two sessions: rehearsed, and by keys in a pseudo-terminal of 80×24.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::support::player::{play_to_end, play_until};
+use crate::support::{Terminal, changed_protocol, study};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// The realizations of a rating in two groups, of which the second rates fewer, and in two
+/// sessions.
+fn protocol(folder: &Path) -> PathBuf {
+    let to = folder.join("protocol");
+    let parts = r#"
+[[parts]]
+id = "real"
+kind = "rating"
+repetitions = 2
+
+[groups]
+[[groups.list]]
+id = "all"
+[[groups.list]]
+id = "few"
+models = ["lambda-0.9991", "lambda-0.9995"]
+
+[[sessions]]
+id = "one"
+[[sessions]]
+id = "two"
+max_gap_h = 72
+
+[[intake]]
+id = "age"
+kind = "number"
+prompt = "Age"
+min = 18
+max = 99
+
+# Asked after"#;
+    let changes = [
+        ("study-protocol/1", "study-protocol/2"),
+        ("repetitions = 3\n", "max_attempts = 50\n"),
+        ("order = \"blocked\"\n", ""),
+        ("# Asked after", parts),
+    ];
+    changed_protocol("turn-signal", &to, &changes);
+    to
+}
+
+/// The rows of a table of the only study, by column.
+fn table(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
+    let mut reader = csv::Reader::from_path(folder.join("turn-signal").join(name)).unwrap();
+    let header = reader.headers().unwrap().clone();
+    let row = |r: csv::StringRecord| {
+        let cells = header.iter().zip(r.iter());
+        cells.map(|(h, c)| (h.to_owned(), c.to_owned())).collect()
+    };
+    reader.records().map(|r| row(r.unwrap())).collect()
+}
+
+#[test]
+fn rehearsed_participants_come_twice_in_their_group_with_other_orders() {
+    let folder = tempfile::tempdir().unwrap();
+    let to = protocol(folder.path());
+    let path = to.to_str().unwrap();
+    let (code, out, err) = study(
+        &["rehearse", path, "--participants", "6", "--out", "out"],
+        folder.path(),
+    );
+    assert_eq!(code, 0, "{out}{err}");
+    let results = folder.path().join("out");
+    let participants = table(&results, "participants.csv");
+    let groups: Vec<&str> = participants.iter().map(|p| p["group"].as_str()).collect();
+    assert_eq!(
+        groups.iter().filter(|g| **g == "few").count(),
+        3,
+        "{groups:?}"
+    );
+    for p in &participants {
+        assert_eq!(
+            (p["session"].as_str(), p["session_id"].as_str()),
+            ("2", "two")
+        );
+        // What is asked once was asked in the first session.
+        assert!(!p["age"].is_empty());
+        // Halfway between 0 and 72 h.
+        assert!(
+            (p["gap_h"].parse::<f64>().unwrap() - 36.0).abs() < 0.1,
+            "{}",
+            p["gap_h"]
+        );
+    }
+    let mut orders: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
+    for row in table(&results, "ratings.csv") {
+        let key = (row["participant"].clone(), row["session_id"].clone());
+        orders.entry(key).or_default().push(row["model"].clone());
+        let own = participants
+            .iter()
+            .find(|p| p["participant"] == row["participant"]);
+        assert_eq!(row["group"], own.unwrap()["group"]);
+    }
+    for p in &participants {
+        let of = |session: &str| &orders[&(p["participant"].clone(), session.to_owned())];
+        let few = p["group"] == "few";
+        assert_eq!(of("one").len(), if few { 4 } else { 10 });
+        let distinct: BTreeSet<&String> = of("one").iter().collect();
+        assert_eq!(distinct.len(), if few { 2 } else { 5 });
+        assert!(few || of("one") != of("two"), "the order repeats");
+    }
+    for command in ["verify", "status"] {
+        let (code, out, err) = study(&[command, "out"], folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+        assert!(command == "verify" || out.contains("Group few: 3"), "{out}");
+    }
+    let (code, out, err) = study(
+        &["schedule", path, "--session", "two", "--csv"],
+        folder.path(),
+    );
+    assert_eq!(code, 0, "{err}");
+    assert!(out.lines().count() > 40, "{out}");
+    analyzed(folder.path());
+}
+
+/// Groups are compared over the two realizations that both have, sessions with their ICC.
+fn analyzed(folder: &Path) {
+    let (code, out, err) = study(&["analyze", "out", "--json"], folder);
+    assert_eq!(code, 0, "{err}");
+    let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let part = &document["parts"][0];
+    assert_eq!(part["task"], "rating");
+    let number = |id: &str| {
+        part["values"][id]
+            .as_f64()
+            .unwrap_or_else(|| panic!("{id}"))
+    };
+    // Two realizations in two sessions.
+    assert_eq!(number("groups/n_cells"), 4.0);
+    let mut means: BTreeMap<String, BTreeMap<String, Vec<f64>>> = BTreeMap::new();
+    for row in table(&folder.join("out"), "ratings.csv") {
+        if ["lambda-0.9991", "lambda-0.9995"].contains(&row["model"].as_str()) {
+            let rating = row["realism"].parse().unwrap();
+            let group = means.entry(row["group"].clone()).or_default();
+            group
+                .entry(row["participant"].clone())
+                .or_default()
+                .push(rating);
+        }
+    }
+    let of = |group: &str| -> Vec<f64> {
+        let own = means[group].values();
+        own.map(|x| x.iter().sum::<f64>() / x.len() as f64)
+            .collect()
+    };
+    let test = study_stats::welch::difference(&of("all"), &of("few")).unwrap();
+    assert!((number("groups/all|few/difference") - test.difference).abs() < 1e-9);
+    assert!((number("groups/p") - test.p.unwrap()).abs() < 1e-9);
+    assert_eq!(number("retest/n"), 6.0);
+    assert!(number("retest/icc_agreement") <= 1.0 && number("sessions/p") <= 1.0);
+    let questions = part["findings"].as_array().unwrap();
+    let asked: Vec<&str> = questions
+        .iter()
+        .map(|f| f["question"].as_str().unwrap())
+        .collect();
+    assert_eq!(asked, ["groups", "sessions"]);
+    let (code, page, err) = study(&["analyze", "out"], folder);
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        page.contains("Do the groups differ?") && page.contains("Test–retest reliability"),
+        "{page}"
+    );
+}
+
+const F3: &str = "\u{1b}OR";
+const F4: &str = "\u{1b}OS";
+const F10: &str = "\u{1b}[21~";
+
+#[test]
+fn two_sessions_by_keys_with_a_failed_playback_a_correction_a_quit_and_a_resume() {
+    let folder = tempfile::tempdir().unwrap();
+    let to = protocol(folder.path());
+    let start = || {
+        let path = to.to_str().unwrap();
+        let mut terminal =
+            Terminal::start(&["run", path, "--operator", "lw"], folder.path(), 24, 80);
+        terminal.wait_for("Who takes part?");
+        terminal
+    };
+    let mut terminal = start();
+    play_until(&mut terminal, "P01", "Enter: rate");
+    terminal.keys(F4);
+    terminal.wait_for("Enter: mark as bad");
+    terminal.keys("somebody came in\r");
+    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: mark as bad"));
+    play_until(&mut terminal, "P01", "trial 3 of");
+    terminal.keys(F3);
+    terminal.wait_for("Correct");
+    terminal.keys("\r");
+    terminal.wait_until("the new answer", |s| s.contains("Enter: continue"));
+    terminal.keys("3\r");
+    terminal.wait_until("the reason", |s| s.contains("Enter: correct"));
+    terminal.keys("mistyped\r");
+    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: correct"));
+    terminal.keys(F10);
+    terminal.wait_for("Are you sure?");
+    terminal.keys("y");
+    assert_eq!(terminal.exit_code(), 0);
+    let mut terminal = start();
+    play_to_end(&mut terminal, "P01");
+
+    // The first screen says that a session follows, and it has no intake.
+    let mut terminal = start();
+    terminal.keys("P01");
+    terminal.wait_for("next: session two, one of 2");
+    terminal.keys("\u{15}");
+    let pages = play_to_end(&mut terminal, "P01");
+    assert!(
+        pages.iter().all(|page| !page.contains("Age")),
+        "asked again"
+    );
+    let mut terminal = start();
+    terminal.keys("P01");
+    terminal.wait_for("finished");
+    terminal.keys(F10);
+    terminal.wait_for("Are you sure?");
+    terminal.keys("y");
+    assert_eq!(terminal.exit_code(), 0);
+
+    let (code, out, err) = study(&["verify", "results"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+    let results = folder.path().join("results");
+    let rows = table(&results, "ratings.csv");
+    let of = |session: &str| rows.iter().filter(|r| r["session_id"] == session).count();
+    assert_eq!(of("one"), of("two"));
+    let groups: BTreeSet<&String> = rows.iter().map(|r| &r["group"]).collect();
+    assert_eq!(groups.len(), 1);
+    assert!(rows.iter().all(|r| r["status"] == "ok"));
+    assert_eq!(rows.iter().filter(|r| r["corrected"] == "true").count(), 1);
+    let participants = table(&results, "participants.csv");
+    assert_eq!(participants.len(), 1);
+    assert!(!participants[0]["age"].is_empty());
+}
