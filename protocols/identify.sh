@@ -58,3 +58,27 @@ identify --method static --dx 1 --id static --out "$passive"
 identify --method spring --out "$passive"
 identify --method passive --dx 0.5 --id passive --out "$passive"
 identify --method mechanism --dx 0.5 --id mechanism --out "$passive"
+
+# The knob, in degrees and N·m at its axis
+lever=20
+for name in training validation; do
+    run record "protocols/knob/$name.toml" --plant protocols/knob/knob.toml --rate 1000 \
+        --seed 1 --force --out "$recordings/knob-rim-$name.csv"
+    awk -v r=$lever -f protocols/knob/turn.awk "$recordings/knob-rim-$name.csv" \
+        >"$recordings/knob-$name.csv"
+done
+
+identify_knob() {
+    run identify "$recordings/knob-training.csv" --validate "$recordings/knob-validation.csv" \
+        --columns 't=time,x=angle:deg,v=rate:deg/s,a=accel:deg/s²,f=torque:N·m' --lever $lever \
+        --force --out "$protocols/knob/models" "$@"
+}
+
+
+identify_knob --method passive --dx 0.5 --id passive-1
+identify_knob --method passive --dx 1 --id passive-3
+identify_knob --method passive --dx 2 --id passive-6
+identify_knob --method passive --dx 4 --id passive-11
+identify_knob --method passive --dx 3 --id practice
+identify_knob --method spring --id smooth
+identify_knob --method mechanism --dx 0.5 --id mechanism

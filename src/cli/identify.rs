@@ -3,6 +3,7 @@
 mod args;
 mod files;
 mod output;
+mod plan;
 
 pub(super) use args::Args;
 

@@ -15,7 +15,7 @@ use study_core::protocol::file::{self, Named, Parsed};
 use study_core::protocol::fingerprint::{self, Fingerprints, Parts, family_file};
 use study_core::protocol::{FileOrders, Order, Protocol, check};
 use study_core::store::layout;
-use study_haptics::model::Realization;
+use study_haptics::model::{Realization, Units};
 
 mod families;
 mod join;
@@ -173,6 +173,7 @@ fn open(path: &Path, purpose: Purpose<'_>) -> (Option<Loaded>, Vec<Findings>) {
         return (None, others.findings(findings));
     };
     others.assign(&protocol);
+    others.turn(protocol.device.lever_mm);
     join::vaf(&mut protocol, &others, &spans, &mut findings);
     if purpose != Purpose::Data {
         join::certificates(&protocol, &others, &spans, &mut findings);
@@ -290,6 +291,26 @@ impl<'f> OtherFiles<'f> {
             findings,
         });
         Ok(())
+    }
+
+    /// Converts the realizations of a turning handle to mm and N at the lever arm.
+    fn turn(&mut self, lever_mm: Option<f64>) {
+        for opened in &mut self.opened {
+            let rotary = |r: &Realization| r.units != Units::Linear;
+            let Some(realization) = opened.realization.take_if(|r| rotary(r)) else {
+                continue;
+            };
+            match lever_mm {
+                Some(lever_mm) => opened.realization = Some(realization.at_lever(lever_mm)),
+                None => {
+                    let [x, f] = realization.units.names();
+                    opened.findings.faults.push(
+                        Fault::error(format!("the realization is in {x} and {f}"))
+                            .hint("`device.lever_mm` of the protocol says where the hand holds"),
+                    );
+                }
+            }
+        }
     }
 
     /// Assigns each realization and each end of a family its file.

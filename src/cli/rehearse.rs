@@ -153,8 +153,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         .filter(|row| !row.practice && row.status == Status::Ok)
         .count();
     let shown = folder.display();
+    let target = match percepts.target() {
+        Some(best) => format!("the realization with the highest VAF, {best}"),
+        None => "the simulated switch B".to_owned(),
+    };
     console.out(format!(
-        "{done} simulated participants, {rated} rated trials in {shown}.\nSimulated: the effects are built in (docs/simulation.md) and are no evidence.\nNext: study analyze {shown}\n"
+        "{done} simulated participants, {rated} rated trials in {shown}.\nThe raters compare with {target}.\nSimulated: the effects are built in (docs/simulation.md) and are no evidence.\nNext: study analyze {shown}\n"
     ))
 }
 

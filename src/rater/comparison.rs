@@ -5,6 +5,7 @@
 //! beyond a criterion. Draws come from a stream of their own and their number never depends
 //! on the realizations.
 
+use super::impression::Reference;
 use super::{Effect, Impression, Rater};
 use std::collections::BTreeMap;
 use study_base::rng::Stream;
@@ -25,6 +26,8 @@ const TIE: f64 = 0.5;
 /// What raters feel of the realizations of a study.
 #[derive(Debug, Default)]
 pub struct Percepts {
+    /// The realization that stands for the target; `None`: switch B.
+    target: Option<ModelId>,
     impressions: BTreeMap<ModelId, Impression>,
     /// Of each realization of a track its distance from the track's standard, N, negative
     /// for lower levels.
@@ -34,9 +37,15 @@ pub struct Percepts {
 impl Percepts {
     /// Computes them from all tables of a study.
     pub fn of(protocol: &Protocol, tables: &BTreeMap<ModelId, Realization>) -> Self {
+        let target = target(protocol, tables);
+        let reference = match &target {
+            Some((_, best)) => Reference::of(best),
+            None => Reference::switch_b(),
+        };
         let mut percepts = Self {
+            target: target.map(|(id, _)| id.clone()),
             impressions: (tables.iter())
-                .map(|(id, table)| (id.clone(), Impression::of(table)))
+                .map(|(id, table)| (id.clone(), Impression::of(table, &reference)))
                 .collect(),
             distances: BTreeMap::new(),
         };
@@ -52,7 +61,7 @@ impl Percepts {
                     (Some(level), Some(standard)) => level < standard,
                     _ => false,
                 };
-                let distance = Impression::distance_n(a, b);
+                let distance = Impression::distance_n(a, b, &reference);
                 let signed = if below { -distance } else { distance };
                 percepts.distances.insert((track.id.clone(), model), signed);
             }
@@ -60,10 +69,36 @@ impl Percepts {
         percepts
     }
 
+    /// The realization that raters compare with; `None`: the simulated switch B.
+    pub fn target(&self) -> Option<&ModelId> {
+        self.target.as_ref()
+    }
+
     /// The impression of a realization.
     pub fn impression(&self, model: &ModelId) -> Option<&Impression> {
         self.impressions.get(model)
     }
+}
+
+/// Of a study whose realizations were not identified from switch B, the one with the highest
+/// VAF, which is nearest to its target.
+fn target<'t>(
+    protocol: &'t Protocol,
+    tables: &'t BTreeMap<ModelId, Realization>,
+) -> Option<(&'t ModelId, &'t Realization)> {
+    let of_b = |table: &Realization| {
+        let note = table.provenance.note.as_deref();
+        note.is_some_and(|note| note.contains("--plant b"))
+    };
+    if tables.values().any(of_b) {
+        return None;
+    }
+    let by_vaf = protocol.models.iter().filter_map(|model| {
+        let table = tables.get(&model.id)?;
+        Some((model.vaf?, &model.id, table))
+    });
+    let best = by_vaf.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some((best.1, best.2))
 }
 
 /// A rater's ability to compare.

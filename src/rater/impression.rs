@@ -1,19 +1,19 @@
 //! A rater's impression of a realization, relative to the target.
 //!
-//! All impressions use one fixed exploration: x = 17.5 + 15·sin 2πφ(t) mm with
+//! All impressions of a study use one exploration: x = c + A·sin 2πφ(t) mm with
 //! φ' = 1 − 0.5·cos(2πt/6) Hz for 6 s, from 0.5 to 1.5 Hz and back. The target's force is
-//! simulated once, and the realization's force is predicted for the same motion. Both are
+//! computed once, and the realization's force is predicted for the same motion. Both are
 //! smoothed over 21 ms, similar to the filter of recordings, because the target's impacts
-//! last a millisecond and no table contains them.
+//! last a millisecond and no table contains them. The target is switch B, or another one
+//! that the study's own best realization stands for.
 
 use std::f64::consts::TAU;
-use std::sync::LazyLock;
 use study_haptics::model::Realization;
 use study_haptics::plant::{DT_S, HandParameters, Parameters, Target};
+use study_wire::mechanism::State;
 use study_wire::predict::{DirectionState, Motion, force_n};
 
-/// Comparison of a realization with target B, from which the shipped realizations were
-/// identified. Deterministic.
+/// Comparison of a realization with the target. Deterministic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impression {
     /// Root mean square difference from the target's force, N.
@@ -31,18 +31,23 @@ pub struct Impression {
 }
 
 const SECONDS: f64 = 6.0;
-const CENTRE_MM: f64 = 17.5;
-const AMPLITUDE_MM: f64 = 15.0;
+/// Centre and amplitude of the exploration of switch B, mm.
+const OF_B_MM: [f64; 2] = [17.5, 15.0];
+/// Amplitude of another exploration, as a share of the trained range.
+const SHARE: f64 = 0.45;
 const END_MM: f64 = 3.0;
+/// Interval of the samples, s.
+const SAMPLE_S: f64 = 1e-3;
 /// Simulation steps per sample, for 1 kHz.
 const STEPS_PER_SAMPLE: usize = 40;
 /// Number of samples on either side in the moving average.
 const SMOOTHING: usize = 10;
 
-/// The target's force during the exploration.
-static REFERENCE: LazyLock<Reference> = LazyLock::new(Reference::new);
-
-struct Reference {
+/// The exploration and the target's force in it.
+#[derive(Debug)]
+pub(super) struct Reference {
+    centre_mm: f64,
+    amplitude_mm: f64,
     motion: Vec<Motion>,
     force_n: Vec<f64>,
     largest_n: f64,
@@ -50,32 +55,51 @@ struct Reference {
 }
 
 impl Reference {
-    fn new() -> Self {
-        let mut target = Target::new(Parameters::b(), CENTRE_MM)
+    /// The simulated switch B.
+    pub(super) fn switch_b() -> Self {
+        let [centre_mm, amplitude_mm] = OF_B_MM;
+        let mut target = Target::new(Parameters::b(), centre_mm)
             .expect("a unit test checks the built-in parameters");
         let steps = (SECONDS / DT_S) as usize;
         let mut sampled = Vec::with_capacity(steps / STEPS_PER_SAMPLE + 1);
         let mut felt = Vec::with_capacity(steps / STEPS_PER_SAMPLE + 1);
         for i in 0..steps {
-            let motion = exploration(i as f64 * DT_S);
+            let motion = exploration(i as f64 * DT_S, OF_B_MM);
             let force_n = target.step(motion);
             if i % STEPS_PER_SAMPLE == 0 {
                 sampled.push(motion);
                 felt.push(force_n);
             }
         }
-        let felt = smoothed(&felt);
+        Self::new([centre_mm, amplitude_mm], sampled, smoothed(&felt))
+    }
+
+    /// A realization that stands for the target.
+    pub(super) fn of(best: &Realization) -> Self {
+        let [low, high] = best.trained.x_mm;
+        let around = [0.5 * (low + high), SHARE * (high - low)];
+        let samples = (SECONDS / SAMPLE_S) as usize;
+        let motion: Vec<Motion> = (0..samples)
+            .map(|i| exploration(i as f64 * SAMPLE_S, around))
+            .collect();
+        let force_n = predicted(best, &motion);
+        Self::new(around, motion, force_n)
+    }
+
+    fn new([centre_mm, amplitude_mm]: [f64; 2], motion: Vec<Motion>, force_n: Vec<f64>) -> Self {
         Self {
-            largest_n: largest(&felt),
-            rate: rate(&felt),
-            motion: sampled,
-            force_n: felt,
+            centre_mm,
+            amplitude_mm,
+            largest_n: largest(&force_n),
+            rate: rate(&force_n),
+            motion,
+            force_n,
         }
     }
 }
 
-/// Motion of the fixed exploration at `t_s`.
-fn exploration(t_s: f64) -> Motion {
+/// Motion of an exploration with this centre and amplitude at `t_s`.
+fn exploration(t_s: f64, [centre_mm, amplitude_mm]: [f64; 2]) -> Motion {
     let turn = TAU / SECONDS;
     // 2πφ and its two derivatives, rad.
     let phase = TAU * t_s - 0.5 * SECONDS * libm::sin(turn * t_s);
@@ -83,18 +107,16 @@ fn exploration(t_s: f64) -> Motion {
     let change = TAU * 0.5 * turn * libm::sin(turn * t_s);
     let (sin, cos) = (libm::sin(phase), libm::cos(phase));
     Motion {
-        x_mm: CENTRE_MM + AMPLITUDE_MM * sin,
-        v_mm_s: AMPLITUDE_MM * cos * rate,
-        a_m_s2: 1e-3 * AMPLITUDE_MM * (cos * change - sin * rate * rate),
+        x_mm: centre_mm + amplitude_mm * sin,
+        v_mm_s: amplitude_mm * cos * rate,
+        a_m_s2: 1e-3 * amplitude_mm * (cos * change - sin * rate * rate),
     }
 }
 
 impl Impression {
-    /// Computes the impression of a realization. This takes about a millisecond, and the
-    /// first call also simulates the target.
-    pub fn of(realization: &Realization) -> Self {
-        let reference = &*REFERENCE;
-        let predicted = predicted(realization);
+    /// Computes the impression of a realization. This takes about a millisecond.
+    pub(super) fn of(realization: &Realization, reference: &Reference) -> Self {
+        let predicted = predicted(realization, &reference.motion);
         let difference = |keep: &dyn Fn(&Motion) -> bool| {
             let squares: Vec<f64> = reference
                 .motion
@@ -108,7 +130,7 @@ impl Impression {
         Self {
             force_error_n: difference(&|_| true),
             end_error_n: difference(&|motion| {
-                (motion.x_mm - CENTRE_MM).abs() > AMPLITUDE_MM - END_MM
+                (motion.x_mm - reference.centre_mm).abs() > reference.amplitude_mm - END_MM
             }),
             activeness: activeness(realization),
             detent: largest(&predicted) / reference.largest_n,
@@ -116,10 +138,9 @@ impl Impression {
         }
     }
 
-    /// Root mean square difference of the forces of two realizations in the fixed
-    /// exploration, N.
-    pub(super) fn distance_n(a: &Realization, b: &Realization) -> f64 {
-        let (a, b) = (predicted(a), predicted(b));
+    /// Root mean square difference of the forces of two realizations in the exploration, N.
+    pub(super) fn distance_n(a: &Realization, b: &Realization, reference: &Reference) -> f64 {
+        let [a, b] = [a, b].map(|of| predicted(of, &reference.motion));
         let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
         (squares / a.len() as f64).sqrt()
     }
@@ -146,14 +167,20 @@ const PER_NEWTON: f64 = 0.7;
 /// Decrease of the opinion per unit of activeness.
 const PER_ACTIVENESS: f64 = 0.5;
 
-/// The force of a realization in the fixed exploration.
-fn predicted(realization: &Realization) -> Vec<f64> {
+/// The force of a realization in an exploration.
+fn predicted(realization: &Realization, exploration: &[Motion]) -> Vec<f64> {
     let table = realization.table();
     let [low, high] = realization.trained.x_mm;
     let trained = realization.trained.v_mm_s;
+    let mechanism = realization.mechanism.as_ref().map(|own| own.view());
+    let mut own = State::at_rest(exploration.first().map_or(low, |motion| motion.x_mm));
     let mut state = DirectionState::default();
-    let forces: Vec<f64> = (REFERENCE.motion.iter())
+    let forces: Vec<f64> = (exploration.iter())
         .map(|motion| {
+            if let Some(view) = &mechanism {
+                let without_mass_n = own.step(view, *motion, SAMPLE_S);
+                return without_mass_n + view.scalars.handle_kg * motion.a_m_s2;
+            }
             let z = state.step(realization.direction, *motion);
             // Limited to the trained range, as on the device.
             let limited = Motion {
@@ -254,16 +281,17 @@ mod tests {
             positive: branch(1.0),
             negative: branch(-1.0),
             mechanism: None,
+            units: study_haptics::model::Units::Linear,
         }
     }
 
     #[test]
     fn the_motion_is_the_derivative_of_the_position() {
         let step = 1e-6;
+        let at = |t_s| exploration(t_s, OF_B_MM);
         for i in 1..60 {
             let t = f64::from(i) * 0.1;
-            let (before, now, after) =
-                (exploration(t - step), exploration(t), exploration(t + step));
+            let (before, now, after) = (at(t - step), at(t), at(t + step));
             let v = (after.x_mm - before.x_mm) / (2.0 * step);
             let a = (after.v_mm_s - before.v_mm_s) / (2.0 * step) * 1e-3;
             assert!((v - now.v_mm_s).abs() < 1e-5, "{t}");
@@ -273,20 +301,36 @@ mod tests {
 
     #[test]
     fn the_targets_profile_has_a_smaller_error_than_half_of_it() {
-        let own = Impression::of(&table(1.0, 0.0));
-        let half = Impression::of(&table(0.5, 0.0));
+        let b = Reference::switch_b();
+        let own = Impression::of(&table(1.0, 0.0), &b);
+        let half = Impression::of(&table(0.5, 0.0), &b);
         assert!(own.force_error_n < 1.6, "{own:?}");
         assert!(half.force_error_n > own.force_error_n + 0.5, "{half:?}");
         assert!((0.8..1.2).contains(&own.detent), "{own:?}");
         assert!((0.4..0.6).contains(&half.detent), "{half:?}");
         assert!(own.opinion("realism") > half.opinion("realism"));
-        assert_eq!(own, Impression::of(&table(1.0, 0.0)));
+        assert_eq!(own, Impression::of(&table(1.0, 0.0), &b));
+    }
+
+    /// A realization that stands for the target is felt as the target.
+    #[test]
+    fn the_best_realization_of_another_study_is_its_target() {
+        let best = table(1.0, 0.0);
+        let target = Reference::of(&best);
+        let own = Impression::of(&best, &target);
+        assert_eq!(
+            (own.force_error_n, own.detent, own.crispness),
+            (0.0, 1.0, 1.0)
+        );
+        let half = Impression::of(&table(0.5, 0.0), &target);
+        assert!(half.force_error_n > 1.0 && half.detent < 0.6, "{half:?}");
     }
 
     #[test]
     fn only_negative_mass_is_active() {
-        assert_eq!(Impression::of(&table(1.0, 0.3)).activeness, 0.0);
-        let active = Impression::of(&table(1.0, -0.3)).activeness;
+        let b = Reference::switch_b();
+        assert_eq!(Impression::of(&table(1.0, 0.3), &b).activeness, 0.0);
+        let active = Impression::of(&table(1.0, -0.3), &b).activeness;
         assert!((active - 0.5).abs() < 1e-12, "{active}");
     }
 }

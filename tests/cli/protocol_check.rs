@@ -102,6 +102,28 @@ fn the_shipped_protocols_have_no_errors() {
     assert!(out.contains(verdict), "{out}");
 }
 
+/// The knob's model files are in degrees and N·m: all pass their certificates at the lever arm
+/// of the protocol, and without one they are refused by name.
+#[test]
+fn a_knob_is_converted_at_its_lever_arm() {
+    let (code, out, err) = run(Path::new(ROOT), &["check", "protocols/knob"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("\nknob: ok, 8 models, 23 trials, "), "{out}");
+    assert!(!out.contains("FAIL"), "{out}");
+    let dir = tempfile::tempdir().unwrap();
+    support::changed_protocol("knob", dir.path(), &[("lever_mm = 20.0\n", "")]);
+    let (code, _, err) = run(dir.path(), &["check", "."]);
+    assert_eq!(code, 2, "{err}");
+    assert!(
+        err.contains("passive-1.toml") && err.contains("the realization is in deg and N·m"),
+        "{err}"
+    );
+    assert!(
+        err.contains("`device.lever_mm` of the protocol says where the hand holds"),
+        "{err}"
+    );
+}
+
 #[test]
 fn a_table_that_fails_its_certificate_is_refused_without_permission() {
     let dir = turn_signal();

@@ -50,6 +50,7 @@ fn detents(mass: f64, damping: f64, direction: Direction) -> Realization {
         positive: branch(1.0),
         negative: branch(-1.0),
         mechanism: None,
+        units: study_haptics::model::Units::Linear,
     }
 }
 
@@ -439,6 +440,7 @@ prop_compose! {
             negative: branch(4),
             x_mm,
             mechanism: None,
+ units: study_haptics::model::Units::Linear,
         }
     }
 }

@@ -32,6 +32,7 @@ fn shipped() -> Vec<(ModelId, Realization, Limits)> {
         "protocols/turn-signal",
         "protocols/turn-signal-extended",
         "protocols/turn-signal-passive",
+        "protocols/knob",
     ] {
         let loaded = load::load(Path::new(&repository(protocol))).unwrap();
         for (id, table) in loaded.models {
@@ -72,6 +73,7 @@ fn mixed(direction: Direction) -> Realization {
         positive: branch(1.0),
         negative: branch(-1.0),
         mechanism: None,
+        units: study_haptics::model::Units::Linear,
     }
 }
 

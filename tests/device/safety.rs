@@ -50,6 +50,7 @@ fn table() -> Realization {
         positive: branch.clone(),
         negative: branch,
         mechanism: None,
+        units: study_haptics::model::Units::Linear,
     }
 }
 

@@ -106,6 +106,7 @@ fn table(id: &str, mass_kg: f64) -> Realization {
         negative: branch(-1.0),
         x_mm,
         mechanism: None,
+        units: study_haptics::model::Units::Linear,
     }
 }
 

@@ -233,6 +233,16 @@ fn a_knob_with_semicolons_and_decimal_commas_is_read_at_its_lever() {
         none.is_none() && said.contains("--columns t=NAME"),
         "{said}"
     );
+    // the model file is in the units of the recording
+    let out = dir.path().join("m");
+    let arguments = ["--columns", columns, "--lever", "25", "--out"];
+    let arguments = [&arguments[..], &[out.to_str().unwrap()]].concat();
+    vaf("k.csv", &text, &arguments);
+    let file = fs::read_to_string(out.join("passive-dx-1.toml")).unwrap();
+    assert!(
+        file.contains("units = { x = \"deg\", f = \"N·m\" }"),
+        "{file}"
+    );
     let (none, said) = vaf("k.csv", &text, &["--columns", columns]);
     assert!(none.is_none() && said.contains("--lever MM"), "{said}");
 }

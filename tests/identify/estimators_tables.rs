@@ -4,13 +4,14 @@
 
 use study_base::rng::Stream;
 use study_haptics::identify::method::{
-    Delta, Ewls, Hat, Segments, Sort, Start, State, TwoSided, Width, Window,
+    Delta, Ewls, Friction, Hat, Passive, Segments, Sort, Start, State, Terms, TwoSided, Width,
+    Window,
 };
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{Identified, IdentifyError, Method, Training, Warning, vaf};
 use study_haptics::model::{Branch, Realization};
 use study_haptics::recording::Recording;
-use study_wire::predict::{Direction, Lookup};
+use study_wire::predict::{Direction, DirectionState, Lookup, Motion};
 
 /// Two sines over 0.1 to 29.9 mm at 1 kHz, without a force.
 fn motion(name: &str, seconds: u32) -> Recording {
@@ -92,6 +93,11 @@ fn every_method() -> Vec<Method> {
         hat(State::Sign),
         hat(State::Play(Delta::Mm(0.5))),
         hat(State::Dahl(Delta::Mm(0.5))),
+        Method::Friction(Friction::default()),
+        Method::Passive(Passive {
+            huber: true,
+            ..Passive::default()
+        }),
         Method::Static,
         Method::Segments(Segments::default()),
         Method::Spring,
@@ -108,6 +114,82 @@ fn identified(recording: &Recording, method: Method, dx_mm: f64) -> Identified {
 /// The static force at node `j`, N.
 fn force(table: &Realization, branch: &Branch, j: usize) -> f64 {
     branch.k_n_per_mm[j] * table.x_mm[j] + branch.f0_n[j]
+}
+
+/// F = 0.2 a + 0.03 v + 1.5 z + 0.4 with Dahl's z: the friction model finds the parameters, and
+/// is passive.
+#[test]
+fn the_friction_model_recovers_its_four_parameters() {
+    let mut r = motion("r", 30);
+    let rule = Direction::Dahl { delta_mm: 0.5 };
+    let mut state = DirectionState::default();
+    for i in 0..r.len() {
+        let at = Motion {
+            x_mm: r.x_mm[i],
+            v_mm_s: r.v_mm_s[i],
+            a_m_s2: r.a_m_s2[i],
+        };
+        r.f_n[i] = 0.2 * at.a_m_s2 + 0.03 * at.v_mm_s + 1.5 * state.step(rule, at) + 0.4;
+    }
+    let known = Method::Friction(Friction {
+        state: State::Dahl(Delta::Mm(0.5)),
+    });
+    let table = identified(&r, known, 1.0).realization;
+    for (branch, f0) in [(&table.positive, 1.9), (&table.negative, -1.1)] {
+        assert!((branch.m_kg[0] - 0.2).abs() < 1e-9, "{branch:?}");
+        assert!((branch.b_n_s_per_mm[1] - 0.03).abs() < 1e-9, "{branch:?}");
+        assert!((branch.f0_n[0] - f0).abs() < 1e-9, "{branch:?}");
+    }
+    assert!(table.certificate().passes());
+    let scanned = identified(&r, Method::Friction(Friction::default()), 1.0).realization;
+    let delta = scanned.direction.delta_mm().unwrap();
+    assert!((0.35..=0.55).contains(&delta), "{delta}");
+}
+
+/// Terms that are left out are 0, and the file says so.
+#[test]
+fn a_passive_table_has_only_the_terms_that_are_asked_for() {
+    let r = motion("r", 10);
+    let with = |m, b| {
+        let method = Method::Passive(Passive {
+            terms: Terms { m, b },
+            ..Passive::default()
+        });
+        identified(&r, method, 1.0).realization
+    };
+    let all_zero = |of: &[f64]| of.iter().all(|v| *v == 0.0);
+    let bare = with(false, false);
+    assert!(all_zero(&bare.positive.m_kg) && all_zero(&bare.negative.b_n_s_per_mm));
+    assert!(bare.provenance.method.ends_with("terms=f0"));
+    let damped = with(false, true);
+    assert!(all_zero(&damped.negative.m_kg) && damped.provenance.method.ends_with("terms=b"));
+}
+
+/// One sample in fifty is wrong by 20 N: with Huber's weights the table is nearly that of the
+/// clean recording, without them it is not.
+#[test]
+fn huber_weights_make_light_of_wrong_samples() {
+    let mut clean = motion("r", 20);
+    for i in 0..clean.len() {
+        let detent = 3.0 * (clean.x_mm[i] / 2.0).sin();
+        clean.f_n[i] = 0.1 * clean.a_m_s2[i] + 0.02 * clean.v_mm_s[i] + detent;
+        clean.f_n[i] += 0.05 * (i as f64 * 1.7).sin();
+    }
+    let mut spoilt = clean.clone();
+    for i in (0..spoilt.len()).step_by(50) {
+        spoilt.f_n[i] += 20.0;
+    }
+    let left = |huber| {
+        let method = Method::Passive(Passive {
+            huber,
+            ..Passive::default()
+        });
+        let table = identified(&spoilt, method, 0.5).realization;
+        let score = vaf::score(&table, &clean);
+        (score.residual_n.powi(2) + score.bias_n.powi(2)).sqrt()
+    };
+    let (plain, robust) = (left(false), left(true));
+    assert!(robust < 0.4 * plain && robust < 0.25, "{robust} {plain}");
 }
 
 #[test]

@@ -52,7 +52,7 @@ fn the_script_reproduces_every_file_byte_for_byte() {
         .env("PROTOCOLS", dir.path())
         .assert()
         .success();
-    for protocol in FOLDERS {
+    for protocol in FOLDERS.into_iter().chain(["knob"]) {
         let made = files(dir.path(), protocol);
         let shipped = files(Path::new("protocols"), protocol);
         assert_eq!(
@@ -195,6 +195,7 @@ fn a_version_1_file_reads_as_it_always_did() {
             f0_n: zero,
         },
         mechanism: None,
+        units: study_haptics::model::Units::Linear,
     };
     assert_eq!(realization, Some(expected));
 }

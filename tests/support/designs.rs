@@ -44,6 +44,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
                 force_n: limit(12.0),
                 velocity_mm_s: limit(1000.0),
             },
+            lever_mm: None,
             uncertified: None,
             rendering: Default::default(),
         },

@@ -261,6 +261,9 @@ pub struct DeviceRules {
     pub limits: Limits,
     /// Permission to play tables that fail their passivity certificate.
     pub uncertified: Option<Uncertified>,
+    /// Lever arm at which the hand holds a turning handle, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lever_mm: Option<f64>,
     /// When a playback is right. Not part of the stimulus.
     #[serde(skip)]
     pub rendering: RenderingRules,

@@ -278,6 +278,7 @@ mod tests {
             },
             x_mm: nodes.to_vec(),
             mechanism: None,
+            units: crate::model::Units::Linear,
             positive: branch(2.0),
             negative: branch(-2.0),
         }

@@ -29,6 +29,7 @@ pub mod baseline;
 pub mod constrained;
 pub mod delivery;
 pub mod ewls;
+mod friction;
 pub mod grid;
 mod hat;
 mod hat_table;
@@ -155,6 +156,7 @@ impl<'r> Training<'r> {
             Method::Hat(options) => self.hat(options, dx_mm, lookup),
             Method::Passive(options) => self.passive(options, dx_mm, lookup),
             Method::Mechanism(options) => self.mechanism(options, dx_mm, |_| ()),
+            Method::Friction(options) => self.friction(options, lookup),
             Method::Static => self.static_profile(dx_mm, lookup),
             Method::Segments(options) => self.segments(options, lookup),
             Method::Spring => Ok(self.spring(lookup)),
@@ -437,6 +439,7 @@ impl<'r> Training<'r> {
                 positive: branch(&positive.theta),
                 negative: branch(&negative.theta),
                 mechanism: None,
+                units: crate::model::Units::Linear,
             },
             warnings,
             fitted: None,

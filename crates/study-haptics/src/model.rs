@@ -8,6 +8,9 @@
 //! with the firmware.
 
 pub mod file;
+mod units;
+
+pub use units::Units;
 
 use std::collections::BTreeMap;
 use study_wire::certificate::{self, Certificate};
@@ -28,6 +31,9 @@ pub struct Realization {
     pub provenance: Provenance,
     /// Variance accounted for, by name of the recording.
     pub vaf: BTreeMap<String, f64>,
+    /// The units of all its numbers. Names of fields say mm and N, which holds for
+    /// [`Units::Linear`]: the others are those of a file, before [`Self::at_lever`].
+    pub units: Units,
     /// How parameters between nodes are found.
     pub lookup: Lookup,
     /// How the two branches are combined.
@@ -166,6 +172,7 @@ impl Realization {
             id,
             provenance,
             vaf,
+            units: Units::Linear,
             lookup: Lookup::Linear,
             direction: Direction::Play {
                 delta_mm: mechanism.scalars.gap_mm + mechanism.scalars.slip_mm,

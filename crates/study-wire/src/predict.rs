@@ -98,6 +98,19 @@ impl Direction {
         }
     }
 
+    /// The rule with δ in another unit of length.
+    pub fn scaled(self, by: f64) -> Self {
+        match self {
+            Self::Sign => Self::Sign,
+            Self::Play { delta_mm } => Self::Play {
+                delta_mm: delta_mm * by,
+            },
+            Self::Dahl { delta_mm } => Self::Dahl {
+                delta_mm: delta_mm * by,
+            },
+        }
+    }
+
     /// δ, mm, if the rule has one.
     pub fn delta_mm(self) -> Option<f64> {
         match self {

@@ -151,5 +151,6 @@ fn constant_force() -> Realization {
         positive: branch.clone(),
         negative: branch,
         mechanism: None,
+        units: study_haptics::model::Units::Linear,
     }
 }

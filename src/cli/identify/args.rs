@@ -1,17 +1,14 @@
-//! The arguments of `study identify`, and the grid that they describe.
+//! The arguments of `study identify`.
 
 use super::Failure;
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
-use study_haptics::identify::Method;
-use study_haptics::identify::grid::Plan;
-use study_haptics::identify::method::{
-    self, Delta, Ewls, Hat, Passive, Segments, Sort, Start, State, TwoSided, Width, Window,
-};
+use study_haptics::identify::method::{Sort, Start, Window};
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::signal::{Acceleration, Settings};
+use study_haptics::model::Units;
 use study_haptics::recording::{Named, Names};
 use study_wire::predict::Lookup;
 
@@ -131,11 +128,11 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "KEY=NAME:UNIT", value_delimiter = ',')]
     pub(super) columns: Vec<Named>,
 
-    /// Lever arm of a rotary target: positions in mm and forces in N are those at its end
+    /// Lever arm of a rotary target: positions in mm and forces in N are those at its end; model files are in the unit of the angle and N·m
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) lever: Option<f64>,
 
-    /// Replace spikes of x and F, samples that differ from their neighbours as no motion does
+    /// Replace spikes of x and F, samples that differ from their neighbours as no motion does; passive: large errors also count less (Huber weights)
     #[arg(long)]
     pub(super) robust: bool,
 
@@ -145,7 +142,7 @@ pub(in crate::cli) struct Args {
 
     /// Estimator [default: passive; ewls if an option of its recursion is given]
     #[arg(long, value_enum)]
-    method: Option<MethodName>,
+    pub(super) method: Option<MethodName>,
 
     /// Forgetting factors, above 0 and at most 1: a list, or FROM:TO:STEP [default: 0.999:0.9999:0.0001]; without --method they mean ewls
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = lambdas)]
@@ -179,17 +176,21 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "MM", value_parser = positive, conflicts_with = "lambda")]
     pub(super) width: Option<f64>,
 
-    /// Direction state of a hat or passive table [default: play]
+    /// Direction state of a hat or passive table [default: play] or of friction [default: dahl]
     #[arg(long, value_enum)]
     pub(super) direction: Option<DirectionRule>,
 
-    /// Length over which a hat or passive table changes direction, in mm [default: the shortest that suits the training recording]
+    /// Length over which a hat or passive table or friction changes direction, in mm [default: the shortest that suits the training recording]
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) delta: Option<f64>,
 
     /// Ridges of a hat table: on the curvature of F, on the slopes of m and b [default: 0.003,0.05]; of a passive table: on F, on b [default: 0.003,0.06]
     #[arg(long, value_name = "F,DYNAMICS", value_delimiter = ',', value_parser = ridge, num_args = 2)]
     pub(super) ridge: Vec<f64>,
+
+    /// Terms of a passive table: f0 with any of m and b [default: m,b,f0]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    pub(super) terms: Vec<Term>,
 
     /// Whether m, b >= 0 for two-sided (default: off) and hat tables (default: on)
     #[arg(long, value_name = "SWITCH", value_parser = choice(&BOUNDS, switch))]
@@ -234,12 +235,24 @@ pub(super) enum MethodName {
     Passive,
     /// A virtual mechanism with backlash, two masses and friction, fitted by simulation
     Mechanism,
+    /// Mass, damping and friction that do not depend on the position
+    Friction,
     /// Baseline: mean force by position and direction
     Static,
     /// Baseline: piecewise linear force by direction
     Segments,
     /// Baseline: one straight line
     Spring,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Term {
+    /// The mass
+    M,
+    /// The damping
+    B,
+    /// The force by position
+    F0,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -369,17 +382,8 @@ fn ridge(given: &str) -> Result<f64, ArgumentError> {
     value.ok_or(ArgumentError::Ridge)
 }
 
-/// The range of the paper's grid.
-const DEFAULT_LAMBDAS: [f64; 10] = [
-    0.999, 0.9991, 0.9992, 0.9993, 0.9994, 0.9995, 0.9996, 0.9997, 0.9998, 0.9999,
-];
-/// The best cell of the paper's grid and the increment of its study, mm.
-const DEFAULT_DX_MM: [f64; 2] = [0.5, 1.0];
-/// The range of the paper's Fig. 4, mm.
-const FIGURE_DX_MM: [f64; 11] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
-
 /// All numbers of some lists, each once.
-fn distinct(lists: &[Numbers]) -> Vec<f64> {
+pub(super) fn distinct(lists: &[Numbers]) -> Vec<f64> {
     let mut all = Vec::new();
     for value in lists.iter().flat_map(|list| &list.0) {
         if !all.contains(value) {
@@ -394,10 +398,20 @@ impl Args {
     pub(super) fn names(&self) -> Result<Names, Failure> {
         match (self.columns.iter().any(Named::is_rotary), self.lever) {
             (true, None) => Err(Failure::usage("columns in units of rotation need --lever")
-                .hint("--lever MM is the radius at which the hand holds: model files, limits and reports are in mm and N there")),
+                .hint("--lever MM is the radius at which the hand holds: limits and reports are in mm and N there")),
             (false, Some(_)) => Err(Failure::usage("--lever without a column in units of rotation")),
             (_, lever_mm) => Ok(Names::new(&self.columns, lever_mm.unwrap_or(1.0))),
         }
+    }
+
+    /// The units of the model files, and the lever arm of a turning handle, mm.
+    pub(super) fn units(&self) -> Option<(Units, f64)> {
+        let degrees = self.columns.iter().find_map(Named::in_degrees);
+        let units = match degrees {
+            Some(false) => Units::Radians,
+            _ => Units::Degrees,
+        };
+        self.lever.map(|lever_mm| (units, lever_mm))
     }
 
     /// The estimator. The options of the paper's recursion mean this recursion.
@@ -424,126 +438,6 @@ impl Args {
         Settings {
             filter_hz: self.filter,
             acceleration: self.acceleration,
-        }
-    }
-
-    /// The grid: every method with its options, and every dx.
-    pub(super) fn plan(&self) -> Result<Plan, Failure> {
-        self.check_options_apply()?;
-        let dx_mm = match distinct(&self.dx) {
-            given if !given.is_empty() => given,
-            _ if self.method() == MethodName::Mechanism => vec![DEFAULT_DX_MM[0]],
-            _ if self.figures.is_some() => FIGURE_DX_MM.to_vec(),
-            _ => DEFAULT_DX_MM.to_vec(),
-        };
-        let lambdas = match distinct(&self.lambda) {
-            given if given.is_empty() => DEFAULT_LAMBDAS.to_vec(),
-            given => given,
-        };
-        let each = |of: &dyn Fn(f64) -> Method| lambdas.iter().map(|l| of(*l)).collect();
-        let methods: Vec<Method> = match self.method() {
-            MethodName::Ewls => each(&|lambda| self.ewls(lambda, false)),
-            MethodName::Constrained => each(&|lambda| self.ewls(lambda, true)),
-            MethodName::TwoSided => {
-                let of = |width| {
-                    Method::TwoSided(TwoSided {
-                        window: self.window.unwrap_or(Window::Tricube),
-                        width,
-                        bounded: self.bounds.unwrap_or(false),
-                    })
-                };
-                match self.width {
-                    Some(mm) => vec![of(Width::Mm(mm))],
-                    None => each(&|lambda| of(Width::Lambda(lambda))),
-                }
-            }
-            MethodName::Hat => vec![self.hat()],
-            MethodName::Passive => vec![self.passive()],
-            MethodName::Mechanism => vec![Method::Mechanism(method::Mechanism {
-                recorded_hz: self.filter,
-            })],
-            MethodName::Static => vec![Method::Static],
-            MethodName::Segments => vec![Method::Segments(
-                self.segments
-                    .map_or_else(Segments::default, |count| Segments { count }),
-            )],
-            MethodName::Spring => vec![Method::Spring],
-        };
-        Ok(Plan { methods, dx_mm })
-    }
-
-    fn ewls(&self, lambda: f64, bounded: bool) -> Method {
-        Method::Ewls(Ewls {
-            lambda,
-            resample: self.resample.unwrap_or(Resample::Bin),
-            start: self.start.unwrap_or(Start::Cold),
-            sort: self.sort.unwrap_or(Sort::Ascending),
-            bounded,
-        })
-    }
-
-    fn state(&self) -> State {
-        let delta = self.delta.map_or(Delta::Scan, Delta::Mm);
-        match self.direction {
-            Some(DirectionRule::Sign) => State::Sign,
-            Some(DirectionRule::Play) | None => State::Play(delta),
-            Some(DirectionRule::Dahl) => State::Dahl(delta),
-        }
-    }
-
-    fn passive(&self) -> Method {
-        let default = Passive::default();
-        Method::Passive(Passive {
-            state: self.state(),
-            ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
-            ridge_damping: self.ridge.get(1).copied().unwrap_or(default.ridge_damping),
-            ..default
-        })
-    }
-
-    fn hat(&self) -> Method {
-        let default = Hat::default();
-        Method::Hat(Hat {
-            state: self.state(),
-            ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
-            ridge_dynamics: self.ridge.get(1).copied().unwrap_or(default.ridge_dynamics),
-            bounded: self.bounds.unwrap_or(default.bounded),
-        })
-    }
-
-    /// Rejects options that the method does not have. Those of the paper's recursion are
-    /// accepted at their defaults, so that one script can identify baselines as well.
-    fn check_options_apply(&self) -> Result<(), Failure> {
-        use MethodName::{Constrained, Ewls, Hat, Mechanism, Passive, Segments, Static, TwoSided};
-        let (lambda, dx) = (!self.lambda.is_empty(), !self.dx.is_empty());
-        let given: [(&str, bool, &[MethodName]); 10] = [
-            ("--lambda", lambda, &[Ewls, Constrained, TwoSided]),
-            (
-                "--dx",
-                dx,
-                &[Ewls, Constrained, TwoSided, Hat, Passive, Mechanism, Static],
-            ),
-            (
-                "--start warm",
-                self.start == Some(Start::Warm),
-                &[Ewls, Constrained],
-            ),
-            ("--window", self.window.is_some(), &[TwoSided]),
-            ("--width", self.width.is_some(), &[TwoSided]),
-            ("--direction", self.direction.is_some(), &[Hat, Passive]),
-            ("--delta", self.delta.is_some(), &[Hat, Passive]),
-            ("--ridge", !self.ridge.is_empty(), &[Hat, Passive]),
-            ("--bounds", self.bounds.is_some(), &[TwoSided, Hat]),
-            ("--segments", self.segments.is_some(), &[Segments]),
-        ];
-        let useless = |(_, given, methods): &&(_, bool, &[MethodName])| {
-            *given && !methods.contains(&self.method())
-        };
-        match given.iter().find(useless) {
-            Some((flag, _, _)) => Err(Failure::usage(format!(
-                "{flag} does not apply to this method"
-            ))),
-            None => Ok(()),
         }
     }
 }
@@ -586,7 +480,10 @@ mod tests {
 
     #[test]
     fn a_range_has_both_ends_and_numbers_as_they_would_be_typed() {
-        assert_eq!(lambdas("0.999:0.9999:0.0001").unwrap().0, DEFAULT_LAMBDAS);
+        assert_eq!(
+            lambdas("0.999:0.9993:0.0001").unwrap().0,
+            [0.999, 0.9991, 0.9992, 0.9993]
+        );
         assert_eq!(increments("1:2:0.4").unwrap().0, [1.0, 1.4, 1.8]);
         assert_eq!(increments("2:2:1").unwrap().0, [2.0]);
         assert_eq!(increments("1e-1:0.3:1e-1").unwrap().0.len(), 3);

@@ -28,6 +28,7 @@ pub(super) fn models(
         MethodName::Hat => "hat-dx-{dx}",
         MethodName::Passive => "passive-dx-{dx}",
         MethodName::Mechanism => "mechanism-dx-{dx}",
+        MethodName::Friction => "friction",
         MethodName::Static => "static-dx-{dx}",
         MethodName::Segments => "segments",
         MethodName::Spring => "spring",
@@ -46,10 +47,13 @@ pub(super) fn models(
                 .hint("use {lambda} and {dx} in the template, or fewer values"));
         }
         cell.realization.id = id.to_string();
-        files.push((
-            dir.join(format!("{id}.toml")),
-            file::write(&cell.realization).into_bytes(),
-        ));
+        let written = match args.units() {
+            Some((units, lever_mm)) => {
+                file::write(&cell.realization.clone().turned(units, lever_mm))
+            }
+            None => file::write(&cell.realization),
+        };
+        files.push((dir.join(format!("{id}.toml")), written.into_bytes()));
         ids.push(id);
     }
     Ok(files)

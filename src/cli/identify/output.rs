@@ -422,7 +422,8 @@ fn row(results: &Results<'_>, cell: &Cell, best: bool) -> Vec<String> {
         number(provenance.dx_mm),
     ];
     if has_delta(results) {
-        row.push(number(cell.realization.direction.delta_mm()));
+        let delta_mm = cell.realization.direction.delta_mm();
+        row.push(number(delta_mm.map(|mm| (1e4 * mm).round() / 1e4)));
     }
     for score in &cell.scores {
         row.push(format!("{:.6}", score.vaf));

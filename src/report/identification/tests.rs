@@ -25,6 +25,7 @@ fn realization(scale: f64) -> Realization {
         positive: branch(scale),
         negative: branch(-1.0),
         mechanism: None,
+        units: study_haptics::model::Units::Linear,
     }
 }
 

@@ -214,6 +214,7 @@ fn one_method(
             tables.iter().map(table).collect()
         }
         Method::Segments(options) => Ok(vec![training.segments(options, lookup)?]),
+        Method::Friction(options) => Ok(vec![training.friction(options, lookup)?]),
         Method::Spring => Ok(vec![training.spring(lookup)]),
         // each fit uses all threads
         Method::Mechanism(options) => (tables.iter())

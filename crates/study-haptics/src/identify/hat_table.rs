@@ -2,9 +2,10 @@
 //! segmented baseline, a hat table of forces alone.
 
 use super::banded::Bound;
+use super::friction;
 use super::hat::{self, HatTable, Penalty};
-use super::method::{Delta, Hat, Method, Passive, Segments, State};
-use super::passive::{self, PassiveTable};
+use super::method::{Delta, Friction, Hat, Method, Passive, Segments, State};
+use super::passive;
 use super::resample::Resampled;
 use super::{Cause, Identified, IdentifyError, Theta, Training, Warning, two_sided, vaf};
 use crate::model::Provenance;
@@ -18,6 +19,13 @@ const STEP: f64 = std::f64::consts::SQRT_2;
 const GOLDEN_STEPS: usize = 10;
 /// A direction state that changes over fewer encoder counts follows their noise.
 const LEAST_COUNTS: f64 = 20.0;
+
+/// Errors above this many standard deviations are large: 95 % efficient with normal errors.
+const HUBER: f64 = 1.345;
+/// Standard deviation over median of the size, with normal errors.
+const SIGMA_PER_MAD: f64 = 1.4826;
+/// Weighted solutions, each with the weights of the one before.
+const HUBER_STEPS: usize = 4;
 
 /// The rms error of the chosen δ over the least one is at most this. Chosen, together
 /// with the ridge on m and b, on simulated switches: see `docs/estimators.md`.
@@ -64,20 +72,62 @@ impl Training<'_> {
             ridge_damping: options.ridge_damping,
             terms: options.terms,
         };
-        let mut identified = self.with_state(options.state, |rule| {
-            let PassiveTable {
+        let weighted = |rule, weights: Option<&[Vec<f64>]>| -> Result<Identified, IdentifyError> {
+            let HatTable {
                 positive,
                 negative,
                 weight,
-            } = passive::table(&self.recordings, &nodes, lookup, rule, penalty, None)
+            } = passive::table(&self.recordings, &nodes, lookup, rule, penalty, weights)
                 .ok_or(IdentifyError::Undetermined)?;
             Ok(self.hats(nodes.clone(), [positive, negative], &weight, rule, lookup))
+        };
+        let mut identified = self.with_state(options.state, |rule| {
+            let mut identified = weighted(rule, None)?;
+            for _ in 0..if options.huber { HUBER_STEPS } else { 0 } {
+                identified = weighted(rule, Some(&self.huber(&identified)))?;
+            }
+            Ok(identified)
         })?;
         identified.realization.provenance = Provenance {
             dx_mm: Some(dx_mm),
             ..self.provenance(Method::Passive(options))
         };
         Ok(identified)
+    }
+
+    /// Mass, damping and friction that do not depend on the position.
+    pub(super) fn friction(
+        &self,
+        options: Friction,
+        lookup: Lookup,
+    ) -> Result<Identified, IdentifyError> {
+        let samples: usize = self.recordings.iter().map(|r| r.len()).sum();
+        let weight = [[0.5 * samples as f64; 2]; 2];
+        let mut identified = self.with_state(options.state, |rule| {
+            let sides = friction::parameters(&self.recordings, rule)
+                .ok_or(IdentifyError::Undetermined)?
+                .map(|theta| vec![theta; 2]);
+            Ok(self.hats(self.range_mm.to_vec(), sides, &weight, rule, lookup))
+        })?;
+        identified.realization.provenance = self.provenance(Method::Friction(options));
+        Ok(identified)
+    }
+
+    /// Huber's weights of all samples: 1 up to [`HUBER`] robust standard deviations of the
+    /// error, then in inverse proportion to it.
+    fn huber(&self, of: &Identified) -> Vec<Vec<f64>> {
+        let errors: Vec<Vec<f64>> = (self.recordings.iter())
+            .map(|recording| vaf::errors(&of.realization, recording))
+            .collect();
+        let mut sizes: Vec<f64> = errors.iter().flatten().map(|e| e.abs()).collect();
+        let middle = sizes.len() / 2;
+        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+        let most = HUBER * SIGMA_PER_MAD * *median;
+        let weight = |e: &f64| if e.abs() > most { most / e.abs() } else { 1.0 };
+        errors
+            .iter()
+            .map(|e| e.iter().map(weight).collect())
+            .collect()
     }
 
     /// The table with the given direction state, or with the δ that the scan finds.

@@ -24,6 +24,8 @@ pub enum Method {
     Passive(Passive),
     /// A virtual mechanism, by the simulation error of the force.
     Mechanism(Mechanism),
+    /// Mass, damping and friction that do not depend on the position.
+    Friction(Friction),
     /// Baseline: mean force by position and direction.
     Static,
     /// Baseline: force by direction, piecewise linear between few nodes.
@@ -42,6 +44,7 @@ impl Method {
             Self::Hat(_) => "hat",
             Self::Passive(_) => "passive",
             Self::Mechanism(_) => "mechanism",
+            Self::Friction(_) => "friction",
             Self::Static => "static",
             Self::Segments(_) => "segments",
             Self::Spring => "spring",
@@ -50,7 +53,7 @@ impl Method {
 
     /// Whether the nodes are multiples of dx.
     pub fn has_dx(self) -> bool {
-        !matches!(self, Self::Segments(_) | Self::Spring)
+        !matches!(self, Self::Segments(_) | Self::Spring | Self::Friction(_))
     }
 
     /// The forgetting factor, if the method has one.
@@ -93,6 +96,7 @@ impl Method {
                 not_negative("the ridge on F", options.ridge_force)?;
                 not_negative("the ridge on b", options.ridge_damping)
             }
+            Self::Friction(options) => options.state.check(),
             Self::Mechanism(options) => match options.recorded_hz {
                 Some(hz) => positive("the corner of the low-pass", hz),
                 None => Ok(()),
@@ -235,6 +239,22 @@ pub struct Mechanism {
     pub recorded_hz: Option<f64>,
 }
 
+/// Options of the friction model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Friction {
+    /// The direction state, in identification and in prediction.
+    pub state: State,
+}
+
+impl Default for Friction {
+    /// Dahl, with δ found on the training recordings.
+    fn default() -> Self {
+        Self {
+            state: State::Dahl(Delta::Scan),
+        }
+    }
+}
+
 /// Options of the passive table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Passive {
@@ -246,6 +266,8 @@ pub struct Passive {
     pub ridge_damping: f64,
     /// Which of m and b the table has.
     pub terms: Terms,
+    /// Whether large errors count by their size and not by its square (Huber 1964).
+    pub huber: bool,
 }
 
 impl Default for Passive {
@@ -256,6 +278,7 @@ impl Default for Passive {
             ridge_force: 3e-3,
             ridge_damping: 6e-2,
             terms: Terms::default(),
+            huber: false,
         }
     }
 }
@@ -365,6 +388,9 @@ impl fmt::Display for Method {
                     options.ridge_force, options.ridge_damping
                 )?;
                 scanned(f, options.state)?;
+                if options.huber {
+                    f.write_str(" huber")?;
+                }
                 match options.terms {
                     Terms { m: true, b: true } => Ok(()),
                     Terms { m: true, b: false } => f.write_str(" terms=m"),
@@ -373,6 +399,7 @@ impl fmt::Display for Method {
                 }
             }
             Self::Segments(options) => write!(f, " count={}", options.count),
+            Self::Friction(options) => scanned(f, options.state),
             Self::Mechanism(options) => match options.recorded_hz {
                 Some(hz) => write!(f, " recorded={hz}"),
                 None => Ok(()),

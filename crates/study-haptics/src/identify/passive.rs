@@ -10,8 +10,8 @@
 //! the rms speed, so that all of them are forces and no weight depends on a unit.
 
 use super::banded::{Banded, Bound};
+use super::hat::HatTable;
 use super::method::Terms;
-use super::samples::Theta;
 use super::vaf::motion;
 use crate::recording::Recording;
 use study_wire::predict::{Direction, DirectionState, Lookup, locate};
@@ -31,15 +31,6 @@ pub(super) struct Penalty {
     pub(super) terms: Terms,
 }
 
-/// θ at the nodes and the weight of the samples behind each.
-#[derive(Debug, Clone)]
-pub(super) struct PassiveTable {
-    pub(super) positive: Vec<Theta>,
-    pub(super) negative: Vec<Theta>,
-    /// Σ h_j (1 ± z)/2 of each node, for + and −.
-    pub(super) weight: Vec<[f64; 2]>,
-}
-
 /// The table of least cost; `None` if recordings and ridges leave it undetermined.
 /// `weights` of the samples of each recording, all 1 if `None`.
 pub(super) fn table(
@@ -49,7 +40,7 @@ pub(super) fn table(
     rule: Direction,
     penalty: Penalty,
     weights: Option<&[Vec<f64>]>,
-) -> Option<PassiveTable> {
+) -> Option<HatTable> {
     let n = nodes.len() * PER_NODE;
     let mass = n;
     let mut normal = Banded::bordered(n, HALF, 1);
@@ -120,7 +111,7 @@ pub(super) fn table(
         let of = |node: &[f64]| [m, node[b].max(0.0), 0.0, node[0] + sign * node[1]];
         x[..n].chunks_exact(PER_NODE).map(of).collect()
     };
-    Some(PassiveTable {
+    Some(HatTable {
         positive: side(1.0, 2),
         negative: side(-1.0, 3),
         weight,

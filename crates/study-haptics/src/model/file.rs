@@ -1,7 +1,8 @@
 //! Reading and writing model files.
 //!
 //! A model file is TOML with `format = "study-model/1"`, or `"study-model/2"` with a `kind`: a
-//! `table`, whose other keys are those of version 1, or a `mechanism`. Reading is strict and reports
+//! `table`, whose other keys are those of version 1, or a `mechanism`, and with `units` of a
+//! straight or a turning handle, which the names of the keys then have. Reading is strict and reports
 //! every fault with its line: unknown keys, numbers that are not finite, positions that
 //! do not ascend, lists of different lengths, reversed ranges. Writing is reproducible:
 //! the same realization gives the same bytes, numbers have the fewest digits that read
@@ -11,7 +12,9 @@ mod write;
 
 pub use write::write;
 
-use super::{Branch, FORMAT, FORMAT_2, Mechanism, Profile, Provenance, Realization, Trained};
+use super::{
+    Branch, FORMAT, FORMAT_2, Mechanism, Profile, Provenance, Realization, Trained, Units,
+};
 use std::collections::BTreeMap;
 use study_base::diagnostic::table::{self, Table, Value};
 use study_base::diagnostic::{Fault, Findings};
@@ -34,31 +37,37 @@ pub fn parse(path: &str, text: &str) -> (Option<Realization>, Findings) {
 
 fn read(mut root: Table<'_, '_>) -> Option<Realization> {
     let second = root.value("format").and_then(|v| v.text()).as_deref() == Some(FORMAT_2);
+    let mut own = Units::Linear;
     if second {
         let kinds = [("table", false), ("mechanism", true)];
         let kind = root.required("kind").and_then(|v| v.word(&kinds));
+        own = root.value("units").map_or(Some(Units::Linear), units)?;
         if kind? {
-            return read_mechanism(root);
+            return read_mechanism(root, own);
         }
     } else if !root.has_format(FORMAT, "a model file") {
         return None;
     }
     let id = id(&mut root);
     let lookup = root.required("lookup").and_then(|v| v.word(&Lookup::NAMES));
-    let direction = root.required("direction").and_then(direction);
-    let trained = root.required("trained").and_then(trained);
-    let x_mm = root.required("x_mm").and_then(|value| positions(&value));
-    let provenance = root.required("provenance").and_then(provenance);
+    let direction = root.required("direction").and_then(|v| direction(v, own));
+    let trained = root.required("trained").and_then(|v| trained(v, own));
+    let x_key = own.key("x_mm");
+    let x_mm = root.required(&x_key).and_then(|value| positions(&value));
+    let provenance = root.required("provenance").and_then(|v| provenance(v, own));
     let vaf = root.value("vaf").map_or(Some(BTreeMap::new()), vaf);
     let nodes = x_mm.as_ref().map(Vec::len);
-    let positive = root.required("positive").and_then(|v| branch(v, nodes));
-    let negative = root.required("negative").and_then(|v| branch(v, nodes));
+    let mut branch = |name| {
+        let value = root.required(name)?;
+        branch(value, nodes, own)
+    };
+    let (positive, negative) = (branch("positive"), branch("negative"));
     if let (Some(trained), Some(x_mm)) = (&trained, &x_mm)
         && (x_mm[0] < trained.x_mm[0] || x_mm[x_mm.len() - 1] > trained.x_mm[1])
     {
         root.fault_at(
-            "x_mm",
-            Fault::warning("there are nodes outside `trained.x_mm`")
+            &x_key,
+            Fault::warning(format!("there are nodes outside `trained.{x_key}`"))
                 .hint("the target was not identified there"),
         );
     }
@@ -67,6 +76,7 @@ fn read(mut root: Table<'_, '_>) -> Option<Realization> {
         id: id?,
         provenance: provenance?,
         vaf: vaf?,
+        units: own,
         lookup: lookup?,
         direction: direction?,
         trained: trained?,
@@ -78,23 +88,40 @@ fn read(mut root: Table<'_, '_>) -> Option<Realization> {
 }
 
 /// A mechanism of version 2.
-fn read_mechanism(mut root: Table<'_, '_>) -> Option<Realization> {
+fn read_mechanism(mut root: Table<'_, '_>, own: Units) -> Option<Realization> {
     let id = id(&mut root);
-    let trained = root.required("trained").and_then(trained);
-    let provenance = root.required("provenance").and_then(provenance);
+    let trained = root.required("trained").and_then(|v| trained(v, own));
+    let provenance = root.required("provenance").and_then(|v| provenance(v, own));
     let vaf = root.value("vaf").map_or(Some(BTreeMap::new()), vaf);
     let mechanism = root
         .required("mechanism")
-        .and_then(|v| mechanism(v, &trained));
+        .and_then(|v| mechanism(v, &trained, own));
     root.finish();
     let (trained, mechanism) = (trained?, mechanism?);
-    Some(Realization::of_mechanism(
-        id?,
-        provenance?,
-        vaf?,
-        trained,
-        mechanism,
-    ))
+    Some(Realization {
+        units: own,
+        ..Realization::of_mechanism(id?, provenance?, vaf?, trained, mechanism)
+    })
+}
+
+/// `{ x = "deg", f = "N·m" }`
+fn units(value: Value<'_, '_>) -> Option<Units> {
+    let mut table = value.table()?;
+    let all = [Units::Linear, Units::Degrees, Units::Radians];
+    let x = table.required("x").and_then(|v| {
+        let words = all.map(|units| (units.names()[0], units));
+        v.word(&words)
+    });
+    let rotary = table.required("f").and_then(|v| {
+        let word = v.word(&[("N", false), ("N·m", true)])?;
+        let fits = x.is_none_or(|x| (x != Units::Linear) == word);
+        match fits {
+            true => Some(word),
+            false => v.refuse("does not go with x: mm and N, deg and N·m, or rad and N·m"),
+        }
+    });
+    table.finish();
+    rotary.and(x)
 }
 
 /// The keys of a mechanism's scalars, in the order of [`Scalars::to_array`].
@@ -114,12 +141,12 @@ pub const SCALAR_KEYS: [&str; SCALARS] = [
     "offset_n",
 ];
 
-fn mechanism(value: Value<'_, '_>, trained: &Option<Trained>) -> Option<Mechanism> {
+fn mechanism(value: Value<'_, '_>, trained: &Option<Trained>, own: Units) -> Option<Mechanism> {
     let mut table = value.table()?;
-    let scalars = SCALAR_KEYS.map(|key| table.required(key).and_then(|v| finite(&v)));
+    let scalars = SCALAR_KEYS.map(|key| table.required(&own.key(key)).and_then(|v| finite(&v)));
     let recorded_hz = table.value("recorded_hz").and_then(|v| positive(&v));
-    let detent = table.required("detent").and_then(profile);
-    let friction = table.required("friction").and_then(profile);
+    let detent = table.required("detent").and_then(|v| profile(v, own));
+    let friction = table.required("friction").and_then(|v| profile(v, own));
     let mut values = [0.0; SCALARS];
     for (value, scalar) in values.iter_mut().zip(scalars) {
         *value = scalar?;
@@ -130,6 +157,7 @@ fn mechanism(value: Value<'_, '_>, trained: &Option<Trained>) -> Option<Mechanis
         friction: friction?,
         recorded_hz,
     };
+    // All conditions are homogeneous in the units of length and force.
     let top_mm_s = trained.as_ref().map_or(0.0, |trained| trained.v_mm_s);
     let fault = match mechanism.view().check(2.0 * top_mm_s) {
         Ok(()) => None,
@@ -150,11 +178,14 @@ fn mechanism(value: Value<'_, '_>, trained: &Option<Trained>) -> Option<Mechanis
     fault.is_none().then_some(mechanism)
 }
 
-fn profile(value: Value<'_, '_>) -> Option<Profile> {
+fn profile(value: Value<'_, '_>, own: Units) -> Option<Profile> {
     let mut table = value.table()?;
-    let first_mm = table.required("first_mm").and_then(|v| finite(&v));
-    let step_mm = table.required("step_mm").and_then(|v| positive(&v));
-    let n = table.required("n").and_then(|value| {
+    let first = table.required(&own.key("first_mm"));
+    let first_mm = first.and_then(|v| finite(&v));
+    let step_mm = table
+        .required(&own.key("step_mm"))
+        .and_then(|v| positive(&v));
+    let n = table.required(&own.key("n")).and_then(|value| {
         let numbers = numbers(&value)?;
         if (2..=MAX_NODES).contains(&numbers.len()) {
             return Some(numbers);
@@ -183,7 +214,7 @@ fn id(root: &mut Table<'_, '_>) -> Option<String> {
     }
 }
 
-fn direction(value: Value<'_, '_>) -> Option<Direction> {
+fn direction(value: Value<'_, '_>, own: Units) -> Option<Direction> {
     let mut table = value.table()?;
     type WithDelta = fn(f64) -> Direction;
     let rules: [(&str, Option<WithDelta>); 3] = [
@@ -194,12 +225,12 @@ fn direction(value: Value<'_, '_>) -> Option<Direction> {
     let direction = match table.required("rule").and_then(|v| v.word(&rules)) {
         Some(None) => Some(Direction::Sign),
         Some(Some(with_delta)) => table
-            .required("delta_mm")
+            .required(&own.key("delta_mm"))
             .and_then(|v| positive(&v))
             .map(with_delta),
         None => {
             // a valid key, whatever the rule was meant to be
-            let _ = table.value("delta_mm");
+            let _ = table.value(&own.key("delta_mm"));
             None
         }
     };
@@ -207,9 +238,9 @@ fn direction(value: Value<'_, '_>) -> Option<Direction> {
     direction
 }
 
-fn trained(value: Value<'_, '_>) -> Option<Trained> {
+fn trained(value: Value<'_, '_>, own: Units) -> Option<Trained> {
     let mut table = value.table()?;
-    let x_mm = table.required("x_mm").and_then(|value| {
+    let x_mm = table.required(&own.key("x_mm")).and_then(|value| {
         let numbers = numbers(&value)?;
         match numbers[..] {
             [low, high] if low < high => Some([low, high]),
@@ -217,7 +248,9 @@ fn trained(value: Value<'_, '_>) -> Option<Trained> {
             _ => value.refuse(format_args!("has to be two numbers, not {}", numbers.len())),
         }
     });
-    let v_mm_s = table.required("v_mm_s").and_then(|v| positive(&v));
+    let v_mm_s = table
+        .required(&own.key("v_mm_s"))
+        .and_then(|v| positive(&v));
     table.finish();
     Some(Trained {
         x_mm: x_mm?,
@@ -246,7 +279,7 @@ fn positions(value: &Value<'_, '_>) -> Option<Vec<f64>> {
     all.map(|()| numbers)
 }
 
-fn provenance(value: Value<'_, '_>) -> Option<Provenance> {
+fn provenance(value: Value<'_, '_>, own: Units) -> Option<Provenance> {
     let mut table = value.table()?;
     let method = table.required("method").and_then(|v| v.text());
     let lambda = table.value("lambda").and_then(|value| {
@@ -258,8 +291,10 @@ fn provenance(value: Value<'_, '_>) -> Option<Provenance> {
             "has to be above 0 and at most 1, not {lambda}"
         ))
     });
-    let memory_mm = table.value("memory_mm").and_then(|v| positive(&v));
-    let dx_mm = table.value("dx_mm").and_then(|v| positive(&v));
+    let memory_mm = table
+        .value(&own.key("memory_mm"))
+        .and_then(|v| positive(&v));
+    let dx_mm = table.value(&own.key("dx_mm")).and_then(|v| positive(&v));
     let resample = table.text("resample");
     let filter = table.text("filter");
     let note = table.text("note");
@@ -309,16 +344,17 @@ fn vaf(value: Value<'_, '_>) -> Option<BTreeMap<String, f64>> {
     Some(vaf)
 }
 
-fn branch(value: Value<'_, '_>, nodes: Option<usize>) -> Option<Branch> {
+fn branch(value: Value<'_, '_>, nodes: Option<usize>, own: Units) -> Option<Branch> {
     let mut table = value.table()?;
     let [m_kg, b_n_s_per_mm, k_n_per_mm, f0_n] = PARAMETERS.map(|key| {
-        let value = table.required(key)?;
+        let value = table.required(&own.key(key))?;
         let numbers = numbers(&value)?;
         let n = numbers.len();
         match nodes {
-            Some(nodes) if nodes != n => {
-                value.refuse(format_args!("has {n} numbers where `x_mm` has {nodes}"))
-            }
+            Some(nodes) if nodes != n => value.refuse(format_args!(
+                "has {n} numbers where `{}` has {nodes}",
+                own.key("x_mm")
+            )),
             _ => Some(numbers),
         }
     });

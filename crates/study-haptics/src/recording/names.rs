@@ -118,6 +118,12 @@ impl Named {
     pub fn is_rotary(&self) -> bool {
         self.lever_power != 0
     }
+
+    /// Whether it is an angle, and in degrees.
+    pub fn in_degrees(&self) -> Option<bool> {
+        let angle = self.column == 1 && self.is_rotary();
+        angle.then_some(self.factor != 1.0)
+    }
 }
 
 /// Names and factors of all columns.

@@ -16,6 +16,9 @@ pub(super) const DEVICE: &[Key] = keys! {
     /// Permission to play tables that fail their passivity certificate, which could put
     /// energy into the hand. Without it such a table is refused.
     "uncertified": Kind::Table(UNCERTIFIED), r#"{ play = true, force_n = 9.0, reason = "the paper's own realizations" }"#;
+    /// Lever arm at which the hand holds a turning handle. Model files in degrees or radians and
+    /// N·m are converted with it; limits, telemetry and results are in mm and N at the hand.
+    "lever_mm": Kind::positive("mm"), "20.0";
     /// When the force of a playback was that of its table, and what follows if it was not.
     /// Needs a device that reports samples.
     "rendering": Kind::Table(RENDERING), r#"{ min_vaf = 0.9, on_fault = "fail" }"#;
@@ -61,6 +64,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
     let given = section.value("limits").is_some();
     let limits = section.section("limits").and_then(limits);
     let uncertified = section.section("uncertified").and_then(uncertified);
+    let lever_mm = section.number("lever_mm");
     let rendering = section.section("rendering").and_then(rendering);
     if !given && kind != Some(DeviceKind::Manual) {
         section.report_missing("limits", section.key("limits").such_as());
@@ -86,6 +90,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
             None => return None,
         },
         uncertified,
+        lever_mm,
         rendering: rendering?,
     })
 }

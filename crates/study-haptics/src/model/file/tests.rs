@@ -56,6 +56,53 @@ fn a_model_file_is_read() {
     assert_eq!(r.negative.f0_n, [-2.0; 3]);
 }
 
+/// m in kg·m², b in N·m·s/deg and so on: a turning handle in its own units is the same at its
+/// lever arm, and a file in degrees says so in its keys.
+#[test]
+fn a_turning_handle_is_read_at_its_lever_arm() {
+    let linear = parse("a.toml", SMALL).0.unwrap();
+    let close = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
+    for (units, x_key) in [(Units::Degrees, "x_deg = ["), (Units::Radians, "x_rad = [")] {
+        let turned = linear.clone().turned(units, 20.0);
+        let text = write(&turned);
+        let [x, _] = units.names();
+        let head = format!(
+            "format = \"study-model/2\"\nkind = \"table\"\nunits = {{ x = \"{x}\", f = \"N·m\" }}\n"
+        );
+        assert!(text.starts_with(&head) && text.contains(x_key), "{text}");
+        assert!(!text.contains("_mm") && !text.contains("m_kg ="), "{text}");
+        let (read, findings) = parse("a.toml", &text);
+        assert_eq!(findings.faults, []);
+        assert_eq!(read, Some(turned.clone()));
+        let back = turned.at_lever(20.0);
+        assert_eq!((back.units, back.lookup), (Units::Linear, Lookup::Floor));
+        let pairs = [
+            (&back.x_mm, &linear.x_mm),
+            (&back.positive.m_kg, &linear.positive.m_kg),
+            (&back.positive.b_n_s_per_mm, &linear.positive.b_n_s_per_mm),
+            (&back.positive.k_n_per_mm, &linear.positive.k_n_per_mm),
+            (&back.negative.f0_n, &linear.negative.f0_n),
+        ];
+        for (one, other) in pairs {
+            assert!(one.iter().zip(other).all(|(a, b)| close(*a, *b)), "{one:?}");
+        }
+        let delta = back.direction.delta_mm().unwrap();
+        assert!(close(delta, 0.5) && close(back.trained.v_mm_s, 100.0));
+    }
+    // 0.1 kg at 20 mm are 4e-5 kg·m²; 1 N/mm is 400 N·mm per radian, 6.98e-3 N·m per degree
+    let degrees = linear.turned(Units::Degrees, 20.0);
+    assert!(close(degrees.positive.m_kg[1], 4e-5));
+    assert!(close(
+        degrees.positive.k_n_per_mm[0],
+        0.4 * std::f64::consts::PI / 180.0
+    ));
+    let mixed = write(&degrees).replace("f = \"N·m\"", "f = \"N\"");
+    let (read, findings) = parse("a.toml", &mixed);
+    assert!(read.is_none());
+    let message = &findings.faults[0].message;
+    assert!(message.contains("does not go with x"), "{message}");
+}
+
 #[test]
 fn every_fault_has_its_line() {
     for (from, to, expected) in [
@@ -239,6 +286,7 @@ proptest! {
             trained: Trained { x_mm: [x_mm[0], x_mm[x_mm.len() - 1]], v_mm_s: delta_mm },
             x_mm, positive, negative,
             mechanism: None,
+            units: Units::Linear,
         };
         let (back, findings) = parse("p.toml", &write(&r));
         prop_assert_eq!(&findings.faults, &[]);

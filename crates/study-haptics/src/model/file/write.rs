@@ -1,7 +1,7 @@
 //! The text of a model file.
 
 use super::{FORMAT, FORMAT_2, PARAMETERS, SCALAR_KEYS};
-use crate::model::{Branch, Realization};
+use crate::model::{Realization, Units};
 use std::fmt::Write as _;
 /// Numbers of a list per line.
 const PER_LINE: usize = 6;
@@ -9,47 +9,59 @@ const PER_LINE: usize = 6;
 /// The text of a model file.
 pub fn write(realization: &Realization) -> String {
     let r = realization;
+    let key = |key: &str| r.units.key(key);
     let mut out = Text::default();
-    match &r.mechanism {
-        None => {
-            out.text("format", FORMAT);
-            out.text("id", &r.id);
-            out.text("lookup", r.lookup.as_str());
-            let rule = r.direction.as_str();
-            let direction = match r.direction.delta_mm() {
-                None => format!("{{ rule = \"{rule}\" }}"),
-                Some(delta_mm) => format!("{{ rule = \"{rule}\", delta_mm = {delta_mm:?} }}"),
-            };
-            out.raw("direction", &direction);
-        }
-        Some(_) => {
-            out.text("format", FORMAT_2);
-            out.text("kind", "mechanism");
-            out.text("id", &r.id);
-        }
+    let turns = r.units != Units::Linear;
+    if turns || r.mechanism.is_some() {
+        out.text("format", FORMAT_2);
+        out.text(
+            "kind",
+            match r.mechanism {
+                Some(_) => "mechanism",
+                None => "table",
+            },
+        );
+    } else {
+        out.text("format", FORMAT);
+    }
+    if turns {
+        let [x, f] = r.units.names();
+        out.raw("units", &format!("{{ x = \"{x}\", f = \"{f}\" }}"));
+    }
+    out.text("id", &r.id);
+    if r.mechanism.is_none() {
+        out.text("lookup", r.lookup.as_str());
+        let rule = r.direction.as_str();
+        let direction = match r.direction.delta_mm() {
+            None => format!("{{ rule = \"{rule}\" }}"),
+            Some(delta) => format!("{{ rule = \"{rule}\", {} = {delta:?} }}", key("delta_mm")),
+        };
+        out.raw("direction", &direction);
     }
     let [low, high] = r.trained.x_mm;
     out.raw(
         "trained",
         &format!(
-            "{{ x_mm = [{low:?}, {high:?}], v_mm_s = {:?} }}",
+            "{{ {} = [{low:?}, {high:?}], {} = {:?} }}",
+            key("x_mm"),
+            key("v_mm_s"),
             r.trained.v_mm_s
         ),
     );
     if r.mechanism.is_none() {
-        out.list("x_mm", &r.x_mm);
+        out.list(&key("x_mm"), &r.x_mm);
     }
 
     let p = &r.provenance;
     out.table("provenance");
     out.text("method", &p.method);
-    for (key, number) in [
+    for (name, number) in [
         ("lambda", p.lambda),
         ("memory_mm", p.memory_mm),
         ("dx_mm", p.dx_mm),
     ] {
         if let Some(number) = number {
-            out.number(key, number);
+            out.number(&key(name), number);
         }
     }
     for (key, text) in [
@@ -64,24 +76,34 @@ pub fn write(realization: &Realization) -> String {
     if !p.recordings.is_empty() {
         out.table("provenance.recordings");
         for (name, hash) in &p.recordings {
-            out.text(&key(name), hash);
+            out.text(&bare(name), hash);
         }
     }
     if !r.vaf.is_empty() {
         out.table("vaf");
         for (name, vaf) in &r.vaf {
-            out.number(&key(name), *vaf);
+            out.number(&bare(name), *vaf);
         }
     }
     match &r.mechanism {
         None => {
-            out.branch("positive", &r.positive);
-            out.branch("negative", &r.negative);
+            for (name, branch) in [("positive", &r.positive), ("negative", &r.negative)] {
+                out.table(name);
+                let columns = [
+                    &branch.m_kg,
+                    &branch.b_n_s_per_mm,
+                    &branch.k_n_per_mm,
+                    &branch.f0_n,
+                ];
+                for (name, values) in PARAMETERS.into_iter().zip(columns) {
+                    out.list(&key(name), values);
+                }
+            }
         }
         Some(mechanism) => {
             out.table("mechanism");
-            for (key, value) in SCALAR_KEYS.iter().zip(mechanism.scalars.to_array()) {
-                out.number(key, value);
+            for (name, value) in SCALAR_KEYS.iter().zip(mechanism.scalars.to_array()) {
+                out.number(&key(name), value);
             }
             if let Some(hz) = mechanism.recorded_hz {
                 out.number("recorded_hz", hz);
@@ -91,9 +113,9 @@ pub fn write(realization: &Realization) -> String {
                 ("mechanism.friction", &mechanism.friction),
             ] {
                 out.table(name);
-                out.number("first_mm", profile.first_mm);
-                out.number("step_mm", profile.step_mm);
-                out.list("n", &profile.n);
+                out.number(&key("first_mm"), profile.first_mm);
+                out.number(&key("step_mm"), profile.step_mm);
+                out.list(&key("n"), &profile.n);
             }
         }
     }
@@ -132,19 +154,6 @@ impl Text {
     fn table(&mut self, name: &str) {
         let _ = writeln!(self.0, "\n[{name}]");
     }
-
-    fn branch(&mut self, name: &str, branch: &Branch) {
-        self.table(name);
-        let columns = [
-            &branch.m_kg,
-            &branch.b_n_s_per_mm,
-            &branch.k_n_per_mm,
-            &branch.f0_n,
-        ];
-        for (key, values) in PARAMETERS.into_iter().zip(columns) {
-            self.list(key, values);
-        }
-    }
 }
 
 /// A basic TOML string, with invisible and control characters escaped.
@@ -166,7 +175,7 @@ fn quoted(text: &str) -> String {
 }
 
 /// A key, bare if TOML allows it.
-fn key(name: &str) -> String {
+fn bare(name: &str) -> String {
     let bare = !name.is_empty()
         && name
             .chars()

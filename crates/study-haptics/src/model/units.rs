@@ -1,0 +1,187 @@
+//! Units of a model file: a straight handle in mm and N, or a turning one in degrees or
+//! radians and N·m.
+//!
+//! Everything that is calculated, played and limited is in mm and N at the hand. A rotary
+//! realization is converted when it is read, with the lever arm at which the hand holds:
+//! x = r θ, F = T/r, m = I/r².
+
+use super::{Mechanism, Profile, Realization};
+use study_wire::mechanism::Scalars;
+
+/// The units of the numbers of a [`Realization`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Units {
+    /// mm, N, kg.
+    #[default]
+    Linear,
+    /// Degrees, N·m, kg·m².
+    Degrees,
+    /// Radians, N·m, kg·m².
+    Radians,
+}
+
+impl Units {
+    /// Those of a turning handle by the name of the unit of the angle.
+    pub fn of_angle(name: &str) -> Option<Self> {
+        match name {
+            "deg" => Some(Self::Degrees),
+            "rad" => Some(Self::Radians),
+            _ => None,
+        }
+    }
+
+    /// Names of the units of position and force.
+    pub fn names(self) -> [&'static str; 2] {
+        match self {
+            Self::Linear => ["mm", "N"],
+            Self::Degrees => ["deg", "N·m"],
+            Self::Radians => ["rad", "N·m"],
+        }
+    }
+
+    /// A key of a model file with these units in its name; `key` is the one with mm and N.
+    pub(super) fn key(self, key: &str) -> String {
+        if self == Self::Linear {
+            return key.to_owned();
+        }
+        let [x, _] = self.names();
+        let renamed = [
+            ("n_s_per_mm", format!("nm_s_per_{x}")),
+            ("n_per_mm", format!("nm_per_{x}")),
+            ("mm_s", format!("{x}_s")),
+            ("mm", x.to_owned()),
+            ("kg", "kg_m2".to_owned()),
+            ("n", "nm".to_owned()),
+        ];
+        let found = renamed.iter().find_map(|(unit, own)| {
+            let before = key.strip_suffix(unit)?;
+            (before.is_empty() || before.ends_with('_')).then(|| format!("{before}{own}"))
+        });
+        found.unwrap_or_else(|| key.to_owned())
+    }
+
+    /// What one unit is at a lever arm of `lever_mm`.
+    fn at_lever(self, lever_mm: f64) -> Scale {
+        let rad = match self {
+            Self::Linear => {
+                return Scale {
+                    x: 1.0,
+                    f: 1.0,
+                    m: 1.0,
+                };
+            }
+            Self::Degrees => std::f64::consts::PI / 180.0,
+            Self::Radians => 1.0,
+        };
+        Scale {
+            x: rad * lever_mm,
+            f: 1e3 / lever_mm,
+            m: 1e6 / lever_mm.powi(2),
+        }
+    }
+}
+
+/// Factors of length, force and mass.
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    x: f64,
+    f: f64,
+    m: f64,
+}
+
+impl Realization {
+    /// In mm and N at the end of a lever arm; a linear realization is as it was.
+    #[must_use]
+    pub fn at_lever(mut self, lever_mm: f64) -> Self {
+        let scale = self.units.at_lever(lever_mm);
+        self.units = Units::Linear;
+        self.rescale(scale);
+        self
+    }
+
+    /// A linear realization at the end of a lever arm, in the units of a turning handle.
+    #[must_use]
+    pub fn turned(mut self, units: Units, lever_mm: f64) -> Self {
+        let Scale { x, f, m } = units.at_lever(lever_mm);
+        self.units = units;
+        self.rescale(Scale {
+            x: 1.0 / x,
+            f: 1.0 / f,
+            m: 1.0 / m,
+        });
+        self
+    }
+
+    fn rescale(&mut self, Scale { x, f, m }: Scale) {
+        let by = |values: &mut [f64], factor: f64| values.iter_mut().for_each(|v| *v *= factor);
+        by(&mut self.x_mm, x);
+        by(&mut self.trained.x_mm, x);
+        self.trained.v_mm_s *= x;
+        self.direction = self.direction.scaled(x);
+        for branch in [&mut self.positive, &mut self.negative] {
+            by(&mut branch.m_kg, m);
+            by(&mut branch.b_n_s_per_mm, f / x);
+            by(&mut branch.k_n_per_mm, f / x);
+            by(&mut branch.f0_n, f);
+        }
+        for length in [&mut self.provenance.dx_mm, &mut self.provenance.memory_mm] {
+            *length = length.map(|mm| mm * x);
+        }
+        if let Some(mechanism) = &mut self.mechanism {
+            mechanism.rescale(Scale { x, f, m });
+        }
+    }
+}
+
+impl Mechanism {
+    fn rescale(&mut self, Scale { x, f, m }: Scale) {
+        let p = &mut self.scalars;
+        *p = Scalars {
+            handle_kg: p.handle_kg * m,
+            follower_kg: p.follower_kg * m,
+            contact_n_per_mm: p.contact_n_per_mm * f / x,
+            contact_n_s_per_mm: p.contact_n_s_per_mm * f / x,
+            gap_mm: p.gap_mm * x,
+            follower_n_s_per_mm: p.follower_n_s_per_mm * f / x,
+            slip_mm: p.slip_mm * x,
+            stribeck: p.stribeck,
+            stribeck_mm_s: p.stribeck_mm_s * x,
+            handle_n: p.handle_n * f,
+            handle_slip_mm: p.handle_slip_mm * x,
+            handle_n_s_per_mm: p.handle_n_s_per_mm * f / x,
+            offset_n: p.offset_n * f,
+        };
+        for profile in [&mut self.detent, &mut self.friction] {
+            let Profile {
+                first_mm,
+                step_mm,
+                n,
+            } = profile;
+            *first_mm *= x;
+            *step_mm *= x;
+            n.iter_mut().for_each(|n| *n *= f);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_name_their_units() {
+        let deg = |key| Units::Degrees.key(key);
+        assert_eq!(deg("x_mm"), "x_deg");
+        assert_eq!(deg("v_mm_s"), "v_deg_s");
+        assert_eq!(deg("m_kg"), "m_kg_m2");
+        assert_eq!(deg("b_n_s_per_mm"), "b_nm_s_per_deg");
+        assert_eq!(deg("contact_n_per_mm"), "contact_nm_per_deg");
+        assert_eq!(deg("f0_n"), "f0_nm");
+        assert_eq!(deg("n"), "nm");
+        assert_eq!(Units::Radians.key("gap_mm"), "gap_rad");
+        for key in ["stribeck", "filter", "rule", "recorded_hz", "lambda"] {
+            assert_eq!(deg(key), key);
+        }
+        assert_eq!(Units::Linear.key("x_mm"), "x_mm");
+    }
+}

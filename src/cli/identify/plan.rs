@@ -1,0 +1,171 @@
+//! The estimators and increments that the arguments ask for.
+
+use super::super::Failure;
+use super::args::{Args, DirectionRule, MethodName, Term, distinct};
+use study_haptics::identify::Method;
+use study_haptics::identify::grid::Plan;
+use study_haptics::identify::method::{
+    self, Delta, Ewls, Friction, Hat, Passive, Segments, Sort, Start, State, Terms, TwoSided,
+    Width, Window,
+};
+use study_haptics::identify::resample::Resample;
+
+/// The range of the paper's grid.
+const DEFAULT_LAMBDAS: [f64; 10] = [
+    0.999, 0.9991, 0.9992, 0.9993, 0.9994, 0.9995, 0.9996, 0.9997, 0.9998, 0.9999,
+];
+/// The best cell of the paper's grid and the increment of its study, mm.
+const DEFAULT_DX_MM: [f64; 2] = [0.5, 1.0];
+/// The range of the paper's Fig. 4, mm.
+const FIGURE_DX_MM: [f64; 11] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
+
+impl Args {
+    /// The grid: every method with its options, and every dx.
+    pub(super) fn plan(&self) -> Result<Plan, Failure> {
+        self.check_options_apply()?;
+        let dx_mm = match distinct(&self.dx) {
+            given if !given.is_empty() => given,
+            _ if self.method() == MethodName::Mechanism => vec![DEFAULT_DX_MM[0]],
+            _ if self.figures.is_some() => FIGURE_DX_MM.to_vec(),
+            _ => DEFAULT_DX_MM.to_vec(),
+        };
+        let lambdas = match distinct(&self.lambda) {
+            given if given.is_empty() => DEFAULT_LAMBDAS.to_vec(),
+            given => given,
+        };
+        let each = |of: &dyn Fn(f64) -> Method| lambdas.iter().map(|l| of(*l)).collect();
+        let methods: Vec<Method> = match self.method() {
+            MethodName::Ewls => each(&|lambda| self.ewls(lambda, false)),
+            MethodName::Constrained => each(&|lambda| self.ewls(lambda, true)),
+            MethodName::TwoSided => {
+                let of = |width| {
+                    Method::TwoSided(TwoSided {
+                        window: self.window.unwrap_or(Window::Tricube),
+                        width,
+                        bounded: self.bounds.unwrap_or(false),
+                    })
+                };
+                match self.width {
+                    Some(mm) => vec![of(Width::Mm(mm))],
+                    None => each(&|lambda| of(Width::Lambda(lambda))),
+                }
+            }
+            MethodName::Hat => vec![self.hat()],
+            MethodName::Passive => vec![self.passive()],
+            MethodName::Mechanism => vec![Method::Mechanism(method::Mechanism {
+                recorded_hz: self.filter,
+            })],
+            MethodName::Friction => {
+                let rule = self.direction.unwrap_or(DirectionRule::Dahl);
+                vec![Method::Friction(Friction {
+                    state: self.state(rule),
+                })]
+            }
+            MethodName::Static => vec![Method::Static],
+            MethodName::Segments => vec![Method::Segments(
+                self.segments
+                    .map_or_else(Segments::default, |count| Segments { count }),
+            )],
+            MethodName::Spring => vec![Method::Spring],
+        };
+        Ok(Plan { methods, dx_mm })
+    }
+
+    fn ewls(&self, lambda: f64, bounded: bool) -> Method {
+        Method::Ewls(Ewls {
+            lambda,
+            resample: self.resample.unwrap_or(Resample::Bin),
+            start: self.start.unwrap_or(Start::Cold),
+            sort: self.sort.unwrap_or(Sort::Ascending),
+            bounded,
+        })
+    }
+
+    fn state(&self, rule: DirectionRule) -> State {
+        let delta = self.delta.map_or(Delta::Scan, Delta::Mm);
+        match rule {
+            DirectionRule::Sign => State::Sign,
+            DirectionRule::Play => State::Play(delta),
+            DirectionRule::Dahl => State::Dahl(delta),
+        }
+    }
+
+    /// The direction state of a table.
+    fn table_state(&self) -> State {
+        self.state(self.direction.unwrap_or(DirectionRule::Play))
+    }
+
+    fn passive(&self) -> Method {
+        let default = Passive::default();
+        Method::Passive(Passive {
+            state: self.table_state(),
+            ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
+            ridge_damping: self.ridge.get(1).copied().unwrap_or(default.ridge_damping),
+            terms: match self.terms.is_empty() {
+                true => default.terms,
+                false => Terms {
+                    m: self.terms.contains(&Term::M),
+                    b: self.terms.contains(&Term::B),
+                },
+            },
+            huber: self.robust,
+        })
+    }
+
+    fn hat(&self) -> Method {
+        let default = Hat::default();
+        Method::Hat(Hat {
+            state: self.table_state(),
+            ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
+            ridge_dynamics: self.ridge.get(1).copied().unwrap_or(default.ridge_dynamics),
+            bounded: self.bounds.unwrap_or(default.bounded),
+        })
+    }
+
+    /// Rejects options that the method does not have. Those of the paper's recursion are
+    /// accepted at their defaults, so that one script can identify baselines as well.
+    fn check_options_apply(&self) -> Result<(), Failure> {
+        use MethodName::{
+            Constrained, Ewls, Friction, Hat, Mechanism, Passive, Segments, Static, TwoSided,
+        };
+        let (lambda, dx) = (!self.lambda.is_empty(), !self.dx.is_empty());
+        if !self.terms.is_empty() && !self.terms.contains(&Term::F0) {
+            return Err(Failure::usage("--terms needs f0, the force by position")
+                .hint("without it: --method friction"));
+        }
+        let given: [(&str, bool, &[MethodName]); 11] = [
+            ("--lambda", lambda, &[Ewls, Constrained, TwoSided]),
+            (
+                "--dx",
+                dx,
+                &[Ewls, Constrained, TwoSided, Hat, Passive, Mechanism, Static],
+            ),
+            (
+                "--start warm",
+                self.start == Some(Start::Warm),
+                &[Ewls, Constrained],
+            ),
+            ("--window", self.window.is_some(), &[TwoSided]),
+            ("--width", self.width.is_some(), &[TwoSided]),
+            (
+                "--direction",
+                self.direction.is_some(),
+                &[Hat, Passive, Friction],
+            ),
+            ("--delta", self.delta.is_some(), &[Hat, Passive, Friction]),
+            ("--terms", !self.terms.is_empty(), &[Passive]),
+            ("--ridge", !self.ridge.is_empty(), &[Hat, Passive]),
+            ("--bounds", self.bounds.is_some(), &[TwoSided, Hat]),
+            ("--segments", self.segments.is_some(), &[Segments]),
+        ];
+        let useless = |(_, given, methods): &&(_, bool, &[MethodName])| {
+            *given && !methods.contains(&self.method())
+        };
+        match given.iter().find(useless) {
+            Some((flag, _, _)) => Err(Failure::usage(format!(
+                "{flag} does not apply to this method"
+            ))),
+            None => Ok(()),
+        }
+    }
+}
