@@ -6,7 +6,7 @@ use std::time::Duration;
 use study::device::firmware::{self, Firmware};
 use study::device::virtual_device::{Options, VirtualDevice};
 use study::device::{Device, Report, Stimulus};
-use study::rater::Impression;
+use study::rater::{Impression, Reference};
 use study_base::limits::{Limit, Limits};
 use study_haptics::model::{Branch, Realization, Trained};
 use study_wire::message::{
@@ -231,6 +231,6 @@ impl Playing {
 #[divan::bench(sample_count = 10)]
 fn an_impression(bencher: Bencher) {
     let realization = realization();
-    Impression::of(&realization);
-    bencher.bench_local(|| Impression::of(black_box(&realization)));
+    let target = Reference::switch_b();
+    bencher.bench_local(|| Impression::of(black_box(&realization), &target));
 }

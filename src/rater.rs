@@ -18,7 +18,7 @@ mod impression;
 mod remarks;
 
 pub use comparison::Percepts;
-pub use impression::Impression;
+pub use impression::{Impression, Reference};
 
 use comparison::Comparing;
 

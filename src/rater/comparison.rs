@@ -5,8 +5,7 @@
 //! beyond a criterion. Draws come from a stream of their own and their number never depends
 //! on the realizations.
 
-use super::impression::Reference;
-use super::{Effect, Impression, Rater};
+use super::{Effect, Impression, Rater, Reference};
 use std::collections::BTreeMap;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};

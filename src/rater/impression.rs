@@ -45,7 +45,7 @@ const SMOOTHING: usize = 10;
 
 /// The exploration and the target's force in it.
 #[derive(Debug)]
-pub(super) struct Reference {
+pub struct Reference {
     centre_mm: f64,
     amplitude_mm: f64,
     motion: Vec<Motion>,
@@ -56,7 +56,7 @@ pub(super) struct Reference {
 
 impl Reference {
     /// The simulated switch B.
-    pub(super) fn switch_b() -> Self {
+    pub fn switch_b() -> Self {
         let [centre_mm, amplitude_mm] = OF_B_MM;
         let mut target = Target::new(Parameters::b(), centre_mm)
             .expect("a unit test checks the built-in parameters");
@@ -75,7 +75,7 @@ impl Reference {
     }
 
     /// A realization that stands for the target.
-    pub(super) fn of(best: &Realization) -> Self {
+    pub fn of(best: &Realization) -> Self {
         let [low, high] = best.trained.x_mm;
         let around = [0.5 * (low + high), SHARE * (high - low)];
         let samples = (SECONDS / SAMPLE_S) as usize;
@@ -115,7 +115,7 @@ fn exploration(t_s: f64, [centre_mm, amplitude_mm]: [f64; 2]) -> Motion {
 
 impl Impression {
     /// Computes the impression of a realization. This takes about a millisecond.
-    pub(super) fn of(realization: &Realization, reference: &Reference) -> Self {
+    pub fn of(realization: &Realization, reference: &Reference) -> Self {
         let predicted = predicted(realization, &reference.motion);
         let difference = |keep: &dyn Fn(&Motion) -> bool| {
             let squares: Vec<f64> = reference

@@ -111,7 +111,7 @@ fn a_knob_is_converted_at_its_lever_arm() {
     assert!(out.contains("\nknob: ok, 8 models, 23 trials, "), "{out}");
     assert!(!out.contains("FAIL"), "{out}");
     let dir = tempfile::tempdir().unwrap();
-    support::changed_protocol("knob", dir.path(), &[("lever_mm = 20.0\n", "")]);
+    crate::support::changed_protocol("knob", dir.path(), &[("lever_mm = 20.0\n", "")]);
     let (code, _, err) = run(dir.path(), &["check", "."]);
     assert_eq!(code, 2, "{err}");
     assert!(

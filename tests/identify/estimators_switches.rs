@@ -10,7 +10,7 @@ use study_haptics::identify::method::{
     Delta, Ewls, Hat, Passive, Segments, State, TwoSided, Width, Window,
 };
 use study_haptics::identify::resample::Resample;
-use study_haptics::identify::{Method, Training, vaf};
+use study_haptics::identify::{Method, Training, Warning, vaf};
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::Lookup;
 
@@ -73,6 +73,19 @@ fn on_switch_a_each_method_reaches_its_known_vaf() {
 }
 
 /// The passive table costs little, and every one passes its certificate.
+/// On these 20 s the golden section finds its best δ beside the shortest of the scan, not at it:
+/// nothing lies beyond.
+#[test]
+fn a_best_delta_inside_the_scan_is_no_end() {
+    let first: Vec<usize> = (0..20_000).collect();
+    let train = recording("training_a").select(&first);
+    let training = Training::new(&train).unwrap();
+    let method = Method::Passive(Passive::default());
+    let found = training.identify(method, 0.5, Lookup::Linear).unwrap();
+    let at_end = |w: &Warning| matches!(w, Warning::DeltaAtEnd { .. });
+    assert!(!found.warnings.iter().any(at_end), "{:?}", found.warnings);
+}
+
 #[test]
 fn passive_tables_pass_by_construction() {
     let (train, validation) = (recording("training_a"), recording("validation_a"));

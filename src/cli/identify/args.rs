@@ -132,9 +132,13 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) lever: Option<f64>,
 
-    /// Replace spikes of x and F, samples that differ from their neighbours as no motion does; passive: large errors also count less (Huber weights)
+    /// Replace spikes of x and F, samples that differ from their neighbours as no motion does
     #[arg(long)]
     pub(super) robust: bool,
+
+    /// Huber weights in a passive table: errors above 1.345 robust standard deviations count by their size, not by its square
+    #[arg(long)]
+    pub(super) huber: bool,
 
     /// Accept a target that supplies energy: without this flag it is refused, because most likely the force has the wrong sign
     #[arg(long)]

@@ -108,7 +108,7 @@ impl Args {
                     b: self.terms.contains(&Term::B),
                 },
             },
-            huber: self.robust,
+            huber: self.huber,
         })
     }
 
@@ -133,7 +133,7 @@ impl Args {
             return Err(Failure::usage("--terms needs f0, the force by position")
                 .hint("without it: --method friction"));
         }
-        let given: [(&str, bool, &[MethodName]); 11] = [
+        let given: [(&str, bool, &[MethodName]); 12] = [
             ("--lambda", lambda, &[Ewls, Constrained, TwoSided]),
             (
                 "--dx",
@@ -154,6 +154,7 @@ impl Args {
             ),
             ("--delta", self.delta.is_some(), &[Hat, Passive, Friction]),
             ("--terms", !self.terms.is_empty(), &[Passive]),
+            ("--huber", self.huber, &[Passive]),
             ("--ridge", !self.ridge.is_empty(), &[Hat, Passive]),
             ("--bounds", self.bounds.is_some(), &[TwoSided, Hat]),
             ("--segments", self.segments.is_some(), &[Segments]),

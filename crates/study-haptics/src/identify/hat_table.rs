@@ -184,7 +184,7 @@ impl Training<'_> {
             (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1))
         };
         let best = least(&tried).ok_or(IdentifyError::Undetermined)?;
-        let at_end = best == 0 || best == tried.len() - 1;
+        let ends_mm = [tried[0].0, tried[tried.len() - 1].0];
         // the golden section of the neighbourhood of the best, in log δ
         let [mut low, mut high] =
             [best.saturating_sub(1), (best + 1).min(tried.len() - 1)].map(|i| tried[i].0.ln());
@@ -217,7 +217,7 @@ impl Training<'_> {
             .filter(|(_, rms_n, _)| *rms_n <= TOLERANCE * least_n)
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .ok_or(IdentifyError::Undetermined)?;
-        if at_end {
+        if ends_mm.contains(&best_mm) {
             identified
                 .warnings
                 .push(Warning::DeltaAtEnd { delta_mm: best_mm });

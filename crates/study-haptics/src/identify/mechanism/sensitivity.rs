@@ -311,8 +311,8 @@ mod tests {
         }
     }
 
-    /// The forces of a motion over many detents and reversals.
-    fn forces(p: &[f64]) -> Vec<f64> {
+    /// The mechanism with these parameters: scalars, 17 values of D, the rest of F_c.
+    fn mechanism(p: &[f64]) -> MechanismView<'_> {
         let mut scalars = [0.0; SCALARS];
         scalars.copy_from_slice(&p[..SCALARS]);
         let profile = |n, step_mm| Profile {
@@ -321,11 +321,16 @@ mod tests {
             n,
         };
         let (detent, friction) = p[SCALARS..].split_at(17);
-        let of = MechanismView::new(
+        MechanismView::new(
             Scalars::from_array(scalars),
             profile(detent, 1.0),
             profile(friction, 8.0),
-        );
+        )
+    }
+
+    /// The forces of a motion over many detents and reversals.
+    fn forces(p: &[f64]) -> Vec<f64> {
+        let of = mechanism(p);
         let mut state = State::settled(&of, motion(0));
         (0..9000)
             .map(|i| state.step(&of, motion(i), 1e-4))
@@ -340,19 +345,7 @@ mod tests {
         p.extend((0..17).map(|i| 4.0 * (f64::from(i) * 1.1).sin()));
         p.extend([1.2, 0.9, 1.4]);
         let parameters = p.len();
-        let mut scalars = [0.0; SCALARS];
-        scalars.copy_from_slice(&p[..SCALARS]);
-        let profile = |n, step_mm| Profile {
-            first_mm: 0.0,
-            step_mm,
-            n,
-        };
-        let (detent, friction) = p[SCALARS..].split_at(17);
-        let of = MechanismView::new(
-            Scalars::from_array(scalars),
-            profile(detent, 1.0),
-            profile(friction, 8.0),
-        );
+        let of = mechanism(&p);
         let start = State::settled(&of, motion(0));
         let mut state = Sensitive::new(&start, parameters);
         let mut by = vec![0.0; parameters];
