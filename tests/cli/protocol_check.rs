@@ -113,7 +113,7 @@ fn a_knob_is_converted_at_its_lever_arm() {
     let dir = tempfile::tempdir().unwrap();
     crate::support::changed_protocol("knob", dir.path(), &[("lever_mm = 20.0\n", "")]);
     let (code, _, err) = run(dir.path(), &["check", "."]);
-    assert_eq!(code, 2, "{err}");
+    assert_eq!(code, 1, "{err}");
     assert!(
         err.contains("passive-1.toml") && err.contains("the realization is in deg and N·m"),
         "{err}"
