@@ -505,7 +505,7 @@ pub(crate) fn claim(protocol: &Protocol, participant: ParticipantId, entries: Ve
         device_id: "simulated-1".to_owned(),
         device_check: None,
         device_telemetry: true,
-        assigned: study_core::protocol::Assigned::default(),
+        assigned: Assigned::default(),
         notices: Vec::new(),
     }
 }

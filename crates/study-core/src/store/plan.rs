@@ -94,7 +94,7 @@ pub fn next_session(own: &[&SessionData], plan: &Plan) -> Next {
     ) {
         return Next::Nothing;
     }
-    let before = own.iter().filter(|s| s.is_done()).next_back();
+    let before = own.iter().rfind(|s| s.is_done());
     let Some(next) = plan.sessions.get(done(own)) else {
         let never = before.is_none() && plan.sessions.is_empty();
         return match never {
