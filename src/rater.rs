@@ -110,7 +110,9 @@ impl Rater {
                 Answer::Number((from + along).clamp(*from, *to))
             }
             QuestionKind::Choice { options, multiple } => self.choose(options, *multiple),
-            QuestionKind::Number { min, max, .. } => self.number(*min, *max),
+            QuestionKind::Number {
+                min, max, above, ..
+            } => self.number(min.or(*above), *max, *above),
             QuestionKind::Text => self.comment(question.required, felt),
         }
     }
@@ -143,16 +145,14 @@ impl Rater {
     }
 
     /// A number within the bounds, whole if possible; without bounds a plausible age.
-    fn number(&mut self, min: Option<f64>, max: Option<f64>) -> Answer {
+    fn number(&mut self, min: Option<f64>, max: Option<f64>, above: Option<f64>) -> Answer {
         let low = min.unwrap_or_else(|| max.map_or(18.0, |max| max - 40.0));
         let high = max.unwrap_or(low + 40.0);
         let drawn = low + self.stream.unit() * (high - low);
         let whole = drawn.round();
-        Answer::Number(if (low..=high).contains(&whole) {
-            whole
-        } else {
-            drawn.clamp(low, high)
-        })
+        let allowed = |n: &f64| (low..=high).contains(n) && above.is_none_or(|above| *n > above);
+        let number = [whole, drawn.clamp(low, high)].into_iter().find(allowed);
+        Answer::Number(number.unwrap_or(high))
     }
 
     fn comment(&mut self, required: bool, felt: Option<&Impression>) -> Answer {
@@ -310,6 +310,7 @@ mod tests {
                     unit: None,
                     min,
                     max: above.map(|above| min.unwrap_or(0.0) + above),
+                    above: above.and(min),
                 }),
             Just(QuestionKind::Text),
         ]

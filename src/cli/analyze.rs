@@ -22,7 +22,7 @@ use study_base::text::{QuestionId, Untrusted};
 use study_core::analyze::{self, Analysis, Better, Deviation, Include, Rules, Warning};
 use study_core::outcome::RatingRow;
 use study_core::outcome::ratings::Ratings;
-use study_core::protocol::Protocol;
+use study_core::protocol::{Protocol, Task};
 use study_core::store::disk::{Disk as _, RealDisk};
 use study_core::store::{Derived, StoreError, StudyFolder};
 
@@ -173,8 +173,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         }
         let place = Place::of(args, study, several);
         let parts = parts::analyse(&sessions, &derived, &loaded.protocol, args);
-        let unrated = question(&loaded.protocol, args.question.as_deref());
-        if !parts.is_empty() && args.question.is_none() && unrated.is_err() {
+        // Estimates of magnitudes are no ratings, though they are numbers.
+        let primary = Some(&loaded.protocol.analysis.primary);
+        let estimated = (loaded.protocol.parts.iter())
+            .any(|p| matches!(p.task, Task::Magnitude(_)) && p.asks.first() == primary);
+        let unrated = estimated || question(&loaded.protocol, None).is_err();
+        if !parts.is_empty() && args.question.is_none() && unrated {
             let damage = study_folder::warnings(study, &sessions, Some(&loaded))?;
             study_folder::warn(study, &damage, console);
             let source = source_of(study, &loaded.protocol);

@@ -30,6 +30,18 @@ const STATIC: (&str, &str) = (
     include_str!("../../protocols/turn-signal-extended/models/static.toml"),
 );
 
+/// Three realizations with a hidden reference and an anchor.
+const WITH_ANCHORS: [(&str, &str); 5] = [
+    STATIC,
+    (
+        "models/spring.toml",
+        include_str!("../../protocols/turn-signal-extended/models/spring.toml"),
+    ),
+    MODELS[0],
+    MODELS[1],
+    MODELS[2],
+];
+
 /// What a trial of a new study is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum TrialKind {
@@ -45,6 +57,15 @@ enum TrialKind {
     /// A threshold by QUEST+
     #[value(name = "questplus")]
     QuestPlus,
+    /// A positive number for each level
+    Magnitude,
+    /// Ratings from 0 to 100 beside a reference
+    Mushra,
+    /// Yes or no, with catch trials
+    #[value(name = "yesno")]
+    YesNo,
+    /// Which of two realizations is the third?
+    Abx,
 }
 
 impl TrialKind {
@@ -56,6 +77,10 @@ impl TrialKind {
             Self::TwoIntervals => (include_str!("new/constant.toml"), &[STATIC]),
             Self::Staircase => (include_str!("new/staircase.toml"), &[STATIC]),
             Self::QuestPlus => (include_str!("new/questplus.toml"), &[STATIC]),
+            Self::Magnitude => (include_str!("new/magnitude.toml"), &[STATIC]),
+            Self::Mushra => (include_str!("new/mushra.toml"), &WITH_ANCHORS),
+            Self::YesNo => (include_str!("new/yesno.toml"), &[STATIC]),
+            Self::Abx => (include_str!("new/abx.toml"), &[MODELS[0], MODELS[2]]),
         }
     }
 }

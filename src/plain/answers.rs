@@ -29,9 +29,18 @@ pub fn ask(question: &Question, words: &Words) -> (Vec<String>, String) {
             };
             words.get(phrase).to_owned()
         }
-        QuestionKind::Number { unit, min, max } => {
+        QuestionKind::Number {
+            unit,
+            min,
+            max,
+            above,
+        } => {
             lines.extend(unit.as_ref().map(|unit| Untrusted(unit).to_string()));
             match (min, max) {
+                _ if above.is_some() => {
+                    let above = above.unwrap_or_default();
+                    words.fill(Phrase::RangeAbove, &[("above", &above)])
+                }
                 (Some(min), Some(max)) => {
                     words.fill(Phrase::PlainRange, &[("from", min), ("to", max)])
                 }

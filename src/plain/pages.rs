@@ -2,7 +2,6 @@
 
 use super::answers;
 use crate::tui::theme::{Colour, Theme};
-use crate::tui::views::playing::ordinal;
 use crate::tui::views::prose::{attending, prose};
 use crate::tui::views::trouble::Trouble;
 use crate::tui::widgets::clock;
@@ -52,7 +51,7 @@ pub fn page(view: &View, at: usize, keys: bool) -> Page {
             ..
         } => {
             if let Some((at, of)) = interval {
-                let which = sentence(words.get(ordinal(*at)));
+                let which = sentence(view.interval_name(*at));
                 page.lines.push(format!("{which} ({at} / {of})"));
             }
             page.lines.push(

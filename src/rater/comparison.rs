@@ -1,4 +1,5 @@
-//! Raters who compare intervals: pairs and tracks.
+//! Raters who compare intervals, pairs and tracks, who estimate magnitudes, and who rate
+//! beside a reference.
 //!
 //! Each interval is felt with normal noise of the rater's own, and the rater decides as an
 //! observer without memory would: the largest, the odd one, the nearer one, a distance
@@ -9,7 +10,7 @@ use super::{Effect, Impression, Rater, Reference};
 use std::collections::BTreeMap;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
-use study_core::protocol::{Answer, Method, Protocol, Question, Stimuli, Trial};
+use study_core::protocol::{Answer, Method, Protocol, Question, Role, Stimuli, Task, Trial};
 use study_haptics::model::Realization;
 
 /// Median standard deviation of the noise of an interval of a track, N: the just
@@ -21,6 +22,13 @@ const DIFFERENT: f64 = 1.8;
 const YES: f64 = 1.0;
 /// Difference of two opinions below which a pair is a tie, in the same unit.
 const TIE: f64 = 0.5;
+/// Median exponent of magnitude estimates, and the standard deviation of its logarithm.
+const EXPONENT: (f64, f64) = (0.8, 0.2);
+/// Standard deviation of the logarithm of an estimate, for the median noise.
+const ESTIMATE_NOISE: f64 = 0.2;
+/// Distance from the reference that is not noticed, and that at which a rating of 100
+/// has fallen to 37, N.
+const CLOSE_N: (f64, f64) = (0.2, 1.5);
 
 /// What raters feel of the realizations of a study.
 #[derive(Debug, Default)]
@@ -31,6 +39,8 @@ pub struct Percepts {
     /// Of each realization of a track its distance from the track's standard, N, negative
     /// for lower levels.
     distances: BTreeMap<(PartId, ModelId), f64>,
+    /// Of each realization of a part with a reference its distance from it, N.
+    from_reference: BTreeMap<(PartId, ModelId), f64>,
 }
 
 impl Percepts {
@@ -47,7 +57,34 @@ impl Percepts {
                 .map(|(id, table)| (id.clone(), Impression::of(table, &reference)))
                 .collect(),
             distances: BTreeMap::new(),
+            from_reference: BTreeMap::new(),
         };
+        for part in &protocol.parts {
+            let Task::Mushra(own) = &part.task else {
+                continue;
+            };
+            let is_hidden = |id: &&ModelId| {
+                let model = protocol.model(id);
+                model.is_some_and(|m| m.role == Role::HiddenReference)
+            };
+            let models = own
+                .presentations
+                .models
+                .iter()
+                .chain(&own.presentations.practice);
+            let hidden = own.presentations.models.iter().find(is_hidden);
+            let reference = own.reference.as_ref().or(hidden);
+            for model in models {
+                if let (Some(a), Some(b)) =
+                    (tables.get(model), reference.and_then(|r| tables.get(r)))
+                {
+                    let key = (part.id.clone(), model.clone());
+                    percepts
+                        .from_reference
+                        .insert(key, Impression::distance_n(a, b));
+                }
+            }
+        }
         for track in &protocol.tracks {
             let standard = track.standard();
             let steps = 0..protocol.ladder(track).levels().len();
@@ -107,21 +144,47 @@ pub(super) struct Comparing {
     /// Standard deviation of the noise, relative to the median rater's.
     noise: f64,
     lapse_rate: f64,
+    /// Logarithm of the rater's number for level 1, and the exponent of their numbers.
+    modulus: f64,
+    exponent: f64,
 }
 
 impl Comparing {
     pub(super) fn new(seed: u64, number: u32) -> Self {
         let mut stream = Stream::new(seed, &["rater", &number.to_string(), "comparing"]);
+        let mut scale = Stream::new(seed, &["rater", &number.to_string(), "magnitude"]);
         Self {
             noise: libm::exp(0.25 * stream.normal()),
             lapse_rate: 0.04 * stream.unit(),
             stream,
+            modulus: libm::log(10.0) + scale.normal(),
+            exponent: EXPONENT.0 * libm::exp(EXPONENT.1 * scale.normal()),
         }
+    }
+
+    /// A number for a level, with two digits; a level of 0 or less feels like a hundredth.
+    fn estimate(&mut self, level: f64) -> Answer {
+        let noise = ESTIMATE_NOISE * self.noise * self.stream.normal();
+        let logarithm = self.modulus + self.exponent * libm::log(level.max(0.01)) + noise;
+        let estimate = libm::exp(logarithm);
+        let digit = libm::pow(10.0, libm::floor(libm::log10(estimate)) - 1.0);
+        Answer::Number((estimate / digit).round() * digit)
+    }
+
+    /// A rating from 0 to 100 for a distance from the reference, N.
+    fn beside_reference(&mut self, distance_n: f64) -> Answer {
+        let felt = (distance_n + 0.5 * NOISE_N * self.noise * self.stream.normal()).abs();
+        let lapses = self.stream.unit() < self.lapse_rate;
+        let anywhere = self.stream.unit();
+        let (unnoticed, falls) = CLOSE_N;
+        let quality = libm::exp(-(felt - unnoticed).max(0.0) / falls);
+        let rating = if lapses { anywhere } else { quality };
+        Answer::Number((100.0 * rating).round())
     }
 }
 
 impl Rater {
-    /// The answer with which a trial of several intervals, or of a track, begins; `None` if
+    /// The answer of a part's own question, with which each of its trials begins; `None` if
     /// the question is another one.
     pub fn compare(
         &mut self,
@@ -134,8 +197,24 @@ impl Rater {
         if part.as_str() != question.id.as_str() {
             return None;
         }
+        let known = self.effect == Effect::BuiltIn;
+        match (protocol.part(part).map(|part| &part.task), trial.model()) {
+            (Some(Task::Magnitude(_)), Some(model)) => {
+                let level = protocol.level_of(model).filter(|_| known);
+                return Some(self.comparing.estimate(level.unwrap_or(1.0)));
+            }
+            (Some(Task::Mushra(_)), Some(model)) => {
+                let key = (part.clone(), model.clone());
+                let distance = percepts.from_reference.get(&key).filter(|_| known);
+                return Some(
+                    self.comparing
+                        .beside_reference(distance.copied().unwrap_or(0.0)),
+                );
+            }
+            _ => {}
+        }
         let method = match &trial.stimuli {
-            Stimuli::One { .. } => return None,
+            Stimuli::One { .. } | Stimuli::Rated { .. } => return None,
             Stimuli::Pair { .. } => None,
             Stimuli::Track { track, .. } => Some(protocol.track(track)?.method),
         };
@@ -145,6 +224,7 @@ impl Rater {
             stream,
             noise,
             lapse_rate,
+            ..
         } = &mut self.comparing;
         // One unit is the median noise: of a force, or a point on the scale of opinions.
         let strength = |model: &ModelId| match (effect, trial.track()) {

@@ -4,7 +4,6 @@
 //! offers and nothing else: see [`Page::offers`]. Nothing here depends on more than the
 //! view, which identifies no realization.
 
-use crate::tui::views::playing::ordinal;
 use crate::tui::views::prose::{Stopped, attending};
 use crate::tui::widgets::clock;
 use serde::{Deserialize, Serialize};
@@ -267,7 +266,7 @@ pub fn page(view: &View) -> Option<Page> {
         Screen::Loading {
             interval: Some((at, _)),
         } => {
-            page.title = capital(words.get(ordinal(*at)));
+            page.title = capital(view.interval_name(*at));
             page.text = words.get(Phrase::OneMoment).to_owned();
         }
         Screen::Playing {
@@ -279,7 +278,7 @@ pub fn page(view: &View) -> Option<Page> {
             let (feel, more) = attending(view);
             match interval {
                 Some((at, _)) => {
-                    page.title = capital(words.get(ordinal(*at)));
+                    page.title = capital(view.interval_name(*at));
                     page.text = words.get(feel).to_owned();
                 }
                 None => page.title = words.get(feel).to_owned(),
@@ -458,8 +457,16 @@ fn asked(question: &Question, words: &Words) -> Asked {
             options: options.iter().map(|o| safe(o)).collect(),
             multiple: *multiple,
         },
-        QuestionKind::Number { unit, min, max } => {
-            hint = range(*min, *max, words);
+        QuestionKind::Number {
+            unit,
+            min,
+            max,
+            above,
+        } => {
+            hint = match above {
+                Some(above) => words.fill(Phrase::RangeAbove, &[("above", above)]),
+                None => range(*min, *max, words),
+            };
             Field::Number {
                 unit: unit.as_deref().map_or(String::new(), safe),
             }

@@ -116,6 +116,9 @@ fn read(
         Ok(()) => Ok(Some(answer)),
         Err(AnswerError::OffScale(from, to)) => Err(range(Some(from), Some(to), words)),
         Err(AnswerError::OutOfRange { min, max }) => Err(range(min, max, words)),
+        Err(AnswerError::NotAbove(above)) => {
+            Err(words.fill(Phrase::RangeAbove, &[("above", &above)]))
+        }
         Err(_) => Err(no_answer()),
     }
 }

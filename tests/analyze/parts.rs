@@ -283,3 +283,96 @@ fn exclusion_rules_apply_to_parts() {
         3
     );
 }
+
+#[test]
+fn magnitude_estimates_of_a_study_give_the_exponent_of_their_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = rehearsed(folder.path(), "magnitude");
+    let results = folder.path().join("out/magnitude");
+    let estimates = cells(
+        &results.join("ratings.csv"),
+        &["participant", "level", "strength"],
+    );
+    // Two participants, seven levels, three repetitions; each estimate is above 0.
+    assert_eq!(estimates.len(), 42);
+    let mut table = "participant,level,estimate\n".to_owned();
+    for e in &estimates {
+        assert!(e[2].parse::<f64>().unwrap() > 0.0, "{e:?}");
+        table += &format!("{}\n", e.join(","));
+    }
+    assert_eq!(part["task"], "magnitude");
+    let values = of_table(folder.path(), &table, &["magnitude"]);
+    assert_eq!(part["values"], values);
+    let exponent = values["magnitude/exponent"].as_f64().unwrap();
+    assert!((0.4..1.6).contains(&exponent), "{exponent}");
+    let (code, out, err) = study(&["verify", "out"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+}
+
+#[test]
+fn ratings_beside_a_reference_are_screened_and_rated_as_their_table() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [
+        vec!["new", "m", "--kind", "mushra"],
+        vec!["rehearse", "m", "--participants", "3", "--out", "out"],
+        vec!["verify", "out"],
+    ] {
+        let (code, out, err) = study(&arguments, folder.path());
+        assert_eq!(code, 0, "{out}{err}");
+    }
+    let results = folder.path().join("out/m");
+    let columns = ["participant", "model", "role", "quality"];
+    let ratings = cells(&results.join("ratings.csv"), &columns);
+    assert_eq!(ratings.len(), 3 * 5 * 2);
+    let mut table = "participant,condition,role,rating\n".to_owned();
+    for r in &ratings {
+        table += &format!("{}\n", r.join(","));
+    }
+    // The reference is felt before each realization, itself among them.
+    let felt = cells(
+        &results.join("intervals.csv"),
+        &["interval", "model", "gap_s"],
+    );
+    let (first, second): (Vec<_>, Vec<_>) = felt.iter().partition(|i| i[0] == "1");
+    assert!(first.iter().all(|i| i[1] == "target" && i[2].is_empty()));
+    assert!(second.iter().any(|i| i[1] == "target"));
+    assert_eq!(second.len(), 30);
+    // The ratings are numbers: the report of ratings, and the part with its screening.
+    let (code, out, err) = study(&["analyze", "out", "--json"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["format"], "study-analysis/1");
+    assert_eq!(
+        document["parts"][0]["values"],
+        of_table(folder.path(), &table, &["mushra"])
+    );
+    let (code, out, err) = study(&["analyze", "out"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("mushra, 30 trials"), "{out}");
+}
+
+/// The other kinds, with few trials, rehearse, pass `verify` and have an analysis.
+#[test]
+fn yes_no_and_abx_are_rehearsed_and_analyzed() {
+    for (kind, statistic) in [
+        ("yesno", "psy/SIM001/friction-yes/posterior/threshold/mean"),
+        ("abx", "sdt/SIM001/abx/d_differencing"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let study = |arguments: &[&str]| {
+            let (code, out, err) = study(arguments, folder.path());
+            assert_eq!(code, 0, "{out}{err}");
+            out
+        };
+        study(&["new", "p", "--kind", kind]);
+        let file = folder.path().join("p/protocol.toml");
+        let text = fs::read_to_string(&file).unwrap();
+        let fewer = text.replace("repetitions = 20", "repetitions = 4");
+        fs::write(&file, fewer.replace("repetitions = 40", "repetitions = 12")).unwrap();
+        study(&["rehearse", "p", "--participants", "1", "--out", "out"]);
+        study(&["verify", "out"]);
+        let document: Value = serde_json::from_str(&study(&["analyze", "out", "--json"])).unwrap();
+        let values = &document["parts"][0]["values"];
+        assert!(values[statistic].is_number(), "{values}");
+    }
+}

@@ -245,7 +245,16 @@ fn the_shipped_protocols_are_valid_and_broken_ones_are_not() {
 fn the_templates_of_parts_are_valid_and_broken_ones_are_not() {
     let schema = schema();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for name in ["pairs", "constant", "staircase", "questplus"] {
+    for name in [
+        "pairs",
+        "constant",
+        "staircase",
+        "questplus",
+        "magnitude",
+        "mushra",
+        "yesno",
+        "abx",
+    ] {
         let file = format!("src/cli/new/{name}.toml");
         let text = std::fs::read_to_string(root.join(&file)).unwrap();
         let parsed = file::parse("p", &text);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
-use study::cli::load::load;
+use study::cli::load::{Loaded, load};
 use study::device::faults::{FaultPlan, InjectedFault};
 use study::device::virtual_device::{Options, VirtualDevice};
 use study::runner::clock::VirtualClock;
@@ -17,7 +17,7 @@ use study::runner::rehearsal::first_day;
 use study::runner::{Runner, Setup};
 use study::tui::{Colour, Surface};
 use study_base::text::ModelId;
-use study_core::protocol::{Answer, Entry, Order, Protocol, QuestionKind, Role};
+use study_core::protocol::{Answer, Entry, FileOrders, Order, Protocol, QuestionKind, Role};
 use study_core::session::{Config, Input, Screen, View};
 use study_core::store::{Frozen, SeatKind, StudyFolder};
 
@@ -52,6 +52,52 @@ fn inputs(view: &View) -> Vec<Input> {
     }
 }
 
+/// A session of P01 on a simulated device and a virtual clock.
+fn session(
+    loaded: Loaded,
+    orders: Option<FileOrders>,
+    fault: Option<InjectedFault>,
+) -> (Runner, VirtualClock) {
+    let clock = VirtualClock::starting_at(first_day());
+    let frozen = Frozen {
+        protocol: &loaded.protocol,
+        files: &loaded.files,
+        fingerprints: &loaded.fingerprints,
+    };
+    let disk = Arc::new(MemoryDisk::new());
+    let now = study::runner::clock::Clock::now(&clock);
+    let study = StudyFolder::open_or_create_on(disk, Path::new("results"), &frozen, now).unwrap();
+    let mut options = Options::default();
+    options.device.telemetry_hz = 50.0;
+    options.device.servo_hz = 2000.0;
+    if let Some(fault) = fault {
+        options.faults = FaultPlan::default().with(1, fault);
+    }
+    let setup = Setup {
+        protocol: Arc::new(loaded.protocol),
+        orders: orders.map(Arc::new),
+        models: loaded.models,
+        fingerprints: loaded.fingerprints,
+        study,
+        kind: SeatKind::Real,
+        rows: None,
+        group: None,
+        device_kind: study_core::protocol::DeviceKind::Simulated,
+        device: Box::new(VirtualDevice::new(options)),
+        device_check: None,
+        deliveries: Default::default(),
+        clock: Box::new(clock.clone()),
+        threaded: false,
+    };
+    let config = Config {
+        participant: "P01".to_owned(),
+        operator: "lw".to_owned(),
+        auto_identify: true,
+        ..Config::default()
+    };
+    (Runner::new(setup, config), clock)
+}
+
 /// The pages of a session, one for each look, up to the trial after `first`.
 fn pages(
     name: &str,
@@ -76,44 +122,7 @@ fn pages(
     order.retain(|id| id != first);
     order.insert(0, first.clone());
     let orders = BTreeMap::from([(1, order)]);
-    let clock = VirtualClock::starting_at(first_day());
-    let frozen = Frozen {
-        protocol: &loaded.protocol,
-        files: &loaded.files,
-        fingerprints: &loaded.fingerprints,
-    };
-    let disk = Arc::new(MemoryDisk::new());
-    let now = study::runner::clock::Clock::now(&clock);
-    let study = StudyFolder::open_or_create_on(disk, Path::new("results"), &frozen, now).unwrap();
-    let mut options = Options::default();
-    options.device.telemetry_hz = 50.0;
-    options.device.servo_hz = 2000.0;
-    if let Some(fault) = fault {
-        options.faults = FaultPlan::default().with(1, fault);
-    }
-    let setup = Setup {
-        protocol: Arc::new(loaded.protocol),
-        orders: Some(Arc::new(orders)),
-        models: loaded.models,
-        fingerprints: loaded.fingerprints,
-        study,
-        kind: SeatKind::Real,
-        rows: None,
-        group: None,
-        device_kind: study_core::protocol::DeviceKind::Simulated,
-        device: Box::new(VirtualDevice::new(options)),
-        deliveries: Default::default(),
-        device_check: None,
-        clock: Box::new(clock.clone()),
-        threaded: false,
-    };
-    let config = Config {
-        participant: "P01".to_owned(),
-        operator: "lw".to_owned(),
-        auto_identify: true,
-        ..Config::default()
-    };
-    let mut runner = Runner::new(setup, config);
+    let (mut runner, clock) = session(loaded, Some(orders), fault);
     let mut surface = Surface::new(Colour::None).with_live(true);
     let mut pages = Vec::new();
     let mut played = false;
@@ -227,4 +236,88 @@ fn a_fault_does_not_tell_realizations_apart() {
             pages
         });
     }
+}
+
+/// Levels of the ladder of the track below.
+const LEVELS: [f64; 6] = [0.1, 0.2, 0.4, 0.8, 1.4, 2.0];
+
+/// The pages of two trials of a track with one level: the seed decides which interval has
+/// it, and the participant gives the answer number `answer`.
+fn pages_of_a_track(folder: &Path, level: f64, seed: u64, answer: usize) -> (Vec<String>, String) {
+    let template = std::fs::read_to_string(repository("src/cli/new/constant.toml")).unwrap();
+    let text = template
+        .replace("range = [0.1, 2.0] ", &format!("levels = {LEVELS:?} #"))
+        .replace("steps = 41", "")
+        .replace("seed = 1 ", &format!("seed = {seed} "))
+        .replace(
+            "levels = [0.1, 0.195, 0.385, 0.765, 1.525], repetitions = 20",
+            &format!("levels = [{level:?}], repetitions = 2"),
+        )
+        .replace("easy = 0.1", "easy = 0.0");
+    std::fs::write(folder.join("protocol.toml"), text).unwrap();
+    let loaded = load(folder).unwrap();
+    let (mut runner, clock) = session(loaded, None, None);
+    let mut surface = Surface::new(Colour::None).with_live(true);
+    let (mut pages, mut felt) = (Vec::new(), String::new());
+    for _ in 0..20_000 {
+        let view = runner.view();
+        let own = serde_json::to_string(&study::screen::pages::page(&view)).unwrap();
+        pages.push(picture(&drawn(&mut surface, &view, 80, 24)) + &own);
+        if matches!(view.screen, Screen::Playing { .. }) {
+            let model = runner.felt().unwrap().as_str();
+            felt.push(if model.ends_with("standard") {
+                'S'
+            } else {
+                'C'
+            });
+        }
+        let given = match &view.screen {
+            Screen::Form { questions, .. } => {
+                let QuestionKind::Choice { options, .. } = &questions[0].kind else {
+                    panic!()
+                };
+                let chosen = Answer::Choice(vec![options[answer].clone()]);
+                vec![Input::Answer(vec![(questions[0].id.clone(), chosen)])]
+            }
+            _ => inputs(&view),
+        };
+        let over = matches!(view.screen, Screen::End { .. });
+        if runner.step(given).is_some() || over {
+            // Which interval had the level, each of them once.
+            let mut order: Vec<char> = felt.chars().collect();
+            order.dedup();
+            return (pages, order.into_iter().collect());
+        }
+        clock.advance(LOOK);
+    }
+    panic!("no end:\n{}", pages.last().unwrap())
+}
+
+/// No level, no order of the intervals and no answer changes a page, or how long it is
+/// shown.
+#[test]
+fn levels_orders_and_answers_leave_nothing_on_a_screen() {
+    let folder = tempfile::tempdir().unwrap();
+    let models = folder.path().join("models");
+    std::fs::create_dir(&models).unwrap();
+    let table = repository("protocols/turn-signal-extended/models/static.toml");
+    std::fs::copy(table, models.join("static.toml")).unwrap();
+    let (expected, first) = pages_of_a_track(folder.path(), LEVELS[0], 1, 0);
+    assert!(expected.iter().any(|page| page.contains("Second")));
+    let mut orders = std::collections::BTreeSet::from([first]);
+    for (n, level) in LEVELS.iter().enumerate() {
+        for answer in 0..2 {
+            let seed = 1 + n as u64;
+            let (shown, order) = pages_of_a_track(folder.path(), *level, seed, answer);
+            orders.insert(order.clone());
+            for (look, (one, other)) in expected.iter().zip(&shown).enumerate() {
+                assert_eq!(
+                    one, other,
+                    "level {level}, {order}, answer {answer}, look {look}"
+                );
+            }
+            assert_eq!(expected.len(), shown.len(), "level {level}, {order}");
+        }
+    }
+    assert!(orders.len() > 1, "{orders:?}");
 }

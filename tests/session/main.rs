@@ -16,8 +16,10 @@ mod languages;
 #[path = "../store/memory.rs"]
 mod memory;
 mod mirror;
+mod parts_by_keys;
 mod plain;
 mod rehearsed;
+mod release_0_1;
 mod screen;
 #[path = "../support/mod.rs"]
 mod support;

@@ -83,6 +83,7 @@ pub(crate) fn number() -> Question {
             unit: Some("years".to_owned()),
             min: Some(18.0),
             max: Some(120.0),
+            above: None,
         },
     )
 }
@@ -136,6 +137,7 @@ pub(crate) fn view(screen: Screen) -> View {
         can_replay: false,
         can_go_back: false,
         force: true,
+        has_reference: false,
         progress: before.then_some(Progress {
             practice: false,
             current: 7,
@@ -457,6 +459,7 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
                             unit: Some("°C".to_owned()),
                             min: None,
                             max: None,
+                            above: None,
                         },
                     )],
                     page: 1,

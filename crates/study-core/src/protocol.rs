@@ -26,8 +26,8 @@ pub mod schema;
 pub use exclusion::Exclusion;
 pub use groups::{Assign, Assigned, GroupRules, Groups, SessionPlan};
 pub use parts::{
-    Compared, Exposure, FamilyRules, Interval, IntervalOrder, Method, Pairs, Part, Presentations,
-    Task, TrackRules, Vary,
+    Compared, Exposure, FamilyRules, Interval, IntervalOrder, Method, Mushra, Pairs, Part,
+    Presentations, Task, TrackRules, Vary,
 };
 pub use plan::{Seat, Stimuli, Trial};
 pub use question::{Answer, AnswerError, Question, QuestionKind};
@@ -382,6 +382,8 @@ words! {
         HiddenReference = "hidden-reference",
         /// A realization that is known to be bad.
         LowAnchor = "low-anchor",
+        /// A realization that is known to be mediocre.
+        MidAnchor = "mid-anchor",
         /// A physical sample.
         Physical = "physical",
     }

@@ -29,7 +29,7 @@ mod tracks;
 pub use crate::protocol::{Seat, Trial};
 pub use requeue::{Felt, Requeued, breaks_constraint, requeue};
 
-use crate::protocol::{FileOrders, PartsOrder, Protocol, Stimuli, Task};
+use crate::protocol::{FileOrders, Mushra, PartsOrder, Protocol, Stimuli, Task};
 use constraints::Violation;
 use pairs::PairOrders;
 use sequence::Sequence;
@@ -217,6 +217,8 @@ pub struct Planner {
 struct PartOrders {
     part: Option<PartId>,
     practice: Vec<ModelId>,
+    /// Felt before each realization.
+    reference: Option<ModelId>,
     kind: Kind,
 }
 
@@ -251,6 +253,7 @@ impl Planner {
             let only = PartOrders {
                 part: None,
                 practice: protocol.design.practice.clone(),
+                reference: None,
                 kind: Kind::Rating(Sequence::of_models(
                     seed,
                     None,
@@ -268,7 +271,11 @@ impl Planner {
             let id = Some(&part.id);
             let design = protocol.design_of(id);
             let kind = match &part.task {
-                Task::Rating(own) => Kind::Rating(Sequence::of_models(
+                Task::Rating(own)
+                | Task::Magnitude(own)
+                | Task::Mushra(Mushra {
+                    presentations: own, ..
+                }) => Kind::Rating(Sequence::of_models(
                     seed,
                     id,
                     &design,
@@ -283,6 +290,7 @@ impl Planner {
             Ok(PartOrders {
                 part: id.cloned(),
                 practice: design.practice,
+                reference: part.task.reference().cloned(),
                 kind,
             })
         };
@@ -355,7 +363,7 @@ impl PartOrders {
     /// Adds the trials of this part, numbered on from those before.
     fn plan(&self, seat: Seat, trials: &mut Vec<Trial>) -> Result<(), ScheduleError> {
         let planned = match &self.kind {
-            Kind::Rating(sequence) => ratings(sequence, seat)?,
+            Kind::Rating(sequence) => ratings(sequence, self.reference.as_ref(), seat)?,
             Kind::Pairs(pairs) => pairs.plan(seat)?,
             Kind::Tracks(tracks) => tracks.plan(seat),
         };
@@ -372,9 +380,7 @@ impl PartOrders {
                 trial: number,
                 block: 0,
                 position: practised + place,
-                stimuli: Stimuli::One {
-                    model: model.clone(),
-                },
+                stimuli: Stimuli::rated(self.reference.as_ref(), model),
                 repetition: 0,
                 practice: true,
                 part: self.part.clone(),
@@ -396,8 +402,12 @@ impl PartOrders {
     }
 }
 
-/// The trials of a rating part.
-fn ratings(sequence: &Sequence, seat: Seat) -> Result<Vec<Planned>, ScheduleError> {
+/// The trials of a part with one rating a trial.
+fn ratings(
+    sequence: &Sequence,
+    reference: Option<&ModelId>,
+    seat: Seat,
+) -> Result<Vec<Planned>, ScheduleError> {
     let mut repetitions = vec![0u32; sequence.models().len()];
     let trial = |model: usize| {
         repetitions[model] += 1;
@@ -408,9 +418,7 @@ fn ratings(sequence: &Sequence, seat: Seat) -> Result<Vec<Planned>, ScheduleErro
             } else {
                 1
             },
-            stimuli: Stimuli::One {
-                model: sequence.models()[model].clone(),
-            },
+            stimuli: Stimuli::rated(reference, &sequence.models()[model]),
             repetition: repetitions[model],
         }
     };

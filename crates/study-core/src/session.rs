@@ -28,6 +28,7 @@ mod flow;
 mod forms;
 pub mod input;
 mod opening;
+mod own_answers;
 mod phase;
 mod project_view;
 pub mod roster;

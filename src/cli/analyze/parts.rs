@@ -122,6 +122,24 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
     let mut text = Vec::new();
     match &part.task {
         Task::Rating(_) => {}
+        Task::Magnitude(own) => text.push(format!(
+            "In each trial one of {} was felt and given a number above 0, each level in {}.",
+            counted(own.models.len(), "level", "levels"),
+            counted(own.repetitions as usize, "trial", "trials")
+        )),
+        Task::Mushra(own) => {
+            let presented = &own.presentations;
+            let reference = match &own.reference {
+                Some(id) => format!("after {id} as the reference"),
+                None => "beside a real reference".to_owned(),
+            };
+            text.push(format!(
+                "In each trial one of {} was rated from 0 to 100 {reference}, each in {}; a hidden reference was among them \
+                 (after ITU-R BS.1534-3, one at a time).",
+                counted(presented.models.len(), "realization", "realizations"),
+                counted(presented.repetitions as usize, "trial", "trials")
+            ));
+        }
         Task::Pairs(pairs) => {
             let order = match pairs.interval_order {
                 IntervalOrder::Balanced => "each pair in both orders in turn",
@@ -145,7 +163,10 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
         }
     }
     let exposure = &part.exposure;
-    let mut felt = format!("Between intervals there were {} s.", part.gap_s);
+    let mut felt = match part.gap_s > 0.0 {
+        true => format!("Between intervals there were {} s.", part.gap_s),
+        false => String::new(),
+    };
     if exposure.min_s > 0.0 {
         felt += &format!(" Each was felt for at least {} s.", exposure.min_s);
     }
@@ -159,7 +180,7 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
             counted(n as usize, "time", "times")
         ),
     };
-    text.push(felt);
+    text.push(felt.trim_start().to_owned());
     text.join(" ")
 }
 

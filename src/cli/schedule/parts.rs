@@ -7,7 +7,8 @@ use std::fmt::Write as _;
 use study_base::text::{ModelId, PartId, Untrusted, counted};
 use study_core::procedure::{Rule, Staircase};
 use study_core::protocol::{
-    Interval, IntervalOrder, Pairs, Part, PartsOrder, Protocol, Stimuli, Task, TrackRules, Trial,
+    Interval, IntervalOrder, Mushra, Pairs, Part, PartsOrder, Protocol, Stimuli, Task, TrackRules,
+    Trial,
 };
 
 /// The orders of some rows.
@@ -43,8 +44,16 @@ pub(super) fn render(protocol: &Protocol, plans: &Plans, width: usize) -> String
         let own = of_part(&part.id, plans);
         let _ = writeln!(out, "\nPart {}", part.id);
         match &part.task {
-            Task::Rating(task) => {
+            Task::Rating(task)
+            | Task::Magnitude(task)
+            | Task::Mushra(Mushra {
+                presentations: task,
+                ..
+            }) => {
                 let design = protocol.design_of(Some(&part.id));
+                if let Some(reference) = part.task.reference() {
+                    let _ = writeln!(out, "{reference} is felt first in each trial");
+                }
                 section(&mut out, protocol, &design, &task.models, &own, width);
             }
             Task::Pairs(task) => pairs(&mut out, protocol, part, task, &own, width),
@@ -102,7 +111,7 @@ fn pairs(
     let named = |[a, b]: &[ModelId; 2]| format!("{}-{}", codes.of_model(a), codes.of_model(b));
     let code = |trial: &Trial| match &trial.stimuli {
         Stimuli::Pair { pair } => named(pair),
-        Stimuli::One { .. } | Stimuli::Track { .. } => String::new(),
+        _ => String::new(),
     };
     orders(out, plans, 2 * codes.width() + 1, width, code);
     let Some(rows) = rows_shown(plans) else {
@@ -167,7 +176,7 @@ fn tracks(out: &mut String, tracks: &[&TrackRules], plans: &Plans, width: usize)
             let name = at(track).map_or("", |at| names[at].as_str());
             format!("{name}{}{}", intervals(all), if *easy { "*" } else { "" })
         }
-        Stimuli::One { .. } | Stimuli::Pair { .. } => String::new(),
+        _ => String::new(),
     };
     let all = || plans.iter().flat_map(|(_, plan)| plan);
     let cell = all().map(|trial| code(trial).len()).max().unwrap_or(1);

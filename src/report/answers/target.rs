@@ -61,6 +61,7 @@ pub(super) fn target(a: &Analysis) -> Option<Answer> {
         (Role::HiddenReference, "hidden reference"),
         (Role::Physical, "physical device"),
         (Role::LowAnchor, "low anchor"),
+        (Role::MidAnchor, "mid anchor"),
     ] {
         for m in a.realizations.iter().filter(|m| m.role == role) {
             if let Some(mean) = a.described(&m.id, "mean") {
@@ -132,7 +133,7 @@ fn against_references(a: &Analysis) -> Vec<String> {
             continue;
         };
         let equivalence = match role {
-            Role::LowAnchor => None,
+            Role::LowAnchor | Role::MidAnchor => None,
             _ => equivalence(a, best, reference),
         };
         let equivalence = equivalence.map_or_else(String::new, |e| format!(" {e}"));

@@ -219,6 +219,7 @@ fn sentence(a: &Analysis, f: &Finding) -> Option<String> {
             let role = a.realizations.iter().find(|m| m.id == *reference)?.role;
             let what = match role {
                 Role::LowAnchor => "the low anchor",
+                Role::MidAnchor => "the mid anchor",
                 Role::Physical => "the physical device",
                 _ => "the hidden reference",
             };

@@ -284,7 +284,12 @@ fn pairs(a: &Analysis) -> Markup {
 /// Each tested realization minus each reference, anchor and physical sample.
 fn against_references(a: &Analysis) -> Vec<HtmlTable> {
     let v = &a.values;
-    let roles = [Role::HiddenReference, Role::Physical, Role::LowAnchor];
+    let roles = [
+        Role::HiddenReference,
+        Role::Physical,
+        Role::LowAnchor,
+        Role::MidAnchor,
+    ];
     let references = a.realizations.iter().filter(|m| roles.contains(&m.role));
     let one = |r: &RealizationSummary| {
         let caption = format!(

@@ -231,6 +231,7 @@ fn in_words(why: AnswerError, words: &Words) -> String {
             (None, Some(max)) => Some(words.fill(Phrase::RangeTo, &[("to", &max)])),
             (None, None) => None,
         },
+        AnswerError::NotAbove(above) => Some(words.fill(Phrase::RangeAbove, &[("above", &above)])),
         _ => None,
     };
     words.unwrap_or_else(|| sentence(&why.to_string()))

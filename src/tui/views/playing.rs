@@ -53,7 +53,7 @@ impl<'a> Playing<'a> {
 
     /// Which interval it is, large: in a box of its own.
     fn interval(&self, area: Rect, at: u32, buf: &mut Buffer) {
-        let word = self.view.words.get(ordinal(at)).to_uppercase();
+        let word = self.view.interval_name(at).to_uppercase();
         let block = Block::bordered()
             .border_type(BorderType::Thick)
             .border_style(self.theme.strong());
@@ -61,15 +61,6 @@ impl<'a> Playing<'a> {
         let place = middle(area, columns.saturating_add(16).max(28), 5);
         block.render(place, buf);
         centre(buf, row(place, 2), &styled(word, self.theme.strong()));
-    }
-}
-
-/// "first", "second", "third": no trial has more intervals.
-pub fn ordinal(interval: u32) -> Phrase {
-    match interval {
-        1 => Phrase::First,
-        2 => Phrase::Second,
-        _ => Phrase::Third,
     }
 }
 

@@ -5,7 +5,7 @@ use study_base::text::QuestionId;
 use study_core::outcome::{Event, Failure, FormId};
 use study_core::procedure::Recorded;
 use study_core::protocol::file::parse;
-use study_core::protocol::{Answer, Interval, Protocol, Seat, Stimuli};
+use study_core::protocol::{Answer, Interval, Protocol, QuestionKind, Seat, Stimuli};
 use study_core::session::{Effect, Ending, Input, Screen};
 
 const HEAD: &str = r#"
@@ -67,6 +67,39 @@ repetitions = 2
 {more}
 "#
     ))
+}
+
+fn beside_a_reference() -> Protocol {
+    let head = HEAD.replace(
+        "file = \"a.toml\" }",
+        "file = \"a.toml\", role = \"hidden-reference\" }",
+    );
+    let text = r#"
+[analysis]
+primary = "close"
+[[parts]]
+id = "close"
+kind = "mushra"
+prompt = "How close?"
+reference = "XQZ-7"
+repetitions = 2
+"#;
+    parse("p", &format!("{head}{text}")).protocol.unwrap()
+}
+
+fn magnitudes() -> Protocol {
+    read(
+        r#"
+[analysis]
+primary = "strong"
+[[parts]]
+id = "strong"
+kind = "magnitude"
+prompt = "How strong?"
+family = "damping"
+repetitions = 1
+"#,
+    )
 }
 
 /// The answer of an observer who hears a level of 1.55 and above, and else says the other.
@@ -444,7 +477,10 @@ fn feedback_says_if_the_answer_was_correct_and_only_where_it_is_wanted() {
 fn the_pages_of_a_trial_are_the_same_whatever_it_presents() {
     for protocol in [
         pairs(""),
+        beside_a_reference(),
+        magnitudes(),
         track("2ifc", STAIRCASE, "easy = 0.3"),
+        track("3ifc", STAIRCASE, "easy = 0.3"),
         track("abx", QUEST, ""),
         track("same-different", QUEST, ""),
         track("odd-one-out", QUEST, ""),
@@ -534,4 +570,62 @@ fn a_form_of_a_part_has_its_own_questions() {
     };
     assert_eq!(questions[0].id.as_str(), "real");
     assert!(matches!(form, FormId::Trial { .. }));
+}
+
+/// People read the answers in their language; files have the words of the program.
+#[test]
+fn answers_are_shown_in_the_language_of_the_study_and_stored_in_one() {
+    let mut protocol = pairs("tie = true");
+    protocol.text.lang = Some("de".to_owned());
+    let mut rig = Rig::new(protocol.clone());
+    until(&mut rig, 0, answering);
+    let Screen::Form { questions, .. } = rig.view().screen else {
+        panic!()
+    };
+    let QuestionKind::Choice { options, .. } = &questions[0].kind else {
+        panic!()
+    };
+    assert_eq!(options, &["erstes", "zweites", "kein Unterschied"]);
+    let id = questions[0].id.clone();
+    let shown = Answer::Choice(vec![options[2].clone()]);
+    rig.send(Input::Answer(vec![(id.clone(), shown.clone())]));
+    until(&mut rig, 1, reference);
+    let stored = |rig: &Rig| rig.session.history().rating_rows(&protocol)[0].answers[&id].clone();
+    assert_eq!(stored(&rig), Answer::Choice(vec!["tie".to_owned()]));
+    // The correction shows and takes the words of the language, too.
+    let given = rig.view().correctable[0].clone();
+    assert_eq!(given.answer, shown);
+    rig.send(Input::Correct {
+        form: given.form,
+        question: id.clone(),
+        answer: Answer::Choice(vec!["zweites".to_owned()]),
+        reason: "a slip".to_owned(),
+        by: study_core::outcome::Author::Participant,
+    });
+    assert_eq!(stored(&rig), Answer::Choice(vec!["second".to_owned()]));
+}
+
+/// A realization is rated after its reference, and the screen says which is which.
+#[test]
+fn a_reference_is_felt_first_and_named() {
+    let protocol = beside_a_reference();
+    let mut rig = Rig::new(protocol.clone());
+    let first = |screen: &Screen| {
+        matches!(
+            screen,
+            Screen::Playing {
+                interval: Some((1, 2)),
+                ..
+            }
+        )
+    };
+    until(&mut rig, 0, first);
+    assert_eq!(rig.view().interval_name(1), "reference");
+    until(&mut rig, 0, second);
+    assert_eq!(rig.view().interval_name(2), "rate this one");
+    until(&mut rig, 1, reference);
+    let row = &rig.session.history().rating_rows(&protocol)[0];
+    assert_eq!(row.model.as_ref(), rig.schedule()[0].model());
+    finish(&mut rig);
+    assert_eq!(rig.session.history().rating_rows(&protocol).len(), 6);
 }

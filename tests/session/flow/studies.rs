@@ -85,6 +85,7 @@ pub(crate) fn rich() -> Protocol {
         unit: None,
         min: Some(0.0),
         max: None,
+        above: None,
     };
     protocol.setup = vec![question("temperature", number, true), text("rig")];
     protocol.intake = vec![rating("experience"), rating("fatigue")];

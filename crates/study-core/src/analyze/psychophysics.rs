@@ -9,6 +9,7 @@ mod discriminations;
 mod excluded;
 mod findings;
 mod fits;
+mod of_scales;
 mod over_participants;
 mod part_data;
 mod preferences;

@@ -18,7 +18,7 @@ pub(super) fn reference(cells: &Cells<'_>, rules: &Rules, values: &mut Values) {
     for (m, model) in cells.ratings.models.iter().enumerate() {
         match model.role {
             Role::Test | Role::Practice => {}
-            Role::HiddenReference | Role::LowAnchor | Role::Physical => {
+            Role::HiddenReference | Role::LowAnchor | Role::MidAnchor | Role::Physical => {
                 contrasts(cells, m, &tests, rules, values);
             }
         }

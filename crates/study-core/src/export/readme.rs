@@ -54,6 +54,20 @@ pub(super) fn methods(job: &Job<'_>) -> String {
                 counted(p.models.len(), "realization was", "realizations were"),
                 counted(p.repetitions as usize, "time", "times")
             ),
+            Task::Magnitude(p) => format!(
+                "{} felt {} and given a number above 0",
+                counted(p.models.len(), "level was", "levels were"),
+                counted(p.repetitions as usize, "time", "times")
+            ),
+            Task::Mushra(p) => format!(
+                "{} rated from 0 to 100 beside a reference {}",
+                counted(
+                    p.presentations.models.len(),
+                    "realization was",
+                    "realizations were"
+                ),
+                counted(p.presentations.repetitions as usize, "time", "times")
+            ),
             Task::Pairs(p) => format!(
                 "{} compared {}",
                 counted(

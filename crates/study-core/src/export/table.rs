@@ -120,10 +120,15 @@ impl Field {
                 }
                 (Some(*from), Some(*to))
             }
-            QuestionKind::Number { unit, min, max } => {
+            QuestionKind::Number {
+                unit,
+                min,
+                max,
+                above,
+            } => {
                 field.kind = Type::Number;
                 field.unit.clone_from(unit);
-                (*min, *max)
+                (min.or(*above), *max)
             }
             QuestionKind::Choice { options, multiple } => {
                 if *multiple {

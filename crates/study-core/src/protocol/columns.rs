@@ -217,6 +217,7 @@ table! {
             ("test", "what the study asks about"),
             ("practice", "for practice trials only"),
             ("hidden-reference", "the target itself, unannounced among the others"),
+            ("mid-anchor", "a realization that is known to be mediocre"),
             ("low-anchor", "known to be poor"),
             ("physical", "a physical sample"),
         ], "role of the realization; `test` for a level and where there are several"),

@@ -268,9 +268,18 @@ fn scale(question: &Question) -> Value {
         QuestionKind::Choice { options, multiple } => {
             json!({ "choice": options, "multiple": multiple })
         }
-        QuestionKind::Number { unit, min, max } => {
-            json!({ "number": [min, max], "unit": unit })
-        }
+        QuestionKind::Number {
+            unit,
+            min,
+            max,
+            above: None,
+        } => json!({ "number": [min, max], "unit": unit }),
+        QuestionKind::Number {
+            unit,
+            min,
+            max,
+            above: Some(above),
+        } => json!({ "number": [min, max], "unit": unit, "above": above }),
         QuestionKind::Text => json!("text"),
     };
     json!({ "id": id, "required": required, "kind": kind })

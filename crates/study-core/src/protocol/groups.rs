@@ -4,7 +4,7 @@
 //! Which trials a session has follows from both: [`Protocol::of`].
 
 use super::keys::words;
-use super::{Protocol, Seat, Task};
+use super::{Protocol, Role, Seat, Task};
 use serde::{Deserialize, Serialize};
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
@@ -118,7 +118,16 @@ impl Protocol {
                         task.pairs
                             .retain(|pair| pair.iter().all(|m| models.contains(m)));
                     }
-                    Task::Discrimination { .. } => {}
+                    // The hidden reference stays, whatever the group rates.
+                    Task::Mushra(task) => {
+                        let hidden = |m: &ModelId| {
+                            let model = self.models.iter().find(|own| own.id == *m);
+                            model.is_some_and(|own| own.role == Role::HiddenReference)
+                        };
+                        let stays = |m: &ModelId| models.contains(m) || hidden(m);
+                        task.presentations.models.retain(stays);
+                    }
+                    Task::Magnitude(_) | Task::Discrimination { .. } => {}
                 }
             }
         }

@@ -35,6 +35,10 @@ pub struct Part {
 pub enum Task {
     /// One realization is felt and rated.
     Rating(Presentations),
+    /// One level of a family is felt and given a positive number.
+    Magnitude(Presentations),
+    /// One realization is rated from 0 to 100 beside a reference.
+    Mushra(Mushra),
     /// Two realizations are felt, and one is chosen.
     Pairs(Pairs),
     /// Levels are told from a standard, on one track or several interleaved ones.
@@ -44,7 +48,7 @@ pub enum Task {
     },
 }
 
-/// Which realizations a rating part presents, and in which order.
+/// Which realizations a part with one rating a trial presents, and in which order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Presentations {
     /// The realizations.
@@ -59,6 +63,37 @@ pub struct Presentations {
     pub min_distance: Option<u32>,
     /// Realizations of the practice trials.
     pub practice: Vec<ModelId>,
+}
+
+/// Which realizations are rated beside which reference.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mushra {
+    /// Felt before the realization in each trial.
+    pub reference: Option<ModelId>,
+    /// The realizations, a hidden reference among them.
+    #[serde(flatten)]
+    pub presentations: Presentations,
+}
+
+impl Task {
+    /// The realizations of a part whose trials each present one.
+    pub fn presentations(&self) -> Option<&Presentations> {
+        match self {
+            Self::Rating(own) | Self::Magnitude(own) => Some(own),
+            Self::Mushra(own) => Some(&own.presentations),
+            Self::Pairs(_) | Self::Discrimination { .. } => None,
+        }
+    }
+
+    /// The reference that is felt before each realization.
+    pub fn reference(&self) -> Option<&ModelId> {
+        match self {
+            Self::Mushra(own) => own.reference.as_ref(),
+            Self::Rating(_) | Self::Magnitude(_) | Self::Pairs(_) | Self::Discrimination { .. } => {
+                None
+            }
+        }
+    }
 }
 
 /// Which realizations are compared.
@@ -410,22 +445,23 @@ impl Protocol {
     /// without parts.
     pub fn design_of(&self, part: Option<&PartId>) -> Design {
         let mut design = self.design.clone();
-        match part.and_then(|id| self.part(id)).map(|part| &part.task) {
-            None => {}
-            Some(Task::Rating(own)) => {
+        let task = part.and_then(|id| self.part(id)).map(|part| &part.task);
+        match (task, task.and_then(Task::presentations)) {
+            (None, _) => {}
+            (_, Some(own)) => {
                 design.repetitions = own.repetitions;
                 design.order = own.order.clone();
                 design.max_run = own.max_run;
                 design.min_distance = own.min_distance;
                 design.practice.clone_from(&own.practice);
             }
-            Some(Task::Pairs(own)) => {
+            (Some(Task::Pairs(own)), _) => {
                 design.repetitions = own.repetitions;
                 design.order = own.order.clone();
                 (design.max_run, design.min_distance) = (None, None);
                 design.practice.clear();
             }
-            Some(Task::Discrimination { .. }) => {
+            (Some(_), None) => {
                 (design.max_run, design.min_distance) = (None, None);
                 design.practice.clear();
             }

@@ -103,6 +103,11 @@ phrases! {
     First "first" "first";
     Second "second" "second";
     Third "third" "third";
+    ReferenceInterval "reference-interval" "reference";
+    ToRate "to-rate" "rate this one";
+    Tie "tie" "no difference";
+    Same "same" "the same";
+    Different "different" "different";
     Answer "answer" "answer";
     Correct "correct" "That was correct.";
     NotCorrect "not-correct" "That was not correct.";
@@ -117,6 +122,7 @@ phrases! {
     Range "range" "Type a number from {from} to {to}.";
     RangeFrom "range-from" "Type a number from {from} up.";
     RangeTo "range-to" "Type a number up to {to}.";
+    RangeAbove "range-above" "Type a number above {above}.";
     PlainRange "plain-range" "Type a number from {from} to {to}, then press Enter.";
     PlainNumber "plain-number" "Type a number, then press Enter.";
     PlainOption "plain-option" "Type the number of one of them, then press Enter.";
@@ -167,6 +173,23 @@ phrases! {
     CommandQuit "command-quit" "leaves; the session can be resumed";
     PageLost "page-lost" "The connection is lost. Trying again …";
     PageClosed "page-closed" "This page is closed. Please tell the experimenter.";
+}
+
+impl Phrase {
+    /// What is shown for one of the answers that parts have of their own.
+    pub fn of_answer(word: &str) -> Option<Self> {
+        Some(match word {
+            "first" => Self::First,
+            "second" => Self::Second,
+            "third" => Self::Third,
+            "tie" => Self::Tie,
+            "same" => Self::Same,
+            "different" => Self::Different,
+            "yes" => Self::Yes,
+            "no" => Self::Refuse,
+            _ => return None,
+        })
+    }
 }
 
 /// The shipped languages besides English: BCP 47 tag and file.
@@ -304,6 +327,8 @@ fn entry(line: &str) -> Option<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::Method;
+    use crate::protocol::keys::Words as _;
 
     #[test]
     fn every_language_has_every_sentence_with_the_same_placeholders() {
@@ -321,6 +346,23 @@ mod tests {
             let (_, file) = SHIPPED.iter().find(|(t, _)| *t == tag).unwrap();
             assert_eq!(file.lines().count(), Phrase::ALL.len(), "{tag}");
             assert!(!file.contains('\\'), "{tag} has an escape");
+        }
+    }
+
+    #[test]
+    fn the_answers_of_a_trial_differ_in_every_language() {
+        for tag in languages() {
+            let words = Words::new(Some(tag), &BTreeMap::new());
+            let ways = Method::VALUES.iter().map(|(_, method)| method.answers());
+            for answers in ways.chain([&["first", "second", "tie"][..]]) {
+                let shown = answers
+                    .iter()
+                    .map(|a| words.get(Phrase::of_answer(a).unwrap()));
+                let mut shown: Vec<&str> = shown.collect();
+                shown.sort_unstable();
+                shown.dedup();
+                assert_eq!(shown.len(), answers.len(), "{tag}: {shown:?}");
+            }
         }
     }
 

@@ -34,6 +34,13 @@ pub struct Trial {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Stimuli {
+    /// A reference, then one realization that is rated.
+    Rated {
+        /// The reference.
+        reference: ModelId,
+        /// The realization.
+        model: ModelId,
+    },
     /// One realization.
     One {
         /// The realization.
@@ -56,11 +63,22 @@ pub enum Stimuli {
     },
 }
 
+impl Stimuli {
+    /// One realization, after a reference if there is one.
+    pub fn rated(reference: Option<&ModelId>, model: &ModelId) -> Self {
+        let model = model.clone();
+        match reference.cloned() {
+            Some(reference) => Self::Rated { reference, model },
+            None => Self::One { model },
+        }
+    }
+}
+
 impl Trial {
-    /// The realization of a trial that presents a single, planned one.
+    /// The realization of a trial that is about a single, planned one.
     pub fn model(&self) -> Option<&ModelId> {
         match &self.stimuli {
-            Stimuli::One { model } => Some(model),
+            Stimuli::One { model } | Stimuli::Rated { model, .. } => Some(model),
             Stimuli::Pair { .. } | Stimuli::Track { .. } => None,
         }
     }
@@ -69,7 +87,7 @@ impl Trial {
     pub fn track(&self) -> Option<&PartId> {
         match &self.stimuli {
             Stimuli::Track { track, .. } => Some(track),
-            Stimuli::One { .. } | Stimuli::Pair { .. } => None,
+            Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
         }
     }
 }

@@ -62,6 +62,9 @@ pub enum QuestionKind {
         min: Option<f64>,
         /// Largest that is accepted.
         max: Option<f64>,
+        /// Only larger numbers are accepted.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        above: Option<f64>,
     },
     /// Free text.
     Text,
@@ -110,6 +113,8 @@ pub enum AnswerError {
     OffScale(f64, f64),
     #[error("{}", range(*.min, *.max))]
     OutOfRange { min: Option<f64>, max: Option<f64> },
+    #[error("a number above {0}")]
+    NotAbove(f64),
     #[error("choose from the list")]
     NotAnOption,
     #[error("choose one")]
@@ -179,6 +184,12 @@ impl Question {
             (&QuestionKind::Slider { from, to, .. }, Answer::Number(n)) => {
                 when(!(from..=to).contains(n), AnswerError::OffScale(from, to))
             }
+            (
+                &QuestionKind::Number {
+                    above: Some(above), ..
+                },
+                Answer::Number(n),
+            ) if *n <= above => Err(AnswerError::NotAbove(above)),
             (&QuestionKind::Number { min, max, .. }, Answer::Number(n)) => {
                 let low = min.is_some_and(|m| *n < m);
                 let high = max.is_some_and(|m| *n > m);
@@ -268,6 +279,7 @@ mod tests {
                 unit: None,
                 min: None,
                 max: Some(99.0),
+                above: None,
             },
             true,
         );

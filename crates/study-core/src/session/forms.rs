@@ -103,7 +103,16 @@ impl Session {
         let Some(page) = open.pages.get(open.at) else {
             return;
         };
-        let checked = check(page, answers).and_then(|answers| {
+        let meant = |(id, answer): (QuestionId, Answer)| {
+            let asked = page.iter().find(|q| q.id == id);
+            let answer = match asked {
+                Some(question) => self.meant(question, answer),
+                None => answer,
+            };
+            (id, answer)
+        };
+        let meant = answers.into_iter().map(meant).collect();
+        let checked = check(page, meant).and_then(|answers| {
             let kept = |q: &Question| self.history.answer(open.id, &q.id).is_some();
             let missing = |q: &&Question| answers.iter().all(|(id, _)| *id != q.id);
             match page.iter().filter(missing).any(kept) {
@@ -204,7 +213,7 @@ impl Session {
             .answer(FormId::Trial { trial, attempt }, question)?;
         match &planned.stimuli {
             Stimuli::Track { intervals, .. } => track.is_correct(intervals, answer),
-            Stimuli::One { .. } | Stimuli::Pair { .. } => None,
+            Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
         }
     }
 
@@ -225,6 +234,11 @@ impl Session {
         by: Author,
         at: Moment,
     ) {
+        let asked = self.questions(form).into_iter().find(|q| q.id == *question);
+        let answer = match asked {
+            Some(asked) => self.meant(asked, answer),
+            None => answer,
+        };
         match self.check_correction(form, question, &answer, &reason) {
             Err(why) => self.notify(why.to_string()),
             Ok(from) => {

@@ -10,7 +10,7 @@ use super::{Ending, Session};
 use crate::outcome::fold::GivenAnswer;
 use crate::outcome::{FormId, Moment};
 use crate::protocol::phrases::Phrase;
-use crate::protocol::{DeviceKind, Seat, TrackRules};
+use crate::protocol::{DeviceKind, Seat, Stimuli, TrackRules};
 use study_base::text::Untrusted;
 
 impl Session {
@@ -37,6 +37,7 @@ impl Session {
             can_replay: self.can_replay(),
             can_go_back: self.can_go_back(),
             force: self.presents_force(),
+            has_reference: self.has_reference(),
             can_advance: can_advance(&screen),
             words: self.words.clone(),
             screen,
@@ -98,7 +99,7 @@ impl Session {
                     })
                     .to_owned(),
             },
-            Phase::Form(form) => form_screen(form),
+            Phase::Form(form) => self.form_screen(form),
             Phase::Reference { .. } => Screen::Reference {
                 prompt: self
                     .protocol
@@ -134,6 +135,17 @@ impl Session {
         }
     }
 
+    fn form_screen(&self, form: &Form) -> Screen {
+        let questions = form.pages.get(form.at).into_iter().flatten();
+        Screen::Form {
+            form: form.id,
+            questions: questions.map(|q| self.shown(q)).collect(),
+            page: number(form.at + 1),
+            pages: number(form.pages.len()),
+            to_experimenter: form.id == FormId::Setup,
+        }
+    }
+
     fn end_text(&self) -> String {
         let finished =
             self.history.finished() && !matches!(self.phase, Phase::Over(Ending::Nothing));
@@ -146,6 +158,12 @@ impl Session {
             };
             self.words.get(phrase).to_owned()
         })
+    }
+
+    /// Whether the first interval of the trial under way is a reference.
+    fn has_reference(&self) -> bool {
+        let open = self.history.open();
+        open.is_some_and(|open| matches!(open.trial.stimuli, Stimuli::Rated { .. }))
     }
 
     /// The interval under way and their number, if there are several.
@@ -268,8 +286,8 @@ impl Session {
                 items.extend(given.map(|given| Correctable {
                     form,
                     title: title.clone(),
-                    question: question.clone(),
-                    answer: given.answer.clone(),
+                    question: self.shown(question),
+                    answer: self.shown_answer(question, &given.answer),
                 }));
             }
         }
@@ -348,16 +366,6 @@ fn count<T>(items: impl Iterator<Item = T>) -> u32 {
 
 fn number(n: usize) -> u32 {
     u32::try_from(n).unwrap_or(u32::MAX)
-}
-
-fn form_screen(form: &Form) -> Screen {
-    Screen::Form {
-        form: form.id,
-        questions: form.pages.get(form.at).cloned().unwrap_or_default(),
-        page: number(form.at + 1),
-        pages: number(form.pages.len()),
-        to_experimenter: form.id == FormId::Setup,
-    }
 }
 
 fn banner(seat: Seat) -> Option<Banner> {

@@ -33,6 +33,9 @@ impl Session {
     pub(super) fn presenting(&mut self, trial: &Trial) -> Option<Presenting> {
         let (track, intervals, easy) = match &trial.stimuli {
             Stimuli::One { model } => return Some(Presenting::of(vec![model.clone()])),
+            Stimuli::Rated { reference, model } => {
+                return Some(Presenting::of(vec![reference.clone(), model.clone()]));
+            }
             Stimuli::Pair { pair } => return Some(Presenting::of(pair.to_vec())),
             Stimuli::Track {
                 track,

@@ -2,7 +2,7 @@
 
 use super::roster::Roster;
 use crate::outcome::FormId;
-use crate::protocol::phrases::Words;
+use crate::protocol::phrases::{Phrase, Words};
 use crate::protocol::{Answer, DeviceKind, Entry, Exposure, Question};
 use std::sync::Arc;
 use study_base::text::QuestionId;
@@ -43,6 +43,9 @@ pub struct View {
     /// Whether what is presented is a force; else a program of the laboratory presents
     /// something else.
     pub force: bool,
+    /// Whether the first interval of the trial is a reference, and the second one is
+    /// rated.
+    pub has_reference: bool,
     /// Whether Enter has an effect now.
     pub can_advance: bool,
     /// The fixed sentences that a participant reads.
@@ -55,6 +58,17 @@ impl View {
         let mut earlier = self.correctable.iter();
         let found = earlier.find(|c| c.form == form && c.question.id == *question);
         found.map(|c| &c.answer)
+    }
+
+    /// The name of an interval, from 1. No trial has more than three.
+    pub fn interval_name(&self, interval: u32) -> &str {
+        self.words.get(match (self.has_reference, interval) {
+            (true, 1) => Phrase::ReferenceInterval,
+            (true, _) => Phrase::ToRate,
+            (false, 1) => Phrase::First,
+            (false, 2) => Phrase::Second,
+            (false, _) => Phrase::Third,
+        })
     }
 }
 

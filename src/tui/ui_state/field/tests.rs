@@ -151,6 +151,7 @@ fn a_number_may_have_a_comma_and_must_be_in_range() {
         unit: None,
         min: Some(0.0),
         max: Some(120.0),
+        above: None,
     });
     assert_eq!(after(&number, &digits("12,5")), Some(12.5));
     let mut field = Field::new(&number);

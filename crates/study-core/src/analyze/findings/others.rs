@@ -171,7 +171,7 @@ pub(super) fn against_references(facts: &Facts<'_>) -> Vec<Finding> {
     let mut found = Vec::new();
     for model in &facts.cells.ratings.models {
         let reference = match model.role {
-            Role::HiddenReference | Role::Physical | Role::LowAnchor => &model.id,
+            Role::HiddenReference | Role::Physical | Role::LowAnchor | Role::MidAnchor => &model.id,
             Role::Test | Role::Practice => continue,
         };
         let id = group_id("reference", &[reference, best]);
@@ -212,7 +212,7 @@ pub(super) fn against_references(facts: &Facts<'_>) -> Vec<Finding> {
             None => Finding::undefined(question, why("p_t"), facts.design),
         };
         found.push(put(differs, "ci95"));
-        if model.role == Role::LowAnchor || get("margin").is_none() {
+        if matches!(model.role, Role::LowAnchor | Role::MidAnchor) || get("margin").is_none() {
             continue;
         }
         let question = Question::Equivalence(reference.clone());

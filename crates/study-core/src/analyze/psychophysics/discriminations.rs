@@ -212,12 +212,12 @@ fn trial(part: &Part, asked: Asked, row: &RatingRow, condition: &str) -> Option<
     let given = chosen(part, row)?;
     let words = asked.answers();
     let given = words.iter().position(|word| *word == given)?;
-    // Of two answers, the one that was not given is correct if the given one is wrong; of
-    // three, the sensitivities need only whether it is.
+    // Of two answers, the one that was not given is correct if the given one is wrong. Of
+    // three it is not known from the row, and not needed: only right or wrong counts.
     let target = match (correct, words.len()) {
         (true, _) => Some(given),
         (false, 2) => Some(1 - given),
-        (false, count) => Some((given + 1) % count),
+        (false, _) => None,
     };
     Some(TrialCount {
         participant: row.participant.as_str().to_owned(),

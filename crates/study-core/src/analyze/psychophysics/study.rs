@@ -6,6 +6,7 @@ use super::excluded;
 use super::findings::{
     PartFacts, PartFinding, of_groups_and_sessions, of_preferences, of_sensitivities, of_thresholds,
 };
+use super::of_scales::{of_magnitudes, of_mushra};
 use super::part_data::{Found, Intervals, PartData, StudyData, asked, chosen, groups, sessions_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use crate::analyze::exclude::Applied;
@@ -98,7 +99,7 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
         let names: Vec<&str> = own.names.iter().map(String::as_str).collect();
         let (mut findings, pairs) = match &part.task {
             Task::Pairs(_) => of_preferences(&facts, &own.names),
-            Task::Rating(_) | Task::Discrimination { .. } => of_thresholds(&facts, &names),
+            _ => of_thresholds(&facts, &names),
         };
         let told = |name: &&&str| {
             own.values
@@ -146,6 +147,8 @@ fn of_part_task(
 ) -> Option<Found> {
     match &part.task {
         Task::Rating(own) => of_ratings(study, part, own, rows),
+        Task::Magnitude(_) => Some(of_magnitudes(part, rows)),
+        Task::Mushra(own) => Some(of_mushra(study.protocol, part, &own.presentations, rows)),
         Task::Pairs(pairs) => Some(of_pairs(study, part, pairs, rows, intervals, rules)),
         Task::Discrimination { tracks } => {
             let protocol = study.protocol;

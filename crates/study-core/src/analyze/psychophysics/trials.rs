@@ -85,10 +85,10 @@ pub struct TrialCount {
     pub condition: String,
     /// The level, if there is one.
     pub level: Option<f64>,
-    /// Which of [`Asked::answers`] is correct, if one is.
+    /// Which of [`Asked::answers`] is correct, if one is and it is known. Of three answers
+    /// it is not needed.
     pub target: Option<usize>,
-    /// Positive answers: those that agree with the target, or without one "yes" and
-    /// "greater".
+    /// Positive answers: those that are correct, or where none is "yes" and "greater".
     pub positive: f64,
     /// Number of trials.
     pub trials: f64,
@@ -204,6 +204,7 @@ fn answers(task: Task, trials: &[&TrialCount]) -> Option<Answers> {
     };
     for trial in trials {
         match (task, trial.target) {
+            // Of a choice among several only right or wrong counts.
             (Task::ForcedChoice(_) | Task::Oddity, _) | (_, Some(0)) => {
                 answers.hits += trial.positive;
                 answers.n_hits += trial.trials;

@@ -34,7 +34,7 @@ fn row(
     let track = trial.track().and_then(|id| protocol.track(id));
     let intervals: Option<&[Interval]> = match &trial.stimuli {
         Stimuli::Track { intervals, .. } => Some(intervals),
-        Stimuli::One { .. } | Stimuli::Pair { .. } => None,
+        Stimuli::One { .. } | Stimuli::Rated { .. } | Stimuli::Pair { .. } => None,
     };
     let playback = presentation.ended.map(|(_, ended)| ended.playback);
     IntervalRow {

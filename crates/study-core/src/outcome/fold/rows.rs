@@ -125,7 +125,8 @@ impl History {
             track: trial.track().cloned(),
             level: (track.and_then(TrackRules::family))
                 .and_then(|_| shown?.level)
-                .map(|level| level.presented),
+                .map(|level| level.presented)
+                .or_else(|| protocol.level_of(shown.and(model)?)),
             correct: correct(trial, track, part, &given),
             replays: shown.map(|a| a.replays),
             fidelity: worst.cloned(),

@@ -2,10 +2,14 @@
 
 use super::{Spans, answers_s, pace};
 use crate::procedure::{Rule, Staircase};
-use crate::protocol::{DeviceKind, Method, Part, Protocol, Question, Role, Task, TrackRules};
+use crate::protocol::{
+    DeviceKind, Method, Mushra, Part, Protocol, Question, Role, Task, TrackRules,
+};
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, PartId};
 
+/// Fewest levels of a magnitude estimation that need no warning.
+const MAGNITUDE_LEVELS: usize = 5;
 /// Fewest trials of an adaptive track that need no warning: the threshold is then known
 /// to about half the standard deviation of the noise.
 const TRACK_TRIALS: u32 = 30;
@@ -33,7 +37,11 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
         n.saturating_mul(repetitions)
     };
     match &part.task {
-        Task::Rating(own) => all(own.models.len(), own.repetitions) + all(own.practice.len(), 1),
+        Task::Rating(own)
+        | Task::Magnitude(own)
+        | Task::Mushra(Mushra {
+            presentations: own, ..
+        }) => all(own.models.len(), own.repetitions) + all(own.practice.len(), 1),
         Task::Pairs(own) => all(own.pairs.len(), own.repetitions),
         Task::Discrimination { tracks: ids } => tracks(protocol, ids).map(track_trials).sum(),
     }
@@ -43,7 +51,8 @@ pub(super) fn trials(protocol: &Protocol, part: &Part) -> u32 {
 /// before each trial.
 pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64 {
     let intervals = match &part.task {
-        Task::Rating(_) => 1,
+        Task::Rating(_) | Task::Magnitude(_) => 1,
+        Task::Mushra(own) => 1 + usize::from(own.reference.is_some()),
         Task::Pairs(_) => 2,
         Task::Discrimination { tracks: ids } => tracks(protocol, ids)
             .map(|track| track.method.sequences()[0].len())
@@ -52,7 +61,9 @@ pub(super) fn seconds(protocol: &Protocol, part: &Part, reference_s: f64) -> f64
     } as f64;
     let free_s = match &part.task {
         Task::Rating(_) => pace::EXPLORE_S,
-        Task::Pairs(_) | Task::Discrimination { .. } => pace::COMPARE_S,
+        Task::Magnitude(_) | Task::Mushra(_) | Task::Pairs(_) | Task::Discrimination { .. } => {
+            pace::COMPARE_S
+        }
     };
     let felt_s = part.exposure.max_s.map_or(free_s, |max| max.min(free_s));
     let load_s = match protocol.device.kind {
@@ -76,6 +87,10 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
             faults.push(Fault::warning(what).at(place));
         }
     }
+    for (i, part) in protocol.parts.iter().enumerate() {
+        let place = spans.get(&format!("parts[{i}].id")).cloned();
+        faults.extend(magnitudes(protocol, part).map(|fault| fault.at(place)));
+    }
     for (i, track) in protocol.tracks.iter().enumerate() {
         let place = spans.get(&format!("tracks[{i}].id")).cloned();
         let doubts = [
@@ -96,18 +111,42 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
         track.standard() == *model || compared.as_ref() == Some(model)
     });
     let by_part = protocol.parts.iter().any(|part| match &part.task {
-        Task::Rating(own) => own.models.contains(model) || own.practice.contains(model),
         Task::Pairs(own) => own.pairs.iter().any(|pair| pair.contains(model)),
-        Task::Discrimination { .. } => false,
+        task => {
+            let own = task.presentations();
+            own.is_some_and(|own| own.models.contains(model) || own.practice.contains(model))
+                || task.reference() == Some(model)
+        }
     });
     by_track || by_part
 }
 
 /// Whether realizations are rated or compared, so that their number matters.
 pub(super) fn is_about_realizations(protocol: &Protocol) -> bool {
-    let about = |part: &Part| !matches!(part.task, Task::Discrimination { .. });
+    let about =
+        |part: &Part| !matches!(part.task, Task::Discrimination { .. } | Task::Magnitude(_));
     let tested = protocol.models.iter().any(|m| m.role == Role::Test);
     protocol.parts.is_empty() || (protocol.parts.iter().any(about) && tested)
+}
+
+/// Too few levels for an exponent, or levels that it leaves out.
+fn magnitudes(protocol: &Protocol, part: &Part) -> Option<Fault> {
+    let Task::Magnitude(own) = &part.task else {
+        return None;
+    };
+    let levels = own.models.iter().filter_map(|id| protocol.level_of(id));
+    let levels: Vec<f64> = levels.collect();
+    let id = &part.id;
+    if levels.iter().any(|level| *level <= 0.0) {
+        let what = format!("the exponent of the part `{id}` leaves out levels of 0 and less");
+        return Some(Fault::warning(what).hint("take levels above 0"));
+    }
+    (levels.len() < MAGNITUDE_LEVELS).then(|| {
+        Fault::warning(format!(
+            "the part `{id}` has {} levels: an exponent of fewer than {MAGNITUDE_LEVELS} is uncertain",
+            levels.len()
+        ))
+    })
 }
 
 fn few_trials(track: &TrackRules) -> Option<Fault> {

@@ -166,7 +166,12 @@ pub(super) fn agree(
                         .filter(|p| p.iter().all(|m| models.contains(m)));
                     (task.pairs.concat(), own.count())
                 }
-                Task::Discrimination { .. } => continue,
+                Task::Mushra(task) => {
+                    let all = &task.presentations.models;
+                    let own = all.iter().filter(|m| models.contains(m));
+                    (all.clone(), own.count())
+                }
+                Task::Magnitude(_) | Task::Discrimination { .. } => continue,
             };
             if left == 0 {
                 let what = format!(

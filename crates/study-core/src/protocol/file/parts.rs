@@ -1,8 +1,10 @@
 //! `[[parts]]`: trials of one kind each.
 
+use super::questions::number_labels;
 use super::section::{Section, Variant, shapes};
 use crate::protocol::keys::{Id, Key, Kind, Shape, Variants, Words as _, keys};
 use crate::protocol::{Exposure, IntervalOrder, Order, Presentations};
+use std::collections::BTreeMap;
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Value;
 use study_base::text::{ModelId, PartId, QuestionId, Untrusted};
@@ -39,15 +41,12 @@ static SHAPES: [Shape; KINDS.len()] = shapes(&KINDS);
 /// The words of `order`: a part has no file of orders.
 const ORDER: Kind = Kind::Word(Order::WORDS);
 
-/// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
-pub(super) const KINDS: [Variant<RawTask>; 3] = [
-    Variant::new(
-        "rating",
-        "One realization is felt and rated.",
+/// Keys of the kinds with one realization a trial.
+macro_rules! presentation_keys {
+    ($($own:tt)*) => {
         keys! {
-            /// The realizations, by id.
-            "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
-            /// How often each is rated.
+            $($own)*
+            /// How often each is presented.
             "repetitions": Kind::Whole(1, 10_000), "3", required;
             /// How the order of the trials is made.
             "order": ORDER, r#""williams""#, default(r#""blocked""#);
@@ -55,10 +54,57 @@ pub(super) const KINDS: [Variant<RawTask>; 3] = [
             "max_run": Kind::COUNT, "1";
             /// The least distance between two positions of the same realization.
             "min_distance": Kind::COUNT, "2";
+        }
+    };
+}
+
+/// The kinds of trial. A new one is declared here and in [`crate::protocol::Task`].
+pub(super) const KINDS: [Variant<RawTask>; 5] = [
+    Variant::new(
+        "rating",
+        "One realization is felt and rated.",
+        presentation_keys! {
+            /// The realizations, by id.
+            "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
             /// The realizations of the practice trials of the part, in this order.
             "practice": Kind::ModelIds, r#"["spring"]"#;
         },
         rating,
+    ),
+    Variant::new(
+        "magnitude",
+        "Magnitude estimation: one level of a family is felt, and a number above 0 is typed for it.",
+        presentation_keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""How strong did it feel?""#, required;
+            /// One of `[[families]]`.
+            "family": Kind::Id(Id::Part), r#""detent""#, required;
+            /// Levels of the ladder.
+            "levels": Kind::NumberList, "[0.5, 1.0, 2.0]", derived("all levels of the ladder");
+        },
+        magnitude,
+    ),
+    Variant::new(
+        "mushra",
+        "One realization is rated from 0 to 100 beside a reference, which is among the realizations, too, unlabelled (after ITU-R BS.1534-3, one at a time).",
+        presentation_keys! {
+            /// What is asked, in any language.
+            "prompt": Kind::Text, r#""How close was it to the reference?""#, required;
+            /// Texts at some of the numbers.
+            "labels": Kind::NumberLabels, r#"{ 0 = "bad", 100 = "excellent" }"#;
+            /// The realizations, by id. One has the role `hidden-reference`; anchors have the roles
+            /// `low-anchor` and `mid-anchor`.
+            "models": Kind::ModelIds, r#"["target", "spring", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
+            /// The realization that is felt as the reference before each one. Without it the
+            /// reference is a real one, which `trial.reference` asks to feel.
+            "reference": Kind::Id(Id::Model), r#""target""#;
+            /// The realizations of the practice trials of the part, in this order.
+            "practice": Kind::ModelIds, r#"["spring"]"#;
+            /// From the end of the reference to the start of the realization. Both are loaded anew
+            /// in this time, whether they differ or not.
+            "gap_s": Kind::positive("s"), "1.5", default("1");
+        },
+        mushra,
     ),
     Variant::new(
         "pairs",
@@ -121,6 +167,21 @@ pub(super) enum RawTask {
         /// Its models are empty if none are named.
         presentations: Presentations,
     },
+    Magnitude {
+        prompt: String,
+        family: PartId,
+        levels: Option<Vec<f64>>,
+        /// Its models are empty.
+        presentations: Presentations,
+    },
+    Mushra {
+        prompt: String,
+        labels: BTreeMap<String, String>,
+        reference: Option<ModelId>,
+        /// Its models are empty if none are named.
+        presentations: Presentations,
+        gap_s: f64,
+    },
     Pairs {
         prompt: String,
         models: Option<Vec<ModelId>>,
@@ -180,20 +241,52 @@ pub(super) fn exposure(mut section: Section<'_, '_>) -> Option<Exposure> {
 }
 
 fn rating(section: &mut Section<'_, '_>) -> Option<RawTask> {
-    let models = section.model_ids("models");
-    let repetitions = section.whole("repetitions");
-    let order = section.word("order");
+    let (models, practice) = (section.model_ids("models"), section.model_ids("practice"));
+    let presentations = presentations(section, models, practice)?;
+    Some(RawTask::Rating { presentations })
+}
+
+fn presentations(
+    section: &mut Section<'_, '_>,
+    models: Vec<ModelId>,
+    practice: Vec<ModelId>,
+) -> Option<Presentations> {
+    let (repetitions, order) = (section.whole("repetitions"), section.word("order"));
     let (max_run, min_distance) = (section.whole("max_run"), section.whole("min_distance"));
-    let practice = section.model_ids("practice");
-    Some(RawTask::Rating {
-        presentations: Presentations {
-            models,
-            order: order?,
-            repetitions: repetitions?,
-            max_run,
-            min_distance,
-            practice,
-        },
+    Some(Presentations {
+        models,
+        order: order?,
+        repetitions: repetitions?,
+        max_run,
+        min_distance,
+        practice,
+    })
+}
+
+fn magnitude(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (prompt, family) = (section.text("prompt"), section.part_id("family"));
+    let levels = section.numbers("levels");
+    let presentations = presentations(section, Vec::new(), Vec::new());
+    Some(RawTask::Magnitude {
+        prompt: prompt?,
+        family: family?,
+        levels,
+        presentations: presentations?,
+    })
+}
+
+fn mushra(section: &mut Section<'_, '_>) -> Option<RawTask> {
+    let (prompt, reference) = (section.text("prompt"), section.model_id("reference"));
+    let labels = number_labels(section, 0.0, 100.0);
+    let (models, practice) = (section.model_ids("models"), section.model_ids("practice"));
+    let presentations = presentations(section, models, practice);
+    let gap_s = section.number("gap_s");
+    Some(RawTask::Mushra {
+        prompt: prompt?,
+        labels: labels?,
+        reference,
+        presentations: presentations?,
+        gap_s: gap_s?,
     })
 }
 

@@ -80,6 +80,8 @@ const KINDS: [Variant<QuestionKind>; 5] = [
             "min": Kind::ANY_NUMBER, "18";
             /// The largest number that is accepted.
             "max": Kind::ANY_NUMBER, "99";
+            /// Only numbers above this one are accepted.
+            "above": Kind::ANY_NUMBER, "0";
         },
         number,
     ),
@@ -99,14 +101,11 @@ pub(super) struct PartialQuestion {
 
 impl PartialQuestion {
     /// The question with which each trial of a part begins; its id is that of the part.
-    pub(super) fn of_part(path: &str, id: &str, prompt: &str, options: &[&str]) -> Self {
+    pub(super) fn of_part(path: &str, id: &str, prompt: &str, kind: QuestionKind) -> Self {
         Self {
             path: path.to_owned(),
             id: QuestionId::new(id).ok(),
-            kind: Some(QuestionKind::Choice {
-                options: options.iter().map(|o| (*o).to_owned()).collect(),
-                multiple: false,
-            }),
+            kind: Some(kind),
             prompt: Some(prompt.to_owned()),
             required: Some(true),
         }
@@ -189,6 +188,21 @@ fn slider(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
             )),
         );
     }
+    let labels = number_labels(section, from, to)?;
+    Some(QuestionKind::Slider {
+        from,
+        to,
+        step,
+        labels,
+    })
+}
+
+/// Texts at numbers of a scale.
+pub(super) fn number_labels(
+    section: &mut Section<'_, '_>,
+    from: f64,
+    to: f64,
+) -> Option<BTreeMap<String, String>> {
     let mut labels = BTreeMap::new();
     for (key, label) in section.entries("labels") {
         match key.parse::<f64>() {
@@ -201,12 +215,7 @@ fn slider(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
             ))),
         }
     }
-    Some(QuestionKind::Slider {
-        from,
-        to,
-        step,
-        labels,
-    })
+    Some(labels)
 }
 
 fn choice(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
@@ -233,6 +242,13 @@ fn choice(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
 fn number(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
     let unit = section.text("unit");
     let (min, max) = (section.number("min"), section.number("max"));
+    let above = section.number("above");
+    if let (Some(above), Some(max)) = (above, max)
+        && above >= max
+    {
+        let what = format!("no number is above {above} and at most max = {max}");
+        section.fault_at("above", Fault::error(what));
+    }
     if let (Some(min), Some(max)) = (min, max)
         && min > max
     {
@@ -244,7 +260,12 @@ fn number(section: &mut Section<'_, '_>) -> Option<QuestionKind> {
             .hint("swap them"),
         );
     }
-    Some(QuestionKind::Number { unit, min, max })
+    Some(QuestionKind::Number {
+        unit,
+        min,
+        max,
+        above,
+    })
 }
 
 /// Reports a scale that does not ascend.

@@ -4,12 +4,15 @@
 use super::Named;
 use super::agree::{Sections, at, collision, unknown};
 use super::families::PartialFamily;
-use super::parts::{RawPairs, RawPart, RawTask};
+use super::grids::Grids;
+use super::looked::Looked;
+use super::parts::{RawPart, RawTask};
 use super::questions::PartialQuestion;
 use super::tracks::{RawRule, RawTrack};
-use crate::procedure::{Constant, Function, Ladder, Parameter, QuestPlus, Rule, Staircase, Track};
+use crate::procedure::{Constant, Ladder, QuestPlus, Rule, Staircase, Track};
 use crate::protocol::{
-    Compared, DeviceKind, FamilyRules, Method, Pairs, Part, Presentations, Role, Task, TrackRules,
+    Compared, FamilyRules, Method, Mushra, Pairs, Part, Presentations, QuestionKind, Task,
+    TrackRules,
 };
 use study_base::diagnostic::Fault;
 use study_base::diagnostic::table::Document;
@@ -18,6 +21,13 @@ use study_base::text::{ModelId, PartId, QuestionId};
 
 /// The answers to a pair.
 const FIRST_OR_SECOND: [&str; 3] = ["first", "second", "tie"];
+
+fn one_of(options: &[&str]) -> QuestionKind {
+    QuestionKind::Choice {
+        options: options.iter().map(|o| (*o).to_owned()).collect(),
+        multiple: false,
+    }
+}
 
 /// Parts, families and tracks as they were read.
 #[derive(Debug)]
@@ -33,12 +43,6 @@ pub(super) struct Resolved {
     pub(super) parts: Option<Vec<Part>>,
     pub(super) families: Option<Vec<FamilyRules>>,
     pub(super) tracks: Option<Vec<TrackRules>>,
-}
-
-/// What is looked up while a part or track is resolved.
-struct Looked<'a> {
-    sections: &'a Sections<'a>,
-    document: &'a Document<'a>,
 }
 
 impl Raw {
@@ -61,14 +65,42 @@ impl Raw {
             let id = part.id.as_ref()?.as_str();
             match part.task.as_ref()? {
                 RawTask::Rating { .. } => None,
+                RawTask::Magnitude { prompt, .. } => {
+                    let positive = QuestionKind::Number {
+                        unit: None,
+                        min: None,
+                        max: None,
+                        above: Some(0.0),
+                    };
+                    Some(PartialQuestion::of_part(&part.path, id, prompt, positive))
+                }
+                RawTask::Mushra { prompt, labels, .. } => {
+                    let scale = QuestionKind::Slider {
+                        from: 0.0,
+                        to: 100.0,
+                        step: 1.0,
+                        labels: labels.clone(),
+                    };
+                    Some(PartialQuestion::of_part(&part.path, id, prompt, scale))
+                }
                 RawTask::Pairs { prompt, tie, .. } => {
                     let options = &FIRST_OR_SECOND[..if *tie { 3 } else { 2 }];
-                    Some(PartialQuestion::of_part(&part.path, id, prompt, options))
+                    Some(PartialQuestion::of_part(
+                        &part.path,
+                        id,
+                        prompt,
+                        one_of(options),
+                    ))
                 }
                 RawTask::Discrimination { prompt, tracks, .. } => {
                     let first = self.track(tracks.first()?)?;
                     let options = first.method?.answers();
-                    Some(PartialQuestion::of_part(&part.path, id, prompt, options))
+                    Some(PartialQuestion::of_part(
+                        &part.path,
+                        id,
+                        prompt,
+                        one_of(options),
+                    ))
                 }
             }
         };
@@ -100,7 +132,8 @@ impl Raw {
             self.families.iter().map(|f| f.family.clone()).collect();
         let known = families.as_deref();
         let tracks = self.tracks.iter().map(|t| looked.track(t, known)).collect();
-        let parts = self.parts.iter().map(|p| self.part(p, &looked)).collect();
+        let parts = self.parts.iter().map(|p| self.part(p, known, &looked));
+        let parts = parts.collect();
         Resolved {
             parts,
             families,
@@ -159,14 +192,21 @@ impl Raw {
                 continue;
             };
             let of = |t: &RawTrack| matches!(&t.compared, Some(Compared::Levels { family, .. }) if family == id);
-            if !self.tracks.iter().any(of) {
-                let fault = Fault::warning(format!("no track has the family `{id}`"));
+            let estimated = |p: &RawPart| matches!(&p.task, Some(RawTask::Magnitude { family, .. }) if family == id);
+            if !self.tracks.iter().any(of) && !self.parts.iter().any(estimated) {
+                let fault = Fault::warning(format!("no track and no part has the family `{id}`"));
                 document.fault(fault.at(at(document, &family.path, "id")));
             }
         }
     }
 
-    fn part(&self, raw: &RawPart, looked: &Looked<'_>) -> Option<Part> {
+    /// `families`: `None` if one of them has a fault of its own.
+    fn part(
+        &self,
+        raw: &RawPart,
+        families: Option<&[FamilyRules]>,
+        looked: &Looked<'_>,
+    ) -> Option<Part> {
         let path = &raw.path;
         let (id, exposure) = (raw.id.clone()?, raw.exposure?);
         let exposure = exposure.unwrap_or(looked.sections.exposure);
@@ -183,6 +223,40 @@ impl Raw {
                     Task::Rating(looked.presentations(presentations, path)?),
                     0.0,
                 )
+            }
+            RawTask::Magnitude {
+                family,
+                levels,
+                presentations,
+                ..
+            } => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                let family = looked.family(family, families?, path)?;
+                let models = looked.levels(family, levels.as_deref(), path)?;
+                let own = Presentations {
+                    models,
+                    ..presentations.clone()
+                };
+                (Task::Magnitude(own), 0.0)
+            }
+            RawTask::Mushra {
+                reference,
+                presentations,
+                gap_s,
+                ..
+            } => {
+                asks.push(QuestionId::new(id.as_str()).ok()?);
+                if let Some(reference) = reference {
+                    looked.model(reference, &format!("{path}.reference"));
+                }
+                let presentations = looked.presentations(presentations, path)?;
+                looked.hidden_reference(&presentations, path);
+                let task = Mushra {
+                    reference: reference.clone(),
+                    presentations,
+                };
+                let gap_s = if reference.is_some() { *gap_s } else { 0.0 };
+                (Task::Mushra(task), gap_s)
             }
             RawTask::Pairs {
                 models,
@@ -283,141 +357,6 @@ impl Raw {
 }
 
 impl Looked<'_> {
-    fn fault(&self, path: &str, key: &str, fault: Fault) {
-        self.document.fault(fault.at(at(self.document, path, key)));
-    }
-
-    fn fault_at(&self, path: &str, fault: Fault) {
-        self.document.fault(fault.at(self.document.span_of(path)));
-    }
-
-    /// Reports an id that no model has; returns whether one has it.
-    fn model(&self, id: &ModelId, place: &str) -> bool {
-        let known = || self.sections.models.iter().filter_map(|m| m.id.as_ref());
-        let found = known().any(|k| k == id);
-        if !found {
-            let fault = unknown("model", id.as_str(), known().map(ModelId::as_str));
-            self.fault_at(place, fault);
-        }
-        found
-    }
-
-    /// Reports ids that no model has, and those that are there twice.
-    fn models(&self, ids: &[ModelId], place: &str) {
-        for (i, id) in ids.iter().enumerate() {
-            let place = format!("{place}[{i}]");
-            if self.model(id, &place) && ids[..i].contains(id) {
-                self.fault_at(&place, Fault::error(format!("`{id}` is there twice")));
-            }
-        }
-    }
-
-    fn question(&self, id: &QuestionId, place: &str) {
-        let known = || self.sections.questions.iter().filter_map(|q| q.id.as_ref());
-        if !known().any(|k| k == id) {
-            let fault = unknown("question", id.as_str(), known().map(QuestionId::as_str));
-            self.fault_at(place, fault);
-        }
-    }
-
-    /// The models that a part presents if it names none.
-    fn default_models(&self, duplicates: bool) -> Vec<ModelId> {
-        let models = self.sections.models.iter();
-        models
-            .filter(|m| m.role != Role::Practice && (duplicates || m.duplicate_of.is_none()))
-            .filter_map(|m| m.id.clone())
-            .collect()
-    }
-
-    fn presentations(&self, raw: &Presentations, path: &str) -> Option<Presentations> {
-        self.models(&raw.models, &format!("{path}.models"));
-        for (i, id) in raw.practice.iter().enumerate() {
-            self.model(id, &format!("{path}.practice[{i}]"));
-        }
-        let models = match raw.models.is_empty() {
-            true => self.default_models(true),
-            false => raw.models.clone(),
-        };
-        if models.is_empty() {
-            let fault =
-                Fault::error("nothing to present: no [[models]] whose role is not practice");
-            self.fault(
-                path,
-                "id",
-                fault.hint("add [[models]] with an id and a file"),
-            );
-            return None;
-        }
-        Some(Presentations {
-            models,
-            ..raw.clone()
-        })
-    }
-
-    fn pairs(
-        &self,
-        models: Option<&[ModelId]>,
-        pairs: &RawPairs,
-        path: &str,
-    ) -> Option<Vec<[ModelId; 2]>> {
-        let place = format!("{path}.pairs");
-        if let RawPairs::List(list) = pairs {
-            if models.is_some() {
-                let what = format!("`{path}` has `models` and a list of pairs");
-                self.fault(
-                    path,
-                    "models",
-                    Fault::error(what).hint("leave `models` out"),
-                );
-            }
-            for (i, pair) in list.iter().enumerate() {
-                self.models(pair, &format!("{place}[{i}]"));
-                let [a, b] = pair;
-                let same = |other: &[ModelId; 2]| other.contains(a) && other.contains(b);
-                if list[..i].iter().any(same) {
-                    let fault = Fault::error(format!("the pair of `{a}` and `{b}` is there twice"));
-                    self.fault_at(&format!("{place}[{i}]"), fault);
-                }
-            }
-            return Some(list.clone());
-        }
-        let models = match models {
-            Some(models) => {
-                self.models(models, &format!("{path}.models"));
-                models.to_vec()
-            }
-            None => self.default_models(false),
-        };
-        if models.len() < 2 {
-            let fault = Fault::error("a pair needs two realizations");
-            self.fault(
-                path,
-                "models",
-                fault.hint("add [[models]] with an id and a file"),
-            );
-            return None;
-        }
-        Some(match pairs {
-            RawPairs::All => {
-                let from = |i: usize| models[i + 1..].iter().map(move |b| (i, b));
-                let all = (0..models.len()).flat_map(from);
-                all.map(|(i, b)| [models[i].clone(), b.clone()]).collect()
-            }
-            RawPairs::Adjacent => (models.windows(2))
-                .map(|w| [w[0].clone(), w[1].clone()])
-                .collect(),
-            RawPairs::Versus(one) => {
-                if !models.contains(one) {
-                    let known = models.iter().map(ModelId::as_str);
-                    self.fault_at(&place, unknown("model", one.as_str(), known));
-                }
-                let others = models.iter().filter(|m| *m != one);
-                others.map(|m| [one.clone(), m.clone()]).collect()
-            }
-            RawPairs::List(list) => list.clone(),
-        })
-    }
-
     /// `families`: `None` if one of them has a fault of its own.
     fn track(&self, raw: &RawTrack, families: Option<&[FamilyRules]>) -> Option<TrackRules> {
         let path = &raw.path;
@@ -428,23 +367,7 @@ impl Looked<'_> {
                 self.models(models, &format!("{path}.models"));
                 Ladder::new(vec![1.0]).ok()?
             }
-            Compared::Levels { family, .. } => {
-                if self
-                    .sections
-                    .device
-                    .is_some_and(|d| d.kind == DeviceKind::Manual)
-                {
-                    let fault = Fault::error("a sample mounted by hand has no levels");
-                    self.fault(path, "family", fault.hint("compare two `models`"));
-                }
-                let families = families?;
-                let Some(family) = families.iter().find(|f| f.id == *family) else {
-                    let known = families.iter().map(|f| f.id.as_str());
-                    self.fault(path, "family", unknown("family", family.as_str(), known));
-                    return None;
-                };
-                family.ladder.clone()
-            }
+            Compared::Levels { family, .. } => self.family(family, families?, path)?.ladder.clone(),
         };
         let rule = self.rule(raw.rule.clone()?, method, &compared, &ladder);
         if let Err(why) = Track::new(&rule, &ladder, &mut Stream::new(0, &["check"])) {
@@ -502,53 +425,13 @@ impl Looked<'_> {
                     guess,
                     lapse,
                 };
-                let parameters = grids.parameters(&rule.function, method, ladder);
+                let standard = match compared {
+                    Compared::Levels { standard, .. } => Some(*standard),
+                    Compared::Models { .. } => None,
+                };
+                let parameters = grids.parameters(&rule.function, method, ladder, standard);
                 Rule::QuestPlus(QuestPlus { parameters, ..rule })
             }
         }
-    }
-}
-
-/// The grids of a QUEST+ track.
-struct Grids {
-    threshold: Option<Vec<f64>>,
-    slope: Option<Vec<f64>>,
-    guess: Option<Vec<f64>>,
-    lapse: Vec<f64>,
-}
-
-impl Grids {
-    /// The parameters of a named function.
-    fn parameters(self, function: &Function, method: Method, ladder: &Ladder) -> Vec<Parameter> {
-        let span = ladder.last() - ladder.first();
-        let linear = *function == Function::Weibull;
-        let threshold = self.threshold.unwrap_or_else(|| {
-            let levels = ladder.levels().iter().copied();
-            levels.filter(|level| !linear || *level > 0.0).collect()
-        });
-        let (location, width, slopes) = match function {
-            Function::Normal | Function::NormalSymmetric => {
-                let parts = [0.5, 0.3, 0.2, 0.12, 0.07, 0.04];
-                ("mean", "sd", parts.map(|part| part * span))
-            }
-            Function::Logistic => {
-                let steps = [2.0, 4.0, 7.0, 12.0, 20.0, 35.0];
-                ("threshold", "slope", steps.map(|step| step / span))
-            }
-            _ => ("threshold", "slope", [0.8, 1.3, 2.0, 3.0, 5.0, 8.0]),
-        };
-        let guess = self.guess.unwrap_or_else(|| match method.guess_rate() {
-            Some(rate) => vec![rate],
-            None => vec![0.02, 0.08, 0.16, 0.3],
-        });
-        let mut parameters = vec![
-            Parameter::new(location, threshold),
-            Parameter::new(width, self.slope.unwrap_or_else(|| slopes.to_vec())),
-        ];
-        if *function != Function::NormalSymmetric {
-            parameters.push(Parameter::new("gamma", guess));
-        }
-        parameters.push(Parameter::new("lambda", self.lapse));
-        parameters
     }
 }

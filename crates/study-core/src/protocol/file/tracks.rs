@@ -125,9 +125,9 @@ const RULES: [Variant<RawRule>; 4] = [
             /// Stops when the posterior standard deviation of the threshold is below this.
             "sd_below": Kind::positive("levels"), "0.05";
             /// The grid of thresholds (`mean` of `normal`).
-            "threshold": Kind::NumberList, "[1.1, 1.2, 1.4]", derived("the levels of the ladder above 0");
+            "threshold": Kind::NumberList, "[1.1, 1.2, 1.4]", derived("the levels of the ladder above 0, of many levels 60");
             /// The grid of slopes (`sd` of `normal`).
-            "slope": Kind::NumberList, "[1, 2, 4, 8]", derived("six values, from shallow to steep");
+            "slope": Kind::NumberList, "[1, 2, 4, 8]", derived("six values, from shallow to steep; steeper ones for a standard above 0");
             /// The grid of guess rates, `gamma`.
             "guess": Kind::NumberList, "[0.5]", derived("that of the method; four values in `yes-no` and `same-different`");
             /// The grid of lapse rates, `lambda`.

@@ -2,7 +2,7 @@
 
 use crate::procedure::Rule;
 use crate::protocol::file::parse;
-use crate::protocol::{Compared, Protocol, Task};
+use crate::protocol::{Answer, Compared, Protocol, Seat, Stimuli, Task};
 
 /// A study with a part of each kind.
 const PARTS: &str = r#"
@@ -297,4 +297,164 @@ fn a_manual_device_has_no_levels() {
     let parsed = parse("protocol.toml", &manual);
     let said = |f: &study_base::diagnostic::Fault| f.message.contains("has no levels");
     assert!(parsed.findings.faults.iter().any(said));
+}
+
+/// A study with a part of magnitude estimation and one of MUSHRA.
+const SCALES: &str = r#"
+format = "study-protocol/2"
+study = { id = "s", title = "t", seed = 1 }
+design = { participants = 4 }
+device = { kind = "simulated", limits = { force_n = 12.0, velocity_mm_s = 1000.0 } }
+analysis = { primary = "strength" }
+models = [
+  { id = "target", file = "a.toml", role = "hidden-reference" },
+  { id = "bad", file = "b.toml", role = "low-anchor" },
+  { id = "c", file = "c.toml" },
+]
+
+[[families]]
+id = "detent"
+from = "a.toml"
+vary = "detent"
+levels = [0.5, 1.0, 2.0, 4.0]
+
+[[parts]]
+id = "strength"
+kind = "magnitude"
+prompt = "How strong?"
+family = "detent"
+levels = [4.0, 1.0]
+repetitions = 3
+
+[[parts]]
+id = "quality"
+kind = "mushra"
+prompt = "How close?"
+labels = { 0 = "bad", 100 = "excellent" }
+reference = "target"
+repetitions = 2
+practice = ["c"]
+"#;
+
+#[test]
+fn magnitudes_are_asked_of_levels_and_mushra_of_realizations_beside_a_reference() {
+    let parsed = parse("p", SCALES);
+    assert!(
+        parsed.findings.faults.is_empty(),
+        "{}",
+        parsed.findings.render(false)
+    );
+    let protocol = parsed.protocol.unwrap();
+    let Task::Magnitude(own) = &protocol.parts[0].task else {
+        panic!()
+    };
+    let names: Vec<&str> = own.models.iter().map(|id| id.as_str()).collect();
+    assert_eq!(names, ["detent.4", "detent.2"]);
+    assert_eq!(protocol.level_of(&own.models[0]), Some(4.0));
+    let ask = |id: &str| {
+        protocol
+            .questions
+            .iter()
+            .find(|q| q.id.as_str() == id)
+            .unwrap()
+    };
+    let number = |n| ask("strength").accepts(&Answer::Number(n));
+    assert!(number(1e-9).is_ok());
+    for bad in [0.0, -1.0, f64::NAN] {
+        assert!(number(bad).is_err(), "{bad}");
+    }
+    let rate = |n| ask("quality").accepts(&Answer::Number(n)).is_ok();
+    assert!(rate(0.0) && rate(100.0) && !rate(100.5));
+    let part = &protocol.parts[1];
+    assert_eq!(part.task.reference().unwrap().as_str(), "target");
+    assert_eq!(part.gap_s, 1.0);
+    let trials = crate::schedule::plan(&protocol, None, Seat::Row(1)).unwrap();
+    assert_eq!(trials.len(), 2 * 3 + 1 + 3 * 2);
+    let beside = |t: &&crate::schedule::Trial| matches!(&t.stimuli, Stimuli::Rated { reference, .. } if reference.as_str() == "target");
+    assert_eq!(trials.iter().filter(beside).count(), 7);
+    // A planned trial is the same after it was written to a journal.
+    let text = serde_json::to_string(&trials).unwrap();
+    let read: Vec<crate::schedule::Trial> = serde_json::from_str(&text).unwrap();
+    assert_eq!(read, trials);
+}
+
+#[test]
+fn faults_of_magnitudes_and_mushra_are_named() {
+    for (from, to, says) in [
+        (
+            "[4.0, 1.0]",
+            "[4.0, 3.0]",
+            "3 is no level of the family `detent`",
+        ),
+        ("[4.0, 1.0]", "[4.0, 4.0]", "the level 4 is there twice"),
+        (
+            "family = \"detent\"",
+            "family = \"detail\"",
+            "there is no family `detail`",
+        ),
+        (
+            "reference = \"target\"",
+            "reference = \"tarqet\"",
+            "there is no model `tarqet`",
+        ),
+        (
+            "role = \"hidden-reference\"",
+            "role = \"test\"",
+            "needs one realization with role = \"hidden-reference\"",
+        ),
+        (
+            "role = \"low-anchor\"",
+            "role = \"test\"",
+            "no anchor is rated",
+        ),
+        (
+            "{ 0 = \"bad\", 100",
+            "{ 150 = \"bad\", 100",
+            "a label belongs to a number from 0 to 100",
+        ),
+        (
+            "kind = \"simulated\"",
+            "kind = \"manual\"",
+            "a sample mounted by hand has no levels",
+        ),
+    ] {
+        let text = SCALES.replacen(from, to, 1);
+        assert_ne!(text, SCALES, "{from}");
+        let shown = parse("p", &text).findings.render(false);
+        assert!(shown.contains(says), "{says}\n{shown}");
+    }
+}
+
+/// The default grids of a QUEST+ track on levels from 1 (or `first`) to 3.
+fn default_grids(first: &str, steps: u32, standard: &str) -> Vec<(String, Vec<f64>)> {
+    let text = PARTS
+        .replace("range = [1.0, 3.0]", &format!("range = [{first}, 3.0]"))
+        .replace("steps = 41", &format!("steps = {steps}"))
+        .replace("standard = 1.0", &format!("standard = {standard}"));
+    let parsed = parse("p", &text);
+    let protocol = parsed
+        .protocol
+        .unwrap_or_else(|| panic!("{}", parsed.findings.render(false)));
+    let quest = protocol.tracks.iter().find_map(|t| match &t.rule {
+        Rule::QuestPlus(rule) => Some(rule.parameters.clone()),
+        _ => None,
+    });
+    let named = |p: crate::procedure::Parameter| (p.name, p.values);
+    quest.unwrap().into_iter().map(named).collect()
+}
+
+#[test]
+fn default_grids_cover_the_ladder_and_are_steeper_above_a_standard() {
+    let grids = default_grids("1.0", 41, "1.0");
+    assert_eq!(grids[0].1.len(), 41);
+    assert_eq!(grids[1].1, [1.6, 2.6, 4.0, 6.0, 10.0, 16.0]);
+    // Over the distance from 0 the slopes are those of the function.
+    assert_eq!(
+        default_grids("0.1", 41, "0.0")[1].1,
+        [0.8, 1.3, 2.0, 3.0, 5.0, 8.0]
+    );
+    // A fine ladder does not make a fine grid.
+    let fine = &default_grids("1.0", 999, "1.0")[0].1;
+    assert_eq!((fine.len(), fine[0], fine[59]), (60, 1.0, 3.0));
+    assert!(fine.windows(2).all(|w| w[0] < w[1]));
 }

@@ -1,0 +1,221 @@
+//! What the ids in parts and tracks stand for; every unknown one is reported.
+
+use super::agree::{Sections, at, unknown};
+use super::parts::RawPairs;
+use crate::protocol::{DeviceKind, FamilyRules, Presentations, Role};
+use study_base::diagnostic::Fault;
+use study_base::diagnostic::table::Document;
+use study_base::text::{ModelId, PartId, QuestionId};
+
+/// What is looked up while a part or track is resolved.
+pub(super) struct Looked<'a> {
+    pub(super) sections: &'a Sections<'a>,
+    pub(super) document: &'a Document<'a>,
+}
+
+impl Looked<'_> {
+    pub(super) fn fault(&self, path: &str, key: &str, fault: Fault) {
+        self.document.fault(fault.at(at(self.document, path, key)));
+    }
+
+    pub(super) fn fault_at(&self, path: &str, fault: Fault) {
+        self.document.fault(fault.at(self.document.span_of(path)));
+    }
+
+    /// Reports an id that no model has; returns whether one has it.
+    pub(super) fn model(&self, id: &ModelId, place: &str) -> bool {
+        let known = || self.sections.models.iter().filter_map(|m| m.id.as_ref());
+        let found = known().any(|k| k == id);
+        if !found {
+            let fault = unknown("model", id.as_str(), known().map(ModelId::as_str));
+            self.fault_at(place, fault);
+        }
+        found
+    }
+
+    /// Reports ids that no model has, and those that are there twice.
+    pub(super) fn models(&self, ids: &[ModelId], place: &str) {
+        for (i, id) in ids.iter().enumerate() {
+            let place = format!("{place}[{i}]");
+            if self.model(id, &place) && ids[..i].contains(id) {
+                self.fault_at(&place, Fault::error(format!("`{id}` is there twice")));
+            }
+        }
+    }
+
+    /// The family that a track or a part names. Samples mounted by hand have none.
+    pub(super) fn family<'f>(
+        &self,
+        id: &PartId,
+        families: &'f [FamilyRules],
+        path: &str,
+    ) -> Option<&'f FamilyRules> {
+        let device = self.sections.device;
+        if device.is_some_and(|d| d.kind == DeviceKind::Manual) {
+            let fault = Fault::error("a sample mounted by hand has no levels");
+            self.fault(
+                path,
+                "family",
+                fault.hint("a track can compare two `models`"),
+            );
+        }
+        let found = families.iter().find(|f| f.id == *id);
+        if found.is_none() {
+            let known = families.iter().map(|f| f.id.as_str());
+            self.fault(path, "family", unknown("family", id.as_str(), known));
+        }
+        found
+    }
+
+    /// The realizations of some levels of a family, or of all.
+    pub(super) fn levels(
+        &self,
+        family: &FamilyRules,
+        levels: Option<&[f64]>,
+        path: &str,
+    ) -> Option<Vec<ModelId>> {
+        let Some(levels) = levels else {
+            return Some(family.realizations().map(|(id, _)| id).collect());
+        };
+        let mut models = Vec::new();
+        for level in levels {
+            let found = family.realizations().find(|(_, own)| own == level);
+            let what = match found {
+                Some((id, _)) if !models.contains(&id) => {
+                    models.push(id);
+                    continue;
+                }
+                Some(_) => format!("the level {level} is there twice"),
+                None => format!("{level} is no level of the family `{}`", family.id),
+            };
+            self.fault(path, "levels", Fault::error(what));
+            return None;
+        }
+        Some(models)
+    }
+
+    /// Reports a part of MUSHRA without one hidden reference, which its screening needs.
+    pub(super) fn hidden_reference(&self, presentations: &Presentations, path: &str) {
+        let of = |role| {
+            let models = self.sections.models.iter().filter(move |m| m.role == role);
+            let ids = models.filter_map(|m| m.id.as_ref());
+            ids.filter(|id| presentations.models.contains(id)).count()
+        };
+        if of(Role::HiddenReference) != 1 {
+            let what =
+                "a part of kind \"mushra\" needs one realization with role = \"hidden-reference\"";
+            let hint = "who rates it below 90 too often is flagged";
+            self.fault(path, "id", Fault::error(what).hint(hint));
+        } else if of(Role::LowAnchor) + of(Role::MidAnchor) == 0 {
+            let what = "no anchor is rated: ratings of different studies cannot be compared";
+            let hint = "add a realization with role = \"low-anchor\" or \"mid-anchor\"";
+            self.fault(path, "id", Fault::warning(what).hint(hint));
+        }
+    }
+
+    pub(super) fn question(&self, id: &QuestionId, place: &str) {
+        let known = || self.sections.questions.iter().filter_map(|q| q.id.as_ref());
+        if !known().any(|k| k == id) {
+            let fault = unknown("question", id.as_str(), known().map(QuestionId::as_str));
+            self.fault_at(place, fault);
+        }
+    }
+
+    /// The models that a part presents if it names none.
+    pub(super) fn default_models(&self, duplicates: bool) -> Vec<ModelId> {
+        let models = self.sections.models.iter();
+        models
+            .filter(|m| m.role != Role::Practice && (duplicates || m.duplicate_of.is_none()))
+            .filter_map(|m| m.id.clone())
+            .collect()
+    }
+
+    pub(super) fn presentations(&self, raw: &Presentations, path: &str) -> Option<Presentations> {
+        self.models(&raw.models, &format!("{path}.models"));
+        for (i, id) in raw.practice.iter().enumerate() {
+            self.model(id, &format!("{path}.practice[{i}]"));
+        }
+        let models = match raw.models.is_empty() {
+            true => self.default_models(true),
+            false => raw.models.clone(),
+        };
+        if models.is_empty() {
+            let fault =
+                Fault::error("nothing to present: no [[models]] whose role is not practice");
+            self.fault(
+                path,
+                "id",
+                fault.hint("add [[models]] with an id and a file"),
+            );
+            return None;
+        }
+        Some(Presentations {
+            models,
+            ..raw.clone()
+        })
+    }
+
+    pub(super) fn pairs(
+        &self,
+        models: Option<&[ModelId]>,
+        pairs: &RawPairs,
+        path: &str,
+    ) -> Option<Vec<[ModelId; 2]>> {
+        let place = format!("{path}.pairs");
+        if let RawPairs::List(list) = pairs {
+            if models.is_some() {
+                let what = format!("`{path}` has `models` and a list of pairs");
+                self.fault(
+                    path,
+                    "models",
+                    Fault::error(what).hint("leave `models` out"),
+                );
+            }
+            for (i, pair) in list.iter().enumerate() {
+                self.models(pair, &format!("{place}[{i}]"));
+                let [a, b] = pair;
+                let same = |other: &[ModelId; 2]| other.contains(a) && other.contains(b);
+                if list[..i].iter().any(same) {
+                    let fault = Fault::error(format!("the pair of `{a}` and `{b}` is there twice"));
+                    self.fault_at(&format!("{place}[{i}]"), fault);
+                }
+            }
+            return Some(list.clone());
+        }
+        let models = match models {
+            Some(models) => {
+                self.models(models, &format!("{path}.models"));
+                models.to_vec()
+            }
+            None => self.default_models(false),
+        };
+        if models.len() < 2 {
+            let fault = Fault::error("a pair needs two realizations");
+            self.fault(
+                path,
+                "models",
+                fault.hint("add [[models]] with an id and a file"),
+            );
+            return None;
+        }
+        Some(match pairs {
+            RawPairs::All => {
+                let from = |i: usize| models[i + 1..].iter().map(move |b| (i, b));
+                let all = (0..models.len()).flat_map(from);
+                all.map(|(i, b)| [models[i].clone(), b.clone()]).collect()
+            }
+            RawPairs::Adjacent => (models.windows(2))
+                .map(|w| [w[0].clone(), w[1].clone()])
+                .collect(),
+            RawPairs::Versus(one) => {
+                if !models.contains(one) {
+                    let known = models.iter().map(ModelId::as_str);
+                    self.fault_at(&place, unknown("model", one.as_str(), known));
+                }
+                let others = models.iter().filter(|m| *m != one);
+                others.map(|m| [one.clone(), m.clone()]).collect()
+            }
+            RawPairs::List(list) => list.clone(),
+        })
+    }
+}

@@ -1,0 +1,429 @@
+//! Whole sessions of parts in a pseudo-terminal of 80×24, by keys alone: each with a failed
+//! interval, a correction, a quit and a resume, after which a track is the one that
+//! `study schedule --answers` finds for the same observer.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::support::player::play;
+use crate::support::{PATIENCE, Terminal, repository, study};
+use serde_json::Value as Json;
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// What every form of a trial asks.
+const PROMPT: &str = "Which is it now?";
+const F3: &str = "\u{1b}OR";
+const F4: &str = "\u{1b}OS";
+const F10: &str = "\u{1b}[21~";
+
+/// How a trial is answered, and another answer for the correction.
+type Observer = fn(&Json) -> (String, String);
+
+/// A study of one part in `folder`, with the tables that the parts need.
+fn written(folder: &Path, rest: &str) {
+    let models = folder.join("p/models");
+    fs::create_dir_all(&models).unwrap();
+    let shipped =
+        |name: &str| fs::read_to_string(repository(&format!("protocols/{name}"))).unwrap();
+    for name in ["0.9991", "0.9993", "0.9995", "0.9997", "0.9999"] {
+        let file = format!("lambda-{name}.toml");
+        let text = shipped(&format!("turn-signal/models/{file}"));
+        fs::write(models.join(file), text).unwrap();
+    }
+    let table = shipped("turn-signal-extended/models/static.toml");
+    fs::write(models.join("static.toml"), &table).unwrap();
+    let text = format!(
+        r#"format = "study-protocol/2"
+study = {{ id = "p", title = "A part", seed = 5 }}
+design = {{ participants = 2, max_attempts = 50 }}
+analysis = {{ primary = "answer" }}
+[device]
+kind = "simulated"
+limits = {{ force_n = 12.0, velocity_mm_s = 1000.0 }}
+uncertified = {{ play = true, force_n = 9.0, reason = "a test" }}
+{rest}"#
+    );
+    fs::write(folder.join("p/protocol.toml"), text).unwrap();
+}
+
+/// A track of two intervals on a family.
+fn track(vary: &str, procedure: &str) -> String {
+    format!(
+        r#"[[families]]
+id = "f"
+from = "models/static.toml"
+vary = "{vary}"
+range = [1.0, 3.0]
+steps = 21
+[[parts]]
+id = "answer"
+kind = "discrimination"
+prompt = "{PROMPT}"
+tracks = ["up"]
+gap_s = 0.2
+exposure = {{ max_s = 0.4 }}
+[[tracks]]
+id = "up"
+method = "2ifc"
+family = "f"
+standard = 1.0
+procedure = {procedure}
+"#
+    )
+}
+
+fn models() -> String {
+    let of = |name: &str| {
+        format!("[[models]]\nid = \"l{name}\"\nfile = \"models/lambda-0.{name}.toml\"\n")
+    };
+    ["9991", "9993", "9995", "9997", "9999"].map(of).concat()
+}
+
+/// The events of the session so far.
+fn events(folder: &Path) -> Vec<Json> {
+    let session = folder.join("results/p/sessions/P01/1");
+    // A resumed session goes on in a second segment.
+    let segment = |name: &str| fs::read_to_string(session.join(name)).unwrap_or_default();
+    let text = ["journal.jsonl", "journal-2.jsonl", "journal-3.jsonl"].map(segment);
+    // A line may be half written.
+    let event = |line: &str| serde_json::from_str(line).ok();
+    text.concat().lines().filter_map(event).collect()
+}
+
+fn of(event: &Json, name: &str) -> bool {
+    event["event"] == name
+}
+
+fn done(folder: &Path) -> usize {
+    let events = events(folder);
+    events.iter().filter(|e| of(e, "trial_done")).count()
+}
+
+/// The attempts that were completed, in order, as they were started.
+fn completed(folder: &Path) -> Vec<Json> {
+    let events = events(folder);
+    let started = |done: &Json| {
+        let same = |e: &&Json| {
+            of(e, "attempt_started")
+                && e["trial"] == done["trial"]
+                && e["attempt"] == done["attempt"]
+        };
+        events.iter().find(same).unwrap().clone()
+    };
+    let trials = events.iter().filter(|e| of(e, "trial_done"));
+    trials.map(started).collect()
+}
+
+/// Waits for a text that the page shows after what was typed.
+fn typed(terminal: &mut Terminal, keys: &str, shown: &str) {
+    terminal.keys(keys);
+    terminal.wait_for(shown);
+}
+
+/// Plays, answers as the observer does, and stops at the first page on which `there` holds.
+fn play_until(
+    terminal: &mut Terminal,
+    folder: &Path,
+    observer: Observer,
+    there: impl Fn(&str) -> bool,
+) {
+    let mut since = Instant::now();
+    let mut before = String::new();
+    while terminal.runs() {
+        let page = terminal.shown().text;
+        if there(&page) {
+            return;
+        }
+        let now = page.replace(|c: char| c.is_ascii_digit(), "");
+        if now != before {
+            (before, since) = (now, Instant::now());
+        }
+        assert!(since.elapsed() < PATIENCE, "nothing happens:\n{page}");
+        if page.contains(PROMPT) && page.contains("Enter: save") {
+            let events = events(folder);
+            let attempt = events.iter().rfind(|e| of(e, "attempt_started")).unwrap();
+            let answer = observer(attempt).0;
+            // An option is marked, a number is read back.
+            let shown = if page.contains("choose") {
+                "(●)"
+            } else {
+                "= "
+            };
+            typed(terminal, &answer, shown);
+            terminal.wait_for("Enter: save");
+            terminal.keys("\r");
+            terminal.wait_until("the next page", |s| !s.contains(PROMPT));
+        } else if !page.contains(PROMPT) {
+            play(terminal, "P01");
+        }
+        std::thread::sleep(Duration::from_millis(3));
+    }
+    panic!("the session ended before");
+}
+
+fn start(folder: &Path) -> Terminal {
+    let arguments = ["run", "p", "--operator", "lw"];
+    let mut terminal = Terminal::start(&arguments, folder, 24, 80);
+    terminal.wait_for("Who takes part?");
+    terminal
+}
+
+/// A session with a failed interval, a correction, a quit during a trial and a resume. The
+/// columns of `ratings.csv` of the counted trials.
+fn eventful(folder: &Path, observer: Observer) -> Vec<csv::StringRecord> {
+    let mut terminal = start(folder);
+    // An interval fails: the last of the trial, where it has several.
+    play_until(&mut terminal, folder, observer, |s| {
+        done(folder) >= 1
+            && (s.contains("SECOND")
+                || s.contains("THIRD")
+                || (s.contains("Feel the") && !s.contains("FIRST")))
+    });
+    typed(&mut terminal, F4, "Enter: mark as bad");
+    terminal.keys("somebody came in\r");
+    terminal.wait_until("the dialog to close", |s| !s.contains("mark as bad"));
+    // The newest answer is corrected.
+    play_until(&mut terminal, folder, observer, |s| {
+        done(folder) >= 3 && s.contains("Enter: when ready")
+    });
+    let last = completed(folder).pop().unwrap();
+    typed(&mut terminal, F3, "Correct");
+    typed(&mut terminal, "\r", "Enter: continue");
+    terminal.keys(&observer(&last).1);
+    std::thread::sleep(Duration::from_millis(50));
+    typed(&mut terminal, "\r", "Enter: correct");
+    terminal.keys("mistyped\r");
+    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: correct"));
+    // Quit while a trial is under way, and resume.
+    play_until(&mut terminal, folder, observer, |s| {
+        done(folder) >= 4 && (s.contains("FIRST") || s.contains("Feel the"))
+    });
+    typed(&mut terminal, F10, "Are you sure?");
+    terminal.keys("y");
+    assert_eq!(terminal.exit_code(), 0);
+    let mut terminal = start(folder);
+    play_until(&mut terminal, folder, observer, |s| {
+        s.contains("Enter: close")
+    });
+    terminal.keys("\r");
+    assert_eq!(terminal.exit_code(), 0);
+
+    let (code, out, err) = study(&["verify", "results"], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    let (code, out, err) = study(&["analyze", "results", "--include", "pilot"], folder);
+    assert_eq!(code, 0, "{out}{err}");
+    let attempts = fs::read_to_string(folder.join("results/p/attempts.csv")).unwrap();
+    assert_eq!(
+        attempts.matches("somebody came in").count(),
+        1,
+        "{attempts}"
+    );
+    let mut table = csv::Reader::from_path(folder.join("results/p/ratings.csv")).unwrap();
+    let header = table.headers().unwrap().clone();
+    let at = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let (status, corrected) = (at("status"), at("corrected"));
+    let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
+    assert!(rows.iter().all(|r| &r[status] == "ok"));
+    assert_eq!(rows.iter().filter(|r| &r[corrected] == "true").count(), 1);
+    assert_eq!(rows.len(), completed(folder).len());
+    rows
+}
+
+/// Hears a comparison of 1.5 and above; of less the other interval is said.
+fn hears(attempt: &Json) -> (String, String) {
+    let comparison = attempt["intervals"][0] != "up.standard";
+    let heard = attempt["level"]["presented"].as_f64().unwrap() >= 1.5;
+    let (first, second) = ("1".to_owned(), "2".to_owned());
+    // The comparison is first, or second; `comparison == heard` says "first".
+    if comparison == heard {
+        (first, second)
+    } else {
+        (second, first)
+    }
+}
+
+/// The levels that this observer gets from the rule, trial by trial, from outside.
+fn expected(folder: &Path) -> Vec<(f64, f64)> {
+    let mut answers = "answer\n".to_owned();
+    let mut levels = Vec::new();
+    // The first answer is a guess that is replaced once the first level is known.
+    let replay = |answers: &str| -> Json {
+        fs::write(folder.join("answers.csv"), answers).unwrap();
+        let arguments = [
+            "schedule",
+            "p",
+            "--answers",
+            "answers.csv",
+            "--json",
+            "--results",
+            "none",
+        ];
+        let (code, out, err) = study(&arguments, folder);
+        assert_eq!(code, 0, "{err}");
+        serde_json::from_str(&out).unwrap()
+    };
+    let first = replay("answer\n1\n")["tracks"][0]["trials"][0].clone();
+    let mut next = first;
+    while !next.is_null() {
+        let level = |key: &str| next[key].as_f64().unwrap();
+        levels.push((level("proposed"), level("presented")));
+        answers += if level("presented") >= 1.5 {
+            "1\n"
+        } else {
+            "0\n"
+        };
+        next = replay(&answers)["tracks"][0]["next"].clone();
+    }
+    levels
+}
+
+/// The track of a session with trouble is that of a session without.
+fn track_by_keys(vary: &str, procedure: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    written(folder.path(), &track(vary, procedure));
+    eventful(folder.path(), hears);
+    let level = |a: &Json, key: &str| a["level"][key].as_f64().unwrap();
+    let levels: Vec<(f64, f64)> = (completed(folder.path()).iter())
+        .map(|a| (level(a, "proposed"), level(a, "presented")))
+        .collect();
+    assert_eq!(levels, expected(folder.path()));
+    assert!(levels.len() > 5, "{levels:?}");
+}
+
+#[test]
+fn a_staircase_on_damping_by_keys() {
+    let rule = r#"{ rule = "staircase", up = 1, down = 2, start = 2.0, steps = [0.4, 0.2], stop = { reversals = 3, max_trials = 9 }, estimate_last = 2 }"#;
+    track_by_keys("b", rule);
+}
+
+#[test]
+fn a_quest_plus_track_on_detent_strength_by_keys() {
+    track_by_keys("detent", r#"{ rule = "quest+", trials = 7 }"#);
+}
+
+#[test]
+fn abx_of_two_realizations_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = format!(
+        r#"{}[[parts]]
+id = "answer"
+kind = "discrimination"
+prompt = "{PROMPT}"
+tracks = ["abx"]
+gap_s = 0.2
+exposure = {{ max_s = 0.4 }}
+[[tracks]]
+id = "abx"
+method = "abx"
+models = ["l9991", "l9999"]
+procedure = {{ rule = "constant", repetitions = 6 }}
+"#,
+        models()
+    );
+    written(folder.path(), &part);
+    let third = |attempt: &Json| {
+        let intervals = &attempt["intervals"];
+        let answers = ("1".to_owned(), "2".to_owned());
+        match intervals[0] == intervals[2] {
+            true => answers,
+            false => (answers.1, answers.0),
+        }
+    };
+    let rows = eventful(folder.path(), third);
+    assert_eq!(rows.len(), 6);
+    // All answers were right, and one was corrected to a wrong one.
+    let correct = rows.iter().filter(|r| r.iter().any(|cell| cell == "abx"));
+    assert_eq!(correct.count(), 6);
+    let (_, out, _) = study(
+        &["analyze", "results", "--include", "pilot", "--json"],
+        folder.path(),
+    );
+    let document: Json = serde_json::from_str(&out).unwrap();
+    assert!(document["parts"][0]["values"]["sdt/P01/abx/d_differencing"].is_number());
+}
+
+#[test]
+fn all_pairs_of_five_realizations_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = format!(
+        r#"{}[[parts]]
+id = "answer"
+kind = "pairs"
+prompt = "{PROMPT}"
+repetitions = 1
+tie = true
+gap_s = 0.2
+exposure = {{ max_s = 0.4 }}
+"#,
+        models()
+    );
+    written(folder.path(), &part);
+    // The realization whose name comes first is preferred.
+    let smaller = |attempt: &Json| {
+        let name = |i: usize| attempt["intervals"][i].as_str().unwrap().to_owned();
+        let first = name(0) < name(1);
+        let answers = ("1".to_owned(), "2".to_owned());
+        if first {
+            answers
+        } else {
+            (answers.1, answers.0)
+        }
+    };
+    let rows = eventful(folder.path(), smaller);
+    assert_eq!(rows.len(), 10, "each pair once");
+    let pairs: std::collections::BTreeSet<Vec<String>> = (completed(folder.path()).iter())
+        .map(|a| {
+            let names = a["intervals"].as_array().unwrap().iter();
+            let mut names: Vec<String> = names.map(|n| n.to_string()).collect();
+            names.sort();
+            names
+        })
+        .collect();
+    assert_eq!(pairs.len(), 10);
+}
+
+#[test]
+fn magnitude_estimation_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = format!(
+        r#"[[families]]
+id = "f"
+from = "models/static.toml"
+vary = "detent"
+levels = [0.5, 1.0, 2.0]
+[[parts]]
+id = "answer"
+kind = "magnitude"
+prompt = "{PROMPT}"
+family = "f"
+repetitions = 2
+exposure = {{ max_s = 0.4 }}
+"#
+    );
+    written(folder.path(), &part);
+    // Ten times the level, which the name of the realization has as its step.
+    let tenfold = |attempt: &Json| {
+        let number = match attempt["model"].as_str().unwrap() {
+            "f.1" => "5",
+            "f.2" => "10",
+            _ => "20",
+        };
+        (number.to_owned(), "\u{15}7,5".to_owned())
+    };
+    let rows = eventful(folder.path(), tenfold);
+    assert_eq!(rows.len(), 6);
+    let cell = |row: &csv::StringRecord, text: &str| row.iter().any(|cell| cell == text);
+    assert_eq!(rows.iter().filter(|r| cell(r, "7.5")).count(), 1);
+    let (_, out, _) = study(
+        &["analyze", "results", "--include", "pilot", "--json"],
+        folder.path(),
+    );
+    let document: Json = serde_json::from_str(&out).unwrap();
+    let part = &document["parts"][0];
+    assert_eq!(
+        (&part["task"], &part["trials"]),
+        (&"magnitude".into(), &6.into())
+    );
+    assert!(part["values"]["magnitude/exponent"].as_f64().unwrap() > 0.3);
+}
