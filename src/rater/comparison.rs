@@ -73,15 +73,15 @@ impl Percepts {
                 .iter()
                 .chain(&own.presentations.practice);
             let hidden = own.presentations.models.iter().find(is_hidden);
-            let reference = own.reference.as_ref().or(hidden);
+            let named = own.reference.as_ref().or(hidden);
+            let Some(beside) = named.and_then(|id| tables.get(id)) else {
+                continue;
+            };
             for model in models {
-                if let (Some(a), Some(b)) =
-                    (tables.get(model), reference.and_then(|r| tables.get(r)))
-                {
+                if let Some(table) = tables.get(model) {
+                    let distance = Impression::distance_n(table, beside, &reference);
                     let key = (part.id.clone(), model.clone());
-                    percepts
-                        .from_reference
-                        .insert(key, Impression::distance_n(a, b));
+                    percepts.from_reference.insert(key, distance);
                 }
             }
         }
