@@ -222,8 +222,8 @@ fn dots_in_one_place_are_drawn_once() {
 
 #[test]
 fn a_note_about_the_data_is_in_the_picture() {
+    assert!(!sample().to_svg().contains("<desc>"));
     let mut figure = sample();
-    assert!(!figure.to_svg().contains("<desc>"));
     figure.note = Some("a < b \u{202e}".to_owned());
     assert!(figure.to_svg().contains("<desc>a &lt; b \\u{202e}</desc>"));
 }
