@@ -48,6 +48,8 @@ pub struct Identity {
     pub mechanisms: bool,
     /// Largest stiffness of a certified realization, N/mm, if it tells.
     pub stiffness_n_per_mm: Option<f64>,
+    /// The version of its firmware, if it tells it.
+    pub firmware: Option<String>,
 }
 
 /// Why a command was refused immediately.

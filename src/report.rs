@@ -7,6 +7,7 @@
 mod answers;
 mod apa;
 pub mod chart;
+pub mod commission;
 pub mod comparison;
 pub mod csv;
 pub mod figures;

@@ -1,9 +1,12 @@
 //! `study device`: ports, device tests and the simulated device.
 
 mod check;
+mod commission;
 mod hold;
 pub(super) mod port;
+pub(super) mod record;
 mod rendered;
+mod rendering;
 #[cfg(unix)]
 mod safety;
 #[cfg(unix)]
@@ -37,6 +40,8 @@ enum What {
     Info(check::InfoArgs),
     /// Test a device on a serial port against the clauses of docs/wire.md
     Check(check::CheckArgs),
+    /// Guide through what only a person can check: weight, ruler, emergency stop, friction
+    Commission(commission::Args),
     /// Run a simulated device on a pseudo-terminal; its path is the first line of output
     #[cfg(unix)]
     Simulate(simulate::Args),
@@ -65,6 +70,7 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         What::List { json } => list(*json, console),
         What::Info(args) => check::info(args, console),
         What::Check(args) => check::check(args, console),
+        What::Commission(args) => commission::run(args, console),
         What::Hold(args) => hold::run(args, console),
         #[cfg(unix)]
         What::Safety(args) => safety::run(args, console),

@@ -2,7 +2,7 @@
 
 use super::{Console, Failure};
 use crate::device::host::HostSettings;
-use crate::device::link::LinkedDevice;
+use crate::device::link::{LinkedDevice, Priority};
 use crate::device::manual::{Manual, WithManual};
 use crate::device::process::{HELLO_TIMEOUT, Opened, Opening, ProcessDevice};
 use crate::device::serial::{BAUD, SerialOpener};
@@ -254,6 +254,15 @@ impl<'a> WaitDisplay<'a> {
         Self::Line(console, false)
     }
 
+    /// Prints a line on standard error, unless a screen is open.
+    fn say(&mut self, text: &str) {
+        match self {
+            Self::Line(console, _) => console.say(text),
+            Self::Screen(_, Some(_)) => {}
+            Self::Screen(_, None) => Console::of_process().say(text),
+        }
+    }
+
     /// Shows the waiting and returns whether the user cancelled.
     fn cancelled(&mut self, program: &str, since: Duration) -> bool {
         match self {
@@ -294,7 +303,16 @@ pub(super) fn open(
             let options = Options::seeded(protocol.study.seed);
             Box::new(VirtualDevice::new(options))
         }
-        DeviceKind::Serial => Box::new(address.serial.open_serial(HostSettings::default())?),
+        DeviceKind::Serial => {
+            let device = address.serial.open_serial(HostSettings::default())?;
+            if device.status().priority == Priority::Usual {
+                display.say(
+                    "warning: the system permits no higher priority for the thread that sends heartbeats; \
+                     on a busy computer the device may go limp (docs/devices.md)",
+                );
+            }
+            Box::new(device)
+        }
         DeviceKind::Process => match address.open_program(display)? {
             Some(device) => Box::new(device),
             None => return Ok(None),
@@ -311,6 +329,29 @@ pub(super) fn with_manual_samples(device: Box<dyn Device>, protocol: &Protocol) 
         Box::new(WithManual::new(device))
     } else {
         device
+    }
+}
+
+/// The device that was tested.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Tested {
+    /// Its serial number; of a program its id.
+    pub(super) serial: String,
+    /// Version of its firmware, if it tells it.
+    pub(super) firmware: Option<String>,
+    /// Whether it is simulated.
+    pub(super) simulated: bool,
+}
+
+impl Tested {
+    /// Of an open device.
+    pub(super) fn of(device: &dyn Device) -> Self {
+        let identity = device.identity();
+        Self {
+            serial: identity.id,
+            firmware: identity.firmware,
+            simulated: identity.simulated,
+        }
     }
 }
 

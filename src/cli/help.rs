@@ -217,6 +217,14 @@ pub(super) const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
                 "study device check --port /dev/ttyACM0",
                 "does it conform to docs/wire.md?",
             ),
+            (
+                "study device check --port /dev/ttyACM0 --rendering --save",
+                "and is its force that of its tables?",
+            ),
+            (
+                "study device commission --port /dev/ttyACM0",
+                "a weight, a ruler, the emergency stop",
+            ),
             ("study device simulate", "a device on a pseudo-terminal"),
         ],
     ),

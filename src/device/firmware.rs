@@ -251,6 +251,12 @@ impl Firmware {
         self.reboot(at);
     }
 
+    /// In playbacks somebody holds the handle at this place instead of moving it to and
+    /// fro, mm, as at a ruler.
+    pub fn hold_at(&mut self, x_mm: f64) {
+        self.body.hold_at(x_mm);
+    }
+
     /// Trips, as by a guard, a button or a fault of the drive.
     pub fn trip(&mut self, fault: Fault, at: Duration) {
         self.advance(at);

@@ -538,6 +538,7 @@ fn identity(device: &message::Identity) -> Option<Identity> {
         servo: device.constants.map(|told| servo(device, &told)),
         mechanisms: device.constants.is_some_and(|told| told.features.mechanism),
         stiffness_n_per_mm: Some(device.stiffness_n_per_mm),
+        firmware: Some(display_name(&device.firmware)),
     })
 }
 

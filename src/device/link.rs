@@ -8,7 +8,7 @@
 //! on a pseudo-terminal.
 
 pub mod memory;
-mod priority;
+pub mod priority;
 #[cfg(unix)]
 pub mod pty;
 

@@ -78,6 +78,7 @@ impl Device for Manual {
             servo: None,
             mechanisms: false,
             stiffness_n_per_mm: None,
+            firmware: None,
         }
     }
 

@@ -327,6 +327,7 @@ fn identity(hello: Hello) -> Identity {
         servo: None,
         mechanisms: hello.mechanisms,
         stiffness_n_per_mm: None,
+        firmware: None,
     }
 }
 

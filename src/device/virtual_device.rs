@@ -231,6 +231,7 @@ impl Device for VirtualDevice {
             servo: None,
             mechanisms: true,
             stiffness_n_per_mm: None,
+            firmware: None,
         })
     }
 

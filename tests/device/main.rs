@@ -6,6 +6,7 @@ mod check;
 #[path = "../support/designs.rs"]
 mod designs;
 mod playback;
+mod port;
 mod precision;
 mod process;
 mod rendering;

@@ -26,7 +26,7 @@ use study_wire::servo::ServoSettings;
 const PAGE: &str = "docs/wrong-devices.md";
 
 /// The tables of the shipped protocols with the limits of their playback.
-fn shipped() -> Vec<(ModelId, Realization, Limits)> {
+pub(crate) fn shipped() -> Vec<(ModelId, Realization, Limits)> {
     let mut all = Vec::new();
     for protocol in [
         "protocols/turn-signal",
@@ -78,12 +78,12 @@ fn mixed(direction: Direction) -> Realization {
 }
 
 /// What a playback reports, and what the device says of its servo.
-struct Heard {
-    samples: Vec<Sample>,
-    playback: Option<Playback>,
-    servo: Option<ServoSettings>,
+pub(crate) struct Heard {
+    pub(crate) samples: Vec<Sample>,
+    pub(crate) playback: Option<Playback>,
+    pub(crate) servo: Option<ServoSettings>,
     /// Why the playback has no end, if it has none.
-    failed: Vec<Report>,
+    pub(crate) failed: Vec<Report>,
 }
 
 /// Loads, plays for `seconds` and stops, each table in turn; what the last reports.
@@ -139,7 +139,7 @@ fn play(options: Options, tables: &[(&Realization, Limits)], seconds: f64) -> He
 }
 
 /// The verdict as a session gives it.
-fn judged(
+pub(crate) fn judged(
     id: &ModelId,
     table: &Realization,
     limits: Limits,

@@ -47,6 +47,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
             lever_mm: None,
             uncertified: None,
             rendering: Default::default(),
+            check_within_h: None,
         },
         trial: TrialRules {
             reference: None,

@@ -267,6 +267,10 @@ pub struct DeviceRules {
     /// When a playback is right. Not part of the stimulus.
     #[serde(skip)]
     pub rendering: RenderingRules,
+    /// Hours within which the device must have passed its check. In no fingerprint: it
+    /// concerns the laboratory.
+    #[serde(skip)]
+    pub check_within_h: Option<f64>,
 }
 
 /// `[device.rendering]`: when a playback is right.

@@ -1,14 +1,17 @@
 //! `study device info` and `study device check`.
 
 use super::port::PortConnection;
+use super::record::{Record, RecordKind};
+use super::rendering;
+use super::single_playback::Pace;
 use crate::cli::device_selection::{
-    COMMISSIONED, COMMISSIONED_FILE, Commissioned, DeviceAddress, SerialPortArgs, WaitDisplay,
+    COMMISSIONED, COMMISSIONED_FILE, Commissioned, DeviceAddress, Tested, WaitDisplay,
 };
 use crate::cli::{Console, Failure, Kind};
 use crate::device::check::{self, Commissioning, Verdict};
-use crate::device::host::display_name;
-use crate::device::link::nonce;
-use crate::device::{Device as _, process};
+use crate::device::host::{HostSettings, display_name};
+use crate::device::link::{nonce, priority};
+use crate::device::{Device, process};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
 use study_wire::message::{Fault, Identity};
@@ -27,14 +30,24 @@ pub(in crate::cli) struct InfoArgs {
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct CheckArgs {
     #[command(flatten)]
-    port: SerialPortArgs,
+    address: DeviceAddress,
+    /// Also play tables in which each term, look-up and direction rule counts, and judge each
+    /// playback as in a session; somebody moves the handle
+    #[arg(long)]
+    rendering: bool,
+    /// Print all messages of the wire format with their bytes, as JSON, and end
+    #[arg(long, exclusive = true)]
+    golden: bool,
     /// Also play each table of this study and compare the rendered force with the table
     #[arg(long, value_name = "PROTOCOL")]
     models: Option<PathBuf>,
-    /// Save the result in device-check.json; sessions with this device that are started
-    /// in this folder record it
+    /// Save the result in devices/ of the results folder, where sessions look for it, and in
+    /// device-check.json
     #[arg(long)]
     save: bool,
+    /// Folder of all results
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    results: PathBuf,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -173,7 +186,15 @@ fn described(device: &Identity) -> serde_json::Value {
 
 /// Tests a device against the clauses of the wire format.
 pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(), Failure> {
-    let mut connection = PortConnection::open(&args.port)?;
+    if args.golden {
+        return console.document(GOLDEN);
+    }
+    if args.address.is_program()? {
+        return program_rendering(args, console);
+    }
+    // A host that is late says nothing of the device.
+    priority::raise();
+    let mut connection = PortConnection::open(&args.address.serial)?;
     let address = connection.address.clone();
     if !args.json {
         console.say(format!(
@@ -191,16 +212,56 @@ pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(
     printed?;
     // The port can be opened only once at a time.
     drop(connection);
+    let port = &args.address.serial;
     let rendered = match &args.models {
-        Some(protocol) if result.passes() => Some(super::rendered::compare_all(
-            protocol, &args.port, console, json,
-        )?),
+        Some(protocol) if result.passes() => {
+            Some(super::rendered::compare_all(protocol, port, console, json)?)
+        }
         _ => None,
     };
-    if args.save {
-        save(&result)?;
+    let rendering = match (args.rendering && result.passes(), &result.device) {
+        (true, Some(told)) => {
+            let [low, high] = told.stroke_mm;
+            let mut device = port.open_serial(HostSettings::default())?;
+            Some(judge_rendering(
+                &mut device,
+                middle(low, high),
+                console,
+                json,
+            )?)
+        }
+        _ => None,
+    };
+    let mut summary = result.summary();
+    if let Some(all) = &rendering {
+        let [passed, failed, open] = rendering::tally(all);
+        summary.push_str(&format!(
+            "; rendering: {passed} of {} passed, {failed} failed, {open} not judged",
+            all.len()
+        ));
     }
-    let passes = result.passes();
+    let right = |all: &Vec<_>| rendering::tally(all)[0] == all.len();
+    let passes = result.passes()
+        && rendering.as_ref().is_none_or(right)
+        && (rendered.iter().flatten()).all(super::rendered::Rendered::is_right);
+    if args.save
+        && let Some(device) = &result.device
+    {
+        save(&result)?;
+        let tested = Tested {
+            serial: display_name(&device.serial),
+            firmware: Some(display_name(&device.firmware)),
+            simulated: device.flags.simulated,
+        };
+        let parts = serde_json::json!({
+            "clauses": result.verdicts,
+            "rendering": rendering,
+            "models": rendered,
+        });
+        let record = Record::new(RecordKind::Check, tested, passes, summary.clone(), parts);
+        let path = record.save(&args.results)?;
+        console.say(format!("saved: {}", path.display()));
+    }
     if json {
         let document = serde_json::json!({
             "format": "study-device-check/1",
@@ -210,16 +271,88 @@ pub(in crate::cli) fn check(args: &CheckArgs, console: &mut Console) -> Result<(
             "verdicts": result.verdicts,
             "latency_ms": result.latency_ms,
             "models": rendered,
+            "rendering": rendering,
         });
         console.json(&document)?;
     } else {
-        console.out(format!("{}\n", result.summary()))?;
+        console.out(format!("{summary}\n"))?;
     }
     if passes {
         return Ok(());
     }
     Err(failed(&address, &result))
 }
+
+/// Plays the tables of the rendering check and prints each result.
+fn judge_rendering(
+    device: &mut dyn Device,
+    middle_mm: f64,
+    console: &mut Console,
+    quiet: bool,
+) -> Result<Vec<rendering::Rendered>, Failure> {
+    if !quiet {
+        console.say(rendering::prompt());
+    }
+    rendering::check(device, middle_mm, Pace::real(), &mut |result| match quiet {
+        true => Ok(()),
+        false => console.out(result.line()),
+    })
+}
+
+/// Where the tables of the rendering check lie: the middle of the stroke; the simulated
+/// device has its handle at 17.5 mm and a stroke of −20 to 60 mm.
+fn middle(low: f64, high: f64) -> f64 {
+    0.5 * (low + high)
+}
+
+/// The golden bytes of docs/wire.md.
+const GOLDEN: &str = include_str!("../../../docs/wire-frames.json");
+
+/// The rendering of a controller program: it has no clauses of the wire format.
+fn program_rendering(args: &CheckArgs, console: &mut Console) -> Result<(), Failure> {
+    if args.models.is_some() {
+        return Err(Failure::usage("--models needs a device on a port"));
+    }
+    let mut display = WaitDisplay::in_a_line(console);
+    let Some(mut device) = args.address.open_program(&mut display)? else {
+        return Ok(());
+    };
+    let all = judge_rendering(&mut device, PROGRAM_MIDDLE_MM, console, args.json)?;
+    let [passed, failed, open] = rendering::tally(&all);
+    let summary = format!(
+        "rendering: {passed} of {} passed, {failed} failed, {open} not judged",
+        all.len()
+    );
+    let pass = passed == all.len();
+    if args.save {
+        let parts = serde_json::json!({ "rendering": all });
+        let tested = Tested::of(&device);
+        let record = Record::new(RecordKind::Check, tested, pass, summary.clone(), parts);
+        let path = record.save(&args.results)?;
+        console.say(format!("saved: {}", path.display()));
+    }
+    if args.json {
+        let document = serde_json::json!({
+            "format": "study-device-check/1",
+            "device": device.identity().id,
+            "pass": pass,
+            "rendering": all,
+        });
+        console.json(&document)?;
+    } else {
+        console.out(format!("{summary}\n"))?;
+    }
+    match pass {
+        true => Ok(()),
+        false => Err(Failure::device(
+            "the program does not render its tables as the servo of docs/wire.md",
+        )
+        .hint("a program with other constants is only marked in sessions; docs/devices.md")),
+    }
+}
+
+/// Middle of the tables for a program, which tells no stroke, mm.
+const PROGRAM_MIDDLE_MM: f64 = 17.5;
 
 fn save(result: &Commissioning) -> Result<(), Failure> {
     let Some(device) = &result.device else {
@@ -239,7 +372,11 @@ fn save(result: &Commissioning) -> Result<(), Failure> {
 }
 
 fn line(verdict: &Verdict) -> String {
-    let mark = if verdict.pass { "pass" } else { "FAIL" };
+    let mark = match (verdict.pass, verdict.judged) {
+        (true, _) => "pass",
+        (false, true) => "FAIL",
+        (false, false) => "open",
+    };
     format!(
         "{mark}  {:<5} {}\n            {}\n",
         verdict.clause,
@@ -250,6 +387,20 @@ fn line(verdict: &Verdict) -> String {
 
 fn failed(address: &str, result: &Commissioning) -> Failure {
     let clauses = result.failed_clauses().join(", ");
+    if clauses.is_empty() && !result.unjudged_clauses().is_empty() {
+        return Failure::device(format!(
+            "{}: this computer was too late to judge every clause",
+            Untrusted(address)
+        ))
+        .hint("end other programs and repeat the check; the device is not accused");
+    }
+    if clauses.is_empty() {
+        return Failure::device(format!(
+            "{}: its force is not shown to be that of its tables",
+            Untrusted(address)
+        ))
+        .hint("do not use it with participants before this is corrected");
+    }
     Failure::device(format!(
         "{}: it violates clause {clauses} of docs/wire.md",
         Untrusted(address)

@@ -3,7 +3,7 @@
 //! For measurements of the link: telemetry over minutes, memory, and the force after
 //! this program is killed.
 
-use super::single_playback;
+use super::single_playback::{self, Pace};
 use crate::cli::device_selection::{DeviceAddress, WaitDisplay};
 use crate::cli::{Console, Failure, Kind, load};
 use crate::device::host::HostSettings;
@@ -61,6 +61,7 @@ pub(in crate::cli) fn run(args: &Args, console: &mut Console) -> Result<(), Fail
         &Stimulus::of_table(&table),
         limits,
         Duration::from_secs(args.seconds),
+        &mut Pace::real(),
         &mut |_| {
             if lines.try_recv().is_ok_and(|line| line.trim() == STALL) {
                 std::thread::sleep(Duration::from_secs(1));

@@ -4,7 +4,7 @@
 //! like recordings, and speed and acceleration are differences of the position. The
 //! VAF of the rendered force is therefore comparable with that of the identification.
 
-use super::single_playback;
+use super::single_playback::{self, Pace};
 use crate::cli::device_selection::SerialPortArgs;
 use crate::cli::{Console, Failure, load};
 use crate::device::host::HostSettings;
@@ -13,7 +13,7 @@ use crate::runner::playback_limits;
 use serde::Serialize;
 use std::path::Path;
 use std::time::Duration;
-use study_core::outcome::Sample;
+use study_core::outcome::{Sample, Verdict};
 use study_core::protocol::DeviceKind;
 use study_haptics::identify::signal::{LowPass, difference};
 use study_haptics::identify::vaf::{self, Score};
@@ -53,6 +53,15 @@ pub(super) struct Rendered {
     measured: bool,
     strokes: u32,
     clamps: u64,
+    /// Whether the force was that of the table, as in a session.
+    rendering: Verdict,
+}
+
+impl Rendered {
+    /// Whether the force was right, or too little was felt to tell.
+    pub(super) fn is_right(&self) -> bool {
+        self.rendering == Verdict::Ok
+    }
 }
 
 /// Plays and compares each table of a study.
@@ -70,7 +79,7 @@ pub(super) fn compare_all(
             "move the handle from end to end, {} s for each table",
             PLAYBACK.as_secs()
         ));
-        console.out("rendered        VAF   bias N   residual N   identified VAF\n")?;
+        console.out("rendered        VAF   bias N   residual N   identified VAF   verdict\n")?;
     }
     for entry in &loaded.protocol.models {
         let Some(table) = loaded.models.get(&entry.id) else {
@@ -94,8 +103,14 @@ pub(super) fn compare_all(
                 }
             }
         };
-        let playback =
-            single_playback::play(&mut device, &stimulus, limits, PLAYBACK, &mut collect);
+        let playback = single_playback::play(
+            &mut device,
+            &stimulus,
+            limits,
+            PLAYBACK,
+            &mut Pace::real(),
+            &mut collect,
+        );
         let playback = playback.map_err(|e| {
             Failure::device(format!("{}: {e}", entry.id))
                 .hint("hold the handle during the playback")
@@ -111,12 +126,18 @@ pub(super) fn compare_all(
             measured,
             strokes: playback.strokes,
             clamps: playback.clamp_count,
+            rendering: super::rendering::fidelity(&device, table, limits, &samples, &playback)?
+                .verdict,
         };
         if !json {
             let identified = entry.vaf.map_or("–".to_owned(), |vaf| format!("{vaf:.3}"));
             console.out(format!(
-                "{:<14} {:>5.3}   {:>6.3}   {:>10.3}   {identified}\n",
-                entry.id, score.vaf, score.bias_n, score.residual_n
+                "{:<14} {:>5.3}   {:>6.3}   {:>10.3}   {identified:>14}   {}\n",
+                entry.id,
+                score.vaf,
+                score.bias_n,
+                score.residual_n,
+                rendered.rendering.as_str()
             ))?;
         }
         all.push(rendered);

@@ -79,7 +79,7 @@ fn wrong(given: &str) -> Result<WrongLoads, ArgumentError> {
 }
 
 /// Commands on standard input, one per line.
-const CONTROLS: &str = "unplug, plug, reset, trip, stall MS, quit";
+const CONTROLS: &str = "unplug, plug, reset, trip, stall MS, hold MM, quit";
 /// Additional delay of a frame with the fault `delay`.
 const EXTRA_DELAY: Duration = Duration::from_millis(20);
 
@@ -134,6 +134,10 @@ fn command(line: &str) -> Option<Command> {
         "stall" => {
             let ms = words.next()?.parse().ok()?;
             Command::Control(Control::Stall(Duration::from_millis(ms)))
+        }
+        "hold" => {
+            let x_mm = words.next()?.parse().ok().filter(|x: &f64| x.is_finite())?;
+            Command::Control(Control::Hold(x_mm))
         }
         "quit" => Command::Quit,
         _ => return None,

@@ -10,6 +10,39 @@ const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time between two polls, as in a session.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
+/// The time of a playback.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Pace {
+    /// Since this instant.
+    Real(Instant),
+    /// Virtual time, which passes while somebody waits.
+    #[cfg(test)]
+    Virtual(Duration),
+}
+
+impl Pace {
+    /// The real time, from now on.
+    pub(super) fn real() -> Self {
+        Self::Real(Instant::now())
+    }
+
+    fn at(self) -> Duration {
+        match self {
+            Self::Real(start) => start.elapsed(),
+            #[cfg(test)]
+            Self::Virtual(at) => at,
+        }
+    }
+
+    fn wait(&mut self) {
+        match self {
+            Self::Real(_) => std::thread::sleep(POLL_INTERVAL),
+            #[cfg(test)]
+            Self::Virtual(at) => *at += POLL_INTERVAL,
+        }
+    }
+}
+
 /// Why a playback failed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum PlaybackError {
@@ -28,22 +61,21 @@ pub(super) fn play(
     stimulus: &Stimulus<'_>,
     limits: Limits,
     duration: Duration,
+    pace: &mut Pace,
     turn: &mut dyn FnMut(&[Report]),
 ) -> Result<Playback, PlaybackError> {
-    let start = Instant::now();
-    let at = || start.elapsed();
-    device.load(stimulus, limits, at())?;
+    device.load(stimulus, limits, pace.at())?;
     let mut stop_at = None;
-    let mut due = ANSWER_TIMEOUT;
+    let mut due = pace.at() + ANSWER_TIMEOUT;
     loop {
-        let reports = device.poll(at());
+        let reports = device.poll(pace.at());
         turn(&reports);
         for report in reports {
             match report {
-                Report::Loaded => device.start(at())?,
+                Report::Loaded => device.start(pace.at())?,
                 Report::Started => {
-                    stop_at = Some(at() + duration);
-                    due = at() + duration + ANSWER_TIMEOUT;
+                    stop_at = Some(pace.at() + duration);
+                    due = pace.at() + duration + ANSWER_TIMEOUT;
                 }
                 Report::Stopped(playback) => return Ok(playback),
                 Report::Fault(reason) | Report::Lost(reason) => {
@@ -52,12 +84,12 @@ pub(super) fn play(
                 _ => {}
             }
         }
-        if stop_at.take_if(|stop_at| at() >= *stop_at).is_some() {
-            device.stop(at())?;
+        if stop_at.take_if(|stop_at| pace.at() >= *stop_at).is_some() {
+            device.stop(pace.at())?;
         }
-        if at() > due {
+        if pace.at() > due {
             return Err(PlaybackError::Timeout);
         }
-        std::thread::sleep(POLL_INTERVAL);
+        pace.wait();
     }
 }

@@ -45,6 +45,11 @@ pub(crate) struct Exchange<'w> {
     pub(crate) pulses: Vec<Pulse>,
     pub(crate) latency_ms: Option<[f64; 3]>,
     playback: u32,
+    /// How late this computer was at most since the last reset; with a simulated device also
+    /// how long that stood still.
+    pub(crate) late: Duration,
+    /// Arrival and clock of the first PULSE of the connection.
+    first_pulse: Option<(Duration, u32)>,
 }
 
 impl<'w> Exchange<'w> {
@@ -67,6 +72,8 @@ impl<'w> Exchange<'w> {
             pulses: Vec::new(),
             latency_ms: None,
             playback: 0,
+            late: Duration::ZERO,
+            first_pulse: None,
         }
     }
 
@@ -103,6 +110,7 @@ impl<'w> Exchange<'w> {
             .exchange(&bytes, wait)
             .map_err(|e| CheckFailure::Disconnected(e.to_string()))?;
         let at = self.now();
+        self.late = self.late.max(at.saturating_sub(now + wait));
         for byte in received {
             if let Some(Ok(body)) = self.decoder.push(byte) {
                 let body = body.to_vec();
@@ -124,6 +132,7 @@ impl<'w> Exchange<'w> {
                 if let Some((_, sent)) = sent {
                     self.clock.add(*sent, at, pulse.clock_ms);
                 }
+                self.compare_clocks(pulse.clock_ms, at);
                 self.pulses.push(pulse);
             }
             _ => self.replies.push(ReceivedReply {
@@ -132,6 +141,17 @@ impl<'w> Exchange<'w> {
                 body,
                 at,
             }),
+        }
+    }
+
+    /// The processor of a simulated device is this computer, which may be busy: its clock
+    /// then falls behind.
+    fn compare_clocks(&mut self, clock_ms: u32, at: Duration) {
+        let (first_at, first_ms) = *self.first_pulse.get_or_insert((at, clock_ms));
+        let own = Duration::from_millis(u64::from(clock_ms.wrapping_sub(first_ms)));
+        let behind = at.saturating_sub(first_at).saturating_sub(own);
+        if self.device.is_some_and(|device| device.flags.simulated) {
+            self.late = self.late.max(behind);
         }
     }
 
@@ -288,6 +308,7 @@ impl<'w> Exchange<'w> {
             return fail("its nonce is not that of HELLO");
         }
         self.clock = DeviceClock::default();
+        self.first_pulse = None;
         self.clock.add(sent, received.at, identity.clock_ms);
         self.device = Some(identity);
         Ok(identity)

@@ -10,6 +10,8 @@ use study_wire::predict::Motion;
 const SPEED_HZ: f64 = 200.0;
 /// Time from the end of a playback to the release of the handle, s.
 const RELEASE_S: f64 = 0.3;
+/// Speed of somebody who brings the handle to a place, mm/s.
+const GUIDED_MM_S: f64 = 40.0;
 /// Initial position of the handle, mm.
 const MIDDLE_MM: f64 = 17.5;
 
@@ -25,6 +27,8 @@ pub(super) struct Body {
     /// Force of the motor, N.
     force_n: f64,
     holder: Holder,
+    /// Where somebody holds the handle in a playback.
+    held_at: Option<f64>,
 }
 
 /// What moves the handle.
@@ -35,6 +39,8 @@ enum Holder {
     /// A hand; after the end of the playback `left` is the number of servo periods until
     /// it releases the handle.
     Hand { hand: Box<Hand>, left: Option<u32> },
+    /// Somebody who brings the handle to a place and holds it there.
+    Guided { motion: Motion, to_mm: f64 },
     /// A probe on its path.
     Probe(Box<ProbeContact>),
 }
@@ -67,6 +73,15 @@ impl Body {
             probe,
             force_n: 0.0,
             holder: Holder::Nobody { x_mm: MIDDLE_MM },
+            held_at: None,
+        }
+    }
+
+    /// See [`Firmware::hold_at`](super::Firmware::hold_at).
+    pub(super) fn hold_at(&mut self, x_mm: f64) {
+        self.held_at = Some(x_mm);
+        if let Holder::Guided { to_mm, .. } = &mut self.holder {
+            *to_mm = x_mm;
         }
     }
 
@@ -84,7 +99,7 @@ impl Body {
         match &self.holder {
             Holder::Nobody { .. } => false,
             Holder::Hand { left, .. } => left.is_none(),
-            Holder::Probe(_) => true,
+            Holder::Guided { .. } | Holder::Probe(_) => true,
         }
     }
 
@@ -93,8 +108,13 @@ impl Body {
     pub(super) fn take(&mut self, range_mm: Option<[f64; 2]>, upload: u32) {
         let upload = upload.to_string();
         let stream = |name| Stream::new(self.seed, &["device", name, &upload]);
-        self.holder = match range_mm {
-            Some([low, high]) => {
+        let here = Motion::at_rest(self.motion().x_mm);
+        self.holder = match (range_mm, self.held_at) {
+            (Some(_), Some(to_mm)) => Holder::Guided {
+                motion: here,
+                to_mm,
+            },
+            (Some([low, high]), None) => {
                 let margin = (0.1 * (high - low)).min(1.5);
                 let hand = Hand::new(self.hand, [low + margin, high - margin], stream("hand"));
                 Holder::Hand {
@@ -102,7 +122,7 @@ impl Body {
                     left: None,
                 }
             }
-            None => {
+            (None, _) => {
                 let x_mm = self.motion().x_mm;
                 Holder::Probe(Box::new(ProbeContact {
                     target: Target::new(self.target.clone(), x_mm).ok(),
@@ -126,6 +146,10 @@ impl Body {
             Holder::Hand { left, .. } => {
                 left.get_or_insert((RELEASE_S * self.servo_hz) as u32);
             }
+            Holder::Guided { motion, .. } => {
+                let x_mm = motion.x_mm;
+                self.rest(x_mm);
+            }
             Holder::Probe(contact) => {
                 let x_mm = contact.motion.x_mm;
                 self.rest(x_mm);
@@ -142,6 +166,7 @@ impl Body {
         match &self.holder {
             Holder::Nobody { x_mm } => Motion::at_rest(*x_mm),
             Holder::Hand { hand, .. } => hand.motion(),
+            Holder::Guided { motion, .. } => *motion,
             Holder::Probe(contact) => contact.motion,
         }
     }
@@ -195,6 +220,15 @@ impl Body {
                     }
                     Some(left) => *left -= 1,
                 }
+            }
+            Holder::Guided { motion, to_mm } => {
+                let most_mm = GUIDED_MM_S * period_s;
+                let step_mm = (*to_mm - motion.x_mm).clamp(-most_mm, most_mm);
+                *motion = Motion {
+                    x_mm: motion.x_mm + step_mm,
+                    v_mm_s: step_mm / period_s,
+                    a_m_s2: 0.0,
+                };
             }
             Holder::Probe(contact) => contact.pass(period_s),
         }

@@ -20,7 +20,7 @@ const REAL_TIME: i32 = 10;
 /// Asks for the best priority that the system permits for the current thread.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[allow(unsafe_code, reason = "no safe crate that is used here has the call")]
-pub(super) fn raise() -> Priority {
+pub fn raise() -> Priority {
     let parameters = libc::sched_param {
         sched_priority: REAL_TIME,
     };
@@ -38,6 +38,6 @@ pub(super) fn raise() -> Priority {
 /// Asks for the best priority that the system permits for the current thread: none is
 /// known here.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-pub(super) fn raise() -> Priority {
+pub fn raise() -> Priority {
     Priority::Usual
 }

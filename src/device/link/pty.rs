@@ -100,7 +100,7 @@ impl Pty {
 }
 
 /// An action on a simulated device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Control {
     /// Unplugs the cable.
     Unplug,
@@ -112,6 +112,8 @@ pub enum Control {
     Trip,
     /// Stops the device's processor for a time.
     Stall(Duration),
+    /// From the next playback on somebody holds the handle at this place, mm.
+    Hold(f64),
 }
 
 /// Timing of the simulator.
@@ -217,6 +219,7 @@ impl Simulator {
             Control::Reset => self.firmware.reset(self.now),
             Control::Trip => self.firmware.trip(Fault::External, self.now),
             Control::Stall(lasting) => self.firmware.stall(self.now, lasting),
+            Control::Hold(x_mm) => self.firmware.hold_at(x_mm),
         }
         Ok(())
     }

@@ -22,6 +22,9 @@ pub(super) const DEVICE: &[Key] = keys! {
     /// When the force of a playback was that of its table, and what follows if it was not.
     /// Needs a device that reports samples.
     "rendering": Kind::Table(RENDERING), r#"{ min_vaf = 0.9, on_fault = "fail" }"#;
+    /// Hours within which `study device check --save` must have passed on the device. A session
+    /// on another device is refused unless `study run --unchecked` says that it is meant.
+    "check_within_h": Kind::positive("h"), "24.0";
 };
 
 const RENDERING: &[Key] = keys! {
@@ -81,6 +84,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
             )),
         );
     }
+    let check_within_h = section.number("check_within_h");
     Some(DeviceRules {
         kind: kind?,
         limits: match limits {
@@ -92,6 +96,7 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<DeviceRules> {
         uncertified,
         lever_mm,
         rendering: rendering?,
+        check_within_h,
     })
 }
 

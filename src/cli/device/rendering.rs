@@ -1,0 +1,377 @@
+//! `study device check --rendering`: tables in which each term, look-up and direction rule
+//! counts are played, and each playback is judged as in a session.
+//!
+//! Somebody moves the handle; a simulated device has a hand. A playback with too little
+//! motion, or on a computer that was late, is not judged, and repeated.
+
+use super::single_playback::{self, Pace, PlaybackError};
+use crate::cli::Failure;
+use crate::device::{Device, Report, Stimulus, rendering_of};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::time::Duration;
+use study_base::limits::Limits;
+use study_base::text::{ModelId, Untrusted};
+use study_core::outcome::{Defect, Fidelity, Playback, Sample, Verdict};
+use study_core::protocol::RenderingRules;
+use study_core::rendering::{Played, judge};
+use study_haptics::model::{Branch, Provenance, Realization, Trained};
+use study_wire::message::Fault;
+use study_wire::predict::{Direction, Lookup};
+use study_wire::servo::ServoSettings;
+
+/// Duration of each playback.
+const PLAYBACK: Duration = Duration::from_secs(6);
+/// How often a playback that cannot be judged is repeated.
+const TRIES: usize = 3;
+/// Positions of the tables, relative to the middle of the stroke, mm.
+const REACH_MM: f64 = 14.0;
+/// Distance of the nodes, mm.
+const STEP_MM: f64 = 1.0;
+/// Largest force, N.
+const FORCE_N: f64 = 9.0;
+/// A velocity limit that every hand passes, mm/s.
+const SLOW_MM_S: f64 = 3.0;
+
+/// The result of one playback.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Rendered {
+    /// What was tested.
+    what: String,
+    /// `pass`, `fail` or `not judged`.
+    pub(super) result: &'static str,
+    seen: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fidelity: Option<Fidelity>,
+}
+
+impl Rendered {
+    fn new(what: &str, result: &'static str, seen: impl Into<String>) -> Self {
+        Self {
+            what: what.to_owned(),
+            result,
+            seen: seen.into(),
+            fidelity: None,
+        }
+    }
+
+    /// For the terminal.
+    pub(super) fn line(&self) -> String {
+        let mark = match self.result {
+            "fail" => "FAIL",
+            other => other,
+        };
+        let seen = Untrusted(&self.seen);
+        format!("{mark:<10}  {}\n            {seen}\n", self.what)
+    }
+}
+
+/// Number of results: passed, failed, not judged.
+pub(super) fn tally(all: &[Rendered]) -> [usize; 3] {
+    ["pass", "fail", "not judged"].map(|word| all.iter().filter(|r| r.result == word).count())
+}
+
+/// What the person at the device has to do.
+pub(super) fn prompt() -> String {
+    format!(
+        "move the handle to and fro over its whole range, {} s for each line",
+        PLAYBACK.as_secs()
+    )
+}
+
+/// Tests a device. `report` receives each result at once.
+pub(super) fn check(
+    device: &mut dyn Device,
+    middle_mm: f64,
+    mut pace: Pace,
+    report: &mut dyn FnMut(&Rendered) -> Result<(), Failure>,
+) -> Result<Vec<Rendered>, Failure> {
+    let mut all = Vec::new();
+    if !device.identity().telemetry {
+        return Err(Failure::device(
+            "the device reports no samples: its rendering cannot be judged",
+        ));
+    }
+    for (what, table) in tables(middle_mm) {
+        let result = one(device, &what, &table, &mut pace);
+        report(&result)?;
+        all.push(result);
+    }
+    let result = trip(device, middle_mm, &mut pace);
+    report(&result)?;
+    all.push(result);
+    Ok(all)
+}
+
+/// Every term by itself and together, with each look-up and direction rule.
+fn tables(middle_mm: f64) -> Vec<(String, Realization)> {
+    let all = [0.3, 0.02, 0.15, 1.0];
+    let mut tables = Vec::new();
+    for (i, term) in ["mass", "damping", "stiffness", "offset"]
+        .iter()
+        .enumerate()
+    {
+        let mut only = [0.0; 4];
+        only[i] = all[i];
+        let what = format!("{term} alone");
+        tables.push((
+            what,
+            table(middle_mm, only, Lookup::Linear, Direction::Sign),
+        ));
+    }
+    let lookups = [
+        ("linear", Lookup::Linear),
+        ("floor", Lookup::Floor),
+        ("nearest", Lookup::Nearest),
+    ];
+    let rules = [
+        ("sign", Direction::Sign),
+        ("play", Direction::Play { delta_mm: 3.0 }),
+        ("Dahl", Direction::Dahl { delta_mm: 3.0 }),
+    ];
+    for (lookup, how) in lookups {
+        for (rule, direction) in rules {
+            let what = format!("all terms, look-up {lookup}, direction {rule}");
+            tables.push((what, table(middle_mm, all, how, direction)));
+        }
+    }
+    tables
+}
+
+/// A table with these terms: mass kg, damping N·s/mm, stiffness N/mm, and the share of an
+/// offset that differs between the directions.
+fn table(
+    middle_mm: f64,
+    [m, b, k, offset]: [f64; 4],
+    lookup: Lookup,
+    direction: Direction,
+) -> Realization {
+    let count = (2.0 * REACH_MM / STEP_MM) as i32;
+    let x_mm: Vec<f64> = (0..=count)
+        .map(|i| middle_mm - REACH_MM + STEP_MM * f64::from(i))
+        .collect();
+    let branch = |friction: f64| Branch {
+        m_kg: vec![m; x_mm.len()],
+        b_n_s_per_mm: vec![b; x_mm.len()],
+        k_n_per_mm: vec![k; x_mm.len()],
+        f0_n: (x_mm.iter())
+            .map(|x| {
+                let turn = (x - middle_mm) / REACH_MM * std::f64::consts::TAU;
+                offset * (2.0 * turn.sin() + friction) - k * middle_mm
+            })
+            .collect(),
+    };
+    let (positive, negative) = (branch(0.8), branch(-0.8));
+    Realization {
+        id: "check".to_owned(),
+        provenance: Provenance::default(),
+        vaf: BTreeMap::new(),
+        lookup,
+        direction,
+        trained: Trained {
+            x_mm: [x_mm[0] - 0.5, middle_mm + REACH_MM + 0.5],
+            v_mm_s: 300.0,
+        },
+        x_mm,
+        positive,
+        negative,
+        mechanism: None,
+    }
+}
+
+struct Heard {
+    samples: Vec<Sample>,
+    ended: Result<Playback, PlaybackError>,
+}
+
+fn play(device: &mut dyn Device, table: &Realization, limits: Limits, pace: &mut Pace) -> Heard {
+    let mut samples = Vec::new();
+    let mut collect = |reports: &[Report]| {
+        for report in reports {
+            if let Report::Telemetry(more) = report {
+                samples.extend_from_slice(more);
+            }
+        }
+    };
+    let what = Stimulus::of_table(table);
+    let ended = single_playback::play(device, &what, limits, PLAYBACK, pace, &mut collect);
+    Heard { samples, ended }
+}
+
+/// Judges a playback as a session does, by the default rules.
+pub(super) fn fidelity(
+    device: &dyn Device,
+    table: &Realization,
+    limits: Limits,
+    samples: &[Sample],
+    playback: &Playback,
+) -> Result<Fidelity, Failure> {
+    let model = ModelId::new("check").map_err(|e| Failure::new(crate::cli::Kind::Bug, e))?;
+    let told = device.identity().servo;
+    let played = Played {
+        model: &model,
+        what: rendering_of(table),
+        servo: ServoSettings {
+            force_n: limits.capped_at(device.identity().limits).force_n.get(),
+            ..told.unwrap_or_default()
+        },
+        servo_told: told.is_some(),
+        samples,
+        lost: playback.samples_lost,
+        time_ratio: playback.time_ratio,
+        host_late_s: playback.host_late_ms.map(|[_, most]| 1e-3 * most),
+        others: &[],
+    };
+    Ok(judge(&played, &RenderingRules::default()))
+}
+
+fn one(device: &mut dyn Device, what: &str, table: &Realization, pace: &mut Pace) -> Rendered {
+    let Ok(limits) = Limits::new(FORCE_N, 1000.0) else {
+        return Rendered::new(what, "not judged", "the limits are invalid");
+    };
+    let mut last = Rendered::new(what, "not judged", "");
+    for _ in 0..TRIES {
+        let heard = play(device, table, limits, pace);
+        let playback = match heard.ended {
+            Ok(playback) => playback,
+            // A trip is usually caused by the hand.
+            Err(why) => {
+                last = Rendered::new(what, "not judged", why.to_string());
+                continue;
+            }
+        };
+        let found = match fidelity(device, table, limits, &heard.samples, &playback) {
+            Ok(found) => found,
+            Err(why) => return Rendered::new(what, "not judged", why.message),
+        };
+        last = judged(what, &found);
+        last.fidelity = Some(found);
+        if last.result != "not judged" {
+            break;
+        }
+    }
+    last
+}
+
+fn judged(what: &str, found: &Fidelity) -> Rendered {
+    let number = |x: Option<f64>| x.map_or("–".to_owned(), |x| format!("{x:.3}"));
+    let seen = format!(
+        "VAF {}, gain {}, offset {} N, delay {} ms",
+        number(found.rendered_vaf),
+        number(found.rendered_gain),
+        number(found.rendered_bias_n),
+        number(found.rendered_delay_ms)
+    );
+    match found.verdict {
+        Verdict::Ok => Rendered::new(what, "pass", seen),
+        Verdict::TooLittle | Verdict::Unverified => Rendered::new(
+            what,
+            "not judged",
+            found.because.clone().unwrap_or_default(),
+        ),
+        Verdict::Flag | Verdict::Fault => {
+            let wrong: Vec<&str> = found.defects.iter().map(|d| in_words(*d)).collect();
+            Rendered::new(what, "fail", format!("{}; {seen}", wrong.join(", ")))
+        }
+    }
+}
+
+/// What is wrong, for the person at the device.
+fn in_words(defect: Defect) -> &'static str {
+    match defect {
+        Defect::OverLimit => "the force passes its limit",
+        Defect::OtherTable => "it is the force of another table",
+        Defect::Sign => "the force has the wrong sign",
+        Defect::Shape => "the force varies otherwise than the table",
+        Defect::Gain => "the force is too large or too small",
+        Defect::Bias => "a constant force is added",
+        Defect::Delay => "the force comes late",
+        Defect::Error => "for a moment the force is another one",
+        Defect::Measured => "the measured force is not the commanded one",
+        Defect::Speed => "the reported speed is not the change of the position",
+        Defect::Clock => "the time of the samples is not that of this computer",
+        Defect::Samples => "samples are repeated, missing or out of order",
+    }
+}
+
+/// A table whose velocity limit a moving hand passes: the device has to trip.
+fn trip(device: &mut dyn Device, middle_mm: f64, pace: &mut Pace) -> Rendered {
+    let what = "trip at the velocity limit";
+    let table = table(
+        middle_mm,
+        [0.0, 0.0, 0.0, 0.2],
+        Lookup::Linear,
+        Direction::Sign,
+    );
+    let mut last = Rendered::new(what, "not judged", "the limits are invalid");
+    let Ok(limits) = Limits::new(FORCE_N, SLOW_MM_S) else {
+        return last;
+    };
+    for _ in 0..TRIES {
+        let heard = play(device, &table, limits, pace);
+        let fastest = (heard.samples.iter()).fold(0.0, |most: f64, s| most.max(s.v_mm_s.abs()));
+        let seen = format!("at {fastest:.0} mm/s of {SLOW_MM_S} mm/s");
+        last = match heard.ended {
+            Err(PlaybackError::Reported(why)) if why == Fault::Watchdog.as_str() => {
+                Rendered::new(what, "not judged", why)
+            }
+            Err(PlaybackError::Reported(why)) => return Rendered::new(what, "pass", why),
+            Ok(_) if fastest > 2.0 * SLOW_MM_S => {
+                return Rendered::new(what, "fail", format!("it goes on {seen}"));
+            }
+            Ok(_) => Rendered::new(what, "not judged", format!("too little motion: {seen}")),
+            Err(why) => Rendered::new(what, "not judged", why.to_string()),
+        };
+    }
+    last
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::firmware::{Wrong, WrongLoads};
+    use crate::device::virtual_device::{Options, VirtualDevice};
+
+    fn checked(wrong: Option<Wrong>) -> Vec<Rendered> {
+        let mut options = Options::seeded(5);
+        options.device.wrong = wrong.map(|wrong| WrongLoads {
+            wrong,
+            loads: [1, u32::MAX],
+        });
+        let mut device = VirtualDevice::new(options);
+        let pace = Pace::Virtual(Duration::ZERO);
+        check(&mut device, 17.5, pace, &mut |_| Ok(())).unwrap()
+    }
+
+    fn failed(all: &[Rendered]) -> Vec<&str> {
+        let failed = all.iter().filter(|r| r.result == "fail");
+        failed.map(|r| r.what.as_str()).collect()
+    }
+
+    #[test]
+    fn the_right_device_passes_every_line() {
+        let all = checked(None);
+        assert_eq!(tally(&all), [14, 0, 0], "{all:#?}");
+    }
+
+    /// A wrong device fails in the line that names what is wrong.
+    #[test]
+    fn a_wrong_device_fails_where_it_is_wrong() {
+        for (wrong, where_) in [
+            ("no-mass", "mass alone"),
+            ("no-damping", "damping alone"),
+            ("no-stiffness", "stiffness alone"),
+            ("half-force", "offset alone"),
+            ("floor", "all terms, look-up linear, direction sign"),
+            ("dahl-rule", "all terms, look-up linear, direction sign"),
+            ("late", "stiffness alone"),
+        ] {
+            let all = checked(Wrong::named(wrong));
+            let failed = failed(&all);
+            assert!(failed.contains(&where_), "{wrong}: {failed:?} {all:#?}");
+        }
+        // What is ignored is not missed where it is not asked for.
+        let all = checked(Wrong::named("no-mass"));
+        assert!(!failed(&all).contains(&"stiffness alone"), "{all:#?}");
+    }
+}
