@@ -120,6 +120,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
             "protocol",
             "rater",
             "recording",
+            "rendering",
             "report",
             "runner",
             "schedule",

@@ -4,10 +4,10 @@ mod page;
 mod unsaved;
 
 use super::console::shell_command;
-use super::device::record::{self, RecordKind};
-use super::device_selection::{self, DeviceArgs, Tested, WaitDisplay};
+use super::device::record;
+use super::device_selection::{self, DeviceArgs, WaitDisplay};
 use super::{Console, Failure, Kind, load, study_folder};
-use crate::device::{Device, Identity};
+use crate::device::Identity;
 use crate::plain::Plain;
 use crate::runner::clock::{Clock as _, RealClock};
 use crate::runner::{Operator, Runner, Setup};
@@ -155,9 +155,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     }
     let within_h = loaded.protocol.device.check_within_h;
     let device_check = match kind {
-        DeviceKind::Serial | DeviceKind::Process => {
-            checked(args, &*device, within_h, at.wall, console)?
-        }
+        DeviceKind::Serial | DeviceKind::Process => record::checked(
+            &*device,
+            &args.results,
+            (within_h, args.unchecked),
+            at.wall,
+            console,
+        )?,
         DeviceKind::Simulated | DeviceKind::Manual => None,
     };
     // A person feels nothing on the simulated device: such data are never real.
@@ -242,38 +246,6 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         ))?;
     }
     finish(console, &study, &protocol, &ended.ending, &resume)
-}
-
-/// What the session records of the device's last check.
-///
-/// # Errors
-/// [`Failure`] if it does not speak for the device, and the user has not said to go on.
-fn checked(
-    args: &Args,
-    device: &dyn Device,
-    within_h: Option<f64>,
-    now: chrono::DateTime<chrono::FixedOffset>,
-    console: &mut Console,
-) -> Result<Option<String>, Failure> {
-    let tested = Tested::of(device);
-    let last = record::last(&args.results, &tested.serial, RecordKind::Check);
-    let doubt = record::doubt(last.as_ref(), tested.firmware.as_deref(), within_h, now);
-    let said = match last {
-        Some(last) => Some(format!("{}: {}", last.id, last.summary)),
-        None => device_selection::commissioned(&tested.serial, console),
-    };
-    let Some(doubt) = doubt else {
-        return Ok(said);
-    };
-    if !args.unchecked {
-        let serial = Untrusted(&tested.serial);
-        return Err(Failure::device(format!("{serial}: {doubt}")).hint(
-            "`study device check --save --port PORT` checks it; with --unchecked the session goes on, \
-             and its records say so",
-        ));
-    }
-    let said = said.map_or_else(String::new, |said| format!("; {said}"));
-    Ok(Some(format!("unchecked, by choice: {doubt}{said}")))
 }
 
 /// The protocol of the working folder.

@@ -2,10 +2,12 @@
 //!
 //! One file for each test, named by its time. A session looks at the last check.
 
-use crate::cli::device_selection::Tested;
-use crate::cli::{Failure, Kind};
+use crate::cli::device_selection::{Tested, commissioned};
+use crate::cli::{Console, Failure, Kind};
+use crate::device::Device;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use study_base::text::Untrusted;
 
 /// `study-device-record/1`.
 const FORMAT: &str = "study-device-record/1";
@@ -129,6 +131,38 @@ pub(in crate::cli) fn doubt(
     Some(format!(
         "its last check, of {at}, is older than the {within_h} h that the protocol allows"
     ))
+}
+
+/// What the session records of the device's last check.
+///
+/// # Errors
+/// [`Failure`] if it does not speak for the device, and the user has not said to go on.
+pub(in crate::cli) fn checked(
+    device: &dyn Device,
+    results: &Path,
+    (within_h, unchecked): (Option<f64>, bool),
+    now: chrono::DateTime<chrono::FixedOffset>,
+    console: &mut Console,
+) -> Result<Option<String>, Failure> {
+    let tested = Tested::of(device);
+    let found = last(results, &tested.serial, RecordKind::Check);
+    let doubt = doubt(found.as_ref(), tested.firmware.as_deref(), within_h, now);
+    let said = match found {
+        Some(last) => Some(format!("{}: {}", last.id, last.summary)),
+        None => commissioned(&tested.serial, console),
+    };
+    let Some(doubt) = doubt else {
+        return Ok(said);
+    };
+    if !unchecked {
+        let serial = Untrusted(&tested.serial);
+        return Err(Failure::device(format!("{serial}: {doubt}")).hint(
+            "`study device check --save --port PORT` checks it; with --unchecked the session goes on, \
+             and its records say so",
+        ));
+    }
+    let said = said.map_or_else(String::new, |said| format!("; {said}"));
+    Ok(Some(format!("unchecked, by choice: {doubt}{said}")))
 }
 
 #[cfg(test)]
