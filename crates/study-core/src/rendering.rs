@@ -39,7 +39,7 @@ const AFTER_RAMP_S: f64 = 0.05;
 const SEARCHED_S: f64 = 20.0;
 /// Largest delay that is searched, s.
 const LONGEST_DELAY_S: f64 = 0.06;
-/// Excess of the commanded force over its limit that rounding explains, N.
+/// Difference of forces that rounding explains: over the limit, or rms, N.
 const ROUNDING_N: f64 = 0.01;
 /// A measured force exceeds its limit if it does so by this factor and this force, N.
 const MEASURED_EXCESS: (f64, f64) = (1.1, 0.5);
@@ -94,7 +94,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
         return fidelity;
     };
     let forces = predicted(&played.what, played.servo, &samples);
-    let keep = comparable(played, &samples, &forces);
+    let keep = comparable(played, &samples, &forces, interval_s);
     explore(played, &samples, interval_s, &mut fidelity);
     let pairs = || {
         (samples.iter().zip(&forces).zip(&keep))
@@ -119,6 +119,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     let found = Found {
         aligned: lag,
         correlation: commanded.correlation(),
+        residual_n: commanded.residual().map(f64::sqrt),
         other: nearest.is_some_and(|near| near.explains),
         disordered: samples.len() < played.samples.len()
             || repeated(&samples).is_some_and(|share| share > MOST_REPEATED)
@@ -135,6 +136,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
 struct Found {
     aligned: Option<moments::Lag>,
     correlation: Option<f64>,
+    residual_n: Option<f64>,
     other: bool,
     disordered: bool,
     enough: bool,
@@ -151,7 +153,9 @@ fn defects(fidelity: &Fidelity, found: &Found, rules: &RenderingRules) -> Vec<De
     if fidelity.over_limit_n.is_some() {
         all.push(Defect::OverLimit);
     }
-    let poor = found.enough && fidelity.rendered_vaf.is_some_and(|v| v < rules.min_vaf);
+    let poor = found.enough
+        && found.residual_n.is_some_and(|rms| rms > ROUNDING_N)
+        && fidelity.rendered_vaf.is_some_and(|v| v < rules.min_vaf);
     let reversed = found.enough
         && fidelity.rendered_gain.is_some_and(|g| g < -0.2)
         && found.correlation.is_some_and(|r| r < -0.5);
@@ -274,9 +278,16 @@ fn share(part: f64, whole: f64) -> Option<f64> {
 }
 
 /// Which samples are compared: after the ramp, where the motion before is complete, and
-/// where the table's force is below its limit. At rest the rule sign can change its
-/// direction between two samples.
-fn comparable(played: &Played<'_>, samples: &[Sample], forces: &[Predicted]) -> Vec<bool> {
+/// where the table's force is below its limit. With the rule sign the direction can change
+/// between two samples: it is known where the handle moves, and has moved in the same
+/// direction for one interval and the time that the slew limit takes for the largest
+/// change of the force.
+fn comparable(
+    played: &Played<'_>,
+    samples: &[Sample],
+    forces: &[Predicted],
+    interval_s: f64,
+) -> Vec<bool> {
     let from_s = played.servo.ramp_s + AFTER_RAMP_S;
     let limit_n = played.servo.force_n;
     let by_sign = matches!(
@@ -286,11 +297,20 @@ fn comparable(played: &Played<'_>, samples: &[Sample], forces: &[Predicted]) -> 
             ..
         }
     );
-    let known = |s: &Sample| !by_sign || s.v_mm_s.abs() > REST_MM_S;
+    let least_n = forces.iter().map(|p| p.force_n).fold(f64::MAX, f64::min);
+    let most_n = forces.iter().map(|p| p.force_n).fold(f64::MIN, f64::max);
+    let unknown_s = 1.5 * interval_s + (most_n - least_n) / played.servo.slew_n_s;
+    let mut changed_s = f64::NEG_INFINITY;
+    let mut before_mm_s = 0.0;
     (samples.iter().zip(forces))
         .map(|(s, p)| {
+            if s.v_mm_s * before_mm_s <= 0.0 {
+                changed_s = s.t_s;
+            }
+            before_mm_s = s.v_mm_s;
+            let moves = s.v_mm_s.abs() > REST_MM_S && s.t_s - changed_s >= unknown_s;
             let free = p.force_n.abs() < limit_n - ROUNDING_N;
-            s.t_s >= from_s && p.settled && free && known(s)
+            s.t_s >= from_s && p.settled && free && (!by_sign || moves)
         })
         .collect()
 }

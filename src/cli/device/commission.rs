@@ -18,7 +18,7 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 use study_base::limits::Limits;
 use study_base::text::Untrusted;
-use study_haptics::model::{Branch, Provenance, Realization, Trained};
+use study_haptics::model::{Branch, Provenance, Realization, Trained, Units};
 use study_wire::message::Fault;
 use study_wire::predict::{Direction, Lookup};
 
@@ -261,6 +261,7 @@ fn constant([low, high]: [f64; 2], force_n: f64) -> Realization {
         f0_n: vec![force_n; 2],
     };
     Realization {
+        units: Units::Linear,
         id: "constant".to_owned(),
         provenance: Provenance::default(),
         vaf: BTreeMap::new(),

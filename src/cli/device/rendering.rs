@@ -15,7 +15,7 @@ use study_base::text::{ModelId, Untrusted};
 use study_core::outcome::{Defect, Fidelity, Playback, Sample, Verdict};
 use study_core::protocol::RenderingRules;
 use study_core::rendering::{Played, judge};
-use study_haptics::model::{Branch, Provenance, Realization, Trained};
+use study_haptics::model::{Branch, Provenance, Realization, Trained, Units};
 use study_wire::message::Fault;
 use study_wire::predict::{Direction, Lookup};
 use study_wire::servo::ServoSettings;
@@ -163,6 +163,7 @@ fn table(
     };
     let (positive, negative) = (branch(0.8), branch(-0.8));
     Realization {
+        units: Units::Linear,
         id: "check".to_owned(),
         provenance: Provenance::default(),
         vaf: BTreeMap::new(),

@@ -67,6 +67,16 @@ fn servo() -> ServoSettings {
 /// A sine for `seconds`, rendered by a device with this table at 4 kHz and reported at
 /// 1 kHz.
 fn played(what: &Rendering<'_>, amplitude_mm: f64, seconds: f64) -> Vec<Sample> {
+    played_at(what, amplitude_mm, seconds, |_, v_mm_s| v_mm_s)
+}
+
+/// The same with another speed of each servo period.
+fn played_at(
+    what: &Rendering<'_>,
+    amplitude_mm: f64,
+    seconds: f64,
+    speed: impl Fn(u32, f64) -> f64,
+) -> Vec<Sample> {
     let mut device = Servo::new(servo());
     device.start();
     let w = std::f64::consts::TAU * STROKES_HZ;
@@ -75,7 +85,7 @@ fn played(what: &Rendering<'_>, amplitude_mm: f64, seconds: f64) -> Vec<Sample> 
         let t_s = f64::from(tick) / HZ;
         let motion = Motion {
             x_mm: CENTRE_MM - amplitude_mm * (w * t_s).cos(),
-            v_mm_s: amplitude_mm * w * (w * t_s).sin(),
+            v_mm_s: speed(tick, amplitude_mm * w * (w * t_s).sin()),
             a_m_s2: 1e-3 * amplitude_mm * w * w * (w * t_s).cos(),
         };
         let force_command_n = device.step(what, motion);
@@ -163,6 +173,51 @@ fn a_right_device_is_ok() {
     near(found.top_speed_mm_s, 62.83, 0.1);
     assert_eq!(found.nearest_model, Some(ModelId::new("right").unwrap()));
     assert_eq!((found.over_limit_n, found.measured_vaf), (None, None));
+}
+
+/// Near its ends of motion the handle trembles by one step of the encoder: the direction
+/// changes in the period of each sample, and the force is on its way.
+#[test]
+fn a_direction_that_changes_between_samples_accuses_nobody() {
+    let trembling = |tick: u32, v_mm_s: f64| {
+        let side = if (tick / 4).is_multiple_of(2) {
+            5.4
+        } else {
+            -5.4
+        };
+        if v_mm_s.abs() < 25.0 { side } else { v_mm_s }
+    };
+    let samples = played_at(&table().what(), AMPLITUDE_MM, 5.0, trembling);
+    let found = verdict_of(&samples);
+    assert_eq!(found.verdict, Verdict::Ok, "{found:?}");
+    near(found.rendered_vaf, 1.0, 1e-3);
+    near(found.rendered_delay_ms, 0.0, 0.2);
+    let found = verdict_of(&forced(&samples, |s| 0.8 * s.force_command_n));
+    assert_eq!(found.defects, [Defect::Gain], "{found:?}");
+    // A direction that is late by 10 ms is late long after it is known.
+    let late = |i: usize| samples[i.saturating_sub(10)].force_command_n;
+    let shifted: Vec<Sample> = (samples.iter().enumerate())
+        .map(|(i, s)| Sample {
+            force_command_n: late(i),
+            ..*s
+        })
+        .collect();
+    let found = verdict(&shifted, |_| (), |rules| rules.max_delay_ms = 8.0);
+    assert_eq!(found.verdict, Verdict::Flag, "{found:?}");
+}
+
+/// The ratio alone would find a shape in the rounding of the numbers.
+#[test]
+fn a_residual_of_rounding_is_no_shape() {
+    let jitter = |size_n: f64| {
+        let side = |s: &Sample| (1e3 * s.t_s).round().rem_euclid(2.0) - 0.5;
+        let samples = forced(&right(), |s| s.force_command_n + size_n * side(s));
+        verdict(&samples, |_| (), |rules| rules.min_vaf = 0.999_999)
+    };
+    let found = jitter(0.01);
+    assert_eq!(found.verdict, Verdict::Ok, "{found:?}");
+    let found = jitter(0.1);
+    assert_eq!(found.defects, [Defect::Shape], "{found:?}");
 }
 
 /// VAF 1 − (1 − g)² for a gain of g.
