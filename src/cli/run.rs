@@ -154,16 +154,8 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         console.say(format!("warning: {}", Untrusted(&notice)));
     }
     let within_h = loaded.protocol.device.check_within_h;
-    let device_check = match kind {
-        DeviceKind::Serial | DeviceKind::Process => record::checked(
-            &*device,
-            &args.results,
-            (within_h, args.unchecked),
-            at.wall,
-            console,
-        )?,
-        DeviceKind::Simulated | DeviceKind::Manual => None,
-    };
+    let asked = (kind, within_h, args.unchecked);
+    let device_check = record::checked(&*device, &args.results, asked, at.wall, console)?;
     // A person feels nothing on the simulated device: such data are never real.
     let overridden = kind != loaded.protocol.device.kind;
     let seats = if args.pilot || overridden || device.identity().simulated {

@@ -56,8 +56,10 @@ fn a_device_that_turns_wrong_costs_an_attempt_and_no_answer() {
         }
     };
     assert!(page.contains("DEVICE TROUBLE"), "{page}");
+    // What this page says of every trouble.
+    let own = seen.replace("The device produces no force.", "");
     for word in TELLING {
-        assert!(!seen.contains(word), "{word}:\n{page}");
+        assert!(!own.contains(word), "{word}:\n{page}");
     }
     // Somebody puts the device in order.
     drop(device);

@@ -297,7 +297,7 @@ pub struct RenderingRules {
 impl Default for RenderingRules {
     fn default() -> Self {
         Self {
-            min_vaf: 0.985,
+            min_vaf: 0.995,
             gain: [0.93, 1.07],
             max_bias_n: 0.2,
             max_delay_ms: 5.0,

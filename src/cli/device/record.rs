@@ -8,6 +8,7 @@ use crate::device::Device;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
+use study_core::protocol::DeviceKind;
 
 /// `study-device-record/1`.
 const FORMAT: &str = "study-device-record/1";
@@ -133,17 +134,20 @@ pub(in crate::cli) fn doubt(
     ))
 }
 
-/// What the session records of the device's last check.
+/// What the session records of the last check of a device of this kind.
 ///
 /// # Errors
 /// [`Failure`] if it does not speak for the device, and the user has not said to go on.
 pub(in crate::cli) fn checked(
     device: &dyn Device,
     results: &Path,
-    (within_h, unchecked): (Option<f64>, bool),
+    (kind, within_h, unchecked): (DeviceKind, Option<f64>, bool),
     now: chrono::DateTime<chrono::FixedOffset>,
     console: &mut Console,
 ) -> Result<Option<String>, Failure> {
+    if matches!(kind, DeviceKind::Simulated | DeviceKind::Manual) {
+        return Ok(None);
+    }
     let tested = Tested::of(device);
     let found = last(results, &tested.serial, RecordKind::Check);
     let doubt = doubt(found.as_ref(), tested.firmware.as_deref(), within_h, now);

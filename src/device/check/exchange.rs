@@ -333,9 +333,13 @@ impl<'w> Exchange<'w> {
         }
         self.telemetry.clear();
         self.events.clear();
-        self.pulses.clear();
         self.replies.clear();
-        // The new connection has received no heartbeat so far.
+        self.first_heartbeat()
+    }
+
+    /// Waits for a fresh heartbeat of a new connection, which has received none so far.
+    pub(crate) fn first_heartbeat(&mut self) -> Result<(), CheckFailure> {
+        self.pulses.clear();
         self.next_beat = self.now();
         let until = self.now() + RETRY_INTERVAL;
         while !self.pulses.iter().any(|pulse| pulse.fresh) {

@@ -26,6 +26,7 @@ pub(super) fn plays(exchange: &mut Exchange<'_>) -> ClauseResult {
         exchange.expect_refusal(first(&device), Refusal::UnknownType)?;
         return Ok("tables only; a mechanism is refused".to_owned());
     }
+    exchange.first_heartbeat()?;
     let refused: [(Refusal, &str, Change); 5] = [
         (Refusal::BadTable, "no mass of the follower", |begin, _| {
             begin.scalars.follower_kg = 0.0;

@@ -31,7 +31,7 @@ impl Lateness {
             seen += n;
             seen > 0 && 100 * seen >= 99 * all
         })?;
-        let most = 1e3 * self.most.as_secs_f64();
+        let most = self.most.as_nanos() as f64 / 1e6;
         Some([((class + 1) as f64).min(most), most])
     }
 }

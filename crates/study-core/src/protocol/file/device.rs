@@ -29,7 +29,7 @@ pub(super) const DEVICE: &[Key] = keys! {
 
 const RENDERING: &[Key] = keys! {
     /// Least share of the variance of the table's force that the device commands.
-    "min_vaf": Kind::Number(AT_MOST_1, ""), "0.9", default("0.985");
+    "min_vaf": Kind::Number(AT_MOST_1, ""), "0.9", default("0.995");
     /// Least and largest slope of the commanded on the table's force, and of the measured on
     /// the commanded force.
     "gain": Kind::NumberList, "[0.9, 1.1]", default("[0.93, 1.07]");
