@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use study_base::limits::Limits;
 use study_base::text::Untrusted;
 use study_haptics::model::{Branch, Provenance, Realization, Trained, Units};
-use study_wire::message::Fault;
+use study_wire::message::{Fault, Refusal};
 use study_wire::predict::{Direction, Lookup};
 
 /// Force on the weight and at the emergency stop, N.
@@ -90,11 +90,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
             let made = step(&mut rig)?;
             rig.release();
             tries += 1;
-            let late = made.seen.contains(Fault::Watchdog.as_str());
+            let late = [Fault::Watchdog.as_str(), Refusal::NoHeartbeat.as_str()]
+                .iter()
+                .any(|why| made.seen.contains(why));
             if !late || tries == TRIES {
                 break made;
             }
-            rig.say("This computer was late and the device went limp, as it has to. Once more:")?;
+            rig.say("This computer was late, and the device gives no force then, as it has to. Once more:")?;
         };
         rig.say(&format!("{}: {}", step.outcome.as_str(), step.seen))?;
         done.push(step);
