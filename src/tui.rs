@@ -183,6 +183,8 @@ impl Operator for Tui {
             match self.terminal.event(left.min(SLICE))? {
                 Some((Event::Mouse(mouse), _)) if mouse.kind == MouseEventKind::Moved => {}
                 Some((event, at)) => {
+                    // A click on a hint counts like its key, and is as quickly repeated.
+                    let event = self.surface.as_key(&event, view).unwrap_or(event);
                     let dialog = self.surface.state().dialog().is_some();
                     if !self.pace.accepts(&event, at, dialog, view.armed) {
                         continue;
@@ -206,9 +208,17 @@ fn as_shown(view: &View) -> View {
     let mut view = view.clone();
     view.line.elapsed_s = view.line.elapsed_s.floor();
     match &mut view.screen {
-        Screen::Playing { since_s, .. } | Screen::Paused { since_s } => {
-            *since_s = since_s.floor();
+        Screen::Playing {
+            since_s, exposure, ..
+        } => {
+            // A bar moves with it.
+            let steps = match exposure.min_s > 0.0 || exposure.max_s.is_some() {
+                true => 10.0,
+                false => 1.0,
+            };
+            *since_s = (*since_s * steps).floor() / steps;
         }
+        Screen::Paused { since_s } => *since_s = since_s.floor(),
         Screen::Reference { wait_s, .. } | Screen::Break { wait_s, .. } => {
             *wait_s = wait_s.ceil();
         }

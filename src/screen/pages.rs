@@ -300,9 +300,22 @@ pub fn page(view: &View) -> Option<Page> {
                 page.button(Does::RateStopped, stopped.rate, true, words);
             }
         }
-        Screen::Break { text, wait_s } => {
+        Screen::Break {
+            text,
+            wait_s,
+            done,
+            total,
+        } => {
             page.title = words.get(Phrase::Break).to_owned();
             page.text = safe(text);
+            if let Some(total) = total {
+                let values = [("n", done as &dyn Display), ("total", total)];
+                page.progress = Some(Progress {
+                    words: capital(&words.fill(Phrase::DoneOf, &values)),
+                    at: *done,
+                    of: Some(*total),
+                });
+            }
             page.waits(*wait_s, words);
             page.button(Does::Advance, Phrase::Ready, view.can_advance, words);
         }

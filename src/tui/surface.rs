@@ -6,7 +6,7 @@
 use super::theme::{Colour, Theme};
 use super::ui_state::{UiState, same_page};
 use super::views::Page;
-use crossterm::event::{Event, MouseButton, MouseEventKind};
+use crossterm::event::{Event, KeyEvent, KeyModifiers, MouseButton, MouseEventKind};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget as _;
@@ -92,9 +92,24 @@ impl Surface {
         }
     }
 
+    /// A click on the hint of a key as that key.
+    pub fn as_key(&self, event: &Event, view: &View) -> Option<Event> {
+        let Event::Mouse(mouse) = event else {
+            return None;
+        };
+        if mouse.kind != MouseEventKind::Down(MouseButton::Left) {
+            return None;
+        }
+        let place = Position::new(mouse.column, mouse.row);
+        let code = self.page(view).key_at(self.area, place)?;
+        Some(Event::Key(KeyEvent::new(code, KeyModifiers::NONE)))
+    }
+
     /// The inputs that an event causes.
     pub fn event(&mut self, event: &Event, view: &View) -> Vec<Input> {
         self.follow(view, self.area);
+        let key = self.as_key(event, view);
+        let event = key.as_ref().unwrap_or(event);
         if Page::too_small(self.area) {
             return self.state.blind(event, view);
         }

@@ -234,7 +234,7 @@ fn hostile_names_and_comments_stay_text() {
             f.name
         );
         let picture = f.wide.picture();
-        Painter::default().png(&picture).unwrap();
+        Painter::default().png(picture).unwrap();
         assert!(picture.to_pdf().starts_with(b"%PDF-"));
     }
 }

@@ -213,15 +213,34 @@ fn the_page_of_the_participant_makes_no_sound() {
 fn required_strokes_show_no_count() {
     let strokes = |protocol: &mut Protocol| protocol.trial.minimum_strokes = 3;
     compare(Entry::Participant, strokes, None, |pages| {
-        let is_number = |c: char| c.is_ascii_digit();
         let mut pages: Vec<String> = pages
             .iter()
-            .map(|page| page.replace(is_number, "0"))
+            .map(|page| without_numbers_of_time(page))
             .collect();
         pages.dedup();
         assert!(pages.iter().any(|page| page.contains("Keep exploring")));
         pages
     });
+}
+
+/// A page without the digits of its times: those before and after a colon, and the large ones.
+/// Every other number stays.
+fn without_numbers_of_time(page: &str) -> String {
+    let is_large = |c: char| ('\u{2580}'..='\u{259f}').contains(&c);
+    let lines = page.split('\n').filter(|line| !line.contains(is_large));
+    let mut words: Vec<String> = Vec::new();
+    for part in lines.collect::<Vec<_>>().join("\n").split(':') {
+        let digit = |c: char| c.is_ascii_digit();
+        match part.get(..2) {
+            Some(seconds) if !words.is_empty() && seconds.chars().all(digit) => {
+                let minutes = words.last_mut().unwrap();
+                minutes.truncate(minutes.trim_end_matches(digit).len());
+                words.push(part[2..].to_owned());
+            }
+            _ => words.push(part.to_owned()),
+        }
+    }
+    words.join(":")
 }
 
 /// The same fault of the device has the same words.

@@ -39,6 +39,8 @@ fn pages_of_a_session(words: &Arc<Words>) -> Vec<(&'static str, View)> {
             Screen::Break {
                 text: words.get(Phrase::BreakText).to_owned(),
                 wait_s: 130.0,
+                done: 6,
+                total: Some(15),
             },
         ),
         (

@@ -4,6 +4,7 @@
 
 mod blinding;
 mod by_keys;
+mod channels;
 mod commission;
 #[path = "../support/designs.rs"]
 mod designs;

@@ -12,8 +12,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Instant;
 
 /// `study` with its lines.
-struct Lines {
-    child: Box<dyn Child + Send + Sync>,
+pub(crate) struct Lines {
+    pub(crate) child: Box<dyn Child + Send + Sync>,
     _master: Box<dyn MasterPty + Send>,
     keys: Box<dyn Write + Send>,
     output: Receiver<Vec<u8>>,
@@ -26,7 +26,7 @@ struct Lines {
 }
 
 impl Lines {
-    fn start(folder: &Path, arguments: &[&str], variable: Option<(&str, &str)>) -> Self {
+    pub(crate) fn start(folder: &Path, arguments: &[&str], variable: Option<(&str, &str)>) -> Self {
         let size = PtySize {
             rows: 24,
             cols: 80,
@@ -63,13 +63,13 @@ impl Lines {
         }
     }
 
-    fn types(&mut self, text: &str) {
+    pub(crate) fn types(&mut self, text: &str) {
         self.keys.write_all(text.as_bytes()).unwrap();
         self.keys.flush().unwrap();
     }
 
     /// Waits for a line after what was read that starts with one of `starts`; the line.
-    fn line(&mut self, starts: &[&str]) -> String {
+    pub(crate) fn line(&mut self, starts: &[&str]) -> String {
         let begin = Instant::now();
         loop {
             while let Some((line, _)) = self.seen[self.read..].split_once('\n') {
@@ -95,14 +95,14 @@ impl Lines {
     }
 
     /// Waits for the line, and until an Enter is no longer taken for a held key.
-    fn asked(&mut self, starts: &[&str]) -> String {
+    pub(crate) fn asked(&mut self, starts: &[&str]) -> String {
         let line = self.line(starts);
         std::thread::sleep(std::time::Duration::from_millis(320));
         line
     }
 
     /// Types what each page asks for, until a line starts with `stop`, or to the end.
-    fn play(&mut self, stop: Option<&str>) -> String {
+    pub(crate) fn play(&mut self, stop: Option<&str>) -> String {
         const ASKS: [&str; 9] = [
             "Type the participant",
             "Type the operator",
@@ -165,8 +165,7 @@ pub(crate) fn events(folder: &Path) -> Vec<Value> {
     let mut journals = Vec::new();
     find(&sessions, &mut journals);
     assert_eq!(journals.len(), 1, "{journals:?}");
-    let text = fs::read_to_string(&journals[0]).unwrap();
-    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
+    let lines = segments(&journals[0]).into_iter();
     let told = |event: Value| {
         let mut event = event;
         let object = event.as_object_mut().unwrap();
@@ -176,6 +175,17 @@ pub(crate) fn events(folder: &Path) -> Vec<Value> {
         event
     };
     lines.map(told).collect()
+}
+
+/// The events of a journal and of its next segments.
+pub(crate) fn segments(journal: &Path) -> Vec<Value> {
+    let next = (2..).map(|n| journal.with_file_name(format!("journal-{n}.jsonl")));
+    let all = std::iter::once(journal.to_owned()).chain(next.take_while(|path| path.exists()));
+    let texts: String = all.map(|path| fs::read_to_string(path).unwrap()).collect();
+    let lines = texts
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap());
+    lines.collect()
 }
 
 pub(crate) fn find(folder: &Path, journals: &mut Vec<std::path::PathBuf>) {

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod guarded;
+mod tap;
 
 use crate::plain::{events, last_answers, short};
 use crate::support::{PATIENCE, PATIENT, Terminal, changed_protocol, player, study};
@@ -17,17 +18,17 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// `study run --plain --screen` with its page.
-struct Session {
-    child: Child,
+pub(crate) struct Session {
+    pub(crate) child: Child,
     stdin: ChildStdin,
     said: Arc<Mutex<String>>,
-    browser: Browser,
+    pub(crate) browser: Browser,
     token: String,
 }
 
 /// What a browser knows.
 #[derive(Clone, Default)]
-struct Browser {
+pub(crate) struct Browser {
     address: String,
     cookie: String,
     revision: u64,
@@ -36,8 +37,8 @@ struct Browser {
 }
 
 /// A response.
-struct Answer {
-    status: u16,
+pub(crate) struct Answer {
+    pub(crate) status: u16,
     head: String,
     body: String,
 }
@@ -71,7 +72,7 @@ impl Browser {
         exchange(host, request.as_bytes()).unwrap()
     }
 
-    fn post(&self, path: &str, body: &Value) -> Answer {
+    pub(crate) fn post(&self, path: &str, body: &Value) -> Answer {
         self.try_post(path, body).unwrap()
     }
 
@@ -124,7 +125,7 @@ impl Browser {
         }
     }
 
-    fn reply(&mut self, page: &Value, does: &str, more: Value) -> Value {
+    pub(crate) fn reply(&mut self, page: &Value, does: &str, more: Value) -> Value {
         self.keys += 1;
         let key = format!("{}-{}", self.cookie.len(), self.keys);
         let mut reply = json!({"page": page["id"], "key": key, "shown_ms": 1000, "does": does});
@@ -157,7 +158,7 @@ impl Browser {
     }
 
     /// Acts until a page is as wanted.
-    fn play(&mut self, what: &str, fine: impl Fn(&Value) -> bool) -> Value {
+    pub(crate) fn play(&mut self, what: &str, fine: impl Fn(&Value) -> bool) -> Value {
         loop {
             let page = self.wait_for(what, |page| fine(page) || acts(page));
             if fine(&page) {
@@ -244,7 +245,7 @@ impl Session {
     }
 
     /// With its page open.
-    fn opened(folder: &Path, protocol: &Path, more: &[&str]) -> Self {
+    pub(crate) fn opened(folder: &Path, protocol: &Path, more: &[&str]) -> Self {
         let mut session = Self::start(folder, protocol, more);
         let token = session.token.clone();
         assert_eq!(session.browser.open(&token), 200);
@@ -252,7 +253,7 @@ impl Session {
     }
 
     /// The experimenter types a line.
-    fn types(&mut self, line: &str) {
+    pub(crate) fn types(&mut self, line: &str) {
         writeln!(self.stdin, "{line}").unwrap();
     }
 
@@ -261,7 +262,7 @@ impl Session {
     }
 
     /// Plays to the end, which the experimenter closes.
-    fn finish(&mut self) {
+    pub(crate) fn finish(&mut self) {
         self.browser.play("the end", is_over);
         self.types("");
         assert!(self.child.wait().unwrap().success(), "{}", self.said());

@@ -43,7 +43,7 @@ fn poison(view: &mut View, text: &str, n: f64) {
             (*document, *version) = (t(), t());
         }
         Screen::Message { text, .. } | Screen::End { text } => *text = t(),
-        Screen::Break { text, wait_s } => (*text, *wait_s) = (t(), n),
+        Screen::Break { text, wait_s, .. } => (*text, *wait_s) = (t(), n),
         Screen::Reference { prompt, wait_s } => (*prompt, *wait_s) = (t(), n),
         Screen::Playing { since_s, .. } | Screen::Paused { since_s } => *since_s = n,
         Screen::DeviceTrouble { what, .. } | Screen::SaveTrouble { what } => *what = t(),

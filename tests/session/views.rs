@@ -136,12 +136,14 @@ pub(crate) fn view(screen: Screen) -> View {
     View {
         can_replay: false,
         can_go_back: false,
+        remarks: vec!["the motor hums".to_owned()],
         force: true,
         has_reference: false,
         progress: before.then_some(Progress {
             practice: false,
             current: 7,
             total: Some(15),
+            block: Some(5),
         }),
         line: StatusLine {
             participant: if device == DeviceState::Unknown {
@@ -370,6 +372,8 @@ pub(crate) fn screens() -> Vec<(&'static str, View)> {
             view(Screen::Break {
                 text: text("Take a rest."),
                 wait_s: 42.0,
+                done: 6,
+                total: Some(15),
             }),
         ),
         ("paused", view(Screen::Paused { since_s: 65.0 })),

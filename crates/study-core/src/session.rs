@@ -97,6 +97,8 @@ pub struct Session {
     running: Vec<tracks::Running>,
     /// Whether the last answer was correct, until the participant is told.
     feedback: Option<bool>,
+    /// Remarks of this process.
+    remarks: Vec<String>,
     /// How the inputs are entered.
     channel: Option<Channel>,
     notice: Option<String>,
@@ -146,6 +148,7 @@ impl Session {
             parts_shown: BTreeSet::new(),
             running: Vec::new(),
             feedback: None,
+            remarks: Vec::new(),
             channel: None,
             notice: None,
             mirror: None,

@@ -3,14 +3,14 @@
 
 use super::dialog::{Confirm, Dialog, DialogResult};
 use super::{Focus, UiState};
-use crate::tui::editor::Handled;
+use crate::tui::editor::{Editor, Handled};
 use crate::tui::keys::{self, Key};
 use crossterm::event::Event;
 use study_base::text::QuestionId;
 use study_core::outcome::Choice;
 use study_core::protocol::phrases::{Phrase, Words};
 use study_core::protocol::{Answer, Question};
-use study_core::session::{Input, Screen, View};
+use study_core::session::{Input, Roster, Screen, View};
 
 impl UiState {
     /// The inputs that a key causes.
@@ -95,13 +95,13 @@ impl UiState {
             Key::MarkBad => match &view.can_mark_bad {
                 Some(trial) => Ok(Dialog::MarkBad {
                     trial: trial.clone(),
-                    reason: super::Editor::new(""),
+                    reason: Editor::new(""),
                 }),
                 None => Err("There is no trial to mark as bad.".to_owned()),
             },
             Key::Decline => match &view.screen {
                 Screen::Form { .. } => Ok(Dialog::Decline {
-                    reason: super::Editor::new(""),
+                    reason: Editor::new(""),
                 }),
                 _ => Err("There is no question to decline.".to_owned()),
             },
@@ -140,7 +140,9 @@ impl UiState {
 
     fn press_on_screen(&mut self, key: Key, view: &View) -> Vec<Input> {
         match &view.screen {
-            Screen::Who { claiming, .. } => self.press_who(key, *claiming),
+            Screen::Who {
+                claiming, roster, ..
+            } => self.press_who(key, *claiming, roster.as_deref()),
             Screen::ResumeChoice { .. } => match key {
                 Key::Char('b' | 'B') => vec![Input::Resume(Choice::RestartBlock)],
                 Key::Char('c' | 'C') => vec![Input::Resume(Choice::Continue)],
@@ -182,7 +184,7 @@ impl UiState {
         }
     }
 
-    fn press_who(&mut self, key: Key, claiming: bool) -> Vec<Input> {
+    fn press_who(&mut self, key: Key, claiming: bool, roster: Option<&Roster>) -> Vec<Input> {
         let Some((_, who)) = &mut self.who else {
             return Vec::new();
         };
@@ -201,6 +203,12 @@ impl UiState {
                     participant: who.participant.text().trim().to_owned(),
                     operator: who.operator.text().trim().to_owned(),
                 }];
+            }
+            // The id that is proposed.
+            Key::Right if !who.on_operator && who.participant.text().is_empty() => {
+                if let Some(id) = roster.and_then(Roster::next_id) {
+                    who.participant = Editor::line(id.as_str());
+                }
             }
             key => {
                 let handled = who.focused().key(key);

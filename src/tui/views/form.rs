@@ -39,7 +39,6 @@ struct Placed {
     words: Vec<String>,
     tall: u16,
     answers: Vec<(usize, Option<Rect>, Rect)>,
-    end: u16,
 }
 
 impl FormView<'_> {
@@ -62,16 +61,27 @@ impl FormView<'_> {
     /// The column of the body that the form uses.
     fn column(&self, area: Rect) -> Rect {
         if self.compact() {
-            let left = 4.min(area.width);
+            let left = 2.min(area.width);
             Rect {
                 x: area.x + left,
-                width: (area.width - left).min(100),
+                width: area
+                    .width
+                    .saturating_sub(left + self.panel_width(area) + 1)
+                    .min(100),
                 ..area
             }
         } else {
             let width = area.width.saturating_sub(12).min(120);
             middle(area, width, area.height)
         }
+    }
+
+    /// Width of the experimenter's panel; 0 where a long question needs all of the page.
+    fn panel_width(&self, body: Rect) -> u16 {
+        let prompt = self.questions.first().map_or("", |q| q.prompt.as_str());
+        let columns = usize::from(body.width.saturating_sub(PANEL + 11)).clamp(1, 72);
+        let short = wrap::paragraph(prompt, columns, usize::MAX).len() <= LONG_PROMPT;
+        if short { PANEL } else { 0 }
     }
 
     /// Height of a rating box, in rows, for the rows that are free.
@@ -145,7 +155,6 @@ impl FormView<'_> {
             words,
             tall,
             answers,
-            end: y,
         }
     }
 
@@ -222,30 +231,57 @@ impl FormView<'_> {
         keys
     }
 
-    fn so_far(&self, buf: &mut Buffer, area: Rect) {
-        if area.height < 3 || self.view.correctable.is_empty() {
-            return;
+    /// The experimenter's panel on the right: trial, device, earlier answers, remarks.
+    fn panel(&self, buf: &mut Buffer, area: Rect) {
+        let theme = self.theme;
+        for y in 0..area.height {
+            left(buf, row(area, y), &styled("│", theme.outline()));
         }
-        let title = styled("Earlier answers", self.theme.quiet());
-        left(buf, row(area, 0), &title);
-        for (y, earlier) in (1..area.height).zip(&self.view.correctable) {
-            let columns = usize::from(area.width).saturating_sub(30);
+        let inside = Rect {
+            x: area.x + 2,
+            width: area.width.saturating_sub(2),
+            ..area
+        };
+        let columns = usize::from(inside.width);
+        let mut lines = Vec::new();
+        if let Some(progress) = self.view.progress {
+            let of = progress.total.map_or(String::new(), |n| format!(" of {n}"));
+            let what = if progress.practice {
+                "Practice"
+            } else {
+                "Trial"
+            };
+            let words = format!("{what} {}{of}", progress.current);
+            lines.push(styled(words, theme.strong()));
+        }
+        let device = super::status::device(self.view.line.device, false);
+        lines.push(styled(device, theme.quiet()));
+        let mut section = |title: &'static str, items: Vec<String>| {
+            if !items.is_empty() {
+                lines.push(Line::default());
+                lines.push(styled(title, theme.text()));
+                lines.extend(items.into_iter().map(|item| styled(item, theme.quiet())));
+            }
+        };
+        let answers = self.view.correctable.iter().take(8).map(|earlier| {
             let answer = super::dialogs::answer_words(&earlier.answer, columns);
-            let line = Line::from(vec![
-                Span::styled(
-                    format!("{:<10} ", wrap::one_line(&earlier.title, 10)),
-                    self.theme.quiet(),
-                ),
-                Span::styled(
-                    format!("{:<16} ", wrap::one_line(earlier.question.id.as_str(), 16)),
-                    self.theme.quiet(),
-                ),
-                Span::styled(answer, self.theme.quiet()),
-            ]);
-            left(buf, row(area, y), &line);
+            let id = earlier.question.id.as_str();
+            wrap::one_line(&format!("{}: {id} {answer}", earlier.title), columns)
+        });
+        section("Earlier answers", answers.collect());
+        let remarks = self.view.remarks.iter();
+        let remarks = remarks.map(|remark| wrap::one_line(remark, columns));
+        section("Remarks", remarks.collect());
+        for (y, line) in (0..inside.height).zip(&lines) {
+            left(buf, row(inside, y), line);
         }
     }
 }
+
+/// Width of the experimenter's panel, in cells.
+const PANEL: u16 = 28;
+/// Lines of a question beside which the panel is shown.
+const LONG_PROMPT: usize = 6;
 
 impl Widget for &FormView<'_> {
     fn render(self, body: Rect, buf: &mut Buffer) {
@@ -291,10 +327,15 @@ impl Widget for &FormView<'_> {
             }
             answer.render(*area, buf);
         }
-        if self.compact() {
-            let area = self.column(body);
-            let y = placed.end + 1;
-            self.so_far(buf, rows(area, y, 6));
+        let wide = self.panel_width(body);
+        if self.compact() && wide > 0 {
+            let x = body.right().saturating_sub(wide);
+            let panel = Rect {
+                x,
+                width: body.right() - x,
+                ..body
+            };
+            self.panel(buf, rows(panel, 1, panel.height));
         }
     }
 }

@@ -12,8 +12,9 @@ use super::who::WhoView;
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::dialog::{Confirm, Dialog};
 use crate::tui::ui_state::{Target, UiState};
-use crate::tui::widgets::{centre, hints, middle, row, rows, styled};
+use crate::tui::widgets::{cap, centre, hints, middle, row, rows, styled};
 use crate::tui::wrap;
+use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::{Clear, Widget};
@@ -105,6 +106,47 @@ impl<'a> Page<'a> {
             unsaved: &self.view.unsaved,
             theme: self.theme,
         })
+    }
+
+    /// The keys that have an effect now.
+    fn offered(&self) -> Vec<(String, Phrase)> {
+        let mut keys = self.keys();
+        keys.retain(|(key, _)| !(self.waits && key == "Enter"));
+        keys
+    }
+
+    /// The key whose hint is at a position.
+    pub fn key_at(&self, area: Rect, place: Position) -> Option<KeyCode> {
+        let line = row(area, area.height.saturating_sub(3));
+        if Self::too_small(area) || self.state.dialog().is_some() || place.y != line.y {
+            return None;
+        }
+        let (keys, words) = (self.offered(), &self.view.words);
+        let wide = |(key, what): &(String, Phrase)| {
+            let cells = wrap::width(key) + 2 + wrap::width(words.get(*what));
+            u16::try_from(cells).unwrap_or(u16::MAX)
+        };
+        // As `hints` and `caps` place them.
+        let (edge, gap) = if self.has_caps() { (4, 3) } else { (0, 7) };
+        let count = u16::try_from(keys.len()).unwrap_or(u16::MAX);
+        let wide = |key: &(String, Phrase)| wide(key).saturating_add(2 * edge);
+        let all = keys.iter().map(wide).sum::<u16>() + gap * count.saturating_sub(1);
+        let mut x = area.x + area.width.saturating_sub(all) / 2;
+        for key in &keys {
+            if (x..x.saturating_add(wide(key))).contains(&place.x) {
+                return Some(match key.0.as_str() {
+                    "Enter" => KeyCode::Enter,
+                    "Esc" => KeyCode::Esc,
+                    "Tab" => KeyCode::Tab,
+                    "Shift-Tab" => KeyCode::BackTab,
+                    "F7" => KeyCode::F(7),
+                    "F10" => KeyCode::F(10),
+                    _ => return None,
+                });
+            }
+            x = x.saturating_add(wide(key) + gap);
+        }
+        None
     }
 
     /// The target at a position.
@@ -214,6 +256,52 @@ impl<'a> Page<'a> {
         }
     }
 
+    /// Whether the page is the participant's: not the experimenter's own ones, nor with
+    /// `--live`.
+    fn own(&self) -> bool {
+        let of_experimenter = matches!(
+            self.view.screen,
+            Screen::Who { .. }
+                | Screen::ResumeChoice { .. }
+                | Screen::Mount { .. }
+                | Screen::Form {
+                    to_experimenter: true,
+                    ..
+                }
+        );
+        self.view.entry == Entry::Participant && !self.live && !of_experimenter
+    }
+
+    /// The keys of a playing device as caps, large: the participant looks elsewhere.
+    fn caps(&self, area: Rect, keys: &[(&str, &str)], buf: &mut Buffer) {
+        let wide = |(key, what): &(&str, &str)| {
+            let cells = wrap::width(key) + wrap::width(what) + 2;
+            u16::try_from(cells).unwrap_or(u16::MAX).saturating_add(8)
+        };
+        let gap = 3;
+        let all = keys.iter().map(wide).sum::<u16>() + gap * (keys.len() as u16).saturating_sub(1);
+        let mut x = area.x + area.width.saturating_sub(all) / 2;
+        for key in keys {
+            let place = Rect {
+                x,
+                width: wide(key),
+                ..area
+            };
+            let border = match key.0 {
+                "Esc" => self.theme.trouble_frame(),
+                _ => self.theme.key(),
+            };
+            cap(buf, place.intersection(area), *key, border, self.theme);
+            x += place.width + gap;
+        }
+    }
+
+    /// Whether the keys are drawn as caps.
+    fn has_caps(&self) -> bool {
+        let plays = matches!(self.view.screen, Screen::Playing { .. });
+        plays && self.view.entry == Entry::Participant
+    }
+
     fn small(&self, area: Rect, buf: &mut Buffer) {
         let stop = if self.view.armed {
             "Esc or Space stops the device."
@@ -267,16 +355,19 @@ impl Widget for &Page<'_> {
         top.render(row(area, 0), buf);
         let body = Page::body(area);
         self.screen(body, buf);
-        let keys = self.keys();
+        let keys = self.offered();
         let words = &self.view.words;
         let keys: Vec<(&str, &str)> = keys
             .iter()
-            .filter(|(key, _)| !(self.waits && key == "Enter"))
             .map(|(key, what)| (key.as_str(), words.get(*what)))
             .collect();
         if self.state.dialog().is_none() {
-            let line = hints(self.theme, &keys);
-            centre(buf, row(area, area.height - 3), &line);
+            if self.has_caps() {
+                self.caps(rows(area, area.height - 4, 3), &keys, buf);
+            } else {
+                let line = hints(self.theme, &keys);
+                centre(buf, row(area, area.height - 3), &line);
+            }
             if self.view.entry == Entry::Experimenter
                 && self.view.line.device != DeviceState::Unknown
             {
@@ -301,6 +392,7 @@ impl Widget for &Page<'_> {
         let status = Status {
             line: &self.view.line,
             text: self.state.is_text(),
+            own: self.own(),
             live: self.live,
             unsaved: matches!(self.view.screen, Screen::SaveTrouble { .. }),
             words: &self.view.words,

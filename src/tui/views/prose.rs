@@ -2,7 +2,9 @@
 
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Reading;
-use crate::tui::widgets::{centre, centre_all, clock, left_all, middle, right, row, rows, styled};
+use crate::tui::widgets::{
+    BIG_ROWS, big, centre, centre_all, clock, left_all, middle, right, row, rows, styled,
+};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -28,6 +30,10 @@ pub struct Prose {
     pub body: String,
     /// Whether the body is a long text: left-aligned and scrollable.
     pub long: bool,
+    /// A time below a long text, drawn large.
+    pub big: String,
+    /// The last line of a long text's page.
+    pub below: String,
     /// Keys in a column: the key, its action, an explanation.
     pub choices: Vec<(&'static str, String, &'static str)>,
     /// The keys at the foot of the page and their actions.
@@ -159,7 +165,20 @@ pub fn prose(view: &View) -> Option<Prose> {
             title: words.get(Phrase::Saving).to_owned(),
             ..Prose::default()
         },
-        Screen::Break { text, wait_s } => Prose {
+        Screen::Break {
+            text,
+            wait_s,
+            done,
+            total,
+        } => Prose {
+            big: if *wait_s > 0.0 {
+                clock(wait_s.ceil())
+            } else {
+                String::new()
+            },
+            below: total.map_or_else(String::new, |total| {
+                words.fill(Phrase::DoneOf, &[("n", done), ("total", &total)])
+            }),
             above: words.get(Phrase::Break).to_owned(),
             body: wrap::flow(text),
             long: true,
@@ -286,7 +305,7 @@ impl ProseView<'_> {
         let column = middle(area, COLUMN.min(area.width.saturating_sub(8)), area.height);
         let lines = wrap::paragraph(&self.prose.body, usize::from(column.width), usize::MAX);
         let head = u16::from(!self.prose.above.is_empty()) * 2;
-        let foot = u16::from(!self.prose.title.is_empty()) * 2;
+        let foot = self.foot();
         let room = area.height.saturating_sub(head + foot).max(1);
         let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room);
         let widest = lines.iter().map(|l| wrap::width(l)).max().unwrap_or(0);
@@ -294,6 +313,13 @@ impl ProseView<'_> {
         let top = head + area.height.saturating_sub(used) * 2 / 5;
         let narrow = u16::try_from(widest).unwrap_or(column.width);
         (lines, middle(rows(column, top, height), narrow, height))
+    }
+
+    /// Rows below a long text.
+    fn foot(&self) -> u16 {
+        let prose = self.prose;
+        let some = |text: &str| u16::from(!text.is_empty());
+        some(&prose.title) * 2 + some(&prose.big) * (BIG_ROWS + 1) + some(&prose.below) * 2
     }
 
     /// The largest scroll position and the number of lines on a page.
@@ -331,14 +357,25 @@ impl ProseView<'_> {
             left_all(buf, place, &lines[from..], style);
         }
         let more = lines.len() > from + page;
-        let foot = Rect {
+        let mut foot = Rect {
             y: place.bottom() + 1,
-            height: 1,
+            height: area.bottom().saturating_sub(place.bottom() + 1),
             ..area
         };
-        if foot.bottom() <= area.bottom() && !self.prose.title.is_empty() {
-            let line = styled(self.prose.title.as_str(), self.theme.quiet());
-            centre(buf, foot, &line);
+        if !self.prose.big.is_empty() {
+            let time = rows(foot, 0, BIG_ROWS);
+            big(buf, time, &self.prose.big, self.theme.strong());
+            foot = rows(foot, BIG_ROWS + 1, foot.height);
+        }
+        for text in [&self.prose.title, &self.prose.below] {
+            if !text.is_empty() {
+                centre(
+                    buf,
+                    row(foot, 0),
+                    &styled(text.as_str(), self.theme.quiet()),
+                );
+                foot = rows(foot, 2, foot.height);
+            }
         }
         let arrow = |text: &'static str| styled(text, self.theme.key());
         if from > 0 {

@@ -1,7 +1,7 @@
 //! The experimenter's status line, the banner and the progress.
 
 use crate::tui::theme::Theme;
-use crate::tui::widgets::{centre, clock, left, right, styled};
+use crate::tui::widgets::{cells, centre, clock, left, right, styled};
 use crate::tui::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Rect};
@@ -9,7 +9,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use std::fmt::Display;
 use study_core::protocol::phrases::{Phrase, Words};
-use study_core::session::view::{Banner, DeviceState, Mirror, StatusLine, Telemetry};
+use study_core::session::view::{Banner, DeviceState, Mirror, Progress, StatusLine, Telemetry};
 use study_core::session::{Screen, View};
 
 /// The status line, in the last row.
@@ -21,6 +21,9 @@ pub struct Status<'a> {
     pub live: bool,
     /// Whether `?` is text at the moment.
     pub text: bool,
+    /// Whether the participant sits at the terminal: who takes part, the clock and the
+    /// device are shown only where something is wrong with it.
+    pub own: bool,
     /// Whether saving has failed.
     pub unsaved: bool,
     /// The fixed sentences that a participant reads.
@@ -29,7 +32,8 @@ pub struct Status<'a> {
     pub theme: Theme,
 }
 
-fn device(state: DeviceState, live: bool) -> &'static str {
+/// The state of the device in words.
+pub(super) fn device(state: DeviceState, live: bool) -> &'static str {
     match state {
         DeviceState::Unknown => "no session yet",
         DeviceState::Limp => "device limp",
@@ -57,19 +61,23 @@ impl Widget for &Status<'_> {
             .map(|name| wrap::one_line(name, 12))
             .collect::<Vec<_>>()
             .join(" · ");
-        left(buf, inside, &styled(who, quiet));
+        if !self.own {
+            left(buf, inside, &styled(who, quiet));
+        }
 
         let bad = matches!(line.device, DeviceState::Fault | DeviceState::Lost);
-        let mut spans = vec![Span::styled(
-            device(line.device, self.live),
-            if bad {
-                self.theme.trouble_frame()
-            } else {
-                quiet
-            },
-        )];
+        let mut spans = Vec::new();
+        if bad || !self.own {
+            let style = match bad {
+                true => self.theme.trouble_frame(),
+                false => quiet,
+            };
+            spans.push(Span::styled(device(line.device, self.live), style));
+        }
         if line.device != DeviceState::Unknown {
-            spans.push(Span::styled(format!(" · {}", clock(line.elapsed_s)), quiet));
+            if !self.own {
+                spans.push(Span::styled(format!(" · {}", clock(line.elapsed_s)), quiet));
+            }
             let (saved, answered) = (line.trials_saved, line.trials_answered);
             if self.unsaved {
                 let words = format!(" · NOT SAVED {saved} of {answered}");
@@ -88,6 +96,11 @@ impl Widget for &Status<'_> {
                 spans.push(Span::styled(mark, self.theme.saved()));
                 spans.push(Span::styled(format!(" {saved} of {answered}"), quiet));
             }
+        }
+        // Nothing stands before the first part.
+        if let Some(first) = spans.first_mut() {
+            let text = first.content.trim_start_matches(" · ").to_owned();
+            first.content = text.into();
         }
         let behind = match line.mirror {
             Some(Mirror::OnlyResults) => " · NO MIRROR",
@@ -112,6 +125,38 @@ pub struct Top<'a> {
     pub view: &'a View,
     /// The styles.
     pub theme: Theme,
+}
+
+impl Top<'_> {
+    /// The closed trials as a bar, with a tick after each block.
+    fn bar(&self, area: Rect, progress: Progress, total: u32, buf: &mut Buffer) {
+        let wide = f64::from(area.width);
+        let column = |trials: u32| (f64::from(trials) / f64::from(total.max(1)) * wide).round();
+        let done = column(progress.current.saturating_sub(1)) as u16;
+        let ticks: Vec<u16> = match progress.block {
+            Some(block) if total / block.max(1) <= 10 => (1..)
+                .map(|n| n * block)
+                .take_while(|trials| *trials < total)
+                .map(|trials| column(trials) as u16)
+                .collect(),
+            _ => Vec::new(),
+        };
+        for x in 0..area.width {
+            // A tick is the last cell of its block.
+            let tick = ticks.contains(&(x + 1));
+            let symbol = match (x < done, tick) {
+                (true, false) => "━",
+                (true, true) => "┿",
+                (false, false) => "─",
+                (false, true) => "┼",
+            };
+            let style = match x < done {
+                true => self.theme.chosen(),
+                false => self.theme.outline(),
+            };
+            buf.set_string(area.x + x, area.y, symbol, style);
+        }
+    }
 }
 
 impl Widget for &Top<'_> {
@@ -143,12 +188,25 @@ impl Widget for &Top<'_> {
             words.push(self.view.words.fill(phrase, &values));
         }
         if !words.is_empty() {
-            let words = Span::styled(words.join(" · "), self.theme.quiet());
+            let words = styled(words.join(" · "), self.theme.quiet());
             let at = Rect {
                 width: area.width.saturating_sub(1),
                 ..area
             };
-            right(buf, at, &Line::from(words));
+            right(buf, at, &words);
+            if let Some((progress, total)) = self.view.progress.and_then(|p| Some((p, p.total?))) {
+                let taken = cells(&words) + 2;
+                let wide = u16::try_from(total).unwrap_or(u16::MAX).clamp(10, 30);
+                let room = at.width.saturating_sub(taken);
+                if room >= wide + 42 {
+                    let place = Rect {
+                        x: at.right() - taken - wide,
+                        width: wide,
+                        ..at
+                    };
+                    self.bar(place, progress, total, buf);
+                }
+            }
         }
     }
 }

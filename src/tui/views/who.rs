@@ -2,7 +2,7 @@
 
 use crate::tui::theme::Theme;
 use crate::tui::ui_state::Who;
-use crate::tui::widgets::{TextField, centre, left, middle, row, styled};
+use crate::tui::widgets::{TextField, centre, frame, left, left_all, middle, row, rows, styled};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::widgets::Widget;
@@ -23,23 +23,15 @@ pub struct WhoView<'a> {
     pub theme: Theme,
 }
 
-/// Width of the fields with their labels, in cells.
+/// Width of the fields, in cells.
 const WIDE: u16 = 56;
-/// Width of the labels, in cells.
-const LABEL: u16 = 14;
+/// Rows of the title and the two boxed fields with their lines.
+const ROWS: u16 = 10;
 
 impl WhoView<'_> {
+    /// The title, the line below, the text and the box of each field.
     fn fields(&self, area: Rect) -> [(&'static str, String, TextField<'_>, Rect); 2] {
-        let place = middle(area, WIDE, 9);
-        let at = |y| {
-            let label = LABEL.min(place.width);
-            let all = row(place, y);
-            Rect {
-                x: all.x + label.min(all.width),
-                width: all.width.saturating_sub(label),
-                ..all
-            }
-        };
+        let place = self.place(area);
         let field = |editor, on| TextField {
             editor,
             focused: self.focused && !self.claiming && self.who.on_operator == on,
@@ -54,15 +46,34 @@ impl WhoView<'_> {
                 "Participant",
                 who.unwrap_or_else(|| "a pseudonym, such as P01".to_owned()),
                 field(participant, false),
-                at(3),
+                rows(place, 2, 3),
             ),
             (
                 "Operator",
                 "your initials or a code".to_owned(),
                 field(operator, true),
-                at(6),
+                rows(place, 6, 3),
             ),
         ]
+    }
+
+    fn recent(&self) -> Vec<String> {
+        let recent = self.roster.iter().flat_map(|roster| roster.recent());
+        recent.map(|(id, who)| format!("{id:<12} {who}")).collect()
+    }
+
+    fn place(&self, area: Rect) -> Rect {
+        let recent = u16::try_from(self.recent().len()).unwrap_or(0);
+        let more = if recent > 0 { recent + 2 } else { 0 };
+        middle(area, WIDE, ROWS + more)
+    }
+
+    /// The text of a boxed field: its bar is the left side of the box.
+    fn inner(at: Rect) -> Rect {
+        Rect {
+            width: at.width.saturating_sub(1),
+            ..row(at, 1)
+        }
     }
 
     /// The position of the terminal's cursor.
@@ -70,13 +81,13 @@ impl WhoView<'_> {
         let fields = self.fields(area);
         fields
             .iter()
-            .find_map(|(_, _, field, at)| field.cursor(*at))
+            .find_map(|(_, _, field, at)| field.cursor(Self::inner(*at)))
     }
 }
 
 impl Widget for &WhoView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let place = middle(area, WIDE, 9);
+        let place = self.place(area);
         let title = if self.claiming {
             "One moment."
         } else {
@@ -84,20 +95,45 @@ impl Widget for &WhoView<'_> {
         };
         let title = styled(title, self.theme.strong());
         centre(buf, row(place, 0), &title);
+        let next = self.roster.and_then(|roster| roster.next_id());
         for (label, hint, field, at) in self.fields(area) {
-            let start = Rect {
-                x: place.x,
-                width: LABEL.min(place.width),
-                ..at
+            let border = match field.focused {
+                true => self.theme.focus(),
+                false => self.theme.outline(),
             };
-            let label = styled(label, self.theme.text());
-            left(buf, start, &label);
-            field.render(at, buf);
-            let below = Rect { y: at.y + 1, ..at };
-            if below.bottom() <= area.bottom() && !at.is_empty() {
-                let hint = styled(format!("  {hint}"), self.theme.quiet());
-                left(buf, below, &hint);
+            frame(buf, at, field.focused, border);
+            let name = Rect {
+                x: at.x + 2.min(at.width),
+                width: at.width.saturating_sub(4),
+                ..row(at, 0)
+            };
+            left(buf, name, &styled(format!(" {label} "), self.theme.text()));
+            field.render(WhoView::inner(at), buf);
+            if let Some(next) = next.as_ref().filter(|_| label == "Participant")
+                && field.editor.is_blank()
+            {
+                let ghost = Rect {
+                    x: at.x + 2.min(at.width),
+                    width: at.width.saturating_sub(4),
+                    ..row(at, 1)
+                };
+                let words = format!("→ {next}");
+                left(buf, ghost, &styled(words, self.theme.quiet()));
             }
+            let below = rows(area, at.bottom().saturating_sub(area.y), 1);
+            let below = Rect {
+                x: at.x,
+                width: at.width,
+                ..below
+            };
+            left(buf, below, &styled(format!("  {hint}"), self.theme.quiet()));
+        }
+        let recent = self.recent();
+        if !recent.is_empty() {
+            let list = rows(place, ROWS + 1, place.height);
+            let title = styled("Last participants", self.theme.quiet());
+            left(buf, row(list, 0), &title);
+            left_all(buf, rows(list, 1, list.height), &recent, self.theme.quiet());
         }
     }
 }

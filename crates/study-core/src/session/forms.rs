@@ -222,6 +222,7 @@ impl Session {
             return self.notify(why.to_string());
         }
         let trial = self.history.open().map(|o| o.trial.trial);
+        self.remarks.push(text.clone());
         self.record(Event::Remark { by, trial, text }, at);
     }
 

@@ -11,6 +11,7 @@ use crate::outcome::fold::GivenAnswer;
 use crate::outcome::{FormId, Moment};
 use crate::protocol::phrases::Phrase;
 use crate::protocol::{DeviceKind, Seat, Stimuli, TrackRules};
+use std::collections::BTreeMap;
 use study_base::text::Untrusted;
 
 impl Session {
@@ -36,6 +37,7 @@ impl Session {
             },
             can_replay: self.can_replay(),
             can_go_back: self.can_go_back(),
+            remarks: self.remarks.iter().rev().take(3).cloned().collect(),
             force: self.presents_force(),
             has_reference: self.has_reference(),
             can_advance: can_advance(&screen),
@@ -127,6 +129,8 @@ impl Session {
                 text: (self.protocol.text.rest.clone())
                     .unwrap_or_else(|| self.words.get(Phrase::BreakText).to_owned()),
                 wait_s: self.break_wait_s(at),
+                done: self.history.closed(false),
+                total: self.total(false),
             },
             Phase::Saving | Phase::Leaving { .. } => Screen::Saving,
             Phase::End | Phase::Over(_) => Screen::End {
@@ -194,7 +198,19 @@ impl Session {
             practice: trial.practice,
             current: (self.history.closed(trial.practice) + 1).min(most),
             total: self.total(trial.practice),
+            block: self.block_length().filter(|_| !trial.practice),
         })
+    }
+
+    /// The length of the blocks of trials that count.
+    fn block_length(&self) -> Option<u32> {
+        let counted = self.history.schedule().iter().filter(|t| !t.practice);
+        let mut blocks: BTreeMap<u32, u32> = BTreeMap::new();
+        for trial in counted {
+            *blocks.entry(trial.block).or_default() += 1;
+        }
+        let first = *blocks.values().next()?;
+        (blocks.len() > 1 && blocks.values().all(|n| *n == first)).then_some(first)
     }
 
     fn line(&self, at: Moment) -> StatusLine {

@@ -10,8 +10,13 @@ pub struct Roster {
     known: BTreeMap<ParticipantId, Known>,
     /// What is said of participants who have finished a session and come again.
     again: BTreeMap<ParticipantId, String>,
+    /// Those who began last, the latest first.
+    recent: Vec<ParticipantId>,
     newcomer: Newcomer,
 }
+
+/// How many of the last participants are shown.
+const RECENT: usize = 5;
 
 /// What a new participant becomes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,7 +49,12 @@ impl Roster {
             };
             (row.participant.clone(), known)
         });
+        let mut begun: Vec<&ParticipantRow> =
+            rows.iter().filter(|row| row.started_at.is_some()).collect();
+        begun.sort_by_key(|row| std::cmp::Reverse(row.started_at));
+        let recent = begun.iter().take(RECENT);
         Self {
+            recent: recent.map(|row| row.participant.clone()).collect(),
             known: known.collect(),
             again: BTreeMap::new(),
             newcomer,
@@ -54,6 +64,25 @@ impl Roster {
     /// Says of a participant who has finished a session when the next one is.
     pub fn comes_again(&mut self, participant: &ParticipantId, words: String) {
         self.again.insert(participant.clone(), words);
+    }
+
+    /// The participants who began last, the latest first, with who they are.
+    pub fn recent(&self) -> impl Iterator<Item = (&ParticipantId, String)> {
+        let who = |id: &ParticipantId| self.who(id.as_str()).unwrap_or_default();
+        self.recent.iter().map(move |id| (id, who(id)))
+    }
+
+    /// An id for the next participant: that of the last one, or P00, with the next free
+    /// number.
+    pub fn next_id(&self) -> Option<ParticipantId> {
+        let last = self.recent.first().map_or("P00", ParticipantId::as_str);
+        let name = last.trim_end_matches(|c: char| c.is_ascii_digit());
+        let digits = &last[name.len()..];
+        let number: u32 = digits.parse().ok()?;
+        let width = digits.len();
+        (number..number.saturating_add(1000))
+            .filter_map(|n| ParticipantId::new(format!("{name}{:0width$}", n.checked_add(1)?)).ok())
+            .find(|id| !self.known.keys().any(|k| k == id || k.collides_with(id)))
     }
 
     /// Who a typed id is; `None` if it is no id.

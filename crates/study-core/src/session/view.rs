@@ -46,6 +46,8 @@ pub struct View {
     /// Whether the first interval of the trial is a reference, and the second one is
     /// rated.
     pub has_reference: bool,
+    /// The experimenter's last remarks in this sitting, newest first.
+    pub remarks: Vec<String>,
     /// Whether Enter has an effect now.
     pub can_advance: bool,
     /// The fixed sentences that a participant reads.
@@ -81,6 +83,8 @@ pub struct Progress {
     pub current: u32,
     /// Number of trials; `None` if it depends on the answers.
     pub total: Option<u32>,
+    /// Trials of a block, if there are several blocks and all are as long.
+    pub block: Option<u32>,
 }
 
 /// Why the data are not those of a real participant.
@@ -269,6 +273,10 @@ pub enum Screen {
         text: String,
         /// Time until Enter works, s.
         wait_s: f64,
+        /// Number of closed trials, without practice.
+        done: u32,
+        /// Number of trials, without practice; `None` if it depends on the answers.
+        total: Option<u32>,
     },
     /// A pause.
     Paused {
