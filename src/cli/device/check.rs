@@ -342,13 +342,17 @@ fn program_rendering(args: &CheckArgs, console: &mut Console) -> Result<(), Fail
     } else {
         console.out(format!("{summary}\n"))?;
     }
-    match pass {
-        true => Ok(()),
-        false => Err(Failure::device(
-            "the program does not render its tables as the servo of docs/wire.md",
-        )
-        .hint("a program with other constants is only marked in sessions; docs/devices.md")),
+    if pass {
+        return Ok(());
     }
+    if all.iter().any(rendering::Rendered::is_silent) {
+        return Err(Failure::device("the program does not answer in time")
+            .hint("it has to answer load, start and stop as docs/devices.md says"));
+    }
+    Err(
+        Failure::device("the program does not render its tables as the servo of docs/wire.md")
+            .hint("a program with other constants is only marked in sessions; docs/devices.md"),
+    )
 }
 
 /// Middle of the tables for a program, which tells no stroke, mm.
@@ -386,7 +390,9 @@ fn line(verdict: &Verdict) -> String {
 }
 
 fn failed(address: &str, result: &Commissioning) -> Failure {
-    let clauses = result.failed_clauses().join(", ");
+    let failed = result.failed_clauses();
+    let plural = if failed.len() == 1 { "" } else { "s" };
+    let clauses = failed.join(", ");
     if clauses.is_empty() && !result.unjudged_clauses().is_empty() {
         return Failure::device(format!(
             "{}: this computer was too late to judge every clause",
@@ -402,7 +408,7 @@ fn failed(address: &str, result: &Commissioning) -> Failure {
         .hint("do not use it with participants before this is corrected");
     }
     Failure::device(format!(
-        "{}: it violates clause {clauses} of docs/wire.md",
+        "{}: it violates clause{plural} {clauses} of docs/wire.md",
         Untrusted(address)
     ))
     .hint("do not use it with participants before this is corrected")

@@ -33,6 +33,9 @@ const FORCE_N: f64 = 9.0;
 /// A velocity limit that every hand passes, mm/s.
 const SLOW_MM_S: f64 = 3.0;
 
+/// What is seen of a device that does not answer; the other tables are not tried.
+const SILENT: &str = "it does not answer in time: the other tables are not tried";
+
 /// The result of one playback.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Rendered {
@@ -53,6 +56,11 @@ impl Rendered {
             seen: seen.into(),
             fidelity: None,
         }
+    }
+
+    /// Whether the device did not answer.
+    pub(super) fn is_silent(&self) -> bool {
+        self.seen == SILENT
     }
 
     /// For the terminal.
@@ -79,7 +87,8 @@ pub(super) fn prompt() -> String {
     )
 }
 
-/// Tests a device. `report` receives each result at once.
+/// Tests a device. `report` receives each result at once. Ends at the first table to which
+/// the device does not answer.
 pub(super) fn check(
     device: &mut dyn Device,
     middle_mm: f64,
@@ -95,7 +104,11 @@ pub(super) fn check(
     for (what, table) in tables(middle_mm) {
         let result = one(device, &what, &table, &mut pace);
         report(&result)?;
+        let silent = result.is_silent();
         all.push(result);
+        if silent {
+            return Ok(all);
+        }
     }
     let result = trip(device, middle_mm, &mut pace);
     report(&result)?;
@@ -235,6 +248,7 @@ fn one(device: &mut dyn Device, what: &str, table: &Realization, pace: &mut Pace
         let heard = play(device, table, limits, pace);
         let playback = match heard.ended {
             Ok(playback) => playback,
+            Err(PlaybackError::Timeout) => return Rendered::new(what, "fail", SILENT),
             // A trip is usually caused by the hand.
             Err(why) => {
                 last = Rendered::new(what, "not judged", why.to_string());
