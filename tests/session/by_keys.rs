@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::player::{play_to_end, play_until as until};
+use crate::support::player::{
+    F2, correct_newest, dialog, mark_bad, play_to_end, play_until as until, quit,
+};
 use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,19 +21,6 @@ fn play_until(terminal: &mut Terminal, text: &str) {
     until(terminal, "P01", text);
 }
 
-/// Opens a dialog by its key and types into it.
-fn dialog(terminal: &mut Terminal, key: &str, title: &str, typed: &str) {
-    terminal.keys(key);
-    terminal.wait_for(title);
-    terminal.keys(typed);
-    terminal.wait_until("the dialog to close", |s| !s.contains(title));
-}
-
-const F2: &str = "\u{1b}OQ";
-const F3: &str = "\u{1b}OR";
-const F4: &str = "\u{1b}OS";
-const F10: &str = "\u{1b}[21~";
-
 /// A session with a remark, a bad trial, a correction, a quit and a resume.
 fn eventful(protocol: &Path, id: &str, trials: usize) {
     let folder = tempfile::tempdir().unwrap();
@@ -47,27 +36,12 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
     play_until(&mut terminal, "trial 2 of");
     // a bad trial
     play_until(&mut terminal, "Enter: rate");
-    dialog(
-        &mut terminal,
-        F4,
-        "Enter: mark as bad",
-        "somebody came in\r",
-    );
+    mark_bad(&mut terminal, "somebody came in");
     play_until(&mut terminal, "trial 3 of");
     // a correction: the newest answer
-    terminal.keys(F3);
-    terminal.wait_for("Correct");
-    terminal.keys("\r");
-    terminal.wait_until("the new answer", |s| s.contains("Enter: continue"));
-    terminal.keys("3\r");
-    terminal.wait_until("the reason", |s| s.contains("Enter: correct"));
-    terminal.keys("mistyped\r");
-    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: correct"));
+    correct_newest(&mut terminal, "3", "mistyped");
     // quit in the middle, and resume
-    terminal.keys(F10);
-    terminal.wait_for("Are you sure?");
-    terminal.keys("y");
-    assert_eq!(terminal.exit_code(), 0);
+    quit(&mut terminal);
     assert!(!terminal.alternate());
     assert!(
         terminal.screen().contains("not finished"),
@@ -92,10 +66,7 @@ fn eventful(protocol: &Path, id: &str, trials: usize) {
         terminal.keys(&format!("\u{15}{id}"));
         terminal.wait_for(who);
     }
-    terminal.keys(F10);
-    terminal.wait_for("Are you sure?");
-    terminal.keys("y");
-    assert_eq!(terminal.exit_code(), 0);
+    quit(&mut terminal);
 
     let results = folder.path().join("results").join(id);
     let (code, out, err) = study(&["verify", "results"], folder.path());
@@ -185,10 +156,7 @@ fn an_erasure_lists_what_goes_and_asks_for_the_id() {
     changed_protocol("turn-signal", &protocol, &[PATIENT]);
     let mut terminal = start(folder.path(), &protocol);
     play_until(&mut terminal, "trial 2 of");
-    terminal.keys(F10);
-    terminal.wait_for("Are you sure?");
-    terminal.keys("y");
-    assert_eq!(terminal.exit_code(), 0);
+    quit(&mut terminal);
     let erase = [
         "participant",
         "results",

@@ -3,7 +3,7 @@
 
 use crate::plain::{Lines, events, last_answers};
 use crate::screen::Session;
-use crate::support::player::{play_to_end, play_until};
+use crate::support::player::{F7, play_to_end, play_until};
 use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -33,7 +33,9 @@ impl Channel {
                 let run = ["run", path, "--operator", "lw"];
                 let mut terminal = Terminal::start(&run, folder, 24, 80);
                 play_until(&mut terminal, "P01", "F7: feel it again");
-                terminal.keys("\u{1b}[18~");
+                terminal.keys(F7);
+                // What the player does next is done to the new page.
+                terminal.wait_until("the replay", |s| !s.contains("F7: feel it again"));
                 play_until(&mut terminal, "P01", "trial 3 of 5");
                 terminal.keys("\u{11}");
                 terminal.wait_for("Quit the session?");

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::player::{play_to_end, play_until};
+use crate::support::player::{correct_newest, mark_bad, play_to_end, play_until, quit};
 use crate::support::{Terminal, changed_protocol, study};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -171,10 +171,6 @@ fn analyzed(folder: &Path) {
     );
 }
 
-const F3: &str = "\u{1b}OR";
-const F4: &str = "\u{1b}OS";
-const F10: &str = "\u{1b}[21~";
-
 #[test]
 fn two_sessions_by_keys_with_a_failed_playback_a_correction_a_quit_and_a_resume() {
     let folder = tempfile::tempdir().unwrap();
@@ -188,23 +184,10 @@ fn two_sessions_by_keys_with_a_failed_playback_a_correction_a_quit_and_a_resume(
     };
     let mut terminal = start();
     play_until(&mut terminal, "P01", "Enter: rate");
-    terminal.keys(F4);
-    terminal.wait_for("Enter: mark as bad");
-    terminal.keys("somebody came in\r");
-    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: mark as bad"));
+    mark_bad(&mut terminal, "somebody came in");
     play_until(&mut terminal, "P01", "trial 3 of");
-    terminal.keys(F3);
-    terminal.wait_for("Correct");
-    terminal.keys("\r");
-    terminal.wait_until("the new answer", |s| s.contains("Enter: continue"));
-    terminal.keys("3\r");
-    terminal.wait_until("the reason", |s| s.contains("Enter: correct"));
-    terminal.keys("mistyped\r");
-    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: correct"));
-    terminal.keys(F10);
-    terminal.wait_for("Are you sure?");
-    terminal.keys("y");
-    assert_eq!(terminal.exit_code(), 0);
+    correct_newest(&mut terminal, "3", "mistyped");
+    quit(&mut terminal);
     let mut terminal = start();
     play_to_end(&mut terminal, "P01");
 
@@ -221,10 +204,7 @@ fn two_sessions_by_keys_with_a_failed_playback_a_correction_a_quit_and_a_resume(
     let mut terminal = start();
     terminal.keys("P01");
     terminal.wait_for("finished");
-    terminal.keys(F10);
-    terminal.wait_for("Are you sure?");
-    terminal.keys("y");
-    assert_eq!(terminal.exit_code(), 0);
+    quit(&mut terminal);
 
     let (code, out, err) = study(&["verify", "results"], folder.path());
     assert_eq!(code, 0, "{out}{err}");

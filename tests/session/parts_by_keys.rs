@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use crate::support::player::play;
+use crate::support::player::{correct_newest, mark_bad, play, quit};
 use crate::support::{PATIENCE, Terminal, repository, study};
 use serde_json::Value as Json;
 use std::fs;
@@ -13,9 +13,6 @@ use std::time::{Duration, Instant};
 
 /// What every form of a trial asks.
 const PROMPT: &str = "Which is it now?";
-const F3: &str = "\u{1b}OR";
-const F4: &str = "\u{1b}OS";
-const F10: &str = "\u{1b}[21~";
 
 /// How a trial is answered, and another answer for the correction.
 type Observer = fn(&Json) -> (String, String);
@@ -180,28 +177,18 @@ fn eventful(folder: &Path, observer: Observer) -> Vec<csv::StringRecord> {
                 || s.contains("THIRD")
                 || (s.contains("Feel the") && !s.contains("FIRST")))
     });
-    typed(&mut terminal, F4, "Enter: mark as bad");
-    terminal.keys("somebody came in\r");
-    terminal.wait_until("the dialog to close", |s| !s.contains("mark as bad"));
+    mark_bad(&mut terminal, "somebody came in");
     // The newest answer is corrected.
     play_until(&mut terminal, folder, observer, |s| {
         done(folder) >= 3 && s.contains("Enter: when ready")
     });
     let last = completed(folder).pop().unwrap();
-    typed(&mut terminal, F3, "Correct");
-    typed(&mut terminal, "\r", "Enter: continue");
-    terminal.keys(&observer(&last).1);
-    std::thread::sleep(Duration::from_millis(50));
-    typed(&mut terminal, "\r", "Enter: correct");
-    terminal.keys("mistyped\r");
-    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: correct"));
+    correct_newest(&mut terminal, &observer(&last).1, "mistyped");
     // Quit while a trial is under way, and resume.
     play_until(&mut terminal, folder, observer, |s| {
         done(folder) >= 4 && (s.contains("FIRST") || s.contains("Feel the"))
     });
-    typed(&mut terminal, F10, "Are you sure?");
-    terminal.keys("y");
-    assert_eq!(terminal.exit_code(), 0);
+    quit(&mut terminal);
     let mut terminal = start(folder);
     play_until(&mut terminal, folder, observer, |s| {
         s.contains("Enter: close")

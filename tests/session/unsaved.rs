@@ -6,13 +6,11 @@
 
 #![cfg(target_os = "linux")]
 
-use crate::support::player::{play_to_end, play_until};
+use crate::support::player::{F10, play_to_end, play_until};
 use crate::support::{PATIENT, Terminal, changed_protocol, study};
 use rustix::process::{Pid, Resource, Rlimit, prlimit};
 use std::fs;
 use std::path::{Path, PathBuf};
-
-const F10: &str = "\u{1b}[21~";
 
 struct Desk {
     folder: tempfile::TempDir,

@@ -87,6 +87,46 @@ fn play_while(
     }
 }
 
+/// The experimenter's keys, as a terminal sends them.
+pub const F2: &str = "\u{1b}OQ";
+pub const F3: &str = "\u{1b}OR";
+pub const F4: &str = "\u{1b}OS";
+pub const F7: &str = "\u{1b}[18~";
+pub const F10: &str = "\u{1b}[21~";
+
+/// Opens a dialog by its key, waits for its title and types into it what ends it.
+pub fn dialog(terminal: &mut Terminal, key: &str, title: &str, typed: &str) {
+    terminal.keys(key);
+    terminal.wait_for(title);
+    terminal.keys(typed);
+    terminal.wait_until("the dialog to close", |s| !s.contains(title));
+}
+
+/// Marks the trial under way, or the last one, as bad.
+pub fn mark_bad(terminal: &mut Terminal, reason: &str) {
+    dialog(terminal, F4, "Enter: mark as bad", &format!("{reason}\r"));
+}
+
+/// Corrects the newest answer.
+pub fn correct_newest(terminal: &mut Terminal, answer: &str, reason: &str) {
+    terminal.keys(F3);
+    terminal.wait_for("Correct");
+    terminal.keys("\r");
+    terminal.wait_until("the new answer", |s| s.contains("Enter: continue"));
+    terminal.keys(&format!("{answer}\r"));
+    terminal.wait_until("the reason", |s| s.contains("Enter: correct"));
+    terminal.keys(&format!("{reason}\r"));
+    terminal.wait_until("the dialog to close", |s| !s.contains("Enter: correct"));
+}
+
+/// Leaves the session.
+pub fn quit(terminal: &mut Terminal) {
+    terminal.keys(F10);
+    terminal.wait_for("Are you sure?");
+    terminal.keys("y");
+    assert_eq!(terminal.exit_code(), 0, "{}", terminal.screen());
+}
+
 fn act(terminal: &mut Terminal, participant: &str, page: &Shown, until: Option<Instant>) -> Did {
     let shows = |text: &str| page.text.contains(text);
     let answer = rating(&page.text);
