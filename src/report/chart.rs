@@ -20,9 +20,8 @@ mod look;
 pub use super::picture::{Anchor, Colour, text_width};
 pub(in crate::report) use axis::MAX_LABEL;
 pub use axis::{Axis, Ticks};
-pub(in crate::report) use draw::share;
 pub(in crate::report) use frame::{for_names, widest};
-pub use look::{Dash, Look, PALETTE, Shape, ramp};
+pub use look::{Dash, Look, PALETTE, Scale, Shape};
 
 use super::picture::Picture;
 use std::sync::OnceLock;
@@ -107,14 +106,12 @@ pub enum Mark {
     Area(Vec<(f64, f64, f64)>),
     /// Filled boxes, such as those of a histogram.
     Bars(Vec<Span>),
-    /// Boxes coloured by a value between `low` and `high`, by [`ramp`].
+    /// Boxes coloured by their value.
     Heat {
         /// Boxes and their values.
         cells: Vec<(Span, f64)>,
-        /// Value of the lightest colour.
-        low: f64,
-        /// Value of the darkest colour.
-        high: f64,
+        /// The colours.
+        scale: Scale,
     },
 }
 
@@ -169,10 +166,8 @@ pub struct Label {
 pub struct ColourBar {
     /// Label. Untrusted.
     pub label: String,
-    /// Value of the lightest colour.
-    pub low: f64,
-    /// Value of the darkest colour.
-    pub high: f64,
+    /// The colours.
+    pub scale: Scale,
 }
 
 impl Figure {

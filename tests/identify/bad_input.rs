@@ -245,6 +245,46 @@ fn a_knob_with_semicolons_and_decimal_commas_is_read_at_its_lever() {
     );
     let (none, said) = vaf("k.csv", &text, &["--columns", columns]);
     assert!(none.is_none() && said.contains("--lever MM"), "{said}");
+    // the table and the figures are in these units as well
+    let figures = dir.path().join("figures");
+    let output = Command::cargo_bin("study")
+        .unwrap()
+        .arg("identify")
+        .args([&dir.path().join("k.csv"), &PathBuf::from("--validate")])
+        .arg(dir.path().join("v.csv"))
+        .args([
+            "--columns",
+            columns,
+            "--lever",
+            "25",
+            "--dx",
+            "1,2",
+            "--delta",
+            "0.5,1",
+        ])
+        .args([&PathBuf::from("--figures"), &figures])
+        .output()
+        .unwrap();
+    let table = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    for said in [
+        "angles in deg",
+        "dx deg",
+        "delta deg",
+        "bias N·m",
+        "2.29183",
+    ] {
+        assert!(table.contains(said), "no {said}: {table}");
+    }
+    let four = fs::read_to_string(figures.join("fig4-vaf.csv")).unwrap();
+    assert!(four.starts_with("delta_deg,dx_deg,vaf\n"), "{four}");
+    assert_eq!(four.lines().count(), 5, "{four}");
+    let six = fs::read_to_string(figures.join("fig6-force.csv")).unwrap();
+    assert!(six.starts_with("t_s,measured_nm,predicted_nm\n"), "{six}");
 }
 
 #[test]

@@ -184,9 +184,9 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_enum)]
     pub(super) direction: Option<DirectionRule>,
 
-    /// Length over which a hat or passive table or friction changes direction, in mm [default: the shortest that suits the training recording]
-    #[arg(long, value_name = "MM", value_parser = positive)]
-    pub(super) delta: Option<f64>,
+    /// Lengths over which a hat or passive table or friction changes direction, in mm: a list, or FROM:TO:STEP [default: the shortest that suits the training recording]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = increments)]
+    pub(super) delta: Vec<Numbers>,
 
     /// Ridges of a hat table: on the curvature of F, on the slopes of m and b [default: 0.003,0.05]; of a passive table: on F, on b [default: 0.003,0.06]
     #[arg(long, value_name = "F,DYNAMICS", value_delimiter = ',', value_parser = ridge, num_args = 2)]
@@ -212,7 +212,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
 
-    /// Template of the ids of the model files, with {lambda} and {dx}
+    /// Template of the ids of the model files, with {lambda}, {dx} and {delta}
     #[arg(long, value_name = "TEMPLATE", requires = "out")]
     pub(super) id: Option<String>,
 

@@ -1,9 +1,9 @@
 //! The files that `study identify` writes: model files and figures.
 
 use super::super::trajectory::{refuse_to_overwrite, write_file};
-use super::args::{Args, MethodName};
+use super::args::{Args, MethodName, distinct};
 use super::{Failure, Kind, Results};
-use crate::report::identification::{self, Drawing, GridCell};
+use crate::report::identification::{self, Drawing, GridCell, Row, Shown};
 use crate::report::picture::png::Painter;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,14 +20,18 @@ pub(super) fn models(
     args: &Args,
     dir: &Path,
 ) -> Result<Vec<OutputFile>, Failure> {
+    let several = distinct(&args.delta).len() > 1;
     let template = args.id.as_deref().unwrap_or(match args.method() {
         MethodName::Ewls => "lambda-{lambda}-dx-{dx}",
         MethodName::Constrained => "constrained-lambda-{lambda}-dx-{dx}",
         MethodName::TwoSided if args.width.is_some() => "two-sided-dx-{dx}",
         MethodName::TwoSided => "two-sided-{lambda}-dx-{dx}",
+        MethodName::Hat if several => "hat-delta-{delta}-dx-{dx}",
         MethodName::Hat => "hat-dx-{dx}",
+        MethodName::Passive if several => "passive-delta-{delta}-dx-{dx}",
         MethodName::Passive => "passive-dx-{dx}",
         MethodName::Mechanism => "mechanism-dx-{dx}",
+        MethodName::Friction if several => "friction-delta-{delta}",
         MethodName::Friction => "friction",
         MethodName::Static => "static-dx-{dx}",
         MethodName::Segments => "segments",
@@ -40,11 +44,12 @@ pub(super) fn models(
         let provenance = &cell.realization.provenance;
         let id = template
             .replace("{lambda}", &number(provenance.lambda))
-            .replace("{dx}", &number(provenance.dx_mm));
+            .replace("{dx}", &number(provenance.dx_mm))
+            .replace("{delta}", &number(cell.realization.direction.delta_mm()));
         let id = ModelId::new(id).map_err(Failure::input)?;
         if ids.iter().any(|other| other.collides_with(&id)) {
             return Err(Failure::input(format!("two cells would have the id {id}"))
-                .hint("use {lambda} and {dx} in the template, or fewer values"));
+                .hint("use {lambda}, {dx} and {delta} in the template, or fewer values"));
         }
         cell.realization.id = id.to_string();
         let written = match args.units() {
@@ -78,14 +83,23 @@ pub(super) fn figures(
 ) -> Result<(Vec<OutputFile>, Vec<&'static str>), Failure> {
     let mut missing = Vec::new();
     let mut drawings: Vec<Drawing> = Vec::new();
+    let shown = results
+        .args
+        .units()
+        .map_or(Shown::LINEAR, |(units, lever_mm)| Shown { units, lever_mm });
     let (selected_on, _) = results.recordings[0];
+    let lambdas = (results.cells.iter()).any(|c| c.realization.provenance.lambda.is_some());
+    let row = if lambdas { Row::Lambda } else { Row::Delta };
     let places: Vec<GridCell> = results
         .cells
         .iter()
         .filter_map(|cell| {
             let provenance = &cell.realization.provenance;
             Some(GridCell {
-                lambda: provenance.lambda?,
+                value: match row {
+                    Row::Lambda => provenance.lambda?,
+                    Row::Delta => cell.realization.direction.delta_mm()?,
+                },
                 memory_mm: provenance.memory_mm,
                 dx_mm: provenance.dx_mm?,
                 vaf: cell.scores.first()?.vaf,
@@ -94,26 +108,32 @@ pub(super) fn figures(
         .collect();
     let whole = places.len() == results.cells.len();
     let name = Untrusted(&selected_on.name).to_string();
-    match identification::surface(&places, results.best.filter(|_| whole), &name) {
+    let best = results.best.filter(|_| whole);
+    match identification::surface(row, &places, best, &name, shown) {
         Some(drawing) => drawings.push(drawing),
-        None => missing.push("no Fig. 4: it requires at least two lambda and two dx"),
+        None => {
+            missing.push("no Fig. 4: it requires two dx and two lambda, or two dx and two delta")
+        }
     }
-    let shown = results.best.unwrap_or(0);
-    if let Some(cell) = results.cells.get(shown) {
+    if let Some(cell) = results.cells.get(results.best.unwrap_or(0)) {
         let recording = results.recordings[results.reported()].1;
-        drawings.push(identification::parameters(&cell.realization));
-        drawings.push(identification::force(&cell.realization, recording));
-        drawings.push(identification::spectra(&cell.realization, recording));
-        let dx = cell.realization.provenance.dx_mm;
+        let realization = &cell.realization;
+        let mechanism = identification::mechanism(realization, recording, shown);
+        let is_table = mechanism.is_none();
+        drawings.push(mechanism.unwrap_or_else(|| identification::parameters(realization, shown)));
+        drawings.push(identification::force(realization, recording, shown));
+        drawings.push(identification::spectra(realization, recording, shown));
+        let dx = realization.provenance.dx_mm;
         let same_dx: Vec<_> = results
             .cells
             .iter()
             .filter(|other| other.realization.provenance.dx_mm == dx)
             .filter_map(|other| Some((other.realization.provenance.lambda?, &other.realization)))
             .collect();
-        match identification::map(&same_dx) {
+        match identification::map(&same_dx, shown) {
             Some(drawing) => drawings.push(drawing),
-            None => missing.push("no Fig. 8: it requires at least two lambda"),
+            None if is_table => missing.push("no Fig. 8: it requires at least two lambda"),
+            None => {}
         }
     }
     let painter = Painter::default();

@@ -10,6 +10,7 @@ use study_haptics::identify::grid::Cell;
 use study_haptics::identify::mechanism::{Filter, Fitted, PARAMETERS};
 use study_haptics::identify::vaf::Score;
 use study_haptics::identify::validation::{Accuracy, JUST_NOTICEABLE_N};
+use study_haptics::model::Units;
 use study_haptics::recording::Recording;
 use study_wire::certificate::Certificate;
 use unicode_width::UnicodeWidthStr as _;
@@ -228,19 +229,65 @@ fn start_and_sort(method: Method) -> [Option<&'static str>; 2] {
     }
 }
 
+/// Lengths and forces as the recording has them: a turning handle in angles and torques.
+#[derive(Clone, Copy)]
+struct Printed {
+    units: Units,
+    lever_mm: f64,
+}
+
+impl Printed {
+    fn of(results: &Results<'_>) -> Self {
+        let (units, lever_mm) = results.args.units().unwrap_or((Units::Linear, 1.0));
+        Self { units, lever_mm }
+    }
+
+    fn length(self, mm: f64) -> f64 {
+        self.units.of_mm(mm, self.lever_mm)
+    }
+
+    fn force(self, n: f64) -> f64 {
+        self.units.of_n(n, self.lever_mm)
+    }
+
+    fn x(self) -> &'static str {
+        self.units.names()[0]
+    }
+
+    fn f(self) -> &'static str {
+        self.units.names()[1]
+    }
+}
+
+/// A number without the digits that a conversion of units leaves.
+fn plain(value: f64) -> String {
+    let rounded = format!("{value:.6e}").parse::<f64>();
+    rounded.map_or_else(|_| value.to_string(), |value| value.to_string())
+}
+
 /// The results as text for a terminal.
 pub(super) fn table(results: &Results<'_>) -> String {
     let mut out = String::new();
+    let p = Printed::of(results);
+    if p.units != Units::Linear {
+        let _ = writeln!(
+            out,
+            "angles in {} and torques in N·m; certificates and mechanisms in mm and N at {} mm",
+            p.x(),
+            p.lever_mm
+        );
+    }
     for (_, training) in results.training {
         let _ = writeln!(
             out,
-            "{}: {} samples, {:.1} s, x {:.2} to {:.2} mm, |v| up to {:.0} mm/s",
+            "{}: {} samples, {:.1} s, x {:.2} to {:.2} {x}, |v| up to {:.0} {x}/s",
             Untrusted(&training.name),
             training.len(),
             training.duration_s(),
-            training.range_mm()[0],
-            training.range_mm()[1],
-            training.top_speed_mm_s(),
+            p.length(training.range_mm()[0]),
+            p.length(training.range_mm()[1]),
+            p.length(training.top_speed_mm_s()),
+            x = p.x(),
         );
     }
     if let Some(cell) = results.cells.first() {
@@ -250,7 +297,11 @@ pub(super) fn table(results: &Results<'_>) -> String {
     match surface(results) {
         Some(rows) => {
             let name = Untrusted(&results.recordings[0].0.name);
-            let _ = writeln!(out, "VAF on {name}, by lambda (and L in mm) and dx in mm:");
+            let x = p.x();
+            let _ = writeln!(
+                out,
+                "VAF on {name}, by lambda (and L in {x}) and dx in {x}:"
+            );
             out.push_str(&align(&rows));
         }
         None => {
@@ -274,6 +325,7 @@ fn surface(results: &Results<'_>) -> Option<Vec<Vec<String>>> {
     if results.cells.len() <= MAX_ROWS {
         return None;
     }
+    let p = Printed::of(results);
     let mut increments: Vec<f64> = Vec::new();
     let mut rows: Vec<(f64, Vec<String>)> = Vec::new();
     for (i, cell) in results.cells.iter().enumerate() {
@@ -289,13 +341,13 @@ fn surface(results: &Results<'_>) -> Option<Vec<Vec<String>>> {
             _ => {
                 let memory = provenance
                     .memory_mm
-                    .map_or("all".into(), |l| format!("{l:.3}"));
+                    .map_or("all".into(), |l| format!("{:.3}", p.length(l)));
                 rows.push((lambda, vec![lambda.to_string(), memory, vaf]));
             }
         }
     }
     let mut heads = vec!["lambda".to_owned(), "L".to_owned()];
-    heads.extend(increments.iter().map(ToString::to_string));
+    heads.extend(increments.iter().map(|dx| plain(p.length(*dx))));
     let mut table = vec![heads];
     table.extend(rows.into_iter().map(|(_, row)| row));
     let columns = table[0].len();
@@ -310,12 +362,13 @@ fn best_in_detail(results: &Results<'_>) -> String {
     let Some(cell) = results.best.map(|best| &results.cells[best]) else {
         return String::new();
     };
-    let mut rows = vec![
-        ["", "VAF", "NRMSE", "bias N", "residual N", "in JND"]
-            .map(String::from)
-            .to_vec(),
-    ];
+    let p = Printed::of(results);
+    let [bias, residual] = ["bias", "residual"].map(|name| format!("{name} {}", p.f()));
+    let heads = ["", "VAF", "NRMSE", &bias, &residual, "in JND"];
+    let mut rows = vec![heads.map(String::from).to_vec()];
     let mut ceilings = String::new();
+    // a torque in N·m is some 30 times smaller than its force
+    let decimals = if p.units == Units::Linear { 3 } else { 5 };
     for ((named, _), (validation, ceiling)) in results
         .recordings
         .iter()
@@ -328,8 +381,8 @@ fn best_in_detail(results: &Results<'_>) -> String {
                     samples,
                     format!("{:.4}", accuracy.vaf),
                     format!("{:.3}", accuracy.nrmse),
-                    format!("{:+.3}", accuracy.bias_n),
-                    format!("{:.3}", accuracy.residual_n),
+                    format!("{:+.*}", decimals, p.force(accuracy.bias_n)),
+                    format!("{:.*}", decimals, p.force(accuracy.residual_n)),
                     format!("{:.1}", accuracy.in_noticeable_differences()),
                 ]);
             }
@@ -338,15 +391,18 @@ fn best_in_detail(results: &Results<'_>) -> String {
         row("v > 0".into(), &v.positive);
         row("v < 0".into(), &v.negative);
         for ([low, high], part) in &v.detents {
-            row(format!("x {low:.1} to {high:.1} mm"), part);
+            let [low, high] = [*low, *high].map(|mm| p.length(mm));
+            row(format!("x {low:.1} to {high:.1} {}", p.x()), part);
         }
         if let Some(c) = ceiling {
             let _ = writeln!(
                 ceilings,
-                "highest VAF that a model can reach on {}: {:.6} (its repetition differs by noise of {:.3} N); the residual is {:.1} times the least one",
+                "highest VAF that a model can reach on {}: {:.6} (its repetition differs by noise of {:.*} {}); the residual is {:.1} times the least one",
                 Untrusted(&named.name),
                 c.vaf,
-                c.noise_n,
+                decimals,
+                p.force(c.noise_n),
+                p.f(),
                 c.residual(v.whole.vaf)
             );
         }
@@ -389,13 +445,20 @@ fn settings(cell: &Cell) -> String {
 }
 
 fn heads(results: &Results<'_>) -> Vec<String> {
-    let mut heads: Vec<String> = ["", "lambda", "L mm", "dx mm"].map(String::from).to_vec();
+    let p = Printed::of(results);
+    let (x, f) = (p.x(), p.f());
+    let mut heads = vec![
+        String::new(),
+        "lambda".into(),
+        format!("L {x}"),
+        format!("dx {x}"),
+    ];
     if has_delta(results) {
-        heads.push("delta mm".into());
+        heads.push(format!("delta {x}"));
     }
     for (named, _) in &results.recordings {
         heads.push(format!("VAF {}", short_name(named)));
-        heads.extend(["bias N", "residual N"].map(String::from));
+        heads.extend([format!("bias {f}"), format!("residual {f}")]);
     }
     heads.extend(["m<0", "b<0", "passive"].map(String::from));
     heads
@@ -408,27 +471,31 @@ fn has_delta(results: &Results<'_>) -> bool {
 }
 
 fn row(results: &Results<'_>, cell: &Cell, best: bool) -> Vec<String> {
+    let p = Printed::of(results);
+    let decimals = if p.units == Units::Linear { 4 } else { 6 };
     let provenance = &cell.realization.provenance;
     let number = |n: Option<f64>| n.map_or("-".to_owned(), |n| n.to_string());
     let memory = match (provenance.lambda, provenance.memory_mm) {
         (Some(_), None) => "all".to_owned(),
-        (_, Some(memory)) => format!("{memory:.3}"),
+        (_, Some(memory)) => format!("{:.3}", p.length(memory)),
         (None, None) => "-".to_owned(),
     };
     let mut row = vec![
         if best { "*" } else { "" }.to_owned(),
         number(provenance.lambda),
         memory,
-        number(provenance.dx_mm),
+        (provenance.dx_mm).map_or("-".to_owned(), |dx| plain(p.length(dx))),
     ];
     if has_delta(results) {
         let delta_mm = cell.realization.direction.delta_mm();
-        row.push(number(delta_mm.map(|mm| (1e4 * mm).round() / 1e4)));
+        row.push(number(
+            delta_mm.map(|mm| (1e4 * p.length(mm)).round() / 1e4),
+        ));
     }
     for score in &cell.scores {
         row.push(format!("{:.6}", score.vaf));
-        row.push(format!("{:+.4}", score.bias_n));
-        row.push(format!("{:.4}", score.residual_n));
+        row.push(format!("{:+.decimals$}", p.force(score.bias_n)));
+        row.push(format!("{:.decimals$}", p.force(score.residual_n)));
     }
     let certificate = &cell.certificate;
     for share in [certificate.negative_mass, certificate.negative_damping] {

@@ -33,6 +33,11 @@ impl Args {
             given if given.is_empty() => DEFAULT_LAMBDAS.to_vec(),
             given => given,
         };
+        let deltas: Vec<Delta> = match distinct(&self.delta) {
+            given if given.is_empty() => vec![Delta::Scan],
+            given => given.into_iter().map(Delta::Mm).collect(),
+        };
+        let each_delta = |of: &dyn Fn(Delta) -> Method| deltas.iter().map(|d| of(*d)).collect();
         let each = |of: &dyn Fn(f64) -> Method| lambdas.iter().map(|l| of(*l)).collect();
         let methods: Vec<Method> = match self.method() {
             MethodName::Ewls => each(&|lambda| self.ewls(lambda, false)),
@@ -50,16 +55,18 @@ impl Args {
                     None => each(&|lambda| of(Width::Lambda(lambda))),
                 }
             }
-            MethodName::Hat => vec![self.hat()],
-            MethodName::Passive => vec![self.passive()],
+            MethodName::Hat => each_delta(&|delta| self.hat(delta)),
+            MethodName::Passive => each_delta(&|delta| self.passive(delta)),
             MethodName::Mechanism => vec![Method::Mechanism(method::Mechanism {
                 recorded_hz: self.filter,
             })],
             MethodName::Friction => {
                 let rule = self.direction.unwrap_or(DirectionRule::Dahl);
-                vec![Method::Friction(Friction {
-                    state: self.state(rule),
-                })]
+                each_delta(&|delta| {
+                    Method::Friction(Friction {
+                        state: state(rule, delta),
+                    })
+                })
             }
             MethodName::Static => vec![Method::Static],
             MethodName::Segments => vec![Method::Segments(
@@ -81,24 +88,15 @@ impl Args {
         })
     }
 
-    fn state(&self, rule: DirectionRule) -> State {
-        let delta = self.delta.map_or(Delta::Scan, Delta::Mm);
-        match rule {
-            DirectionRule::Sign => State::Sign,
-            DirectionRule::Play => State::Play(delta),
-            DirectionRule::Dahl => State::Dahl(delta),
-        }
-    }
-
     /// The direction state of a table.
-    fn table_state(&self) -> State {
-        self.state(self.direction.unwrap_or(DirectionRule::Play))
+    fn table_state(&self, delta: Delta) -> State {
+        state(self.direction.unwrap_or(DirectionRule::Play), delta)
     }
 
-    fn passive(&self) -> Method {
+    fn passive(&self, delta: Delta) -> Method {
         let default = Passive::default();
         Method::Passive(Passive {
-            state: self.table_state(),
+            state: self.table_state(delta),
             ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
             ridge_damping: self.ridge.get(1).copied().unwrap_or(default.ridge_damping),
             terms: match self.terms.is_empty() {
@@ -112,10 +110,10 @@ impl Args {
         })
     }
 
-    fn hat(&self) -> Method {
+    fn hat(&self, delta: Delta) -> Method {
         let default = Hat::default();
         Method::Hat(Hat {
-            state: self.table_state(),
+            state: self.table_state(delta),
             ridge_force: self.ridge.first().copied().unwrap_or(default.ridge_force),
             ridge_dynamics: self.ridge.get(1).copied().unwrap_or(default.ridge_dynamics),
             bounded: self.bounds.unwrap_or(default.bounded),
@@ -152,7 +150,7 @@ impl Args {
                 self.direction.is_some(),
                 &[Hat, Passive, Friction],
             ),
-            ("--delta", self.delta.is_some(), &[Hat, Passive, Friction]),
+            ("--delta", !self.delta.is_empty(), &[Hat, Passive, Friction]),
             ("--terms", !self.terms.is_empty(), &[Passive]),
             ("--huber", self.huber, &[Passive]),
             ("--ridge", !self.ridge.is_empty(), &[Hat, Passive]),
@@ -168,5 +166,13 @@ impl Args {
             ))),
             None => Ok(()),
         }
+    }
+}
+
+fn state(rule: DirectionRule, delta: Delta) -> State {
+    match rule {
+        DirectionRule::Sign => State::Sign,
+        DirectionRule::Play => State::Play(delta),
+        DirectionRule::Dahl => State::Dahl(delta),
     }
 }

@@ -3,7 +3,7 @@
 use super::MAX_LABEL;
 use super::frame::{Frame, SAMPLE, TITLE_BASE};
 use super::labels;
-use super::look::{Look, Shape, ramp};
+use super::look::{Look, Shape};
 use super::{Anchor, Colour, ColourBar, Mark, NORMAL, Note, Panel, SMALL, fitted, shortened};
 use super::{Span, Whisker, text_width};
 use crate::report::picture::{Path, Pen, Picture, Point, Text};
@@ -197,9 +197,9 @@ fn mark(out: &mut Picture, panel: &Panel, f: &Frame, mark: &Mark, look: Look) {
             }
             out.path(boxes.opacity(look.opacity));
         }
-        Mark::Heat { cells, low, high } => {
+        Mark::Heat { cells, scale } => {
             for (span, value) in cells.iter().filter(|(_, v)| v.is_finite()) {
-                let colour = ramp(share(*value, *low, *high));
+                let colour = scale.colour(*value);
                 // An outline of the same colour hides the seams between cells.
                 let mut cell = Path::filled(colour).edged(Pen::new(colour, 0.5));
                 if let Some((a, b)) = corners(panel, f, span) {
@@ -209,12 +209,6 @@ fn mark(out: &mut Picture, panel: &Panel, f: &Frame, mark: &Mark, look: Look) {
             }
         }
     }
-}
-
-/// Position of a value between two others; 0.5 if these are equal.
-pub(in crate::report) fn share(value: f64, low: f64, high: f64) -> f64 {
-    let share = (value - low) / (high - low);
-    if share.is_finite() { share } else { 0.5 }
 }
 
 fn pen(look: Look) -> Pen {
@@ -342,12 +336,12 @@ fn colour_bar(out: &mut Picture, bar: &ColourBar, f: &Frame) {
     let height = f.bottom - f.top;
     for i in 0..STEPS {
         let y = f.bottom - height * (i + 1) as f64 / STEPS as f64;
-        let mut step = Path::filled(ramp((i as f64 + 0.5) / STEPS as f64));
+        let mut step = Path::filled(bar.scale.at((i as f64 + 0.5) / STEPS as f64));
         // An overlap of half a px hides the seams.
         step.rectangle((left, y), (left + 12.0, y + height / STEPS as f64 + 0.5));
         out.path(step);
     }
-    let axis = super::Axis::new("", bar.low, bar.high);
+    let axis = super::Axis::new("", bar.scale.low, bar.scale.high);
     let most = (height / 24.0).floor().clamp(2.0, 6.0) as usize;
     let mut ticks = Path::drawn(Pen::new(Colour::INK, 1.0));
     for (at, label) in axis.marks(most) {
@@ -363,7 +357,7 @@ fn colour_bar(out: &mut Picture, bar: &ColourBar, f: &Frame) {
         }
     }
     out.path(ticks);
-    let at = (left + 58.0, (f.top + f.bottom) / 2.0);
+    let at = (left + 64.0, (f.top + f.bottom) / 2.0);
     out.text(Text {
         angle: 90,
         ..Text::new(at, &shortened(&bar.label, MAX_NOTE), SMALL, Anchor::Middle)

@@ -118,7 +118,7 @@ fn left_margin(panel: &Panel) -> f64 {
 
 fn right_margin(panel: &Panel) -> f64 {
     match &panel.colour_bar {
-        Some(_) => 76.0,
+        Some(_) => 82.0,
         None => 14.0,
     }
 }

@@ -146,7 +146,8 @@ impl Look {
     }
 }
 
-/// Stops of the colour ramp, with evenly decreasing lightness.
+/// Stops of the ascending scale, with evenly decreasing lightness and a single hue, so that
+/// the order is visible in greyscale too.
 const STOPS: [Colour; 5] = [
     Colour(0xf4, 0xf7, 0xfb),
     Colour(0xb9, 0xd3, 0xe8),
@@ -155,13 +156,61 @@ const STOPS: [Colour; 5] = [
     Colour(0x08, 0x30, 0x6b),
 ];
 
-/// The colour of a value from 0 (light) to 1 (dark). It has a single hue, so that the
-/// order is visible in greyscale too.
-pub fn ramp(share: f64) -> Colour {
-    let at = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
+/// Stops of the diverging scale: light in the middle, two hues, darker towards both ends.
+const DIVERGING: [Colour; 5] = [
+    Colour(0x7f, 0x3b, 0x08),
+    Colour(0xe0, 0x8f, 0x3e),
+    Colour(0xf7, 0xf7, 0xf7),
+    Colour(0x6a, 0xa6, 0xd0),
+    Colour(0x08, 0x30, 0x6b),
+];
+
+/// The colours of values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// The value of the first colour; lower values have it as well.
+    pub low: f64,
+    /// The value of the last colour; higher values have it as well.
+    pub high: f64,
+    stops: &'static [Colour; 5],
+}
+
+impl Scale {
+    /// From light to dark.
+    pub fn ascending(low: f64, high: f64) -> Self {
+        Self {
+            low,
+            high,
+            stops: &STOPS,
+        }
+    }
+
+    /// Light at 0, with one hue below it and another one above it, up to ±`most`.
+    pub fn diverging(most: f64) -> Self {
+        Self {
+            low: -most,
+            high: most,
+            stops: &DIVERGING,
+        }
+    }
+
+    /// The colour of a value; that of the middle if both ends are equal.
+    pub fn colour(&self, value: f64) -> Colour {
+        let share = (value - self.low) / (self.high - self.low);
+        between(self.stops, if share.is_finite() { share } else { 0.5 })
+    }
+
+    /// The colour at a share of the scale, from 0 to 1.
+    pub(super) fn at(&self, share: f64) -> Colour {
+        between(self.stops, share)
+    }
+}
+
+fn between(stops: &[Colour; 5], share: f64) -> Colour {
+    let at = share.clamp(0.0, 1.0) * (stops.len() - 1) as f64;
     // Between 0 and 3, so the cast is exact.
-    let low = (at.floor() as usize).min(STOPS.len() - 2);
-    let (a, b, t) = (STOPS[low], STOPS[low + 1], at - low as f64);
+    let low = (at.floor() as usize).min(stops.len() - 2);
+    let (a, b, t) = (stops[low], stops[low + 1], at - low as f64);
     // Between two bytes, so the cast is exact.
     let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * t).round() as u8;
     Colour(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))

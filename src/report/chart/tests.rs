@@ -74,11 +74,21 @@ fn ids_begin_with_the_figures_own_and_are_unique() {
 }
 
 #[test]
-fn the_ramp_darkens_all_the_way() {
-    let all: Vec<f64> = (0..=20)
-        .map(|i| ramp(f64::from(i) / 20.0).luminance())
-        .collect();
-    assert!(all.windows(2).all(|w| w[1] < w[0]), "{all:?}");
+fn scales_darken_all_the_way() {
+    let luminances = |scale: Scale, from: f64, to: f64| -> Vec<f64> {
+        let at = |i| from + (to - from) * f64::from(i) / 20.0;
+        (0..=20).map(|i| scale.colour(at(i)).luminance()).collect()
+    };
+    let diverging = Scale::diverging(4.0);
+    for all in [
+        luminances(Scale::ascending(2.0, 3.0), 2.0, 3.0),
+        luminances(diverging, 0.0, 4.0),
+        luminances(diverging, 0.0, -4.0),
+    ] {
+        assert!(all.windows(2).all(|w| w[1] < w[0]), "{all:?}");
+    }
+    assert_ne!(diverging.colour(4.0), diverging.colour(-4.0));
+    assert_eq!(diverging.colour(9.0), diverging.colour(4.0));
 }
 
 #[test]
@@ -105,8 +115,9 @@ fn names_that_have_no_room_are_turned_and_thinned() {
 
 #[test]
 fn what_stands_on_a_colour_can_be_read() {
-    for i in 0..=200 {
-        let paper = ramp(f64::from(i) / 200.0);
+    let scales = [Scale::ascending(-1.0, 1.0), Scale::diverging(1.0)];
+    let values = (-100..=100).map(|i| f64::from(i) / 100.0);
+    for paper in values.flat_map(|v| scales.map(|scale| scale.colour(v))) {
         let (a, b) = (paper.luminance() + 0.05, paper.text_on().luminance() + 0.05);
         assert!(a.max(b) / a.min(b) >= 4.5, "{paper:?}");
     }

@@ -3,8 +3,8 @@
 use super::{Along, Canvas, Drawn, Scene, cell, drawn, head, name, rows_height};
 use crate::report::apa;
 use crate::report::chart::{
-    Axis, Colour, ColourBar, Look, MAX_LABEL, Mark, Note, PALETTE, Panel, SMALL, Span, for_names,
-    ramp, share, text_width, widest,
+    Axis, Colour, ColourBar, Look, MAX_LABEL, Mark, Note, PALETTE, Panel, SMALL, Scale, Span,
+    for_names, text_width, widest,
 };
 use std::collections::BTreeMap;
 use study_stats::describe::mean;
@@ -76,10 +76,10 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
             };
             (span, *mean)
         });
+        let scale = Scale::ascending(low, high);
         let heat = Mark::Heat {
             cells: boxes.collect(),
-            low,
-            high,
+            scale,
         };
         // The first row is at the top.
         let y = Axis::of_names(y, &rows).reversed();
@@ -87,8 +87,7 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
             Panel::new(Axis::of_names(&x, &columns), y).with(Look::plain(PALETTE[0]), heat);
         panel.colour_bar = Some(ColourBar {
             label: scene.asked.clone(),
-            low,
-            high,
+            scale,
         });
         // Width without labels and legend; a cell below 26 px is too narrow for a number.
         let room = c.width - widest(&rows, MAX_LABEL) - 110.0;
@@ -96,8 +95,8 @@ pub(super) fn cells(scene: &Scene<'_>) -> Option<Drawn> {
             panel.notes = found
                 .iter()
                 .map(|(at, mean)| {
-                    let paper = ramp(share(*mean, low, high));
-                    Note::new(place(*at), &apa::number(*mean, 1)).on(paper)
+                    let text = apa::number(*mean, 1);
+                    Note::new(place(*at), &text).on(scale.colour(*mean))
                 })
                 .collect();
         }

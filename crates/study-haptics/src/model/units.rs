@@ -39,8 +39,18 @@ impl Units {
         }
     }
 
+    /// A length in mm at the end of a lever arm of `lever_mm`, in these units.
+    pub fn of_mm(self, mm: f64, lever_mm: f64) -> f64 {
+        mm / self.at_lever(lever_mm).x
+    }
+
+    /// A force in N at the end of a lever arm of `lever_mm`, in these units.
+    pub fn of_n(self, n: f64, lever_mm: f64) -> f64 {
+        n / self.at_lever(lever_mm).f
+    }
+
     /// A key of a model file with these units in its name; `key` is the one with mm and N.
-    pub(super) fn key(self, key: &str) -> String {
+    pub fn key(self, key: &str) -> String {
         if self == Self::Linear {
             return key.to_owned();
         }
@@ -167,6 +177,16 @@ impl Mechanism {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// 20 N at 30 mm are 0.6 N·m, and 30 mm along the arc are 1 rad.
+    #[test]
+    fn lengths_and_forces_at_a_lever_arm() {
+        assert!((Units::Radians.of_mm(30.0, 30.0) - 1.0).abs() < 1e-12);
+        let degrees = Units::Degrees.of_mm(30.0, 30.0);
+        assert!((degrees - 57.295_779_513).abs() < 1e-9, "{degrees}");
+        assert!((Units::Degrees.of_n(20.0, 30.0) - 0.6).abs() < 1e-12);
+        assert_eq!(Units::Linear.of_mm(3.0, 30.0), 3.0);
+    }
 
     #[test]
     fn keys_name_their_units() {

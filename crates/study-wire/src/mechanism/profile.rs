@@ -89,8 +89,8 @@ impl<R: Real> Profile<'_, R> {
         }
     }
 
-    /// The value of the spline.
-    pub(super) fn spline_n(&self, x_mm: R) -> R {
+    /// The value of the spline, N.
+    pub fn spline_n(&self, x_mm: R) -> R {
         let around = self.spline(x_mm);
         let mut sum = R::ZERO;
         for (i, weight) in around.at.iter().zip(around.weight) {
@@ -99,8 +99,8 @@ impl<R: Real> Profile<'_, R> {
         sum
     }
 
-    /// The value by linear interpolation.
-    pub(super) fn linear_n(&self, x_mm: R) -> R {
+    /// The value by linear interpolation, N.
+    pub fn linear_n(&self, x_mm: R) -> R {
         let (left, t, _) = self.linear(x_mm);
         let [from, to] = [self.n[left], self.n[left + 1]].map(R::of);
         from + t * (to - from)
