@@ -1,5 +1,6 @@
-//! The table of `docs/estimators.md`: every method's VAF on switch A as recorded in
-//! tests/data, and on 12 random simulated switches. `cargo bench --bench estimators`.
+//! The tables of `docs/estimators.md`: every method's VAF on switch A as recorded in
+//! tests/data, and on 12 random simulated switches: `cargo bench --bench estimators`. How
+//! the residuals compare at 1 kHz and at 10 kHz: `cargo bench --bench estimators -- --rates`.
 
 #![allow(
     clippy::print_stdout,
@@ -14,7 +15,7 @@ use std::fs::File;
 use std::io::BufReader;
 use study_base::rng::Stream;
 use study_haptics::identify::method::{
-    Delta, Ewls, Hat, Segments, Sort, Start, State, TwoSided, Width, Window,
+    Delta, Ewls, Hat, Passive, Segments, Sort, Start, State, TwoSided, Width, Window,
 };
 use study_haptics::identify::resample::Resample;
 use study_haptics::identify::{Method, Training, vaf};
@@ -133,6 +134,9 @@ fn main() {
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
+    if std::env::args().any(|argument| argument == "--rates") {
+        return rates();
+    }
     let mut pairs = vec![(shipped("training_a"), shipped("validation_a"))];
     let ensemble = (0..SWITCHES).map(switches::random_switch);
     for (i, parameters) in [Parameters::a(), Parameters::b()]
@@ -178,5 +182,62 @@ fn rule(direction: Direction) -> String {
     match direction {
         Direction::Sign => String::new(),
         Direction::Play { delta_mm } | Direction::Dahl { delta_mm } => format!("δ {delta_mm}"),
+    }
+}
+
+/// Memory lengths of EWLS, as forgetting factors at 1 kHz.
+const TUNED: [f64; 8] = [0.95, 0.97, 0.98, 0.985, 0.99, 0.995, 0.998, 0.999];
+
+/// The unexplained variance of the paper's cell and of EWLS with the best memory, divided by
+/// that of the tables with a direction state, at two rates.
+fn rates() {
+    let switches: Vec<Parameters> = [Parameters::a(), Parameters::b()]
+        .into_iter()
+        .chain((0..SWITCHES).map(switches::random_switch))
+        .collect();
+    for hz in [1e3, 1e4] {
+        let mut ratios: [Vec<f64>; 4] = Default::default();
+        for (i, parameters) in switches.iter().enumerate() {
+            let slips = [(0.0, 0.0); 4];
+            let switch = switches::Switch {
+                parameters,
+                slips: &slips,
+                hz,
+            };
+            let mut noise = Stream::new(i as u64, &["rates"]);
+            let training = switch.record("t", switches::training, 60.0, &mut noise);
+            let validation = switch.record("v", switches::validation, 20.0, &mut noise);
+            let training = Training::new(&training).unwrap();
+            let left = |method| 1.0 - score(&training, &validation, method).0;
+            let paper = left(Method::Ewls(Ewls::paper(0.999, Resample::Point)));
+            // the same memory at every rate
+            let tuned = TUNED.map(|at_1_khz| {
+                let lambda = at_1_khz.powf(1e3 / hz);
+                left(Method::Ewls(Ewls::paper(lambda, Resample::Hat)))
+            });
+            let tuned = tuned.into_iter().fold(f64::INFINITY, f64::min);
+            let hat = left(Method::Hat(Hat::default()));
+            let passive = left(Method::Passive(Passive::default()));
+            let of_switch = [paper / hat, paper / passive, tuned / hat, tuned / passive];
+            for (all, ratio) in ratios.iter_mut().zip(of_switch) {
+                all.push(ratio);
+            }
+        }
+        let names = [
+            "paper's cell / hat",
+            "paper's cell / passive",
+            "tuned EWLS / hat",
+            "tuned EWLS / passive",
+        ];
+        println!(
+            "{hz} Hz: geometric mean, least, greatest of {} switches",
+            switches.len()
+        );
+        for (name, all) in names.iter().zip(ratios) {
+            let mean = (all.iter().map(|r| r.ln()).sum::<f64>() / all.len() as f64).exp();
+            let least = all.iter().copied().fold(f64::INFINITY, f64::min);
+            let greatest = all.iter().copied().fold(0.0, f64::max);
+            println!("    {name:24} {mean:.2} {least:.2} {greatest:.2}");
+        }
     }
 }

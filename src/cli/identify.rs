@@ -293,7 +293,11 @@ fn read(
     }
     if args.robust {
         let replaced = recording.without_spikes();
-        console.say(format!("{}: {replaced} spikes replaced", path.display()));
+        let plural = if replaced == 1 { "" } else { "s" };
+        console.say(format!(
+            "{}: {replaced} spike{plural} replaced",
+            path.display()
+        ));
     }
     // swapped columns, which are warned of, have the opposite energy as well
     let swapped = |w: &recording::Warning| matches!(w, recording::Warning::Swapped { .. });
@@ -302,13 +306,20 @@ fn read(
         && !args.active
         && !recording.warnings.iter().any(swapped)
     {
+        let spikes = |w: &recording::Warning| matches!(w, recording::Warning::Spikes { .. });
+        let hint = match !args.robust && recording.warnings.iter().any(spikes) {
+            true => "the spikes may be the cause: --robust replaces them",
+            false => {
+                "F is the force that the probe applies to the target, positive with +x: change its sign. For a target with a motor: --active"
+            }
+        };
         return Err(Failure::input(format!(
             "{}: the target supplies energy: the work of the force over closed cycles is {:.3} J on {:.0} mm, but no passive target gives any",
             path.display(),
             energy.supplied_j,
             energy.path_mm,
         ))
-        .hint("F is the force that the probe applies to the target, positive with +x: change its sign. For a target with a motor: --active"));
+        .hint(hint));
     }
     if let Some((even, most_s)) = signal::without_jitter(&recording)
         && args.needs_even_samples()

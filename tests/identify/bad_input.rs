@@ -127,6 +127,20 @@ fn a_spike_is_named_and_replaced_on_request() {
     let robust = vaf(&spiked, &["--robust"]);
     assert!((good - robust).abs() < 0.001, "{good} {robust}");
     assert!(vaf(&spiked, &[]) < -1e3);
+    // a position that is impossible may turn the sign of the energy
+    let mut jump = training();
+    let rise = |i: &usize| jump[i + 1][4] - jump[i - 1][4];
+    let steepest = (100..1000).max_by(|a, b| rise(a).total_cmp(&rise(b)));
+    jump[steepest.unwrap()][1] = 1e8;
+    let (code, _, err) = identify(&text(NAMES, &jump), &[]);
+    assert_eq!(code, 1, "{err}");
+    assert!(
+        err.contains("may be the cause: --robust replaces them"),
+        "{err}"
+    );
+    let (code, out, err) = identify(&text(NAMES, &jump), &["--robust"]);
+    assert_eq!(code, 0, "{out}{err}");
+    assert!(err.contains(": 1 spike replaced"), "{err}");
 }
 
 #[test]

@@ -68,29 +68,28 @@ fn a_session_on_a_child_program_is_real_data_with_telemetry() {
     assert_eq!(fs::read_dir(telemetry).unwrap().count(), 5);
 }
 
-/// The knob by keys on the simulated device: a mechanism among its playbacks, every one with the
-/// force of its realization.
-#[test]
-fn a_session_with_the_knob_by_keys() {
+/// A shortened study by keys on the simulated device: a mechanism among its playbacks, every
+/// one with the force of its realization.
+fn mechanism_by_keys(name: &str, waits: &[(&str, &str)], trials: usize, asked: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("protocol");
-    let changes = [
+    let shorter = [
         ("repetitions = 3", "repetitions = 1"),
         ("reference_min_s = 3", "reference_min_s = 0"),
         ("minimum_strokes = 2", "minimum_strokes = 1"),
-        PATIENT,
     ];
-    changed_protocol("knob", &to, &changes);
+    changed_protocol(name, &to, &[&shorter, waits].concat());
     let arguments = ["run", to.to_str().unwrap(), "--operator", "lw"];
     let mut terminal = Terminal::start(&arguments, folder.path(), 24, 80);
     terminal.wait_for("Who takes part?");
     play_to_end(&mut terminal, "P01");
-    let rows = ratings(&folder.path().join("results/knob/ratings.csv"));
+    let results = folder.path().join("results").join(name);
+    let rows = ratings(&results.join("ratings.csv"));
     let tested: Vec<&Row> = rows
         .iter()
         .filter(|row| row["practice"] == "false")
         .collect();
-    assert_eq!(tested.len(), 7);
+    assert_eq!(tested.len(), trials);
     assert!(tested.iter().any(|row| row["model"] == "mechanism"));
     for row in tested {
         assert_eq!(row["status"], "ok", "{row:?}");
@@ -98,8 +97,22 @@ fn a_session_with_the_knob_by_keys() {
             ["ok", "too-little"].contains(&&*row["rendering"]),
             "{row:?}"
         );
-        assert!(!row["crispness"].is_empty() && !row["realism"].is_empty());
+        assert!(asked.iter().all(|q| !row[*q].is_empty()), "{row:?}");
     }
+}
+
+#[test]
+fn a_session_with_the_knob_by_keys() {
+    mechanism_by_keys("knob", &[PATIENT], 7, &["realism", "crispness"]);
+}
+
+#[test]
+fn a_session_with_the_passive_realizations_by_keys() {
+    let waits = [
+        ("at_least_s = 60", "at_least_s = 1"),
+        ("max_attempts = 3", "max_attempts = 50"),
+    ];
+    mechanism_by_keys("turn-signal-passive", &waits, 9, &["realism"]);
 }
 
 /// A controller that plays tables only is not given a study with a mechanism: nothing is

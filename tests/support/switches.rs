@@ -1,6 +1,6 @@
 //! Recordings of simulated switches: a motion imposed on the target, an encoder of
 //! 5 µm, force and acceleration with 0.05 N and 0.05 m/s² of noise, all sampled at
-//! 1 kHz and passed forwards and backwards through a Butterworth filter of second
+//! 1 kHz, or another rate, and passed forwards and backwards through a Butterworth filter of second
 //! order at 30 Hz. Simulation, not measurement.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -13,7 +13,6 @@ use study_haptics::plant::{DT_S, Parameters, Target};
 use study_haptics::recording::Recording;
 use study_wire::predict::Motion;
 
-const STEPS_PER_SAMPLE: u32 = 40;
 /// Ramp at the beginning, not recorded, s.
 const RAMP_S: f64 = 0.5;
 
@@ -88,51 +87,84 @@ pub fn record_with(
     seconds: f64,
     noise: &mut Stream,
 ) -> Recording {
-    let mut springs_n = [0.0; 4];
-    let mut before_mm: Option<f64> = None;
-    let mut target = Target::new(parameters.clone(), 17.5).unwrap();
-    let samples = ((RAMP_S + seconds) * 1e3) as u32;
-    let [mut x, mut a, mut f] = [const { Vec::new() }; 3];
-    for i in 0..samples * STEPS_PER_SAMPLE {
-        let t = f64::from(i) * DT_S;
-        let ramped = ramp(motion(t), t);
-        let mut force_n = target.step(ramped);
-        let moved_mm = ramped.x_mm - before_mm.unwrap_or(ramped.x_mm);
-        before_mm = Some(ramped.x_mm);
-        for (spring_n, (n_per_mm, most_n)) in springs_n.iter_mut().zip(slips) {
-            *spring_n = (*spring_n + n_per_mm * moved_mm).clamp(-most_n, *most_n);
-            force_n += *spring_n;
+    let switch = Switch {
+        parameters,
+        slips,
+        hz: 1e3,
+    };
+    switch.record(name, motion, seconds, noise)
+}
+
+/// A simulated switch and the rate at which it is recorded, Hz: 40 kHz divided by a whole
+/// number.
+pub struct Switch<'a> {
+    pub parameters: &'a Parameters,
+    pub slips: &'a Slips,
+    pub hz: f64,
+}
+
+impl Switch<'_> {
+    /// Imposes a motion for `seconds` after the ramp.
+    pub fn record(
+        &self,
+        name: &str,
+        motion: impl Fn(f64) -> Motion,
+        seconds: f64,
+        noise: &mut Stream,
+    ) -> Recording {
+        let Self {
+            parameters,
+            slips,
+            hz,
+        } = *self;
+        let steps_per_sample = (1.0 / (DT_S * hz)).round() as u32;
+        let dt_s = 1.0 / hz;
+        let mut springs_n = [0.0; 4];
+        let mut before_mm: Option<f64> = None;
+        let mut target = Target::new(parameters.clone(), 17.5).unwrap();
+        let samples = ((RAMP_S + seconds) * hz) as u32;
+        let [mut x, mut a, mut f] = [const { Vec::new() }; 3];
+        for i in 0..samples * steps_per_sample {
+            let t = f64::from(i) * DT_S;
+            let ramped = ramp(motion(t), t);
+            let mut force_n = target.step(ramped);
+            let moved_mm = ramped.x_mm - before_mm.unwrap_or(ramped.x_mm);
+            before_mm = Some(ramped.x_mm);
+            for (spring_n, (n_per_mm, most_n)) in springs_n.iter_mut().zip(slips) {
+                *spring_n = (*spring_n + n_per_mm * moved_mm).clamp(-most_n, *most_n);
+                force_n += *spring_n;
+            }
+            if i % steps_per_sample == 0 {
+                x.push((ramped.x_mm / 0.005).round() * 0.005);
+                a.push(ramped.a_m_s2 + 0.05 * noise.normal());
+                f.push(force_n + 0.05 * noise.normal());
+            }
         }
-        if i % STEPS_PER_SAMPLE == 0 {
-            x.push((ramped.x_mm / 0.005).round() * 0.005);
-            a.push(ramped.a_m_s2 + 0.05 * noise.normal());
-            f.push(force_n + 0.05 * noise.normal());
+        for column in [&mut x, &mut a, &mut f] {
+            for _ in 0..2 {
+                low_pass(column, hz);
+                column.reverse();
+            }
         }
-    }
-    for column in [&mut x, &mut a, &mut f] {
-        low_pass(column);
-        column.reverse();
-        low_pass(column);
-        column.reverse();
-    }
-    let v: Vec<f64> = (0..x.len())
-        .map(|i| {
-            let (before, after) = (i.saturating_sub(1), (i + 1).min(x.len() - 1));
-            (x[after] - x[before]) / ((after - before) as f64 * 1e-3)
-        })
-        .collect();
-    // the ramp and the ends of the filter
-    let keep = 500..x.len() - 50;
-    Recording {
-        name: name.into(),
-        t_s: keep.clone().map(|i| i as f64 * 1e-3).collect(),
-        x_mm: x[keep.clone()].to_vec(),
-        v_mm_s: v[keep.clone()].to_vec(),
-        a_m_s2: a[keep.clone()].to_vec(),
-        f_n: f[keep].to_vec(),
-        header: Vec::new(),
-        sha256: name.into(),
-        warnings: Vec::new(),
+        let v: Vec<f64> = (0..x.len())
+            .map(|i| {
+                let (before, after) = (i.saturating_sub(1), (i + 1).min(x.len() - 1));
+                (x[after] - x[before]) / ((after - before) as f64 * dt_s)
+            })
+            .collect();
+        // the ramp and the ends of the filter
+        let keep = (RAMP_S * hz) as usize..x.len() - (0.05 * hz) as usize;
+        Recording {
+            name: name.into(),
+            t_s: keep.clone().map(|i| i as f64 * dt_s).collect(),
+            x_mm: x[keep.clone()].to_vec(),
+            v_mm_s: v[keep.clone()].to_vec(),
+            a_m_s2: a[keep.clone()].to_vec(),
+            f_n: f[keep].to_vec(),
+            header: Vec::new(),
+            sha256: name.into(),
+            warnings: Vec::new(),
+        }
     }
 }
 
@@ -153,9 +185,9 @@ fn ramp(motion: Motion, t: f64) -> Motion {
     }
 }
 
-/// One pass of a Butterworth filter of second order, 30 Hz at 1 kHz.
-fn low_pass(values: &mut [f64]) {
-    let k = (std::f64::consts::PI * 30.0 / 1e3).tan();
+/// One pass of a Butterworth filter of second order, 30 Hz, at a rate in Hz.
+fn low_pass(values: &mut [f64], hz: f64) {
+    let k = (std::f64::consts::PI * 30.0 / hz).tan();
     let norm = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
     let b = k * k * norm;
     let a1 = 2.0 * (k * k - 1.0) * norm;

@@ -48,9 +48,14 @@ fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The number of samples in runs at the highest or lowest value, and that value.
-fn saturated(values: &[f64]) -> Option<(usize, f64)> {
-    let [low, high] = range(values);
+/// The number of samples in runs at the highest or lowest value, and that value. Spikes
+/// are no part of the range.
+fn saturated(values: &[f64], spikes: &[usize]) -> Option<(usize, f64)> {
+    let mut usual = values.to_vec();
+    for at in spikes {
+        usual[*at] = f64::NAN;
+    }
+    let [low, high] = range(&usual);
     let tolerance = 1e-9 * (high - low);
     [high, low].into_iter().find_map(|end| {
         let (mut run, mut count) = (0, 0);
@@ -69,8 +74,8 @@ fn saturated(values: &[f64]) -> Option<(usize, f64)> {
 /// Warnings about spikes and saturation.
 pub(super) fn warnings(x_mm: &[f64], f_n: &[f64], t_s: &[f64]) -> Vec<Warning> {
     let mut warnings = Vec::new();
-    for (column, values) in [("x_mm", x_mm), ("f_n", f_n)] {
-        let found = spikes(values);
+    let of_force = spikes(f_n);
+    for (column, values, found) in [("x_mm", x_mm, &spikes(x_mm)), ("f_n", f_n, &of_force)] {
         let largest = |a: &&usize, b: &&usize| values[**a].abs().total_cmp(&values[**b].abs());
         if let Some(at) = found.iter().max_by(largest) {
             warnings.push(Warning::Spikes {
@@ -81,7 +86,7 @@ pub(super) fn warnings(x_mm: &[f64], f_n: &[f64], t_s: &[f64]) -> Vec<Warning> {
             });
         }
     }
-    if let Some((count, force_n)) = saturated(f_n) {
+    if let Some((count, force_n)) = saturated(f_n, &of_force) {
         warnings.push(Warning::Saturated { count, force_n });
     }
     warnings
@@ -226,10 +231,16 @@ mod tests {
     #[test]
     fn a_clipped_force_is_saturated() {
         let mut clipped = recording(1.0);
-        assert_eq!(saturated(&clipped.f_n), None);
+        assert_eq!(saturated(&clipped.f_n, &[]), None);
         clipped.f_n.iter_mut().for_each(|f| *f = f.clamp(-9.0, 3.0));
-        let (count, force_n) = saturated(&clipped.f_n).unwrap();
+        let (count, force_n) = saturated(&clipped.f_n, &[]).unwrap();
         assert_eq!(force_n, 3.0);
         assert!(count > 400, "{count}");
+        // a spike neither hides it nor makes a smooth peak look flat
+        clipped.f_n[700] = 1e8;
+        assert_eq!(saturated(&clipped.f_n, &[700]).unwrap().1, 3.0);
+        let mut smooth = recording(1.0);
+        smooth.f_n[700] = -1e9;
+        assert_eq!(saturated(&smooth.f_n, &[700]), None);
     }
 }
