@@ -6,7 +6,7 @@
 //! beyond a criterion. Draws come from a stream of their own and their number never depends
 //! on the realizations.
 
-use super::{Effect, Impression, Rater, Reference};
+use super::{Effect, Impression, MIDPOINT, Rater, Reference};
 use std::collections::BTreeMap;
 use study_base::rng::Stream;
 use study_base::text::{ModelId, PartId};
@@ -200,7 +200,11 @@ impl Rater {
         let known = self.effect == Effect::BuiltIn;
         match (protocol.part(part).map(|part| &part.task), trial.model()) {
             (Some(Task::Magnitude(_)), Some(model)) => {
-                let level = protocol.level_of(model).filter(|_| known);
+                // The opinion of a realization stands for its level; 1 is the middle of the scale.
+                let opinion = || Some(percepts.impression(model)?.opinion(part.as_str()));
+                let level = protocol.level_of(model);
+                let level = level.or_else(|| Some(opinion()?.max(0.5) / MIDPOINT));
+                let level = level.filter(|_| known);
                 return Some(self.comparing.estimate(level.unwrap_or(1.0)));
             }
             (Some(Task::Mushra(_)), Some(model)) => {

@@ -42,7 +42,12 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Answered {
             format!("{condition}: are standard and comparison told apart?")
         }
         PartQuestion::Thresholds => "Do thresholds differ between the conditions?".to_owned(),
+        PartQuestion::Magnitudes => "Do the estimates differ between realizations?".to_owned(),
+        PartQuestion::MagnitudeVaf => "Does VAF predict the estimates?".to_owned(),
         PartQuestion::Groups => "Do the groups differ?".to_owned(),
+        PartQuestion::GroupsConditions => {
+            "Does what distinguishes the conditions depend on the group?".to_owned()
+        }
         PartQuestion::Sessions => "Do the sessions differ?".to_owned(),
     };
     let decided = || format!("{verdict}: {}.", result(part, f));
@@ -52,7 +57,7 @@ fn answer(part: &PartAnalysis, f: &PartFinding) -> Answered {
     }
     if matches!(
         f.question,
-        PartQuestion::Preferred | PartQuestion::Thresholds
+        PartQuestion::Preferred | PartQuestion::Thresholds | PartQuestion::Magnitudes
     ) {
         more.extend(different(part));
     }
@@ -87,7 +92,7 @@ fn result(part: &PartAnalysis, f: &PartFinding) -> String {
             });
             format!("{clearest}{tested} ({test}, {people})")
         }
-        PartQuestion::PreferenceVaf => {
+        PartQuestion::PreferenceVaf | PartQuestion::MagnitudeVaf => {
             let n = counted(f.realizations, "realization", "realizations");
             format!("r = {}, {tested} ({test}, {n})", estimate(apa::r))
         }
@@ -101,8 +106,10 @@ fn result(part: &PartAnalysis, f: &PartFinding) -> String {
                 estimate(apa::two)
             )
         }
-        PartQuestion::Thresholds => format!("{tested} ({test}, {people})"),
-        PartQuestion::Groups | PartQuestion::Sessions => {
+        PartQuestion::Thresholds | PartQuestion::Magnitudes => {
+            format!("{tested} ({test}, {people})")
+        }
+        PartQuestion::Groups | PartQuestion::GroupsConditions | PartQuestion::Sessions => {
             let size = f.estimate.as_ref().map_or_else(String::new, |e| {
                 format!("{} {}, ", e.name, sentences::estimate(e, apa::two))
             });
@@ -180,6 +187,7 @@ pub(super) fn caveats(part: &PartAnalysis) -> Vec<String> {
 /// The results, for a paper.
 pub(super) fn results(part: &PartAnalysis) -> String {
     let mut text: Vec<String> = thresholds(part);
+    text.extend(scores(part));
     for f in &part.findings {
         let Some(test) = &f.test else { continue };
         let what = result(part, f);
@@ -211,9 +219,27 @@ pub(super) fn results(part: &PartAnalysis) -> String {
                     "{c}: it was not shown that standard and comparison are told apart, {what}."
                 )
             }
+            (PartQuestion::Magnitudes, true) => {
+                format!("Estimates differed between realizations, {what}.")
+            }
+            (PartQuestion::Magnitudes, false) => {
+                format!("No difference of estimates between realizations was shown, {what}.")
+            }
+            (PartQuestion::MagnitudeVaf, true) => {
+                format!("Estimates (logarithms) were correlated with VAF, {what}.")
+            }
+            (PartQuestion::MagnitudeVaf, false) => {
+                format!("No correlation of estimates (logarithms) with VAF was shown, {what}.")
+            }
             (PartQuestion::Groups, true) => format!("The groups differed, {what}."),
             (PartQuestion::Groups, false) => {
                 format!("No difference between the groups was shown, {what}.")
+            }
+            (PartQuestion::GroupsConditions, true) => {
+                format!("The differences between the conditions depended on the group, {what}.")
+            }
+            (PartQuestion::GroupsConditions, false) => {
+                format!("No interaction of group and condition was shown, {what}.")
             }
             (PartQuestion::Sessions, true) => format!("The sessions differed, {what}."),
             (PartQuestion::Sessions, false) => {
@@ -228,10 +254,10 @@ pub(super) fn results(part: &PartAnalysis) -> String {
         });
     }
     text.extend(retest(part));
-    let pairs = part
-        .findings
-        .iter()
-        .any(|f| f.is_yes() && f.question == PartQuestion::Thresholds);
+    let pairs = part.findings.iter().any(|f| {
+        let of_conditions = [PartQuestion::Thresholds, PartQuestion::Magnitudes];
+        f.is_yes() && of_conditions.contains(&f.question)
+    });
     text.extend(different(part).filter(|_| pairs));
     text.join(" ")
 }
@@ -281,6 +307,46 @@ fn thresholds(part: &PartAnalysis) -> Vec<String> {
     conditions.iter().filter_map(one).collect()
 }
 
+/// The mean score of a questionnaire.
+fn scores(part: &PartAnalysis) -> Option<String> {
+    let get = |what: &str| part.values.number(&format!("questionnaire/{what}"));
+    let name = questionnaire(part)?.0;
+    let ci = part.values.interval("questionnaire/ci95")?;
+    Some(format!(
+        "The mean score of the {name} was {} (SD = {}, 95 % CI {}, median {}, n = {}).",
+        apa::two(get("mean")?),
+        apa::two(get("sd")?),
+        apa::interval(ci, apa::two),
+        apa::two(get("median")?),
+        get("n")?
+    ))
+}
+
+/// The name of a questionnaire, and how it is scored.
+fn questionnaire(part: &PartAnalysis) -> Option<(&'static str, &'static str)> {
+    match part.task {
+        "sus" => Some((
+            "System Usability Scale",
+            "Participants filled in the System Usability Scale (Brooke, 1996) at the end; its score goes from 0 to \
+             100, and more is better.",
+        )),
+        "nasa-tlx" => Some((
+            "raw NASA Task Load Index",
+            "Participants filled in the NASA Task Load Index (Hart & Staveland, 1988) at the end; its raw score, \
+             without weights (Hart, 2006), is the mean of six ratings from 0 to 100, and more is more load.",
+        )),
+        _ => None,
+    }
+}
+
+/// What was counted of a part: its trials, or its questionnaires.
+pub(super) fn answers(part: &PartAnalysis) -> String {
+    match questionnaire(part) {
+        None => counted(part.trials, "trial", "trials"),
+        Some(_) => counted(part.trials, "score", "scores"),
+    }
+}
+
 /// How the numbers were computed, for a paper.
 pub(super) fn methods(part: &PartAnalysis) -> String {
     let has = |group: &str| part.values.iter().any(|(id, _)| id.starts_with(group));
@@ -290,6 +356,23 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
             "The psychometric function of each participant and condition was a cumulative normal with \
              beta-binomial errors; thresholds are posterior means with equal-tailed 95 % intervals \
              (Schütt et al., 2016), at half the height between guesses and lapses."
+                .to_owned(),
+        );
+    }
+    if let Some((_, how)) = questionnaire(part) {
+        text.push(how.to_owned());
+    }
+    if has("magnitude/") {
+        text.push(
+            "Estimates of magnitude were averaged as logarithms, after the participants' own means were made equal \
+             (Lane et al., 1961)."
+                .to_owned(),
+        );
+    }
+    if has("magnitude_mixed/") {
+        text.push(
+            "Realizations were compared by a linear mixed model of the logarithms with an intercept for each \
+             participant (REML, Satterthwaite's degrees of freedom), contrasts with Holm's correction."
                 .to_owned(),
         );
     }
@@ -310,6 +393,13 @@ pub(super) fn methods(part: &PartAnalysis) -> String {
         text.push(
             "Groups were compared by Welch's analysis of variance of one mean for each participant, over what \
              all groups have."
+                .to_owned(),
+        );
+    }
+    if has("groups_conditions/") {
+        text.push(
+            "Whether conditions depend on the group is the interaction of both in an analysis of variance between \
+             and within participants, with the Greenhouse–Geisser correction."
                 .to_owned(),
         );
     }

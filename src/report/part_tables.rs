@@ -1,9 +1,11 @@
 //! The tables of thresholds, sensitivities and preferences: the same on the terminal, in
 //! the report and as CSV.
 
+mod scales;
+
 use super::apa::{interval_or_dash, name, or_dash, plain, two};
+use scales::{items, magnitudes, ratings, scores};
 use std::collections::BTreeSet;
-use study_base::text::counted;
 use study_core::analyze::{Value, Values};
 
 /// How a number is printed.
@@ -60,7 +62,10 @@ pub(super) fn tables(values: &Values) -> Vec<PartTable> {
         abilities,
         differences,
         magnitudes,
+        magnitude_contrasts,
         ratings,
+        scores,
+        items,
         groups,
         group_pairs,
     ];
@@ -195,11 +200,30 @@ fn conditions(values: &Values) -> PartTable {
     table
 }
 
-/// Contrasts of the mixed model.
+/// Contrasts of thresholds.
 fn contrasts(values: &Values) -> PartTable {
+    of_model(
+        values,
+        "psy_mixed",
+        ("contrasts", "Contrasts of thresholds"),
+    )
+}
+
+/// Contrasts of estimated magnitudes.
+fn magnitude_contrasts(values: &Values) -> PartTable {
+    let names = ("magnitude_contrasts", "Contrasts of estimated magnitudes");
+    of_model(values, "magnitude_mixed", names)
+}
+
+/// The contrasts of a mixed model, with the name of its file and the caption.
+fn of_model(
+    values: &Values,
+    model: &str,
+    (file, caption): (&'static str, &'static str),
+) -> PartTable {
     let mut table = PartTable {
-        file: "contrasts",
-        caption: "Contrasts of thresholds",
+        file,
+        caption,
         columns: &[
             ("", "conditions"),
             ("estimate", "estimate"),
@@ -211,8 +235,8 @@ fn contrasts(values: &Values) -> PartTable {
         rows: Vec::new(),
         notes: Vec::new(),
     };
-    for cell in cells(values, "psy_mixed", 1) {
-        let id = |statistic: &str| format!("psy_mixed/{}/{statistic}", cell[0]);
+    for cell in cells(values, model, 1) {
+        let id = |statistic: &str| format!("{model}/{}/{statistic}", cell[0]);
         let number = |statistic: &str| values.number(&id(statistic));
         let (ratio, difference) = (number("ratio"), number("difference"));
         let Some(estimate) = ratio.or(difference) else {
@@ -475,88 +499,6 @@ fn differences(values: &Values) -> PartTable {
             PartCell::Number(number("preferred"), two),
             PartCell::Number(number("p_holm"), plain),
         ]);
-    }
-    table
-}
-
-fn magnitudes(values: &Values) -> PartTable {
-    let mut table = PartTable {
-        file: "magnitudes",
-        caption: "Estimated magnitudes",
-        columns: &[
-            ("level", "level"),
-            ("geometric mean", "geometric_mean"),
-            ("95 %", "geometric_mean_ci95"),
-        ],
-        rows: Vec::new(),
-        notes: Vec::new(),
-    };
-    let mut levels: Vec<&str> = (values.iter())
-        .filter_map(|(id, _)| {
-            id.strip_prefix("magnitude/level/")?
-                .strip_suffix("/geometric_mean")
-        })
-        .collect();
-    let level = |text: &str| text.parse().unwrap_or(f64::MAX);
-    levels.sort_by(|a, b| level(a).total_cmp(&level(b)));
-    for level in levels {
-        let id = format!("magnitude/level/{level}");
-        table.rows.push(vec![
-            named(level),
-            PartCell::Number(values.number(&format!("{id}/geometric_mean")), plain),
-            PartCell::Interval(values.interval(&format!("{id}/ci95")), plain),
-        ]);
-    }
-    if let Some(exponent) = values.number("magnitude/exponent") {
-        let interval = values.interval("magnitude/exponent_over_participants/ci95");
-        let left_out = values.number("magnitude/n_left_out").unwrap_or_default();
-        table.notes.push(format!(
-            "Exponent {} {}, over participants. {} left out, because not above 0.",
-            two(exponent),
-            interval_or_dash(interval, two),
-            counted(left_out as usize, "estimate", "estimates"),
-        ));
-    }
-    table
-}
-
-fn ratings(values: &Values) -> PartTable {
-    let mut table = PartTable {
-        file: "mushra",
-        caption: "Ratings from 0 to 100",
-        columns: &[
-            ("", "condition"),
-            ("median", "median"),
-            ("quartiles", "quartile"),
-            ("mean", "mean"),
-            ("95 %", "mean_ci95_half"),
-        ],
-        rows: Vec::new(),
-        notes: Vec::new(),
-    };
-    let of = |statistic: &str| -> Vec<&str> {
-        let suffix = format!("/{statistic}");
-        (values.iter())
-            .filter_map(|(id, _)| id.strip_prefix("mushra/")?.strip_suffix(&suffix))
-            .collect()
-    };
-    for condition in of("median") {
-        let number = |statistic: &str| values.number(&format!("mushra/{condition}/{statistic}"));
-        table.rows.push(vec![
-            named(condition),
-            PartCell::Number(number("median"), plain),
-            PartCell::Interval(number("q1").zip(number("q3")), plain),
-            PartCell::Number(number("mean"), plain),
-            PartCell::Number(number("ci95_half"), |h| format!("± {}", plain(h))),
-        ]);
-    }
-    let screened: Vec<String> = (of("screened").iter())
-        .filter(|p| values.number(&format!("mushra/{p}/screened")) == Some(1.0))
-        .map(|p| name(p))
-        .collect();
-    if !screened.is_empty() {
-        let text = format!("Screened, and not in this table: {}.", screened.join(", "));
-        table.notes.push(text);
     }
     table
 }

@@ -15,6 +15,7 @@ mod pool;
 mod possible;
 mod properties;
 mod psychophysics;
+mod questionnaires;
 mod rendering;
 mod report_answers;
 mod report_figures;

@@ -8,10 +8,10 @@ use std::fs;
 use std::path::Path;
 
 /// The range of the shipped protocol of a threshold, and the same as an option.
-const LADDER: (&str, &str) = ("range = [0.05, 2.0] ", "0.05..2:0.04875");
+const LADDER: (&str, &str) = ("range = [0.02, 0.6] ", "0.02..0.6:0.02");
 
 /// Runs `study`: exit code, standard output, standard error.
-fn study(arguments: &[&str], folder: &Path) -> (i32, String, String) {
+pub(crate) fn study(arguments: &[&str], folder: &Path) -> (i32, String, String) {
     let mut command = Command::cargo_bin("study").unwrap();
     let output = command
         .args(arguments)
@@ -54,7 +54,7 @@ fn of_table(folder: &Path, table: &str, arguments: &[&str]) -> Value {
 }
 
 /// The cells of some columns, by row.
-fn cells(path: &Path, columns: &[&str]) -> Vec<Vec<String>> {
+pub(crate) fn cells(path: &Path, columns: &[&str]) -> Vec<Vec<String>> {
     let mut reader = csv::Reader::from_path(path).unwrap();
     let header = reader.headers().unwrap().clone();
     let at = |name: &&str| header.iter().position(|h| h == *name).unwrap();

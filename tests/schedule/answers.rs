@@ -388,7 +388,7 @@ fn the_orders_of_parts_are_shown_with_their_balance() {
     let text = String::from_utf8(output.stdout).unwrap();
     for part in [
         "1 part, 134 trials at most\n",
-        "a  high: 2ifc, 1 up, 3 down (settles at 79.4 %) from 1.5, 60 trials at most\n",
+        "a  high: 2ifc, 1 up, 3 down (settles at 79.4 %) from 0.5, 60 trials at most\n",
         "  a  134: CS ",
         "; easy 14, catch 0\n",
     ] {

@@ -266,11 +266,11 @@ const LEVELS: [f64; 6] = [0.1, 0.2, 0.4, 0.8, 1.4, 2.0];
 fn pages_of_a_track(folder: &Path, level: f64, seed: u64, answer: usize) -> (Vec<String>, String) {
     let template = std::fs::read_to_string(repository("src/cli/new/constant.toml")).unwrap();
     let text = template
-        .replace("range = [0.1, 2.0] ", &format!("levels = {LEVELS:?} #"))
-        .replace("steps = 41", "")
+        .replace("range = [0.02, 0.6] ", &format!("levels = {LEVELS:?} #"))
+        .replace("steps = 30", "")
         .replace("seed = 1 ", &format!("seed = {seed} "))
         .replace(
-            "levels = [0.1, 0.195, 0.385, 0.765, 1.525], repetitions = 20",
+            "levels = [0.04, 0.08, 0.12, 0.2, 0.4], repetitions = 20",
             &format!("levels = [{level:?}], repetitions = 2"),
         )
         .replace("easy = 0.1", "easy = 0.0");

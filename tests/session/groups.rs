@@ -50,7 +50,12 @@ max = 99
 
 /// The rows of a table of the only study, by column.
 fn table(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
-    let mut reader = csv::Reader::from_path(folder.join("turn-signal").join(name)).unwrap();
+    rows(&folder.join("turn-signal").join(name))
+}
+
+/// The rows of a table, by column.
+fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
     let header = reader.headers().unwrap().clone();
     let row = |r: csv::StringRecord| {
         let cells = header.iter().zip(r.iter());
@@ -162,7 +167,9 @@ fn analyzed(folder: &Path) {
         .iter()
         .map(|f| f["question"].as_str().unwrap())
         .collect();
-    assert_eq!(asked, ["groups", "sessions"]);
+    assert_eq!(asked, ["groups", "groups-conditions", "sessions"]);
+    assert_eq!(number("groups_conditions/n_conditions"), 2.0);
+    assert_eq!(number("groups_conditions/df2"), 4.0);
     let (code, page, err) = study(&["analyze", "out"], folder);
     assert_eq!(code, 0, "{err}");
     assert!(
@@ -219,4 +226,55 @@ fn two_sessions_by_keys_with_a_failed_playback_a_correction_a_quit_and_a_resume(
     let participants = table(&results, "participants.csv");
     assert_eq!(participants.len(), 1);
     assert!(!participants[0]["age"].is_empty());
+}
+
+/// A track of two sessions is a track of its own in each: `TRACK@SESSION`.
+#[test]
+fn a_track_of_two_sessions_has_a_threshold_in_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, err) = study(&["new", "t", "--kind", "staircase"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let path = folder.path().join("t/protocol.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let text = text
+        .replace("tracks = [\"high\", \"low\"]", "tracks = [\"high\"]")
+        .replace("max_trials = 60", "max_trials = 20");
+    let (before, after) = text.split_once("[[tracks]]\nid = \"low\"").unwrap();
+    let (_, analysis) = after.split_once("[analysis]").unwrap();
+    let sessions = "[[sessions]]\nid = \"one\"\n[[sessions]]\nid = \"two\"\n";
+    std::fs::write(&path, format!("{before}{sessions}[analysis]{analysis}")).unwrap();
+    let arguments = ["rehearse", "t", "--participants", "3", "--out", "out"];
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 0, "{err}");
+    let (code, out, err) = study(&["verify", "out"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+    let (code, out, err) = study(&["analyze", "out", "--json"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let values = document["parts"][0]["values"].as_object().unwrap();
+    let trials = rows(&folder.path().join("out/t/ratings.csv"));
+    let mut thresholds = Vec::new();
+    for participant in ["SIM001", "SIM002", "SIM003"] {
+        for session in ["one", "two"] {
+            let of = |r: &&BTreeMap<String, String>| {
+                r["participant"] == participant && r["session_id"] == session
+            };
+            let trials = trials.iter().filter(of).count() as f64;
+            let id = format!("psy/{participant}/high@{session}");
+            assert_eq!(values[&format!("{id}/n_trials")], trials, "{id}");
+            thresholds.push(values[&format!("{id}/posterior/threshold/mean")].as_f64());
+        }
+    }
+    assert!(thresholds.iter().all(Option::is_some));
+    // Two sessions of a participant are two tracks.
+    assert!(thresholds.chunks(2).any(|own| own[0] != own[1]));
+    let sessions = values
+        .get("sessions/p")
+        .or(document["parts"][0]["undefined"].get("sessions/p"));
+    assert!(sessions.is_some());
+    assert!(
+        values
+            .keys()
+            .any(|id| id.starts_with("track/SIM001/high@two/"))
+    );
 }

@@ -69,6 +69,7 @@ pub(crate) fn design(models: usize, repetitions: u32, order: Order) -> Protocol 
         sessions: Vec::new(),
         intake: Vec::new(),
         outro: Vec::new(),
+        questionnaires: Vec::new(),
         power: Default::default(),
         analysis: AnalysisRules {
             primary: QuestionId::new("realism").expect("an identifier"),

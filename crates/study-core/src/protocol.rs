@@ -21,6 +21,7 @@ pub mod phrases;
 pub mod plan;
 pub mod power;
 pub mod question;
+pub mod questionnaires;
 pub mod schema;
 
 pub use exclusion::Exclusion;
@@ -31,6 +32,7 @@ pub use parts::{
 };
 pub use plan::{Seat, Stimuli, Trial};
 pub use question::{Answer, AnswerError, Question, QuestionKind};
+pub use questionnaires::{Inventory, Questionnaire};
 
 use keys::words;
 use serde::Serialize;
@@ -68,8 +70,11 @@ pub struct Protocol {
     pub setup: Vec<Question>,
     /// `[[intake]]`, asked of the participant once.
     pub intake: Vec<Question>,
-    /// `[[outro]]`, asked of the participant at the end.
+    /// `[[outro]]` and the items of the questionnaires, asked of the participant at the end.
     pub outro: Vec<Question>,
+    /// `[[questionnaires]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub questionnaires: Vec<Questionnaire>,
     /// `[analysis]`
     pub analysis: AnalysisRules,
     /// `[[parts]]`; without any, the study is one rating part.

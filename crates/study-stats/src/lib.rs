@@ -70,6 +70,7 @@ pub mod power;
 pub mod proportion;
 pub mod psychometric;
 mod quadrature;
+pub mod questionnaire;
 pub mod random;
 pub mod rank;
 pub mod regression;

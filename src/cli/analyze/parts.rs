@@ -14,7 +14,7 @@ use study_core::protocol::Protocol;
 use study_core::protocol::parts::{Compared, IntervalOrder, Part, Task, TrackRules};
 use study_core::store::{Derived, SessionData};
 
-/// The analysis of each part; none of a study without such parts.
+/// The analysis of each part and questionnaire; none of a study without any.
 pub(super) fn analyse(
     sessions: &[SessionData],
     derived: &Derived,
@@ -122,11 +122,18 @@ fn trials(protocol: &Protocol, part: &Part) -> String {
     let mut text = Vec::new();
     match &part.task {
         Task::Rating(_) => {}
-        Task::Magnitude(own) => text.push(format!(
-            "In each trial one of {} was felt and given a number above 0, each level in {}.",
-            counted(own.models.len(), "level", "levels"),
-            counted(own.repetitions as usize, "trial", "trials")
-        )),
+        Task::Magnitude(own) => {
+            let levels = own.models.iter().any(|m| protocol.level_of(m).is_some());
+            let (one, many) = match levels {
+                true => ("level", "levels"),
+                false => ("realization", "realizations"),
+            };
+            text.push(format!(
+                "In each trial one of {} was felt and given a number above 0, each {one} in {}.",
+                counted(own.models.len(), one, many),
+                counted(own.repetitions as usize, "trial", "trials")
+            ));
+        }
         Task::Mushra(own) => {
             let presented = &own.presentations;
             let reference = match &own.reference {

@@ -12,7 +12,7 @@ pub fn part_tables(parts: &[PartAnalysis]) -> Vec<TableFile> {
         table("parts.csv", statistics(parts)),
         table("parts_findings.csv", findings(parts)),
     ];
-    const FILES: [(&str, &str); 11] = [
+    const FILES: [(&str, &str); 14] = [
         ("groups", "part_groups.csv"),
         ("group_pairs", "part_group_pairs.csv"),
         ("thresholds", "part_thresholds.csv"),
@@ -23,7 +23,10 @@ pub fn part_tables(parts: &[PartAnalysis]) -> Vec<TableFile> {
         ("preferences", "part_preferences.csv"),
         ("preference_pairs", "part_preference_pairs.csv"),
         ("magnitudes", "part_magnitudes.csv"),
+        ("magnitude_contrasts", "part_magnitude_contrasts.csv"),
         ("mushra", "part_mushra.csv"),
+        ("scores", "part_scores.csv"),
+        ("items", "part_items.csv"),
     ];
     for (kind, file) in FILES {
         let mut rows: Vec<Vec<String>> = Vec::new();

@@ -4,7 +4,7 @@
 use super::{Details, figures_section, safe, statistics, typeset};
 use crate::report::Source;
 use crate::report::figures::Drawn;
-use crate::report::part_answers::{Answered, answered, banner, caveats, methods, results};
+use crate::report::part_answers::{Answered, answered, answers, banner, caveats, methods, results};
 use crate::report::part_tables::{PartTable, tables};
 use maud::{Markup, html};
 use study_base::text::counted;
@@ -73,7 +73,7 @@ fn section(part: &PartAnalysis, report: &PartReport, first: usize) -> Markup {
             h2 { "Part " (safe(part.part.as_str())) }
             p.facts {
                 span { (part.task) } " "
-                span { (counted(part.trials, "trial", "trials")) } " "
+                span { (answers(part)) } " "
                 span { (counted(part.participants, "participant", "participants")) }
             }
             @if let Some(text) = banner(part) { div.banner role="note" { b { (text) } } }

@@ -3,7 +3,7 @@
 use super::Page;
 use super::layout::{Grid, Paint, wrap};
 use crate::report::apa::name;
-use crate::report::part_answers::{Answered, answered, banner, caveats};
+use crate::report::part_answers::{Answered, answered, answers, banner, caveats};
 use crate::report::part_tables::{PartCell, PartTable, tables};
 use study_base::text::{Untrusted, counted};
 use study_core::analyze::Values;
@@ -25,7 +25,7 @@ pub fn part(title: &str, part: &PartAnalysis, page: Page) -> String {
     out += &format!(
         "\n{}, {}, {}\n",
         part.task,
-        counted(part.trials, "trial", "trials"),
+        answers(part),
         counted(part.participants, "participant", "participants")
     );
     if let Some(text) = banner(part) {

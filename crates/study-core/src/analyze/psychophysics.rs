@@ -13,6 +13,7 @@ mod of_scales;
 mod over_participants;
 mod part_data;
 mod preferences;
+mod questionnaires;
 mod scales;
 mod study;
 mod table;

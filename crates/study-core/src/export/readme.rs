@@ -56,7 +56,10 @@ pub(super) fn methods(job: &Job<'_>) -> String {
             ),
             Task::Magnitude(p) => format!(
                 "{} felt {} and given a number above 0",
-                counted(p.models.len(), "level was", "levels were"),
+                match p.models.iter().any(|m| protocol.level_of(m).is_some()) {
+                    true => counted(p.models.len(), "level was", "levels were"),
+                    false => counted(p.models.len(), "realization was", "realizations were"),
+                },
                 counted(p.repetitions as usize, "time", "times")
             ),
             Task::Mushra(p) => format!(

@@ -38,6 +38,7 @@ pub type Spans = BTreeMap<String, Range<usize>>;
 pub fn warnings(protocol: &Protocol, spans: &Spans, unread: &[&ModelId]) -> Vec<Fault> {
     let mut faults = Vec::new();
     language(protocol, spans, &mut faults);
+    untranslated(protocol, spans, &mut faults);
     birth_dates(protocol, spans, &mut faults);
     if parts::is_about_realizations(protocol) {
         realizations(protocol, spans, &mut faults);
@@ -89,6 +90,28 @@ fn language(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
             missing.join(", ")
         )),
     );
+}
+
+/// Questionnaires that are in English in a study of another language.
+fn untranslated(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Fault>) {
+    let lang = protocol.text.lang.as_deref().unwrap_or("en");
+    if lang.split('-').next() == Some("en") {
+        return;
+    }
+    for (i, own) in protocol.questionnaires.iter().enumerate() {
+        let has = |key: &str| spans.contains_key(&format!("questionnaires[{i}].{key}"));
+        if !has("items") || !has("labels") {
+            faults.push(
+                Fault::warning(format!(
+                    "the questionnaire `{}` is in English, and the study in `{}`",
+                    own.id,
+                    Untrusted(lang)
+                ))
+                .at(spans.get(&format!("questionnaires[{i}].id")).cloned())
+                .hint("write a published translation in `items` and `labels`"),
+            );
+        }
+    }
 }
 
 /// Questions that ask for a date of birth, which identifies a person.

@@ -21,6 +21,7 @@ mod models;
 mod orders;
 mod parts;
 mod power;
+mod questionnaires;
 mod questions;
 mod resolve;
 mod section;
@@ -82,6 +83,9 @@ pub const ROOT: &[Key] = keys! {
     "intake": Kind::Variants(&questions::QUESTIONS), "";
     /// Asked of the participant once, at the end.
     "outro": Kind::Variants(&questions::QUESTIONS), "";
+    /// Standard questionnaires, asked of the participant after `[[outro]]`, with their scores in
+    /// the analysis.
+    "questionnaires": Kind::Variants(&questionnaires::QUESTIONNAIRES), "";
     /// Decisions that were made before the data.
     "analysis": Kind::Table(analysis::ANALYSIS), "", required;
     /// What is assumed before the data, for `study power`. It changes no session and no
@@ -254,10 +258,14 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
     let trial = root.section("trial").and_then(general::trial);
     let models = root.sections("models").into_iter().map(models::read);
     let mut questions = questions::read(&mut root, "questions");
-    questions.extend(raw.questions());
+    let own_questions = raw.questions();
+    let has_faulty_parts = raw.rating_parts() + own_questions.len() < raw.parts.len();
+    questions.extend(own_questions);
     let setup = questions::read(&mut root, "setup");
     let intake = questions::read(&mut root, "intake");
-    let outro = questions::read(&mut root, "outro");
+    let mut outro = questions::read(&mut root, "outro");
+    let questionnaires = questionnaires::read(&mut root);
+    outro.extend(questionnaires.iter().flat_map(|q| q.questions()));
     let analysis = root.section("analysis").and_then(analysis::read);
     let power = root.section("power").and_then(power::read);
 
@@ -273,16 +281,20 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         outro,
         analysis: analysis.as_ref(),
         has_parts,
+        has_faulty_parts,
     };
     named.extend(sections.files());
     named.extend(raw.files());
     if !broken {
         sections.agree(document);
+        questionnaires::agree(&questionnaires, &raw.parts, document);
     }
     let resolved = raw.resolve(&sections, document, broken);
-    if let (Some(sessions), Some(parts), false) = (&sessions, &resolved.parts, broken) {
+    if let (Some(sessions), Some(parts), Some(families), false) =
+        (&sessions, &resolved.parts, &resolved.families, broken)
+    {
         let known = groups.as_ref().and_then(Option::as_ref);
-        groups::agree(known, sessions, parts, document);
+        groups::agree(known, sessions, (parts, families), document);
     }
     sections.fill_duplicates();
     let Sections {
@@ -305,6 +317,9 @@ fn read(document: &Document<'_>, broken: bool, named: &mut Vec<Named>) -> Option
         setup: all(setup)?,
         intake: all(intake)?,
         outro: all(outro)?,
+        questionnaires: (questionnaires.iter())
+            .map(|q| q.finish())
+            .collect::<Option<_>>()?,
         design: design?,
         device: device?,
         analysis: analysis?,

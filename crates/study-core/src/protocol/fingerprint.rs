@@ -80,6 +80,7 @@ pub fn parts(
         setup,
         intake,
         outro,
+        questionnaires,
         analysis,
         parts,
         families,
@@ -207,6 +208,9 @@ pub fn parts(
     // Absent from the fingerprints of protocols without it.
     if device.rendering != super::RenderingRules::default() {
         analysis["rendering"] = json!(device.rendering);
+    }
+    if !questionnaires.is_empty() {
+        analysis["questionnaires"] = json!(questionnaires);
     }
     Parts {
         stimulus,

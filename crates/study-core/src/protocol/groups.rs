@@ -114,6 +114,11 @@ impl Protocol {
             for part in &mut own.parts {
                 match &mut part.task {
                     Task::Rating(task) => task.models.retain(|m| models.contains(m)),
+                    // The levels of a family belong to all groups.
+                    Task::Magnitude(task) => {
+                        let stays = |m: &ModelId| models.contains(m) || self.level_of(m).is_some();
+                        task.models.retain(stays);
+                    }
                     Task::Pairs(task) => {
                         task.pairs
                             .retain(|pair| pair.iter().all(|m| models.contains(m)));
@@ -127,7 +132,7 @@ impl Protocol {
                         let stays = |m: &ModelId| models.contains(m) || hidden(m);
                         task.presentations.models.retain(stays);
                     }
-                    Task::Magnitude(_) | Task::Discrimination { .. } => {}
+                    Task::Discrimination { .. } => {}
                 }
             }
         }

@@ -35,7 +35,7 @@ pub struct Part {
 pub enum Task {
     /// One realization is felt and rated.
     Rating(Presentations),
-    /// One level of a family is felt and given a positive number.
+    /// One level of a family, or one realization, is felt and given a positive number.
     Magnitude(Presentations),
     /// One realization is rated from 0 to 100 beside a reference.
     Mushra(Mushra),

@@ -1,14 +1,15 @@
-//! Groups and repeated sessions: `groups/…`, `sessions/…`, `retest/…`.
+//! Groups and repeated sessions: `groups/…`, `groups_conditions/…`, `sessions/…`, `retest/…`.
 //!
 //! Each participant has one number for each condition and session: a mean rating, a
 //! threshold or a sensitivity. Groups are compared over what all of them have, sessions
 //! over what all sessions have.
 
-use super::over_participants::{Threshold, mixed};
+use super::over_participants::{NOT_POSITIVE, Threshold, mixed};
 use crate::analyze::identifiers::{group_id, pair_id};
 use crate::analyze::values::Values;
 use std::collections::{BTreeMap, BTreeSet};
 use study_stats::agreement::icc;
+use study_stats::between;
 use study_stats::describe::{mean, sd};
 use study_stats::paired::holm;
 use study_stats::welch;
@@ -44,19 +45,22 @@ pub(super) fn again(measured: &[Measured], sessions: &[&str], ratios: bool, valu
     }
 }
 
-const NOT_POSITIVE: &str = "a threshold is not above 0";
-
-/// The mean of each participant over these cells; only of those who have all of them.
-fn means<'a>(measured: &'a [Measured], cells: &BTreeSet<Cell<'_>>) -> BTreeMap<&'a str, f64> {
-    let mut own: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+/// The numbers of each participant in these cells, in their order; only of those who have all
+/// of them.
+fn complete<'a>(
+    measured: &'a [Measured],
+    cells: &BTreeSet<Cell<'_>>,
+) -> BTreeMap<&'a str, Vec<f64>> {
+    let mut own: BTreeMap<&str, BTreeMap<Cell<'_>, f64>> = BTreeMap::new();
     for m in measured {
-        if cells.contains(&(m.condition.as_str(), m.session.as_deref())) {
-            own.entry(&m.participant).or_default().push(m.value);
+        let cell = (m.condition.as_str(), m.session.as_deref());
+        if cells.contains(&cell) {
+            own.entry(&m.participant).or_default().insert(cell, m.value);
         }
     }
     let complete = own.into_iter().filter(|(_, x)| x.len() == cells.len());
     complete
-        .filter_map(|(who, x)| Some((who, mean(&x)?)))
+        .map(|(who, x)| (who, x.into_values().collect()))
         .collect()
 }
 
@@ -80,12 +84,20 @@ fn between_groups(measured: &[Measured], ratios: bool, usable: bool, values: &mu
         .filter_map(|m| Some((m.participant.as_str(), m.group.as_deref()?)))
         .collect();
     let mut groups: BTreeMap<&str, Vec<f64>> = names.iter().map(|g| (*g, Vec::new())).collect();
+    let mut rows: BTreeMap<&str, Vec<Vec<f64>>> = BTreeMap::new();
     if usable && !common.is_empty() {
-        for (who, value) in means(measured, &common) {
-            if let Some(own) = group_of.get(who).and_then(|g| groups.get_mut(g)) {
-                own.push(value);
-            }
+        for (who, own) in complete(measured, &common) {
+            let Some(group) = group_of.get(who) else {
+                continue;
+            };
+            groups.entry(group).or_default().extend(mean(&own));
+            rows.entry(group).or_default().push(own);
         }
+    }
+    let conditions: BTreeSet<&str> = common.iter().map(|(condition, _)| *condition).collect();
+    if conditions.len() > 1 && names.len() > 1 {
+        let rows: Vec<Vec<Vec<f64>>> = rows.into_values().collect();
+        profiles(&rows, (&common, &conditions), names.len(), values);
     }
     let x: Vec<&Vec<f64>> = groups.values().collect();
     let test = welch::one_way(&x);
@@ -132,6 +144,43 @@ fn between_groups(measured: &[Measured], ratios: bool, usable: bool, values: &mu
         group.maybe("p_holm", p_holm);
         group.maybe("hedges_g", found.and_then(|d| d.hedges_g));
     }
+}
+
+/// Whether what the conditions do depends on the group: the interaction of both, of each
+/// participant's means over the sessions.
+fn profiles(
+    groups: &[Vec<Vec<f64>>],
+    (cells, conditions): (&BTreeSet<Cell<'_>>, &BTreeSet<&str>),
+    n_groups: usize,
+    values: &mut Values,
+) {
+    let of_conditions = |row: &Vec<f64>| -> Vec<f64> {
+        let of = |condition: &&str| {
+            let own = cells.iter().zip(row).filter(|((c, _), _)| c == condition);
+            mean(&own.map(|(_, x)| *x).collect::<Vec<_>>())
+        };
+        conditions.iter().filter_map(of).collect()
+    };
+    let rows: Vec<Vec<Vec<f64>>> = (groups.iter())
+        .map(|group| group.iter().map(of_conditions).collect())
+        .collect();
+    let all_groups = rows.len() == n_groups;
+    let found = if all_groups {
+        between::profiles(&rows)
+    } else {
+        None
+    };
+    let why = "too few participants have all conditions that the groups have in common";
+    let mut group = values.group("groups_conditions", why);
+    group.put("n_conditions", conditions.len() as f64);
+    group.put("n", rows.iter().map(Vec::len).sum::<usize>() as f64);
+    let found = found.as_ref();
+    group.maybe("F", found.and_then(|f| f.f));
+    group.maybe("df1", found.map(|f| f.df1));
+    group.maybe("df2", found.map(|f| f.df2));
+    group.maybe("p", found.and_then(|f| f.p));
+    group.maybe("eps_gg", found.and_then(|f| f.eps_gg));
+    group.maybe("p_gg", found.and_then(|f| f.p_gg));
 }
 
 fn between_sessions(
@@ -290,6 +339,55 @@ mod tests {
             assert!(without.number(id).is_some(), "{id}");
             assert_eq!(with.number(id), without.number(id), "{id}");
         }
+    }
+
+    /// Of the ratings below. R 4.2.2: F and p of aov(v ~ g * c + Error(p / c)); ε from the
+    /// covariance of orthonormal contrasts, pooled within groups.
+    const INTERACTION: [(&str, f64); 6] = [
+        ("F", 14.682926829268),
+        ("df1", 2.0),
+        ("df2", 8.0),
+        ("p", 0.00210116575328025),
+        ("eps_gg", 0.85200202736949),
+        ("p_gg", 0.003965799811631),
+    ];
+
+    #[test]
+    fn groups_by_conditions_are_the_interaction_of_r() {
+        const RATINGS: [(&str, &str, [f64; 3]); 6] = [
+            ("A", "x", [2.0, 4.0, 5.5]),
+            ("B", "x", [3.0, 4.5, 6.0]),
+            ("C", "x", [2.5, 5.0, 7.0]),
+            ("D", "y", [4.0, 4.5, 4.0]),
+            ("E", "y", [5.0, 4.0, 5.5]),
+            ("F", "y", [4.5, 5.5, 5.0]),
+        ];
+        let rows = RATINGS.iter().flat_map(|(participant, group, ratings)| {
+            let one = |(condition, value): (&str, &f64)| Measured {
+                participant: (*participant).to_owned(),
+                group: Some((*group).to_owned()),
+                session: None,
+                condition: condition.to_owned(),
+                value: *value,
+            };
+            let all = ["c1", "c2", "c3"].into_iter().zip(ratings).map(one);
+            all.collect::<Vec<_>>()
+        });
+        let rows: Vec<Measured> = rows.collect();
+        let mut values = Values::default();
+        again(&rows, &[], false, &mut values);
+        for (id, expected) in INTERACTION {
+            let id = format!("groups_conditions/{id}");
+            let found = values.number(&id).unwrap_or(f64::NAN);
+            assert!(
+                (found / expected - 1.0).abs() < 1e-6,
+                "{id}: {found} {expected}"
+            );
+        }
+        // Nothing without a second condition.
+        let mut values = Values::default();
+        again(&rows[..1], &[], false, &mut values);
+        assert_eq!(values.get("groups_conditions/F"), None);
     }
 
     #[test]

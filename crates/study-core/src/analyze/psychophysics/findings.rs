@@ -22,8 +22,14 @@ pub enum PartQuestion {
     ToldApart(String),
     /// Do thresholds differ between the conditions?
     Thresholds,
+    /// Do estimates of magnitude differ between the realizations?
+    Magnitudes,
+    /// Does VAF predict the estimates?
+    MagnitudeVaf,
     /// Do the groups differ?
     Groups,
+    /// Do the differences between conditions depend on the group?
+    GroupsConditions,
     /// Do the sessions differ?
     Sessions,
 }
@@ -37,7 +43,10 @@ impl PartQuestion {
             Self::IntervalOrder => "interval-order".to_owned(),
             Self::ToldApart(condition) => group_id("told-apart", &[condition]),
             Self::Thresholds => "thresholds".to_owned(),
+            Self::Magnitudes => "magnitudes".to_owned(),
+            Self::MagnitudeVaf => "magnitude-vaf".to_owned(),
             Self::Groups => "groups".to_owned(),
+            Self::GroupsConditions => "groups-conditions".to_owned(),
             Self::Sessions => "sessions".to_owned(),
         }
     }
@@ -91,7 +100,7 @@ pub(super) fn of_preferences(
     }
     let mut found = vec![preferred(facts, items, &pairs)];
     if facts.values.get("pairs/vaf/n_models").is_some() {
-        found.push(with_vaf(facts));
+        found.push(with_vaf(facts, PartQuestion::PreferenceVaf, "pairs/vaf"));
     }
     if facts.values.get("pairs/order").is_some() {
         found.push(interval_order(facts));
@@ -131,24 +140,25 @@ fn preferred(facts: &PartFacts<'_>, items: &[String], pairs: &[Pair]) -> PartFin
     found
 }
 
-fn with_vaf(facts: &PartFacts<'_>) -> PartFinding {
-    const GROUP: &str = "pairs/vaf";
-    let n = facts.number("pairs/vaf/n_models").unwrap_or(0.0) as usize;
-    let Some(test) = permutation(facts.values, GROUP, facts.alpha) else {
-        return facts.undefined(PartQuestion::PreferenceVaf, "pairs/vaf/pearson/r", n);
+/// The correlation with VAF in `group`.
+fn with_vaf(facts: &PartFacts<'_>, question: PartQuestion, group: &str) -> PartFinding {
+    let id = |what: &str| format!("{group}/{what}");
+    let n = facts.number(&id("n_models")).unwrap_or(0.0) as usize;
+    let Some(test) = permutation(facts.values, group, facts.alpha) else {
+        return facts.undefined(question, &id("pearson/r"), n);
     };
-    let r = facts.number("pairs/vaf/pearson/r");
+    let r = facts.number(&id("pearson/r"));
     let direction = r.map(Direction::of).filter(|_| test.is_significant());
     let mut found = Finding {
         direction,
         estimate: r.map(|value| Estimate {
             name: "r",
             value,
-            ci95: facts.values.interval("pairs/vaf/pearson/ci95"),
+            ci95: facts.values.interval(&id("pearson/ci95")),
         }),
-        ..Finding::decided(PartQuestion::PreferenceVaf, test, facts.design(n))
+        ..Finding::decided(question, test, facts.design(n))
     };
-    let least = facts.number("pairs/vaf/pearson/smallest_p_two_sided");
+    let least = facts.number(&id("pearson/smallest_p_two_sided"));
     if let Some(least) = least.filter(|p| *p >= facts.alpha) {
         found.caveat(
             "too-few",
@@ -216,12 +226,33 @@ pub(super) fn of_thresholds(
     facts: &PartFacts<'_>,
     conditions: &[&str],
 ) -> (Vec<PartFinding>, Vec<Pair>) {
-    let question = PartQuestion::Thresholds;
-    if facts.values.get("psy_mixed/F").is_none() {
+    of_model(facts, conditions, (PartQuestion::Thresholds, "psy_mixed"))
+}
+
+/// Whether estimates differ between realizations, their contrasts, and whether VAF predicts them.
+pub(super) fn of_realizations(
+    facts: &PartFacts<'_>,
+    realizations: &[&str],
+) -> (Vec<PartFinding>, Vec<Pair>) {
+    let model = (PartQuestion::Magnitudes, "magnitude_mixed");
+    let (mut found, pairs) = of_model(facts, realizations, model);
+    if facts.values.get("magnitude/vaf/n_models").is_some() {
+        found.push(with_vaf(facts, PartQuestion::MagnitudeVaf, "magnitude/vaf"));
+    }
+    (found, pairs)
+}
+
+/// The test of the conditions of a mixed model, and their contrasts; nothing without one.
+fn of_model(
+    facts: &PartFacts<'_>,
+    conditions: &[&str],
+    (question, model): (PartQuestion, &str),
+) -> (Vec<PartFinding>, Vec<Pair>) {
+    if facts.values.get(&format!("{model}/F")).is_none() {
         return (Vec::new(), Vec::new());
     }
     let of_pair = |a: &str, b: &str| {
-        let id = pair_id("psy_mixed", a, b);
+        let id = pair_id(model, a, b);
         let ratio = facts.values.get(&format!("{id}/ratio")).is_some();
         let name = if ratio { "ratio" } else { "difference" };
         pair(facts, &id, (a, b), (name, TestKind::MixedContrast, "t"))
@@ -230,9 +261,9 @@ pub(super) fn of_thresholds(
     for (i, a) in conditions.iter().enumerate() {
         pairs.extend(conditions[i + 1..].iter().filter_map(|b| of_pair(a, b)));
     }
-    let of = |what: &str| facts.number(&format!("psy_mixed/{what}"));
+    let of = |what: &str| facts.number(&format!("{model}/{what}"));
     let found = match of("p") {
-        None => facts.undefined(question, "psy_mixed/p", conditions.len()),
+        None => facts.undefined(question, &format!("{model}/p"), conditions.len()),
         Some(p) => {
             let test = Test::single(TestKind::MixedModel, p, facts.alpha).with(
                 "F",
@@ -253,10 +284,16 @@ pub(super) fn of_groups_and_sessions(facts: &PartFacts<'_>) -> Vec<PartFinding> 
     let one = |(question, group, kind): (PartQuestion, &str, TestKind)| {
         let id = |what: &str| format!("{group}/{what}");
         facts.values.get(&id("F"))?;
-        let Some(p) = facts.number(&id("p")) else {
-            return Some(facts.undefined(question, &id("p"), 0));
+        let p = match kind {
+            TestKind::BetweenWithin => "p_gg",
+            _ => "p",
         };
-        let df = [facts.number(&id("df1")), facts.number(&id("df2"))];
+        let Some(p) = facts.number(&id(p)) else {
+            return Some(facts.undefined(question, &id(p), 0));
+        };
+        // Of a test within participants both degrees of freedom are corrected.
+        let epsilon = facts.number(&id("eps_gg")).unwrap_or(1.0);
+        let df = ["df1", "df2"].map(|df| Some(facts.number(&id(df))? * epsilon));
         let test = Test::single(kind, p, facts.alpha).with("F", facts.number(&id("F")), &df);
         Some(Finding {
             estimate: only_pair(facts, group),
@@ -265,6 +302,11 @@ pub(super) fn of_groups_and_sessions(facts: &PartFacts<'_>) -> Vec<PartFinding> 
     };
     let questions = [
         (PartQuestion::Groups, "groups", TestKind::Welch),
+        (
+            PartQuestion::GroupsConditions,
+            "groups_conditions",
+            TestKind::BetweenWithin,
+        ),
         (PartQuestion::Sessions, "sessions", TestKind::MixedModel),
     ];
     questions.into_iter().filter_map(one).collect()

@@ -1,5 +1,6 @@
 //! Psychometric functions of participants and conditions: `psy/…`, `psy_group/…`.
 
+use super::over_participants::NOT_POSITIVE;
 use crate::analyze::draws::Draws;
 use crate::analyze::identifiers::group_id;
 use crate::analyze::values::Values;
@@ -236,7 +237,7 @@ fn summary(condition: &str, name: &str, thresholds: &[(&str, Option<f64>)], valu
     let found = group(&known);
     let why = match found {
         None if known.is_empty() => "nobody has a threshold",
-        None => "a threshold is not above 0",
+        None => NOT_POSITIVE,
         Some(_) => "there is only one threshold",
     };
     let prefix = format!("{}/{name}", group_id("psy_group", &[condition]));

@@ -1,15 +1,28 @@
 //! Magnitude estimation and MUSHRA of a study.
 
 use super::part_data::{Found, PartData};
-use super::scales::{MagnitudeRow, MushraRoles, MushraRow, magnitude, mushra};
+use super::scales::{
+    MagnitudeRow, MushraRoles, MushraRow, RealizationRow, magnitude, mushra, realizations,
+};
+use crate::analyze::identifiers::group_id;
+use crate::analyze::{Rules, vaf};
 use crate::outcome::RatingRow;
 use crate::protocol::parts::{Part, Presentations};
 use crate::protocol::{Protocol, Role};
+use std::collections::BTreeSet;
 use study_base::text::ModelId;
 use study_stats::mushra::Screening;
 
-/// The estimates of a part.
-pub(super) fn of_magnitudes(part: &Part, rows: &[&RatingRow]) -> Found {
+/// The estimates of a part: of levels, or of realizations.
+pub(super) fn of_magnitudes(
+    protocol: &Protocol,
+    part: &Part,
+    own: &Presentations,
+    (rows, rules): (&[&RatingRow], &Rules),
+) -> Found {
+    if own.models.iter().all(|m| protocol.level_of(m).is_none()) {
+        return of_realizations(protocol, part, rows, rules);
+    }
     let estimate = |row: &&RatingRow| {
         Some(MagnitudeRow {
             participant: row.participant.as_str().to_owned(),
@@ -24,6 +37,51 @@ pub(super) fn of_magnitudes(part: &Part, rows: &[&RatingRow]) -> Found {
         values: magnitude(&estimates),
         warnings: Vec::new(),
         names: Vec::new(),
+        data: PartData::default(),
+    }
+}
+
+/// The estimates of realizations: geometric means, their comparison, and their correlation with
+/// VAF. A hidden duplicate counts as its original.
+fn of_realizations(protocol: &Protocol, part: &Part, rows: &[&RatingRow], rules: &Rules) -> Found {
+    let names = |id: &ModelId| {
+        let model = protocol.model(id);
+        let original = model.and_then(|m| m.duplicate_of.as_ref());
+        original.unwrap_or(id).as_str().to_owned()
+    };
+    let estimate = |row: &&RatingRow| {
+        Some(RealizationRow {
+            participant: row.participant.as_str().to_owned(),
+            realization: names(row.model.as_ref()?),
+            estimate: number(part, row)?,
+        })
+    };
+    let estimates: Vec<RealizationRow> = rows.iter().filter_map(estimate).collect();
+    let mut values = realizations(&estimates);
+    let felt: BTreeSet<&str> = estimates.iter().map(|e| e.realization.as_str()).collect();
+    let with_vaf = protocol.models.iter().filter_map(|m| {
+        let id = m.id.as_str();
+        let mean = format!(
+            "{}/geometric_mean",
+            group_id("magnitude/realization", &[id])
+        );
+        let tested = m.role == Role::Test && felt.contains(id);
+        let mean = values.number(&mean).filter(|_| tested)?;
+        Some((id, m.vaf?, libm::log10(mean)))
+    });
+    let known: Vec<(&str, f64, f64)> = with_vaf.collect();
+    if !known.is_empty() {
+        let of = |pick: fn(&(&str, f64, f64)) -> f64| known.iter().map(pick).collect::<Vec<_>>();
+        let names: Vec<&str> = known.iter().map(|k| k.0).collect();
+        let (x, y) = (of(|k| k.1), of(|k| k.2));
+        vaf::correlations("magnitude/vaf", &x, &y, &names, rules, &mut values);
+    }
+    Found {
+        task: "magnitude",
+        trials: estimates.len(),
+        values,
+        warnings: Vec::new(),
+        names: felt.into_iter().map(str::to_owned).collect(),
         data: PartData::default(),
     }
 }

@@ -49,7 +49,11 @@ pub(super) fn sensitivities(told: &[Told], values: &mut Values) {
     }
 }
 
-/// A threshold.
+/// Why there are no ratios of thresholds.
+pub(super) const NOT_POSITIVE: &str = "a threshold is estimated at or below 0, where there are no ratios: the \
+     levels do not bracket it, or its trials are too few";
+
+/// A threshold, or another number of one participant in one condition.
 #[derive(Debug, Clone)]
 pub(super) struct Threshold<'a> {
     pub(super) participant: &'a str,
@@ -86,7 +90,7 @@ pub(super) fn mixed(group: &str, thresholds: &[Threshold<'_>], ratios: bool, val
         .collect();
     let fit = LmmData::new(&cells, FixedEffects::Realizations).and_then(|t| adjusted_means(&t));
     let why = match &fit {
-        _ if ratios && !positive => "a threshold is not above 0".to_owned(),
+        _ if ratios && !positive => NOT_POSITIVE.to_owned(),
         Err(why) => why.to_string().replace("rating", "threshold"),
         Ok(_) => "the likelihood is too flat for degrees of freedom".to_owned(),
     };
@@ -223,14 +227,8 @@ mod tests {
         thresholds.extend(other);
         let mut values = Values::default();
         mixed("psy_mixed", &thresholds, true, &mut values);
-        assert_eq!(
-            values.reason("psy_mixed/F"),
-            Some("a threshold is not above 0")
-        );
-        assert_eq!(
-            values.reason("psy_mixed/x|y/ratio"),
-            Some("a threshold is not above 0")
-        );
+        assert_eq!(values.reason("psy_mixed/F"), Some(NOT_POSITIVE));
+        assert_eq!(values.reason("psy_mixed/x|y/ratio"), Some(NOT_POSITIVE));
     }
 
     #[test]

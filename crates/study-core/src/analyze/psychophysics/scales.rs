@@ -1,9 +1,10 @@
 //! Magnitude estimation, `magnitude/…`, and ratings with hidden reference and anchors,
 //! `mushra/…`.
 
+use super::over_participants::{Threshold, mixed};
 use crate::analyze::identifiers::group_id;
 use crate::analyze::values::Values;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use study_stats::magnitude::{Estimate, magnitude as estimate};
 use study_stats::mushra::{Screening, condition};
 
@@ -65,6 +66,65 @@ pub fn magnitude(rows: &[MagnitudeRow]) -> Values {
     values
 }
 
+/// One estimate of a realization.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RealizationRow {
+    /// Participant. Untrusted.
+    pub participant: String,
+    /// Realization. Untrusted.
+    pub realization: String,
+    /// Number given.
+    pub estimate: f64,
+}
+
+/// Geometric means of realizations, as of levels, and their comparison by a mixed model of the
+/// logarithms: one mean of each participant and realization.
+pub(super) fn realizations(rows: &[RealizationRow]) -> Values {
+    let mut names: Vec<&str> = rows.iter().map(|r| r.realization.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut people: Vec<&str> = rows.iter().map(|r| r.participant.as_str()).collect();
+    people.sort_unstable();
+    people.dedup();
+    let place = |list: &[&str], name: &str| list.binary_search(&name).unwrap_or_default();
+    // A realization has no level: its place stands for it, and no power law is fitted.
+    let estimates: Vec<Estimate> = (rows.iter())
+        .map(|row| Estimate {
+            participant: place(&people, &row.participant),
+            level: place(&names, &row.realization) as f64,
+            estimate: row.estimate,
+        })
+        .collect();
+    let found = estimate(&estimates);
+    let mut values = Values::default();
+    values
+        .group("magnitude", "")
+        .put("n_left_out", found.left_out as f64);
+    for (place, mean) in &found.levels {
+        let name = names[*place as usize];
+        let prefix = group_id("magnitude/realization", &[name]);
+        let mut group = values.group(prefix, "there is one participant");
+        group.maybe("geometric_mean", mean.map(|m| m.mean));
+        group.interval("ci95", mean.and_then(|m| m.ci95));
+    }
+    let mut logs: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+    for row in rows.iter().filter(|r| r.estimate > 0.0) {
+        let cell = (row.participant.as_str(), row.realization.as_str());
+        logs.entry(cell).or_default().push(libm::log(row.estimate));
+    }
+    let cells: Vec<Threshold<'_>> = (logs.iter())
+        .filter_map(|((participant, condition), logs)| {
+            Some(Threshold {
+                participant,
+                condition,
+                value: libm::exp(study_stats::describe::mean(logs)?),
+            })
+        })
+        .collect();
+    mixed("magnitude_mixed", &cells, true, &mut values);
+    values
+}
+
 /// One rating.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MushraRow {
@@ -85,7 +145,8 @@ pub struct MushraRoles {
     pub mid_anchor: Option<String>,
 }
 
-/// Who is screened, and every condition over those who are not.
+/// Who is screened, and every condition over those who are not; if somebody is screened, over
+/// all as well.
 pub fn mushra(rows: &[MushraRow], roles: &MushraRoles, screening: &Screening) -> Values {
     let mut values = Values::default();
     let people: BTreeSet<&str> = rows.iter().map(|r| r.participant.as_str()).collect();
@@ -97,7 +158,9 @@ pub fn mushra(rows: &[MushraRow], roles: &MushraRoles, screening: &Screening) ->
         own.map(|r| r.rating).collect()
     };
     let mut kept = Vec::new();
+    let mut all = Vec::new();
     for person in people {
+        all.push(person);
         let reference = ratings(person, &roles.reference);
         let anchor = (roles.mid_anchor.as_ref()).map_or_else(Vec::new, |a| ratings(person, a));
         let found = screening.judge(&reference, &anchor);
@@ -110,16 +173,100 @@ pub fn mushra(rows: &[MushraRow], roles: &MushraRoles, screening: &Screening) ->
         }
     }
     values.group("mushra", "").put("n_kept", kept.len() as f64);
-    for name in conditions {
-        let own: Vec<Vec<f64>> = kept.iter().map(|person| ratings(person, name)).collect();
-        let found = condition(&own);
-        let mut group = values.group(group_id("mushra", &[name]), "nobody is left who rated it");
-        group.maybe("median", found.map(|c| c.median));
-        group.maybe("q1", found.map(|c| c.quartiles.0));
-        group.maybe("q3", found.map(|c| c.quartiles.1));
-        group.maybe("mean", found.map(|c| c.mean));
-        let half = found.and_then(|c| c.ci95_half);
-        group.put_or("ci95_half", half, "there is one participant");
+    let over = [("mushra", &kept), ("mushra_unscreened", &all)];
+    let one_screened = kept.len() < all.len();
+    // The same numbers twice if nobody is screened.
+    for (prefix, people) in &over[..if one_screened { 2 } else { 1 }] {
+        for name in &conditions {
+            let own: Vec<Vec<f64>> = people.iter().map(|person| ratings(person, name)).collect();
+            let found = condition(&own);
+            let why = "nobody is left who rated it";
+            let mut group = values.group(group_id(prefix, &[name]), why);
+            group.maybe("median", found.map(|c| c.median));
+            group.maybe("q1", found.map(|c| c.quartiles.0));
+            group.maybe("q3", found.map(|c| c.quartiles.1));
+            group.maybe("mean", found.map(|c| c.mean));
+            let half = found.and_then(|c| c.ci95_half);
+            group.put_or("ci95_half", half, "there is one participant");
+        }
     }
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three participants and realizations; estimates with moduli 1, 10 and 3.
+    fn estimates() -> Vec<RealizationRow> {
+        let noise = [[1.0, 1.2, 0.9], [1.1, 0.8, 1.0], [0.9, 1.0, 1.3]];
+        let mut rows = Vec::new();
+        for (p, modulus) in [1.0, 10.0, 3.0].into_iter().enumerate() {
+            for (r, (name, size)) in [("a", 2.0), ("b", 4.0), ("c", 5.0)].into_iter().enumerate() {
+                for repetition in [1.0, 1.1] {
+                    rows.push(RealizationRow {
+                        participant: format!("P{p}"),
+                        realization: name.to_owned(),
+                        estimate: modulus * size * noise[p][r] * repetition,
+                    });
+                }
+            }
+        }
+        rows
+    }
+
+    /// Everybody judged everything, so that equalisation leaves the geometric means, and the
+    /// contrasts of the mixed model are their ratios.
+    #[test]
+    fn realizations_have_the_geometric_means_of_their_estimates() {
+        let rows = estimates();
+        let values = realizations(&rows);
+        let of = |name: &str| -> f64 {
+            let own = rows.iter().filter(|r| r.realization == name);
+            let logs: Vec<f64> = own.map(|r| r.estimate.ln()).collect();
+            (logs.iter().sum::<f64>() / logs.len() as f64).exp()
+        };
+        let found = |id: &str| values.number(id).unwrap_or(f64::NAN);
+        for name in ["a", "b", "c"] {
+            let mean = found(&format!("magnitude/realization/{name}/geometric_mean"));
+            assert!((mean / of(name) - 1.0).abs() < 1e-12, "{name}: {mean}");
+        }
+        let ratio = found("magnitude_mixed/a|b/ratio");
+        assert!((ratio / (of("a") / of("b")) - 1.0).abs() < 1e-9, "{ratio}");
+        assert!(found("magnitude_mixed/p") < 0.05);
+        assert_eq!(values.get("magnitude/exponent"), None);
+    }
+
+    #[test]
+    fn whoever_is_screened_is_in_the_second_result_only() {
+        let row = |participant: &str, condition: &str, rating| MushraRow {
+            participant: participant.to_owned(),
+            condition: condition.to_owned(),
+            rating,
+        };
+        let mut rows = vec![
+            row("A", "ref", 100.0),
+            row("A", "x", 40.0),
+            row("B", "ref", 95.0),
+            row("B", "x", 60.0),
+        ];
+        let roles = MushraRoles {
+            reference: "ref".to_owned(),
+            mid_anchor: None,
+        };
+        let all = |rows: &[MushraRow]| mushra(rows, &roles, &Screening::default());
+        let kept = all(&rows);
+        assert!(
+            kept.iter()
+                .all(|(id, _)| !id.starts_with("mushra_unscreened/"))
+        );
+        rows.extend([row("C", "ref", 20.0), row("C", "x", 80.0)]);
+        let values = all(&rows);
+        assert_eq!(values.number("mushra/C/screened"), Some(1.0));
+        for (id, value) in kept.iter().filter(|(id, _)| id.starts_with("mushra/x/")) {
+            assert_eq!(values.get(id), Some(value), "{id}");
+        }
+        assert_eq!(values.number("mushra_unscreened/x/mean"), Some(60.0));
+        assert_eq!(values.number("mushra_unscreened/x/median"), Some(60.0));
+    }
 }

@@ -4,11 +4,13 @@ use super::again::{Measured, again};
 use super::discriminations::of_tracks;
 use super::excluded;
 use super::findings::{
-    PartFacts, PartFinding, of_groups_and_sessions, of_preferences, of_sensitivities, of_thresholds,
+    PartFacts, PartFinding, of_groups_and_sessions, of_preferences, of_realizations,
+    of_sensitivities, of_thresholds,
 };
 use super::of_scales::{of_magnitudes, of_mushra};
 use super::part_data::{Found, Intervals, PartData, StudyData, asked, chosen, groups, sessions_of};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
+use super::questionnaires::of_questionnaires;
 use crate::analyze::exclude::Applied;
 use crate::analyze::findings::Pair;
 use crate::analyze::identifiers::group_id;
@@ -29,9 +31,9 @@ use study_stats::describe::{is_constant, mean};
 pub struct PartAnalysis {
     /// The part.
     pub part: PartId,
-    /// The kind of its trials, as in `[[tracks]] method`, or `pairs`.
+    /// The kind of its trials, as in `[[tracks]] method`, or `pairs`; that of a questionnaire.
     pub task: &'static str,
-    /// Number of trials with an answer that counts.
+    /// Number of trials with an answer that counts, or of questionnaires with a score.
     pub trials: usize,
     /// Number of participants with such a trial.
     pub participants: usize,
@@ -55,8 +57,8 @@ pub struct PartAnalysis {
     pub data: PartData,
 }
 
-/// The analyses of all parts that are not ratings, and of what ratings say of groups and
-/// sessions. Which participants count is decided as
+/// The analyses of all parts that are not ratings, of questionnaires, and of what ratings say of
+/// groups and sessions. Which participants count is decided as
 /// for ratings. Practice and trials without an answer do not count, nor do those that an
 /// exclusion rule excludes. Answers are the corrected ones, at the levels that were
 /// presented.
@@ -99,6 +101,7 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
         let names: Vec<&str> = own.names.iter().map(String::as_str).collect();
         let (mut findings, pairs) = match &part.task {
             Task::Pairs(_) => of_preferences(&facts, &own.names),
+            Task::Magnitude(_) => of_realizations(&facts, &names),
             _ => of_thresholds(&facts, &names),
         };
         let told = |name: &&&str| {
@@ -134,7 +137,9 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
             data: own.data,
         })
     };
-    protocol.parts.iter().filter_map(one).collect()
+    let parts = protocol.parts.iter().filter_map(one);
+    let questionnaires = of_questionnaires(study, include);
+    parts.chain(questionnaires).collect()
 }
 
 /// The statistics of these trials of a part; `None` of ratings.
@@ -147,7 +152,7 @@ fn of_part_task(
 ) -> Option<Found> {
     match &part.task {
         Task::Rating(own) => of_ratings(study, part, own, rows),
-        Task::Magnitude(_) => Some(of_magnitudes(part, rows)),
+        Task::Magnitude(own) => Some(of_magnitudes(study.protocol, part, own, (rows, rules))),
         Task::Mushra(own) => Some(of_mushra(study.protocol, part, &own.presentations, rows)),
         Task::Pairs(pairs) => Some(of_pairs(study, part, pairs, rows, intervals, rules)),
         Task::Discrimination { tracks } => {
@@ -221,10 +226,13 @@ fn without_exclusions(before: &Values, values: &mut Values) {
     for group in [
         "pairs/ability/",
         "pairs/vaf/pearson/",
+        "magnitude/",
+        "mushra/",
         "psy_group/",
         "psy_mixed/",
         "sdt_group/",
         "groups/",
+        "groups_conditions/",
         "sessions/",
         "retest/",
     ] {

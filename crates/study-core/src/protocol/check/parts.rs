@@ -3,7 +3,7 @@
 use super::{Spans, answers_s, pace};
 use crate::procedure::{Rule, Staircase};
 use crate::protocol::{
-    DeviceKind, Method, Mushra, Part, Protocol, Question, Role, Task, TrackRules,
+    DeviceKind, IntervalOrder, Method, Mushra, Part, Protocol, Question, Role, Task, TrackRules,
 };
 use study_base::diagnostic::Fault;
 use study_base::text::{ModelId, PartId};
@@ -89,7 +89,9 @@ pub(super) fn warnings(protocol: &Protocol, spans: &Spans, faults: &mut Vec<Faul
     }
     for (i, part) in protocol.parts.iter().enumerate() {
         let place = spans.get(&format!("parts[{i}].id")).cloned();
-        faults.extend(magnitudes(protocol, part).map(|fault| fault.at(place)));
+        let doubts = [magnitudes(protocol, part), one_order(part)];
+        let doubts = doubts.into_iter().flatten();
+        faults.extend(doubts.map(|fault| fault.at(place.clone())));
     }
     for (i, track) in protocol.tracks.iter().enumerate() {
         let place = spans.get(&format!("tracks[{i}].id")).cloned();
@@ -123,8 +125,11 @@ fn presented(protocol: &Protocol, model: &ModelId) -> bool {
 
 /// Whether realizations are rated or compared, so that their number matters.
 pub(super) fn is_about_realizations(protocol: &Protocol) -> bool {
-    let about =
-        |part: &Part| !matches!(part.task, Task::Discrimination { .. } | Task::Magnitude(_));
+    let about = |part: &Part| match &part.task {
+        Task::Discrimination { .. } => false,
+        Task::Magnitude(own) => own.models.iter().all(|m| protocol.level_of(m).is_none()),
+        Task::Rating(_) | Task::Mushra(_) | Task::Pairs(_) => true,
+    };
     let tested = protocol.models.iter().any(|m| m.role == Role::Test);
     protocol.parts.is_empty() || (protocol.parts.iter().any(about) && tested)
 }
@@ -136,6 +141,9 @@ fn magnitudes(protocol: &Protocol, part: &Part) -> Option<Fault> {
     };
     let levels = own.models.iter().filter_map(|id| protocol.level_of(id));
     let levels: Vec<f64> = levels.collect();
+    if levels.is_empty() {
+        return None;
+    }
     let id = &part.id;
     if levels.iter().any(|level| *level <= 0.0) {
         let what = format!("the exponent of the part `{id}` leaves out levels of 0 and less");
@@ -146,6 +154,21 @@ fn magnitudes(protocol: &Protocol, part: &Part) -> Option<Fault> {
             "the part `{id}` has {} levels: an exponent of fewer than {MAGNITUDE_LEVELS} is uncertain",
             levels.len()
         ))
+    })
+}
+
+/// Pairs whose trials do not have both orders equally often.
+fn one_order(part: &Part) -> Option<Fault> {
+    let Task::Pairs(own) = &part.task else {
+        return None;
+    };
+    let uneven = own.interval_order == IntervalOrder::Balanced && own.repetitions % 2 == 1;
+    uneven.then(|| {
+        let what = format!(
+            "`repetitions = {}`: nobody has both orders of a pair of `{}` equally often",
+            own.repetitions, part.id
+        );
+        Fault::warning(what).hint("take an even number; the orders are balanced over two rows")
     })
 }
 
@@ -160,6 +183,10 @@ fn few_trials(track: &TrackRules) -> Option<Fault> {
         Rule::Staircase(rule) if rule.stop.reversals < rule.estimate_last => format!(
             "the estimate of the track `{id}` is the mean of {} reversals, and it stops after {}",
             rule.estimate_last, rule.stop.reversals
+        ),
+        Rule::Staircase(rule) if rule.estimate_last % 2 == 1 => format!(
+            "the estimate of the track `{id}` is the mean of an odd number of reversals, {}: the peaks or the valleys weigh more",
+            rule.estimate_last
         ),
         Rule::QuestPlus(_) | Rule::Staircase(_) if trials < TRACK_TRIALS => format!(
             "the track `{id}` has at most {trials} trials: about 40 give a threshold to half the noise"

@@ -29,6 +29,8 @@ pub(super) struct Sections<'a> {
     pub(super) analysis: Option<&'a AnalysisRules>,
     /// Whether there are `[[parts]]`.
     pub(super) has_parts: bool,
+    /// Whether the answer of one of them is unknown.
+    pub(super) has_faulty_parts: bool,
 }
 
 impl Sections<'_> {
@@ -279,6 +281,10 @@ impl Sections<'_> {
         let primary = &analysis.primary;
         let mut questions = self.questions.iter();
         let Some(question) = questions.find(|q| q.id.as_ref() == Some(primary)) else {
+            // It may be the answer of a part with a fault of its own.
+            if self.has_faulty_parts {
+                return;
+            }
             let ids = self.questions.iter().filter_map(|q| q.id.as_ref());
             let fault = unknown("question", primary.as_str(), ids.map(QuestionId::as_str));
             return document.fault(fault.at(place));
@@ -290,13 +296,22 @@ impl Sections<'_> {
                 min.unwrap_or(f64::NEG_INFINITY),
                 max.unwrap_or(f64::INFINITY),
             ),
-            Some(QuestionKind::Choice {
-                multiple: false, ..
-            }) if self.has_parts => return,
+            // Of pairs and of discrimination, which have analyses of their own.
+            Some(QuestionKind::Choice { .. }) if question.path.starts_with("parts[") => {
+                if analysis.realistic_from.is_some() {
+                    let what =
+                        format!("`analysis.realistic_from` has no effect: `{primary}` is a choice");
+                    let place = document.span_of("analysis.realistic_from");
+                    document.fault(Fault::error(what).at(place));
+                }
+                return;
+            }
             Some(QuestionKind::Choice { .. } | QuestionKind::Text) => {
                 let what = "cannot be the primary question: its answers are not numbers";
                 let fault = Fault::error(format!("`{primary}` {what}")).at(place);
-                return document.fault(fault.hint("a rating, a slider or a number can"));
+                let hint = "a rating, a slider or a number can, and a part of kind \"pairs\" or \
+                            \"discrimination\", such as one of yes-no trials";
+                return document.fault(fault.hint(hint));
             }
             None => return,
         };

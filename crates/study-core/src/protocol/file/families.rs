@@ -123,7 +123,11 @@ fn levels(section: &mut Section<'_, '_>) -> Option<Vec<f64>> {
     }
     let (Some(range), Some(steps)) = (range, steps) else {
         let hint = "such as range = [0.0, 3.0] with steps = 41, or levels = [0.5, 1.0, 2.0]";
-        section.report_missing("levels", hint.to_owned());
+        // A range that is there is at fault itself.
+        let both = ["range", "steps"].map(|key| section.value(key).is_some());
+        if both != [true, true] {
+            section.report_missing("levels", hint.to_owned());
+        }
         return None;
     };
     let refuse = |what: &str| {

@@ -4,10 +4,10 @@ use super::agree::at;
 use super::section::Section;
 use crate::protocol::groups::{Assign, GroupRules, Groups, SessionPlan};
 use crate::protocol::keys::{Id, Key, Kind, Words as _, keys};
-use crate::protocol::{Part, Task};
+use crate::protocol::{FamilyRules, Part, Task};
 use study_base::diagnostic::table::Document;
 use study_base::diagnostic::{Fault, did_you_mean};
-use study_base::text::PartId;
+use study_base::text::{ModelId, PartId};
 
 pub(super) const GROUPS: &[Key] = keys! {
     /// How a participant gets a group.
@@ -87,12 +87,13 @@ pub(super) fn session(mut section: Section<'_, '_>) -> Option<SessionPlan> {
 pub(super) fn agree(
     groups: Option<&Groups>,
     sessions: &[SessionPlan],
-    parts: &[Part],
+    (parts, families): (&[Part], &[FamilyRules]),
     document: &Document<'_>,
 ) {
     let fault = |place: &str, key: &str, fault: Fault| {
         document.fault(fault.at(at(document, place, key)));
     };
+    let is_level = |model: &ModelId| families.iter().any(|f| f.level_of(model).is_some());
     let group_list = groups.map_or(&[][..], |g| &g.list);
     if parts.is_empty() {
         for (section, used) in [
@@ -155,7 +156,9 @@ pub(super) fn agree(
         };
         for part in parts.iter().filter(own) {
             let (all, left) = match &part.task {
-                Task::Rating(task) => {
+                // The levels of a family belong to all groups.
+                Task::Magnitude(task) if task.models.iter().any(is_level) => continue,
+                Task::Rating(task) | Task::Magnitude(task) => {
                     let own = task.models.iter().filter(|m| models.contains(m));
                     (task.models.clone(), own.count())
                 }
@@ -171,7 +174,7 @@ pub(super) fn agree(
                     let own = all.iter().filter(|m| models.contains(m));
                     (all.clone(), own.count())
                 }
-                Task::Magnitude(_) | Task::Discrimination { .. } => continue,
+                Task::Discrimination { .. } => continue,
             };
             if left == 0 {
                 let what = format!(

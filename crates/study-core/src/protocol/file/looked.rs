@@ -85,10 +85,18 @@ impl Looked<'_> {
                     models.push(id);
                     continue;
                 }
-                Some(_) => format!("the level {level} is there twice"),
+                Some(_) => {
+                    let what = format!("the level {level} is there twice");
+                    self.fault(path, "levels", Fault::error(what));
+                    return None;
+                }
                 None => format!("{level} is no level of the family `{}`", family.id),
             };
-            self.fault(path, "levels", Fault::error(what));
+            let far = |own: &f64| (own - level).abs();
+            let all = family.ladder.levels().iter().copied();
+            let near = all.min_by(|a, b| far(a).total_cmp(&far(b)));
+            let near = near.map_or_else(String::new, |near| format!("the nearest level is {near}"));
+            self.fault(path, "levels", Fault::error(what).hint(near));
             return None;
         }
         Some(models)
@@ -130,11 +138,16 @@ impl Looked<'_> {
             .collect()
     }
 
-    pub(super) fn presentations(&self, raw: &Presentations, path: &str) -> Option<Presentations> {
-        self.models(&raw.models, &format!("{path}.models"));
+    /// Reports practice trials with realizations that do not exist.
+    pub(super) fn practice(&self, raw: &Presentations, path: &str) {
         for (i, id) in raw.practice.iter().enumerate() {
             self.model(id, &format!("{path}.practice[{i}]"));
         }
+    }
+
+    pub(super) fn presentations(&self, raw: &Presentations, path: &str) -> Option<Presentations> {
+        self.models(&raw.models, &format!("{path}.models"));
+        self.practice(raw, path);
         let models = match raw.models.is_empty() {
             true => self.default_models(true),
             false => raw.models.clone(),

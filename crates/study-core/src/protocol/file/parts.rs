@@ -73,14 +73,18 @@ pub(super) const KINDS: [Variant<RawTask>; 5] = [
     ),
     Variant::new(
         "magnitude",
-        "Magnitude estimation: one level of a family is felt, and a number above 0 is typed for it.",
+        "Magnitude estimation: one level of a family, or one realization, is felt, and a number above 0 is typed for it.",
         presentation_keys! {
             /// What is asked, in any language.
             "prompt": Kind::Text, r#""How strong did it feel?""#, required;
-            /// One of `[[families]]`.
-            "family": Kind::Id(Id::Part), r#""detent""#, required;
+            /// One of `[[families]]`, whose levels are felt.
+            "family": Kind::Id(Id::Part), r#""detent""#;
             /// Levels of the ladder.
             "levels": Kind::NumberList, "[0.5, 1.0, 2.0]", derived("all levels of the ladder");
+            /// The realizations, by id, in a part without a family.
+            "models": Kind::ModelIds, r#"["lambda-0.9991", "lambda-0.9995"]"#, derived("all whose role is not `practice`");
+            /// The realizations of the practice trials of the part, in this order.
+            "practice": Kind::ModelIds, r#"["spring"]"#;
         },
         magnitude,
     ),
@@ -169,9 +173,9 @@ pub(super) enum RawTask {
     },
     Magnitude {
         prompt: String,
-        family: PartId,
-        levels: Option<Vec<f64>>,
-        /// Its models are empty.
+        /// With its levels, if they are named.
+        family: Option<(PartId, Option<Vec<f64>>)>,
+        /// Its models are empty if none are named.
         presentations: Presentations,
     },
     Mushra {
@@ -266,11 +270,20 @@ fn presentations(
 fn magnitude(section: &mut Section<'_, '_>) -> Option<RawTask> {
     let (prompt, family) = (section.text("prompt"), section.part_id("family"));
     let levels = section.numbers("levels");
-    let presentations = presentations(section, Vec::new(), Vec::new());
+    let (models, practice) = (section.model_ids("models"), section.model_ids("practice"));
+    let path = section.path();
+    if family.is_some() && !models.is_empty() {
+        let what = format!("`{path}` has `models` and a family");
+        section.fault_at("models", Fault::error(what).hint("leave one of them out"));
+    }
+    if family.is_none() && levels.is_some() {
+        let what = format!("`{path}` has `levels` without a family");
+        section.fault_at("levels", Fault::error(what).hint("add family = \"…\""));
+    }
+    let presentations = presentations(section, models, practice);
     Some(RawTask::Magnitude {
         prompt: prompt?,
-        family: family?,
-        levels,
+        family: family.map(|family| (family, levels)),
         presentations: presentations?,
     })
 }

@@ -100,8 +100,8 @@ pub(super) struct PartialQuestion {
 }
 
 impl PartialQuestion {
-    /// The question with which each trial of a part begins; its id is that of the part.
-    pub(super) fn of_part(path: &str, id: &str, prompt: &str, kind: QuestionKind) -> Self {
+    /// A required question that another section states.
+    pub(super) fn made(path: &str, id: &str, prompt: &str, kind: QuestionKind) -> Self {
         Self {
             path: path.to_owned(),
             id: QuestionId::new(id).ok(),

@@ -72,7 +72,7 @@ impl Raw {
                         max: None,
                         above: Some(0.0),
                     };
-                    Some(PartialQuestion::of_part(&part.path, id, prompt, positive))
+                    Some(PartialQuestion::made(&part.path, id, prompt, positive))
                 }
                 RawTask::Mushra { prompt, labels, .. } => {
                     let scale = QuestionKind::Slider {
@@ -81,11 +81,11 @@ impl Raw {
                         step: 1.0,
                         labels: labels.clone(),
                     };
-                    Some(PartialQuestion::of_part(&part.path, id, prompt, scale))
+                    Some(PartialQuestion::made(&part.path, id, prompt, scale))
                 }
                 RawTask::Pairs { prompt, tie, .. } => {
                     let options = &FIRST_OR_SECOND[..if *tie { 3 } else { 2 }];
-                    Some(PartialQuestion::of_part(
+                    Some(PartialQuestion::made(
                         &part.path,
                         id,
                         prompt,
@@ -95,7 +95,7 @@ impl Raw {
                 RawTask::Discrimination { prompt, tracks, .. } => {
                     let first = self.track(tracks.first()?)?;
                     let options = first.method?.answers();
-                    Some(PartialQuestion::of_part(
+                    Some(PartialQuestion::made(
                         &part.path,
                         id,
                         prompt,
@@ -105,6 +105,12 @@ impl Raw {
             }
         };
         self.parts.iter().filter_map(question).collect()
+    }
+
+    /// Parts without an answer of their own.
+    pub(super) fn rating_parts(&self) -> usize {
+        let rated = |part: &&RawPart| matches!(part.task, Some(RawTask::Rating { .. }));
+        self.parts.iter().filter(rated).count()
     }
 
     fn track(&self, id: &PartId) -> Option<&RawTrack> {
@@ -192,7 +198,7 @@ impl Raw {
                 continue;
             };
             let of = |t: &RawTrack| matches!(&t.compared, Some(Compared::Levels { family, .. }) if family == id);
-            let estimated = |p: &RawPart| matches!(&p.task, Some(RawTask::Magnitude { family, .. }) if family == id);
+            let estimated = |p: &RawPart| matches!(&p.task, Some(RawTask::Magnitude { family: Some((family, _)), .. }) if family == id);
             if !self.tracks.iter().any(of) && !self.parts.iter().any(estimated) {
                 let fault = Fault::warning(format!("no track and no part has the family `{id}`"));
                 document.fault(fault.at(at(document, &family.path, "id")));
@@ -226,16 +232,20 @@ impl Raw {
             }
             RawTask::Magnitude {
                 family,
-                levels,
                 presentations,
                 ..
             } => {
                 asks.push(QuestionId::new(id.as_str()).ok()?);
-                let family = looked.family(family, families?, path)?;
-                let models = looked.levels(family, levels.as_deref(), path)?;
-                let own = Presentations {
-                    models,
-                    ..presentations.clone()
+                let own = match family {
+                    None => looked.presentations(presentations, path)?,
+                    Some((family, levels)) => {
+                        let family = looked.family(family, families?, path)?;
+                        looked.practice(presentations, path);
+                        Presentations {
+                            models: looked.levels(family, levels.as_deref(), path)?,
+                            ..presentations.clone()
+                        }
+                    }
                 };
                 (Task::Magnitude(own), 0.0)
             }
@@ -370,6 +380,18 @@ impl Looked<'_> {
             Compared::Levels { family, .. } => self.family(family, families?, path)?.ladder.clone(),
         };
         let rule = self.rule(raw.rule.clone()?, method, &compared, &ladder);
+        if let Rule::Staircase(Staircase {
+            min_level: Some(standard),
+            start,
+            ..
+        }) = &rule
+            && start < standard
+        {
+            let what = format!("the staircase begins at {start}, below its standard {standard}");
+            let hint = "a staircase goes down to the standard: levels below it are not easier to tell from it";
+            self.fault(path, "standard", Fault::error(what).hint(hint));
+            return None;
+        }
         if let Err(why) = Track::new(&rule, &ladder, &mut Stream::new(0, &["check"])) {
             self.fault(path, "procedure", Fault::error(why.to_string()));
             return None;

@@ -522,6 +522,7 @@ fn any_text_is_read_without_a_panic() {
 
 mod keys;
 mod parts;
+mod questionnaires;
 
 mod random {
     use super::*;

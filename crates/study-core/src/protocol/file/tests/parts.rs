@@ -458,3 +458,84 @@ fn default_grids_cover_the_ladder_and_are_steeper_above_a_standard() {
     assert_eq!((fine.len(), fine[0], fine[59]), (60, 1.0, 3.0));
     assert!(fine.windows(2).all(|w| w[0] < w[1]));
 }
+
+/// One mistake is one fault: what follows from it is not reported.
+#[test]
+fn a_fault_has_no_echo() {
+    for (from, to) in [
+        ("range = [1.0, 3.0]", "range = \"x\""),
+        ("steps = 41", "steps = 1"),
+        ("prompt = \"Which?\"\nquestions", "prompt = 3\nquestions"),
+    ] {
+        let found = changed(from, to);
+        assert_eq!(found.len(), 1, "{to}: {found:?}");
+    }
+}
+
+#[test]
+fn a_staircase_begins_above_its_standard() {
+    let found = changed("standard = 1.0", "standard = 2.5");
+    assert_eq!(found, ["the staircase begins at 2, below its standard 2.5"]);
+}
+
+#[test]
+fn a_choice_of_a_rating_part_is_no_primary_question() {
+    let choice = "id = \"sure\"\nkind = \"choice\"\noptions = [\"yes\", \"no\"]\nprompt = \"?\"\n";
+    let text = PARTS
+        .replace(
+            "id = \"sure\"\nkind = \"rating\"\nprompt = \"?\"\nfrom = 1\nto = 3\n",
+            choice,
+        )
+        .replace("primary = \"pairs\"", "primary = \"sure\"");
+    let parsed = parse("p", &text);
+    let messages: Vec<&str> = (parsed.findings.faults.iter())
+        .map(|f| f.message.as_str())
+        .collect();
+    assert_eq!(
+        messages,
+        ["`sure` cannot be the primary question: its answers are not numbers"]
+    );
+    let found = changed(
+        "primary = \"pairs\"",
+        "primary = \"pairs\", realistic_from = 1",
+    );
+    assert_eq!(
+        found,
+        ["`analysis.realistic_from` has no effect: `pairs` is a choice"]
+    );
+}
+
+/// Realizations are estimated where there is no family.
+#[test]
+fn magnitudes_are_asked_of_realizations_without_a_family() {
+    let without = SCALES.replace("family = \"detent\"\nlevels = [4.0, 1.0]\n", "");
+    assert_ne!(without, SCALES);
+    let parsed = parse("p", &without);
+    let shown = parsed.findings.render(false);
+    let protocol = parsed.protocol.unwrap_or_else(|| panic!("{shown}"));
+    let Task::Magnitude(own) = &protocol.parts[0].task else {
+        panic!()
+    };
+    let tests: Vec<_> = protocol.models.iter().map(|m| &m.id).collect();
+    assert!(!own.models.is_empty() && own.models.iter().all(|id| tests.contains(&id)));
+    assert!(own.models.iter().all(|id| protocol.level_of(id).is_none()));
+    for (to, expected) in [
+        (
+            "family = \"detent\"\nmodels = [\"c\"]\n",
+            "`parts[0]` has `models` and a family",
+        ),
+        (
+            "levels = [4.0]\n",
+            "`parts[0]` has `levels` without a family",
+        ),
+        (
+            "family = \"detent\"\nlevels = [1.1]\n",
+            "1.1 is no level of the family `detent`",
+        ),
+        ("models = [\"nobody\"]\n", "there is no model `nobody`"),
+    ] {
+        let text = SCALES.replace("family = \"detent\"\nlevels = [4.0, 1.0]\n", to);
+        let shown = parse("p", &text).findings.render(false);
+        assert!(shown.contains(expected), "{to}\n{shown}");
+    }
+}

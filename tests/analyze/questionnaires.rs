@@ -1,0 +1,118 @@
+//! Questionnaires at the end of a session, and magnitude estimates of realizations: from
+//! `study new` to the report.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::parts::{cells, study};
+use serde_json::Value;
+use std::fs;
+
+const QUESTIONNAIRES: &str = r#"
+[[questionnaires]]
+id = "sus"
+kind = "sus"
+
+[[questionnaires]]
+id = "load"
+kind = "nasa-tlx"
+"#;
+
+fn document(folder: &std::path::Path) -> Value {
+    let (code, out, err) = study(&["analyze", "out", "--json"], folder);
+    assert_eq!(code, 0, "{err}");
+    serde_json::from_str(&out).unwrap()
+}
+
+#[test]
+fn questionnaires_are_answered_scored_and_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, err) = study(&["new", "s"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let path = folder.path().join("s/protocol.toml");
+    let protocol = fs::read_to_string(&path).unwrap() + QUESTIONNAIRES;
+    fs::write(&path, protocol).unwrap();
+    let arguments = ["rehearse", "s", "--participants", "3", "--out", "out"];
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 0, "{err}");
+    let (code, out, err) = study(&["verify", "out"], folder.path());
+    assert_eq!(code, 0, "{out}{err}");
+    let document = document(folder.path());
+    let [sus, load] = [0, 1].map(|i| &document["parts"][i]);
+    assert_eq!(
+        (&sus["task"], &load["task"]),
+        (&"sus".into(), &"nasa-tlx".into())
+    );
+    let names: Vec<String> = (1..=10).map(|i| format!("sus_{i}")).collect();
+    let mut columns = vec!["participant"];
+    columns.extend(names.iter().map(String::as_str));
+    let answers = cells(&folder.path().join("out/s/participants.csv"), &columns);
+    assert_eq!(answers.len(), 3);
+    let mut total = 0.0;
+    for row in &answers {
+        let given: Vec<f64> = row[1..].iter().map(|a| a.parse().unwrap()).collect();
+        let odd: f64 = given.iter().step_by(2).sum();
+        let even: f64 = given.iter().skip(1).step_by(2).sum();
+        let score = 2.5 * (odd - 5.0 + 25.0 - even);
+        assert_eq!(
+            sus["values"][format!("questionnaire/score/{}", row[0])],
+            score
+        );
+        total += score;
+    }
+    let mean = sus["values"]["questionnaire/mean"].as_f64().unwrap();
+    assert!((mean - total / 3.0).abs() < 1e-9);
+    assert_eq!(load["values"]["questionnaire/item/mental/n"], 3.0);
+    let (code, out, err) = study(&["analyze", "out"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("sus, 3 scores, 3 participants"), "{out}");
+    let analysis = folder.path().join("out/s/analysis");
+    let report = fs::read_to_string(analysis.join("report.html")).unwrap();
+    assert!(report.contains("System Usability Scale (Brooke, 1996)"));
+    assert!(
+        analysis.join("part_scores.csv").is_file() && analysis.join("part_items.csv").is_file()
+    );
+}
+
+#[test]
+fn magnitudes_of_realizations_are_estimated_and_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, err) = study(&["new", "m", "--kind", "pairs"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    let path = folder.path().join("m/protocol.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let (head, rest) = text.split_once("[[parts]]").unwrap();
+    let (_, analysis) = rest.split_once("[analysis]").unwrap();
+    let part = "[[parts]]\nid = \"more-real\"\nkind = \"magnitude\"\nprompt = \"How real?\"\nrepetitions = 2\n";
+    fs::write(&path, format!("{head}{part}\n[analysis]{analysis}")).unwrap();
+    let arguments = ["rehearse", "m", "--participants", "3", "--out", "out"];
+    let (code, _, err) = study(&arguments, folder.path());
+    assert_eq!(code, 0, "{err}");
+    let document = document(folder.path());
+    assert_eq!(document["format"], "study-parts/1");
+    let part = &document["parts"][0];
+    assert_eq!(
+        (&part["task"], &part["trials"]),
+        (&"magnitude".into(), &18.into())
+    );
+    let columns = ["model", "more-real"];
+    let given = cells(&folder.path().join("out/m/ratings.csv"), &columns);
+    for model in ["lambda-0.9991", "lambda-0.9995", "lambda-0.9999"] {
+        let own = given.iter().filter(|row| row[0] == model);
+        let logs: Vec<f64> = own.map(|row| row[1].parse::<f64>().unwrap().ln()).collect();
+        assert_eq!(logs.len(), 6);
+        let mean = (logs.iter().sum::<f64>() / 6.0).exp();
+        let id = format!("magnitude/realization/{model}/geometric_mean");
+        let found = part["values"][&id].as_f64().unwrap();
+        assert!((found / mean - 1.0).abs() < 1e-9, "{model}: {found} {mean}");
+    }
+    let questions: Vec<&Value> = (part["findings"].as_array().unwrap().iter())
+        .map(|f| &f["question"])
+        .collect();
+    assert_eq!(questions, ["magnitudes", "magnitude-vaf"]);
+    let (code, out, err) = study(&["analyze", "out"], folder.path());
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("Do the estimates differ between realizations?"),
+        "{out}"
+    );
+}
