@@ -11,7 +11,7 @@ pub(super) fn magnitudes(values: &Values) -> PartTable {
         file: "magnitudes",
         caption: "Estimated magnitudes",
         columns: &[
-            ("level", "level"),
+            ("", "level"),
             ("geometric mean", "geometric_mean"),
             ("95 %", "geometric_mean_ci95"),
         ],

@@ -1,6 +1,9 @@
 //! What the parts of a study are analyzed from, and what is found of one.
 
+use super::findings::PartFinding;
 use super::tracks::TrackData;
+use crate::analyze::exclude::Applied;
+use crate::analyze::findings::Pair;
 use crate::analyze::values::Values;
 use crate::analyze::warning::Warning;
 use crate::outcome::fold::History;
@@ -24,6 +27,37 @@ pub struct StudyData<'a> {
     pub participants: &'a [ParticipantRow],
     /// Its sessions, of which the tracks are replayed.
     pub sessions: &'a [&'a History],
+}
+
+/// The analysis of one part of a study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartAnalysis {
+    /// The part.
+    pub part: PartId,
+    /// The kind of its trials, as in `[[tracks]] method`, or `pairs`; that of a questionnaire.
+    pub task: &'static str,
+    /// Number of trials with an answer that counts, or of questionnaires with a score.
+    pub trials: usize,
+    /// Number of participants with such a trial.
+    pub participants: usize,
+    /// Whether answers of pilots are among them.
+    pub pilot: bool,
+    /// Whether answers of simulated participants are among them.
+    pub simulated: bool,
+    /// The statistics.
+    pub values: Values,
+    /// The answers to the questions about it.
+    pub findings: Vec<PartFinding>,
+    /// The comparisons on which they rest: of realizations, or of thresholds.
+    pub pairs: Vec<Pair>,
+    /// What limits them.
+    pub warnings: Vec<Warning>,
+    /// The effect of each preregistered exclusion rule.
+    pub exclusions: Vec<Applied>,
+    /// Level of significance of every test, two-sided.
+    pub alpha: f64,
+    /// What its figures draw besides.
+    pub data: PartData,
 }
 
 /// The answers of a part by level and trial.

@@ -2,12 +2,11 @@
 
 use super::again::{Measured, again};
 use super::findings::{PartFacts, of_groups_and_sessions};
-use super::part_data::{PartData, StudyData};
-use super::study::PartAnalysis;
+use super::part_data::{PartAnalysis, PartData, StudyData};
 use crate::analyze::identifiers::group_id;
 use crate::analyze::select::{Include, Whose, state_counts};
 use crate::analyze::values::Values;
-use crate::analyze::{Rules, Warning};
+use crate::analyze::warning::Warning;
 use crate::outcome::ParticipantRow;
 use crate::outcome::fold::History;
 use crate::outcome::ratings::Origin;
@@ -102,7 +101,7 @@ fn one(protocol: &Protocol, own: &Questionnaire, rows: &[ParticipantRow]) -> Par
     let sessions = if several { &sessions[..] } else { &[] };
     again(&scores, sessions, false, &mut values);
     let who: BTreeSet<_> = rows.iter().map(|r| &r.participant).collect();
-    let alpha = Rules::of(protocol, "", Include::default()).alpha;
+    let alpha = protocol.analysis.alpha();
     let findings = of_groups_and_sessions(&PartFacts {
         values: &values,
         alpha,

@@ -4,15 +4,15 @@ use super::again::{Measured, again};
 use super::discriminations::of_tracks;
 use super::excluded;
 use super::findings::{
-    PartFacts, PartFinding, of_groups_and_sessions, of_preferences, of_realizations,
-    of_sensitivities, of_thresholds,
+    PartFacts, of_groups_and_sessions, of_preferences, of_realizations, of_sensitivities,
+    of_thresholds,
 };
 use super::of_scales::{of_magnitudes, of_mushra};
-use super::part_data::{Found, Intervals, PartData, StudyData, asked, chosen, groups, sessions_of};
+use super::part_data::{
+    Found, Intervals, PartAnalysis, PartData, StudyData, asked, chosen, groups, sessions_of,
+};
 use super::preferences::{Choice, Preference, in_both_orders, preferences};
 use super::questionnaires::of_questionnaires;
-use crate::analyze::exclude::Applied;
-use crate::analyze::findings::Pair;
 use crate::analyze::identifiers::group_id;
 use crate::analyze::select::{Include, Whose, state_counts};
 use crate::analyze::values::Values;
@@ -25,37 +25,6 @@ use crate::protocol::{Answer, Role};
 use std::collections::{BTreeMap, BTreeSet};
 use study_base::text::{ModelId, PartId, ParticipantId};
 use study_stats::describe::{is_constant, mean};
-
-/// The analysis of one part of a study.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PartAnalysis {
-    /// The part.
-    pub part: PartId,
-    /// The kind of its trials, as in `[[tracks]] method`, or `pairs`; that of a questionnaire.
-    pub task: &'static str,
-    /// Number of trials with an answer that counts, or of questionnaires with a score.
-    pub trials: usize,
-    /// Number of participants with such a trial.
-    pub participants: usize,
-    /// Whether answers of pilots are among them.
-    pub pilot: bool,
-    /// Whether answers of simulated participants are among them.
-    pub simulated: bool,
-    /// The statistics.
-    pub values: Values,
-    /// The answers to the questions about it.
-    pub findings: Vec<PartFinding>,
-    /// The comparisons on which they rest: of realizations, or of thresholds.
-    pub pairs: Vec<Pair>,
-    /// What limits them.
-    pub warnings: Vec<Warning>,
-    /// The effect of each preregistered exclusion rule.
-    pub exclusions: Vec<Applied>,
-    /// Level of significance of every test, two-sided.
-    pub alpha: f64,
-    /// What its figures draw besides.
-    pub data: PartData,
-}
 
 /// The analyses of all parts that are not ratings, of questionnaires, and of what ratings say of
 /// groups and sessions. Which participants count is decided as
@@ -112,13 +81,17 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
         let told: Vec<&str> = names.iter().filter(told).copied().collect();
         findings.extend(of_sensitivities(&facts, &told));
         findings.extend(of_groups_and_sessions(&facts));
-        let compared = !matches!(part.task, Task::Pairs(_));
-        if !compared && (protocol.groups.is_some() || sessions_of(protocol, part).len() > 1) {
+        let uncompared = match part.task {
+            Task::Pairs(_) => Some("its abilities are those of all participants together"),
+            Task::Magnitude(_) => Some("each participant has numbers of their own"),
+            Task::Mushra(_) => Some("its means are those of all participants together"),
+            Task::Rating(_) | Task::Discrimination { .. } => None,
+        };
+        let several = protocol.groups.is_some() || sessions_of(protocol, part).len() > 1;
+        if let Some(why) = uncompared.filter(|_| several) {
             own.warnings.push(Warning {
                 code: "groups-not-compared",
-                text: "groups and sessions are not compared in a part of pairs: its abilities are those of \
-                       all participants together"
-                    .to_owned(),
+                text: format!("groups and sessions are not compared in this part: {why}"),
             });
         }
         Some(PartAnalysis {
