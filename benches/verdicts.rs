@@ -46,6 +46,19 @@ struct World {
     /// Half of the participants rate higher with VAF, half lower: by this per standard
     /// deviation of VAF.
     camps: f64,
+    /// What the camps disagree about.
+    about: About,
+}
+
+/// What two camps of participants disagree about.
+#[derive(Clone, Copy, PartialEq)]
+enum About {
+    /// The value of VAF; the camps are of equal size.
+    Vaf,
+    /// Anything: what is VAF for `Vaf` is the VAF of a random order of the realizations.
+    Anything,
+    /// The value of VAF; the camp of each participant is left to chance.
+    VafByChance,
 }
 
 const COMPLETE: World = World {
@@ -56,6 +69,7 @@ const COMPLETE: World = World {
     missing: Missing::None,
     taste: 0.5,
     camps: 0.0,
+    about: About::Vaf,
 };
 const RANDOM: World = World {
     name: "random",
@@ -82,6 +96,16 @@ const CAMPS: World = World {
 const CAMPS_RANDOM: World = World {
     name: "camps, random",
     missing: Missing::Random,
+    ..CAMPS
+};
+const ELSEWHERE_RANDOM: World = World {
+    name: "camps about anything, random",
+    about: About::Anything,
+    ..CAMPS_RANDOM
+};
+const CAMPS_BY_CHANCE: World = World {
+    name: "camps by chance",
+    about: About::VafByChance,
     ..CAMPS
 };
 const EIGHT: World = World {
@@ -146,16 +170,22 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
     let means: Vec<f64> = (0..k)
         .map(|m| slope * x[m] + spread * noise.normal() - lower(m))
         .collect();
+    // Draws of their own, so that the other worlds do not depend on them.
+    let mut camps = Stream::new(2007, &["camps", key[0], key[1], key[2]]);
+    let mut about = x.clone();
+    if world.about == About::Anything {
+        camps.shuffle(&mut about);
+    }
     let mut trials = Vec::new();
     for p in 0..world.participants {
         let level = 4.0 + 0.7 * noise.normal();
-        let camp = if p % 2 == 0 {
-            world.camps
-        } else {
-            -world.camps
+        let rises = match world.about {
+            About::Vaf | About::Anything => p % 2 == 0,
+            About::VafByChance => camps.below(2) == 0,
         };
+        let camp = if rises { world.camps } else { -world.camps };
         let own: Vec<f64> = (0..k)
-            .map(|m| level + means[m] + camp * x[m] + world.taste * noise.normal())
+            .map(|m| level + means[m] + camp * about[m] + world.taste * noise.normal())
             .collect();
         let rated: Vec<bool> = (0..k)
             .map(|m| match world.missing {
@@ -193,7 +223,7 @@ fn study(world: &World, truth: Truth, number: u32) -> Vec<Trial> {
 type Results = BTreeMap<String, Option<bool>>;
 
 /// Statistics of the analysis that are compared with 5 %.
-const TESTS: [&str; 11] = [
+const TESTS: [&str; 12] = [
     "rmanova/p_gg",
     "rmanova/p_hf",
     "rmanova/p",
@@ -205,6 +235,8 @@ const TESTS: [&str; 11] = [
     "corr_adjusted/pearson/p_t",
     "lmm_vaf_crossed/slope_satterthwaite_p",
     "order_previous_rating/p",
+    // Two realizations that are chosen before the ratings.
+    "pair/m03|m04/p",
 ];
 
 /// The findings of `analyze` and the tests behind them.
@@ -408,6 +440,13 @@ fn main() {
         null,
         true,
         &with(Truth::Equal),
+        verdicts,
+    );
+    table(
+        "No realization is better: what the camps disagree about",
+        null,
+        true,
+        &[&CAMPS_RANDOM, &ELSEWHERE_RANDOM, &CAMPS_BY_CHANCE].map(|world| (world, Truth::Equal)),
         verdicts,
     );
     table(
