@@ -10,6 +10,7 @@ use study_base::rng::Stream;
 use study_haptics::identify::method::{Hat, Mechanism as Options, Method, Passive};
 use study_haptics::identify::{Training, vaf};
 use study_haptics::model::file;
+use study_haptics::plant::Parameters;
 use study_haptics::recording::{self, Recording};
 use study_wire::predict::{Lookup, Motion};
 
@@ -136,4 +137,33 @@ fn on_ten_switches_with_other_friction_the_mechanism_leaves_a_quarter_of_the_res
         assert!(passive >= 0.9, "motion {motion}: {passive}");
         assert!(mechanism >= 4.0, "motion {motion}: {mechanism}");
     }
+}
+
+/// The stiffness that a device has to state for the passive tables of B and of ten switches
+/// with other friction: that of the force over x and over δ together. The simulated device
+/// states 100 N/mm. The numbers are in docs/estimators.md.
+///
+/// `cargo test --test identify ten_other -- --ignored --nocapture`
+#[test]
+#[ignore = "ten seconds"]
+fn the_simulated_device_can_play_the_passive_tables_of_ten_other_switches() {
+    let mut asked = Vec::new();
+    let others = (0..10).map(|i| (random_switch(i), random_slips(i)));
+    let b = (Parameters::b(), [(0.0, 0.0); 4]);
+    for (i, (parameters, slips)) in std::iter::once(b).chain(others).enumerate() {
+        let mut noise = Stream::new(i as u64, &["stiffness"]);
+        let train = record_with("t", &parameters, &slips, training, 60.0, &mut noise);
+        let found = (Training::new(&train).unwrap())
+            .identify(Method::Passive(Passive::default()), 0.5, Lookup::Linear)
+            .unwrap();
+        let certificate = found.realization.certificate();
+        assert!(certificate.passes(), "{i}");
+        let state = certificate.state_n_per_mm.unwrap();
+        asked.push(certificate.stiffness_n_per_mm + state);
+    }
+    println!("N/mm, B first: {asked:.1?}");
+    assert!(
+        asked.iter().all(|n_per_mm| *n_per_mm < 100.0),
+        "{asked:.1?}"
+    );
 }
