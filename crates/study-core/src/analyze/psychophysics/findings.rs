@@ -8,6 +8,7 @@ use crate::analyze::findings::{
 use crate::analyze::identifiers::{group_id, pair_id};
 use crate::analyze::values::Values;
 use study_base::apa;
+use study_stats::level::rejects;
 
 /// A question about a part.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -159,7 +160,7 @@ fn with_vaf(facts: &PartFacts<'_>, question: PartQuestion, group: &str) -> PartF
         ..Finding::decided(question, test, facts.design(n))
     };
     let least = facts.number(&id("pearson/smallest_p_two_sided"));
-    if let Some(least) = least.filter(|p| *p >= facts.alpha) {
+    if let Some(least) = least.filter(|p| !rejects(*p, facts.alpha)) {
         found.caveat(
             "too-few",
             format!(
