@@ -54,7 +54,10 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("store", &["procedure", "protocol", "outcome"]),
     ("rendering", &["protocol", "outcome", "wire"]),
     ("analyze", &["protocol", "procedure", "outcome", "stats"]),
-    ("power", &["protocol", "outcome", "analyze", "stats"]),
+    (
+        "power",
+        &["protocol", "procedure", "outcome", "analyze", "stats"],
+    ),
     ("export", &["protocol", "outcome", "analyze"]),
     ("preregister", &["protocol", "outcome", "analyze"]),
     ("model", &["wire"]),

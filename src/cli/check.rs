@@ -54,6 +54,9 @@ struct Sensitivity {
 impl Sensitivity {
     fn of(protocol: &Protocol) -> Option<Self> {
         let plan = power::Plan::of(protocol, &power::Overrides::default()).ok()?;
+        if plan.part.is_some() {
+            return None;
+        }
         let (q, settings) = (plan.own.realizations, &plan.settings);
         let floor = power::floor(&settings.vaf(q), settings.alpha);
         Some(Self {

@@ -221,6 +221,13 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
         export::export(&source, &options, read, write)
     });
     let summary = summary.map_err(|e| explained(e, &derived, &study))?;
+    for left in target.left_behind() {
+        console.say(format!(
+            "note: {} was left by an export that was interrupted, or is of one that still runs; \
+             it has data of participants: delete it if none runs",
+            Untrusted(&left.display().to_string())
+        ));
+    }
     tell(&summary, &study, args, console)?;
     study_folder::whole(&study, &sessions)
 }
@@ -469,6 +476,25 @@ impl Target {
             let _ = fs::remove_dir_all(&self.part);
         }
         named
+    }
+
+    /// What other exports into the same folder did not finish.
+    fn left_behind(&self) -> Vec<PathBuf> {
+        let (Some(parent), Some(name)) = (self.part.parent(), self.out.file_name()) else {
+            return Vec::new();
+        };
+        let start = format!(".{}.", name.to_string_lossy());
+        let is_left = |path: &PathBuf| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let middle = name
+                .strip_prefix(&start)
+                .and_then(|n| n.strip_suffix(".part"));
+            middle.is_some_and(|pid| pid.parse::<u32>().is_ok()) && path.is_dir()
+        };
+        let items = fs::read_dir(parent).into_iter().flatten().flatten();
+        let mut found: Vec<PathBuf> = items.map(|i| i.path()).filter(is_left).collect();
+        found.sort();
+        found
     }
 
     fn rename(&self) -> Result<(), WriteError> {

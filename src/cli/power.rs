@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use study_base::text::Untrusted;
-use study_core::power::{Cell, CellResult, Chunk, Plan, enough, merge, run_chunk};
+use study_core::power::{CHUNK, Cell, CellResult, Chunk, Plan, enough, merge, run_chunk};
 
 /// Arguments of `study power`.
 #[derive(Debug, clap::Args)]
@@ -74,13 +74,21 @@ pub(super) fn units_of(plan: &Plan, cells: &[Cell]) -> Vec<Unit> {
         .collect()
 }
 
+/// What a unit of work is, for people.
+fn unit(plan: &Plan) -> &'static str {
+    match plan.settings.chunk() {
+        CHUNK => "thousand studies",
+        _ => "lots of studies",
+    }
+}
+
 /// Runs units on all threads, with a progress bar; the results are in their order.
 pub(super) fn simulate(
     plan: &Plan,
     units: &[Unit],
     threads: Option<u16>,
 ) -> Result<Vec<Chunk>, Failure> {
-    let bar = super::console::progress(units.len() as u64, "thousand studies");
+    let bar = super::console::progress(units.len() as u64, unit(plan));
     let found = simulate_with(plan, units, threads, &bar);
     bar.finish_and_clear();
     found
@@ -121,7 +129,7 @@ fn simulate_until(
     within: f64,
     threads: Option<u16>,
 ) -> Result<Vec<Option<Chunk>>, Failure> {
-    let bar = super::console::progress(units.len() as u64, "thousand studies");
+    let bar = super::console::progress(units.len() as u64, unit(plan));
     let mut found: Vec<Option<Chunk>> = vec![None; units.len()];
     for index in 0..plan.settings.chunks() {
         let mut places = Vec::new();
@@ -169,6 +177,12 @@ pub(super) fn run(args: &Args, console: &mut Console) -> Result<(), Failure> {
     };
     let loaded = load::load(path)?;
     let plan = assume::plan(&loaded.protocol, &args.assume, console)?;
+    if args.closed && plan.part.is_some() {
+        return Err(
+            Failure::usage("--closed: a part of pairs or tracks has no closed form")
+                .hint("leave it out; --studies sets how many are simulated"),
+        );
+    }
     let page = Page {
         width: console.width,
         colour: console.colour,

@@ -6,6 +6,7 @@ mod figure;
 mod json;
 mod page;
 mod paragraph;
+mod part;
 
 pub use figure::figure;
 pub use json::{document, own_design};
@@ -14,6 +15,7 @@ pub use page::{head, results};
 pub use paragraph::paragraph;
 
 use super::apa;
+use study_base::text::counted;
 use study_core::power::{self, Cell, CellResult, Plan, Reach, Scale, Smallest, Test, Vaf};
 use study_stats::power::covariate::Expected;
 use study_stats::power::detectable_correlation;
@@ -84,9 +86,13 @@ impl Report {
         at(0.1).zip(at(0.9))
     }
 
-    /// What decides such a study: the requirement of its number of realizations.
+    /// What decides such a study: the requirement of its number of realizations. Of a part
+    /// of pairs or tracks, what is simulated.
     pub fn ceiling_sentence(&self) -> String {
         let (plan, settings) = (&self.plan, &self.plan.settings);
+        if plan.part.is_some() {
+            return part::summary(self);
+        }
         let q = plan.own.realizations;
         let target = plan.targets.first().copied().unwrap_or(0.8);
         let Some(needed) = detectable_correlation(q, target, settings.alpha) else {
@@ -114,7 +120,6 @@ impl Report {
     /// What a reader has to know.
     pub fn warnings(&self) -> Vec<String> {
         let (plan, settings) = (&self.plan, &self.plan.settings);
-        let a = &settings.assumptions;
         let mut found = Vec::new();
         if self.missing_units > 0 {
             found.push(format!(
@@ -128,6 +133,54 @@ impl Report {
                 plan.defaults.join(", ")
             ));
         }
+        match plan.part {
+            Some(_) => found.extend(part::warnings(self)),
+            None => self.warnings_of_ratings(&mut found),
+        }
+        if plan.exclusions > 0 {
+            found.push(
+                "the protocol's exclusion rules are not simulated; state their loss as dropout"
+                    .to_owned(),
+            );
+        }
+        if let Some(most) = plan.max_session_min {
+            for shape in plan.shapes() {
+                if let Some(minutes) = plan.too_long(shape) {
+                    found.push(format!(
+                        "{} realizations × {} take about {} min, more than {most}: not proposed",
+                        shape.0,
+                        counted(shape.1, "repetition", "repetitions"),
+                        apa::number(minutes, 0)
+                    ));
+                }
+            }
+        }
+        if let Some(pilot) = &settings.pilot {
+            found.push(format!(
+                "from a pilot of {} participants: the scatter rests on {} degrees of freedom",
+                pilot.participants,
+                pilot.scatter_df()
+            ));
+        }
+        for result in &self.results {
+            for test in result.tests.iter().filter(|t| t.undefined_share() > 0.01) {
+                let among = test.power_if_defined().map_or(String::new(), |p| {
+                    format!("; among the others the power is {}", apa::share(p, 3))
+                });
+                found.push(format!(
+                    "{}: {} is undefined in {} of the studies{among}",
+                    design(&result.cell),
+                    test.test.as_str(),
+                    percent(test.undefined_share()),
+                ));
+            }
+        }
+        found
+    }
+
+    fn warnings_of_ratings(&self, found: &mut Vec<String>) {
+        let (plan, settings) = (&self.plan, &self.plan.settings);
+        let a = &settings.assumptions;
         if let Some(floor) = power::floor(&settings.vaf(plan.own.realizations), settings.alpha)
             && !floor.can_reject
         {
@@ -161,46 +214,6 @@ impl Report {
                     .to_owned(),
             );
         }
-        if plan.exclusions > 0 {
-            found.push(
-                "the protocol's exclusion rules are not simulated; state their loss as dropout"
-                    .to_owned(),
-            );
-        }
-        if let Some(most) = plan.max_session_min {
-            for shape in plan.shapes() {
-                if let Some(minutes) = plan.too_long(shape) {
-                    found.push(format!(
-                        "{} realizations × {} repetitions take about {} min, more than {most}: not \
-                         proposed",
-                        shape.0,
-                        shape.1,
-                        apa::number(minutes, 0)
-                    ));
-                }
-            }
-        }
-        if let Some(pilot) = &settings.pilot {
-            found.push(format!(
-                "from a pilot of {} participants: the scatter rests on {} degrees of freedom",
-                pilot.participants,
-                pilot.scatter_df()
-            ));
-        }
-        for result in &self.results {
-            for test in result.tests.iter().filter(|t| t.undefined_share() > 0.01) {
-                let among = test.power_if_defined().map_or(String::new(), |p| {
-                    format!("; among the others the power is {}", apa::share(p, 3))
-                });
-                found.push(format!(
-                    "{}: {} is undefined in {} of the studies{among}",
-                    design(&result.cell),
-                    test.test.as_str(),
-                    percent(test.undefined_share()),
-                ));
-            }
-        }
-        found
     }
 }
 

@@ -4,6 +4,7 @@ mod command;
 #[path = "../support/designs.rs"]
 mod designs;
 mod official;
+mod sessions;
 mod studies;
 #[path = "../support/mod.rs"]
 mod support;

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::print_stderr, reason = "says what is missing on this machine")]
 
-use crate::studies::{export, files, hostile, japanese, new, real_study, rehearsed};
+use crate::studies::{export, files, grouped, hostile, japanese, new, real_study, rehearsed};
 use crate::support::{copy_folder, repository};
 use serde_json::Value;
 use std::fs;
@@ -146,6 +146,11 @@ fn studies(home: &Path) -> Vec<(PathBuf, &'static [&'static str])> {
         ),
         // Declined and missing answers, and a comment of everything.
         (hostile(&of("hostile")), &[]),
+        (grouped(4, &of("grouped")), SIMULATED),
+        (
+            rehearsed(&new("abx", &of("abx")), 3, &home.join("abx"), &[]),
+            SIMULATED,
+        ),
     ]
 }
 

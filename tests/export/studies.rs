@@ -201,6 +201,24 @@ pub(crate) fn japanese(home: &Path) -> PathBuf {
     })
 }
 
+/// The folder of a rehearsal of a study with two groups, of which the second rates fewer
+/// realizations, in two sessions.
+pub(crate) fn grouped(participants: usize, home: &Path) -> PathBuf {
+    let folder = home.join("grouped");
+    let parts = "[[parts]]\nid = \"real\"\nkind = \"rating\"\nrepetitions = 2\n\n\
+        [groups]\n[[groups.list]]\nid = \"all\"\n[[groups.list]]\nid = \"few\"\n\
+        models = [\"lambda-0.9991\", \"lambda-0.9993\", \"lambda-0.9995\"]\n\n\
+        [[sessions]]\nid = \"one\"\n[[sessions]]\nid = \"two\"\n\n# Asked after";
+    let changes = [
+        ("study-protocol/1", "study-protocol/2"),
+        ("repetitions = 3\n", ""),
+        ("order = \"blocked\"\n", ""),
+        ("# Asked after", parts),
+    ];
+    changed_protocol("turn-signal", &folder, &changes);
+    rehearsed(&folder, participants, home, &[])
+}
+
 /// A new study of a kind.
 pub(crate) fn new(kind: &str, home: &Path) -> PathBuf {
     let (code, _, err) = study(&["new", kind, "--kind", kind], home);

@@ -8,18 +8,24 @@
 //!
 //! Results are reproducible: the numbers of study k of a cell follow from the seed, the
 //! text of the cell and k, never from threads, shards or other cells. Counts are integers;
-//! sums run over chunks of [`CHUNK`] studies in order.
+//! sums run over chunks ([`Settings::chunk`]) in order.
+//!
+//! Parts of pairs and of tracks are simulated answer by answer, and decided by the analysis of
+//! such parts.
 
 mod decide;
 mod draw;
 mod expected;
+mod part_plan;
+mod parts;
 mod pilot;
 mod plan;
 mod tally;
 
 pub use expected::{Floor, Reach, Smallest, candidates, closed, design, floor, reach, smallest};
+pub use parts::{PairsWorld, PartWorld, TrackWorld, TracksWorld, Truth};
 pub use pilot::{Parameters, Pilot, PilotError};
-pub use plan::{Overrides, Plan, PlanError};
+pub use plan::{Overrides, Pace, Plan, PlanError};
 pub use tally::{CellResult, Chunk, Tally, TestResult, enough, merge, run_chunk};
 
 pub use crate::protocol::power::{PowerLink as Link, PowerTest as Test, PowerVaf as Vaf};
@@ -31,6 +37,9 @@ pub const STREAM: &str = "power/1";
 
 /// Studies of a chunk, the unit of work.
 pub const CHUNK: u64 = 1000;
+
+/// Studies of a chunk of tracks, each of which takes many fits.
+const CHUNK_OF_TRACKS: u64 = 20;
 
 /// A design to simulate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -95,6 +104,9 @@ pub struct Assumptions {
     pub dropout: f64,
     /// Share of trials without a rating.
     pub missing: f64,
+    /// The true mean of the hidden reference minus that of the realization with the highest
+    /// VAF.
+    pub reference: f64,
 }
 
 /// What a simulation needs besides its cells.
@@ -102,6 +114,8 @@ pub struct Assumptions {
 pub struct Settings {
     /// The assumptions.
     pub assumptions: Assumptions,
+    /// The part of pairs or tracks that is simulated; `None`: ratings.
+    pub part: Option<PartWorld>,
     /// The pilot whose uncertainty each study draws from, in place of the assumed slope
     /// and standard deviations.
     pub pilot: Option<Pilot>,
@@ -138,8 +152,16 @@ impl Settings {
         }
     }
 
+    /// Studies of a chunk.
+    pub fn chunk(&self) -> u64 {
+        match self.part {
+            Some(PartWorld::Tracks(_)) => CHUNK_OF_TRACKS,
+            None | Some(PartWorld::Pairs(_)) => CHUNK,
+        }
+    }
+
     /// Chunks of a cell.
     pub fn chunks(&self) -> u64 {
-        self.studies.div_ceil(CHUNK)
+        self.studies.div_ceil(self.chunk())
     }
 }

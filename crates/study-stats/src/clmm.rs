@@ -29,7 +29,7 @@ mod tests;
 use super::clm::counts::CategoryCounts;
 use super::clm::newton::{Evaluation, Maximum, maximise};
 use super::clm::{ClmError, ClmFit, clm, fit_of, logistic};
-pub use crossed::{CrossedClmm, clmm_crossed};
+pub use crossed::{CrossedClmm, CrossedParameters, clmm_crossed};
 use std::sync::LazyLock;
 
 /// Number of nodes of the reported quadrature.

@@ -232,9 +232,14 @@ pub struct Choice {
 /// One of `m` intervals has the signal, without bias:
 /// Pc = ∫φ(x − d′)Φ(x)^(m−1)dx. `None` unless m ≥ 2 and there are trials.
 pub fn forced_choice(correct: f64, trials: f64, m: u32) -> Option<Choice> {
+    choice(correct, trials, share_of_choice(m)?)
+}
+
+/// The share of correct answers of a choice among `m` intervals by d′. `None` unless m ≥ 2.
+pub fn share_of_choice(m: u32) -> Option<impl Fn(f64) -> f64> {
     let others = i32::try_from(m).ok().filter(|m| *m >= 2)? - 1;
     let nodes = gauss_legendre(80, -9.0, 9.0);
-    choice(correct, trials, |d| {
+    Some(move |d| {
         (nodes.iter())
             .map(|(x, w)| w * normal_density(*x) * normal_cdf(x + d).powi(others))
             .sum()
@@ -244,8 +249,13 @@ pub fn forced_choice(correct: f64, trials: f64, m: u32) -> Option<Choice> {
 /// Which of three is odd, by differencing:
 /// Pc = 2∫₀^∞[Φ(−x√3 + d′√⅔) + Φ(−x√3 − d′√⅔)]φ(x)dx.
 pub fn oddity(correct: f64, trials: f64) -> Option<Choice> {
+    choice(correct, trials, share_of_oddity())
+}
+
+/// The share of correct answers of oddity by d′.
+pub fn share_of_oddity() -> impl Fn(f64) -> f64 {
     let nodes = gauss_legendre(80, 0.0, 9.0);
-    choice(correct, trials, |d| {
+    move |d| {
         let shift = d * (2.0f64 / 3.0).sqrt();
         let sum = |x: f64| {
             let far = -x * 3f64.sqrt();
@@ -254,7 +264,7 @@ pub fn oddity(correct: f64, trials: f64) -> Option<Choice> {
         (nodes.iter())
             .map(|(x, w)| 2.0 * w * sum(*x) * normal_density(*x))
             .sum()
-    })
+    }
 }
 
 fn choice(correct: f64, trials: f64, share_of: impl Fn(f64) -> f64) -> Option<Choice> {
@@ -321,18 +331,43 @@ pub fn abx(answers: &Answers, raw: bool) -> Option<Abx> {
         answers.corrected()
     }?;
     let (hit, false_alarm) = rates.z()?;
-    let model = |second: f64| {
-        move |d: f64| {
-            let both = |d: f64| normal_cdf(d / SQRT_2) * normal_cdf(d / second);
-            both(d) + both(-d)
-        }
-    };
+    let model = |second: f64| move |d: f64| share_of_abx(d, second);
     Some(Abx {
         share_unbiased: rates.unbiased()?,
         differencing: through_z(answers, rates, |p| inverse(p, model(6f64.sqrt())))?,
         independent: through_z(answers, rates, |p| inverse(p, model(2.0)))?,
         bias: -(hit + false_alarm) / 2.0,
     })
+}
+
+/// The share of correct answers of ABX by d′: `second` is √6 by differencing.
+fn share_of_abx(d: f64, second: f64) -> f64 {
+    let both = |d: f64| normal_cdf(d / SQRT_2) * normal_cdf(d / second);
+    both(d) + both(-d)
+}
+
+/// The share of correct answers of ABX by d′, by differencing.
+pub fn share_of_abx_by_differencing(d: f64) -> f64 {
+    share_of_abx(d, 6f64.sqrt())
+}
+
+/// Hits and false alarms of the answer "different" by d′, by differencing, with the criterion
+/// at which most answers are correct.
+pub fn rates_of_same_different(d: f64) -> (f64, f64) {
+    // There the density of a difference is the same for both: it falls with τ for the same.
+    let density = |x: f64| normal_density(x / SQRT_2);
+    let (mut low, mut high) = (0.0, d.abs() + 4.0);
+    for _ in 0..60 {
+        let tau = 0.5 * (low + high);
+        if density(tau - d) + density(tau + d) < 2.0 * density(tau) {
+            low = tau;
+        } else {
+            high = tau;
+        }
+    }
+    let tau = 0.5 * (low + high);
+    let hits = normal_cdf((d - tau) / SQRT_2) + normal_cdf((-d - tau) / SQRT_2);
+    (hits, 2.0 * normal_cdf(-tau / SQRT_2))
 }
 
 /// An estimate that is a rising function of Φ((zH − zF)/2), with the interval of zH − zF.

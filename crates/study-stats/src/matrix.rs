@@ -80,7 +80,7 @@ fn place(i: usize, j: usize) -> usize {
 }
 
 /// L of A = LLᵀ.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Cholesky {
     factor: SymmetricMatrix,
     /// What the variables before leave of each diagonal element; 0: the variable is
@@ -144,6 +144,17 @@ impl Cholesky {
             x[i] = (b[i] - known) / self.factor.get(i, i);
         }
         for i in kept().rev() {
+            let later = i + 1..b.len();
+            let known: f64 = later.map(|k| self.factor.get(k, i) * x[k]).sum();
+            x[i] = (x[i] - known) / self.factor.get(i, i);
+        }
+        x
+    }
+
+    /// x of Lᵀx = b of a definite matrix: with standard normal b its covariance is A⁻¹.
+    pub(crate) fn solve_transposed(&self, b: &[f64]) -> Vec<f64> {
+        let mut x = b.to_vec();
+        for i in (0..b.len()).rev() {
             let later = i + 1..b.len();
             let known: f64 = later.map(|k| self.factor.get(k, i) * x[k]).sum();
             x[i] = (x[i] - known) / self.factor.get(i, i);

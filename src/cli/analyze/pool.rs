@@ -12,6 +12,7 @@ use study_core::analyze::{Deviation, Include, Rules, Warning};
 use study_core::outcome::ratings::{Origin, Ratings};
 use study_core::protocol::difference::{self, Change};
 use study_core::protocol::fingerprint::Parts;
+use study_core::protocol::{Protocol, Task};
 use study_core::store::{Derived, SessionData, StudyFolder};
 
 /// Differences that a refusal lists.
@@ -45,6 +46,16 @@ pub(super) fn analysed(
     }
     same_sessions(&sites)?;
     let protocol = &first.loaded.protocol;
+    let apart = not_pooled(protocol);
+    let is_rating = protocol.primary().is_some_and(|q| q.kind.is_number());
+    if args.question.is_none() && !is_rating {
+        return Err(Failure::input(format!(
+            "{}: comparisons and thresholds are not pooled, and the primary question `{}` is theirs",
+            apart.join(", "),
+            protocol.analysis.primary
+        ))
+        .hint("analyze each site; `--question` names a rating of the study, if it has one"));
+    }
     let question = question(protocol, args.question.as_deref())?;
     let tables: Vec<(String, Ratings)> = (sites.iter())
         .map(|s| (s.name.clone(), ratings(&s.loaded, &s.derived, &question)))
@@ -59,6 +70,15 @@ pub(super) fn analysed(
     };
     let mut analysis = progress::analyze(&pooled, &rules);
     analysis.warnings.splice(0..0, notes(&sites));
+    if !apart.is_empty() {
+        analysis.warnings.push(Warning {
+            code: "parts-not-pooled",
+            text: format!(
+                "{}: comparisons and thresholds are not pooled; analyze each site",
+                apart.join(", ")
+            ),
+        });
+    }
     let shown: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
     let mut derived = Derived::default();
     for site in &sites {
@@ -81,6 +101,15 @@ pub(super) fn analysed(
         traces: Vec::new(),
         analysis,
     })
+}
+
+/// The parts that rate no single realizations. Their estimates are made of the answers of one
+/// site's participants, and which rows of two sites are alike is not known.
+fn not_pooled(protocol: &Protocol) -> Vec<String> {
+    (protocol.parts.iter())
+        .filter(|part| !matches!(part.task, Task::Rating(_)))
+        .map(|part| format!("part {}", part.id))
+        .collect()
 }
 
 fn read(paths: &[PathBuf], console: &mut Console) -> Result<Vec<Read>, Failure> {

@@ -3,11 +3,12 @@
 use super::super::{Console, Failure, study_folder};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use study_base::text::PartId;
 use study_core::analyze::{Include, Rules, analyze};
 use study_core::outcome::ratings::Ratings;
 use study_core::power::{Link, Overrides, Pilot, Plan, PlanError, Test, Vaf};
-use study_core::protocol::Protocol;
-use study_core::protocol::power::{PowerPlan, PowerScale};
+use study_core::protocol::power::{PowerPlan, PowerScale, PowerTrack};
+use study_core::protocol::{Protocol, QuestionKind};
 use study_core::store::Derived;
 
 /// Flags that state assumptions; they come after `[power]` of the protocol.
@@ -29,7 +30,8 @@ pub(super) struct Assume {
     /// Standard deviations: participant=, realization=, interaction=, residual=, slope=
     #[arg(long, value_name = "WHAT=SD", value_delimiter = ',', value_parser = deviation)]
     sd: Vec<(Deviation, f64)>,
-    /// continuous, rounded, or probit or logit with thresholds: logit:-2,-1,0.5
+    /// continuous, rounded, or probit or logit with thresholds: logit:-2,-1,0.5; with --from, logit
+    /// alone takes the pilot's
     #[arg(long, value_name = "SCALE", value_parser = scale, allow_hyphen_values = true)]
     scale: Option<PowerScale>,
     /// listed, spread or drawn
@@ -41,6 +43,18 @@ pub(super) struct Assume {
     /// Share of trials without a rating
     #[arg(long, value_name = "SHARE", value_parser = share)]
     missing: Option<f64>,
+    /// True mean of the hidden reference minus that of the best realization
+    #[arg(long, value_name = "B", value_parser = finite, allow_hyphen_values = true)]
+    reference: Option<f64>,
+    /// The part of pairs or tracks (default: the one with the primary question)
+    #[arg(long, value_name = "PART")]
+    part: Option<PartId>,
+    /// Pairs: share of "no difference" between two that are alike
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    ties: Option<f64>,
+    /// Tracks: threshold=, ratio=, difference=, width=, lapse=, guess=, d=
+    #[arg(long, value_name = "WHAT=X", value_delimiter = ',', value_parser = track)]
+    track: Vec<(Tracked, f64)>,
     /// Numbers of participants to compare
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(2..=10_000))]
     participants: Vec<u32>,
@@ -51,7 +65,7 @@ pub(super) struct Assume {
     #[arg(long, value_name = "R,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=100))]
     repetitions: Vec<u32>,
     /// Simulated studies of each design
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(100..=10_000_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(10..=10_000_000))]
     studies: Option<u64>,
     /// Simulate a design no further once the interval of its power is ± this
     #[arg(long, value_name = "HALF", value_parser = target)]
@@ -62,7 +76,8 @@ pub(super) struct Assume {
     /// Power that is wanted
     #[arg(long, value_name = "P,…", value_delimiter = ',', value_parser = target)]
     targets: Vec<f64>,
-    /// verdict, pearson, permutation, crossed, friedman, clmm, equivalence; the first one decides
+    /// verdict, pearson, permutation, crossed, friedman, clmm, equivalence, reference-equivalence; of
+    /// pairs preferred, preference-vaf; of tracks thresholds, told-apart; the first one decides
     #[arg(long, value_name = "TEST,…", value_delimiter = ',', value_parser = test)]
     tests: Vec<Test>,
     /// Seed of the simulated studies (default: that of the study)
@@ -89,6 +104,17 @@ enum Deviation {
     Interaction,
     Residual,
     Slope,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tracked {
+    Threshold,
+    Ratio,
+    Difference,
+    Width,
+    Lapse,
+    Guess,
+    D,
 }
 
 /// A value that a flag cannot have.
@@ -151,12 +177,37 @@ fn deviation(text: &str) -> Result<(Deviation, f64), FlagError> {
     Ok((what, not_negative(sd)?))
 }
 
+fn track(text: &str) -> Result<(Tracked, f64), FlagError> {
+    const EXPECTED: &str = "write threshold=0.4, ratio=, difference=, width=, lapse=, guess= or d=";
+    let (name, value) = text.split_once('=').ok_or(FlagError(EXPECTED))?;
+    let (what, value) = match name.trim() {
+        "threshold" => (Tracked::Threshold, positive(value)),
+        "ratio" => (Tracked::Ratio, positive(value)),
+        "difference" => (Tracked::Difference, finite(value)),
+        "width" => (Tracked::Width, positive(value)),
+        "lapse" => (Tracked::Lapse, rate(value)),
+        "guess" => (Tracked::Guess, rate(value)),
+        "d" => (Tracked::D, not_negative(value)),
+        _ => return Err(FlagError(EXPECTED)),
+    };
+    Ok((what, value?))
+}
+
+fn rate(text: &str) -> Result<f64, FlagError> {
+    number(
+        text,
+        |x| (0.0..0.5).contains(&x),
+        "give a share from 0 to below 0.5",
+    )
+}
+
 fn scale(text: &str) -> Result<PowerScale, FlagError> {
     const EXPECTED: &str =
         "write continuous, rounded, probit:T,T,… or logit:T,T,… with rising thresholds";
     let (name, list) = match text.split_once(':') {
         None if text == "continuous" => return Ok(PowerScale::Continuous),
         None if text == "rounded" => return Ok(PowerScale::Rounded),
+        None if text == "logit" => return Ok(PowerScale::FromPilot),
         Some(parts) => parts,
         None => return Err(FlagError(EXPECTED)),
     };
@@ -181,7 +232,8 @@ fn vaf(text: &str) -> Result<Vaf, FlagError> {
 fn test(text: &str) -> Result<Test, FlagError> {
     let found = Test::ALL.into_iter().find(|t| t.as_str() == text);
     found.ok_or(FlagError(
-        "write verdict, pearson, permutation, crossed, friedman, clmm or equivalence",
+        "write verdict, pearson, permutation, crossed, friedman, clmm, equivalence, \
+         reference-equivalence, preferred, preference-vaf, thresholds or told-apart",
     ))
 }
 
@@ -192,13 +244,22 @@ pub(super) fn plan(
     console: &mut Console,
 ) -> Result<Plan, Failure> {
     let seed = given.seed.unwrap_or(protocol.study.seed);
+    let of_pilot = given.scale.as_ref() == Some(&PowerScale::FromPilot);
+    let ends = match protocol.primary().map(|q| &q.kind) {
+        Some(QuestionKind::Rating { from, to, .. }) if of_pilot => Some((*from, *to)),
+        _ => None,
+    };
     let pilot = match &given.from {
-        Some(path) => Some(pilot(path, given, seed, console)?),
+        Some(path) => Some(pilot(path, given, (seed, ends), console)?),
         None => None,
     };
     let sd = |of: Deviation| {
         let last = given.sd.iter().rev().find(|(what, _)| *what == of);
         last.map(|(_, sd)| *sd)
+    };
+    let track = |of: Tracked| {
+        let last = given.track.iter().rev().find(|(what, _)| *what == of);
+        last.map(|(_, value)| *value)
     };
     let mut plan = PowerPlan {
         studies: given.studies,
@@ -212,6 +273,17 @@ pub(super) fn plan(
         vaf: given.vaf,
         dropout: given.dropout,
         missing: given.missing,
+        reference: given.reference,
+        ties: given.ties,
+        track: PowerTrack {
+            threshold: track(Tracked::Threshold),
+            ratio: track(Tracked::Ratio),
+            difference: track(Tracked::Difference),
+            width: track(Tracked::Width),
+            lapse: track(Tracked::Lapse),
+            guess: track(Tracked::Guess),
+            d: track(Tracked::D),
+        },
         within: given.within,
         max_session_min: given.max_session_min,
         participants: given.participants.clone(),
@@ -228,11 +300,14 @@ pub(super) fn plan(
         plan,
         seed: Some(seed),
         pilot,
+        part: given.part.clone(),
     };
     Plan::of(protocol, &overrides).map_err(|error| {
         let hint = match error {
             PlanError::FewRealizations(_) => "add realizations with a VAF to [[models]]",
-            PlanError::NoMargin => "equivalence_margin states which difference is negligible",
+            PlanError::NoMargin(_) => "equivalence_margin states which difference is negligible",
+            PlanError::NoPilot => "add --from RESULTS, or thresholds: logit:-2,-1,…",
+            PlanError::NoPart(_) | PlanError::NoRatings(_) => "--part names one of [[parts]]",
             _ => "the assumptions are flags, or keys of [power] in the protocol",
         };
         Failure::input(&error).hint(hint)
@@ -240,7 +315,12 @@ pub(super) fn plan(
 }
 
 /// What the results of a pilot allow.
-fn pilot(path: &Path, given: &Assume, seed: u64, console: &mut Console) -> Result<Pilot, Failure> {
+fn pilot(
+    path: &Path,
+    given: &Assume,
+    (seed, ends): (u64, Option<(i64, i64)>),
+    console: &mut Console,
+) -> Result<Pilot, Failure> {
     let include = Include {
         pilot: given.include.contains(&Who::Pilot),
         simulated: given.include.contains(&Who::Simulated),
@@ -280,7 +360,7 @@ fn pilot(path: &Path, given: &Assume, seed: u64, console: &mut Console) -> Resul
              is its p in other words; rely on the smallest effect that the design finds"
         ));
     }
-    Pilot::of(&analysis, seed).map_err(|error| {
+    Pilot::of(&analysis, seed, ends).map_err(|error| {
         Failure::input(format!("{shown}: {error}")).hint("a larger pilot, or stated assumptions")
     })
 }

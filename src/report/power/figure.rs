@@ -3,13 +3,22 @@
 
 use super::{Report, deciding};
 use crate::report::chart::{Axis, Dash, Figure, Look, Mark, Panel, Whisker};
-use study_core::power::Cell;
+use study_core::power::{Cell, PartWorld};
 
 /// Height of a panel, px.
 const HEIGHT: f64 = 300.0;
 
-/// The figure; `None` without results.
+/// What a line has a number of.
+fn line(report: &Report) -> &'static str {
+    match report.plan.settings.part {
+        Some(PartWorld::Tracks(_)) => "tracks",
+        None | Some(PartWorld::Pairs(_)) => "realizations",
+    }
+}
+
+/// The figure; `None` without results or tests.
 pub fn figure(report: &Report) -> Option<Figure> {
+    report.plan.settings.tests.first()?;
     let mut shapes = report.plan.shapes();
     shapes.sort_by_key(|(q, r)| (*r, *q));
     let cells = report.shown();
@@ -57,7 +66,7 @@ pub fn figure(report: &Report) -> Option<Figure> {
             panel = panel
                 .with(solid, Mark::ErrorBars(whiskers))
                 .with(solid, Mark::Line(points.clone()))
-                .named(&format!("{q} realizations"), look, Mark::Points(points));
+                .named(&format!("{q} {}", line(report)), look, Mark::Points(points));
             if let Some(ceiling) = ceiling {
                 let ends = vec![(0.0, ceiling), (most * 1.05, ceiling)];
                 panel = panel.with(look.dashed(Dash::Dashed).stroke(1.0), Mark::Line(ends));

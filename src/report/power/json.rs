@@ -1,6 +1,6 @@
 //! The document of `study power --json`, `study-power/1`.
 
-use super::Report;
+use super::{Report, part};
 use serde_json::{Value, json};
 use study_core::power::{Cell, Link, Reach, Scale, floor};
 use study_stats::power::detectable_correlation;
@@ -8,7 +8,12 @@ use study_stats::power::detectable_correlation;
 /// The document. Equal results give equal bytes, whatever the threads and shards.
 pub fn document(report: &Report) -> Value {
     let (plan, settings) = (&report.plan, &report.plan.settings);
-    let own = floor(&settings.vaf(plan.own.realizations), settings.alpha);
+    let of_part = plan.part.is_some();
+    let own = floor(&settings.vaf(plan.own.realizations), settings.alpha).filter(|_| !of_part);
+    let smallest = match of_part {
+        true => part::smallest_values(report),
+        false => smallest(report),
+    };
     let mut document = json!({
         "format": "study-power/1",
         "study": report.study,
@@ -17,7 +22,7 @@ pub fn document(report: &Report) -> Value {
         "summary": report.ceiling_sentence(),
         "assumptions": assumptions(report),
         "cells": report.results.iter().map(|r| cell(report, &r.cell)).collect::<Vec<_>>(),
-        "smallest": smallest(report),
+        "smallest": smallest,
         "sensitivity": sensitivity(report),
         "permutation_floor": own.map(|f| json!({
             "smallest_p": f.smallest_p, "can_reject": f.can_reject,
@@ -25,6 +30,9 @@ pub fn document(report: &Report) -> Value {
         "warnings": report.warnings(),
         "paragraph": super::paragraph(report),
     });
+    if let Some(part) = &plan.part {
+        document["part"] = json!(part.as_str());
+    }
     if report.missing_units > 0 {
         document["partial"] = json!({ "missing_units": report.missing_units });
     }
@@ -42,6 +50,9 @@ pub fn own_design(report: &Report) -> Value {
 }
 
 fn assumptions(report: &Report) -> Value {
+    if report.plan.part.is_some() {
+        return part::assumptions(report);
+    }
     let (plan, settings) = (&report.plan, &report.plan.settings);
     let a = &settings.assumptions;
     let scale = match &a.scale {
@@ -73,6 +84,7 @@ fn assumptions(report: &Report) -> Value {
         },
         "scale": scale,
         "vaf": a.vaf.as_str(),
+        "reference": a.reference,
         "listed_vaf": settings.listed,
         "dropout": a.dropout,
         "missing": a.missing,
@@ -166,6 +178,9 @@ fn smallest(report: &Report) -> Vec<Value> {
 
 fn sensitivity(report: &Report) -> Vec<Value> {
     let (plan, settings) = (&report.plan, &report.plan.settings);
+    if plan.part.is_some() {
+        return Vec::new();
+    }
     let design = study_core::power::design(settings, &plan.own);
     let one = |target: &f64| {
         json!({

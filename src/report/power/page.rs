@@ -4,7 +4,7 @@ use super::{Report, deciding, design, name_of, percent, reached};
 use crate::report::apa;
 use crate::report::text::Page;
 use crate::report::text::layout::{Paint, pad, wrap};
-use study_base::text::Untrusted;
+use study_base::text::{Untrusted, counted};
 use study_core::power::{Cell, Reach, design as closed_design, floor};
 use study_stats::power::detectable_correlation;
 
@@ -13,6 +13,9 @@ const BAR: usize = 20;
 
 /// What is known at once: the sentence, and what is assumed.
 pub fn head(report: &Report, page: Page) -> String {
+    if report.plan.part.is_some() {
+        return super::part::head(report, page);
+    }
     let (width, paint) = (page.width.clamp(60, 100), Paint(page.colour));
     let settings = &report.plan.settings;
     let a = &settings.assumptions;
@@ -40,6 +43,9 @@ pub fn head(report: &Report, page: Page) -> String {
 
 /// The table, the smallest designs, this design, and warnings.
 pub fn results(report: &Report, page: Page) -> String {
+    if report.plan.part.is_some() {
+        return super::part::results(report, page);
+    }
     let (width, paint) = (page.width.clamp(60, 100), Paint(page.colour));
     let mut out = format!("\n{}", table(report, paint));
     out += &smallest(report, width, paint);
@@ -54,13 +60,13 @@ pub fn results(report: &Report, page: Page) -> String {
 }
 
 /// A bar up to the power, with a mark at the ceiling.
-fn bar(power: f64, ceiling: f64) -> String {
+pub(super) fn bar(power: f64, ceiling: Option<f64>) -> String {
     // Between 0 and the number of columns, so the casts are exact.
     let at = |x: f64| (x.clamp(0.0, 1.0) * BAR as f64).round() as usize;
     (0..BAR)
         .map(|i| match i {
             i if i < at(power) => '█',
-            i if i + 1 == at(ceiling).max(1) => '┆',
+            i if ceiling.is_some_and(|c| i + 1 == at(c).max(1)) => '┆',
             _ => '·',
         })
         .collect()
@@ -117,7 +123,7 @@ fn table(report: &Report, paint: Paint) -> String {
             "{:>6} {:>7}  {}",
             maybe(closed.map(|c| c.power), |x| apa::share(x, 3)),
             maybe(closed.map(|c| c.ceiling), |x| apa::share(x, 3)),
-            bar(height, ceiling)
+            bar(height, Some(ceiling))
         );
         if simulated {
             out += &format!(
@@ -162,8 +168,9 @@ fn smallest(report: &Report, width: usize, paint: Paint) -> String {
                 reached(&s.reach)
             };
             let line = format!(
-                "{} realizations × {} repetitions: {text}",
-                s.realizations, s.repetitions
+                "{} realizations × {}: {text}",
+                s.realizations,
+                counted(s.repetitions, "repetition", "repetitions")
             );
             out += &wrap(&line, width, "  ", "    ");
         }
@@ -191,6 +198,9 @@ fn smallest(report: &Report, width: usize, paint: Paint) -> String {
 /// The smallest effects that the study's own design finds.
 pub(in crate::report) fn sensitivity_sentences(report: &Report) -> Vec<String> {
     let (plan, settings) = (&report.plan, &report.plan.settings);
+    if plan.part.is_some() {
+        return Vec::new();
+    }
     let world = closed_design(settings, &plan.own);
     let one = |target: &f64| {
         let slope = world.detectable_slope(*target, settings.alpha)?;

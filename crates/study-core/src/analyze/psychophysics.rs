@@ -4,6 +4,7 @@
 //! defines them.
 
 mod again;
+pub(crate) mod decided;
 mod detection;
 mod discriminations;
 mod excluded;
@@ -21,6 +22,7 @@ mod tracks;
 mod trials;
 
 pub use detection::{Detection, Task, detection};
+pub(crate) use discriminations::settings as track_settings;
 pub use findings::{PartFinding, PartQuestion};
 pub use fits::{FitCell, FitSettings, psychometric};
 pub use part_data::{LevelData, PartAnalysis, PartData, StudyData};

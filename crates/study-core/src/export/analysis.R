@@ -79,6 +79,7 @@ print(table(status = ratings$status))
 
 question <- setting("question")
 has_ratings <- !is.na(question)
+kept <- function(kind) sub(paste0("^", kind, " "), "", grep(paste0("^", kind, " "), settings$key, value = TRUE))
 if (has_ratings) {
   print(table(because = ratings$not_used_because, useNA = "no"))
   counted <- ratings[ratings$included & !is.na(ratings[[question]]) & ratings$status != "failed", ]
@@ -90,7 +91,6 @@ if (has_ratings) {
   tested$participant <- droplevels(tested$participant)
 } else {
   cat("The primary question is no rating. These are the answers and their numbers:\n")
-  columns <- intersect(c("part", "track", "level", "correct"), names(ratings))
   answered <- ratings[ratings$status == "ok" & !ratings$practice, ]
   if (any(!is.na(answered$correct))) {
     print(aggregate(cbind(share_correct = correct) ~ participant + track + level,
@@ -119,6 +119,21 @@ if (has_ratings) {
 #' participants; Pearson's correlation with the VAF over the realizations, and its exact
 #' permutation test.
 
+# The exact permutation test goes through all orders of up to eight realizations.
+correlated <- function(x, y) {
+  orders <- function(x) {
+    if (length(x) < 2) return(list(x))
+    do.call(c, lapply(seq_along(x), function(i) lapply(orders(x[-i]), function(o) c(x[i], o))))
+  }
+  p <- NA
+  if (length(x) <= 8) {
+    x <- x - mean(x)
+    y <- y - mean(y)
+    sums <- abs(vapply(orders(seq_along(y)), function(o) sum(x * y[o]), 0))
+    p <- mean(sums >= abs(sum(x * y)) - 1e-10 * sqrt(sum(x^2) * sum(y^2)))
+  }
+  list(r = cor(x, y), p_exact = p)
+}
 with_vaf <- if (has_ratings) tested[!is.na(tested$vaf), ] else data.frame()
 if (nrow(with_vaf) > 0) {
   with_vaf$model <- droplevels(with_vaf$model)
@@ -132,18 +147,7 @@ if (nrow(with_vaf) > 0 && length(means) > 2 && sd(vaf) > 0 && sd(means) > 0) {
   print(pearson)
   value["corr/pearson/r"] <- unname(pearson$estimate)
   value["corr/pearson/p_t"] <- pearson$p.value
-  if (length(means) <= 8) {
-    orders <- function(x) {
-      if (length(x) < 2) return(list(x))
-      do.call(c, lapply(seq_along(x), function(i) lapply(orders(x[-i]), function(o) c(x[i], o))))
-    }
-    x <- vaf - mean(vaf)
-    y <- means - mean(means)
-    sums <- abs(vapply(orders(seq_along(y)), function(o) sum(x * y[o]), 0))
-    observed <- abs(sum(x * y))
-    value["corr/pearson/p_exact_two_sided"] <-
-      mean(sums >= observed - 1e-10 * sqrt(sum(x^2) * sum(y^2)))
-  }
+  value["corr/pearson/p_exact_two_sided"] <- correlated(vaf, means)$p_exact
 }
 
 #' ## Linear mixed model
@@ -206,6 +210,141 @@ if (three && all(with_vaf$rating == round(with_vaf$rating))) {
   value["clmm_vaf_crossed/loglik"] <- as.numeric(logLik(ordinal_fit))
   value["clmm_vaf_crossed/lrt_chi2"] <-
     2 * as.numeric(logLik(ordinal_fit) - logLik(without))
+}
+
+#' ## Pairs
+#'
+#' Abilities by maximum likelihood, as a log-linear model of the counts: the weight of the
+#' first is its ability and half the effect of the order, that of the second likewise, and of a
+#' tie half of both abilities and a constant (Bradley and Terry; Davidson). The abilities sum to
+#' zero.
+
+for (part in kept("pairs")) {
+  answers <- ratings[ratings$included & ratings$part == part, ]
+  answers$answer <- as.character(answers[[setting(paste("pairs", part))]])
+  felt <- read_table("intervals")
+  key <- function(data) paste(data$participant, data$session, data$trial, data$attempt, sep = "\r")
+  item <- function(number) {
+    own <- felt[felt$interval == number, ]
+    as.character(own$model)[match(key(answers), key(own))]
+  }
+  answers$first <- item(1)
+  answers$second <- item(2)
+  ties <- setting(paste("ties", part)) == "ties" && any(answers$answer == "tie")
+  if (!ties) answers <- answers[answers$answer != "tie", ]
+  items <- sort(unique(c(answers$first, answers$second)), method = "radix")
+  outcomes <- c("first", "second", if (ties) "tie")
+  counts <- as.data.frame(table(pair = paste(answers$first, answers$second, sep = "\r"),
+                                answer = factor(answers$answer, levels = outcomes)))
+  names <- do.call(rbind, strsplit(as.character(counts$pair), "\r", fixed = TRUE))
+  share <- cbind(ifelse(counts$answer == "first", 1, ifelse(counts$answer == "tie", 0.5, 0)),
+                 ifelse(counts$answer == "second", 1, ifelse(counts$answer == "tie", 0.5, 0)))
+  # The last ability is minus the sum of the others.
+  effect <- function(name) {
+    own <- outer(name, items, "==") + 0
+    own[, -length(items), drop = FALSE] - own[, length(items)]
+  }
+  weights <- share[, 1] * effect(names[, 1]) + share[, 2] * effect(names[, 2])
+  colnames(weights) <- paste0("ability", seq_len(ncol(weights)))
+  both_orders <- any(paste(names[, 2], names[, 1], sep = "\r") %in% counts$pair)
+  if (both_orders) weights <- cbind(weights, order = (share[, 1] - share[, 2]) / 2)
+  if (ties) weights <- cbind(weights, tie = (counts$answer == "tie") + 0)
+  pair <- model.matrix(~ pair - 1, counts)
+  fit <- tryCatch(
+    glm.fit(cbind(weights, pair), counts$Freq, family = poisson(),
+            control = list(epsilon = 1e-14, maxit = 100)),
+    warning = function(why) NULL, error = function(why) NULL)
+  if (is.null(fit) || !fit$converged || ncol(pair) < 1) {
+    cat("part ", part, ": the abilities have no estimate\n", sep = "")
+    next
+  }
+  covariance <- chol2inv(fit$qr$qr[seq_along(fit$coefficients), , drop = FALSE])
+  covariance <- covariance[order(fit$qr$pivot), order(fit$qr$pivot)]
+  own <- seq_len(ncol(weights))
+  estimate <- fit$coefficients[own]
+  covariance <- covariance[own, own, drop = FALSE]
+  contrast <- rbind(diag(length(items) - 1), -1)
+  contrast <- cbind(contrast, matrix(0, length(items), ncol(weights) - length(items) + 1))
+  ability <- as.vector(contrast %*% estimate)
+  spread <- contrast %*% covariance %*% t(contrast)
+  put <- function(what, number) value[paste0(part, ":", what)] <<- number
+  print(data.frame(item = items, ability = ability, se = sqrt(diag(spread))))
+  for (i in seq_along(items)) {
+    put(paste0("pairs/ability/", items[i]), ability[i])
+    put(paste0("pairs/ability_se/", items[i]), sqrt(spread[i, i]))
+    for (j in seq_along(items)) if (j > i) {
+      group <- paste0("pairs/", items[i], "|", items[j])
+      put(paste0(group, "/difference"), ability[i] - ability[j])
+      put(paste0(group, "/se"), sqrt(spread[i, i] + spread[j, j] - 2 * spread[i, j]))
+    }
+  }
+  named <- function(what) match(what, colnames(weights))
+  if (both_orders) {
+    put("pairs/order", estimate[[named("order")]])
+    put("pairs/order_se", sqrt(covariance[named("order"), named("order")]))
+  }
+  if (ties) {
+    put("pairs/tie_log_nu", estimate[[named("tie")]])
+    put("pairs/tie_log_nu_se", sqrt(covariance[named("tie"), named("tie")]))
+  }
+  vaf <- realizations$vaf[match(items, realizations$id)]
+  if (sum(!is.na(vaf)) > 2 && sd(vaf, na.rm = TRUE) > 0) {
+    found <- correlated(vaf[!is.na(vaf)], ability[!is.na(vaf)])
+    put("pairs/vaf/pearson/r", found$r)
+    put("pairs/vaf/pearson/p_exact_two_sided", found$p_exact)
+  }
+}
+
+#' ## Tracks
+#'
+#' The thresholds of `thresholds.csv` (posterior means of `study analyze`) are compared by the
+#' linear mixed model of their logarithms; whether two realizations are told apart, by a t test
+#' of what is 0 by chance.
+
+for (part in kept("tracks")) {
+  answers <- ratings[ratings$included & ratings$part == part & !is.na(ratings$correct), ]
+  put <- function(what, number) value[paste0(part, ":", what)] <<- number
+  print(aggregate(cbind(share_correct = correct) ~ participant + track, data = answers, FUN = mean))
+  tracks <- kept(paste("method", part))
+  for (track in tracks[!(tracks %in% answers$track[!is.na(answers$level)])]) {
+    own <- answers[answers$track == track, ]
+    if (nrow(own) == 0) next
+    method <- setting(paste("method", part, track))
+    given <- as.character(own[[setting(paste("tracks", part))]])
+    words <- switch(method, "same-different" = c("different", "same"), "yes-no" = c("yes", "no"),
+                    c("first", "second"))
+    target <- ifelse(own$correct, given, ifelse(given == words[1], words[2], words[1]))
+    above <- vapply(split(seq_len(nrow(own)), droplevels(own$participant)), function(rows) {
+      if (method %in% c("3ifc", "odd-one-out")) return(mean(own$correct[rows]) - 1 / 3)
+      rate <- function(word) {
+        asked <- rows[target[rows] == word]
+        (sum(given[asked] == words[1]) + 0.5) / (length(asked) + 1)
+      }
+      z <- qnorm(rate(words[1])) - qnorm(rate(words[2]))
+      switch(method, "2ifc" = z / sqrt(2), "yes-no" = z, pnorm(z / 2) - 0.5)
+    }, 0)
+    if (length(above) > 1 && sd(above) > 0) {
+      found <- t.test(above)
+      print(found)
+      put(paste0("sdt_group/", track, "/above_chance/t"), unname(found$statistic))
+      put(paste0("sdt_group/", track, "/above_chance/p"), found$p.value)
+    }
+  }
+  if (!file.exists("thresholds.csv")) next
+  found <- read_text("thresholds.csv")
+  found <- found[found$part == part, ]
+  found$threshold <- as.numeric(found$threshold)
+  if (length(unique(found$track)) < 2 || length(unique(found$participant)) < 2) next
+  found$y <- if (is.na(setting(paste("ratios", part)))) found$threshold else log(found$threshold)
+  fit <- lmer(y ~ track + (1 | participant), data = found,
+              control = lmerControl(optimizer = "bobyqa", optCtrl = list(rhobeg = 0.2, rhoend = 1e-9),
+                                    check.conv.singular = "ignore"))
+  table <- anova(fit, type = 3, ddf = "Satterthwaite")
+  print(table)
+  put("psy_mixed/F", table[["F value"]])
+  put("psy_mixed/df1", table[["NumDF"]])
+  put("psy_mixed/df2", table[["DenDF"]])
+  put("psy_mixed/p", table[["Pr(>F)"]])
 }
 
 #' ## Comparison with `study analyze`

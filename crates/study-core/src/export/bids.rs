@@ -3,6 +3,7 @@
 use super::delimited::{self, MISSING};
 use super::table::{Field, Table, Type};
 use super::{ExportError, Job, author, readme, telemetry};
+use crate::outcome::RatingRow;
 use crate::outcome::cell::Cell;
 use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeMap;
@@ -364,16 +365,15 @@ fn playbacks(
             prefix(job, label, recorded.session),
             recorded.trial
         );
-        let mut rows = job.selected.rows.iter();
-        let first = rows.find(|r| r.participant == *id && r.session == recorded.session);
+        let of_session = |r: &&RatingRow| r.participant == *id && r.session == recorded.session;
+        let mut rows = job.selected.rows.iter().filter(of_session);
+        let row = rows.clone().find(|r| r.trial == recorded.trial);
+        let first = rows.next();
         let first = first.and_then(|row| row.started_at);
         let start = recorded
             .started_at
             .zip(first)
             .map(|(at, first)| (at - first).as_seconds_f64());
-        let row = rows.find(|r| {
-            (&r.participant, r.session, r.trial) == (id, recorded.session, recorded.trial)
-        });
         let mut about = json!({
             "TaskName": task,
             "SamplingFrequency": rate,

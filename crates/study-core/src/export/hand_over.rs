@@ -3,12 +3,15 @@
 
 use super::table::{Field, Type, clean};
 use super::{Dialect, ExportError, Job, delimited, readme, telemetry};
-use crate::analyze::{Analysis, Include, Rules, analyze};
+use crate::analyze::psychophysics::{LevelData, PartAnalysis, StudyData, parts};
+use crate::analyze::{Analysis, Include, Rules, analyze, group_id};
 use crate::outcome::cell::Cell;
 use crate::outcome::ratings::Ratings;
 use crate::protocol::columns::UsedColumn;
+use crate::protocol::parts::Task;
 use sha2::{Digest as _, Sha256};
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 /// The script. Lines that begin with `#'` are the text of the document. No text of a
@@ -22,8 +25,9 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<(), ExportError> {
     let dialect = Dialect::default();
     let mut tables = job.tables.clone();
     let analysis = analysis(job);
-    if let Some(analysis) = &analysis {
-        mark(job, analysis, &mut tables.ratings);
+    let parts = parts_of(job);
+    if analysis.is_some() || !parts.is_empty() {
+        mark(job, analysis.as_ref(), &parts, &mut tables.ratings);
     }
     let mut files = Vec::new();
     let mut sums = Vec::new();
@@ -37,10 +41,24 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<(), ExportError> {
     let all: Vec<_> = tables.all().collect();
     job.file("dictionary.csv", &delimited::dictionary(&all, &dialect))?;
     job.file("labels.csv", &delimited::labels(&all, &dialect))?;
+    let thresholds = thresholds(&parts);
+    if !thresholds.is_empty() {
+        let head = ["part", "participant", "track", "threshold"].map(str::to_owned);
+        let lines = std::iter::once(head).chain(thresholds);
+        let lines = lines.map(|line| line.map(Cow::Owned).to_vec());
+        let bytes = delimited::lines(lines, &dialect);
+        job.file("thresholds.csv", &bytes)?;
+        sums.push(("thresholds.csv".to_owned(), sha256(&bytes)));
+        files.push((
+            "thresholds.csv".to_owned(),
+            "the threshold of each participant on each track, a posterior mean of `study analyze`",
+        ));
+    }
     let question = analysis.as_ref().map_or("", |a| a.question.as_str());
-    let settings = settings(job, question, &sums);
+    let settings = settings(job, question, &parts, &sums);
     job.file("settings.csv", &settings)?;
-    let headline = analysis.as_ref().map_or_else(Vec::new, headline);
+    let mut headline = analysis.as_ref().map_or_else(Vec::new, headline);
+    headline.extend(parts.iter().flat_map(headline_of_part));
     let head = ["id", "value", "tolerance"].map(Cow::Borrowed).to_vec();
     let lines = headline.into_iter().map(|(id, value, tolerance)| {
         vec![
@@ -113,15 +131,51 @@ fn analysis(job: &Job<'_>) -> Option<Analysis> {
     (!ratings.is_empty()).then(|| analyze(&ratings, &rules))
 }
 
+/// The analyses of the parts of pairs and tracks. Of a part that several sessions have, the
+/// tracks of each session are conditions of their own, which R does not repeat.
+fn parts_of(job: &Job<'_>) -> Vec<PartAnalysis> {
+    let study = StudyData {
+        protocol: job.source.protocol,
+        rows: &job.selected.rows,
+        intervals: &job.selected.intervals,
+        participants: &job.selected.participants,
+        // Only the course of tracks follows from them.
+        sessions: &[],
+    };
+    let include = Include {
+        pilot: true,
+        simulated: true,
+    };
+    let mut found = parts(&study, include);
+    let protocol = job.source.protocol;
+    found.retain(|own| {
+        let task = protocol.part(&own.part).map(|p| &p.task);
+        matches!(task, Some(Task::Pairs(_) | Task::Discrimination { .. }))
+            && protocol.sessions.len() < 2
+            && own.trials > 0
+    });
+    found
+}
+
 /// Adds whether the analysis used each row, and why not.
-fn mark(job: &Job<'_>, analysis: &Analysis, table: &mut super::table::Table<'_>) {
-    let mut decisions = analysis.rows.iter();
+fn mark(
+    job: &Job<'_>,
+    analysis: Option<&Analysis>,
+    parts: &[PartAnalysis],
+    table: &mut super::table::Table<'_>,
+) {
+    let in_parts: BTreeSet<_> = parts.iter().flat_map(|part| &part.used).collect();
+    let mut decisions = analysis.map_or(&[][..], |a| &a.rows[..]).iter();
     // The analysis has a row for each rating of a realization that is no practice.
     let used: Vec<Option<Option<String>>> = (job.selected.rows.iter())
         .map(|row| {
             let rated = row.model.is_some() && row.track.is_none() && !row.practice;
             let decision = if rated { decisions.next() } else { None };
-            decision.map(|d| d.excluded.as_ref().map(ToString::to_string))
+            let place = (row.participant.clone(), row.session, row.trial);
+            match decision {
+                Some(decision) => Some(decision.excluded.as_ref().map(ToString::to_string)),
+                None => in_parts.contains(&&place).then_some(None),
+            }
         })
         .collect();
     let declared = UsedColumn::Included.column();
@@ -144,7 +198,12 @@ fn mark(job: &Job<'_>, analysis: &Analysis, table: &mut super::table::Table<'_>)
     table.add(why, cells);
 }
 
-fn settings(job: &Job<'_>, question: &str, sums: &[(String, String)]) -> Vec<u8> {
+fn settings(
+    job: &Job<'_>,
+    question: &str,
+    parts: &[PartAnalysis],
+    sums: &[(String, String)],
+) -> Vec<u8> {
     let mut records = vec![["key", "value"].map(|w| Cow::Owned(w.to_owned())).to_vec()];
     let mut put = |key: &str, value: &str| {
         records.push(vec![
@@ -156,23 +215,53 @@ fn settings(job: &Job<'_>, question: &str, sums: &[(String, String)]) -> Vec<u8>
     put("study", &job.source.protocol.study.id);
     put("question", question);
     put("tool_version", job.source.tool_version);
+    let protocol = job.source.protocol;
+    for part in parts.iter().filter_map(|own| protocol.part(&own.part)) {
+        let asked = part.asks.first().map_or("", |q| q.as_str());
+        match &part.task {
+            Task::Pairs(pairs) => {
+                let ties = if pairs.tie { "ties" } else { "no ties" };
+                put(&format!("pairs {}", part.id), asked);
+                put(&format!("ties {}", part.id), ties);
+            }
+            Task::Discrimination { tracks } => {
+                put(&format!("tracks {}", part.id), asked);
+                for track in tracks.iter().filter_map(|id| protocol.track(id)) {
+                    put(
+                        &format!("method {} {}", part.id, track.id),
+                        track.method.as_str(),
+                    );
+                }
+            }
+            Task::Rating(_) | Task::Magnitude(_) | Task::Mushra(_) => {}
+        }
+    }
+    for part in parts {
+        let ratios = (part.values.iter())
+            .any(|(id, _)| id.starts_with("psy_mixed/") && id.ends_with("/geometric_mean"));
+        if ratios {
+            put(&format!("ratios {}", part.part), "true");
+        }
+    }
     for (path, sum) in sums {
         put(&format!("sha256 {path}"), sum);
     }
     delimited::lines(records, &Dialect::default())
 }
 
-/// The tolerance, relative to a value above 1, of closed forms, of the linear mixed model
-/// and of the ordinal one.
+/// The tolerance, relative to a value above 1, of closed forms, of the linear mixed model,
+/// of abilities, and of the ordinal model.
 const CLOSED: &str = "1e-9";
 const LINEAR: &str = "2e-5";
+/// Of a likelihood that both maximize by Newton's method.
+const FITTED: &str = "1e-6";
 const ORDINAL: &str = "2e-3";
 
 /// The numbers that R has to come to.
 fn headline(analysis: &Analysis) -> Vec<(String, Option<f64>, &'static str)> {
     let mut ids: Vec<(String, &'static str)> = Vec::new();
     for realization in &analysis.realizations {
-        let group = crate::analyze::group_id("desc", &[&realization.id]);
+        let group = group_id("desc", &[&realization.id]);
         ids.extend(["n", "mean", "sd"].map(|what| (format!("{group}/{what}"), CLOSED)));
     }
     ids.extend(["n_models", "pearson/r", "pearson/p_t"].map(|w| (format!("corr/{w}"), CLOSED)));
@@ -204,6 +293,58 @@ fn headline(analysis: &Analysis) -> Vec<(String, Option<f64>, &'static str)> {
             (id, value, tolerance)
         })
         .collect()
+}
+
+/// The numbers of a part that R has to come to, with the part's id before theirs.
+fn headline_of_part(part: &PartAnalysis) -> Vec<(String, Option<f64>, &'static str)> {
+    let tolerance = |id: &str| {
+        let (group, what) = id.rsplit_once('/')?;
+        let of = |names: &[&str]| names.contains(&what);
+        let found = match group {
+            "pairs" => of(&["order", "order_se", "tie_log_nu", "tie_log_nu_se"]).then_some(FITTED),
+            "pairs/vaf/pearson" => of(&["r", "p_exact_two_sided"]).then_some(FITTED),
+            "psy_mixed" => of(&["F", "df1", "df2", "p"]).then_some(LINEAR),
+            _ if group == "pairs/ability" || group == "pairs/ability_se" => Some(FITTED),
+            _ if group.starts_with("pairs/") && group.contains('|') => {
+                of(&["difference", "se"]).then_some(FITTED)
+            }
+            _ if group.starts_with("sdt_group/") && group.ends_with("/above_chance") => {
+                of(&["t", "p"]).then_some(CLOSED)
+            }
+            _ => None,
+        };
+        found.filter(|_| {
+            what != "p_exact_two_sided"
+                || (part.values.number("pairs/vaf/n_models")).is_some_and(|n| n <= MAX_PERMUTED)
+        })
+    };
+    (part.values.iter())
+        .filter_map(|(id, _)| Some((id, tolerance(id)?)))
+        .map(|(id, tolerance)| {
+            let value = part.values.number(id);
+            (format!("{}:{id}", part.part), value, tolerance)
+        })
+        .collect()
+}
+
+/// The threshold of each participant on each track: part, participant, track, threshold.
+fn thresholds(parts: &[PartAnalysis]) -> Vec<[String; 4]> {
+    let of_part = |part: &PartAnalysis| -> Vec<[String; 4]> {
+        let one = |level: &LevelData| {
+            let group = group_id("psy", &[&level.participant, &level.condition]);
+            let value = part
+                .values
+                .number(&format!("{group}/posterior/threshold/mean"))?;
+            Some([
+                part.part.to_string(),
+                level.participant.clone(),
+                level.condition.clone(),
+                value.to_string(),
+            ])
+        };
+        part.data.levels.iter().filter_map(one).collect()
+    };
+    parts.iter().flat_map(of_part).collect()
 }
 
 /// The script as a Quarto document: text, and a chunk for the lines between.

@@ -10,11 +10,12 @@ use crate::protocol::Role;
 use std::collections::{BTreeMap, HashMap};
 use study_stats::clm::{CategoryCount, CategoryCounts, Predictor};
 use study_stats::clmm::clmm_crossed;
+use study_stats::describe::{is_constant, rounded};
 use study_stats::distribution::t_quantile;
 use study_stats::friedman::friedman;
 use study_stats::level;
 use study_stats::lmm::balanced_slope;
-use study_stats::paired::equivalence_of;
+use study_stats::paired::{equivalence, equivalence_of};
 use study_stats::permutation::Decision;
 
 /// What one study shows.
@@ -43,7 +44,7 @@ pub(super) struct Judge<'a> {
     means: Vec<f64>,
 }
 
-const UNDEFINED: &str = "no variation, or too few participants or realizations";
+pub(super) const UNDEFINED: &str = "no variation, or too few participants or realizations";
 const NOT_FITTED: &str = "the model has no fit";
 
 impl<'a> Judge<'a> {
@@ -116,6 +117,8 @@ impl<'a> Judge<'a> {
                 Test::Equivalence => {
                     crossed.and_then(|c| self.is_equivalent(x, c.estimate, c.se, c.df))
                 }
+                Test::ReferenceEquivalence => self.is_as_the_reference(study),
+                Test::Preferred | Test::PreferenceVaf | Test::Thresholds | Test::ToldApart => None,
             };
             tests.push(decided.ok_or(UNDEFINED));
         }
@@ -133,7 +136,18 @@ impl<'a> Judge<'a> {
         let ends = |f: fn(f64, f64) -> f64| x.iter().copied().reduce(f);
         let range = ends(f64::max)? - ends(f64::min)?;
         let tests = equivalence_of(slope * range, se * range, df, self.settings.margin?)?;
-        Some(tests.p < self.settings.alpha)
+        Some(level::rejects(tests.p, self.settings.alpha))
+    }
+
+    /// Whether the realization with the highest VAF is equivalent to the hidden reference,
+    /// as `reference/*/p_tost` of the analysis.
+    fn is_as_the_reference(&self, study: &Drawn) -> Option<bool> {
+        let equal: Vec<f64> = study.beside_reference.iter().map(|d| rounded(*d)).collect();
+        if is_constant(&equal) {
+            return None;
+        }
+        let tests = equivalence(&study.beside_reference, self.settings.margin?)?;
+        Some(level::rejects(tests.p, self.settings.alpha))
     }
 
     /// A study with missing trials.
@@ -170,6 +184,10 @@ impl<'a> Judge<'a> {
                     let decided =
                         slope.and_then(|((b, se), df)| self.is_equivalent(&study.vaf, b, se, df));
                     (decided, NOT_FITTED)
+                }
+                Test::ReferenceEquivalence => (self.is_as_the_reference(study), UNDEFINED),
+                Test::Preferred | Test::PreferenceVaf | Test::Thresholds | Test::ToldApart => {
+                    (None, UNDEFINED)
                 }
             };
             tests.push(decided.ok_or(why));
@@ -245,7 +263,8 @@ impl<'a> Judge<'a> {
         let rows: Vec<Vec<f64>> = (sums.iter())
             .map(|row| row.iter().map(|(sum, n)| sum / n).collect())
             .collect();
-        Some(friedman(&rows)?.iman_davenport_p? < self.settings.alpha)
+        let p = friedman(&rows)?.iman_davenport_p?;
+        Some(level::rejects(p, self.settings.alpha))
     }
 
     fn ordinal(&self, study: &Drawn) -> Option<bool> {
@@ -268,7 +287,8 @@ impl<'a> Judge<'a> {
             .map(|&x| Predictor { column: 0, x })
             .collect();
         let table = CategoryCounts::new(predictors, 1, used.len(), &counts);
-        Some(clmm_crossed(&table).ok()?.p? < self.settings.alpha)
+        let p = clmm_crossed(&table).ok()?.p?;
+        Some(level::rejects(p, self.settings.alpha))
     }
 }
 
@@ -325,7 +345,9 @@ mod tests {
                 vaf,
                 dropout: 0.0,
                 missing: 0.0,
+                reference: 0.0,
             },
+            part: None,
             pilot: None,
             listed: vec![0.7672, 0.7851, 0.7904, 0.7798, 0.7425],
             tests: Test::ALL[..4].to_vec(),
@@ -429,9 +451,9 @@ mod tests {
             let found = judge.decide(&study, &|| Draws(Stream::new(1, &[])));
             let analysis = analyze::analyze(&judge.ratings(&study), &rules);
             let p = analysis.values.number("equivalence/vaf/p").unwrap();
-            assert_eq!(found.tests, [Ok(p < 0.05)], "{k}: {p}");
-            yes += u32::from(p < 0.05);
-            no += u32::from(p >= 0.05);
+            assert_eq!(found.tests, [Ok(p <= 0.05)], "{k}: {p}");
+            yes += u32::from(p <= 0.05);
+            no += u32::from(p > 0.05);
         }
         assert!(yes > 5 && no > 5, "{yes} {no}");
         settings.margin = None;
@@ -441,12 +463,62 @@ mod tests {
         assert!(found.tests[0].is_err());
     }
 
+    /// Equivalence with the hidden reference is that of the analysis; with missing trials,
+    /// too.
+    #[test]
+    fn equivalence_with_the_reference_is_that_of_the_analysis() {
+        let mut settings = settings(Scale::Rounded(1, 7), Vaf::Listed, 0.05);
+        settings.tests = vec![Test::ReferenceEquivalence];
+        settings.margin = Some(0.6);
+        let cell = Cell {
+            realizations: 5,
+            repetitions: 3,
+            participants: 12,
+        };
+        let rules = Rules {
+            equivalence_margin: settings.margin,
+            ..Rules::default()
+        };
+        let (mut yes, mut no) = (0, 0);
+        for k in 0..60u32 {
+            settings.assumptions.missing = [0.0, 0.1][k as usize % 2];
+            settings.assumptions.reference = [0.0, 0.3][k as usize / 2 % 2];
+            let world = &settings.assumptions;
+            let mut draws = Draws(Stream::new(u64::from(k), &["reference"]));
+            let mut study = Drawn::new(&cell, &settings);
+            study.draw(&cell, world, &mut draws);
+            let reference = study.compare(&cell, world, &mut draws);
+            let mut judge = Judge::new(&settings, cell);
+            let found = judge.decide(&study, &|| Draws(Stream::new(1, &[])));
+            // The same study as a table: the third realization has the highest VAF.
+            let mut csv = "subject,model,role,repetition,rating\n".to_owned();
+            for (i, own) in reference.iter().enumerate() {
+                for (r, rating) in own.iter().enumerate() {
+                    csv += &format!("P{i:02},ref,hidden-reference,{},{rating}\n", r + 1);
+                }
+                for r in 0..3 {
+                    let at = i * 15 + 2 * 3 + r;
+                    if study.missing.get(at) != Some(&true) {
+                        csv += &format!("P{i:02},best,test,{},{}\n", r + 1, study.ratings[at]);
+                    }
+                }
+            }
+            let ratings = Ratings::read_csv("t.csv", csv.as_bytes(), None).unwrap();
+            let analysis = analyze::analyze(&ratings, &rules);
+            let p = analysis.values.number("reference/ref/best/p_tost").unwrap();
+            assert_eq!(found.tests, [Ok(p <= 0.05)], "{k}: {p}");
+            yes += u32::from(p <= 0.05);
+            no += u32::from(p > 0.05);
+        }
+        assert!(yes > 5 && no > 5, "{yes} {no}");
+    }
+
     /// With missing trials the verdict is that of the whole analysis.
     #[test]
     fn incomplete_studies_are_decided_by_the_analysis() {
         let mut settings = settings(Scale::Rounded(1, 7), Vaf::Listed, 0.05);
         settings.assumptions.missing = 0.3;
-        settings.tests = Test::ALL.to_vec();
+        settings.tests = Test::ALL[..7].to_vec();
         let cell = Cell {
             realizations: 5,
             repetitions: 1,

@@ -2,6 +2,7 @@
 
 use super::{Assumptions, Cell, Link, Scale, Settings, Vaf};
 use study_base::rng::Stream;
+use study_stats::describe::mean;
 use study_stats::random::RandomSource;
 
 /// The stream of one study.
@@ -36,8 +37,13 @@ pub(super) struct Drawn {
     pub(super) x: Vec<f64>,
     /// Standard deviation of VAF.
     pub(super) unit: f64,
+    /// The realization with the highest VAF minus the hidden reference, of each participant
+    /// who rated both; only after [`Drawn::compare`].
+    pub(super) beside_reference: Vec<f64>,
     /// True means of the realizations.
     means: Vec<f64>,
+    /// Level and own slope of each participant who was not lost.
+    people: Vec<(f64, f64)>,
 }
 
 /// Less their mean, over their standard deviation with denominator n; and that.
@@ -81,18 +87,15 @@ impl Drawn {
             self.means.push(world.mean + world.slope * x + scatter);
         }
         self.ratings.clear();
+        self.people.clear();
         for _ in 0..cell.participants {
             let level = sd.subject * draws.normal();
             let own = sd.slope * draws.normal();
+            self.people.push((level, own));
             for (mean, x) in self.means.iter().zip(&self.x) {
                 let here = mean + level + own * x + sd.interaction * draws.normal();
                 for _ in 0..r {
-                    let residual = match &world.scale {
-                        Scale::Ordinal {
-                            link: Link::Logit, ..
-                        } => logistic(draws),
-                        _ => sd.residual * draws.normal(),
-                    };
+                    let residual = residual(world, draws);
                     self.ratings.push(rating(here + residual, &world.scale));
                 }
             }
@@ -109,10 +112,12 @@ impl Drawn {
             for i in 0..cell.participants {
                 if draws.0.unit() >= world.dropout {
                     self.ratings.copy_within(i * own..(i + 1) * own, kept * own);
+                    self.people[kept] = self.people[i];
                     kept += 1;
                 }
             }
             self.ratings.truncate(kept * own);
+            self.people.truncate(kept);
             self.participants = kept;
         }
         self.missing.clear();
@@ -122,14 +127,62 @@ impl Drawn {
         }
     }
 
+    /// Draws the ratings of the hidden reference, whose true mean is that of the realization
+    /// with the highest VAF and `reference` points more, and compares the two. Returns its
+    /// ratings by participant, without missing ones.
+    pub(super) fn compare(
+        &mut self,
+        cell: &Cell,
+        world: &Assumptions,
+        draws: &mut Draws,
+    ) -> Vec<Vec<f64>> {
+        let (q, r) = (cell.realizations, cell.repetitions);
+        let highest = (0..q).max_by(|a, b| self.x[*a].total_cmp(&self.x[*b]));
+        let best = highest.unwrap_or(0);
+        let mut all = Vec::with_capacity(self.participants);
+        self.beside_reference.clear();
+        for (i, (level, own)) in self.people.iter().enumerate() {
+            let here = self.means[best] + world.reference + level + own * self.x[best];
+            let here = here + world.spread.interaction * draws.normal();
+            let mut ratings = Vec::with_capacity(r);
+            for _ in 0..r {
+                let rating = rating(here + residual(world, draws), &world.scale);
+                if world.missing == 0.0 || draws.0.unit() >= world.missing {
+                    ratings.push(rating);
+                }
+            }
+            let from = (i * q + best) * r;
+            let rated = |at: &usize| self.missing.get(*at) != Some(&true);
+            let of_best: Vec<f64> = (from..from + r)
+                .filter(rated)
+                .map(|at| self.ratings[at])
+                .collect();
+            if let (Some(a), Some(b)) = (mean(&of_best), mean(&ratings)) {
+                self.beside_reference.push(a - b);
+            }
+            all.push(ratings);
+        }
+        all
+    }
+
     /// Whether everybody who was not lost rated everything.
     pub(super) fn is_complete(&self) -> bool {
         !self.missing.contains(&true)
     }
 }
 
+/// From repetition to repetition.
+fn residual(world: &Assumptions, draws: &mut Draws) -> f64 {
+    match &world.scale {
+        Scale::Ordinal {
+            link: Link::Logit, ..
+        } => logistic(draws),
+        _ => world.spread.residual * draws.normal(),
+    }
+}
+
 /// A standard logistic number.
-fn logistic(draws: &mut Draws) -> f64 {
+pub(super) fn logistic(draws: &mut Draws) -> f64 {
     // Between 0 and 1, without the ends.
     let u = draws.0.unit() + 2f64.powi(-54);
     (u / (1.0 - u)).ln()

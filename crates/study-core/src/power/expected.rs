@@ -6,7 +6,7 @@ use study_stats::permutation;
 use study_stats::power::covariate::{Design, Expected, Spread, Values};
 
 /// Standard deviation of the standard logistic distribution, π/√3.
-const LOGISTIC_SD: f64 = 1.813_799_364_234_217_8;
+pub(super) const LOGISTIC_SD: f64 = 1.813_799_364_234_217_8;
 
 /// The design of a cell under the assumptions. For an ordered scale it is that of the
 /// latent values.
@@ -35,8 +35,11 @@ pub fn design(settings: &Settings, cell: &Cell) -> Design {
 }
 
 /// Power of Pearson's t test in closed form, without losses. `None` for fewer than three
-/// realizations or where nothing varies.
+/// realizations, where nothing varies, and for parts.
 pub fn closed(settings: &Settings, cell: &Cell) -> Option<Expected> {
+    if settings.part.is_some() {
+        return None;
+    }
     design(settings, cell).expected(settings.alpha)
 }
 

@@ -5,11 +5,17 @@
 //! certainty. Therefore each simulated study draws its own parameters. Complete, balanced
 //! pilot: λ = SS/χ²(ν) for each mean square, components by differences (below 0 becomes 0),
 //! slope = estimate + z·√(λₘ/(nRq)). Otherwise: estimates of studies simulated from the fit.
+//!
+//! Where thresholds are wanted, the crossed ordinal model is fitted, and worlds are drawn from the
+//! normal approximation of its likelihood.
 
 use super::draw::standardized;
+use super::expected::LOGISTIC_SD;
 use super::{Assumptions, Link, Scale};
 use crate::analyze::Analysis;
 use study_base::rng::Stream;
+use study_stats::clm::{CategoryCount, CategoryCounts, ClmError, Predictor};
+use study_stats::clmm::{CrossedClmm, CrossedParameters, clmm_crossed};
 use study_stats::lmm::{
     CellSummary, Criterion, FixedEffects, LmmData, LmmError, RandomEffects, fit,
 };
@@ -37,13 +43,19 @@ pub enum PilotError {
     /// The crossed model has no fit.
     #[error("the crossed mixed model has no fit: {0}")]
     NotFitted(#[from] LmmError),
+    /// The ordinal model has no fit.
+    #[error("the crossed ordinal model has no fit: {0}")]
+    NoOrdinal(#[from] ClmError),
+    /// Ratings of no ordered scale.
+    #[error("the ratings are not whole numbers, so that there are no thresholds between them")]
+    NotWhole,
     /// Too few simulated pilots have a fit.
     #[error("too few studies simulated from the fit have a fit themselves")]
     Unstable,
 }
 
 /// One possible world.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     /// Slope per standard deviation of VAF.
     pub slope: f64,
@@ -51,12 +63,17 @@ pub struct Parameters {
     pub mean: f64,
     /// Standard deviations.
     pub spread: Spread,
+    /// Thresholds of the ordinal model, if that was fitted.
+    pub scale: Option<Scale>,
 }
 
 impl Parameters {
     pub(super) fn apply(&self, world: &mut Assumptions) {
         world.slope = self.slope;
         world.mean = self.mean;
+        if let Some(scale) = &self.scale {
+            world.scale = scale.clone();
+        }
         world.spread = Spread {
             // A pilot of this model says nothing about it.
             slope: world.spread.slope,
@@ -84,14 +101,103 @@ pub struct Pilot {
     squares: Option<([Option<Square>; 4], usize)>,
     /// Otherwise: estimates of studies simulated from the fit.
     refits: Vec<Parameters>,
+    /// The ordinal model, if thresholds are wanted.
+    ordinal: Option<Ordinal>,
+}
+
+/// The crossed ordinal model of a pilot.
+#[derive(Debug, Clone, PartialEq)]
+struct Ordinal {
+    fit: CrossedClmm,
+    /// The ratings that occur, rising.
+    used: Vec<i64>,
+    /// The lowest and the highest of the scale.
+    ends: (i64, i64),
+}
+
+impl Ordinal {
+    fn of(rows: &[(&str, usize, f64)], x: &[f64], ends: (i64, i64)) -> Result<Self, PilotError> {
+        if rows.iter().any(|r| r.2.fract() != 0.0) {
+            return Err(PilotError::NotWhole);
+        }
+        let mut used: Vec<i64> = rows.iter().map(|r| r.2 as i64).collect();
+        used.sort_unstable();
+        used.dedup();
+        let mut subjects: Vec<&str> = rows.iter().map(|r| r.0).collect();
+        subjects.dedup();
+        let counts: Vec<CategoryCount> = (rows.iter())
+            .map(|(subject, realization, rating)| CategoryCount {
+                subject: subjects.partition_point(|s| s < subject) as u32,
+                predictor: *realization as u32,
+                category: used.partition_point(|u| *u < *rating as i64) as u32,
+                n: 1,
+            })
+            .collect();
+        let predictors = x.iter().map(|&x| Predictor { column: 0, x }).collect();
+        let table = CategoryCounts::new(predictors, 1, used.len(), &counts);
+        Ok(Self {
+            fit: clmm_crossed(&table)?,
+            used,
+            ends,
+        })
+    }
+
+    /// A rating that nobody gave has no threshold of its own: it is never drawn.
+    fn scale(&self, of_used: &[f64]) -> Scale {
+        let (from, to) = self.ends;
+        let between = |below: i64| match self.used.partition_point(|u| *u <= below) {
+            0 => f64::NEG_INFINITY,
+            n => of_used.get(n - 1).copied().unwrap_or(f64::INFINITY),
+        };
+        Scale::Ordinal {
+            link: Link::Logit,
+            thresholds: (from..to).map(between).collect(),
+            from,
+        }
+    }
+
+    fn parameters(&self, of: &CrossedParameters) -> Parameters {
+        Parameters {
+            slope: of.beta,
+            mean: 0.0,
+            spread: Spread {
+                subject: of.sd_subject,
+                realization: of.sd_realization,
+                // The model has none.
+                interaction: 0.0,
+                residual: LOGISTIC_SD,
+                slope: 0.0,
+            },
+            scale: Some(self.scale(&of.thresholds)),
+        }
+    }
+
+    fn estimate(&self) -> Parameters {
+        self.parameters(&self.fit.estimate())
+    }
+
+    /// A world of the normal approximation, drawn again if its thresholds do not rise.
+    fn draw(&self, noise: &mut Stream) -> Parameters {
+        const TRIES: usize = 100;
+        let mut found = (0..TRIES).filter_map(|_| self.fit.drawn(|| noise.normal()));
+        match found.next() {
+            Some(found) => self.parameters(&found),
+            None => self.estimate(),
+        }
+    }
 }
 
 impl Pilot {
     /// From the ratings that an analysis includes.
     ///
     /// # Errors
-    /// If they are too few, or the crossed model has no fit.
-    pub fn of(analysis: &Analysis, seed: u64) -> Result<Self, PilotError> {
+    /// If they are too few, or the crossed model has no fit. With the ends of the scale it is
+    /// the ordinal model, in logits, else the linear one, in rating points.
+    pub fn of(
+        analysis: &Analysis,
+        seed: u64,
+        ordinal: Option<(i64, i64)>,
+    ) -> Result<Self, PilotError> {
         let realizations: Vec<(&str, f64)> = (analysis.tested())
             .filter_map(|m| Some((m.id.as_str(), m.vaf?)))
             .collect();
@@ -123,16 +229,29 @@ impl Pilot {
         if sd == 0.0 {
             return Err(PilotError::ConstantVaf);
         }
+        if let Some(ends) = ordinal {
+            let ordinal = Ordinal::of(&rows, &x, ends)?;
+            return Ok(Self {
+                estimate: ordinal.estimate(),
+                participants: n,
+                realizations: q,
+                ratings: rows.len(),
+                squares: None,
+                refits: Vec::new(),
+                ordinal: Some(ordinal),
+            });
+        }
         let estimate = fitted(&cells)?;
         let repetitions = cells[0].n;
         let complete = cells.len() == n * q && cells.iter().all(|c| c.n == repetitions);
         let mut pilot = Self {
-            estimate,
+            estimate: estimate.clone(),
             participants: n,
             realizations: q,
             ratings: rows.len(),
             squares: complete.then(|| (squares(&cells, &x, n, repetitions), repetitions)),
             refits: Vec::new(),
+            ordinal: None,
         };
         if !complete {
             let simulated = (0..REFITS).filter_map(|k| {
@@ -149,10 +268,13 @@ impl Pilot {
 
     /// The world of study k: the same in every cell.
     pub fn parameters(&self, seed: u64, k: u64) -> Parameters {
-        let Some((squares, r)) = &self.squares else {
-            return self.refits[(k % self.refits.len() as u64) as usize];
-        };
         let mut noise = Stream::new(seed, &[super::STREAM, "pilot", &k.to_string()]);
+        if let Some(ordinal) = &self.ordinal {
+            return ordinal.draw(&mut noise);
+        }
+        let Some((squares, r)) = &self.squares else {
+            return self.refits[(k % self.refits.len() as u64) as usize].clone();
+        };
         let mut lambda = |square: &Option<Square>| {
             square.map(|(sum, df)| {
                 let chi2: f64 = (0..df).map(|_| noise.normal().powi(2)).sum();
@@ -179,24 +301,13 @@ impl Pilot {
                 residual: e.unwrap_or(c).sqrt(),
                 slope: 0.0,
             },
+            scale: None,
         }
     }
 
     /// Degrees of freedom on which the scatter of the realizations rests.
     pub fn scatter_df(&self) -> usize {
         self.realizations - 2
-    }
-
-    /// Whether its ratings can be assumed for a scale: those of a link other than the
-    /// identity are on another one.
-    pub fn suits(scale: &Scale) -> bool {
-        !matches!(
-            scale,
-            Scale::Ordinal {
-                link: Link::Logit,
-                ..
-            }
-        )
     }
 }
 
@@ -232,6 +343,7 @@ fn fitted(cells: &[CellSummary]) -> Result<Parameters, LmmError> {
             residual: v.error.max(0.0).sqrt(),
             slope: 0.0,
         },
+        scale: None,
     })
 }
 
@@ -320,7 +432,7 @@ mod tests {
             }
         }
         let ratings = Ratings::read_csv("pilot.csv", csv.as_bytes(), None).unwrap();
-        Pilot::of(&analyze(&ratings, &Rules::default()), 7)
+        Pilot::of(&analyze(&ratings, &Rules::default()), 7, None)
     }
 
     /// The draws of a complete pilot are about its estimates, with the spread that its few
@@ -342,10 +454,10 @@ mod tests {
             (pilot.estimate, slope, sd, mean(|w| w.spread.residual))
         };
         let (complete, hole) = (of(false), of(true));
-        for (estimate, slope, sd, residual) in [complete, hole] {
+        for (estimate, slope, sd, residual) in [&complete, &hole] {
             let standard_error = estimate.spread.realization / 6f64.sqrt();
             assert!((slope - estimate.slope).abs() < 0.25 * sd, "{slope}");
-            assert!(sd > 0.8 * standard_error, "{sd}, {standard_error}");
+            assert!(*sd > 0.8 * standard_error, "{sd}, {standard_error}");
             assert!((residual - estimate.spread.residual).abs() < 0.1);
         }
         assert!((complete.0.slope - hole.0.slope).abs() < 0.1);
@@ -357,5 +469,58 @@ mod tests {
         let refused = |n, q| pilot(n, q, false).unwrap_err();
         assert_eq!(refused(8, 3), PilotError::Realizations(3));
         assert_eq!(refused(3, 6), PilotError::Participants(3));
+    }
+
+    /// Thresholds, slope and scatter are drawn about the estimates of the ordinal model, with
+    /// their standard errors. Ratings that nobody gave are never drawn.
+    #[test]
+    fn thresholds_are_drawn_about_the_estimates() {
+        let mut noise = Stream::new(5, &["ordinal pilot"]);
+        let mut csv = "subject,model,repetition,rating,vaf\n".to_owned();
+        let scatter: Vec<f64> = (0..8).map(|_| 0.6 * noise.normal()).collect();
+        for i in 0..12 {
+            let level = 0.8 * noise.normal();
+            for (j, scatter) in scatter.iter().enumerate() {
+                for r in 1..=2 {
+                    let u = noise.unit() + 1e-12;
+                    let latent = level + 0.5 * (j as f64 - 3.5) + scatter + (u / (1.0 - u)).ln();
+                    // From 2 to 6 of a scale from 1 to 7, without 5.
+                    let below = [-2.0, 0.0, 2.0].iter().filter(|t| **t < latent).count();
+                    let rating = [2, 3, 4, 6][below];
+                    csv += &format!("P{i:02},m{j},{r},{rating},{}\n", 0.7 + 0.03 * j as f64);
+                }
+            }
+        }
+        let ratings = Ratings::read_csv("pilot.csv", csv.as_bytes(), None).unwrap();
+        let analysis = analyze(&ratings, &Rules::default());
+        let pilot = Pilot::of(&analysis, 7, Some((1, 7))).unwrap();
+        let thresholds = |p: &Parameters| match &p.scale {
+            Some(Scale::Ordinal { thresholds, .. }) => thresholds.clone(),
+            other => panic!("{other:?}"),
+        };
+        let own = thresholds(&pilot.estimate);
+        assert_eq!((own[0], own[5]), (f64::NEG_INFINITY, f64::INFINITY));
+        assert_eq!(own[3], own[4], "5 has no threshold of its own");
+        assert!(own[1] < own[2] && own[2] < own[3]);
+        // The coefficient is that of the analysis, in standard deviations of VAF.
+        let unit = standardized(
+            &(0..8)
+                .map(|j| 0.7 + 0.03 * f64::from(j))
+                .collect::<Vec<_>>(),
+        )
+        .1;
+        let beta = analysis.values.number("clmm_vaf_crossed/beta/vaf").unwrap();
+        let se = analysis.values.number("clmm_vaf_crossed/se/vaf").unwrap();
+        assert!((pilot.estimate.slope - beta * unit).abs() < 1e-6);
+        let worlds: Vec<Parameters> = (0..1000).map(|k| pilot.parameters(7, k)).collect();
+        let mean = |f: &dyn Fn(&Parameters) -> f64| worlds.iter().map(f).sum::<f64>() / 1000.0;
+        let slope = mean(&|w| w.slope);
+        let sd = mean(&|w| (w.slope - slope).powi(2)).sqrt();
+        assert!((slope - beta * unit).abs() < 4.0 * sd / 1000f64.sqrt());
+        assert!((sd / (se * unit) - 1.0).abs() < 0.1, "{sd} {}", se * unit);
+        let second = mean(&|w| thresholds(w)[2]);
+        assert!((second - own[2]).abs() < 0.1, "{second} {}", own[2]);
+        assert!(worlds.iter().all(|w| thresholds(w).is_sorted()));
+        assert_eq!(pilot.parameters(7, 3), pilot.parameters(7, 3));
     }
 }

@@ -1,10 +1,12 @@
 //! From a protocol to settings: defaults, then `[power]`, then a pilot, then flags.
 
+use super::part_plan;
 use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
+use crate::protocol::parts::Task;
 use crate::protocol::power::{PowerLink, PowerPlan, PowerScale};
 use crate::protocol::{Protocol, QuestionKind, Role, check};
-use study_base::text::QuestionId;
+use study_base::text::{PartId, QuestionId};
 use study_stats::power::covariate::Spread;
 use thiserror::Error;
 
@@ -26,9 +28,48 @@ pub enum PlanError {
     /// Too few realizations with a VAF.
     #[error("{0} tested realizations have a VAF, but a correlation over them takes three")]
     FewRealizations(usize),
-    /// Thresholds and comparisons.
-    #[error("`{0}` is no rating; the power of thresholds and comparisons is not computed")]
+    /// No number and no part of pairs or tracks.
+    #[error("`{0}` is no rating, and no part of pairs or tracks asks it")]
     NoRatings(QuestionId),
+    /// No such part.
+    #[error("there is no part `{0}`")]
+    NoPart(PartId),
+    /// Another kind of part.
+    #[error("the power of part `{0}` is not computed: it has no pairs and no tracks")]
+    NoPower(PartId),
+    /// A pilot of ratings for another part.
+    #[error("a pilot has estimates for ratings, not for part `{0}`: state its assumptions")]
+    PilotOfPart(PartId),
+    /// Numbers that the protocol fixes.
+    #[error("the number of {0} of part `{1}` is that of the protocol")]
+    Fixed(&'static str, PartId),
+    /// A test of something else.
+    #[error("`{0}` is no test of part `{1}`")]
+    NotOfPart(&'static str, PartId),
+    /// A test of a part for ratings.
+    #[error("`{0}` is no test of ratings, but of a part of pairs or tracks")]
+    NotOfRatings(&'static str),
+    /// Trials of a track are asked until there is an answer.
+    #[error("missing trials of tracks are not simulated: leave missing out")]
+    MissingOfTracks,
+    /// Ties without an answer for them.
+    #[error("ties are no answer in this part: leave them out")]
+    NoTies,
+    /// A ratio of levels without ratios, or the other way round.
+    #[error("{}", match .0 {
+        true => "the levels have ratios: state track.ratio, not track.difference",
+        false => "the levels have no ratios: state track.difference, not track.ratio",
+    })]
+    RatioOrDifference(bool),
+    /// A kind of trial without a psychometric function.
+    #[error("track `{0}`: same-different with levels has no threshold")]
+    NoFunction(PartId),
+    /// Equivalence with a reference that does not exist.
+    #[error("the test `reference-equivalence` needs a realization with the role hidden-reference")]
+    NoReference,
+    /// Thresholds of a pilot without one.
+    #[error("the scale `logit` without thresholds takes them from a pilot, and there is none")]
+    NoPilot,
     /// Both ways to state the effect.
     #[error("the slope and rho state the same effect: give one of them")]
     SlopeAndRho,
@@ -51,12 +92,14 @@ pub enum PlanError {
     /// An ordered scale for a question without levels.
     #[error("the primary question is no rating: only scale = \"continuous\" is possible")]
     NoLevels,
-    /// A pilot for latent logits.
-    #[error("the estimates of a pilot are rating points, not logits: use another scale")]
+    /// Stated thresholds for a pilot.
+    #[error(
+        "the estimates of a pilot are rating points, not logits: leave the thresholds out, and they are the pilot's, too"
+    )]
     PilotLogit,
     /// Equivalence without a margin.
-    #[error("the test `equivalence` needs equivalence_margin in [analysis]")]
-    NoMargin,
+    #[error("the test `{0}` needs equivalence_margin in [analysis]")]
+    NoMargin(&'static str),
 }
 
 /// What flags state; later than `[power]`.
@@ -66,8 +109,10 @@ pub struct Overrides {
     pub plan: PowerPlan,
     /// Seed of all numbers; without it that of the study.
     pub seed: Option<u64>,
-    /// Level of significance; without it that of the analysis.
+    /// A pilot's estimates.
     pub pilot: Option<Pilot>,
+    /// The part that is meant; without it the one with the primary question.
+    pub part: Option<PartId>,
 }
 
 /// What to simulate.
@@ -75,6 +120,8 @@ pub struct Overrides {
 pub struct Plan {
     /// How.
     pub settings: Settings,
+    /// The part of pairs or tracks; `None`: ratings.
+    pub part: Option<PartId>,
     /// The protocol's own design.
     pub own: Cell,
     /// The designs that are compared.
@@ -97,11 +144,11 @@ pub struct Plan {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
     /// What does not depend on the number of trials, min.
-    fixed: f64,
+    pub(super) fixed: f64,
     /// A repetition of one realization, min.
-    trial: f64,
+    pub(super) trial: f64,
     /// Realizations that are presented besides those of a cell.
-    others: usize,
+    pub(super) others: usize,
 }
 
 impl Pace {
@@ -131,19 +178,24 @@ impl Plan {
     /// # Errors
     /// If the two contradict each other, or too few realizations have a VAF.
     pub fn of(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
+        if let Some(part) = part_plan::meant(protocol, flags.part.as_ref())? {
+            return part_plan::plan(protocol, flags, part);
+        }
         let (base, over) = (&protocol.power, &flags.plan);
-        let mut defaults = Vec::new();
-        let mut stated = |key: &str, value: Option<f64>, default: f64| {
-            value.unwrap_or_else(|| {
-                defaults.push(format!("{key} = {default}"));
-                default
-            })
-        };
+        let mut defaults = Defaults::default();
+        let mut stated =
+            |key: &str, value: Option<f64>, default: f64| defaults.or(key, value, default);
+        let primary = &protocol.analysis.primary;
+        let rated = protocol.parts.iter().find_map(|part| match &part.task {
+            Task::Rating(own) if part.asks.contains(primary) => Some(own),
+            _ => None,
+        });
         let listed: Vec<f64> = (protocol.models.iter())
             .filter(|m| m.role == Role::Test && m.duplicate_of.is_none())
+            .filter(|m| rated.is_none_or(|own| own.models.contains(&m.id)))
             .filter_map(|m| m.vaf)
             .collect();
-        let primary = &protocol.analysis.primary;
+        let repetitions = rated.map_or(protocol.design.repetitions, |own| own.repetitions);
         let asked = protocol.questions.iter().find(|q| q.id == *primary);
         if asked.is_some_and(|q| !q.kind.is_number()) {
             return Err(PlanError::NoRatings(primary.clone()));
@@ -151,7 +203,15 @@ impl Plan {
         if listed.len() < 3 {
             return Err(PlanError::FewRealizations(listed.len()));
         }
-        let scale = scale(protocol, over.scale.as_ref().or(base.scale.as_ref()))?;
+        let pilot = flags.pilot.as_ref();
+        let asked = over.scale.as_ref().or(base.scale.as_ref());
+        let scale = match asked {
+            Some(PowerScale::FromPilot) => {
+                let found = pilot.and_then(|p| p.estimate.scale.clone());
+                found.ok_or(PlanError::NoPilot)?
+            }
+            _ => scale(protocol, asked)?,
+        };
         let logit = matches!(
             scale,
             Scale::Ordinal {
@@ -159,15 +219,17 @@ impl Plan {
                 ..
             }
         );
-        let pilot = flags.pilot.as_ref();
-        if logit && pilot.is_some() {
+        if logit && pilot.is_some_and(|p| p.estimate.scale.is_none()) {
             return Err(PlanError::PilotLogit);
         }
         let of_pilot = |f: fn(&Spread) -> f64| pilot.map(|p| f(&p.estimate.spread));
         let sd = |own: fn(&PowerPlan) -> Option<f64>, pilot: Option<f64>| {
             own(over).or(pilot).or(own(base))
         };
-        let residual = sd(|p| p.sd.residual, of_pilot(|s| s.residual));
+        let residual = sd(
+            |p| p.sd.residual,
+            of_pilot(|s| s.residual).filter(|_| !logit),
+        );
         if logit && residual.is_some() {
             return Err(PlanError::LogitResidual);
         }
@@ -194,19 +256,9 @@ impl Plan {
             },
             slope: stated("sd.slope", sd(|p| p.sd.slope, None), SPREAD.slope),
         };
-        let effect = |plan: &PowerPlan| {
-            (plan.slope.is_some() || plan.rho.is_some()).then_some((plan.slope, plan.rho))
-        };
-        let of_pilot = pilot.map(|p| (Some(p.estimate.slope), None));
-        let slope = match effect(over).or(of_pilot).or_else(|| effect(base)) {
-            Some((Some(_), Some(_))) => return Err(PlanError::SlopeAndRho),
-            Some((None, Some(_))) if spread.realization == 0.0 => {
-                return Err(PlanError::RhoWithoutScatter);
-            }
-            Some((None, Some(rho))) => spread.realization * rho / (1.0 - rho * rho).sqrt(),
-            Some((slope, _)) => slope.unwrap_or(SLOPE),
-            None => stated("slope", None, SLOPE),
-        };
+        let of_pilot = pilot.map(|p| p.estimate.slope);
+        let slope = slope((base, over), of_pilot, spread.realization)?;
+        let slope = stated("slope", slope, SLOPE);
         let middle = match &scale {
             Scale::Ordinal { thresholds, .. } => {
                 thresholds.iter().sum::<f64>() / thresholds.len().max(1) as f64
@@ -217,17 +269,8 @@ impl Plan {
         let mean = stated("mean", mean, middle);
         let own = Cell {
             realizations: listed.len(),
-            repetitions: protocol.design.repetitions as usize,
+            repetitions: repetitions as usize,
             participants: protocol.design.participants as usize,
-        };
-        let numbers = |of: fn(&PowerPlan) -> &Vec<u32>, default: Vec<usize>| -> Vec<usize> {
-            let given = [of(over), of(base)]
-                .into_iter()
-                .find(|list| !list.is_empty());
-            let mut list = given.map_or(default, |list| list.iter().map(|n| *n as usize).collect());
-            list.sort_unstable();
-            list.dedup();
-            list
         };
         let n = own.participants.max(2);
         let vaf = over.vaf.or(base.vaf);
@@ -238,9 +281,13 @@ impl Plan {
                 .filter(|q| *q >= own.realizations)
                 .collect(),
         };
-        let participants = numbers(|p| &p.participants, vec![n, 2 * n, 4 * n]);
-        let realizations = numbers(|p| &p.realizations, more);
-        let repetitions = numbers(|p| &p.repetitions, vec![1, own.repetitions.max(1)]);
+        let participants = numbers((base, over), |p| &p.participants, vec![n, 2 * n, 4 * n]);
+        let realizations = numbers((base, over), |p| &p.realizations, more);
+        let repetitions = numbers(
+            (base, over),
+            |p| &p.repetitions,
+            vec![1, own.repetitions.max(1)],
+        );
         if vaf == Some(Vaf::Listed) && realizations != [own.realizations] {
             return Err(PlanError::Listed(own.realizations));
         }
@@ -254,30 +301,25 @@ impl Plan {
                 }));
             }
         }
-        let list = |of: fn(&PowerPlan) -> &Vec<Test>| {
-            let given = [of(over), of(base)]
-                .into_iter()
-                .find(|list| !list.is_empty());
-            let mut tests = given.cloned().unwrap_or_else(|| vec![Test::Verdict]);
-            let all = tests.clone();
-            let mut at = 0;
-            tests.retain(|test| {
-                at += 1;
-                !all[..at - 1].contains(test)
-            });
-            tests
-        };
-        let tests = list(|p| &p.tests);
-        let margin = protocol.analysis.equivalence_margin;
-        if tests.contains(&Test::Equivalence) && margin.is_none() {
-            return Err(PlanError::NoMargin);
+        let tests = tests((base, over)).unwrap_or_else(|| vec![Test::Verdict]);
+        if let Some(test) = tests.iter().find(|test| !test.is_of_ratings()) {
+            return Err(PlanError::NotOfRatings(test.as_str()));
         }
-        let targets = [&over.targets, &base.targets]
-            .into_iter()
-            .find(|t| !t.is_empty());
-        let mut targets = targets.map_or(TARGETS.to_vec(), Clone::clone);
-        targets.sort_by(f64::total_cmp);
-        targets.dedup();
+        let margin = protocol.analysis.equivalence_margin;
+        let needs_margin = [Test::Equivalence, Test::ReferenceEquivalence];
+        if let Some(test) = tests.iter().find(|test| needs_margin.contains(test))
+            && margin.is_none()
+        {
+            return Err(PlanError::NoMargin(test.as_str()));
+        }
+        let has_reference = protocol
+            .models
+            .iter()
+            .any(|m| m.role == Role::HiddenReference);
+        if tests.contains(&Test::ReferenceEquivalence) && !has_reference {
+            return Err(PlanError::NoReference);
+        }
+        let targets = targets((base, over));
         Ok(Self {
             settings: Settings {
                 assumptions: Assumptions {
@@ -289,7 +331,9 @@ impl Plan {
                     vaf: vaf.unwrap_or(Vaf::Listed),
                     dropout: over.dropout.or(base.dropout).unwrap_or(0.0),
                     missing: over.missing.or(base.missing).unwrap_or(0.0),
+                    reference: over.reference.or(base.reference).unwrap_or(0.0),
                 },
+                part: None,
                 pilot: flags.pilot.clone(),
                 listed,
                 tests,
@@ -298,10 +342,11 @@ impl Plan {
                 seed: flags.seed.unwrap_or(protocol.study.seed),
                 studies: over.studies.or(base.studies).unwrap_or(STUDIES),
             },
+            part: None,
             own,
             grid,
             targets,
-            defaults,
+            defaults: defaults.0,
             exclusions: protocol.analysis.exclude.len(),
             within: over.within.or(base.within),
             max_session_min: over.max_session_min.or(base.max_session_min),
@@ -357,6 +402,12 @@ impl Plan {
     pub fn cells(&self) -> Vec<Cell> {
         let mut cells = self.grid.clone();
         cells.push(self.own);
+        if self.part.is_some() {
+            // No closed form says where the smallest design is.
+            cells.sort_unstable();
+            cells.dedup();
+            return cells;
+        }
         let most = self.most_participants();
         cells.extend(super::candidates(
             &self.settings,
@@ -368,6 +419,85 @@ impl Plan {
         cells.dedup();
         cells
     }
+}
+
+/// What nobody stated, as `key = value`.
+#[derive(Debug, Default)]
+pub(super) struct Defaults(pub(super) Vec<String>);
+
+impl Defaults {
+    /// The stated value, or the default, which is noted once.
+    pub(super) fn or(&mut self, key: &str, value: Option<f64>, default: f64) -> f64 {
+        value.unwrap_or_else(|| {
+            let note = format!("{key} = {default}");
+            if !self.0.contains(&note) {
+                self.0.push(note);
+            }
+            default
+        })
+    }
+}
+
+/// `[power]`, and what flags state.
+type Stated<'p> = (&'p PowerPlan, &'p PowerPlan);
+
+/// The effect: the last that is stated, in `[power]`, by a pilot, or by a flag.
+pub(super) fn slope(
+    (base, over): Stated<'_>,
+    of_pilot: Option<f64>,
+    scatter: f64,
+) -> Result<Option<f64>, PlanError> {
+    let effect = |plan: &PowerPlan| {
+        (plan.slope.is_some() || plan.rho.is_some()).then_some((plan.slope, plan.rho))
+    };
+    let of_pilot = of_pilot.map(|slope| (Some(slope), None));
+    match effect(over).or(of_pilot).or_else(|| effect(base)) {
+        Some((Some(_), Some(_))) => Err(PlanError::SlopeAndRho),
+        Some((None, Some(_))) if scatter == 0.0 => Err(PlanError::RhoWithoutScatter),
+        Some((None, Some(rho))) => Ok(Some(scatter * rho / (1.0 - rho * rho).sqrt())),
+        Some((slope, _)) => Ok(slope),
+        None => Ok(None),
+    }
+}
+
+/// Numbers of the grid, sorted.
+pub(super) fn numbers(
+    (base, over): Stated<'_>,
+    of: fn(&PowerPlan) -> &Vec<u32>,
+    default: Vec<usize>,
+) -> Vec<usize> {
+    let given = [of(over), of(base)]
+        .into_iter()
+        .find(|list| !list.is_empty());
+    let mut list = given.map_or(default, |list| list.iter().map(|n| *n as usize).collect());
+    list.sort_unstable();
+    list.dedup();
+    list
+}
+
+/// The tests that are asked for, each once.
+pub(super) fn tests((base, over): Stated<'_>) -> Option<Vec<Test>> {
+    let given = [&over.tests, &base.tests]
+        .into_iter()
+        .find(|list| !list.is_empty())?;
+    let mut tests: Vec<Test> = Vec::new();
+    for test in given {
+        if !tests.contains(test) {
+            tests.push(*test);
+        }
+    }
+    Some(tests)
+}
+
+/// The power that is wanted, sorted.
+pub(super) fn targets((base, over): Stated<'_>) -> Vec<f64> {
+    let targets = [&over.targets, &base.targets]
+        .into_iter()
+        .find(|t| !t.is_empty());
+    let mut targets = targets.map_or(TARGETS.to_vec(), Clone::clone);
+    targets.sort_by(f64::total_cmp);
+    targets.dedup();
+    targets
 }
 
 /// Lowest and highest answer of the primary question.
@@ -397,6 +527,7 @@ fn scale(protocol: &Protocol, given: Option<&PowerScale>) -> Result<Scale, PlanE
                 from,
             })
         }
+        (Some(PowerScale::FromPilot), _) => Err(PlanError::NoPilot),
         (Some(_), None) => Err(PlanError::NoLevels),
     }
 }

@@ -21,12 +21,23 @@ words! {
         /// The effect of VAF lies within the equivalence margin of the analysis (two one-sided
         /// tests of the slope of the crossed mixed model).
         Equivalence = "equivalence",
+        /// The realization with the highest VAF is equivalent to the hidden reference, within
+        /// the margin of the analysis (two one-sided t tests over participants).
+        ReferenceEquivalence = "reference-equivalence",
+        /// Of a part of pairs: a realization is preferred to another.
+        Preferred = "preferred",
+        /// Of a part of pairs: VAF predicts which realization is preferred.
+        PreferenceVaf = "preference-vaf",
+        /// Of a part of tracks: thresholds differ between its tracks.
+        Thresholds = "thresholds",
+        /// Of a part of tracks: the two realizations of every track are told apart.
+        ToldApart = "told-apart",
     }
 }
 
 impl PowerTest {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 12] = [
         Self::Verdict,
         Self::Pearson,
         Self::Permutation,
@@ -34,7 +45,20 @@ impl PowerTest {
         Self::Friedman,
         Self::Clmm,
         Self::Equivalence,
+        Self::ReferenceEquivalence,
+        Self::Preferred,
+        Self::PreferenceVaf,
+        Self::Thresholds,
+        Self::ToldApart,
     ];
+
+    /// Whether it is one of ratings, and not of another part.
+    pub fn is_of_ratings(self) -> bool {
+        !matches!(
+            self,
+            Self::Preferred | Self::PreferenceVaf | Self::Thresholds | Self::ToldApart
+        )
+    }
 }
 
 words! {
@@ -73,6 +97,27 @@ pub enum PowerScale {
         /// Rising.
         thresholds: Vec<f64>,
     },
+    /// Standard logistic residuals, with the thresholds that a pilot allows.
+    FromPilot,
+}
+
+/// What is assumed of participants on tracks.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PowerTrack {
+    /// Threshold on the first track, in its levels.
+    pub threshold: Option<f64>,
+    /// Threshold on the last track over that on the first.
+    pub ratio: Option<f64>,
+    /// The same as a difference, for levels without ratios.
+    pub difference: Option<f64>,
+    /// From 5 to 95 % of the function, in levels.
+    pub width: Option<f64>,
+    /// Share of lapses.
+    pub lapse: Option<f64>,
+    /// Share of "yes" without a signal.
+    pub guess: Option<f64>,
+    /// d′ of two realizations.
+    pub d: Option<f64>,
 }
 
 /// Standard deviations of the random effects, in rating points.
@@ -117,6 +162,13 @@ pub struct PowerPlan {
     pub dropout: Option<f64>,
     /// Share of trials without a rating.
     pub missing: Option<f64>,
+    /// The true mean of the hidden reference minus that of the realization with the highest
+    /// VAF.
+    pub reference: Option<f64>,
+    /// Share of "no difference" between two realizations that are alike.
+    pub ties: Option<f64>,
+    /// Participants on tracks.
+    pub track: PowerTrack,
     /// Half-width of the interval of the power at which a design has enough studies.
     pub within: Option<f64>,
     /// The longest session, min.

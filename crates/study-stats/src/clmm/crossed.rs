@@ -45,6 +45,54 @@ pub struct CrossedClmm {
     pub t: f64,
     /// Two-sided p of t with q − 2 degrees of freedom.
     pub p: Option<f64>,
+    /// Thresholds, coefficient and both standard deviations, as the search found them.
+    at: Vec<f64>,
+    /// The factor of their observed information.
+    factor: Cholesky,
+}
+
+/// Parameters of the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CrossedParameters {
+    /// Rising.
+    pub thresholds: Vec<f64>,
+    /// Coefficient of the covariate.
+    pub beta: f64,
+    /// Standard deviation between subjects.
+    pub sd_subject: f64,
+    /// Standard deviation between realizations.
+    pub sd_realization: f64,
+}
+
+impl CrossedParameters {
+    fn of(at: &[f64]) -> Self {
+        let (thresholds, others) = at.split_at(at.len() - 3);
+        Self {
+            thresholds: thresholds.to_vec(),
+            beta: others[0],
+            // The likelihood is even in them.
+            sd_subject: others[1].abs(),
+            sd_realization: others[2].abs(),
+        }
+    }
+}
+
+impl CrossedClmm {
+    /// The estimates.
+    pub fn estimate(&self) -> CrossedParameters {
+        CrossedParameters::of(&self.at)
+    }
+
+    /// Parameters of the normal approximation about the estimates, whose covariance is the
+    /// inverse of the observed information. `normal` gives standard normal numbers. `None` if
+    /// the thresholds do not rise.
+    pub fn drawn(&self, mut normal: impl FnMut() -> f64) -> Option<CrossedParameters> {
+        let z: Vec<f64> = self.at.iter().map(|_| normal()).collect();
+        let moved = self.factor.solve_transposed(&z);
+        let at: Vec<f64> = self.at.iter().zip(moved).map(|(x, d)| x + d).collect();
+        let found = CrossedParameters::of(&at);
+        found.thresholds.is_sorted_by(|a, b| a < b).then_some(found)
+    }
 }
 
 /// Fits the model with one covariate, whose value is that of the predictor, and without.
@@ -79,7 +127,10 @@ pub fn clmm_crossed(table: &CategoryCounts) -> Result<CrossedClmm, ClmError> {
     );
     let size = ((q - 2.0) * (chi2 / q).exp_m1()).sqrt();
     let size = if fit.beta[0] < 0.0 { -size } else { size };
+    let factor = Cholesky::definite(&full.information).ok_or(ClmError::NoMaximum)?;
     Ok(CrossedClmm {
+        factor,
+        at: full.at.clone(),
         sd_subject: sd(1),
         sd_realization: sd(2),
         null_loglik: null.value,

@@ -168,7 +168,7 @@ fn condition(track: &PartId, session: Option<&PartId>) -> String {
 }
 
 /// d′ and what is 0 by chance.
-fn sensitivity(
+pub(super) fn sensitivity(
     asked: Asked,
     rules: &TrackRules,
     values: &Values,
@@ -231,7 +231,7 @@ fn trial(part: &Part, asked: Asked, row: &RatingRow, condition: &str) -> Option<
 
 /// How the functions of a track are fitted: the priors refer to the range of the ladder,
 /// since an adaptive track stays near the threshold.
-fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings {
+pub(crate) fn settings(protocol: &Protocol, track: &TrackRules) -> TrialSettings {
     let family = match &track.compared {
         Compared::Levels { family, .. } => protocol.family(family),
         Compared::Models { .. } => None,

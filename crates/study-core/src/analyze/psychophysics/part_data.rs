@@ -56,6 +56,8 @@ pub struct PartAnalysis {
     pub exclusions: Vec<Applied>,
     /// Level of significance of every test, two-sided.
     pub alpha: f64,
+    /// The trials that count: participant, session, trial.
+    pub used: Vec<(ParticipantId, u32, u32)>,
     /// What its figures draw besides.
     pub data: PartData,
 }

@@ -128,6 +128,7 @@ fn one(protocol: &Protocol, own: &Questionnaire, rows: &[ParticipantRow]) -> Par
         warnings: (incomplete > 0).then(warning).into_iter().collect(),
         exclusions: Vec::new(),
         alpha,
+        used: Vec::new(),
         data: PartData::default(),
     }
 }

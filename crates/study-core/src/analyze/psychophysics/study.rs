@@ -107,6 +107,9 @@ pub fn parts(study: &StudyData<'_>, include: Include) -> Vec<PartAnalysis> {
             warnings: own.warnings,
             exclusions,
             alpha: rules.alpha,
+            used: (rows.iter())
+                .map(|r| (r.participant.clone(), r.session, r.trial))
+                .collect(),
             data: own.data,
         })
     };

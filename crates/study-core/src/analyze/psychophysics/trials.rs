@@ -51,7 +51,7 @@ impl Asked {
     }
 
     /// The experiment of a psychometric function; `None` if it has none.
-    fn experiment(self) -> Option<(Experiment, f64)> {
+    pub(super) fn experiment(self) -> Option<(Experiment, f64)> {
         let choice = |guess| Some((Experiment::ForcedChoice(guess), guess));
         match self {
             Self::TwoIntervals | Self::Abx => choice(0.5),

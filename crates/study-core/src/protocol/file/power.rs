@@ -2,20 +2,23 @@
 
 use super::section::Section;
 use crate::protocol::keys::{Key, Kind, Word, Words, keys};
-use crate::protocol::power::{PowerLink, PowerPlan, PowerScale, PowerSpread, PowerTest, PowerVaf};
+use crate::protocol::power::{
+    PowerLink, PowerPlan, PowerScale, PowerSpread, PowerTest, PowerTrack, PowerVaf,
+};
 use std::ops::Bound;
 use study_base::diagnostic::Fault;
 
 const SHARE: Kind = Kind::Number((Bound::Included(0.0), Bound::Excluded(1.0)), "");
 
 pub(super) const POWER: &[Key] = keys! {
-    /// How many studies are simulated for each design.
-    "studies": Kind::Whole(100, 10_000_000), "40000", default("10000");
+    /// How many studies are simulated for each design; of pairs 2000 without it, of tracks 200.
+    "studies": Kind::Whole(10, 10_000_000), "40000", default("10000");
     /// The power that is wanted.
     "targets": Kind::NumberList, "[0.8, 0.9]";
     /// The tests whose power is simulated: `verdict`, `pearson`, `permutation`, `crossed`,
-    /// `friedman`, `clmm`, `equivalence`. The first one decides about designs. Without it: the
-    /// verdict of the analysis.
+    /// `friedman`, `clmm`, `equivalence`, `reference-equivalence`; of pairs `preferred`,
+    /// `preference-vaf`; of tracks `thresholds`, `told-apart`. The first one decides about
+    /// designs. Without it: the verdicts of the analysis.
     "tests": Kind::Texts(1), r#"["verdict", "crossed"]"#;
     /// Rating points per standard deviation of VAF (with the number of realizations as the
     /// denominator).
@@ -27,7 +30,9 @@ pub(super) const POWER: &[Key] = keys! {
     "smallest": Kind::positive("points"), "0.3";
     /// The mean rating, before it is cut to the scale. Without it: the middle of the scale.
     "mean": Kind::ANY_NUMBER, "4.5";
-    /// Standard deviations of the random effects, in rating points.
+    /// Standard deviations of the random effects, in rating points; of pairs in logits, of
+    /// tracks in natural logarithms of the threshold (in levels for a blend, in d′ for two
+    /// realizations).
     "sd": Kind::Table(SD), "{ realization = 0.3, residual = 0.8 }";
     /// How a number becomes a rating. Without it: rounded for a rating, else continuous.
     "scale": Kind::WordOrTable(SCALES, ORDINAL), r#""continuous""#;
@@ -38,6 +43,14 @@ pub(super) const POWER: &[Key] = keys! {
     "dropout": SHARE, "0.1";
     /// The share of trials without a rating.
     "missing": SHARE, "0.02";
+    /// The true mean of the hidden reference minus that of the realization with the highest
+    /// VAF, for `reference-equivalence`. Without it 0: the two are alike.
+    "reference": Kind::ANY_NUMBER, "0.2";
+    /// Pairs: the share of "no difference" between two realizations that are alike. Without
+    /// it 0.2, if it is an answer.
+    "ties": SHARE, "0.25";
+    /// What is assumed of participants on tracks.
+    "track": Kind::Table(TRACK), "{ threshold = 0.4, ratio = 1.5 }";
     /// A design is simulated no further once the interval of its power is ± this, checked
     /// after each thousand studies. Without it: all `studies`.
     "within": Kind::Number((Bound::Excluded(0.0), Bound::Excluded(1.0)), ""), "0.02";
@@ -59,6 +72,25 @@ const SD: &[Key] = keys! {
     "residual": Kind::not_negative("points"), "0.8";
     /// Slopes of the participants.
     "slope": Kind::not_negative("points"), "0.2";
+};
+
+const TRACK: &[Key] = keys! {
+    /// The typical threshold on the first track. Without it: the middle of its ladder.
+    "threshold": Kind::positive(""), "0.4";
+    /// The typical threshold on the last track over that on the first; those between are in
+    /// even steps. Without it 1.5.
+    "ratio": Kind::positive(""), "1.3";
+    /// Instead of `ratio`, for a blend: the difference. Without it a fifth of the ladder.
+    "difference": Kind::ANY_NUMBER, "0.1";
+    /// How far apart the levels with 5 and 95 % of the function are. Without it: the
+    /// threshold, or a third of the ladder of a blend.
+    "width": Kind::positive(""), "0.5";
+    /// The share of trials that are answered without attention. Without it 0.02.
+    "lapse": Kind::Number((Bound::Included(0.0), Bound::Excluded(0.5)), ""), "0.02";
+    /// The share of "yes" without a signal, of `yes-no`. Without it 0.1.
+    "guess": Kind::Number((Bound::Included(0.0), Bound::Excluded(0.5)), ""), "0.1";
+    /// The mean d′ of two realizations. Without it 1.
+    "d": Kind::not_negative(""), "0.8";
 };
 
 const SCALES: &[Word] = &[
@@ -109,6 +141,8 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<PowerPlan> {
         vaf: section.word("vaf"),
         dropout: section.number("dropout"),
         missing: section.number("missing"),
+        reference: section.number("reference"),
+        ties: section.number("ties"),
         within: section.number("within"),
         max_session_min: section.number("max_session_min"),
         ..PowerPlan::default()
@@ -120,6 +154,17 @@ pub(super) fn read(mut section: Section<'_, '_>) -> Option<PowerPlan> {
             interaction: sd.number("interaction"),
             residual: sd.number("residual"),
             slope: sd.number("slope"),
+        };
+    }
+    if let Some(mut track) = section.section("track") {
+        plan.track = PowerTrack {
+            threshold: track.number("threshold"),
+            ratio: track.number("ratio"),
+            difference: track.number("difference"),
+            width: track.number("width"),
+            lapse: track.number("lapse"),
+            guess: track.number("guess"),
+            d: track.number("d"),
         };
     }
     if let Some(mut grid) = section.section("grid") {

@@ -1,0 +1,205 @@
+//! Data sets of studies with groups, several sessions, failed attempts, pairs and tracks; and
+//! an export that is interrupted.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::studies::{export, files, grouped, new, rehearsed};
+use crate::support::{repository, study};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+const SIMULATED: [&str; 2] = ["--include", "simulated"];
+
+type Row = BTreeMap<String, String>;
+
+fn table(path: &Path) -> Vec<Row> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let head = reader.headers().unwrap().clone();
+    let row = |r: csv::StringRecord| {
+        let cells = head.iter().zip(r.iter());
+        cells.map(|(h, c)| (h.to_owned(), c.to_owned())).collect()
+    };
+    reader.records().map(|r| row(r.unwrap())).collect()
+}
+
+#[test]
+fn several_sessions_have_folders_and_groups_have_a_column() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = grouped(4, home.path());
+    let results = table(&folder.join("ratings.csv"));
+    for to in ["csv", "r", "frictionless", "wide"] {
+        let (out, _) = export(&folder, to, home.path(), to, &SIMULATED);
+        let name = if to == "wide" {
+            "wide.csv"
+        } else {
+            "ratings.csv"
+        };
+        let rows = table(&out.join(name));
+        if to == "wide" {
+            assert_eq!(rows.len(), 4);
+            continue;
+        }
+        assert_eq!(rows.len(), results.len(), "{to}");
+        let places = |rows: &[Row]| -> BTreeSet<Vec<String>> {
+            let keys = ["participant", "session", "trial", "group", "realism"];
+            rows.iter()
+                .map(|r| keys.iter().map(|k| r[*k].clone()).collect())
+                .collect()
+        };
+        assert_eq!(places(&rows), places(&results), "{to}");
+    }
+    let more = [&SIMULATED[..], &["--with-telemetry"]].concat();
+    let (out, _) = export(&folder, "bids", home.path(), "bids", &more);
+    let all = files(&out);
+    let named = |end: &str| -> Vec<&str> {
+        let names = all.iter().map(|(name, _)| name.as_str());
+        names.filter(|n| n.ends_with(end)).collect()
+    };
+    let tables = named("_beh.tsv");
+    assert_eq!(tables.len(), 8);
+    for name in &tables {
+        let parts: Vec<&str> = name.split('/').collect();
+        let [subject, session, "beh", file] = parts[..] else {
+            panic!("{name}");
+        };
+        assert!(
+            file.starts_with(&format!("{subject}_{session}_task-")),
+            "{name}"
+        );
+        assert!(["ses-1", "ses-2"].contains(&session), "{name}");
+    }
+    // Every recording has the clamps of its trial, that of the first trial, too.
+    let recordings = named("_stim.json");
+    assert_eq!(recordings.len(), results.len());
+    for name in recordings {
+        let about: serde_json::Value =
+            serde_json::from_slice(&fs::read(out.join(name)).unwrap()).unwrap();
+        assert!(about["clamp_count"].is_u64(), "{name}: {about}");
+    }
+}
+
+/// A trial that failed and was done again is one row, that of the attempt that counts.
+#[test]
+fn a_trial_is_one_row_however_many_attempts_it_took() {
+    let home = tempfile::tempdir().unwrap();
+    let protocol = repository("protocols/turn-signal");
+    let folder = rehearsed(Path::new(&protocol), 4, home.path(), &["--faults"]);
+    let attempts = table(&folder.join("attempts.csv"));
+    let place = |row: &Row| {
+        ["participant", "session", "trial"]
+            .map(|key| row[key].clone())
+            .to_vec()
+    };
+    let mut last: BTreeMap<Vec<String>, u32> = BTreeMap::new();
+    for row in attempts.iter().filter(|r| !r["attempt"].is_empty()) {
+        let attempt: u32 = row["attempt"].parse().unwrap();
+        let most = last.entry(place(row)).or_default();
+        *most = attempt.max(*most);
+    }
+    assert!(last.values().any(|n| *n > 1), "nothing failed");
+    let (out, _) = export(&folder, "csv", home.path(), "csv", &SIMULATED);
+    let rows = table(&out.join("ratings.csv"));
+    let places: BTreeSet<Vec<String>> = rows.iter().map(place).collect();
+    assert_eq!(places.len(), rows.len());
+    for row in &rows {
+        assert_eq!(
+            row["attempt"].parse().ok(),
+            last.get(&place(row)).copied(),
+            "{row:?}"
+        );
+    }
+    assert!(!out.join("attempts.csv").exists());
+}
+
+/// The numbers that R has to come to are those of `analyze`, and the rows that it uses are
+/// marked.
+#[test]
+fn the_headline_of_pairs_and_tracks_is_that_of_the_analysis() {
+    for (kind, part, id, n) in [
+        ("pairs", "more-real", "pairs/ability/lambda-0.9995", 8),
+        ("abx", "", "", 0),
+        ("staircase", "more-friction", "psy_mixed/F", 4),
+    ] {
+        let home = tempfile::tempdir().unwrap();
+        let folder = rehearsed(&new(kind, home.path()), n.max(3), home.path(), &[]);
+        let (out, _) = export(&folder, "r", home.path(), "r", &SIMULATED);
+        let arguments = ["analyze", folder.to_str().unwrap(), "--json"];
+        let more = [&arguments[..], &SIMULATED].concat();
+        let (code, text, err) = study(&more, home.path());
+        assert_eq!(code, 0, "{err}");
+        let analysis: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let headline = table(&out.join("headline.csv"));
+        assert!(!headline.is_empty(), "{kind}");
+        let parts = analysis["parts"].as_array().unwrap();
+        let mut compared = 0;
+        for row in &headline {
+            let (of, id) = row["id"].split_once(':').unwrap();
+            let own = parts.iter().find(|p| p["part"] == of).unwrap();
+            let value = own["values"][id].as_f64();
+            assert_eq!(row["value"].parse().ok(), value, "{kind} {id}");
+            compared += usize::from(value.is_some());
+        }
+        assert!(compared > 0, "{kind}: nothing is defined");
+        let is_there = headline.iter().any(|r| r["id"] == format!("{part}:{id}"));
+        assert!(id.is_empty() || is_there, "{headline:?}");
+        let rows = table(&out.join("ratings.csv"));
+        let used = rows.iter().filter(|r| r["included"] == "true").count();
+        let trials = parts
+            .iter()
+            .map(|p| p["trials"].as_u64().unwrap())
+            .sum::<u64>();
+        assert_eq!(used as u64, trials, "{kind}");
+        assert_eq!(out.join("thresholds.csv").exists(), kind == "staircase");
+    }
+}
+
+/// A killed export leaves no data set, says so the next time, and is repeated whole.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_export_is_repeated_whole() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = grouped(4, home.path());
+    let more = [&SIMULATED[..], &["--with-telemetry"]].concat();
+    let (whole, _) = export(&folder, "bids", home.path(), "whole", &more);
+    let left = || -> Vec<String> {
+        let items = fs::read_dir(home.path()).unwrap();
+        let names = items.map(|i| i.unwrap().file_name().into_string().unwrap());
+        names.filter(|n| n.ends_with(".part")).collect()
+    };
+    let mut interrupted = 0;
+    for _ in 0..50 {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_study"))
+            .args([
+                "export",
+                folder.to_str().unwrap(),
+                "--to",
+                "bids",
+                "--out",
+                "again",
+            ])
+            .args(&more)
+            .current_dir(home.path())
+            .stdout(std::process::Stdio::null())
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        while left().len() == interrupted && child.try_wait().unwrap().is_none() {}
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if home.path().join("again").exists() {
+            fs::remove_dir_all(home.path().join("again")).unwrap();
+        }
+        interrupted = left().len();
+        if interrupted > 0 {
+            break;
+        }
+    }
+    assert_eq!(interrupted, 1, "no export was interrupted");
+    let (again, said) = export(&folder, "bids", home.path(), "again", &more);
+    assert!(
+        said.contains(&left()[0]) && said.contains("interrupted"),
+        "{said}"
+    );
+    assert!(files(&again) == files(&whole));
+}
