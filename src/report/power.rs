@@ -20,6 +20,9 @@ use study_core::power::{self, Cell, CellResult, Plan, Reach, Scale, Smallest, Te
 use study_stats::power::covariate::Expected;
 use study_stats::power::detectable_correlation;
 
+/// Columns of a bar.
+const BAR: usize = 20;
+
 /// What is known of a study that is planned.
 #[derive(Debug, Clone)]
 pub struct Report {
@@ -215,6 +218,19 @@ impl Report {
             );
         }
     }
+}
+
+/// A bar up to the power, with a mark at the ceiling.
+fn bar(power: f64, ceiling: Option<f64>) -> String {
+    // Between 0 and the number of columns, so the casts are exact.
+    let at = |x: f64| (x.clamp(0.0, 1.0) * BAR as f64).round() as usize;
+    (0..BAR)
+        .map(|i| match i {
+            i if i < at(power) => '█',
+            i if ceiling.is_some_and(|c| i + 1 == at(c).max(1)) => '┆',
+            _ => '·',
+        })
+        .collect()
 }
 
 /// `10 × 5 × 3`: participants, realizations, repetitions.

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod power;
+mod power_parts;
 mod preregister;
 mod protocol_check;
 mod protocol_docs;

@@ -1,15 +1,12 @@
 //! The terminal page.
 
-use super::{Report, deciding, design, name_of, percent, reached};
+use super::{BAR, Report, bar, deciding, design, name_of, percent, reached};
 use crate::report::apa;
 use crate::report::text::Page;
 use crate::report::text::layout::{Paint, pad, wrap};
 use study_base::text::{Untrusted, counted};
 use study_core::power::{Cell, Reach, design as closed_design, floor};
 use study_stats::power::detectable_correlation;
-
-/// Columns of a bar.
-const BAR: usize = 20;
 
 /// What is known at once: the sentence, and what is assumed.
 pub fn head(report: &Report, page: Page) -> String {
@@ -57,19 +54,6 @@ pub fn results(report: &Report, page: Page) -> String {
     out.push('\n');
     out += &paint.dim(&wrap(&super::paragraph(report), width, "", ""));
     out
-}
-
-/// A bar up to the power, with a mark at the ceiling.
-pub(super) fn bar(power: f64, ceiling: Option<f64>) -> String {
-    // Between 0 and the number of columns, so the casts are exact.
-    let at = |x: f64| (x.clamp(0.0, 1.0) * BAR as f64).round() as usize;
-    (0..BAR)
-        .map(|i| match i {
-            i if i < at(power) => '█',
-            i if ceiling.is_some_and(|c| i + 1 == at(c).max(1)) => '┆',
-            _ => '·',
-        })
-        .collect()
 }
 
 fn table(report: &Report, paint: Paint) -> String {

@@ -1,8 +1,7 @@
 //! The power of a part of pairs or tracks: page, document and paragraph. There is no closed
 //! form, so that the designs are those of the grid.
 
-use super::page::bar;
-use super::{Report, percent};
+use super::{Report, bar, percent};
 use crate::report::apa;
 use crate::report::text::Page;
 use crate::report::text::layout::{Paint, wrap};

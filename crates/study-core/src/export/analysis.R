@@ -92,7 +92,7 @@ if (has_ratings) {
 } else {
   cat("The primary question is no rating. These are the answers and their numbers:\n")
   answered <- ratings[ratings$status == "ok" & !ratings$practice, ]
-  if (any(!is.na(answered$correct))) {
+  if (any(!is.na(answered$correct) & !is.na(answered$level))) {
     print(aggregate(cbind(share_correct = correct) ~ participant + track + level,
                     data = answered, FUN = mean))
   }

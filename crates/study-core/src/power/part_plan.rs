@@ -24,10 +24,7 @@ const STUDIES_OF_TRACKS: u64 = 200;
 
 /// The part that is meant: the one of the flag, or the one that asks the primary question;
 /// `None` if that is a part of ratings.
-pub(super) fn meant<'p>(
-    protocol: &'p Protocol,
-    flag: Option<&PartId>,
-) -> Result<Option<&'p Part>, PlanError> {
+fn meant<'p>(protocol: &'p Protocol, flag: Option<&PartId>) -> Result<Option<&'p Part>, PlanError> {
     let primary = &protocol.analysis.primary;
     let found = match flag {
         Some(id) => Some(
@@ -40,8 +37,21 @@ pub(super) fn meant<'p>(
     Ok(found.filter(|part| !matches!(part.task, Task::Rating(_))))
 }
 
+impl Plan {
+    /// The plan of a protocol (with VAF filled in) and flags.
+    ///
+    /// # Errors
+    /// If the two contradict each other, or too few realizations have a VAF.
+    pub fn of(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
+        match meant(protocol, flags.part.as_ref())? {
+            Some(part) => plan(protocol, flags, part),
+            None => Self::of_ratings(protocol, flags),
+        }
+    }
+}
+
 /// The plan of a part.
-pub(super) fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, PlanError> {
+fn plan(protocol: &Protocol, flags: &Overrides, part: &Part) -> Result<Plan, PlanError> {
     let (base, over) = (&protocol.power, &flags.plan);
     if flags.pilot.is_some() {
         return Err(PlanError::PilotOfPart(part.id.clone()));

@@ -1,6 +1,5 @@
 //! From a protocol to settings: defaults, then `[power]`, then a pilot, then flags.
 
-use super::part_plan;
 use super::{Assumptions, Cell, Pilot, Scale, Settings, Test, Vaf};
 use crate::analyze::ALPHA;
 use crate::protocol::parts::Task;
@@ -173,14 +172,8 @@ impl Pace {
 }
 
 impl Plan {
-    /// The plan of a protocol (with VAF filled in) and flags.
-    ///
-    /// # Errors
-    /// If the two contradict each other, or too few realizations have a VAF.
-    pub fn of(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
-        if let Some(part) = part_plan::meant(protocol, flags.part.as_ref())? {
-            return part_plan::plan(protocol, flags, part);
-        }
+    /// The plan of the ratings of a protocol.
+    pub(super) fn of_ratings(protocol: &Protocol, flags: &Overrides) -> Result<Self, PlanError> {
         let (base, over) = (&protocol.power, &flags.plan);
         let mut defaults = Defaults::default();
         let mut stated =

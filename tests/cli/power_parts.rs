@@ -1,0 +1,147 @@
+//! `study power` of pairs and tracks.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::support::study;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+/// A new study of a kind, in `folder`.
+fn new(kind: &str, folder: &Path) -> String {
+    let (code, _, err) = study(&["new", kind, "--kind", kind], folder);
+    assert_eq!(code, 0, "{err}");
+    kind.to_owned()
+}
+
+#[test]
+fn pairs_have_power_by_their_own_analysis() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let pairs = new("pairs", dir);
+    let run = |more: &[&str]| {
+        let own = [
+            "power",
+            &pairs,
+            "--studies",
+            "1500",
+            "--participants",
+            "10,40",
+        ];
+        study(&[&own[..], more].concat(), dir)
+    };
+    let json = |more: &[&str]| {
+        let (code, out, err) = run(&[more, &["--json"]].concat());
+        assert_eq!(code, 0, "{err}");
+        out
+    };
+    let whole = json(&["--threads", "1"]);
+    assert_eq!(json(&["--threads", "2"]), whole);
+    for shard in ["0", "1", "2"] {
+        let own = ["--shards", "3", "--shard", shard, "--out", "parts"];
+        assert_eq!(run(&own).0, 0);
+    }
+    assert_eq!(json(&["--merge", "parts"]), whole);
+    let found: Value = serde_json::from_str(&whole).unwrap();
+    assert_eq!(found["part"], "more-real");
+    let power = |cell: usize, test: &str| found["cells"][cell]["tests"][test]["power"].as_f64();
+    assert!(power(1, "preferred") > power(0, "preferred"));
+    // Three realizations: 1/6 is the least p.
+    assert_eq!(power(1, "preference-vaf"), Some(0.0));
+    assert!(found["cells"][0]["closed"].is_null());
+    let (code, page, err) = run(&[]);
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        page.starts_with("Part more-real: 3 pairs of 3 realizations, 2 trials each."),
+        "{page}"
+    );
+    assert!(
+        page.contains("no p of preference-vaf is below .333"),
+        "{page}"
+    );
+    assert!(page.lines().all(|l| l.chars().count() <= 100), "{page}");
+    for (more, what) in [
+        (&["--closed"][..], "no closed form"),
+        (
+            &["--tests", "pearson"],
+            "`pearson` is no test of part `more-real`",
+        ),
+        (&["--part", "other"], "there is no part `other`"),
+        (&["--realizations", "8"], "realizations of part `more-real`"),
+        (&["--slope", "1", "--from", "x"], "x"),
+    ] {
+        let (code, _, err) = run(more);
+        assert!(code != 0 && err.contains(what), "{err}");
+    }
+}
+
+#[test]
+fn tracks_have_power_by_their_own_rule_and_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let staircase = new("staircase", dir);
+    // As few as possible: each fit takes long in a test.
+    let protocol = dir.join("staircase/protocol.toml");
+    let text = fs::read_to_string(&protocol).unwrap();
+    fs::write(
+        &protocol,
+        text.replace("participants = 10", "participants = 2"),
+    )
+    .unwrap();
+    let own = [
+        "power",
+        &staircase,
+        "--studies",
+        "10",
+        "--participants",
+        "2",
+    ];
+    let (code, out, err) = study(
+        &[&own[..], &["--track", "ratio=4,width=0.2", "--json"]].concat(),
+        dir,
+    );
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    let tracks = &found["assumptions"]["tracks"];
+    let at = |i: usize| tracks[i]["threshold"].as_f64().unwrap();
+    assert!((at(1) / at(0) - 4.0).abs() < 1e-12);
+    let own_cells = found["cells"].as_array().unwrap();
+    assert!(
+        own_cells
+            .iter()
+            .all(|c| c["half_width"].as_f64().unwrap() > 0.0)
+    );
+    let abx = new("abx", dir);
+    let (code, page, err) = study(
+        &[
+            "power",
+            &abx,
+            "--studies",
+            "200",
+            "--participants",
+            "6,12",
+            "--track",
+            "d=2",
+        ],
+        dir,
+    );
+    assert_eq!(code, 0, "{err}");
+    assert!(page.contains("told-apart"), "{page}");
+    for (protocol, more, what) in [
+        (
+            &staircase,
+            &["--missing", "0.1"][..],
+            "missing trials of tracks",
+        ),
+        (
+            &staircase,
+            &["--track", "difference=1"],
+            "state track.ratio",
+        ),
+        (&staircase, &["--repetitions", "2"], "repetitions of part"),
+        (&abx, &["--track", "d=-1"], "0 or more"),
+    ] {
+        let (code, _, err) = study(&[&["power", protocol], more].concat(), dir);
+        assert!(code != 0 && err.contains(what), "{err}");
+    }
+}
