@@ -18,7 +18,7 @@ pub use flaw::Flaw;
 use flaw::FlawInjector;
 use std::time::Duration;
 use study_base::limits::Limits;
-use study_haptics::plant::{HandParameters, Parameters};
+use study_haptics::plant::{HandParameters, Parameters, Probe};
 use study_wire::handler::{Bounds, Drive, Handler, Measured, Out, Profile};
 use study_wire::message::{DeviceState, Fault, Features, Flags, Loaded, Name};
 use study_wire::servo::ServoSettings;
@@ -49,6 +49,8 @@ pub struct Options {
     pub watchdog_ms: u16,
     /// Hand and slider.
     pub hand: HandParameters,
+    /// Resolution of the position, mm.
+    pub encoder_mm: f64,
     /// Target that the probe moves in a recording.
     pub target: Parameters,
     /// Smallest mass that is rendered, kg. Minus infinity renders every table unchanged,
@@ -76,6 +78,7 @@ impl Default for Options {
             limits: Limits::new(15.0, 1000.0).expect("positive constants"),
             watchdog_ms: 30,
             hand,
+            encoder_mm: Probe::default().encoder_mm,
             target: Parameters::a(),
             least_mass_kg: -hand.slider_kg,
             clock_ms: 0,
@@ -323,7 +326,10 @@ impl Firmware {
         let drive = self.with_handler(at, |handler, now_ms, out| {
             handler.servo(measured, now_ms, out)
         });
-        self.body.drive(drive);
+        self.body.drive(match &self.saboteur {
+            Some(saboteur) => saboteur.drive(drive),
+            None => drive,
+        });
     }
 
     /// Lets hand and motor follow the state of the handler.

@@ -22,6 +22,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use study_base::limits::Limits;
+use study_core::outcome::Playback;
 use study_haptics::model::Realization;
 use study_wire::message;
 
@@ -265,6 +266,20 @@ pub fn nonce() -> u32 {
     RandomState::new().hash_one(std::process::id()) as u32
 }
 
+impl LinkedDevice {
+    /// A simulated device has no clock of its own: it stands still while this computer does
+    /// something else, which says nothing of a clock.
+    fn without_clock(&self, report: Report) -> Report {
+        match report {
+            Report::Stopped(playback) if self.identity().simulated => Report::Stopped(Playback {
+                time_ratio: None,
+                ..playback
+            }),
+            other => other,
+        }
+    }
+}
+
 impl Device for LinkedDevice {
     fn identity(&self) -> Identity {
         self.identity.clone()
@@ -310,7 +325,7 @@ impl Device for LinkedDevice {
             .reports
             .try_iter()
             .filter(|(epoch, report)| *epoch == now || report.survives_limp())
-            .map(|(_, report)| report)
+            .map(|(_, report)| self.without_clock(report))
             .collect();
         if ended && !self.end_reported {
             self.end_reported = true;

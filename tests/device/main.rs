@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod accused;
 mod check;
 #[path = "../support/designs.rs"]
 mod designs;
@@ -15,5 +16,7 @@ mod shipped;
 mod supervision;
 #[path = "../support/mod.rs"]
 mod support;
+mod tables;
 mod target;
 mod turning;
+mod wrong;

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use crate::tables;
 use proptest::prelude::*;
 use std::time::Duration;
 use study::device::faults::{FaultPlan, InjectedFault};
@@ -11,7 +12,7 @@ use study::device::{Device, DeviceError, Report, Stimulus};
 use study_base::limits::{Limit, Limits};
 use study_core::outcome::{Playback, Sample};
 use study_haptics::model::{Branch, Realization, Trained};
-use study_wire::predict::{Direction, Lookup};
+use study_wire::predict::Direction;
 
 /// A name and an action on a `T`.
 type Case<'a, T> = (&'static str, &'a dyn Fn(&mut T));
@@ -26,36 +27,17 @@ fn limits(force_n: f64) -> Limits {
 /// Three detents of about 6 N with nodes 1 mm apart, a friction of 1 N and a constant mass
 /// and damping.
 fn detents(mass: f64, damping: f64, direction: Direction) -> Realization {
-    let nodes: Vec<f64> = (2..=33).map(f64::from).collect();
-    let branch = |friction: f64| Branch {
-        m_kg: vec![mass; nodes.len()],
-        b_n_s_per_mm: vec![damping; nodes.len()],
-        k_n_per_mm: vec![0.0; nodes.len()],
-        f0_n: nodes
-            .iter()
-            .map(|x| 6.0 * ((x - 5.0) / 12.5 * std::f64::consts::TAU).sin() + friction)
-            .collect(),
-    };
-    Realization {
-        id: "detents".to_owned(),
-        provenance: Default::default(),
-        vaf: Default::default(),
-        lookup: Lookup::Linear,
+    tables::table(
+        "detents",
+        tables::fine(),
+        [mass, damping, 0.0],
+        |x_mm, side| 6.0 * tables::detent_n(x_mm) + side,
         direction,
-        trained: Trained {
-            x_mm: [1.5, 33.5],
-            v_mm_s: 138.0,
-        },
-        x_mm: nodes.clone(),
-        positive: branch(1.0),
-        negative: branch(-1.0),
-        mechanism: None,
-        units: study_haptics::model::Units::Linear,
-    }
+    )
 }
 
 fn ordinary() -> Realization {
-    detents(0.05, 0.01, Direction::Play { delta_mm: 0.5 })
+    detents(0.05, 0.01, tables::PLAY)
 }
 
 fn ms(ms: u64) -> Duration {
@@ -426,10 +408,6 @@ prop_compose! {
             f0_n: column(first + 3, scale[3]),
         };
         Realization {
-            id: "any".to_owned(),
-            provenance: Default::default(),
-            vaf: Default::default(),
-            lookup: Lookup::Linear,
             direction: match rule {
                 0 => Direction::Sign,
                 1 => Direction::Play { delta_mm },
@@ -439,8 +417,7 @@ prop_compose! {
             positive: branch(0),
             negative: branch(4),
             x_mm,
-            mechanism: None,
- units: study_haptics::model::Units::Linear,
+            ..ordinary()
         }
     }
 }

@@ -3,16 +3,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use crate::tables;
 use std::time::Duration;
 use study::device::firmware::{Firmware, Options};
 use study::device::host::{Host, HostSettings, SUPERVISION_TIMEOUT};
 use study::device::link::memory::{Line, Noise};
 use study::device::{Report, Stimulus};
 use study_base::limits::{Limit, Limits};
-use study_haptics::model::{Branch, Realization, Trained};
+use study_haptics::model::Realization;
 use study_wire::frame::Decoder;
 use study_wire::message::{DeviceState, Fault, Request};
-use study_wire::predict::{Direction, Lookup};
 
 const TICK: Duration = Duration::from_micros(250);
 
@@ -29,29 +29,8 @@ fn limits() -> Limits {
 
 /// A constant force of 3 N.
 fn table() -> Realization {
-    let nodes: Vec<f64> = (0..=7).map(|i| 5.0 * f64::from(i)).collect();
-    let branch = Branch {
-        m_kg: vec![0.0; nodes.len()],
-        b_n_s_per_mm: vec![0.005; nodes.len()],
-        k_n_per_mm: vec![0.0; nodes.len()],
-        f0_n: vec![3.0; nodes.len()],
-    };
-    Realization {
-        id: "push".to_owned(),
-        provenance: Default::default(),
-        vaf: Default::default(),
-        lookup: Lookup::Linear,
-        direction: Direction::Play { delta_mm: 0.5 },
-        trained: Trained {
-            x_mm: [1.5, 33.5],
-            v_mm_s: 138.0,
-        },
-        x_mm: nodes,
-        positive: branch.clone(),
-        negative: branch,
-        mechanism: None,
-        units: study_haptics::model::Units::Linear,
-    }
+    let (nodes, terms) = (tables::coarse(), [0.0, 0.005, 0.0]);
+    tables::table("push", nodes, terms, |_, _| 3.0, tables::PLAY)
 }
 
 /// Host, line and device. Flags say which parts are running.

@@ -2,6 +2,7 @@
 //! that it requests.
 
 use crate::designs::{design, model};
+use crate::tables;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -16,8 +17,7 @@ use study_base::text::QuestionId;
 use study_core::protocol::fingerprint::Fingerprints;
 use study_core::protocol::*;
 use study_core::store::{Frozen, SeatKind, StudyFolder};
-use study_haptics::model::{Branch, Realization, Trained};
-use study_wire::predict::{Direction, Lookup};
+use study_haptics::model::Realization;
 
 /// What the runner asked a device to load.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,29 +85,8 @@ impl Device for Observed {
 
 /// A table of constant mass and damping with 1 N of friction.
 fn table(id: &str, mass_kg: f64) -> Realization {
-    let x_mm: Vec<f64> = (0..=7).map(|i| 5.0 * f64::from(i)).collect();
-    let branch = |friction_n: f64| Branch {
-        m_kg: vec![mass_kg; x_mm.len()],
-        b_n_s_per_mm: vec![0.01; x_mm.len()],
-        k_n_per_mm: vec![0.0; x_mm.len()],
-        f0_n: vec![friction_n; x_mm.len()],
-    };
-    Realization {
-        id: id.to_owned(),
-        provenance: Default::default(),
-        vaf: Default::default(),
-        lookup: Lookup::Linear,
-        direction: Direction::Play { delta_mm: 0.5 },
-        trained: Trained {
-            x_mm: [1.5, 33.5],
-            v_mm_s: 138.0,
-        },
-        positive: branch(1.0),
-        negative: branch(-1.0),
-        x_mm,
-        mechanism: None,
-        units: study_haptics::model::Units::Linear,
-    }
+    let terms = [mass_kg, 0.01, 0.0];
+    tables::table(id, tables::coarse(), terms, |_, side| side, tables::PLAY)
 }
 
 /// Realizations `A`, which is certified, and `B`, which is not; one rating.

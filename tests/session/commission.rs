@@ -97,6 +97,7 @@ fn a_ruler_finds_a_wrong_scale_and_a_wrong_origin() {
     for (wrong, seen) in [
         ("half-position", "scale 0.500"),
         ("shifted-position", "off by 3.00 mm"),
+        ("mirrored", "scale -1.000"),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let (code, record, page) = commissioned(folder.path(), &["--wrong", wrong], "203.9");

@@ -5,6 +5,7 @@
 mod blinding;
 mod by_keys;
 mod channels;
+mod checked;
 mod commission;
 #[path = "../support/designs.rs"]
 mod designs;

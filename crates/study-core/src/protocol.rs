@@ -306,7 +306,7 @@ impl Default for RenderingRules {
             gain: [0.93, 1.07],
             max_bias_n: 0.2,
             max_delay_ms: 5.0,
-            max_error_n: 0.7,
+            max_error_n: 0.5,
             max_measured_error_n: 0.5,
             on_fault: None,
         }

@@ -8,33 +8,22 @@
 //! constant without a force sensor, a wrong clock that is consistent. `study device
 //! commission` asks a person to measure those.
 
+mod comparable;
 mod moments;
 mod predicted;
 
 use crate::outcome::{Defect, Fidelity, Sample, Verdict};
 use crate::protocol::{OnFault, RenderingRules};
+use comparable::{SLOW_S, comparable, direction_known, too_coarse, too_little, with_doubt};
 use moments::{Moments, best_lag};
 use predicted::{Predicted, predicted};
 use study_base::text::ModelId;
-use study_wire::predict::Direction;
-use study_wire::servo::{self, Law, ServoSettings};
+use study_wire::servo::{self, ServoSettings};
 
 /// Slower than this the handle rests, mm/s.
 const REST_MM_S: f64 = 5.0;
-/// Least time of comparable samples, s.
-const LEAST_S: f64 = 0.5;
-/// Least time of motion in each direction, s.
-const LEAST_MOTION_S: f64 = 0.1;
-/// Least distance, mm.
-const LEAST_TRAVEL_MM: f64 = 5.0;
-/// Least standard deviation of the table's force, N.
-const LEAST_SD_N: f64 = 0.1;
-/// Telemetry with longer intervals is too slow for a verdict, s.
-const SLOW_S: f64 = 0.0025;
 /// Duration of the window of [`Fidelity::rendered_error_n`], s.
 const WINDOW_S: f64 = 0.02;
-/// Time after the ramp before forces are compared, s.
-const AFTER_RAMP_S: f64 = 0.05;
 /// Only this much of a playback is searched for a delay or another table, s.
 const SEARCHED_S: f64 = 20.0;
 /// Largest delay that is searched, s.
@@ -93,8 +82,9 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
         fidelity.because = Some("no samples".to_owned());
         return fidelity;
     };
-    let forces = predicted(&played.what, played.servo, &samples);
-    let keep = comparable(played, &samples, &forces, interval_s);
+    let forces = with_doubt(played, &samples);
+    let known = direction_known(played, &samples, &forces, interval_s);
+    let keep = comparable(played, &samples, &forces, &known);
     explore(played, &samples, interval_s, &mut fidelity);
     let pairs = || {
         (samples.iter().zip(&forces).zip(&keep))
@@ -102,10 +92,14 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
             .map(|((s, p), _)| (p.force_n, s.force_command_n))
     };
     let commanded = Moments::of(pairs());
-    fidelity.rendered_vaf = commanded.vaf();
+    let apart = (samples.iter().zip(&forces).zip(&keep))
+        .filter(|(_, keep)| **keep)
+        .map(|((s, p), _)| (p.force_n, p.force_n + p.apart_n(s)));
+    let beyond_doubt = Moments::of(apart);
+    fidelity.rendered_vaf = beyond_doubt.vaf();
     fidelity.rendered_gain = commanded.slope();
     fidelity.rendered_bias_n = commanded.bias();
-    fidelity.rendered_error_n = lasting_error(played, &samples, &forces);
+    fidelity.rendered_error_n = lasting_error(played, &samples, &forces, &known);
     limits(played, &samples, interval_s, &mut fidelity);
     measured(&samples, &mut fidelity);
 
@@ -116,10 +110,11 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
     fidelity.nearest_model = nearest.as_ref().map(|near| near.model.clone());
 
     let too_little = too_little(&samples, &keep, interval_s, &commanded);
+    let open = too_little.or_else(|| too_coarse(&forces, &keep, &commanded));
     let found = Found {
         aligned: lag,
         correlation: commanded.correlation(),
-        residual_n: commanded.residual().map(f64::sqrt),
+        residual_n: beyond_doubt.residual().map(f64::sqrt),
         other: nearest.is_some_and(|near| near.explains),
         disordered: samples.len() < played.samples.len()
             || repeated(&samples).is_some_and(|share| share > MOST_REPEATED)
@@ -128,7 +123,7 @@ pub fn judge(played: &Played<'_>, rules: &RenderingRules) -> Fidelity {
         host_in_time: played.host_late_s.is_none_or(|late| late < HOST_LATE_S),
     };
     fidelity.defects = defects(&fidelity, &found, rules);
-    settle(&mut fidelity, played, rules, too_little);
+    settle(&mut fidelity, played, rules, open);
     fidelity
 }
 
@@ -277,44 +272,6 @@ fn share(part: f64, whole: f64) -> Option<f64> {
     (whole > 0.0).then(|| part / whole)
 }
 
-/// Which samples are compared: after the ramp, where the motion before is complete, and
-/// where the table's force is below its limit. With the rule sign the direction can change
-/// between two samples: it is known where the handle moves, and has moved in the same
-/// direction for one interval and the time that the slew limit takes for the largest
-/// change of the force.
-fn comparable(
-    played: &Played<'_>,
-    samples: &[Sample],
-    forces: &[Predicted],
-    interval_s: f64,
-) -> Vec<bool> {
-    let from_s = played.servo.ramp_s + AFTER_RAMP_S;
-    let limit_n = played.servo.force_n;
-    let by_sign = matches!(
-        played.what.law,
-        Law::Table {
-            rule: Direction::Sign,
-            ..
-        }
-    );
-    let least_n = forces.iter().map(|p| p.force_n).fold(f64::MAX, f64::min);
-    let most_n = forces.iter().map(|p| p.force_n).fold(f64::MIN, f64::max);
-    let unknown_s = 1.5 * interval_s + (most_n - least_n) / played.servo.slew_n_s;
-    let mut changed_s = f64::NEG_INFINITY;
-    let mut before_mm_s = 0.0;
-    (samples.iter().zip(forces))
-        .map(|(s, p)| {
-            if s.v_mm_s * before_mm_s <= 0.0 {
-                changed_s = s.t_s;
-            }
-            before_mm_s = s.v_mm_s;
-            let moves = s.v_mm_s.abs() > REST_MM_S && s.t_s - changed_s >= unknown_s;
-            let free = p.force_n.abs() < limit_n - ROUNDING_N;
-            s.t_s >= from_s && p.settled && free && (!by_sign || moves)
-        })
-        .collect()
-}
-
 /// Travel, range, speeds and the time in motion.
 fn explore(played: &Played<'_>, samples: &[Sample], interval_s: f64, fidelity: &mut Fidelity) {
     let steps = || samples.windows(2).map(|w| (w[0], w[1]));
@@ -365,14 +322,19 @@ fn repeated(samples: &[Sample]) -> Option<f64> {
 }
 
 /// The largest mean difference of commanded and expected force over a window, N. Only
-/// motion counts, as at rest the direction can change between two samples, and the first
-/// quarter of the ramp, where forces are small.
-fn lasting_error(played: &Played<'_>, samples: &[Sample], forces: &[Predicted]) -> Option<f64> {
+/// motion in a known direction counts, and the first quarter of the ramp, where forces are
+/// small.
+fn lasting_error(
+    played: &Played<'_>,
+    samples: &[Sample],
+    forces: &[Predicted],
+    known: &[bool],
+) -> Option<f64> {
     let early_s = 0.25 * played.servo.ramp_s;
     largest_mean(samples, |i| {
-        let moves = samples[i].v_mm_s.abs() > REST_MM_S || samples[i].t_s < early_s;
-        let known = forces[i].settled && moves;
-        known.then(|| samples[i].force_command_n - forces[i].force_n)
+        let moves = samples[i].v_mm_s.abs() > REST_MM_S && known[i];
+        let counts = forces[i].settled && (moves || samples[i].t_s < early_s);
+        counts.then(|| forces[i].apart_n(&samples[i]))
     })
 }
 
@@ -481,7 +443,7 @@ fn nearest<'a>(
         ..played.servo
     };
     let score = |what: &servo::Rendering<'_>| {
-        let forces = predicted(what, settings, samples);
+        let forces = predicted(what, settings, samples, 0.0);
         let pairs = (samples.iter().zip(&forces).zip(keep)).filter(|(_, keep)| **keep);
         let moments = Moments::of(pairs.map(|((s, p), _)| (p.force_n, s.force_command_n)));
         let far = moments.residual()? + moments.bias()?.powi(2);
@@ -506,47 +468,6 @@ fn nearest<'a>(
         }
     }
     Some(best)
-}
-
-/// Why a playback cannot be judged, if it cannot.
-fn too_little(
-    samples: &[Sample],
-    keep: &[bool],
-    interval_s: f64,
-    commanded: &Moments,
-) -> Option<&'static str> {
-    let compared = || {
-        samples
-            .iter()
-            .zip(keep)
-            .filter(|(_, keep)| **keep)
-            .map(|(s, _)| s)
-    };
-    let lasting = |n: usize, least_s: f64| n as f64 * interval_s >= least_s;
-    let moving = |sign: f64| compared().filter(|s| sign * s.v_mm_s > REST_MM_S).count();
-    let travel_mm: f64 = (samples.windows(2).zip(keep))
-        .filter(|(_, keep)| **keep)
-        .map(|(w, _)| (w[1].x_mm - w[0].x_mm).abs())
-        .sum();
-    if interval_s > SLOW_S {
-        Some("the device reports fewer than 400 samples per second")
-    } else if !lasting(compared().count(), LEAST_S) {
-        Some("too few samples after the ramp and below the limit")
-    } else if ![1.0, -1.0]
-        .iter()
-        .all(|sign| lasting(moving(*sign), LEAST_MOTION_S))
-    {
-        Some("too little motion in one of the directions")
-    } else if travel_mm < LEAST_TRAVEL_MM {
-        Some("too little travel")
-    } else if commanded
-        .var_x()
-        .is_none_or(|var| var < LEAST_SD_N * LEAST_SD_N)
-    {
-        Some("too little change of the force")
-    } else {
-        None
-    }
 }
 
 #[cfg(test)]

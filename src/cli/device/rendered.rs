@@ -6,9 +6,10 @@
 
 use super::single_playback::{self, Pace};
 use crate::cli::device_selection::SerialPortArgs;
-use crate::cli::{Console, Failure, load};
+use crate::cli::load::{self, Loaded};
+use crate::cli::{Console, Failure};
 use crate::device::host::HostSettings;
-use crate::device::{Report, Stimulus};
+use crate::device::{Device, Report, Stimulus};
 use crate::runner::playback_limits;
 use serde::Serialize;
 use std::path::Path;
@@ -58,9 +59,22 @@ pub(super) struct Rendered {
 }
 
 impl Rendered {
-    /// Whether the force was right, or too little was felt to tell.
+    /// Whether the force was shown to be right.
     pub(super) fn is_right(&self) -> bool {
         self.rendering == Verdict::Ok
+    }
+
+    /// For the terminal.
+    fn line(&self) -> String {
+        let identified = (self.identified_vaf).map_or("–".to_owned(), |vaf| format!("{vaf:.3}"));
+        format!(
+            "{:<14} {:>5.3}   {:>6.3}   {:>10.3}   {identified:>14}   {}\n",
+            self.model,
+            self.vaf,
+            self.bias_n,
+            self.residual_n,
+            self.rendering.as_str()
+        )
     }
 }
 
@@ -73,7 +87,6 @@ pub(super) fn compare_all(
 ) -> Result<Vec<Rendered>, Failure> {
     let loaded = load::load(protocol)?;
     let mut device = port.open_serial(HostSettings::default())?;
-    let mut all = Vec::new();
     if !json {
         console.say(format!(
             "move the handle from end to end, {} s for each table",
@@ -81,6 +94,29 @@ pub(super) fn compare_all(
         ));
         console.out("rendered        VAF   bias N   residual N   identified VAF   verdict\n")?;
     }
+    let all = compare_each(
+        &loaded,
+        &mut device,
+        Pace::real(),
+        &mut |rendered| match json {
+            true => Ok(()),
+            false => console.out(rendered.line()),
+        },
+    )?;
+    if !json && all.iter().all(|r| !r.measured) {
+        console.say("no force sensor: the values are for the commanded force");
+    }
+    Ok(all)
+}
+
+/// `report` receives each comparison at once.
+fn compare_each(
+    loaded: &Loaded,
+    device: &mut dyn Device,
+    mut pace: Pace,
+    report: &mut dyn FnMut(&Rendered) -> Result<(), Failure>,
+) -> Result<Vec<Rendered>, Failure> {
+    let mut all = Vec::new();
     for entry in &loaded.protocol.models {
         let Some(table) = loaded.models.get(&entry.id) else {
             continue;
@@ -103,14 +139,8 @@ pub(super) fn compare_all(
                 }
             }
         };
-        let playback = single_playback::play(
-            &mut device,
-            &stimulus,
-            limits,
-            PLAYBACK,
-            &mut Pace::real(),
-            &mut collect,
-        );
+        let playback =
+            single_playback::play(device, &stimulus, limits, PLAYBACK, &mut pace, &mut collect);
         let playback = playback.map_err(|e| {
             Failure::device(format!("{}: {e}", entry.id))
                 .hint("hold the handle during the playback")
@@ -126,24 +156,11 @@ pub(super) fn compare_all(
             measured,
             strokes: playback.strokes,
             clamps: playback.clamp_count,
-            rendering: super::rendering::fidelity(&device, table, limits, &samples, &playback)?
+            rendering: super::rendering::fidelity(device, table, limits, &samples, &playback)?
                 .verdict,
         };
-        if !json {
-            let identified = entry.vaf.map_or("–".to_owned(), |vaf| format!("{vaf:.3}"));
-            console.out(format!(
-                "{:<14} {:>5.3}   {:>6.3}   {:>10.3}   {identified:>14}   {}\n",
-                entry.id,
-                score.vaf,
-                score.bias_n,
-                score.residual_n,
-                rendered.rendering.as_str()
-            ))?;
-        }
+        report(&rendered)?;
         all.push(rendered);
-    }
-    if !json && all.iter().all(|r| !r.measured) {
-        console.say("no force sensor: the values are for the commanded force");
     }
     Ok(all)
 }
@@ -188,4 +205,55 @@ fn compare(table: &Realization, samples: &[Sample]) -> Result<(Score, bool), Com
     recording::write(&mut bytes, "rendered\n", columns).map_err(|e| signal(&e))?;
     let recording = recording::read("the playback", bytes.as_slice()).map_err(|e| signal(&e))?;
     Ok((vaf::score(table, &recording), measured))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::firmware::{Wrong, WrongLoads};
+    use crate::device::virtual_device::{Options, VirtualDevice};
+
+    fn compared(wrong: Option<&str>) -> Vec<Rendered> {
+        let protocol = concat!(env!("CARGO_MANIFEST_DIR"), "/protocols/turn-signal");
+        let loaded = load::load(Path::new(protocol)).unwrap();
+        let mut options = Options::seeded(2);
+        options.device.wrong = wrong.map(|name| WrongLoads {
+            wrong: Wrong::named(name).unwrap(),
+            loads: [2, u32::MAX],
+        });
+        let mut device = VirtualDevice::new(options);
+        let mut lines = Vec::new();
+        let pace = Pace::Virtual(Duration::ZERO);
+        let all = compare_each(&loaded, &mut device, pace, &mut |rendered| {
+            lines.push(rendered.line());
+            Ok(())
+        });
+        let all = all.unwrap();
+        for (line, rendered) in lines.iter().zip(&all) {
+            assert!(
+                line.trim_end().ends_with(rendered.rendering.as_str()),
+                "{line}"
+            );
+        }
+        all
+    }
+
+    #[test]
+    fn the_right_device_has_the_force_of_every_table() {
+        let all = compared(None);
+        assert_eq!(all.len(), 5);
+        assert!(all.iter().all(Rendered::is_right), "{all:#?}");
+        assert!(all.iter().all(|r| r.vaf > 0.8 && !r.measured), "{all:#?}");
+    }
+
+    /// From the second table on.
+    #[test]
+    fn a_wrong_device_is_told_from_the_right_one_in_each_table() {
+        for (wrong, verdict) in [("half-force", Verdict::Flag), ("no-clamp", Verdict::Fault)] {
+            let all = compared(Some(wrong));
+            assert!(all[0].is_right(), "{wrong}: {all:#?}");
+            let found: Vec<Verdict> = all[1..].iter().map(|r| r.rendering).collect();
+            assert_eq!(found, [verdict; 4], "{wrong}: {all:#?}");
+        }
+    }
 }

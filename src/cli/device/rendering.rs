@@ -346,6 +346,7 @@ mod tests {
     use super::*;
     use crate::device::firmware::{Wrong, WrongLoads};
     use crate::device::virtual_device::{Options, VirtualDevice};
+    use crate::device::{DeviceError, Identity};
 
     fn checked(wrong: Option<Wrong>) -> Vec<Rendered> {
         let mut options = Options::seeded(5);
@@ -369,6 +370,69 @@ mod tests {
         let open: Vec<_> = all.iter().filter(|r| r.result != "pass").collect();
         assert!(open.is_empty(), "{open:?}");
         assert_eq!(tally(&all), [14, 0, 0]);
+    }
+
+    /// A device that tells no constants, as a controller program.
+    struct Program(VirtualDevice);
+
+    impl Device for Program {
+        fn identity(&self) -> Identity {
+            Identity {
+                servo: None,
+                firmware: None,
+                ..self.0.identity()
+            }
+        }
+
+        fn load(
+            &mut self,
+            what: &Stimulus<'_>,
+            limits: Limits,
+            at: Duration,
+        ) -> Result<(), DeviceError> {
+            self.0.load(what, limits, at)
+        }
+
+        fn start(&mut self, at: Duration) -> Result<(), DeviceError> {
+            self.0.start(at)
+        }
+
+        fn stop(&mut self, at: Duration) -> Result<(), DeviceError> {
+            self.0.stop(at)
+        }
+
+        fn limp(&mut self, at: Duration) {
+            self.0.limp(at);
+        }
+
+        fn poll(&mut self, at: Duration) -> Vec<Report> {
+            self.0.poll(at)
+        }
+    }
+
+    /// A program with the usual constants passes; what is wrong is found, also where a
+    /// session would only mark it.
+    #[test]
+    fn a_program_that_tells_no_constants_is_judged_by_the_usual_ones() {
+        for wrong in [None, Some("half-force")] {
+            let mut options = Options::seeded(5);
+            options.device.wrong = wrong.map(|name| WrongLoads {
+                wrong: Wrong::named(name).unwrap(),
+                loads: [1, u32::MAX],
+            });
+            // the constants of a device that tells none
+            options.device.least_mass_kg = 0.0;
+            let mut device = Program(VirtualDevice::new(options));
+            let pace = Pace::Virtual(Duration::ZERO);
+            let all = check(&mut device, 17.5, pace, &mut |_| Ok(())).unwrap();
+            assert_eq!(all.len(), 14);
+            let [passes, fails, _] = tally(&all);
+            match wrong {
+                None => assert_eq!(passes, 14, "{all:#?}"),
+                // the trip is right
+                Some(_) => assert_eq!([passes, fails], [1, 13], "{all:#?}"),
+            }
+        }
     }
 
     /// A wrong device fails in the line that names what is wrong.

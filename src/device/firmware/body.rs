@@ -63,7 +63,10 @@ struct ProbeContact {
 
 impl Body {
     pub(super) fn new(options: &Options) -> Self {
-        let probe = Probe::default();
+        let probe = Probe {
+            encoder_mm: options.encoder_mm,
+            ..Probe::default()
+        };
         Self {
             seed: options.seed,
             hand: options.hand,

@@ -4,13 +4,9 @@
 //! A wrong device changes the table on its way to the servo, the motion that the servo
 //! sees, or what is reported. It obeys docs/wire.md in everything else.
 
-use std::collections::VecDeque;
-use study_wire::frame::Decoder;
-use study_wire::message::{
-    Commit, FixedVec, Node, Play, Reply, Request, TableBegin, TableChunk, Telemetry,
-    TelemetrySample, UploadCrc,
-};
-use study_wire::predict::{Direction, Lookup, Motion};
+mod saboteur;
+
+pub(super) use saboteur::Saboteur;
 use study_wire::servo::ServoSettings;
 
 macro_rules! wrongs {
@@ -48,6 +44,8 @@ wrongs! {
     DampingTimesTen "damping-times-ten" "b is ten times too large";
     Biased "biased" "0.6 N are added";
     FirstTable "first-table" "the first table that was ever loaded is played";
+    PreviousTable "previous-table" "the table before is played";
+    TornTable "torn-table" "the second half of the table is that of the table before";
     NodesBackwards "nodes-backwards" "the parameters are in reverse order";
     NodesShifted "nodes-shifted" "each node has the parameters of the one before";
     HalfTable "half-table" "the second half of the table is zero";
@@ -63,6 +61,8 @@ wrongs! {
     SpeedReversed "speed-reversed" "the speed has the wrong sign, in the servo and in telemetry";
     SpeedZero "speed-zero" "the speed is always 0, in the servo and in telemetry";
     SpeedHalfInside "speed-half-inside" "the speed is half, in the servo only";
+    SpeedClipped "speed-clipped" "the servo gets at most 40 mm/s";
+    DirectionLate "direction-late" "the servo gets a new direction after 3 mm";
     SpeedLate "speed-late" "the servo gets the speed 30 ms late";
     PositionLate "position-late" "the servo gets the position 30 ms late";
     PositionCoarse "position-coarse" "the position has steps of 3 mm";
@@ -74,6 +74,12 @@ wrongs! {
     CoarseForce "coarse-force" "the force has steps of 2 N";
     Noisy "noisy" "the force alternates by 2 N every 30 ms";
     Fading "fading" "the force fades away within 6 s";
+    Hot "hot" "0.7 of the force after 3 s";
+    Overflow "overflow" "a force beyond 4 N wraps to the other sign";
+    Unsigned "unsigned" "negative forces are positive";
+    OneSidedLimit "one-sided-limit" "the force is at most 2 N in one direction";
+    DeadBand "dead-band" "forces below 0.7 N are 0";
+    Cogging "cogging" "0.8 N are added, with a period of 3 mm";
     Dropouts "dropouts" "no force for 100 ms of each second";
     Sticking "sticking" "the force is frozen for 150 ms of each half second";
     Stale "stale" "each sample is reported ten times";
@@ -90,6 +96,8 @@ wrongs! {
     StuckSensor "stuck-sensor" "3 N are measured, whatever is commanded";
     HalfPosition "half-position" "the position is half, everywhere: only a ruler shows it";
     ShiftedPosition "shifted-position" "the position is 3 mm off, everywhere: only a ruler shows it";
+    Mirrored "mirrored" "position and motor are the wrong way round: only a ruler shows it";
+    WeakMotor "weak-motor" "the motor gives half of the force that is reported: only a weight shows it";
 }
 
 impl Wrong {
@@ -101,7 +109,10 @@ impl Wrong {
 
     /// Whether only a physical check can show it.
     pub fn is_physical(self) -> bool {
-        matches!(self, Self::HalfPosition | Self::ShiftedPosition)
+        matches!(
+            self,
+            Self::HalfPosition | Self::ShiftedPosition | Self::Mirrored | Self::WeakMotor
+        )
     }
 
     /// The servo that it has, instead of the one that it tells.
@@ -139,394 +150,4 @@ pub struct WrongLoads {
     pub wrong: Wrong,
     /// First and last load.
     pub loads: [u32; 2],
-}
-
-/// Changes what a wrong device receives, measures and sends.
-#[derive(Debug)]
-pub(super) struct Saboteur {
-    how: WrongLoads,
-    told: ServoSettings,
-    loads: u32,
-    /// Bytes since the last zero.
-    raw: Vec<u8>,
-    begin: Option<TableBegin>,
-    /// The nodes of the table as received, and of the first table.
-    nodes: Vec<Node>,
-    first: Vec<Node>,
-    crc: UploadCrc,
-    /// CRC of the table as received, and as changed.
-    crcs: (u32, u32),
-    /// Motions of the last periods, and the number of periods since the start.
-    motions: VecDeque<Motion>,
-    periods: usize,
-    /// Commanded forces of the last samples, µN, with their periods.
-    forces: VecDeque<(u32, i32)>,
-    held: Option<TelemetrySample>,
-}
-
-/// Servo periods of the late position and speed: 30 ms at 4 kHz.
-const LATE_PERIODS: usize = 120;
-/// Periods whose motion is kept: longer than a sample waits.
-const KEPT_PERIODS: usize = 800;
-
-impl Saboteur {
-    pub(super) fn new(how: WrongLoads, told: ServoSettings) -> Self {
-        Self {
-            how,
-            told,
-            loads: 0,
-            raw: Vec::new(),
-            begin: None,
-            nodes: Vec::new(),
-            first: Vec::new(),
-            crc: UploadCrc::default(),
-            crcs: (0, 0),
-            motions: VecDeque::new(),
-            periods: 0,
-            forces: VecDeque::new(),
-            held: None,
-        }
-    }
-
-    /// How it is wrong now.
-    fn wrong(&self) -> Option<Wrong> {
-        let [from, to] = self.how.loads;
-        (from..=to).contains(&self.loads).then_some(self.how.wrong)
-    }
-
-    /// The bytes for the handler.
-    pub(super) fn inbound(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let mut changed = Vec::new();
-        for byte in bytes {
-            if *byte != 0 {
-                self.raw.push(*byte);
-                continue;
-            }
-            let raw = std::mem::take(&mut self.raw);
-            let body = decoded(&raw);
-            match body.and_then(|body| Request::decode(&body).ok()) {
-                Some((header, request)) => {
-                    let request = self.request(request);
-                    changed.extend_from_slice(request.frame(header.sequence).as_bytes());
-                }
-                None => {
-                    changed.push(0);
-                    changed.extend_from_slice(&raw);
-                    changed.push(0);
-                }
-            }
-        }
-        changed
-    }
-
-    fn request(&mut self, request: Request) -> Request {
-        match request {
-            Request::TableBegin(begin) => {
-                if self.first.is_empty() {
-                    self.first.clone_from(&self.nodes);
-                }
-                self.loads += 1;
-                self.nodes.clear();
-                let begin = self.begin(begin);
-                self.begin = Some(begin);
-                self.crc = UploadCrc::of_table(&begin);
-                Request::TableBegin(begin)
-            }
-            Request::MechanismBegin(_) => {
-                self.loads += 1;
-                request
-            }
-            Request::TableChunk(chunk) => {
-                // A repeated chunk is answered without being executed.
-                let again = usize::from(chunk.first) < self.nodes.len();
-                let mut nodes = FixedVec::new();
-                for (i, node) in chunk.nodes.as_slice().iter().enumerate() {
-                    let at = usize::from(chunk.first) + i;
-                    if !again {
-                        self.nodes.push(*node);
-                    }
-                    let node = self.node(at, *node);
-                    if !again {
-                        self.crc.node(&node);
-                    }
-                    nodes.push(node);
-                }
-                Request::TableChunk(TableChunk { nodes, ..chunk })
-            }
-            Request::TableCommit(commit) if self.wrong().is_some() => {
-                self.crcs = (commit.crc, self.crc.clone().value());
-                Request::TableCommit(Commit { crc: self.crcs.1 })
-            }
-            Request::Play(play) if play.crc == self.crcs.0 && self.wrong().is_some() => {
-                self.motions.clear();
-                self.periods = 0;
-                self.forces.clear();
-                self.held = None;
-                Request::Play(Play {
-                    crc: self.crcs.1,
-                    ..play
-                })
-            }
-            other => other,
-        }
-    }
-
-    fn begin(&self, begin: TableBegin) -> TableBegin {
-        let Some(wrong) = self.wrong() else {
-            return begin;
-        };
-        // It does not look at what it plays.
-        let mut begin = TableBegin {
-            uncertified_n: Some(begin.force_n),
-            ..begin
-        };
-        match wrong {
-            Wrong::Floor => begin.lookup = Lookup::Floor,
-            Wrong::Nearest => begin.lookup = Lookup::Nearest,
-            Wrong::PlayRule => begin.direction = Direction::Play { delta_mm: 8.0 },
-            Wrong::DahlRule => begin.direction = Direction::Dahl { delta_mm: 8.0 },
-            Wrong::LowLimit => {
-                begin.force_n /= 3.0;
-                begin.uncertified_n = Some(begin.force_n);
-            }
-            _ => {}
-        }
-        begin
-    }
-
-    fn node(&self, at: usize, node: Node) -> Node {
-        let Some(wrong) = self.wrong() else {
-            return node;
-        };
-        let count = self.begin.map_or(0, |b| usize::from(b.nodes));
-        let scaled = |by: [f64; 4]| {
-            let scale = |p: [f64; 4]| std::array::from_fn(|i| by[i] * p[i]);
-            Node {
-                positive: scale(node.positive),
-                negative: scale(node.negative),
-                ..node
-            }
-        };
-        let raised = |by: f64| {
-            let mut raised = node;
-            raised.positive[3] += by;
-            raised.negative[3] += by;
-            raised
-        };
-        // Parameters of the node at another place, as far as it has been received.
-        let from = |other: Option<&Node>| {
-            other.map_or(node, |other| Node {
-                x_mm: node.x_mm,
-                ..*other
-            })
-        };
-        match wrong {
-            Wrong::HalfForce => scaled([0.5; 4]),
-            Wrong::DoubleForce => scaled([2.0; 4]),
-            Wrong::Weak => scaled([0.85; 4]),
-            Wrong::Strong => scaled([1.15; 4]),
-            Wrong::Reversed => scaled([-1.0; 4]),
-            Wrong::Limp => scaled([0.0; 4]),
-            Wrong::NoMass => scaled([0.0, 1.0, 1.0, 1.0]),
-            Wrong::NoDamping => scaled([1.0, 0.0, 1.0, 1.0]),
-            Wrong::NoStiffness => scaled([1.0, 1.0, 0.0, 1.0]),
-            Wrong::NoOffset => scaled([1.0, 1.0, 1.0, 0.0]),
-            Wrong::MassSign => scaled([-1.0, 1.0, 1.0, 1.0]),
-            Wrong::DampingSign => scaled([1.0, -1.0, 1.0, 1.0]),
-            Wrong::DampingTimesTen => scaled([1.0, 10.0, 1.0, 1.0]),
-            Wrong::StiffnessFromStart => {
-                let start_mm = self.nodes.first().map_or(0.0, |n| n.x_mm);
-                let mut moved = node;
-                moved.positive[3] -= node.positive[2] * start_mm;
-                moved.negative[3] -= node.negative[2] * start_mm;
-                moved
-            }
-            Wrong::OneDirection => Node {
-                negative: node.positive,
-                ..node
-            },
-            Wrong::OtherDirection => Node {
-                positive: node.negative,
-                negative: node.positive,
-                ..node
-            },
-            Wrong::OnlyForwards => Node {
-                negative: [0.0; 4],
-                ..node
-            },
-            Wrong::Biased => raised(0.6),
-            Wrong::OneBadNode if at == count / 2 => raised(6.0),
-            Wrong::HalfTable if at >= count / 2 => scaled([0.0; 4]),
-            Wrong::FirstTable => from(self.first.get(at)),
-            // Only the second half can be known while the table arrives.
-            Wrong::NodesBackwards if at >= count / 2 => from(self.nodes.get(count - 1 - at)),
-            Wrong::NodesShifted => from(self.nodes.get(at.saturating_sub(1))),
-            Wrong::Stretched => Node {
-                x_mm: 1.1 * node.x_mm,
-                ..node
-            },
-            _ => node,
-        }
-    }
-
-    /// The motion that the servo sees.
-    pub(super) fn motion(&mut self, motion: Motion) -> Motion {
-        let Some(wrong) = self.wrong() else {
-            return motion;
-        };
-        self.motions.push_back(motion);
-        self.periods += 1;
-        if self.motions.len() > KEPT_PERIODS {
-            self.motions.pop_front();
-        }
-        let late = self.motions.len().saturating_sub(LATE_PERIODS);
-        let late = self.motions[late];
-        let speed = |by: f64| Motion {
-            v_mm_s: by * motion.v_mm_s,
-            ..motion
-        };
-        let acceleration = |by: f64| Motion {
-            a_m_s2: by * motion.a_m_s2,
-            ..motion
-        };
-        let position = |x_mm: f64| Motion { x_mm, ..motion };
-        match wrong {
-            Wrong::SpeedHalf | Wrong::SpeedHalfInside => speed(0.5),
-            Wrong::SpeedInMetres => speed(1e-3),
-            Wrong::SpeedReversed => speed(-1.0),
-            Wrong::SpeedZero => speed(0.0),
-            Wrong::SpeedLate => Motion {
-                v_mm_s: late.v_mm_s,
-                ..motion
-            },
-            Wrong::PositionLate => position(late.x_mm),
-            // Steps without a jump that would trip.
-            Wrong::PositionCoarse => {
-                let step = (motion.x_mm / 3.0).round() * 3.0;
-                position(step + (motion.x_mm - step).clamp(-1.5, 1.5).powi(5) / 5.0625)
-            }
-            Wrong::AccelerationTimesThree => acceleration(3.0),
-            Wrong::AccelerationReversed => acceleration(-1.0),
-            Wrong::HalfPosition => Motion {
-                x_mm: 0.5 * motion.x_mm,
-                v_mm_s: 0.5 * motion.v_mm_s,
-                a_m_s2: 0.5 * motion.a_m_s2,
-            },
-            Wrong::ShiftedPosition => position(motion.x_mm + 3.0),
-            _ => motion,
-        }
-    }
-
-    /// The bytes to send for the handler's output.
-    pub(super) fn outbound(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let mut sent = Vec::new();
-        let mut decoder = Decoder::new();
-        for byte in bytes {
-            let Some(Ok(body)) = decoder.push(*byte) else {
-                continue;
-            };
-            let Ok((header, reply)) = Reply::decode(body) else {
-                continue;
-            };
-            let reply = match reply {
-                Reply::Telemetry(telemetry) => Reply::Telemetry(self.telemetry(telemetry)),
-                Reply::Identity(mut identity) => {
-                    // It tells the constants of a right device.
-                    if let Some(constants) = &mut identity.constants {
-                        constants.ramp_s = self.told.ramp_s;
-                        constants.slew_n_s = self.told.slew_n_s;
-                        constants.damping_n_s_per_mm = self.told.damping_n_s_per_mm;
-                        constants.acceleration_hz = self.told.acceleration_hz;
-                    }
-                    Reply::Identity(identity)
-                }
-                other => other,
-            };
-            sent.extend_from_slice(reply.frame(header.sequence).as_bytes());
-        }
-        sent
-    }
-
-    fn telemetry(&mut self, telemetry: Telemetry) -> Telemetry {
-        let mut samples = FixedVec::new();
-        for sample in telemetry.samples.as_slice() {
-            samples.push(self.sample(*sample));
-        }
-        Telemetry {
-            samples,
-            ..telemetry
-        }
-    }
-
-    fn sample(&mut self, sample: TelemetrySample) -> TelemetrySample {
-        let Some(wrong) = self.wrong() else {
-            return sample;
-        };
-        let hz = self.told.servo_hz;
-        let t_s = f64::from(sample.tick) / hz;
-        self.forces.push_back((sample.tick, sample.command_un));
-        let ago = |forces: &VecDeque<(u32, i32)>, ms: f64| {
-            let then = sample.tick.saturating_sub((ms * 1e-3 * hz) as u32);
-            let before = forces.iter().rev().find(|(tick, _)| *tick <= then);
-            before.map_or(0, |(_, force)| *force)
-        };
-        if self.forces.len() > 4096 {
-            self.forces.pop_front();
-        }
-        let mut changed = sample;
-        let newtons = f64::from(sample.command_un) * 1e-6;
-        let command = |force_n: f64| (force_n * 1e6) as i32;
-        match wrong {
-            Wrong::Late => changed.command_un = ago(&self.forces, 20.0),
-            Wrong::SlightlyLate => changed.command_un = ago(&self.forces, 11.0),
-            Wrong::NoClamp => changed.command_un = command(2.0 * newtons),
-            Wrong::CoarseForce => changed.command_un = command((newtons / 2.0).round() * 2.0),
-            Wrong::Noisy => {
-                let up = ((t_s / 0.03) as u32).is_multiple_of(2);
-                changed.command_un = command(newtons + if up { 1.0 } else { -1.0 });
-            }
-            Wrong::Fading => changed.command_un = command(newtons * (1.0 - t_s / 6.0).max(0.0)),
-            Wrong::Dropouts if t_s.fract() > 0.9 => changed.command_un = 0,
-            Wrong::Sticking if (t_s % 0.5) > 0.35 => {
-                changed.command_un = self.held.map_or(0, |held| held.command_un);
-            }
-            Wrong::Stale => {
-                if let Some(held) = self.held
-                    && !(sample.tick / 4).is_multiple_of(10)
-                {
-                    changed = TelemetrySample {
-                        tick: sample.tick,
-                        ..held
-                    };
-                }
-            }
-            Wrong::SlowClock => changed.tick = (0.8 * f64::from(sample.tick)) as u32,
-            Wrong::FastClock => changed.tick = (1.25 * f64::from(sample.tick)) as u32,
-            Wrong::LimpSensor => changed.measured_un = Some(0),
-            Wrong::ReversedSensor => changed.measured_un = Some(-sample.command_un),
-            Wrong::HalfSensor => changed.measured_un = Some(sample.command_un / 2),
-            Wrong::StuckSensor => changed.measured_un = Some(3_000_000),
-            // The reported motion is the true one.
-            Wrong::SpeedHalfInside => changed.v_um_s = sample.v_um_s.saturating_mul(2),
-            Wrong::SpeedLate | Wrong::PositionLate | Wrong::PositionCoarse => {
-                let since = self.periods.saturating_sub(sample.tick as usize);
-                let at = self.motions.len().checked_sub(since);
-                if let Some(then) = at.and_then(|at| self.motions.get(at)) {
-                    changed.x_nm = (then.x_mm * 1e6) as i32;
-                    changed.v_um_s = (then.v_mm_s * 1e3) as i32;
-                }
-            }
-            _ => {}
-        }
-        self.held = Some(changed);
-        changed
-    }
-}
-
-fn decoded(raw: &[u8]) -> Option<Vec<u8>> {
-    let mut decoder = Decoder::new();
-    for byte in raw {
-        decoder.push(*byte);
-    }
-    decoder.push(0)?.ok().map(<[u8]>::to_vec)
 }

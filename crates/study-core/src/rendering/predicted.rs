@@ -21,16 +21,27 @@ pub(super) struct Predicted {
     pub force_n: f64,
     /// Whether it is known well: the samples before it are complete.
     pub settled: bool,
+    /// By how much it may be another one because the position has steps, N.
+    pub doubt_n: f64,
+}
+
+impl Predicted {
+    /// By how much the commanded force differs from all that it may be, N.
+    pub(super) fn apart_n(&self, sample: &Sample) -> f64 {
+        let apart_n = sample.force_command_n - self.force_n;
+        apart_n - apart_n.clamp(-self.doubt_n, self.doubt_n)
+    }
 }
 
 /// The force at each sample. The samples are finite and in the order of time.
 ///
 /// Between two samples the motion is interpolated, so that the servo runs at its own
-/// rate. The acceleration is the difference of the speed.
+/// rate. `more_m_s2` is added to the acceleration.
 pub(super) fn predicted(
     what: &Rendering<'_>,
     settings: ServoSettings,
     samples: &[Sample],
+    more_m_s2: f64,
 ) -> Vec<Predicted> {
     // The device trips by its own measurements; here every sample has a force.
     let mut servo = Servo::new(ServoSettings {
@@ -49,7 +60,7 @@ pub(super) fn predicted(
         let here = Motion {
             x_mm: sample.x_mm,
             v_mm_s: sample.v_mm_s,
-            a_m_s2: acceleration(samples, i),
+            a_m_s2: acceleration(samples, i) + more_m_s2,
         };
         // A playback begins at its servo period 0 with the first motion that is known.
         let (from_s, from) = before.unwrap_or((-1.0 / hz, here));
@@ -74,6 +85,7 @@ pub(super) fn predicted(
         all.push(Predicted {
             force_n,
             settled: sample.t_s >= settled_from_s,
+            doubt_n: 0.0,
         });
         before = Some((sample.t_s, here));
     }

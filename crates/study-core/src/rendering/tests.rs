@@ -408,6 +408,51 @@ fn too_little_is_never_ok() {
     assert_eq!(found.verdict, Verdict::TooLittle, "{found:?}");
 }
 
+/// An accelerometer knows what the positions do not tell.
+#[test]
+fn steps_of_the_position_accuse_nobody_and_excuse_nothing() {
+    let heavy = Table {
+        m_kg: [0.8; 2],
+        ..table()
+    };
+    let model = ModelId::new("heavy").unwrap();
+    let with_steps = |step_mm: f64, by: f64| {
+        let rounded = |x_mm: f64| (x_mm / step_mm).round() * step_mm;
+        let samples: Vec<Sample> = (played(&heavy.what(), AMPLITUDE_MM, 5.0).into_iter())
+            .map(|s| Sample {
+                x_mm: rounded(s.x_mm),
+                force_command_n: by * s.force_command_n,
+                ..s
+            })
+            .collect();
+        let played = Played {
+            model: &model,
+            what: heavy.what(),
+            servo: servo(),
+            servo_told: true,
+            samples: &samples,
+            lost: 0,
+            time_ratio: None,
+            host_late_s: None,
+            others: &[],
+        };
+        judge(&played, &RenderingRules::default())
+    };
+    for step_mm in [0.001, 0.005, 0.02] {
+        let found = with_steps(step_mm, 1.0);
+        assert_eq!(found.verdict, Verdict::Ok, "{step_mm}: {found:?}");
+        near(found.rendered_gain, 1.0, 0.01);
+        for by in [0.8, 1.2] {
+            let found = with_steps(step_mm, by);
+            assert_eq!(found.verdict, Verdict::Flag, "{step_mm} {by}: {found:?}");
+        }
+    }
+    let found = with_steps(0.2, 1.0);
+    assert_eq!(found.verdict, Verdict::TooLittle, "{found:?}");
+    assert!(found.because.is_some_and(|why| why.contains("too coarse")));
+    assert_eq!(with_steps(0.2, -1.0).defects, [Defect::Sign]);
+}
+
 #[test]
 fn lost_samples_cost_only_their_time() {
     let right = right();

@@ -38,7 +38,7 @@ const RENDERING: &[Key] = keys! {
     /// Largest delay of the commanded force.
     "max_delay_ms": Kind::positive("ms"), "10.0", default("5.0");
     /// Largest difference of commanded and table's force that lasts 20 ms.
-    "max_error_n": Kind::positive("N"), "1.0", default("0.7");
+    "max_error_n": Kind::positive("N"), "1.0", default("0.5");
     /// Largest mean size of measured minus commanded force.
     "max_measured_error_n": Kind::positive("N"), "1.0", default("0.5");
     /// What a wrong playback is. Without this key it fails if the force passed its limit, was

@@ -1,0 +1,158 @@
+//! Which samples of a playback are compared with the table, and whether they are enough.
+
+use super::moments::Moments;
+use super::predicted::{Predicted, predicted};
+use super::{Played, REST_MM_S, ROUNDING_N};
+use crate::outcome::Sample;
+use study_wire::predict::Direction;
+use study_wire::servo::Law;
+
+/// Least time of comparable samples, s.
+const LEAST_S: f64 = 0.5;
+/// Least time of motion in each direction, s.
+const LEAST_MOTION_S: f64 = 0.1;
+/// Least distance, mm.
+const LEAST_TRAVEL_MM: f64 = 5.0;
+/// Least standard deviation of the table's force, N.
+const LEAST_SD_N: f64 = 0.1;
+/// Telemetry with longer intervals is too slow for a verdict, s.
+pub(super) const SLOW_S: f64 = 0.0025;
+/// Time after the ramp before forces are compared, s.
+const AFTER_RAMP_S: f64 = 0.05;
+/// Largest doubt about the force, rms, as a share of its standard deviation, and N.
+const MOST_DOUBT: (f64, f64) = (0.1, 0.5);
+
+/// The force of the table at each sample. The position has steps, which leaves the
+/// acceleration open within the band of its filter, and the force with it.
+pub(super) fn with_doubt(played: &Played<'_>, samples: &[Sample]) -> Vec<Predicted> {
+    let mut forces = predicted(&played.what, played.servo, samples, 0.0);
+    // The largest acceleration in that band within half a step.
+    let band = std::f64::consts::TAU * played.servo.acceleration_hz;
+    let doubt_m_s2 = 1e-3 * 0.5 * step_mm(samples) * band * band;
+    let others = predicted(&played.what, played.servo, samples, doubt_m_s2);
+    for (force, other) in forces.iter_mut().zip(&others) {
+        force.doubt_n = (other.force_n - force.force_n).abs();
+    }
+    forces
+}
+
+/// The smallest change of the position, mm.
+fn step_mm(samples: &[Sample]) -> f64 {
+    let changes = samples.windows(2).map(|w| (w[1].x_mm - w[0].x_mm).abs());
+    changes
+        .filter(|mm| *mm > 0.0)
+        .reduce(f64::min)
+        .unwrap_or(0.0)
+}
+
+/// Whether what the steps of the position leave open is as much as a verdict excludes.
+pub(super) fn too_coarse(
+    forces: &[Predicted],
+    keep: &[bool],
+    commanded: &Moments,
+) -> Option<&'static str> {
+    let kept = || forces.iter().zip(keep).filter(|(_, keep)| **keep);
+    let square: f64 = kept().map(|(p, _)| p.doubt_n.powi(2)).sum();
+    let doubt_n = (square / kept().count().max(1) as f64).sqrt();
+    let known = doubt_n < MOST_DOUBT.0 * commanded.var_x()?.sqrt() && doubt_n < MOST_DOUBT.1;
+    (!known).then_some("the steps of the position are too coarse for this mass")
+}
+
+/// At which samples the direction of the motion is known. With the rule sign it can change
+/// between two samples: it is known after one interval in the same direction and the time
+/// that the slew limit takes for the largest change of the force.
+pub(super) fn direction_known(
+    played: &Played<'_>,
+    samples: &[Sample],
+    forces: &[Predicted],
+    interval_s: f64,
+) -> Vec<bool> {
+    if !by_sign(played) {
+        return vec![true; samples.len()];
+    }
+    let least_n = forces.iter().map(|p| p.force_n).fold(f64::MAX, f64::min);
+    let most_n = forces.iter().map(|p| p.force_n).fold(f64::MIN, f64::max);
+    let unknown_s = 1.5 * interval_s + (most_n - least_n) / played.servo.slew_n_s;
+    let mut changed_s = f64::NEG_INFINITY;
+    let mut before_mm_s = 0.0;
+    let known = samples.iter().map(|s| {
+        if s.v_mm_s * before_mm_s <= 0.0 {
+            changed_s = s.t_s;
+        }
+        before_mm_s = s.v_mm_s;
+        s.t_s - changed_s >= unknown_s
+    });
+    known.collect()
+}
+
+fn by_sign(played: &Played<'_>) -> bool {
+    matches!(
+        played.what.law,
+        Law::Table {
+            rule: Direction::Sign,
+            ..
+        }
+    )
+}
+
+/// Which samples are compared: after the ramp, where the motion before is complete, where
+/// the table's force is below its limit and its direction is known, with the rule sign in
+/// motion.
+pub(super) fn comparable(
+    played: &Played<'_>,
+    samples: &[Sample],
+    forces: &[Predicted],
+    known: &[bool],
+) -> Vec<bool> {
+    let from_s = played.servo.ramp_s + AFTER_RAMP_S;
+    let limit_n = played.servo.force_n;
+    let by_sign = by_sign(played);
+    (samples.iter().zip(forces).zip(known))
+        .map(|((s, p), known)| {
+            let moves = s.v_mm_s.abs() > REST_MM_S;
+            let free = p.force_n.abs() < limit_n - ROUNDING_N;
+            s.t_s >= from_s && p.settled && free && *known && (!by_sign || moves)
+        })
+        .collect()
+}
+
+/// Why a playback cannot be judged, if it cannot.
+pub(super) fn too_little(
+    samples: &[Sample],
+    keep: &[bool],
+    interval_s: f64,
+    commanded: &Moments,
+) -> Option<&'static str> {
+    let compared = || {
+        samples
+            .iter()
+            .zip(keep)
+            .filter(|(_, keep)| **keep)
+            .map(|(s, _)| s)
+    };
+    let lasting = |n: usize, least_s: f64| n as f64 * interval_s >= least_s;
+    let moving = |sign: f64| compared().filter(|s| sign * s.v_mm_s > REST_MM_S).count();
+    let travel_mm: f64 = (samples.windows(2).zip(keep))
+        .filter(|(_, keep)| **keep)
+        .map(|(w, _)| (w[1].x_mm - w[0].x_mm).abs())
+        .sum();
+    if interval_s > SLOW_S {
+        Some("the device reports fewer than 400 samples per second")
+    } else if !lasting(compared().count(), LEAST_S) {
+        Some("too few samples after the ramp and below the limit")
+    } else if ![1.0, -1.0]
+        .iter()
+        .all(|sign| lasting(moving(*sign), LEAST_MOTION_S))
+    {
+        Some("too little motion in one of the directions")
+    } else if travel_mm < LEAST_TRAVEL_MM {
+        Some("too little travel")
+    } else if commanded
+        .var_x()
+        .is_none_or(|var| var < LEAST_SD_N * LEAST_SD_N)
+    {
+        Some("too little change of the force")
+    } else {
+        None
+    }
+}
